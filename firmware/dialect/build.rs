@@ -1,5 +1,5 @@
-//! Generates two things from the message definitions (XML) of the `mavlink` crate: the layout table, and the
-//! structures of messages that are read field by field. The crate's own generator makes the latter.
+//! Generates two things from the message definitions (XML) of the `mavlink` crate: the layout table, and structures
+//! of the messages that are read by field. The crate's own generator makes the latter.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;

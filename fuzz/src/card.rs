@@ -1,4 +1,4 @@
-//! Any bytes on a card, through the reader of its file system: each found file is on the card and found once; damage
+//! Any bytes on a card, through the reader of its file system. Each found file is on the card and found once; damage
 //! is reported in bounded text.
 //!
 //! The input is a list of changes to a small formatted card: place, offset (two bytes), length, and the bytes. A

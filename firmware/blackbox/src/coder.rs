@@ -259,8 +259,8 @@ impl Decoder {
         self.offset < self.range.wrapping_mul(parts)
     }
 
-    /// Operands of `part`, for callers that need no division: the width of each of the `2^16` parts, and the offset
-    /// of the next one in all of them. `take` must follow.
+    /// The width of each of the `2^16` parts, and the offset of the next one in all of them. They are operands of
+    /// `part`, for callers that need no division. `take` must follow.
     #[inline]
     pub(crate) fn parts(&mut self) -> (u16, u32) {
         self.range >>= PROBABILITY_BITS;

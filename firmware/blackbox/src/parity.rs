@@ -162,8 +162,8 @@ impl Column {
     }
 
     /// Whether the sums agree with the sectors and with each other, as far as this is known. `lost` are the numbers
-    /// of missing sectors, ascending, at least three if there are more. A sum without missing sectors must equal that
-    /// of the others. A single missing sector must be the same by either sum.
+    /// of missing sectors, ascending, at least three if there are more. A sum without missing sectors must equal the
+    /// sum of the others. A single missing sector must be the same by either sum.
     pub fn agrees(&self, lost: &[u32]) -> bool {
         let of = |index: usize| {
             let (sum, last, rest) = self.held(index)?;

@@ -1,5 +1,5 @@
-//! The checks of the fuzz targets (`fuzz/`), on a few thousand generated inputs, the same each time: pure noise, and
-//! a real log with bytes changed, moved, cut and doubled.
+//! The checks of the fuzz targets (`fuzz/`), on a few thousand generated inputs, always the same: noise, and a real
+//! log with bytes changed, moved, cut and doubled.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]
 

@@ -4,8 +4,8 @@
 //! PX4's events in `alert/events.rs`, flags of health in [`crate::cause`], the estimator's here. A new way is one row
 //! there. A severe report that is in no table is [`Cause::Other`].
 //!
-//! A text or an event is a moment: it holds for [`HOLDS`]. A flag holds while its message has it, from the second
-//! such message on, because one wrong message is no alarm.
+//! A text or an event is a moment: it holds for [`HOLDS`]. A flag counts from the second message with it on: one
+//! wrong message must not raise an alarm.
 
 mod events;
 mod texts;
@@ -25,19 +25,19 @@ const CRITICAL_STATE: u8 = 5;
 /// Flags come at 1 Hz or faster.
 const FLAGS_AGE: Span = Span::from_secs(5);
 
-/// In place of an [`Urgency`]: the alert is no longer reported, and nothing reports that all is well.
+/// In place of an [`Urgency`]: the alert is no longer reported, and no report says that all is well.
 pub const ENDED: f32 = -1.0;
 
 /// The alert in a text of the autopilot.
 ///
-/// `severity` is a `MAV_SEVERITY`; a notice, or less, is no alert. It is `None` for a log that stores no severity.
+/// `severity` is a `MAV_SEVERITY`; a notice, or less, does not count. It is `None` for a log that stores no severity.
 /// Then only known texts count that are severe by their words.
 ///
 /// `MAV_SEVERITY_ALERT` is treated as unknown. `ArduPilot` until 3.2 (2015) counted from 1 for low to 4 for critical,
 /// and sent "Reached Command #1" with it. Later versions use it for a parachute, a fuel cell's states and developers'
 /// messages, PX4 never.
 ///
-/// Repeated texts are no alerts: our own texts, if a script forwards them to the pilot's radio
+/// Repeated texts do not count: our own, if a script forwards them to the pilot's radio
 /// (`docs/stations/hums_texts.lua`), and marked texts of others in `ArduPilot`'s log
 /// (`GCS_MAVLINK::handle_statustext`).
 pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {

@@ -75,8 +75,8 @@ impl Leap {
     }
 }
 
-/// The last sample of the barometer: height above that of the first one, m; dynamic pressure of the ground speed as a
-/// height, m; climb, m/s.
+/// The last sample of the barometer: height above the first one, m; dynamic pressure of the ground speed as a height,
+/// m; climb, m/s.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
     at: Stamp,

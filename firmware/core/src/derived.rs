@@ -1,5 +1,5 @@
-//! What the raw messages do not say by themselves: cell voltage, silence of an ESC against its own rhythm,
-//! imbalance of motors in steady flight, clips of late, load factor.
+//! Quantities derived from several messages: cell voltage, silence of an ESC against its own rhythm, imbalance of
+//! motors in steady flight, recent clips, load factor.
 
 use crate::cells::Cells;
 use crate::crosscheck::Crosschecks;
@@ -26,10 +26,10 @@ const SAG_MAX_V: f32 = 0.3;
 const OFF_THROTTLE: f32 = 0.03;
 /// A link on which nothing at all came for so long was silent, unless it often is: streams of one a second have such pauses.
 const SILENCE_S: f32 = 0.3;
-/// So many times the longest pause of late are no pause as usual.
+/// A silence is longer than the longest recent pause by this factor.
 const SILENCE_PAUSES: f32 = 3.0;
-/// A pause counts as this at most, s; with each observation the longest one is this part shorter, so that after some hundred
-/// it is forgotten.
+/// A pause counts as at most this, s. Each observation shortens the longest one by this part, so it is forgotten
+/// after some hundred.
 const PAUSE_MAX_S: f32 = 1.0;
 const PAUSE_FADES: f32 = 1.0 / 64.0;
 /// How long a loss of frames stays a warning.
@@ -214,7 +214,7 @@ impl Derived {
         }
         self.crosschecks.step(now, vehicle, flight);
         let clips = clips(vehicle).unwrap_or(0);
-        // What was clipped before this flight, or before the autopilot's restart, is not of this flight.
+        // Clips before this flight, or before the autopilot's restart, are not of this flight.
         if event.is_some() || clips < self.clips.count || !self.clips_known {
             self.clips_known = vehicle.vibration.get().is_some();
             self.clips = Lately { count: clips, before: clips, ..Lately::NONE };
@@ -232,7 +232,7 @@ impl Derived {
         }
     }
 
-    /// What is known of a battery's internal resistance.
+    /// The internal resistance of a battery.
     pub(crate) fn resistance(&self, battery: usize) -> Option<&Resistance> {
         self.resistance.get(battery)
     }
@@ -253,8 +253,8 @@ impl Derived {
         }
     }
 
-    /// The lowest cell's voltage where cells are measured, the pack's share of it otherwise; what it would be without its sag
-    /// under the load, as far as that is known.
+    /// The voltage of the lowest cell, or the pack's share for a cell if cells are not measured. The sag under the
+    /// load is added, if it is known.
     pub(crate) fn cell_voltage(&self, vehicle: &Vehicle, params: &Params, battery: u8) -> Option<Reading> {
         let index = usize::from(battery);
         let slot = vehicle.batteries.get(index)?;

@@ -1,7 +1,7 @@
 //! The phases of a flight: on the ground, in the air, in a mishap, down.
 //!
-//! Five witnesses say each step that the vehicle flies or stands (`witness`): the autopilot's word, height, thrust, inertial sensors, speed. A
-//! majority of them moves the phase:
+//! Five witnesses say each step that the vehicle flies or stands (`witness`): the autopilot's word, height, thrust,
+//! inertial sensors, speed. A majority of them moves the phase:
 //!
 //! | phase | evidence | for | next |
 //! |---|---|---|---|
@@ -19,15 +19,16 @@
 //! | falling, impacted | no majority: down if it is off or silent, or two say that it stands; it flies otherwise | 30 s after the last sign | down, airborne |
 //! | down | armed again; or two witnesses of flight, more than of standing | at once; 4 s | ground |
 //!
-//! A take-off and a landing have the time at which their majority began. While the autopilot's word is that the vehicle flies, it has not landed.
-//! Without power, or with less than 5 % of throttle on rotors, nothing takes off; with less than 10 % it does after 5 s, if two witnesses say so
-//! and no other one is against it.
-//! A bad inertial sensor makes no sign: it falls or turns for 5 s while two other witnesses say that the vehicle flies, and it does not sink.
+//! A take-off and a landing have the time at which their majority began. While the autopilot's word is that the
+//! vehicle flies, it has not landed. Without power, or with less than 5 % of throttle on rotors, a vehicle does not
+//! take off. With less than 10 % it does after 5 s, if two witnesses agree and none disagrees. A bad inertial sensor
+//! makes no sign: it falls or turns for 5 s while two other witnesses report flight and the vehicle does not sink.
 //! Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
-//! Signs of a mishap (`signs`) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their table. Outside of a flight
-//! they are reported once for each arming ([`Change::OnBench`]), but a vehicle that its own rotors turned over has had a mishap.
-//! `hums check` judges a fall during a loss of the link, and of a vehicle that was off before its first message.
+//! Signs of a mishap (`signs`) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their
+//! table. Outside of a flight they are reported once for each arming ([`Change::OnBench`]), but a vehicle that its
+//! own rotors turned over has had a mishap. `hums check` judges a fall during a loss of the link, and of a vehicle
+//! that was off before its first message.
 
 mod disarming;
 mod signs;

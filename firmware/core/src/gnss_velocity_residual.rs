@@ -117,8 +117,8 @@ mod tests {
     use super::*;
     use crate::units::{Metres, MetresPerSecond, Radians};
 
-    /// The residual of a flight whose velocity turns once in `turn_s` and is reported with an error, north and east
-    /// in m/s; each position comes twice. `measured` is the time of a step, ms.
+    /// The residual of a flight whose velocity turns once in `turn_s` and is reported with `error_mps`, north and
+    /// east. Each position comes twice. `measured` is the time of a step, ms.
     fn heard((speed_mps, turn_s): (f32, f32), error_mps: [f32; 2], measured: fn(u64) -> u32) -> Option<f32> {
         let mut velocity_residual = GnssVelocity::NEW;
         let mut place = [47.0, 8.0];

@@ -1,11 +1,11 @@
-//! Judgement by accelerometer and gyros alone, without an estimator: whether the vehicle is level and still, and
-//! whether it lies on its side or its back.
+//! Judgement by accelerometer and gyros alone, without an estimator: whether the vehicle is level and still, on its
+//! side or on its back.
 //!
 //! An estimator with a gyro offset turns its attitude over while the vehicle stands. A vehicle that really turns over
 //! turns fast; at a great tilt it is carried with more than its weight, or falls. An attitude far from level is
 //! contradicted if for `LASTS` nothing turned and the force was one of these:
 //!
-//! - that of a level vehicle at rest;
+//! - the force of a level vehicle at rest;
 //! - far from the direction that the attitude demands.
 //!
 //! The contradiction ends when both agree again.
@@ -32,8 +32,8 @@ const FRESH: Span = Span::from_secs(1);
 /// than the offset of a gyro that still flies.
 const TURNS_RATE: f32 = 0.7;
 const STILL_RATE: f32 = 0.5;
-/// A rate within the first of these of its mean, and below the second, rad/s, is an offset: no vehicle turns so
-/// steadily and is carried as at rest.
+/// A rate within [`STEADY_RATE`] of its mean, and below [`OFFSET_RATE`], rad/s, is an offset: no vehicle turns so
+/// steadily while it is carried as at rest.
 const STEADY_RATE: f32 = 0.15;
 const OFFSET_RATE: f32 = 1.2;
 /// An attitude that was contradicted is believed again within 20 degrees.
@@ -275,8 +275,8 @@ fn weight(step: Option<Span>, constant_s: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Whether a vehicle that is still and carried with this force for three seconds contradicts an attitude rolled
-    /// by these degrees, and then a level one.
+    /// Whether a still vehicle, carried with this force for three seconds, contradicts an attitude rolled by
+    /// `roll_deg`, and then a level one.
     fn contradicts(force: [f32; 3], roll_deg: f32) -> (bool, bool) {
         let mut inertial = Inertial::new();
         let mut now = Instant::ZERO;

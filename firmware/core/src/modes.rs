@@ -44,8 +44,8 @@ pub(crate) fn is_made_to_turn(vehicle: &Vehicle) -> bool {
     }
 }
 
-/// Modes in which the sticks command rates of roll and pitch, so that the pilot banks freely: those made for turning
-/// over, `ArduCopter`'s DRIFT and SPORT, PX4's RATTITUDE.
+/// Modes in which the sticks command rates of roll and pitch, so that the pilot banks freely. They are those made for
+/// turning over, `ArduCopter`'s DRIFT and SPORT, PX4's RATTITUDE.
 pub(crate) fn is_banked_by_hand(vehicle: &Vehicle) -> bool {
     is_made_to_turn(vehicle)
         || vehicle.heartbeat.get().is_some_and(|heartbeat| match heartbeat.autopilot {

@@ -1,7 +1,8 @@
 //! Motors by what their ESCs send: silence, speeds against each other, and currents.
 //!
-//! Only a motor that was seen lifting can be lost by its current. A VTOL's motors that push stand still in hover and may help against the
-//! wind; its motors that lift stop on the wings. So each motor gets a [`Role`] while the vehicle is armed:
+//! Only a motor that was seen lifting can be lost by its current. A VTOL's motors that push stand still in hover and
+//! may help against the wind; its motors that lift stop on the wings. So each motor gets a [`Role`] while the vehicle
+//! is armed:
 //!
 //! | in the air | role |
 //! |---|---|
@@ -10,10 +11,11 @@
 //!
 //! A motor with too little current is not lost in two cases:
 //!
-//! 1. Half of the motors that lift, or more, stand nearly still and the vehicle does not spin: a VTOL that turns against the wind stops its
-//!    motors of one sense of rotation. A vehicle that lost two of four spins.
-//! 2. It turns at half of the others' speed or more, and slower than they do: its command was cut, as in hard braking, and it takes next to
-//!    nothing until it has slowed down. A dead motor stands; one without its propeller turns faster.
+//! 1. Half of the motors that lift, or more, stand nearly still and the vehicle does not spin. A VTOL that turns
+//!    against the wind stops its motors of one sense of rotation. A vehicle that lost two of four spins.
+//! 2. It turns at half of the others' speed or more, and slower than they do. Its command was cut, as in hard
+//!    braking, and it takes next to nothing until it has slowed down. A dead motor stands; one without its propeller
+//!    turns faster.
 
 use core::ops::Range;
 
@@ -30,8 +32,9 @@ use crate::vehicle::{Motor, Vehicle};
 
 /// A motor that never turned faster is not fitted.
 const TURNING_RPM: f32 = 100.0;
-/// An ESC is silent when it misses this many of its own intervals; of those that are longer than [`SLOW_S`], as on a thin link, more: where a
-/// fifth of the messages is lost, three in a row are every two minutes, and five in a row every hour.
+/// An ESC is silent when it misses this many of its own intervals, or more if they are longer than [`SLOW_S`], as on
+/// a thin link. If a fifth of the messages is lost, three in a row are lost every two minutes, and five in a row
+/// every hour.
 const INTERVALS_MISSED: f32 = 3.0;
 const INTERVALS_MISSED_SLOW: f32 = 5.0;
 const SLOW_S: f32 = 0.7;
@@ -55,7 +58,7 @@ const SLOWS_PART: Range<f32> = 0.5..0.9;
 /// 60 degrees a second: a vehicle that lost two motors of four spins faster within a moment.
 const SPINS_RAD_S: f32 = 1.05;
 
-/// What a motor does, as seen since the vehicle was armed.
+/// The work of a motor since the vehicle was armed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Role {
     #[default]
@@ -198,8 +201,8 @@ impl Motors {
         Some(if missed { silence_s } else { 0.0 })
     }
 
-    /// Whether all ESCs that sent anything, of several, are silent at once: motors that carry the vehicle do not fail so, and the wire of
-    /// their telemetry does.
+    /// Whether all ESCs that sent anything, of several, are silent at once. Motors that carry the vehicle do not fail
+    /// together; the wire of their telemetry does.
     pub(crate) fn are_silent(&self, heard: Instant, resumed: Instant) -> bool {
         let mut known =
             (0..).zip(&self.tracks).filter(|(_, track)| track.interval_s > 0.0).map(|(motor, _)| motor);
@@ -234,7 +237,7 @@ impl Motors {
         Reading::new(known.moved_at.filter(|_| stands), Some(0.0))
     }
 
-    /// A motor's current in percent of the mean of the others that lift, while the throttle asks for thrust and the vehicle hangs
+    /// A motor's current in percent of the mean of the others that lift, while there is thrust and the vehicle hangs
     /// on its rotors; `None` for a motor that was not seen lifting.
     fn current_share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let place = Some(usize::from(motor)).filter(|place| self.lifts(*place))?;
@@ -273,12 +276,12 @@ impl Motors {
         2 * idle >= currents().count() && !spins
     }
 
-    /// How far a motor's speed is from the middle one of all and from that of each other motor, in percent of the middle one, in
-    /// steady flight; 0 for all but the motor that is furthest from the middle one: if one is lost the others turn as they must
-    /// to make up for it. `None` of a motor that is shut off.
+    /// The distance of a motor's speed from the middle one of all, or from the nearest other motor if that is less.
+    /// It is in percent of the middle speed, in steady flight. It is 0 for all but the motor furthest from the
+    /// middle: if one is lost the others turn as they must to make up for it. `None` of a motor that is shut off.
     ///
-    /// A turn, a lean and a load on one side drive motors in twos, threes and fours: those of one sense of rotation,
-    /// the front ones, the upper ones of coaxial pairs. So a motor is off if no other one is near it, whatever the layout.
+    /// A turn, a lean and a load on one side drive motors in twos, threes and fours: one sense of rotation, the
+    /// front, the upper ones of coaxial pairs. So a motor is off if no other one is near it, whatever the layout.
     pub(crate) fn imbalance(
         &self,
         now: Instant,
@@ -339,8 +342,8 @@ impl Motors {
         speeds().find(is_middle).filter(|speed| *speed >= TURNING_RPM)
     }
 
-    /// Whether all motors that are fitted sent something just now, and turn as in flight: speeds that are held, or zeros of ESCs
-    /// that lost their telemetry, say nothing about a motor.
+    /// Whether all fitted motors sent a speed just now, and turn as in flight. Held speeds, or zeros of ESCs that
+    /// lost their telemetry, do not count.
     fn turn_as_in_flight(&self, now: Instant, middle_rpm: f32) -> bool {
         let mut fitted = self.tracks.iter().filter(|track| track.is_fitted());
         fitted.all(|track| {

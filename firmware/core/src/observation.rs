@@ -1,8 +1,8 @@
-//! What a vehicle says, in one model for PX4 and ArduPilot: SI units, `None` where the sender did not know.
+//! Observations of a vehicle, in one model for PX4 and `ArduPilot`: SI units, `None` where the sender did not know.
 //!
-//! The link crate makes these from MAVLink messages and resolves every trap of that format (scales, "unknown" values,
-//! extension fields that read as zero); from here on nobody needs to know where a value came from, but for the few
-//! quantities that the two autopilots define differently, which say so ([`VibrationScale`], [`EstimatorScale`]).
+//! The link crate makes them from MAVLink messages. It resolves every trap of that format: scales, "unknown" values,
+//! extension fields that read as zero. Nothing behind it depends on a value's source, except a few quantities that
+//! the two autopilots define differently ([`VibrationScale`], [`EstimatorScale`]).
 
 use core::num::{NonZeroU16, NonZeroU32};
 
@@ -92,9 +92,9 @@ pub struct SystemStatus {
     pub voltage: Option<Volts>,
     /// Battery current; negative charges.
     pub current: Option<Amperes>,
-    /// What is left of the battery.
+    /// Remaining charge of the battery.
     pub remaining: Option<Fraction>,
-    /// What it says of sensors; `None` where it says nothing of them (a log of PX4 since v1.14).
+    /// Health of the sensors; `None` if it is not reported (a log of PX4 since v1.14).
     pub sensors: Option<Sensors>,
 }
 
@@ -139,7 +139,7 @@ pub struct Gnss {
     pub hdop: Option<f32>,
     /// Horizontal accuracy (1 sigma).
     pub accuracy: Option<Metres>,
-    /// Where it is, when it has a fix.
+    /// The position, with a fix.
     pub position: Option<Position>,
     /// Above mean sea level.
     pub altitude: Option<Metres>,
@@ -152,8 +152,8 @@ pub struct Gnss {
 }
 
 impl Gnss {
-    /// A 3D fix that is exact enough to hold other sensors against: accuracy and dilution within what PX4 flies with (`EKF2_REQ_EPH` 3 m,
-    /// `EKF2_REQ_PDOP` 2.5), as far as they are told.
+    /// Whether the fix is 3D and exact enough to check other sensors against. Reported accuracy and dilution are
+    /// within the limits of PX4 (`EKF2_REQ_EPH` 3 m, `EKF2_REQ_PDOP` 2.5).
     pub fn is_exact(&self) -> bool {
         self.fix >= 3
             && self.accuracy.is_none_or(|accuracy| accuracy.0 <= 3.0)
@@ -207,7 +207,7 @@ pub struct Attitude {
     pub pitch: Radians,
     /// From north, clockwise.
     pub yaw: Radians,
-    /// Angular rates about the body's axes, where they are told.
+    /// Angular rates about the body's axes, if they are reported.
     pub rates: Option<[RadiansPerSecond; 3]>,
     /// Milliseconds since the autopilot's boot. Every autopilot sends it here; `SYSTEM_TIME` only some do.
     pub boot_ms: Option<u32>,
@@ -224,14 +224,14 @@ pub struct SecondEstimate {
     pub altitude: Option<Metres>,
 }
 
-/// The attitude that the autopilot wants: what the mission, its own loops or the pilot's sticks ask for.
+/// The attitude that the autopilot demands, for its mission, its own loops or the pilot's sticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wanted {
     /// Right wing down is positive.
     pub roll: Radians,
     /// Nose up is positive.
     pub pitch: Radians,
-    /// The rates that it wants, where they are told.
+    /// The demanded rates, if they are reported.
     pub rates: Option<WantedRates>,
 }
 
@@ -240,9 +240,9 @@ pub struct Wanted {
 pub struct WantedRates {
     /// About roll, pitch and yaw.
     pub about: [RadiansPerSecond; 3],
-    /// The attitude that is wanted, as a quaternion from the wanted body to north, east, down, real part first, where the rates may be
-    /// about its axes: those of `ArduPilot`'s `ATTITUDE_TARGET` are (`AC_AttitudeControl::get_attitude_target_ang_vel`), those of PX4's
-    /// (`vehicle_rates_setpoint`) are about the body's.
+    /// The demanded attitude, as a quaternion from the demanded body to north, east, down, real part first. It is
+    /// present if the rates may be about its axes. `ArduPilot`'s are
+    /// (`AC_AttitudeControl::get_attitude_target_ang_vel`); PX4's (`vehicle_rates_setpoint`) are about the body's.
     pub of: Option<[f32; 4]>,
 }
 
@@ -250,7 +250,7 @@ impl Wanted {
     /// Of the quaternion of a rotation from north, east, down to the body, its real part first; `None` where it is none.
     pub fn from_quaternion([w, x, y, z]: [f32; 4]) -> Option<Self> {
         let norm = w * w + x * x + y * y + z * z;
-        // Zeros before there is one, and what is no number.
+        // Zeros come before the first attitude. NaN does not count either.
         if !(0.9..1.1).contains(&norm) {
             return None;
         }
@@ -269,7 +269,7 @@ pub struct LocalPosition {
     pub velocity: [MetresPerSecond; 3],
 }
 
-/// What the autopilot gives motors and servos: pulses of `SERVO_OUTPUT_RAW`.
+/// Outputs to motors and servos: pulses of `SERVO_OUTPUT_RAW`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outputs {
     /// Which group: 0 the main outputs, 1 the auxiliary ones.
@@ -281,7 +281,7 @@ pub struct Outputs {
 /// The fused global position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GlobalPosition {
-    /// Where it is, once the autopilot knows.
+    /// The position, once the autopilot knows it.
     pub position: Option<Position>,
     /// Above mean sea level.
     pub altitude: Metres,
@@ -291,7 +291,7 @@ pub struct GlobalPosition {
     pub velocity: [MetresPerSecond; 3],
 }
 
-/// What a pilot's display shows.
+/// The values of a pilot's display.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hud {
     /// Through the air.
@@ -369,7 +369,8 @@ pub struct Battery {
     pub charge: u8,
 }
 
-/// The voltage of a cell in whole millivolts, as messages have it: two bytes, of which each battery has [`CELLS_MAX`].
+/// The voltage of a cell in whole millivolts, as in messages: two bytes each, for [`CELLS_MAX`] cells of each
+/// battery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CellVoltage(NonZeroU16);
 
@@ -388,7 +389,7 @@ impl CellVoltage {
     }
 }
 
-/// What a battery feeds: `MAV_BATTERY_FUNCTION`.
+/// The consumer of a battery: `MAV_BATTERY_FUNCTION`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Feeds {
     /// Not said. Of the autopilot's own and of a battery's component that is the vehicle ([`crate::vehicle`]).
@@ -441,7 +442,7 @@ pub enum EstimatorScale {
 /// How well the estimator believes its sensors: 0 is perfect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimator {
-    /// What the figures mean.
+    /// The meaning of the figures.
     pub scale: EstimatorScale,
     /// Velocity.
     pub velocity: Option<f32>,
@@ -468,7 +469,7 @@ pub enum VibrationScale {
 /// Vibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vibration {
-    /// What the levels mean.
+    /// The meaning of the levels.
     pub scale: VibrationScale,
     /// Three levels.
     pub levels: [Option<f32>; 3],
@@ -498,7 +499,7 @@ pub struct Esc {
 pub struct EscGroup {
     /// Motor number of the first, from 0.
     pub first: u8,
-    /// `None` where there is no such motor.
+    /// `None` for a motor that does not exist.
     pub escs: [Option<Esc>; ESC_GROUP],
 }
 
@@ -561,7 +562,7 @@ pub enum LandedState {
     Landing,
 }
 
-/// What a VTOL flies on: `MAV_VTOL_STATE` of `EXTENDED_SYS_STATE`.
+/// The lift of a VTOL: `MAV_VTOL_STATE` of `EXTENDED_SYS_STATE`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VtolState {
     /// Not said, or no VTOL.
@@ -675,7 +676,7 @@ pub enum Observation {
     CommandAck(CommandAck),
     /// `STATUSTEXT` or `EVENT` that says that something is wrong.
     Alert(Alert),
-    /// `HIGH_LATENCY2`: what has failed.
+    /// The failures in a `HIGH_LATENCY2`.
     Failing(Causes),
     /// `PARAM_VALUE` of a parameter that is in [`crate::cells::KNOWN`], by its place there, and its value.
     Parameter(u8, f32),

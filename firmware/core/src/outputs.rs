@@ -1,32 +1,37 @@
-//! What the autopilot gives each motor of a multicopter against what it gives the others: a motor that gives less thrust than it
-//! should shows there, without any telemetry of its ESC.
+//! Outputs of the autopilot to each motor of a multicopter, against the others. A motor with too little thrust shows
+//! there, without any telemetry of its ESC.
 //!
-//! Control keeps the sum of thrust, roll, pitch and yaw. So where one motor is weak, its command rises until the sums are what they
-//! were: the commands change by the projection of that motor on the four. Of four motors that is the weak one's command alone. Of six
-//! it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite one. What moves the vehicle's load, tilts it
-//! or turns it changes commands in pairs: as much down on one side as up on the other. What is judged is therefore how far the highest
-//! change is above the second, less how far the others are apart from each other: of four motors all others, of six without the
-//! lowest. Of six it is half of the loss, and counts twice. It is in percent of what the motors are given on the average, smoothed, and
-//! against what was usual in this flight ([`crate::adaptive_baseline`]), less what commands vary by anyway. (Derived from the geometry of
-//! regular frames, for this project.)
+//! Control keeps the sum of thrust, roll, pitch and yaw. So where one motor is weak, its command rises until the sums
+//! are as before: the commands change by the projection of that motor on the four. Of four motors that is the weak
+//! one's command alone. Of six it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite
+//! one. A load, a tilt or a turn changes commands in pairs: as much down on one side as up on the other. The measure
+//! is therefore the distance of the highest change from the second, less the distance of the others from each other.
+//! Of four motors these are all others, of six all but the lowest. Of six it is half of the loss, and counts twice.
+//! It is in percent of the mean command, smoothed, and against the usual value of this flight
+//! ([`crate::adaptive_baseline`]), less the usual variation of commands. (Derived from the geometry of regular
+//! frames, for this project.)
 //!
-//! Of eight motors, flat or two on each of four arms, it is 1/2 of the loss at the weak motor, a quarter or less at three others, and less at
-//! the rest. So the second to the fourth are apart by as little as noise, and the weak motor alone is a quarter of the loss above them (flat:
-//! a fifth, with what the fourth has less), while what tilts such a vehicle raises two or three alike. It counts five times.
+//! Of eight motors, flat or two on each of four arms, it is 1/2 of the loss at the weak motor, at most a quarter at
+//! three others, and less at the rest. So the second to the fourth are apart by as little as noise, and the weak
+//! motor alone is a quarter of the loss above them. (Flat: a fifth, less the gap of the fourth.) A tilt of such a
+//! vehicle raises two or three alike. It counts five times.
 //!
-//! A motor that is a little weak stands out little, and in wind no more than others do at times; but it goes on doing so. So what a motor
-//! stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off again (a CUSUM: E. S. Page,
-//! Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what stands out at once.
+//! A slightly weak motor stands out little, and in wind no more than others do at times; but it goes on doing so. So
+//! what a motor stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off
+//! again (a CUSUM: E. S. Page, Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds
+//! counts as what stands out at once.
 //!
-//! A motor that alone is at the end of its range while no other one is near it gives less than is asked of it, however the vehicle falls.
+//! A motor that alone is at the end of its range while no other one is near it gives less than is asked of it,
+//! however the vehicle falls.
 //!
 //! A motor that is given next to nothing while the others carry the vehicle was taken out.
 //!
-//! Outputs are pulses of 1000 to 2000 us, or `PX4`'s numbers for its drivers: 0 to 1999 for `DShot`, 0 to 8191 for ESCs on CAN (`DShot.h`,
-//! `actuators/esc.hpp`; `SERVO_OUTPUT_RAW` has `actuator_outputs` as they are). What they are of is seen on the ground, and each becomes a part
-//! of its range.
+//! Outputs are pulses of 1000 to 2000 us, or `PX4`'s numbers for its drivers: 0 to 1999 for `DShot`, 0 to 8191 for
+//! ESCs on CAN (`DShot.h`, `actuators/esc.hpp`; `SERVO_OUTPUT_RAW` has `actuator_outputs` as they are). What they are
+//! of is seen on the ground, and each becomes a part of its range.
 //!
-//! Other frames are not judged: three motors have no such pattern, and of three arms with two motors each none stands out.
+//! Other frames are not judged: three motors have no such pattern, and of three arms with two motors each none stands
+//! out.
 
 use core::ops::RangeInclusive;
 
@@ -44,17 +49,18 @@ pub(crate) const JUDGED_MAX: usize = 8;
 const SMOOTHING_S: f32 = 2.0;
 /// What motors are given is a part of their range. One that does not turn is given no more than this.
 const IDLE: f32 = 0.15;
-/// Parts of what the others are given: what idled on the ground and is given so much in level flight is a motor too. A frame that is put
-/// together by parameters may still call itself a quadrotor.
+/// Parts of the mean command of the others. An output that idled on the ground and has such a command in level flight
+/// is a motor too. A frame that is put together by parameters may still call itself a quadrotor.
 const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
 const SURELY_CARRIES: f32 = 0.3;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
-/// Where commands vary much, a change must be larger: by so many of their mean distances from what is usual.
+/// Where commands vary much, a change must be larger: by this many of their mean distances from the usual value.
 const SPREADS: f32 = 3.0;
-/// A third of what a motor that gives 85 % of its command stands out by, percent: no healthy one does so on the average.
+/// A third of the excess of a motor that gives 85 % of its command, percent: no healthy one reaches it on the
+/// average.
 const DRIFT_PERCENT: f32 = 3.0;
-/// What is beyond for so long, s, counts in full.
+/// An excess for this long, s, counts in full.
 const SUMMED_S: f32 = 6.0;
 /// No sum is worth more, percent: what ends is over soon.
 const SUM_MAX_PERCENT: f32 = 12.0;
@@ -66,13 +72,13 @@ const SATURATED_PERCENT: f32 = 100.0;
 const OFF: f32 = 0.05;
 /// Outputs end here or beyond: `MOT_PWM_MAX` of ArduPilot is 1950 us, `PWM_MAIN_MAX` of PX4 2000.
 const FULL: f32 = 0.94;
-/// Two thirds of the range: what is above shares the load with what is at its end, as in a turn or a climb.
+/// Two thirds of the range: an output above it shares the load with one at the end, as in a turn or a climb.
 const SHARES: f32 = 0.667;
 /// 30 degrees a second: a pilot yaws faster, and gusts do not turn a vehicle so fast for long.
 const YAWS_RAD_S: f32 = 0.5;
 /// A motor's command varies by more than this in flight; a servo that holds its place, as a landing gear's, does not.
 const MOVES: f32 = 0.02;
-/// What nobody saw begin is believed after so long.
+/// A state without an observed beginning counts after this time.
 const LASTS: Span = Span::from_secs(3);
 
 /// What an output's range is.
@@ -313,8 +319,8 @@ impl MotorOutputs {
         }
     }
 
-    /// Whether this output alone is at an end of its range in a flight whose take-off was not received: how its motor turned before is
-    /// not known.
+    /// Whether this output alone is at an end of its range in a flight without a received take-off: its motor's
+    /// earlier speed is not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
         self.takeoff_not_recorded
             && self.verdict.0 == motor
@@ -342,7 +348,7 @@ impl MotorOutputs {
         self.outputs.get(usize::from(motor))
     }
 
-    /// Whether a motor that carried before is given next to nothing: that it does not turn is no fault of its own.
+    /// Whether a motor that carried before has next to no command: then it stands without a fault of its own.
     pub(crate) fn is_off(&self, motor: u8) -> bool {
         self.output(motor).is_some_and(|output| output.off)
     }
@@ -414,7 +420,7 @@ impl MotorOutputs {
         self.outputs.first().is_some_and(|output| output.share.is_known())
     }
 
-    /// How many motors are judged; 0 of what is no such frame now.
+    /// The number of judged motors; 0 for a frame that is not judged now.
     fn judged(&self, vehicle: &Vehicle) -> usize {
         motors(vehicle).max(self.count.into()) * usize::from(motors(vehicle) > 0)
     }
@@ -463,7 +469,7 @@ fn surely_carries(given: &f32) -> bool {
     *given > SURELY_CARRIES
 }
 
-/// The only motor of which this is so, while that is so of all others.
+/// The only motor with property `is`, if all others have property `others`.
 fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option<u8> {
     let place = given.iter().position(is)?;
     let mut rest = given.iter().enumerate().filter(|(other, _)| *other != place);

@@ -2,7 +2,7 @@
 //!
 //! 1. Two samples are compared if they are of one moment, and each sample once. Their difference is smoothed as a
 //!    vector, so that noise and the motion between the two samples cancel. One sample moves it by half of the limit
-//!    at most, because one wrong message is no fault.
+//!    at most, so that one wrong message raises no alarm.
 //! 2. The length of that vector is the residual ([`crate::residual::PAIRS`]). Calibration, mounting and currents make
 //!    its baseline.
 //! 3. Of three sensors the one that is apart from both others is wrong. With two sensors it is open which is wrong:
@@ -20,7 +20,7 @@ use crate::units::norm;
 pub(crate) const SENSORS_MAX: usize = 3;
 /// Pairs of them.
 const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
-/// After this time the difference is that of many samples, and is learnt.
+/// After this time the difference is a mean of many samples, and is learnt.
 const SETTLES_S: f32 = 1.5;
 /// Scale difference of gyros; autopilots calibrate only their offsets (MPU-6000: 3 %, data sheet).
 const GYRO_SCALE: f32 = 0.05;

@@ -20,9 +20,8 @@
 //! Only in flight and armed. While the vehicle is on the ground for a moment, or in a mishap, the countdown and the
 //! requests pause. Each step is a record, with the autopilot's answer.
 //!
-//! A mode change is the autopilot's own in three cases: a new problem is reported within `SIGN` of it, the mode is
-//! one in which failsafes wait, or a mission ended. Any other mode change is the pilot's, and cancels the action for
-//! the flight.
+//! A mode change is the autopilot's own in three cases: a new problem appears within `SIGN` of it, failsafes wait in
+//! the mode, or a mission ended. Any other mode change is the pilot's, and cancels the action for the flight.
 //!
 //! If a return is refused (no position), a landing follows on multicopters, helicopters, and a VTOL that reports a
 //! hover. A vehicle that returns or lands already gets no request, once a sign of that has lasted 2 s; until then the
@@ -61,8 +60,8 @@ const MISSION_ENDS: Span = Span::from_secs(3);
 /// A mission that sinks faster than this, within this height of home, may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
-/// A sign of landing that has lasted so long is believed. One message is no proof, nor are the pauses of a stream at
-/// 1 Hz.
+/// A sign of landing that has lasted so long is believed. One message proves nothing, nor do the pauses of a stream
+/// at 1 Hz.
 const LANDING_SHOWS: Span = PAUSE;
 /// Time after the last sign of landing in which a vehicle still lands: it may flare.
 const LANDING_LASTS: Span = Span::from_secs(15);
@@ -513,8 +512,8 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
 }
 
 /// The critical check, of those that `PROT_CHECK` selects: 0 an empty battery (by its remaining charge or its cells),
-/// from 1 on any check of a subsystem. A check that becomes stale stays the reason: silence is no better level.
-/// Batteries of avionics, of a payload or of an unknown consumer do not count.
+/// from 1 on any check of a subsystem. A check that becomes stale stays the reason: its silence does not improve its
+/// level. Batteries of avionics, of a payload or of an unknown consumer do not count.
 fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
     let Situation { vehicle, health, params, .. } = *situation;
     let chosen = params.get(Param::ProtCheck) as u8;

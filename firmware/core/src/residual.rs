@@ -2,7 +2,7 @@
 //! flight.
 //!
 //! 1. A sample counts while all gates of its [`Row`] are open.
-//! 2. One sample moves the residual by `clamp` at most, because one wrong message is no fault.
+//! 2. One sample moves the residual by `clamp` at most, so that one wrong message raises no alarm.
 //! 3. The residual is smoothed. An allowance (delay, scale, wind) is smoothed with it and taken off.
 //! 4. Its baseline is the mean of the last minute ([`crate::adaptive_baseline`]). A residual further out than `hold`
 //!    teaches nothing.

@@ -37,11 +37,12 @@ const MOVES_MS: f32 = 3_000.0;
 const CLIMBED_M: f32 = 0.3;
 const TRAVELLED_M: f32 = 0.5;
 const TURNED_RAD: f32 = 0.02;
-/// So many times as far it must have turned if all of its compasses repeat their values at once: an estimator's yaw drifts by 0.02
-/// rad in 3 s while a vehicle holds still, and a compass's digit of a milligauss may hide its noise.
+/// If all compasses repeat their values at once, the vehicle must have turned this many times as far. An estimator's
+/// yaw drifts by 0.02 rad in 3 s while a vehicle holds still, and a compass's digit of a milligauss may hide its
+/// noise.
 const ALL_REPEAT_TIMES: f32 = 10.0;
-/// Less is no move, m/s and rad: an estimator trembles and has offsets while a simulator without noise hangs still, and the last digits
-/// of its sensors do not change.
+/// Slower motion does not count, m/s and rad. A simulator without noise hangs still and repeats its sensors' last
+/// digits, while its estimator trembles and has offsets.
 const HANGS_MPS: f32 = 0.3;
 const TREMBLES_RAD: f32 = 0.01;
 
@@ -108,8 +109,8 @@ impl Stuck {
         self.changes >= CHANGES_KNOWN
     }
 
-    /// Whether this one took a new value in the second half of the time for which another has repeated its own: what changed both last
-    /// comes in two messages, one after the other.
+    /// Whether this one took a new value in the second half of the other's repeated time. A change of both comes in
+    /// two messages, one after the other.
     fn changed_during(&self, other: &Self) -> bool {
         self.since_ms.wrapping_sub(other.since_ms) as i32 > i32::from(other.lasts_ms / 2)
     }
@@ -245,7 +246,7 @@ impl Repeats {
         };
         let mut witnesses = all.iter().enumerate().filter(is_witness).peekable();
         let times = match kind {
-            // Where the accelerometer repeats its values too, a simulator without noise hovers.
+            // A hovering simulator without noise repeats the accelerometer's values too.
             Kind::Barometer if stuck.fell_silent() && self.sensors[0][0].repeats == 0 => 0.0,
             // All of them repeat their values.
             Kind::Compass

@@ -38,7 +38,7 @@ pub(crate) struct Thrust {
     at: Instant,
     /// Last time armed with more than idle throttle; zero for never.
     driven_at: Instant,
-    /// Whether the throttle reached that of flight since arming: its values have a meaning then.
+    /// Whether the throttle reached its level of flight since arming: only then its values have a meaning.
     has_flown: bool,
 }
 
@@ -83,7 +83,7 @@ impl Thrust {
         }
     }
 
-    /// Whether the throttle reached that of flight since arming.
+    /// Whether the throttle reached its level of flight since arming.
     pub(crate) const fn has_flown(&self) -> bool {
         self.has_flown
     }

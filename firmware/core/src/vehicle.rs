@@ -1,8 +1,7 @@
-//! What is known of the vehicle now: the latest of each observation with its time.
+//! The state of the vehicle: the latest of each observation with its time.
 //!
-//! Which system on the link is the vehicle is decided by [`crate::election`]; the others (ground stations, other vehicles)
-//! are recorded and judged by nobody. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; what is
-//! beyond is recorded only.
+//! [`crate::election`] decides which system on the link is the vehicle. The others (ground stations, other vehicles)
+//! are recorded and not judged. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; more are recorded only.
 
 use crate::alert::Alerts;
 use crate::election::Election;
@@ -28,8 +27,8 @@ const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
 /// Boot times follow each other within this of the time that went by, milliseconds: messages overtake each other and wait in line.
 /// One that falls by more is a reboot.
 const REBOOT_MS: i64 = 3_000;
-/// An autopilot that restarts in flight is off no longer; a link that was silent for longer is lost (PX4, `COM_DL_LOSS_T`: 10 s), and
-/// nobody knows what passed meanwhile: a landing, a disarming, another battery.
+/// The longest restart of an autopilot in flight. After a longer silence the link is lost (PX4: `COM_DL_LOSS_T`, 10
+/// s), and a landing, a disarming or another battery may have passed unseen.
 const OFF: Span = Span::from_secs(10);
 
 /// One motor, put together from two kinds of ESC messages: PX4 sends both, ArduPilot's one message is of both kinds. The fields of a kind
@@ -272,8 +271,8 @@ impl Vehicle {
             .is_some_and(|heartbeat| matches!(heartbeat.type_number, 2 | 13 | 14 | 15 | 29 | 35))
     }
 
-    /// Whether it hangs on its rotors now (`Some(false)`: it flies on wings); `None` where nobody knows. Of a VTOL its own word
-    /// counts, and its speed where it says none: between the two it may be either.
+    /// Whether it hangs on its rotors now (`Some(false)`: it flies on wings); `None` if that is unknown. Of a VTOL
+    /// its own word counts, and its speed where it says none: between the two it may be either.
     pub fn hovers(&self, now: Instant) -> Option<bool> {
         const WINGS_MPS: f32 = 12.0;
         const ROTORS_MPS: f32 = 6.0;
@@ -446,12 +445,12 @@ impl Vehicle {
         if let Some((_, told_at)) = self.boot
             && self.boot.map(ahead_ms).is_some_and(|(ahead, _)| ahead < 0)
         {
-            // How long nothing was heard before this power-on: what happened in a long silence, a landing too, nobody knows.
+            // The silence before this power-on. A long one may hide anything, a landing too.
             let silent_ms = at.since(told_at).as_millis().saturating_sub(boot_ms.into());
             self.reboots = self.reboots.saturating_add(1);
             self.rebooted_at = Some(at);
-            // As it was before: the first heartbeat after a restart may come before the time that shows it, and an autopilot's own
-            // log of the next power-on may begin with its arming.
+            // As before: the first heartbeat after a restart may come before the time that shows it. An autopilot's
+            // own log of the next power-on may begin with its arming.
             self.rebooted_armed = self.boot_armed && silent_ms <= OFF.as_millis();
         }
         (self.boot, self.odd_boot, self.boot_armed) = (Some((boot_ms, at)), None, self.armed());
@@ -479,8 +478,8 @@ impl Vehicle {
         self.vibration.set(at, Vibration { scale, ..vibration });
     }
 
-    /// One that does not say what it feeds is the vehicle's if the autopilot or a battery of its own component tells of it; that of a
-    /// gimbal or a payload is not.
+    /// A battery of unknown use is the vehicle's if the autopilot or a battery of its own component reports it, and
+    /// not a gimbal or a payload.
     fn take_battery(&mut self, at: Instant, component: u8, mut battery: Battery) {
         let is_own = BATTERY_COMPONENTS.contains(&component)
             || self.source.is_some_and(|vehicle| vehicle.component == component);

@@ -55,7 +55,7 @@ fn where_the_pilot_asks_for_rates_a_bank_says_nothing_by_itself() {
         assert_eq!(banks(&quad, None), NOTHING, "{autopilot:?} {mode:x}");
         assert_eq!(banks(&quad, Some(0.0)), ["roll"], "{autopilot:?} {mode:x}: it does not follow");
     }
-    // ACRO of both: PX4's setpoint is that of the mode before.
+    // ACRO of both: PX4 still sends the setpoint of the mode before.
     for (autopilot, mode) in [(Autopilot::ArduPilot, 1), (Autopilot::Px4, 0x0005_0000)] {
         let quad = quad(autopilot, mode);
         assert!(

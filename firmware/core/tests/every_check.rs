@@ -176,8 +176,8 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("card_room", 0, Level::Warning, |quad, _| quad.recorder.room = Some(0.05)),
 ];
 
-/// Checks with scripts of their own: silence, restarts and rates in `scripted_faults.rs`, a battery's resistance in
-/// `cells.rs`, mishaps in `mishap.rs`, departures from usual levels in `crosscheck.rs`.
+/// Checks with scripts of their own: silence, restarts and rates in `scripted_faults.rs`, resistance in `cells.rs`,
+/// mishaps in `mishap.rs`, departures from usual levels in `crosscheck.rs`.
 const ELSEWHERE: &str = "\
     ahrs2_tilt ahrs2_height ahrs2_position gps_sats_fall gps_hdop_rise compass_heading gps_height \
     position_silent baro_height baro_noise ekf_climb accel_stuck gyro_stuck compass_stuck baro_stuck \

@@ -1,8 +1,8 @@
 //! Layouts of MAVLink messages on the wire: one table, generated at build time from the message definitions (XML) of
 //! the `mavlink` crate.
 //!
-//! Three readers share it. The framer needs length and checksum seed; the black box the kind of each field, for its
-//! prediction; the host tools names and units (feature `names`). The common parts of all messages stand beside it:
+//! Three readers share it. The framer needs length and checksum seed; the black box the kind of each field, to
+//! predict it; the host tools names and units (feature `names`). The common parts of all messages stand beside it:
 //! the parts of a frame ([`wire`]) and its checksum ([`crc`]).
 //!
 //! Messages that are read field by field are structures from the `mavlink` crate's generator ([`ardupilotmega`]).

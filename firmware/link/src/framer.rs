@@ -12,9 +12,9 @@
 //! They must be recorded and forwarded, unlike line noise. For each wrong checksum we compute the `crc_extra` that
 //! would make it correct ([`hums_dialect::crc::extra_of`]; 1 in 256 of random bytes has one). The candidate passes as
 //! [`Check::Unverified`](crate::frame::Check::Unverified) if this system used that extra for this id before. At first
-//! sight it passes only between frames: behind a frame or silence, before a start byte or silence, and without a
-//! known complete frame inside. Without a frame before it, its extra is only remembered, and the next one passes. An
-//! id that this system has sent with our definition never passes unverified: it is damage.
+//! sight it passes only between frames: behind a frame or silence, before a start byte or silence, without a known
+//! complete frame inside. Without a frame before it, its extra is only remembered, and the next one passes. An id
+//! that this system has sent with our definition never passes unverified: it is damage.
 //!
 //! # Limits
 //! About 1 KiB. A candidate waits for at most 281 bytes (3 ms at 921,600 baud) or for `idle`. Per byte: one copy and

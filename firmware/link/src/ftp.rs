@@ -34,7 +34,7 @@ pub const fn checksum_of(file: &[u8]) -> u32 {
     CRC.checksum(file)
 }
 
-/// The checksum of a file: `before` is that of the bytes before `bytes`, 0 for the beginning.
+/// The checksum of a file: `before` is the checksum of the bytes before `bytes`, 0 for the beginning.
 pub fn checksum(before: u32, bytes: &[u8]) -> u32 {
     // The library takes its first value as the polynomial is written, and returns the reflected result.
     let mut digest = CRC.digest_with_initial(before.reverse_bits());

@@ -1,5 +1,5 @@
 //! The checks of the framer's fuzz target (`fuzz/`), on a few thousand generated inputs, always the same: noise with
-//! start bytes, and frames with changed bytes.
+//! start bytes, and changed frames.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]
 

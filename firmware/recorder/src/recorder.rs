@@ -1,9 +1,9 @@
 //! Sectors to segments: one session's log on the present card.
 //!
 //! A sector with number `n` belongs at block `n - base` of the open segment. A segment is left for the next one at
-//! the first group that no longer fits, so that each file can be read by itself. A *partial* sector (one still in
-//! progress) goes alternately to its own place and to the next one, so a torn write never destroys the older copy. If
-//! the newest copy is at the sector's own place, the whole sector is first written as a copy at the next one.
+//! the first group that no longer fits, so that each file can be read by itself. A *partial* sector (one in progress)
+//! goes alternately to its own place and to the next one, so a torn write never destroys the older copy. If the
+//! newest copy is at the sector's own place, the whole sector is first written as a copy at the next one.
 //!
 //! Each stretch of a segment has its parity at the segment's end. It is written when the stretch is full, when the
 //! segment is left, when the log ends in order, and every 10 s meanwhile. It may fail without consequence: the

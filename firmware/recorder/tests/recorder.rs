@@ -359,8 +359,8 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     assert!(status.read().write_errors > 500, "{:?}", status.read());
 }
 
-/// All sectors of any two pages of a stretch are rebuilt, also in an unfinished stretch, and behind a segment that
-/// was left after a refused block.
+/// All sectors of any two pages of a stretch are rebuilt, also in an unfinished stretch and behind a segment left
+/// after a refused block.
 #[test]
 fn lost_pages_are_made_again_from_parity() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);

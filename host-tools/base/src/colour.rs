@@ -1,9 +1,9 @@
 //! Colours on a terminal, for the words that decide: levels and verdicts.
 //!
-//! A text is made with marks in it. [`crate::output`] prints colours in their place if standard output is a terminal
-//! with colours (`NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM=dumb` count, as in the crate `anstream`), and
-//! nothing elsewhere. Marks are noncharacters, which Unicode reserves for a program's own use (The Unicode Standard,
-//! 23.7). In foreign texts they are shown by their numbers ([`crate::printable::word`]).
+//! A text is made with marks in it. [`crate::output`] prints colours in their place on a terminal with colours, and
+//! nothing elsewhere. `NO_COLOR`, `CLICOLOR`, `CLICOLOR_FORCE` and `TERM=dumb` count, as in the crate `anstream`.
+//! Marks are noncharacters, which Unicode reserves for a program's own use (The Unicode Standard, 23.7). In foreign
+//! texts they are shown by their numbers ([`crate::printable::word`]).
 
 use std::borrow::Cow;
 use std::fmt;

@@ -63,8 +63,8 @@ impl<T: HasEnding> EndResolver<T> {
         self.held.into_iter()
     }
 
-    /// Notes that the start of `next` found no sector in the newest files, of which `newest` is the last number.
-    /// Those that are empty now were empty then.
+    /// Notes that the start of `next` found no sector in the newest files, up to number `newest`. Those that are
+    /// empty now were empty then.
     fn tell_empty(&mut self, newest: u32, next: &str) {
         for log in self.held.iter_mut().filter_map(HasEnding::ending) {
             let ((card, number), blocks) = (place(&log.name), &log.summary.blocks);

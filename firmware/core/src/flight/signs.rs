@@ -195,8 +195,8 @@ impl Flight {
         }
     }
 
-    /// Since when an inertial sensor has fallen or turned while others say that it flies, none that it stands, and it does not sink:
-    /// the sensor is bad.
+    /// The beginning of a fall or a turn by an inertial sensor while others report flight, none reports standing, and
+    /// the vehicle does not sink: the sensor is bad.
     pub(super) fn doubt(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) {
         let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
             && self.pressure.follows(now, -FALLING_MPS) != Some(true);
@@ -424,8 +424,8 @@ impl Flight {
         }
     }
 
-    /// Whether a vehicle that is still does not hang in the air: off, on the ground by its word, on its side, without thrust or with all of
-    /// it.
+    /// Whether a still vehicle cannot hang in the air: it is off, landed by its own report, on its side, without
+    /// thrust or with full thrust.
     fn hangs_not(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>) -> bool {
         !self.arming.is_on
             || self.calls_itself_landed(now, vehicle)
@@ -433,8 +433,8 @@ impl Flight {
             || matches!(power, Some(Power::Idle | Power::Full))
     }
 
-    /// Whether a sign outside of a flight is the work of its own rotors, and of no hand: it had throttle just now, and the inertial messages show
-    /// it.
+    /// Whether its own rotors, and no hand, caused a sign outside of a flight: it had throttle just now, and the
+    /// inertial messages show the sign.
     pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
         self.thrust.was_driven(now, DRIVEN)
             && on_rotors(now, vehicle)

@@ -28,8 +28,8 @@ use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 /// Rotors pull upwards: what carries the vehicle from above by more than this, g, is the ground under its back.
 const ON_BACK_G: f32 = 0.5;
-/// With idle throttle, its weight on it and a steady pressure for so long, it stands: a flare takes its weight from the speed over ground for
-/// less.
+/// A vehicle with idle throttle, its weight on it and a steady pressure for this long stands. A flare takes its
+/// weight from the ground speed for less.
 const SUPPORTED: Span = Span::from_secs(4);
 /// The weight, g, with the scale error of a sensor; more is a bias, which may be what lost the estimate.
 const WEIGHT_G: core::ops::Range<f32> = 0.85..2.0;
@@ -256,7 +256,8 @@ impl Flight {
         }
     }
 
-    /// Whether the estimate of height and speed is lost: the pressure does not follow a climb or a sink; or, in a mishap, the receiver stands.
+    /// Whether the estimate of height and speed is lost. The pressure does not follow a climb or a sink; or, in a
+    /// mishap, the receiver stands.
     fn is_lost(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let climbs = climb_mps(now, vehicle).filter(|climb_mps| climb_mps.abs() > LOST_MPS);
         self.has_strayed(now)
@@ -283,8 +284,8 @@ impl Flight {
         vehicle.is_multicopter() && self.felt.from_above_g > ON_BACK_G
     }
 
-    /// Whether something carries it that is not its rotors, by no estimate: for a while it had idle throttle, its weight on it, and a steady
-    /// pressure.
+    /// Whether something other than its rotors carries it, by no estimate: idle throttle, its weight on it, and a
+    /// steady pressure for a while.
     pub(super) fn is_supported(&self, now: Instant) -> bool {
         self.supported.is_some_and(|(since, _)| now.since(since) >= SUPPORTED)
     }

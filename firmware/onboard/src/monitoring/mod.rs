@@ -127,8 +127,8 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// Reports the previous session on a card that was opened, in a second boot record and in that of each further
-    /// file.
+    /// Reports the previous session on a card that was opened, in a second boot record and in the boot record of each
+    /// further file.
     #[inline(never)]
     fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Some(before) = self.book.card.take_before() else { return };
@@ -136,7 +136,7 @@ impl<'a> Monitoring<'a> {
         self.book.journal.record(now, &Record::Boot(self.identity), sectors);
     }
 
-    /// Records the end of the previous boot, with a note on what came before, and tells the ground station as soon as
+    /// Records the end of the previous boot, with a note on the time before it. Tells the ground station as soon as
     /// the vehicle is known. To be called after [`Self::start`].
     pub fn fault(&mut self, now: Instant, fault: &Fault<'_>, before: &str, sectors: &mut SectorsIn) {
         let journal = &mut self.book.journal;

@@ -18,7 +18,7 @@ use crate::output::Stdout;
 const BUFFER_BYTES: usize = 16 * 1024;
 
 /// A file that is written by the rules of this [module](super). An output from a live source has its final name from
-/// the beginning, and each write is in the file at once: the source cannot be read again.
+/// the beginning. Each write is in the file at once: the source cannot be read again.
 #[derive(Debug)]
 pub struct Output {
     to: BufWriter<To>,

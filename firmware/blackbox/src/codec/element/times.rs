@@ -5,8 +5,12 @@ use super::rest::{ESCAPE, integer_class, integer_rest};
 use super::{Context, Distributions, Element, What};
 use crate::coder::Coder;
 
-/// Predictions of a time: the last value (the first one), with the last step, by the arrival time, by the newest time
-/// of any message, or that time itself.
+/// Predictions of a time:
+/// - the last value (the first one);
+/// - with the last step;
+/// - by the arrival time;
+/// - by the newest time of any message;
+/// - that time itself.
 const LINEAR: usize = 1;
 const BY_ARRIVAL: usize = 2;
 const BY_CLOCK: usize = 3;

@@ -94,7 +94,7 @@ fn a_level_is_what_its_values_of_some_time_say() {
         // A check that does not apply has no level.
         (above, usual, 1, "0 10, 50 off, 100", " | none"),
         (above, usual, 1, "0 50, 1000 off, 1050", "500 warning, 1000 ok | none"),
-        // One wrong message is no alarm, even if it is held for long or is the last one.
+        // One wrong message raises no alarm, even if it is held for long or is the last one.
         (above, usual, 12, "0 =10, 2500 =170, 5000 =10, 10000", " | ok"),
         (above, usual, 12, "0 =10, 2500 =170, 14000", " | ok"),
         (above, usual, 12, "0 =10, 2500 =170, 5000 =170, 7500 =10, 12000", "5000 critical, 9500 ok | ok"),

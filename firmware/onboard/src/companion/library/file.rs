@@ -202,10 +202,10 @@ impl Job {
 
     /// Sends bytes of a file of this length, in messages of the requested size, as far as the port's budget allows.
     ///
-    /// A burst ends after [`BURST_BYTES`] with "burst complete", as with `ArduPilot` and PX4: a client that must wait
-    /// for a timeout after each burst gives up. `MAVProxy` and pymavlink take a shorter message with this mark for
-    /// the file's end. So if the line is too slow for messages of that size, the mark comes in a message without
-    /// data. The file's end is always a message of its own.
+    /// A burst ends after [`BURST_BYTES`] with "burst complete", as with `ArduPilot` and PX4: a client that waits for
+    /// a timeout after each burst gives up. `MAVProxy` and pymavlink take a shorter message with this mark for the
+    /// file's end. So if the line is too slow for messages of that size, the mark comes in a message without data.
+    /// The file's end is always a message of its own.
     fn read(
         &mut self,
         bytes: u32,

@@ -54,7 +54,7 @@ impl Places {
         }
     }
 
-    /// Whether a place is still that of the list. Without a list only a beginning may be requested.
+    /// Whether `offset` belongs to the present list. Without a list only a beginning may be requested.
     fn is_listed(&self, offset: u32, directory: u32) -> bool {
         self.listed.map_or(offset == 0, |listed| listed == directory)
     }

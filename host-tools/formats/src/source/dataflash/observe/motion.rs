@@ -205,8 +205,8 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 
-/// If the log has no position of the estimator in use, the second estimator's does not count either: the
-/// first one's place then holds the receiver's position.
+/// Without a position of the estimator in use, the second estimator's does not count either: the first one's place
+/// then holds the receiver's position.
 fn second_estimate(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let angles =
         given.singles(0).filter(|angles: &[f32; 3]| angles.iter().all(|angle| angle.abs() <= TURN_DEG));
