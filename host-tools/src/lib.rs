@@ -40,7 +40,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match Cli::try_parse_from(arguments) {
         Ok(cli) => outcome::exit_code(command(&cli.command)),
         Err(error) => {
-            // Help and version go to standard output and are no failure; a reader that has gone is none either.
+            // Help and version go to standard output and succeed; so does output to a reader that has gone.
             let _ = error.print();
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         }

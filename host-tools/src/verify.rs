@@ -35,7 +35,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    // Of what is no log; of the logs.
+    // First the files that are no logs, then the logs.
     let (mut ok, mut worst, mut weakened) = (!found.is_cut(), Verdict::Holds, Weakened::default());
     let (mut logs, mut without_earlier) = (0_u64, WithoutEarlier::default());
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
@@ -109,7 +109,8 @@ impl Weakened {
     }
 }
 
-/// The first log of each card of which those before it were not read: the first one's name, and how many more there are.
+/// Logs whose earlier logs on the same card were not read: the name of the first such log, and the number of other
+/// cards with one.
 #[derive(Default)]
 struct WithoutEarlier {
     first: Option<String>,
@@ -127,7 +128,7 @@ impl WithoutEarlier {
         }
     }
 
-    /// What is said of all logs: no more than of those that were read.
+    /// The verdict on all logs, limited to those that were read.
     fn verdict(&self, worst: Verdict, weakened: Weakened, has_passed_over: bool) -> String {
         let all = self.first.is_none() && !has_passed_over;
         let words = match (worst, weakened == Weakened::default(), all) {
@@ -178,14 +179,13 @@ pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>)
 pub enum Verdict {
     /// All that is in it holds, and nothing is missing at its end.
     Holds,
-    /// All that is in it holds up to its last end mark. What came after it is read as far as it goes.
+    /// All that is in it holds up to its last end mark. The rest is read as far as it goes.
     ToMark,
     /// A check failed, or nothing proves that it goes to a landing, a disarming or an orderly end.
     NotProved,
 }
 
-/// What can be said of a log that was read with [`Overview::verified`]; nothing good is said of one of which sectors had to be
-/// made again.
+/// The verdict on a log that was read with [`Overview::verified`]. A log with rebuilt sectors never gets a good one.
 pub fn verdict(log: &Overview) -> Verdict {
     let log = LogJson::new(log);
     if log.ok { log.verdict } else { Verdict::NotProved }
@@ -295,9 +295,9 @@ struct LogJson {
     ok: bool,
     /// The session ended in order.
     closed: bool,
-    /// The name of the log of which it is a mere copy, which is not looked at again.
+    /// The name of the original, if this log is a mere copy. A copy is not examined again.
     copy_of: Option<String>,
-    /// It is what newer sessions left of one that no file holds any more: what is missing in it is no damage.
+    /// The log is the rest of one that newer sessions overwrote: its missing parts are no damage.
     left_over: bool,
     /// What is known of its end.
     end: EndJson,
@@ -341,10 +341,10 @@ impl LogJson {
             .sum::<u64>()
             + contents.other_messages.count;
         let gaps = || contents.gaps.iter();
-        // Where nobody knows how many are missing it is one at least.
+        // An unknown number of missing sectors counts as one.
         let missing: u64 = gaps().map(|gap| u64::from(loss::sectors_lost(gap).unwrap_or(1))).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
-        // A gap in which nobody knows how many are missing is one at least.
+        // A gap with an unknown number of missing frames counts as one.
         let frames_missing = summary.frames_missing + summary.gaps_uncounted;
         let uncounted = match summary.gaps_uncounted {
             0 => String::new(),
@@ -397,7 +397,7 @@ impl LogJson {
     }
 }
 
-/// What a mere copy holds that is not of the session which it copies.
+/// The parts of a mere copy that do not belong to the copied session.
 fn beside_copy(ending: &Ending) -> Vec<Check> {
     let (besides, files) = (ending.besides(), ending.files.len() as u64);
     let check =
@@ -422,14 +422,14 @@ fn weakened(log: &Overview) -> Vec<Check> {
         return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();
     }
     let words = "parity is missing: what the card loses of these files cannot be made again";
-    // What was packed on a PC has none.
+    // A log packed on a PC has no parity.
     let written = if summary.marks.has_boot { summary.parity.written } else { 0 };
     let mut protected = check("sectors protected", written, ending.unprotected(), words);
     protected.detail.extend(not_taken_words(ending.not_taken()));
     vec![intact, protected]
 }
 
-/// What the log says of its end and of its place.
+/// The checks of a log's end and place.
 fn ends(log: &Overview) -> [Check; 7] {
     let ending = &log.ending;
     let summary = &ending.summary;
@@ -487,7 +487,7 @@ fn newer(log: &Overview) -> String {
     if log.needs_newer_program() { "some need a newer hums".to_owned() } else { String::new() }
 }
 
-/// What came damaged over the line, and so is in no log: the log is as whole as without it.
+/// Input that was damaged on the line, and so is in no log: it does not count against the log.
 fn came_damaged(contents: &Contents) -> Option<String> {
     let of = |what: Lost| contents.losses.get(what.name()).map(|loss| loss.count).filter(|count| *count > 0);
     let frames = of(Lost::DamagedFrames).map(|frames| count(frames, "damaged frame"));

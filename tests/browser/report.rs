@@ -523,7 +523,7 @@ fn assert_compared(
     shoot(page, "compare");
 }
 
-/// Each flight has its track, all in one scale, and its distance is that of the track on its own page.
+/// Each flight has its track, all in one scale, and the same distance as on its own page.
 #[track_caller]
 fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
     for (data, far_m) in pages.iter().zip(far_m) {

@@ -1,5 +1,5 @@
-//! The ground station's port is never overrun. The bytes in every window of a second are limited on every recording,
-//! no message starves, and a critical finding goes out soon on a busy port.
+//! The ground station's port is never overrun. Limits on every recording: bytes in every window of a second, no
+//! starving message, a critical finding soon after its time on a busy port.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -147,7 +147,7 @@ fn assert_what_passes(said: &Value, dir: &TempDir) {
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
     let (before, after) = (said["logs_before"].as_array().unwrap(), said["logs_after"].as_array().unwrap());
     assert_eq!((before.len(), after.len()), (2, 1), "erased but for the one in work: {said}");
-    // It is no longer offered, but still on the card.
+    // The log is still on the card, but not offered any more.
     let image = dir.path().join("card.img");
     let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
     assert!(info.contains("00001_00.HUM"), "{info}");

@@ -1,5 +1,7 @@
-//! Reports about a log's end: whole to the last landing or disarming, if power failed after it; not proved after a
-//! power cut in flight; missing, if the next start found more data on the card.
+//! Reports about a log's end, in three cases.
+//! - Power failed after the last landing or disarming: the log is whole up to that.
+//! - Power failed in flight: it is not proved.
+//! - The next start found more data on the card: the end is missing.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Persistence: counters and parameters continue from flight to flight, after a power cut at any word of the store,
-//! and with any card in the slot.
+//! Persistence: counters and parameters continue from flight to flight, after a power cut at any word of the store
+//! and with any card.
 
 use std::fs;
 use std::path::Path;

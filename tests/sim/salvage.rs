@@ -1,5 +1,5 @@
-//! Logs on cards without a file system, deleted files, logs that a newer one has partly overwritten: the remaining
-//! data comes out, and missing data is reported with its times.
+//! Logs on cards without a file system, deleted files, and partly overwritten logs: the remaining data comes out, and
+//! missing data is reported with its times.
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt as _;
@@ -13,7 +13,7 @@ use serde_json::Value;
 
 const BLOCK: u64 = 512;
 
-/// Offsets on the card, in bytes: the partition, its FAT, its clusters, the first of which is the directory.
+/// Offsets on the card, in bytes: the partition, its FAT, its clusters. The first cluster is the directory.
 struct Places {
     partition: u64,
     fat: u64,

@@ -16,8 +16,8 @@ use serde::Deserialize;
 use crate::firmware::{self, Board};
 use crate::repo;
 
-/// The memories: name, first address, one past the last of the board that has most of it, and what the f405 has for
-/// these (`memory.x`, `boards/f405.x`): flash is the half of a program, CCM is without the stack.
+/// The memories: name, first address, end on the largest board, and size on the f405 (`memory.x`, `boards/f405.x`).
+/// Flash is the half of one program; CCM is without the stack.
 const MEMORIES: [(&str, u64, u64, u64); 3] = [
     ("flash", 0x0800_0000, 0x0820_0000, 448 * 1024),
     ("ram", 0x2000_0000, 0x2003_0000, 128 * 1024),

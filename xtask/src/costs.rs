@@ -1,5 +1,5 @@
-//! `cargo xtask costs`: a recording at the fastest line through the image that is flashed, on the model of its chip, and what the
-//! processor and the stack had to give for it, against `budgets.toml`. All of it is modelled, not measured.
+//! `cargo xtask costs`: time of the processor and stack for a recording at the fastest line, against `budgets.toml`.
+//! The image that is flashed runs on the model of its chip. All of it is modelled, not measured.
 
 use std::path::Path;
 

@@ -40,8 +40,9 @@ impl Options {
     }
 }
 
-/// In CI the demo must run the firmware, and end. Program and firmware are there already. The beginning of the shortest recording: the
-/// demo's own flight is what the step `chip` flies, by the same program and image, and compares frame by frame.
+/// In CI the demo must run the firmware, and end. Program and firmware are there already. The beginning of the
+/// shortest recording is enough: the step `chip` flies the demo's own flight, by the same program and image, and
+/// compares each frame.
 pub(crate) fn as_test() -> Result<()> {
     const SHORT: &str = "tests/flights/px4_hil_quad_low.tlog";
     const BYTES: usize = 120_000;

@@ -1,8 +1,9 @@
 //! `cargo xtask dist`: the files of a release, and proof that every build gives the same.
 //!
-//! A release is built from a commit, in a clone of its own, so that nothing that lies about in the working copy gets
-//! into it. The firmware's flags and files are those of every build of it ([`firmware::flags`], [`firmware::files`]). Two builds in two
-//! places are equal byte by byte, which `--check` shows by doing so; it also runs the unit tests and the program for Windows under Wine.
+//! A release is built from a commit, in a clone of its own, so no stray file of the working copy gets into it. The
+//! firmware's flags and files are those of every build of it ([`firmware::flags`], [`firmware::files`]). Two builds
+//! in two places are equal byte by byte; `--check` shows it. It also runs the unit tests, and the program for Windows
+//! under Wine.
 
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -231,8 +232,8 @@ fn ensure_tool(name: &str, options: &[&str]) -> Result<()> {
     Shell::cargo().args(["install", "--quiet", "--locked"]).args(options).arg(package).run()
 }
 
-/// `hums-onboard` depends on all other crates that fly. The target has no std, so whatever of them or of what they
-/// depend on asks for std does not compile; and `hums-app`, which turns further features on, takes no part.
+/// `hums-onboard` depends on all other crates that fly. The target has no std, so a crate or dependency that needs
+/// std does not compile. `hums-app` takes no part: it turns further features on.
 fn without_std() -> Result<()> {
     firmware::cargo()?
         .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])

@@ -11,8 +11,8 @@ use crate::image;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::shell::Shell;
 
-/// Flags of `cargo rustc` for the last crate, where all of the program is inlined: functions of less than half the
-/// compiler's own limit only. 4.7 KB of flash less, at 0.2 % more load.
+/// Flags of `cargo rustc` for the last crate, into which all of the program is inlined: only functions below half of
+/// the compiler's own limit. 4.7 KB of flash less, at 0.2 % more load.
 pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
 
 /// The firmware's targets.
@@ -109,7 +109,7 @@ pub(crate) fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
-/// [`build`] and, at the same time, what is built for this PC: the last part of each is one core's work.
+/// [`build`], and programs for this PC at the same time: the last part of each is one core's work.
 pub(crate) fn build_beside(board: Board, pc: impl FnOnce() -> Result<()>) -> Result<PathBuf> {
     std::thread::scope(|scope| {
         let firmware = scope.spawn(|| build(board));

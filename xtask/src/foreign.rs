@@ -1,8 +1,9 @@
-//! `cargo xtask prove foreign`: programs that are not ours on the model of the chip, the second opinion on our reading of the manual.
+//! `cargo xtask prove foreign`: programs that are not ours on the model of the chip, the second opinion on our
+//! reading of the manual.
 //!
-//! They are the examples that packages of the registry bring, fetched and built where this runs; only their names are here. embassy's own
-//! examples come from a checkout of its repository, if there is one. Each program's judge, and the behaviour by its source,
-//! is in `chip/stm32f405/examples/foreign`.
+//! They are examples in packages of the registry, fetched and built here; the repository has only their names. The
+//! examples of embassy come from a checkout of its repository, if there is one. Each program's judge, and the
+//! behaviour by its source, is in `chip/stm32f405/examples/foreign`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

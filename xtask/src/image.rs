@@ -52,8 +52,8 @@ fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     Ok(joined)
 }
 
-/// All of the pieces as one, from the first address on. What lies between them is as erased flash is: whoever programs
-/// this, and not the pieces, gives the board an empty store.
+/// All of the pieces as one, from the first address on. Gaps are filled as erased flash: programming this file, and
+/// not the pieces, empties the board's store.
 pub(crate) fn flat(pieces: &[Piece]) -> Vec<u8> {
     let mut flat = Vec::new();
     let Some(first) = pieces.first() else { return flat };

@@ -1,6 +1,5 @@
-//! The independent reader of MAVLink: pymavlink in a virtual environment of its own, with a dialect that its `mavgen`
-//! makes from the very definitions that the firmware is built with (the XML files of the `mavlink` crate). pymavlink's
-//! own dialects lack messages that PX4 sends.
+//! The independent reader of MAVLink: pymavlink in a virtual environment of its own. Its `mavgen` makes the dialect
+//! from the definitions of the firmware (the XML files of the `mavlink` crate).
 
 use std::fs;
 use std::path::PathBuf;

@@ -117,7 +117,7 @@ pub(crate) fn lint() -> Result<()> {
     Shell::cargo().arg("clippy").args(CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
 }
 
-/// Builds the documentation, in which a warning is an error. There are no examples in it.
+/// Builds the documentation, in which a warning is an error. It has no examples to run.
 pub(crate) fn document() -> Result<()> {
     Shell::cargo()
         .env("RUSTDOCFLAGS", "-D warnings")

@@ -147,7 +147,7 @@ impl Outcome {
     }
 }
 
-/// [`ensure`]; what is still missing is an error.
+/// [`ensure`]; then a missing tool is an error.
 pub(crate) fn require(needs: &[Need]) -> Result<()> {
     ensure(needs, false).require_all()
 }

@@ -110,8 +110,8 @@ pub(crate) fn is_root() -> bool {
     *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
-/// In quotes if a shell would otherwise read it differently; a control character (cargo's flags have such) as its number, so that a
-/// file into which this is sent stays a text.
+/// Quotes a word that a shell would read differently. A control character (cargo's flags have some) becomes its
+/// number, so that a file with this output stays a text.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("{word:?}") }

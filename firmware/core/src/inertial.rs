@@ -32,7 +32,7 @@ const FRESH: Span = Span::from_secs(1);
 /// than the offset of a gyro that still flies.
 const TURNS_RATE: f32 = 0.7;
 const STILL_RATE: f32 = 0.5;
-/// A rate within [`STEADY_RATE`] of its mean, and below [`OFFSET_RATE`], rad/s, is an offset: no vehicle turns so
+/// A rate within [`STEADY_RATE`] of its mean and below [`OFFSET_RATE`], rad/s, is an offset. No vehicle turns so
 /// steadily while it is carried as at rest.
 const STEADY_RATE: f32 = 0.15;
 const OFFSET_RATE: f32 = 1.2;

@@ -344,7 +344,7 @@ pub struct Rails {
 pub struct Battery {
     /// Which one.
     pub id: u8,
-    /// Voltage of each cell, where the battery measures them.
+    /// Voltage of each cell, if the battery measures them.
     pub cells: [Option<CellVoltage>; CELLS_MAX],
     /// Of the whole battery.
     pub voltage: Option<Volts>,
@@ -360,12 +360,12 @@ pub struct Battery {
     pub temperature: Option<Celsius>,
     /// `MAV_BATTERY_FAULT` bits.
     pub faults: u32,
-    /// Lithium polymer or lithium ion, or not said: what the limits of a cell's voltage are made for.
+    /// Lithium polymer or lithium ion, or unknown: the limits of a cell's voltage are for these.
     pub lithium: bool,
     /// What it feeds.
     pub feeds: Feeds,
-    /// What the autopilot calls it: `MAV_BATTERY_CHARGE_STATE` (0 not said, 1 ok, 2 low, 3 critical, 4 emergency, 5 failed,
-    /// 6 unhealthy, 7 charging).
+    /// Charge state by the autopilot: `MAV_BATTERY_CHARGE_STATE` (0 not said, 1 ok, 2 low, 3 critical, 4 emergency, 5
+    /// failed, 6 unhealthy, 7 charging).
     pub charge: u8,
 }
 

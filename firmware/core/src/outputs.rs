@@ -1,13 +1,13 @@
 //! Outputs of the autopilot to each motor of a multicopter, against the others. A motor with too little thrust shows
 //! there, without any telemetry of its ESC.
 //!
-//! Control keeps the sum of thrust, roll, pitch and yaw. So where one motor is weak, its command rises until the sums
-//! are as before: the commands change by the projection of that motor on the four. Of four motors that is the weak
-//! one's command alone. Of six it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite
-//! one. A load, a tilt or a turn changes commands in pairs: as much down on one side as up on the other. The measure
-//! is therefore the distance of the highest change from the second, less the distance of the others from each other.
-//! Of four motors these are all others, of six all but the lowest. Of six it is half of the loss, and counts twice.
-//! It is in percent of the mean command, smoothed, and against the usual value of this flight
+//! Control keeps the sum of thrust, roll, pitch and yaw. So if one motor is weak, its command rises until the sums
+//! are as before: commands change by the projection of that motor on the four. Of four motors that is the weak one's
+//! command alone. Of six it is 2/3 of the loss at the weak motor, 1/6 at four others and -1/3 at the opposite one. A
+//! load, a tilt or a turn changes commands in pairs: as much down on one side as up on the other. The measure is
+//! therefore the distance of the highest change from the second, less the distance of the others from each other. Of
+//! four motors these are all others, of six all but the lowest. Of six it is half of the loss, and counts twice. It
+//! is in percent of the mean command, smoothed, and against the usual value of this flight
 //! ([`crate::adaptive_baseline`]), less the usual variation of commands. (Derived from the geometry of regular
 //! frames, for this project.)
 //!
@@ -506,8 +506,8 @@ mod tests {
 
     const STEP_S: f32 = 0.2;
 
-    /// What is said of the motors of a flat octocopter whose first motor lost so much of its thrust, percent, in 60 s; another one is given
-    /// more for one message of seven.
+    /// The verdict on a flat octocopter whose first motor lost this share of its thrust, percent, for 60 s. In one
+    /// message of seven another motor gets a higher command.
     fn octocopter(lost: f32) -> Vec<(u8, f32)> {
         let mut outputs = MotorOutputs::new();
         let steps = 0..350_usize;

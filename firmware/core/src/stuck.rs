@@ -1,15 +1,17 @@
 //! A sensor that repeats one value, bit for bit, while the vehicle flies.
 //!
-//! In flight the noise of a sensor is far above the last digit of its messages, so that the same value seldom comes twice. How often it
-//! does depends on the sensor, on the message and on how fast it is sent, and is learnt in each flight: the longest time that a value has
-//! been repeated so far is usual. What lasts [`TIMES`] as long is stuck, and is told from [`REPEATS_MIN`] repeats on, once the vehicle has
-//! moved so that the value must have changed: a simulator without noise, and a vehicle on a string, may hold still. Whether it moved is an
-//! estimator's word, which drifts; others of the sensor's kind are better witnesses ([`Stuck::changed_during`]).
+//! In flight the noise of a sensor is far above the last digit of its messages, so that the same value seldom comes
+//! twice. The usual time depends on the sensor, the message and its rate, and is learnt in each flight: it is the
+//! longest time for which a value was repeated. A sensor that repeats for [`TIMES`] as long is stuck. It is reported
+//! from [`REPEATS_MIN`] repeats on, once the vehicle has moved: a simulator without noise, and a vehicle on a string,
+//! may hold still. Whether it moved is an estimator's word, which drifts; others of the sensor's kind are better
+//! witnesses ([`Stuck::changed_during`]).
 //!
-//! A barometer's value trembles where nothing moves too. One that did so, and then repeats one value for so long as [`SILENT_MS`], is stuck
-//! whether the vehicle moves or not ([`Stuck::fell_silent`]).
+//! A barometer's value trembles where nothing moves too. One that did so, and then repeats one value for so long as
+//! [`SILENT_MS`], is stuck whether the vehicle moves or not ([`Stuck::fell_silent`]).
 //!
-//! Two messages may tell of the same sensor in digits of their own, so a value counts as repeated where it is one of the last two.
+//! Two messages may report the same sensor with different digits, so a value counts as repeated if it is one of the
+//! last two.
 
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};

@@ -81,7 +81,7 @@ pub struct Vehicle {
     pub heartbeat: Latest<Heartbeat>,
     /// `SYS_STATUS`
     pub system: Latest<SystemStatus>,
-    /// What it says itself is wrong.
+    /// Alerts: problems that the autopilot reports.
     pub alerts: Alerts,
     /// `SYSTEM_TIME`
     pub time: Latest<SystemTime>,
@@ -91,7 +91,7 @@ pub struct Vehicle {
     pub gnss_integrity: [Latest<GnssIntegrity>; RECEIVERS_MAX],
     /// The first inertial sensor.
     pub imu: Latest<Imu>,
-    /// What it and the gyros of the attitude say by themselves.
+    /// Judgement of its motion and attitude by accelerometer and gyros alone.
     pub inertial: Inertial,
     /// The air.
     pub air: Latest<Air>,
@@ -131,7 +131,7 @@ pub struct Vehicle {
     pub(crate) generator_top: Option<Rpm>,
     /// The autopilot's word on flying.
     pub landed: Latest<LandedState>,
-    /// What a VTOL flies on, as old as `landed`.
+    /// The lift of a VTOL, as old as `landed`.
     pub vtol: VtolState,
     /// The autopilot's processor.
     pub processor: Latest<Processor>,
@@ -479,7 +479,7 @@ impl Vehicle {
     }
 
     /// A battery of unknown use is the vehicle's if the autopilot or a battery of its own component reports it, and
-    /// not a gimbal or a payload.
+    /// not if a gimbal does.
     fn take_battery(&mut self, at: Instant, component: u8, mut battery: Battery) {
         let is_own = BATTERY_COMPONENTS.contains(&component)
             || self.source.is_some_and(|vehicle| vehicle.component == component);

@@ -50,7 +50,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// What the analysis is asked.
+    /// The request to the analysis.
     pub fn request(&self) -> check::Request<'_> {
         check::Request {
             inputs: &self.inputs,

@@ -81,7 +81,7 @@ mod tests {
 
     use super::*;
 
-    /// What the shell does with a command's output is left out.
+    /// A command line without pipes and redirections.
     fn without_redirection(line: &str) -> &str {
         line.split(['|', '>']).next().unwrap_or_default().trim_end()
     }
@@ -118,7 +118,7 @@ mod tests {
             let text = std::fs::read_to_string(path).expect("a document");
             for line in text.lines().map(|line| line.trim_start_matches("target/release/")) {
                 let Some(line) = line.strip_prefix("hums ") else { continue };
-                // Commands stand in a column; what stands in the next one is a remark.
+                // Commands stand in one column, remarks in the next.
                 let (name, arguments) = line.split_once(' ').unwrap_or((line, ""));
                 let arguments = arguments.trim_start().split("   ").next().unwrap_or_default();
                 let line = format!("{name} {}", without_redirection(arguments));

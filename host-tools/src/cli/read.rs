@@ -27,7 +27,7 @@ An output that exists is overwritten with --force only, once all of the new one 
 and a folder that holds another session's tables, are refused.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
-/// What is read: a file whose name a slash stands behind is that file.
+/// The parser of an input's path: a name with a slash behind it is that file.
 pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(without_slash)
 }

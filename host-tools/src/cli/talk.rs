@@ -71,7 +71,7 @@ pub struct Link {
 pub enum ParamsAction {
     /// List all parameters, in the board's order
     List {
-        /// Where the board is.
+        /// The address of the board.
         #[command(flatten)]
         at: Link,
         /// Print the result as one JSON object (docs/json.md)
@@ -83,7 +83,7 @@ pub enum ParamsAction {
         /// Names, for instance `GS_BUDGET`
         #[arg(required = true, value_name = "NAME")]
         names: Vec<String>,
-        /// Where the board is.
+        /// The address of the board.
         #[command(flatten)]
         at: Link,
         /// Print the result as one JSON object (docs/json.md)
@@ -92,7 +92,7 @@ pub enum ParamsAction {
     },
     /// Give the board the key of --key, over the port from which it takes keys (parameter `SIGN_PORT`)
     Sign {
-        /// Where the board is.
+        /// The address of the board.
         #[command(flatten)]
         at: Link,
         /// Take the key away
@@ -110,7 +110,7 @@ pub enum ParamsAction {
         /// The value; of single precision, so that it may be rounded, which is said
         #[arg(value_name = "VALUE", allow_negative_numbers = true)]
         value: f64,
-        /// Where the board is.
+        /// The address of the board.
         #[command(flatten)]
         at: Link,
         /// Print the result as one JSON object (docs/json.md)
@@ -136,7 +136,7 @@ with --around, something of the moment, or of what was searched for the finding,
 #[derive(Args, Clone, Debug)]
 #[command(after_help = PULL_EXAMPLES)]
 pub struct Pull {
-    /// Where the board is.
+    /// The address of the board.
     #[command(flatten)]
     pub at: Link,
     /// The directory for the logs; made when missing
@@ -205,7 +205,7 @@ only while the vehicle is disarmed.";
 #[derive(Args, Clone, Debug)]
 #[command(after_help = FORMAT_EXAMPLES)]
 pub struct FormatCard {
-    /// Where the board is.
+    /// The address of the board.
     #[command(flatten)]
     pub at: Link,
     /// Yes, everything on the card may be lost

@@ -123,7 +123,7 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
             anyhow::anyhow!("{}: {why}", context())
         })
     })?;
-    // What a recorder does with an empty card is worth a run, too.
+    // A run with an empty card is allowed: it shows the recorder's reaction.
     if let Some(words) = image::check(&file, path)? {
         note!("{}: {words}", path.display());
     }

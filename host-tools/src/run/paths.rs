@@ -9,8 +9,8 @@ use crate::endpoint::Endpoint;
 use crate::files::{FileId, Inputs, Output, is_seekable, means_standard_output};
 use crate::outcome::usage;
 
-/// What of a run must not be written over: its inputs, and the card and the store, which are updated in place. Refuses
-/// a run of which one file is named twice.
+/// Files of a run that must not be overwritten: its inputs, and the card and the store, which are updated in place.
+/// Refuses a run that names one file twice.
 pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
     let tap = run.tap.as_deref();
     let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(run.firmware.as_deref()));

@@ -25,7 +25,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
         Some(path) => read(path)?,
         None => (Vec::new(), None),
     };
-    // What is damaged is written over by what still counts of it.
+    // A damaged store is overwritten with the items that still count.
     if let Some(path) = path.filter(|_| found(&bytes) == Some(Found::Damaged)) {
         drop(file);
         let whole = |mut file: &File| file.write_all(&bytes).with_context(|| cannot_write(path));
@@ -72,7 +72,7 @@ pub(super) fn check(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What the file holds, and the file for writing.
+/// The content of the file, and the file for writing.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if let Ok(about) = path.metadata() {
         if !about.is_file() {

@@ -45,7 +45,7 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
     "what it writes lies in that folder",
 )];
 
-/// Commands that have inputs and write no file, or outputs and no input, with the reason why there is no pair to try.
+/// Commands without a pair of input and output to try, with the reason.
 const NO_PAIRS: [(&str, &str); 10] = [
     ("check", "prints"),
     ("live", "shows and sends"),

@@ -182,7 +182,7 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
     assert!(String::from_utf8_lossy(&said.stderr).contains("are one file"));
 }
 
-/// Two cards have an equal log; the trend on its page is that of its card.
+/// Two cards have an equal log; the trend on a page belongs to the page's own card.
 #[test]
 fn a_page_of_an_equal_session_of_another_card_is_refused() {
     let dir = tempfile::tempdir().expect("directory");

@@ -314,7 +314,7 @@ fn what_a_card_has_lost_of_a_log_hides_nothing_of_the_rest() {
     let text = b"0123456789abcdef".repeat(32);
     let fills = [[0; 512], [0xff; 512], *text.first_chunk().expect("a block"), whole[&(other + 9)]];
     for (at, lost) in pages.chain(rows).chain(more) {
-        // A log's identity is that of its first sound sector.
+        // A log's identity comes from its first sound sector.
         let fills = if at == 0 { &fills[..3] } else { &fills[..] };
         for fill in fills {
             (at..at + lost).for_each(|at| medium.set(first + at, fill));

@@ -1,10 +1,10 @@
-//! `cargo xtask bench logs`: the speed of `hums check` on logs of autopilots, beside the usual readers:
-//! pymavlink's `DFReader` for `DataFlash`, pyulog for `ULog`. Each reads every message of a log, on one core, one after the
-//! other in the same run; speeds depend on the machine, ratios hardly. What counts is the processor's time, of the program and of the
-//! system for it, and of some rounds the best: what else runs on the machine only makes a round slower.
+//! `cargo xtask bench logs`: the speed of `hums check` on logs of autopilots, beside the usual readers: pymavlink's
+//! `DFReader` for `DataFlash`, pyulog for `ULog`. Each reads every message of a log, on one core, one after the other
+//! in the same run; speeds depend on the machine, ratios hardly. The measure is the processor's time for the program,
+//! the system's part included. The best of some rounds counts: other load only makes a round slower.
 //!
-//! A log is read as often as it takes to have 16 MB, in one file as `cat` joins it (each time is judged by itself): the program's start, two
-//! milliseconds, is no part of a speed.
+//! Each log is repeated to 16 MB in one file, as `cat` joins it (each time is judged by itself). So the program's
+//! start, two milliseconds, is no part of a speed.
 //!
 //! Logs are those below the folders that `HUMS_LOGS` names (separated by colons), else those of `tests`.
 

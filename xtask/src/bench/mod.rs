@@ -23,7 +23,7 @@ use crate::shell::Shell;
 
 /// How much smaller than the tlog a whole session is to be, as a geometric mean.
 const SMALLER_MIN: f64 = 6.5;
-/// Ratio of the size to that of `xz -9e` of the tlog.
+/// Smallest ratio of two sizes: the tlog by `xz -9e`, and the log.
 const SMALLER_THAN_XZ_MIN: f64 = 2.3;
 /// Bytes of MAVLink a second at 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;

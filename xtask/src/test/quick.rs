@@ -1,4 +1,4 @@
-//! `cargo xtask test --quick`: what is soon known about a change, before all steps run.
+//! `cargo xtask test --quick`: the fast checks of a change, before all steps run.
 
 use std::path::Path;
 

@@ -195,8 +195,8 @@ impl Flight {
         }
     }
 
-    /// The beginning of a fall or a turn by an inertial sensor while others report flight, none reports standing, and
-    /// the vehicle does not sink: the sensor is bad.
+    /// The beginning of a fall or turn by an inertial sensor that others contradict: two report flight, none reports
+    /// standing, and the vehicle does not sink. The sensor is bad.
     pub(super) fn doubt(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) {
         let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
             && self.pressure.follows(now, -FALLING_MPS) != Some(true);
@@ -425,7 +425,7 @@ impl Flight {
     }
 
     /// Whether a still vehicle cannot hang in the air: it is off, landed by its own report, on its side, without
-    /// thrust or with full thrust.
+    /// thrust or at full thrust.
     fn hangs_not(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>) -> bool {
         !self.arming.is_on
             || self.calls_itself_landed(now, vehicle)
@@ -433,7 +433,7 @@ impl Flight {
             || matches!(power, Some(Power::Idle | Power::Full))
     }
 
-    /// Whether its own rotors, and no hand, caused a sign outside of a flight: it had throttle just now, and the
+    /// Whether its own rotors, and no hand, caused a sign outside of a flight. It had throttle just now, and the
     /// inertial messages show the sign.
     pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
         self.thrust.was_driven(now, DRIVEN)
@@ -464,8 +464,8 @@ impl Flight {
     }
 }
 
-/// Whether the autopilot wants it to sink faster than the limit, and it does not sink much faster than that: a mission, a script or an
-/// offboard computer asks for it.
+/// Whether the autopilot wants a faster sink than the limit, and the vehicle sinks little faster than that. A
+/// mission, a script or an offboard computer then asks for it.
 fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
     let wanted_mps = vehicle.climb_wanted.within(at, SETPOINT_AGE).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)

@@ -1,8 +1,8 @@
 //! The flight, on observations made for the purpose.
 //!
-//! A script has pieces, each until a second: `5 h0 t0.5 | 20 air h25`. A vehicle is armed unless it is `off`. It
-//! reports a landed state (`ground`, `takingoff`, `air`, `landing`), a height `h` m, a climb of `c` m/s, a throttle
-//! `t`, an air speed `a` and a ground speed `v` m/s.
+//! A script has pieces, each until a second: `5 h0 t0.5 | 20 air h25`. A vehicle is armed unless it is `off`. It has
+//! a landed state (`ground`, `takingoff`, `air`, `landing`), a height `h` m, a climb of `c` m/s, a throttle `t`, an
+//! air speed `a` m/s and a ground speed `v` m/s.
 
 use super::VehicleKind::{Plane, Rotorcraft, Surface};
 use super::*;

@@ -1,4 +1,4 @@
-//! The board on the model of its chip: what comes to its ports, what leaves them, its card and its power.
+//! The board on the model of its chip: input and output of its ports, its card and its power.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -19,13 +19,13 @@ use crate::source::Chunk;
 
 /// The store in the chip's flash: sectors 1 and 2.
 const STORE: std::ops::Range<usize> = 16 * 1024..48 * 1024;
-/// Power comes so long before the first byte: a start takes some 20 ms until it listens.
+/// Time from power-on to the first byte: a start takes some 20 ms until it listens.
 const LEAD: Ps = 30 * MS;
 /// How long power is away when it goes for a moment.
 const AWAY: Ps = 100 * MS;
-/// What is in memory at the end is written after so long: a sector in progress waits for 0.15 s (`hums_onboard::monitoring`).
+/// Wait at the end for data in memory: a sector in progress waits for 0.15 s (`hums_onboard::monitoring`).
 const LEAST: Ps = 2_400 * MS;
-/// Or, where the card is slow, once it was not written for so long; before the silence is a finding (3 s).
+/// On a slow card the wait ends after this time without a write, at the latest before the silence is a finding (3 s).
 const QUIET: Ps = 200 * MS;
 const MOST: Ps = 3_000 * MS;
 /// The ports are looked after this often.
@@ -70,7 +70,7 @@ pub(super) struct Board {
     lines: [Line; 2],
     /// When power goes for a moment, sorted.
     reboots: VecDeque<u64>,
-    /// What a framer makes of what came, and of what went to the ground station.
+    /// Framers of the received bytes and of those to the ground station.
     came: Framer,
     went: Framer,
     load: Load,
@@ -84,7 +84,7 @@ struct Load {
     worst: f64,
 }
 
-/// What the ports had.
+/// Traffic of the ports.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Traffic {
     pub(super) frames_in: u64,
@@ -184,13 +184,13 @@ impl Board {
         while self.chip.now() < end.saturating_add(MOST) && writes.replace(self.medium.writes()) != writes {
             self.run_until(self.chip.now().saturating_add(QUIET))?;
         }
-        // What is still in the framer is whole, or nothing.
+        // The framer's rest is a complete frame, or nothing.
         self.came.idle(&mut |_| {});
         self.went.idle(&mut |_| {});
         self.to_ground.flush().context("--gs: cannot be written")
     }
 
-    /// What the store holds.
+    /// The content of the store.
     pub(super) fn store(&self) -> &[u8] {
         self.chip.memory(FLASH.0 + STORE.start as u32, STORE.len() as u32)
     }

@@ -57,7 +57,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     if is_card && medium.get(0) != table {
         bail!("{}: was formatted by command in this run, and is left as it was before", run.sd.display());
     }
-    // Also of a run that came to an early end: what a card has it has.
+    // Also after an early end of the run: the card keeps its data.
     medium.save(&card).with_context(|| format!("{}: cannot be written", run.sd.display()))?;
     flash.set(board.store());
     if let Some(error) = flash.take_error() {
@@ -88,7 +88,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged() || !gone.is_empty())))
 }
 
-/// What the ports had, and what of it the card has.
+/// Reports the traffic of the ports, and the part of it on the card.
 fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     report.frames_in = traffic.frames_in;
     report.frames_logged = frames.min(traffic.frames_in);

@@ -118,11 +118,11 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
     SimCard::new(image, faults)
 }
 
-/// Records chunks until there are none, on a card that may hold anything, as one power-on: for those who ask more of
-/// the recorder than the command line does. `boots` tells one power-on on a card from another.
+/// Records all chunks on any card, as one power-on. It is for callers that need more of the recorder than the command
+/// line offers. `boots` tells one power-on on a card from another.
 ///
-/// `gs` gets what the ground station does. `moment` is called with each chunk before it arrives. A card whose power went
-/// ends it.
+/// `gs` gets what the ground station does. `moment` is called with each chunk before it arrives. A card whose power
+/// went ends it.
 pub fn power_on(
     card: &SimCard,
     params: &Params,
@@ -158,7 +158,7 @@ pub fn power_on(
     Ok(PowerOn { stats, frames_left, card: memory.card_reading() })
 }
 
-/// What one power-on came to.
+/// The result of one power-on.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerOn {
     /// The pipeline's figures.
@@ -268,10 +268,10 @@ impl World<'_> {
         report.blocks_written = self.card.writes();
         let findings = std::mem::take(&mut report.findings);
         let (frames, _) = report.read_card(card, earlier)?;
-        // What the monitor said at the time, also where the card did not take it.
+        // Findings of the monitor at their time, also those that the card did not take.
         report.findings = findings;
         if self.overwritten {
-            // What came first may be gone again.
+            // The first frames may be overwritten.
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         } else if !self.frames_on_card {

@@ -1,8 +1,8 @@
-//! Foreign recordings, judged by hand, alarm by alarm: by the values around the moment, the mode, the pilot's
-//! actions, and the autopilot's own texts and events.
+//! Foreign recordings, judged by hand, alarm by alarm: by the values at the time, the mode, the pilot's actions, and
+//! the autopilot's texts and events.
 //!
 //! `verdicts.json` has no content of them: it identifies a recording by its name and the beginning of its SHA-256. An
-//! alarm is true in three cases: the vehicle crashed or was about to, the autopilot reports the same, or a value
+//! alarm is true in three cases. The vehicle crashed or was about to, the autopilot reports the same, or a value
 //! exceeds its autopilot's published limit. One verdict is for all alarms of a check in a recording. Recordings that
 //! are not listed have no verdict.
 
