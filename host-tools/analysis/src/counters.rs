@@ -18,7 +18,7 @@ pub struct Counters {
     pub motors: Vec<Motor>,
     /// By quantity.
     pub ranges: Vec<Ranges>,
-    /// What there is to say of them.
+    /// A remark on the counters.
     pub remark: Option<&'static str>,
 }
 
@@ -27,7 +27,7 @@ pub struct Counters {
 pub struct Plain {
     /// For people.
     pub title: String,
-    /// Of its values; empty for a number of things.
+    /// The unit of its values; empty for a count.
     pub unit: &'static str,
     decimals: u8,
     /// In this session.
@@ -56,7 +56,7 @@ pub struct Motor {
 pub struct Ranges {
     /// The quantity's name.
     pub title: &'static str,
-    /// Of the ranges' ends.
+    /// The unit of the ranges' ends.
     pub unit: &'static str,
     /// Its ranges.
     pub bands: Vec<Band>,
@@ -89,7 +89,7 @@ pub fn is_told(name: &str, vehicle: &Vehicle) -> bool {
     }
 }
 
-/// Whether anything tells if the vehicle flies.
+/// Whether any message shows if the vehicle flies.
 pub fn tells_flight(vehicle: &Vehicle) -> bool {
     let Vehicle { landed, global, local, hud, .. } = vehicle;
     landed.get().is_some() || global.get().is_some() || local.get().is_some() || hud.get().is_some()
@@ -160,10 +160,10 @@ fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
 }
 
 const FLIGHTS: &str = UsageCounter::Flights.name();
-/// Of a session that begins in a flight, which a session before has counted.
+/// Remark on a session that begins in a flight: the session before has counted that flight.
 const BEGUN_BEFORE: &str = "it was in the air at its start: that flight is counted in the log before";
 
-/// By what the counters mean; those that this program does not know have their names.
+/// The counters by their meaning. Counters unknown to this program keep their names.
 pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Counters {
     let mut all = Counters::default();
     let number = |counter: UsageCounter| session.get(counter.name()).copied().unwrap_or(0.0);

@@ -127,7 +127,7 @@ pub struct VehicleJson {
 
 #[derive(Debug, Serialize)]
 struct MessageJson {
-    /// Of MAVLink messages.
+    /// The id, for MAVLink messages.
     id: Option<u32>,
     name: String,
     verified: bool,
@@ -387,7 +387,7 @@ pub fn duration_s(log: &Overview) -> f64 {
     }
 }
 
-/// The vehicle, if it was heard.
+/// The vehicle, if it was received.
 pub fn vehicle(log: &Overview) -> Option<VehicleJson> {
     let vehicle = log.contents.vehicle?;
     let [major, minor, patch, _] = vehicle.firmware.to_be_bytes();

@@ -74,7 +74,7 @@ pub fn due_words((name, limit): &(String, Option<String>)) -> String {
     limit.as_ref().map_or_else(|| name.clone(), |limit| format!("{name} (limit {limit})"))
 }
 
-/// Whether a check tells that a part is due.
+/// Whether a check reports that a part is due.
 pub fn is_due(check: &str) -> bool {
     check.ends_with("_due")
 }

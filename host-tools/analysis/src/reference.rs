@@ -43,7 +43,7 @@ pub enum Quantity {
     Velocity(usize),
     /// Its length, m/s.
     VelocityModule,
-    /// Speed over ground as the GNSS receiver says it, m/s.
+    /// Speed over ground by the GNSS receiver, m/s.
     GnssSpeed,
     /// Above mean sea level, m.
     Altitude,
@@ -63,17 +63,17 @@ pub enum Quantity {
     HudAltitude,
     /// Upwards, m/s.
     ClimbRate,
-    /// Of a motor, 1/min.
+    /// Motor speed, 1/min.
     EscRpm(usize),
     /// At an ESC, V.
     EscVoltage(usize),
-    /// Of a motor, A.
+    /// Motor current, A.
     EscCurrent(usize),
     /// `ESC_FAILURE_FLAGS`
     EscFailures(usize),
     /// Errors that an ESC counted.
     EscErrors(usize),
-    /// Of an ESC, degC.
+    /// ESC temperature, degC.
     EscTemperature(usize),
 }
 
@@ -137,7 +137,7 @@ pub struct Observed {
 pub struct Reference {
     vehicle: Vehicle,
     flight: Flight,
-    /// Of the last flight that has ended.
+    /// Duration of the last complete flight.
     flown: Span,
     heard: Option<Instant>,
 }
@@ -188,7 +188,7 @@ impl Reference {
         self.heard
     }
 
-    /// A quantity as it is known now.
+    /// The present value of a quantity.
     pub fn value(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
         let now = time::Instant::from(now);
         let single = |value: f32| Some(Scalar::Single(value));

@@ -45,7 +45,7 @@ impl Extremes {
         }
     }
 
-    /// With what a later interval kept.
+    /// Joins the values of a later interval.
     fn joined(self, later: Self) -> Self {
         let (first, second) = if later.rises { (later.low, later.high) } else { (later.high, later.low) };
         self.with(first).with(second)
@@ -118,7 +118,7 @@ pub struct Store<P> {
     /// Intervals that have a value, of all series.
     filled: usize,
     series_max: usize,
-    /// Values taken so far, of all series.
+    /// Number of values in all series.
     taken: u64,
 }
 
@@ -132,7 +132,7 @@ impl<P> Default for Store<P> {
 }
 
 impl<P> Store<P> {
-    /// With room for so many series; they have the filled intervals of all together.
+    /// Room for this many series, which share one grid of intervals.
     pub fn of(series_max: usize) -> Self {
         let grid = Grid { start_ms: None, interval_ms: INTERVAL_MS };
         Self { grid, series: BTreeMap::new(), filled: 0, series_max, taken: 0 }
@@ -191,7 +191,7 @@ impl<P: Copy + Ord> Store<P> {
         Some((self.grid.start_ms?, self.grid.interval_ms))
     }
 
-    /// Values taken so far, of all series.
+    /// Number of values in all series.
     pub fn taken(&self) -> u64 {
         self.taken
     }

@@ -1,4 +1,4 @@
-//! What people are shown of a check's value: a quantity with its limit, or the words of a state.
+//! The display of a check's value: a quantity with its limit, or the name of a state.
 
 use hums_core::health::check_named;
 
@@ -13,7 +13,7 @@ pub enum Shown {
     /// The name of the state; `None` if unknown. Neither the number is for people, nor the limit, which lies between
     /// two of them.
     State(Option<&'static str>),
-    /// A quantity, where there is one, and its limit, where that says something.
+    /// A quantity, if it is known, and its limit, if it is meaningful.
     Quantity(Option<f32>, Option<f32>),
 }
 

@@ -56,15 +56,15 @@ pub struct FindingLine {
     pub level: &'static str,
     /// The one before.
     pub previous: &'static str,
-    /// What decided.
+    /// The decisive value.
     pub value: f32,
-    /// What it crossed.
+    /// The limit that it crossed.
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
 }
 
-/// A level by its name; `ok` for what is none.
+/// A level by its name; other names give `ok`.
 fn level_named(name: &str) -> Level {
     Level::ALL.into_iter().find(|level| level.name() == name).unwrap_or(Level::Ok)
 }
@@ -75,7 +75,7 @@ impl FindingLine {
         level_named(self.level)
     }
 
-    /// What people read of a check that no longer applies.
+    /// Text for a check that no longer applies.
     pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
     /// Whether the check no longer applies (after landing): its value is not known to be good then.
@@ -128,7 +128,7 @@ pub struct BootLine {
     pub board: String,
     /// Why it started.
     pub reset: String,
-    /// Power-ons so far.
+    /// Number of power-ons.
     pub boots: u32,
 }
 
@@ -137,7 +137,7 @@ pub struct BootLine {
 pub struct JudgedChecks {
     /// These had.
     pub judged: usize,
-    /// So many of them tell of the box, its card and its wire alone.
+    /// The number of those that concern the box, its card and its wire only.
     pub of_box: usize,
     /// All.
     pub all: usize,
@@ -167,7 +167,7 @@ pub struct EndsInAir {
     pub climb_mps: Option<f32>,
     /// Speed over ground, m/s.
     pub speed_mps: Option<f32>,
-    /// Degrees north and east, as they were told last.
+    /// The last position, degrees north and east.
     pub place_deg: Option<(f64, f64)>,
 }
 
@@ -263,17 +263,19 @@ pub struct Contents {
     pub findings_count: u64,
     /// They were found by this program when it read the log, because its recorder ran no checks.
     pub checked_here: bool,
-    /// How much was judged, where that was looked at: of a log that its recorder checked only where few kinds of messages are in it.
+    /// The number of judged checks, if it is known. For a log checked by its recorder it is known only if few kinds
+    /// of messages are in it.
     pub judged: Option<JudgedChecks>,
-    /// The vehicle was in the air when it was heard first.
+    /// The vehicle was in the air when it was first received.
     pub begins_in_air: bool,
     /// Take-offs (`true`) and landings, in order, up to [`LISTED_MAX`].
     pub moves: Vec<(Instant, bool)>,
     /// The last flight goes on at its end, in a recording that was judged here.
     pub ends_in_air: Option<EndsInAir>,
-    /// Part of the time was not recorded, as its recorder says or as is seen, in a recording of another program.
+    /// Part of the time was not recorded: by the recorder's report, or by the evidence of another program's
+    /// recording.
     pub is_lossy: bool,
-    /// Seconds in the air that the box had counted where it began a log, as the first counters tell.
+    /// Seconds in the air before the log, by the box's first counters.
     pub flight_before_s: Option<f64>,
     /// The latest values of the usage counters, and when they were so.
     pub usage: BTreeMap<String, f64>,
@@ -289,9 +291,9 @@ pub struct Contents {
     pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
     /// Components by place, from 1, as recorded last.
     pub components: BTreeMap<u8, ComponentLine>,
-    /// What each may run at most, by place from 0.
+    /// Limits of use of each part, by place from 0.
     pub part_limits: [part::Limits; COMPONENTS_MAX],
-    /// Losses by what was lost: how many, the first and the last time.
+    /// Losses by kind: count, first and last time.
     pub losses: BTreeMap<&'static str, Loss>,
     /// The recorder's last statistics.
     pub stats: Option<Stats>,
@@ -299,9 +301,9 @@ pub struct Contents {
     pub gaps: Vec<Gap>,
     /// For each of them its offset in the file and its cause, in a recording of another format.
     pub gap_words: Vec<(Option<u64>, String)>,
-    /// Why nothing is known of the vehicle, where this program judged the recording and heard none.
+    /// The reason why no vehicle was found, if this program judged the recording.
     pub unheard: Option<String>,
-    /// What else there is to say of the vehicles in it, as sentences.
+    /// Further remarks on the vehicles, as sentences.
     pub remarks: Vec<String>,
     /// Entries that are not frames.
     pub not_frames: u64,
@@ -322,12 +324,12 @@ impl Contents {
         all
     }
 
-    /// Whether what recorded it checked the vehicle's health: only such a recorder writes these records.
+    /// Whether the recorder checked the vehicle's health: only such a recorder writes these records.
     pub fn is_checked(&self) -> bool {
         self.boot.is_some() || !self.usage.is_empty() || self.findings_count > 0
     }
 
-    /// Who checked it: `board`, `hums` (this program), `nobody`.
+    /// The checker: `board`, `hums` (this program), `nobody`.
     pub fn checked_by(&self) -> &'static str {
         match (self.checked_here, self.is_checked()) {
             (true, _) => "hums",
@@ -384,7 +386,7 @@ impl Contents {
         Some(self.part(*place, line))
     }
 
-    /// Whether the box says that it was not recording somewhere in a gap.
+    /// Whether the box reports that it did not record somewhere in a gap.
     pub fn did_not_record(&self, gap: &Gap) -> bool {
         let (from, to) = (gap.from.unwrap_or(Instant::ZERO), gap.to);
         let is_ok = |finding: &FindingLine| finding.level == Level::Ok.name();
@@ -481,7 +483,7 @@ impl Contents {
         }
     }
 
-    /// Adds what the next part held.
+    /// Adds the next part.
     fn add(&mut self, next: Self) {
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
@@ -534,7 +536,7 @@ impl Collect for Contents {
     }
 
     fn held_bytes(&self) -> usize {
-        // What an entry of a tree takes, texts on the heap included.
+        // Size of a tree's entry, with its texts on the heap.
         const ENTRY_BYTES: usize = 256;
         ENTRY_BYTES * (self.findings.len() + self.exceedances.len() + self.moves.len())
     }
@@ -559,7 +561,7 @@ impl Deliver<Self> for Contents {
 pub struct Overview {
     /// The reader's counts, and the proofs of completeness.
     pub ending: Ending,
-    /// Its format, unless it is a log of ours.
+    /// Its format; `None` for a HUMS log.
     pub format: Option<Format>,
     /// Bytes of these files that are set aside for it.
     pub bytes_on_card: u64,
@@ -576,14 +578,14 @@ impl HasEnding for Overview {
 }
 
 impl Overview {
-    /// Reads a log through. That frames are what the monitor received is the record's own word; see
+    /// Reads a log through. Only the record itself shows that frames are those of the monitor; see
     /// [`Overview::verified`].
     pub fn of(log: &Log) -> Result<Self> {
         Self::read(log, Want::default(), None)
     }
 
-    /// The same, and hands on in order what the log says, of several vehicles what that with this system id does: one reading for
-    /// both.
+    /// The same, and hands on the log's content in order: one reading for both. Of several vehicles it is the one
+    /// with this system id.
     pub fn told(log: &Log, system: Option<u8>, take: &mut Take<'_>) -> Result<Self> {
         Self::read(log, Want { system, ..Want::default() }, Some(take))
     }
@@ -630,12 +632,12 @@ impl Overview {
         self.epochs.utc_us(at)
     }
 
-    /// Bytes that the log takes: its sectors, without what is set aside.
+    /// Size of the log: its sectors, without the rest of the file.
     pub fn log_bytes(&self) -> u64 {
         self.ending.summary.blocks.sectors * 512
     }
 
-    /// How many times smaller than the same frames as a tlog, of a log of ours.
+    /// The size of the same frames as a tlog, divided by that of a HUMS log.
     pub fn ratio(&self) -> Option<f64> {
         let bytes = self.log_bytes();
         (self.format.is_none() && bytes > 0).then(|| self.contents.tlog_bytes() as f64 / bytes as f64)
@@ -650,7 +652,7 @@ impl Overview {
         self.contents.usage_at.filter(|at| last.since(*at) >= COUNTED_LATE)
     }
 
-    /// Of which time the counters are, as a sentence; `None` where they are of all of it.
+    /// The time up to which the counters count, as a sentence; `None` if they cover all.
     pub fn counted_words(&self) -> Option<String> {
         let at = moment(self.counted_until()?);
         Some(if self.contents.is_recounted {

@@ -17,7 +17,7 @@ pub struct Point {
     pub latitude_deg: f64,
     /// Degrees, east positive.
     pub longitude_deg: f64,
-    /// Above home, where that was told.
+    /// Height above home, if known.
     pub height_m: Option<f32>,
 }
 

@@ -25,19 +25,19 @@ pub trait Port: Send {
     /// As [`Port::read`], and with it all else that has come already; the buffer has room for [`ALL_BYTES`]. Bytes
     /// written meanwhile may be lost.
     fn read_all(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        // A stream gives what it has.
+        // A stream gives its available bytes.
         self.read(buffer)
     }
 
-    /// From now on what is written goes to whoever sent what was read last, whoever else speaks.
+    /// From now on the destination is the sender of the last received bytes, whoever else sends.
     fn keep_to(&mut self) {}
 }
 
 /// Both directions.
 pub struct Duplex {
-    /// What comes.
+    /// Input.
     pub reader: Box<dyn Port>,
-    /// What goes.
+    /// Output.
     pub writer: Box<dyn Write + Send>,
 }
 
@@ -81,7 +81,7 @@ pub fn open(endpoint: &Endpoint, silence: Duration) -> Result<Duplex> {
     })
 }
 
-/// Why a port cannot be listened on, and what to do.
+/// The reason why a port cannot be bound, with advice.
 fn why_not_bound(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::AddrInUse => "another program, perhaps a ground station, has this port: close it, or let it forward the vehicle's \
@@ -119,7 +119,7 @@ struct DatagramReader {
     socket: UdpSocket,
     peer: Arc<Mutex<Option<SocketAddr>>>,
     fixed: bool,
-    /// Who sent what was read last.
+    /// The sender of the last received datagram.
     last: Option<SocketAddr>,
     /// Whoever else speaks does not become the peer.
     kept: bool,
@@ -127,7 +127,7 @@ struct DatagramReader {
 
 /// The largest UDP datagram.
 const LARGEST_BYTES: usize = 65_536;
-/// What [`Port::read_all`] needs room for: as long as another datagram fits for sure, it is taken.
+/// Room for [`Port::read_all`]: it reads on while another datagram surely fits.
 pub const ALL_BYTES: usize = 2 * LARGEST_BYTES;
 /// Maximum datagrams taken at once: a flood of the port must not block the program.
 const AT_ONCE_MAX: usize = 4_096;
@@ -212,7 +212,7 @@ impl Write for DatagramWriter {
 }
 
 fn lock(peer: &Mutex<Option<SocketAddr>>) -> std::sync::MutexGuard<'_, Option<SocketAddr>> {
-    // An address is whole whatever happened to who held it.
+    // An address is complete, whatever happened to the holder of the lock.
     peer.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -1,4 +1,4 @@
-//! Where bytes come from and go to, as the command line names it: SRC and SINK.
+//! Sources and destinations of bytes on the command line: SRC and SINK.
 
 use std::fmt;
 use std::net::{SocketAddr, ToSocketAddrs};
@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result};
 
-/// What `--help` and every usage error say about the forms.
+/// The forms, for `--help` and every usage error.
 pub const FORMS: &str =
     "a file, `-`, `udpin:ADDR:PORT`, `udpout:ADDR:PORT`, `tcp:ADDR:PORT` or `serial:DEVICE:BAUD`";
 
@@ -89,7 +89,7 @@ impl Endpoint {
     }
 }
 
-/// A path as its user means it: a slash behind the name of a file is none of it.
+/// A path without a slash at its end: behind the name of a file it has no meaning.
 pub fn without_slash(path: PathBuf) -> PathBuf {
     let bare: PathBuf = path.components().collect();
     if bare.is_file() { bare } else { path }

@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM end an endless run in good order: waiting data is written, the log is closed and the results
 //! are printed. A second signal ends the program at once, unless it follows so closely that it belongs to the first.
-//! With a database the second one ends the wait for that, and the third one the program. SIGTERM is what `systemctl
-//! stop` and `docker stop` send.
+//! With a database the second one ends the wait for that, and the third one the program. `systemctl stop` and `docker
+//! stop` send SIGTERM.
 //!
 //! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is
 //! only noted: then the write fails with an error that names the file.
@@ -24,7 +24,7 @@ const ECHO: Duration = Duration::from_millis(50);
 const LOOK: Duration = Duration::from_millis(20);
 
 static REQUESTED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
-/// Whether a second one was asked for, where that is told from the first.
+/// Whether a second request came, if it counts apart from the first.
 static AGAIN: AtomicBool = AtomicBool::new(false);
 
 /// From now on the first Ctrl-C or SIGTERM is only noted; the second one ends the program at once.
@@ -63,7 +63,7 @@ fn watched<N: FnMut() + Send + 'static>(
     requested
 }
 
-/// Waits for so many, after which the next one ends the program at once.
+/// Waits for this many signals; the next one ends the program at once.
 fn tell_apart(wishes: u32, mut next: impl FnMut(), armed: &AtomicBool) {
     let mut last: Option<Instant> = None;
     for wish in 1..=wishes {
@@ -78,7 +78,7 @@ fn tell_apart(wishes: u32, mut next: impl FnMut(), armed: &AtomicBool) {
     armed.store(true, Ordering::SeqCst);
 }
 
-/// What returns when the next signal has come.
+/// A function that returns at the next signal.
 #[cfg(unix)]
 fn next() -> io::Result<impl FnMut() + Send + 'static> {
     let (mut heard, tell) = io::pipe()?;
@@ -88,7 +88,7 @@ fn next() -> io::Result<impl FnMut() + Send + 'static> {
     Ok(move || while !matches!(io::Read::read(&mut heard, &mut [0]), Ok(1)) {})
 }
 
-/// What returns when the next signal has come.
+/// A function that returns at the next signal.
 #[cfg(not(unix))]
 fn next() -> io::Result<impl FnMut() + Send + 'static> {
     let heard = Arc::new(AtomicBool::new(false));
@@ -127,12 +127,12 @@ pub fn no_end_by_file_size() {
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-/// Whether the user, or the system, asked to end.
+/// Whether the user, or the system, requested the end.
 pub fn requested() -> bool {
     REQUESTED.get().is_some_and(|requested| requested.load(Ordering::SeqCst))
 }
 
-/// Whether that was asked a second time, after [`watch_twice`].
+/// Whether the end was requested a second time, after [`watch_twice`].
 pub fn requested_again() -> bool {
     AGAIN.load(Ordering::SeqCst)
 }

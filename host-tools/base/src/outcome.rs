@@ -14,14 +14,14 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The end of a run that did what it was asked.
+/// The end of a run without an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// Everything, exactly.
     Done,
     /// Everything, and a check of the vehicle found something wrong.
     Findings,
-    /// All that could be had; something was lost or damaged, and the results say what.
+    /// All possible results; they report losses or damage.
     Losses,
 }
 
@@ -55,7 +55,7 @@ pub fn usage(message: impl Into<String>) -> anyhow::Error {
     Usage(message.into()).into()
 }
 
-/// Whoever read our standard output has gone (`hums info | head`): not an error, nothing to say.
+/// The reader of our standard output has gone (`hums info | head`). This is not an error and needs no message.
 #[derive(Debug)]
 pub struct ReaderGone;
 
@@ -84,7 +84,7 @@ fn find<E: StdError + 'static>(error: &anyhow::Error) -> Option<&E> {
     })
 }
 
-/// Says on standard error what went wrong, and gives the exit code.
+/// Reports an error on standard error, and returns the exit code.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -34,7 +34,7 @@ impl Schema {
     }
 }
 
-/// An object with what says which one it is.
+/// An object with its schema.
 #[derive(Serialize)]
 struct Named<'a, T> {
     #[serde(flatten)]
@@ -58,7 +58,7 @@ pub fn is_in_colour() -> bool {
     choice != anstream::ColorChoice::Never
 }
 
-/// Prints what was made for a terminal, and has its sequences: nothing of the world is in it.
+/// Prints a text made for a terminal, with escape sequences. It must have no foreign text.
 pub fn terminal_only(text: &str) -> Result<()> {
     raw_line(text)
 }
@@ -89,14 +89,14 @@ pub fn json(schema: Schema, value: &impl Serialize) -> Result<()> {
     json_line(&serde_json::to_string_pretty(&Named { schema, value })?)
 }
 
-/// A JSON object that is printed as it is made: some members, then a list that is too long to be held. It prints the
+/// A JSON object that is printed step by step: some members, then a list that is too long for memory. It prints the
 /// same text as [`json`].
 pub struct JsonList {
     empty: bool,
 }
 
 impl JsonList {
-    /// Prints what says which object it is, further members, and the beginning of the list.
+    /// Prints the schema, further members, and the beginning of the list.
     pub fn begin(schema: Schema, members: &impl Serialize, list: &str) -> Result<Self> {
         let before = serde_json::to_string_pretty(&Named { schema, value: members })?;
         print(&format!("{},\n  \"{list}\": [", printable::json(before.trim_end_matches("\n}"))))?;

@@ -34,12 +34,12 @@ pub fn path(path: &Path) -> String {
     word(&path.to_string_lossy()).into_owned()
 }
 
-/// Lines of ours, in which words of the world stand.
+/// Lines of the program, with foreign texts in them.
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| is_obeyed(c) && c != '\n')
 }
 
-/// A message. Further lines of ours are set in by two spaces; any other line's end came with words of the world.
+/// A message. Its further lines are indented by two spaces; any other line break came with a foreign text.
 pub fn message(text: &str) -> Cow<'_, str> {
     if !text.contains(|c| is_obeyed(c) || is_mark(c)) {
         return Cow::Borrowed(text);
@@ -47,8 +47,7 @@ pub fn message(text: &str) -> Cow<'_, str> {
     text.split("\n  ").map(word).collect::<Vec<_>>().join("\n  ").into()
 }
 
-/// JSON, which stays the same to whoever reads it: such characters stand inside of strings only, and are written by their
-/// numbers there.
+/// JSON with the same meaning: such characters occur inside of strings only, and are written there by their numbers.
 pub fn json(text: &str) -> Cow<'_, str> {
     let is_meant = |c: char| (c > '\u{7e}' && c.is_control()) || redirects(c);
     // Writing to a `String` cannot fail.

@@ -11,7 +11,7 @@ use crate::printable::word;
 /// Between two drawings.
 const EVERY: Duration = Duration::from_millis(100);
 
-/// A line that says how much of something is done.
+/// A line that shows the progress of a task.
 #[derive(Debug)]
 pub struct Progress {
     name: String,

@@ -13,7 +13,7 @@ use crate::files::{Inputs, Output, settle};
 use crate::outcome::Outcome;
 use crate::output::Stdout;
 
-/// How long the reader waits before it looks whether anybody still listens.
+/// Interval at which the reader checks whether anybody still listens.
 const SILENCE: Duration = Duration::from_millis(50);
 /// Pieces that may wait for the pipeline; more are lost, as at a UART.
 const PIECES: usize = 64;
@@ -34,7 +34,7 @@ pub struct Ground {
 pub struct Beside(Arc<Mutex<Inside>>);
 
 struct Inside {
-    /// What asked for it.
+    /// The flag that requested it.
     flag: &'static str,
     to: To,
     failed: bool,
@@ -84,7 +84,7 @@ impl Beside {
 }
 
 impl Inside {
-    /// Tries something with what is written; after an error nothing more is.
+    /// Tries an operation on the output; after an error nothing more is written.
     fn attempt(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
         let done = match &mut self.to {
             To::Nowhere => Ok(()),
@@ -140,10 +140,10 @@ impl Heard {
     }
 }
 
-/// What `--gs` is called where it fails.
+/// The flag in errors of `--gs`.
 const FLAG: &str = "--gs";
 
-/// Opens SINK, which is none of the inputs.
+/// Opens SINK, which must not be one of the inputs.
 pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
     let heard = Heard::nobody();
     match endpoint {

@@ -25,7 +25,7 @@ impl Cells {
         self.unknown_on_board = true;
     }
 
-    /// The box says that its store is new.
+    /// The box reported that its store is new.
     pub(super) const fn nothing_stored(&mut self) {
         self.nothing_stored = true;
     }
@@ -46,7 +46,7 @@ impl Cells {
     pub(super) fn are_unknown(&self, by: JudgedBy) -> bool {
         let lasts = || self.unknown.is_some_and(|(from, to)| to.since(from) >= CELLS_COME);
         match by {
-            // It says so once it has waited for them: a log may end before.
+            // The board reports it after a wait; a log may end before.
             JudgedBy::Board => self.unknown_on_board || (self.nothing_stored && lasts()),
             JudgedBy::Here => lasts(),
         }

@@ -13,7 +13,7 @@ pub struct Checked {
     pub format: Format,
     /// The judgement.
     pub judged: Judged,
-    /// The evidence of its end, for a log of ours.
+    /// The evidence of its end, for a HUMS log.
     pub ending: Option<Ending>,
 }
 
@@ -27,7 +27,7 @@ impl Checked {
         Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 
-    /// Faults of a log of ours, as parts of sentences: see [`Ending::faults`].
+    /// Faults of a HUMS log, as parts of sentences: see [`Ending::faults`].
     pub fn faults(&self) -> Vec<String> {
         self.ending.as_ref().map_or_else(Vec::new, Ending::faults)
     }

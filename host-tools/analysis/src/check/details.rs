@@ -41,7 +41,7 @@ pub(super) struct Details {
     others: Vec<Heard>,
 }
 
-/// An autopilot that was received, as far as autopilots can be told apart.
+/// An autopilot that was received, as far as autopilots can be distinguished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Heard {
     system: u8,
@@ -54,9 +54,9 @@ struct Heard {
 /// `MAV_AUTOPILOT_INVALID`: the sender is not an autopilot.
 const NO_AUTOPILOT: u8 = 8;
 
-/// Maximum number of autopilots told apart.
+/// Maximum number of distinguished autopilots.
 const TOLD_APART_MAX: usize = 32;
-/// Maximum number of further batteries told apart, beyond those followed: `ArduPilot` has 16.
+/// Maximum number of distinguished further batteries, beyond the followed ones: `ArduPilot` has 16.
 const BEYOND_MAX: usize = 1_024;
 
 impl Details {
@@ -93,7 +93,7 @@ impl Details {
         words.clone_into(&mut self.failsafes);
     }
 
-    /// The vehicle says which of its sensors are not healthy.
+    /// Takes the vehicle's report of unhealthy sensors.
     pub(super) fn sensors(&mut self, status: &SystemStatus) -> bool {
         let unhealthy = status.sensors.map(|sensors| sensors.unhealthy | sensors.lost);
         let is_new = unhealthy.filter(|unhealthy| *unhealthy != self.sensors);
@@ -107,7 +107,7 @@ impl Details {
         core::mem::replace(&mut self.doubted, doubted) != doubted
     }
 
-    /// It says in words that something is wrong, or (`false`) no longer is.
+    /// Takes a text with an alert, or with its end; `false` for the latter.
     pub(super) fn said(&mut self, at: Instant, alert: Alert, words: String) -> bool {
         let is_wrong = alert.urgency > Urgency::Over;
         if let Some(said) = self.said.get_mut(alert.cause as usize).filter(|_| is_wrong) {

@@ -74,7 +74,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits given by the user. All others are the defaults, or the values in a log of ours.
+    /// Limits given by the user. All others are the defaults, or the values in a HUMS log.
     pub fn new(given: &[(&'static hums_core::params::ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
@@ -287,9 +287,8 @@ impl Judge {
         }
     }
 
-    /// The vehicle is received, perhaps after a silence that the recording does not report itself. A log of
-    /// ours comes from the autopilot's wire, whose silence is a check of its own, unless it was packed on a
-    /// PC.
+    /// Takes a reception of the vehicle, perhaps after a silence that the recording does not report itself. A HUMS
+    /// log comes from the autopilot's wire, whose silence has its own check, unless it was packed on a PC.
     fn hear(&mut self, at: Instant) {
         let (armed, airborne) = (self.monitor.vehicle().armed(), self.monitor.flight().airborne());
         let before = self.last_heard.replace(Last { at, airborne });
@@ -362,7 +361,7 @@ impl Judge {
         self.monitor.vehicle().source == Some(source)
     }
 
-    /// The vehicle says which of its sensors are not healthy.
+    /// Takes the vehicle's report of unhealthy sensors.
     fn sensors(&mut self, source: Source, status: &SystemStatus) {
         if self.is_vehicle(source) && self.details.sensors(status) {
             for cause in Cause::ALL {
@@ -379,7 +378,7 @@ impl Judge {
         }
     }
 
-    /// Somebody says in words that something is wrong.
+    /// Takes a text with an alert.
     fn said(&mut self, at: Instant, source: Source, alert: Alert, words: String) {
         if self.is_vehicle(source) && self.details.said(at, alert, words) {
             self.tell(alert.cause.name());

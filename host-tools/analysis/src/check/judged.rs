@@ -50,8 +50,8 @@ impl Holes {
         }
     }
 
-    /// Whether this span is exactly one of the holes. A gap that is none of them is a place, or a count over
-    /// much of the recording.
+    /// Whether this span is exactly one of the holes. Any other gap is a moment, or a count over much of the
+    /// recording.
     pub fn is_one(&self, span: &(Instant, Instant)) -> bool {
         self.pauses.contains(span) || self.silences.contains(span)
     }
@@ -123,7 +123,7 @@ impl Judged {
         begin_in_air(&self.flights)
     }
 
-    /// Whether the recorder says itself, or it is seen, that it did not write all.
+    /// Whether the recorder reports a loss, or the recording shows one.
     pub fn is_lossy(&self) -> bool {
         self.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
     }
@@ -196,8 +196,7 @@ impl Judged {
         self.checks().is_little()
     }
 
-    /// The verdict in a word, for scripts and tables: the worst level. With too little to judge it is not
-    /// `ok`.
+    /// The verdict for scripts and tables: the worst level. With too little to judge it is not `ok`.
     pub fn verdict(&self) -> &'static str {
         match self.worst() {
             None => "unknown",

@@ -57,7 +57,7 @@ const FRESH: Span = Span::from_secs(2);
 const STANDS_M: f32 = 3.0;
 /// A falling vehicle sinks faster than this, m/s.
 const FALLING_MPS: f32 = 2.5;
-/// Of sea level: 35 % too much at 4,000 m, so a fall there must be deeper.
+/// Pressure change of a metre at sea level. At 4,000 m it is 35 % too much, so a fall there must be deeper.
 const HPA_PER_METRE: f32 = 0.12;
 /// A vehicle is judged for this long after it is first received.
 const FIRST: Span = Span::from_secs(10);

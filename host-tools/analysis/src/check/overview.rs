@@ -1,8 +1,7 @@
 //! The contents of a recording with the monitor's findings: for `info`, `report` and other views of findings.
 //!
-//! A log of ours has the findings of the monitor on board. Recordings without a monitor are packed recordings
-//! and the logs of autopilots and ground stations. They are checked here when they are read: "not checked" is
-//! not "good".
+//! A HUMS log has the findings of the monitor on board. Recordings without a monitor are packed recordings and the
+//! logs of autopilots and ground stations. They are checked here when they are read: "not checked" is not "good".
 
 use std::collections::BTreeSet;
 

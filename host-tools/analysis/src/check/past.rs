@@ -43,7 +43,8 @@ impl Past {
         Ok(Self { limits, taught: Some(taught) })
     }
 
-    /// Judges a recording; `shows` turns progress on. If it is of another vehicle, its trends are not judged, and a message says so.
+    /// Judges a recording; `shows` turns progress on. The trends of another vehicle are not judged, and a message
+    /// reports it.
     pub(super) fn judge(&self, place: &Place, heard: Heard, shows: bool) -> Result<Read> {
         let mut read = overview::judge(place, &self.limits, heard, shows)?;
         let Some((baselines, past)) = &self.taught else { return Ok(read) };

@@ -236,7 +236,7 @@ impl Problems {
             let Problem { check, instance, .. } = &followed.problem;
             let effect = Alarm::of(check, *instance, followed.level, since.into());
             if let Some(cause) = effect.and_then(|effect| root_cause(&effect, alarms.iter().copied())) {
-                // Of several times the one counts that had its worst level first.
+                // The cause of the alarm that first had the worst level counts.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
                     followed.problem.because = Some(cause.check.name.to_owned());
                 }

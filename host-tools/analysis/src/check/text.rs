@@ -97,15 +97,15 @@ enum State {
     /// that, so it differs from damage inside.
     Cut,
     Damaged,
-    /// The recorder says itself, or it is seen, that it did not write all.
+    /// The recorder reports a loss, or the recording shows one.
     Lossy,
     /// All bytes were written, and some of them are noise on the line, or text before the first frame.
     NotFrames,
-    /// A log of ours without damage and without proof that it is complete.
+    /// A HUMS log without damage and without proof that it is complete.
     NotProved,
-    /// A complete log of ours, with lost sectors rebuilt from parity.
+    /// A complete HUMS log, with lost sectors rebuilt from parity.
     MadeAgain,
-    /// A complete log of ours without its parity.
+    /// A complete HUMS log without its parity.
     Unprotected,
 }
 
@@ -279,7 +279,7 @@ pub(super) fn firmware(version: u32) -> Option<String> {
 
 fn when(checked: &Checked) -> String {
     let (judged, format) = (&checked.judged, checked.format);
-    // A log of ours goes on while the vehicle is not received.
+    // A HUMS log continues while the vehicle is not received.
     let of_log = checked.ending.as_ref().and_then(|ending| ending.summary.first.zip(ending.summary.last));
     let Some((first, last)) = judged.span.map(|span| of_log.unwrap_or(span)) else {
         return "nothing of a vehicle is in it".to_owned();

@@ -5,7 +5,7 @@
 //! beyond the warning's limit does not move it, so a fault never becomes normal.
 //!
 //! A baseline has the mean of the figures and their spread. A departure counts if only one unchanged flight in
-//! `TRD_FALSE` goes so far, by Student's t distribution. The figures are normal with unknown mean and spread, the
+//! `TRD_FALSE` departs further, by Student's t distribution. The figures are normal with unknown mean and spread, the
 //! spread with a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3). The test of one figure is the
 //! likelihood ratio test for a changed mean, so its rate of false alarms can be set. (Lehmann and Romano, Testing
 //! Statistical Hypotheses, 5.2.)
@@ -41,7 +41,7 @@ pub const FLIGHTS_MIN: u16 = 3;
 const WEIGHT: f32 = 0.1;
 /// As many flights as a baseline remembers.
 const REMEMBERED: u16 = 10;
-/// The prior spread of a quantity counts as so many flights.
+/// The prior spread of a quantity counts as this many flights.
 const PRIOR_FLIGHTS: f32 = 8.0;
 /// See above.
 const WEIGHT_EXPONENT: f32 = 1.25;
@@ -58,7 +58,7 @@ pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
     causes.iter().find(is_cause).map(|cause| (*cause).to_owned())
 }
 
-/// Whether a record of a box tells that a part was changed which the figures are of.
+/// Whether a record reports the change of a part that a figure depends on.
 pub(super) fn is_change(record: &Record<'_>) -> bool {
     match record {
         Record::Component(part) => part.why == Why::Replaced && part.kind != Kind::Card,
@@ -124,7 +124,7 @@ fn terms(quantity: Quantity) -> Terms {
 pub enum Episode {
     /// A flight.
     Flown(Box<Flown>),
-    /// A part was changed: earlier flights tell nothing of later ones.
+    /// A part was changed: earlier flights are no measure for later ones.
     Changed,
 }
 
@@ -237,15 +237,15 @@ impl Baselines {
         Some(flown.figure(quantity)? - self.known(quantity)?)
     }
 
-    /// Whether only few unchanged flights go so far.
+    /// Whether a departure is rare among unchanged flights.
     fn exceeds(&self, quantity: Quantity, off: f32, params: &Params) -> bool {
         let (baseline, Terms { is_share, prior, .. }) = (self.0[quantity.index()], terms(quantity));
         let prior = if is_share { prior } else { prior * baseline.value };
         off.abs() > baseline.reach(prior, params.get(Param::TrdFalse))
     }
 
-    /// How far a quantity is from its baseline, the way that is bad: percent of it; of a motor against the others, percent of these. 0 where
-    /// an unchanged flight may go so far. `None` without a baseline or a figure.
+    /// How far a quantity is from its baseline, the way that is bad: percent of it; of a motor against the others,
+    /// percent of these. It is 0 within the reach of an unchanged flight. `None` without a baseline or a figure.
     fn departure(&self, quantity: Quantity, flown: &Flown, params: &Params) -> Option<f32> {
         let off = self.off(quantity, flown)?;
         let Terms { bad, is_share, .. } = terms(quantity);
@@ -302,7 +302,7 @@ impl Baselines {
             let terms = terms(quantity);
             let takes_more = matches!(quantity, Quantity::HoverThrottle | Quantity::HoverPower);
             let is_weight = takes_more && heavier.is_some_and(|percent| percent > 0.0);
-            // A motor's output is its figure only where no ESC tells its speed.
+            // A motor's output is its figure only if no ESC reports its speed.
             let is_told = all.iter().any(|(known, _)| (known.check, known.part) == (terms.check, terms.part));
             if !is_told {
                 all.push((terms, if is_weight { 0.0 } else { departure }));

@@ -1,4 +1,4 @@
-//! What tells a recording from others: its content, or as much of it as is quickly read.
+//! The identity of a recording: its content, or the part of it that is quickly read.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
-/// Bytes at each end of a file that tell it from others, with its length: where recordings begin and end, they differ.
+/// Bytes at each end of a file that identify it, with its length: recordings differ at their beginning and end.
 const END_BYTES: u64 = 256 * 1024;
 
 /// Adds a file's length and its two ends to a digest.

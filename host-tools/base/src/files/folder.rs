@@ -71,7 +71,7 @@ impl Folder {
         }
     }
 
-    /// Whether a folder is one of ours.
+    /// Whether the program made a folder.
     pub fn is_ours(path: &Path) -> bool {
         Stamp::of(path).is_some()
     }
@@ -112,7 +112,7 @@ impl Folder {
                     })?;
                 }
                 if target.is_dir() {
-                    // One in which somebody has put a file meanwhile stays.
+                    // A folder with new files of others stays.
                     fs::remove_dir(&target)?;
                 }
                 fs::rename(part.path(), &target)

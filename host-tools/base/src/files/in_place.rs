@@ -30,7 +30,7 @@ pub fn open_in_place(options: &mut OpenOptions, path: &Path) -> io::Result<File>
         let file = options.open(path)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => Err(busy()),
-            // On a file system without locks nothing tells two runs apart.
+            // Without locks of the file system, two runs cannot be distinguished.
             Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
         }
     }

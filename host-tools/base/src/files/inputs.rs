@@ -10,13 +10,13 @@ use super::identity::FileId;
 use crate::endpoint::Endpoint;
 use crate::outcome::usage;
 
-/// The inputs of a command, and what else of it must not be written over.
+/// The inputs of a command, and its other files that must not be overwritten.
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     files: BTreeMap<FileId, String>,
     /// `--force`; none if the command has no such flag.
     force: Option<bool>,
-    /// One of them is live: its output cannot be made again.
+    /// One of them is live: its output cannot be repeated.
     live: bool,
 }
 
@@ -33,7 +33,7 @@ impl Inputs {
         inputs
     }
 
-    /// The same of a command whose outputs may replace files if the user says `--force`.
+    /// The same for a command whose outputs may replace files with `--force`.
     #[must_use]
     pub fn forcing(mut self, force: bool) -> Self {
         self.force = Some(force);
@@ -65,7 +65,7 @@ impl Inputs {
         self.live
     }
 
-    /// Adds what an endpoint reads.
+    /// Adds the file of an endpoint.
     pub fn add_endpoint(&mut self, endpoint: &Endpoint) {
         self.live |= endpoint.is_live();
         if let Endpoint::File(path) = endpoint {

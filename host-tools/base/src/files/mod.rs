@@ -3,9 +3,9 @@
 //! 1. An output that is an input of the same command is refused ([`Inputs`]).
 //! 2. An output is written beside its place, and renamed when complete ([`Output`], [`Folder`]). A kill, an error or
 //!    a full disk leaves the old file or none.
-//! 3. A file or folder that exists is not overwritten, unless the user says `--force`.
-//! 4. A folder of tables that holds another session's files, or somebody else's, is refused even then.
-//! 5. A stream (`-`, a pipe, `/dev/null`) is written as it is.
+//! 3. A file or folder that exists is not overwritten without `--force`.
+//! 4. A folder of tables with another session's files, or with foreign ones, is refused even then.
+//! 5. A stream (`-`, a pipe, `/dev/null`) is written directly.
 //!
 //! A simulated card (`--sd`) and a simulated board's flash (`--store`) are updated in place, like real memories. A
 //! run locks them ([`open_in_place`]) and makes new ones whole ([`make_in_place`]).

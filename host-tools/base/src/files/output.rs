@@ -34,7 +34,7 @@ enum To {
     Standard(Stdout),
 }
 
-/// What becomes of the written bytes at the end.
+/// The fate of the written bytes at the end.
 #[derive(Debug)]
 enum Part {
     /// They are in their place.
@@ -46,7 +46,7 @@ enum Part {
 }
 
 impl Output {
-    /// Begins a file, which is none of the inputs. Its folder must be there.
+    /// Creates a file, which must not be one of the inputs. Its folder must be there.
     pub fn create(path: &Path, inputs: &Inputs) -> Result<Self> {
         if means_standard_output(path) {
             // The results that the command prints are not to stand in the output.
@@ -146,7 +146,7 @@ impl Output {
         matches!(self.part, Part::None)
     }
 
-    /// Throws away the bytes so far.
+    /// Discards all bytes.
     pub fn begin_anew(&mut self) -> Result<()> {
         let emptied = self.to.flush().and_then(|()| match self.to.get_mut() {
             To::File(file) => file.set_len(0).and_then(|()| file.rewind()),

@@ -1,4 +1,4 @@
-//! Names of output files, and what is said of one that cannot be written.
+//! Names of output files, and the errors of those that cannot be written.
 
 use std::fs;
 use std::io;
@@ -62,7 +62,7 @@ pub fn make_directory(dir: &Path) -> Result<()> {
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
-/// Refuses a directory that cannot be one: it, or what it is to lie in, is a file, or a device such as `/dev/null`.
+/// Refuses a directory if it, or a parent, is a file or a device such as `/dev/null`.
 fn check_directory(dir: &Path) -> Result<()> {
     // Without a slash at its end, with which a file is not found.
     let dir: PathBuf = dir.components().collect();

@@ -133,7 +133,7 @@ fn a_folder_is_replaced_as_a_whole_with_force_and_by_its_own_session_only() {
     assert!(words(tables(&path, "s2", true, "b.csv")).contains("holds the files of another session, s1"));
     tables(&path, "s1", true, "b.csv").expect("made");
     assert_eq!(names(&path), [".hums", "b.csv"]);
-    // What somebody put there would be lost.
+    // A foreign file would be lost.
     fs::write(path.join("notes"), "mine").expect("written");
     assert!(words(tables(&path, "s1", true, "c.csv")).contains("notes: was not made by this command"));
     assert_eq!(

@@ -108,7 +108,7 @@ fn disarmed_high(falls: bool) -> Judged {
     disarmed_high_with(falls, None)
 }
 
-/// The same, of a log that says how it knows of arming.
+/// The same, for a log with this source of its arming.
 fn disarmed_high_with(falls: bool, arming: Option<&str>) -> Judged {
     use crate::source::item::Fact;
     use hums_core::observation::GlobalPosition;
