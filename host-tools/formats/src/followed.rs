@@ -16,11 +16,11 @@ pub const HELD_MAX: usize = 4;
 
 /// The result of a log that was read.
 pub trait HasEnding {
-    /// Its end, if it is a log of ours.
+    /// Its end, if it is a HUMS log.
     fn ending(&mut self) -> Option<&mut Ending>;
 }
 
-/// Holds logs back for as long as a later one may say something of their end.
+/// Holds logs back while a later one may have a record of their end.
 #[derive(Debug)]
 pub struct EndResolver<T> {
     held: VecDeque<T>,
@@ -28,7 +28,7 @@ pub struct EndResolver<T> {
 }
 
 impl<T: HasEnding> EndResolver<T> {
-    /// Of logs whose first sectors were looked at.
+    /// For logs whose first sectors were read.
     pub const fn new(sessions: Sessions) -> Self {
         Self { held: VecDeque::new(), sessions }
     }
@@ -52,7 +52,7 @@ impl<T: HasEnding> EndResolver<T> {
             }
         }
         self.held.push_back(next);
-        // Only the newest that has sectors can be what the next start found.
+        // Of the logs, only the newest with sectors can be the one that the next start found.
         let keep = if has_sectors { 1 } else { HELD_MAX };
         let done = self.held.len().saturating_sub(keep);
         self.held.drain(..done).collect()
@@ -99,8 +99,8 @@ impl<T: HasEnding> EndResolver<T> {
             card == other && numbers.is_some_and(|(next, read)| read <= before.number && before.number < next)
         };
         let is_looked_at = held.iter().any(|log| is_looked_at(&log.name));
-        // Numbers go up, so where a lower one is there, this one was not written over. A log that began on another card may have
-        // lost what it found on this one.
+        // Numbers go up, so where a lower one is there, this one was not written over. A log that began on another
+        // card may have lost the record of this one.
         let began_here = next.summary.first_number == Some(0);
         let is_looked_at =
             is_looked_at || began_here && self.sessions.has_older(card, before.number.saturating_add(1));

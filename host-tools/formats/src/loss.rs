@@ -1,4 +1,4 @@
-//! What of the losses that a log records counts as lost, and why a log does not have something.
+//! The losses that a log records, as counts and texts, and the reasons for missing data.
 
 use hums_blackbox::record::{Loss, Lost};
 use hums_blackbox::{Cause, Gap};
@@ -6,7 +6,7 @@ use hums_blackbox::{Cause, Gap};
 use crate::plural::count;
 use crate::utc::moment;
 
-/// How much a loss record says the recorder lost. Noise on the line is not the recorder's loss: it was no frame.
+/// The number of losses in a record. Noise on the line is not the recorder's loss: it was no frame.
 pub fn lost(loss: &Loss) -> u64 {
     match loss.what {
         Lost::NotFrames | Lost::DamagedFrames => 0,
@@ -37,7 +37,7 @@ pub fn words(loss: &Loss) -> Option<String> {
     Some(format!("{} {was} not recorded: {why}", count(loss.count, one)))
 }
 
-/// How many sectors are missing in a gap; none before the first sector of a log where nothing tells where the log began.
+/// Missing sectors of a gap; none before the first sector of a log with an unknown beginning.
 pub fn sectors_lost(gap: &Gap) -> Option<u32> {
     let is_known =
         gap.from.is_some() || gap.sectors_lost > 0 || gap.sectors_skipped > 0 || gap.frames.is_some();
@@ -60,7 +60,7 @@ pub const fn why(gap: &Gap) -> &'static str {
     }
 }
 
-/// All that a loss record says, and when.
+/// The content of a loss record, with its time.
 pub fn told(loss: &Loss) -> String {
     let words = words(loss).unwrap_or_else(|| match loss.what {
         Lost::NotFrames => format!("{} of no frame came over the line", count(loss.count, "byte")),

@@ -84,7 +84,7 @@ pub fn clock_source_name(number: u8) -> &'static str {
     }
 }
 
-/// What kind of fault the monitor had, by the number that a log stores.
+/// The kind of a monitor's fault, by its number in a log.
 pub fn fault_name(number: u8) -> &'static str {
     match number {
         1 => "panic",
@@ -94,7 +94,7 @@ pub fn fault_name(number: u8) -> &'static str {
     }
 }
 
-/// What happened, by the number that a log stores.
+/// The name of an event, by its number in a log.
 pub fn event_name(number: u8) -> &'static str {
     match number {
         1 => "armed",

@@ -16,7 +16,7 @@ use crate::logs::naming::{identity_at_end, segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
-/// Of a file's own name: file systems take 255 bytes, and 55 at most follow.
+/// Maximum length of a file's own name: file systems allow 255 bytes, and at most 55 follow.
 const NAME_BYTES_MAX: usize = 190;
 
 /// The identity of a log, from its sectors' headers and its first records. For a session on a card it is the
@@ -27,7 +27,7 @@ pub struct Traits {
     session: Option<u32>,
     /// The board's unique id; `None` if the log does not begin with the record of its start.
     board: Option<[u8; 12]>,
-    /// Of every sector's number and checksum: equal of copies only.
+    /// Hash of every sector's number and checksum: equal for copies only.
     fingerprint: Fingerprint,
 }
 
@@ -141,7 +141,7 @@ pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     (others.into_iter().cloned().collect(), made.iter().map(remark).collect())
 }
 
-/// Whether a file's name, or a folder's name or stamp, marks an output of ours other than a recording.
+/// Whether a file's name, or a folder's name or stamp, marks an output of this program other than a recording.
 pub fn is_made(path: &Path) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
     if path.is_dir() {
@@ -155,7 +155,7 @@ pub fn is_made(path: &Path) -> bool {
     stems.find_map(identity_at_end).is_some()
 }
 
-/// Whether a page says at its beginning that `hums report` made it: the table of a folder's pages has no session in its name.
+/// Whether the beginning of a page names `hums report`: the table of a folder's pages has no session in its name.
 fn says_report(path: &Path) -> bool {
     head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
 }
@@ -184,7 +184,7 @@ fn cut(mut name: String) -> String {
     name
 }
 
-/// Of all bytes of a file.
+/// Hash of all bytes of a file.
 fn fingerprint(path: &Path) -> Result<[u8; 16]> {
     let digest = digest(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(digest.first_chunk().copied().unwrap_or_default())

@@ -12,7 +12,7 @@ const fn words(
     Words { said, meaning, action, needs, scope: Scope::Stored }
 }
 
-/// The checks that only earlier flights tell. The alarms are what boxes said that judged trends themselves.
+/// The checks against earlier flights only. The alarms come from boxes that judged trends themselves.
 pub static WORDS: [Words; 6] = [
     words(
         "batt_capacity",

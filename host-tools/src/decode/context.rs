@@ -61,7 +61,7 @@ impl Formats {
 pub struct Context {
     /// The formats to write.
     pub formats: Formats,
-    /// UTC by the clock of each part; for a log of ours, at the power-on.
+    /// UTC by the clock of each part; for a HUMS log, at the power-on.
     pub epochs: Epochs,
     /// The wanted part of it.
     pub selection: Selection,

@@ -211,7 +211,7 @@ struct Task<'a> {
 struct Done {
     name: String,
     outcome: Outcome,
-    /// The evidence of its end, for a log of ours.
+    /// The evidence of its end, for a HUMS log.
     ending: Option<Ending>,
     /// Whether there was anything to write.
     written: bool,

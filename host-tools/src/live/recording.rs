@@ -1,4 +1,4 @@
-//! Sources of playback: a recording of any kind, or one session of a log of ours (a log file, segments, a
+//! Sources of playback: a recording of any kind, or one session of a HUMS log (a log file, segments, a
 //! card's image or folder).
 
 use std::io;

@@ -29,7 +29,7 @@ pub struct SourceJson {
     pub phase: &'static str,
     /// More about it, in words.
     pub words: String,
-    /// The end of a log of ours, in words.
+    /// The end of a HUMS log, in words.
     pub log_end: Option<String>,
     /// Of reading, 0 to 1.
     pub progress: f64,

@@ -248,7 +248,7 @@ fn a_recording_is_decoded_without_a_log_of_ours_between() {
         fs::read_to_string(folder.expect("tables").join("ATTITUDE.csv")).expect("a table")
     };
     let columns = |text: String| -> Vec<String> {
-        // Without both times: a log of ours keeps milliseconds.
+        // Without both times: a HUMS log keeps milliseconds.
         text.lines().map(|line| line.splitn(3, ',').nth(2).unwrap_or_default().to_owned()).collect()
     };
     assert_eq!(columns(table("out")), columns(table("packed")));

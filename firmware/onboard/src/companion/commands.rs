@@ -170,7 +170,7 @@ impl Commands {
     }
 }
 
-/// Formats only a card without logs of ours: no radio command may destroy logs.
+/// Formats only a card without HUMS logs: no radio command may destroy logs.
 fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn) -> u8 {
     let state = book.card.read().state;
     let may = state.wants_format();

@@ -13,7 +13,7 @@ use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 use crate::files::{make_in_place, open_in_place};
 use crate::outcome::usage;
 
-/// The size of an image that is made, in MiB, unless `--card-size` says otherwise.
+/// The default size of a new image, in MiB (`--card-size`).
 pub const SIZE_MIB: u64 = 256;
 /// The smallest size for FAT32, in MiB.
 pub const SIZE_MIB_MIN: u64 = (BLOCKS_MIN as u64 * 512).div_ceil(1 << 20);

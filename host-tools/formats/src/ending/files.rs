@@ -13,7 +13,7 @@ use crate::plural::{are, count};
 
 /// Maximum difference of two power-ons' clocks that does not show their order: microseconds.
 const EPOCH_SLACK_US: u64 = 60_000_000;
-/// No box recorded before 2025, and a clock that says so is wrong: microseconds since 1970.
+/// No box recorded before 2025: an earlier clock is wrong. Microseconds since 1970.
 const EARLIEST_US: u64 = 1_735_689_600_000_000;
 /// Files of a log that are named one by one.
 const NAMED_MAX: usize = 3;
@@ -166,7 +166,7 @@ const fn foreign_words(number: u64) -> &'static str {
     if number == 1 { "that is no sector" } else { "that are no sectors" }
 }
 
-/// Of blocks that begin as a sector does.
+/// Text for blocks with the beginning of a sector and a wrong check.
 const UNSOUND: &str = "with the head of a sector and a wrong check";
 
 /// The blocks after the last sector, in words; empty without any.

@@ -10,7 +10,7 @@ use crate::utc::iso8601_ms;
 /// The proof of a log's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proof {
-    /// Its last sector says that the session was ended in order.
+    /// Its last sector has the mark of an orderly end.
     Closed,
     /// The next start on the card found that it ends there. It has the time of arming or take-off if power
     /// failed while the vehicle was armed or flying. The last data before the power cut are then unknown.

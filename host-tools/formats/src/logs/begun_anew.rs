@@ -249,7 +249,7 @@ pub(super) fn before(log: &Log) -> Option<Before> {
     at_beginning(log, |boot| Some(boot.before).filter(Before::has_end))
 }
 
-/// Whether a log's beginning says that its card had no log.
+/// Whether a log's beginning reports that its card had no log.
 pub(super) fn found_nothing(log: &Log) -> bool {
     own(log).is_some_and(|before| before.found == Found::Nothing)
 }

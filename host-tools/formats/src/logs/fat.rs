@@ -62,7 +62,7 @@ pub struct CardFile {
     /// Segment and session by its name. `None` for any other name, if the file's first block is a sector of a
     /// log.
     pub name: Option<LogName>,
-    /// The size that the directory says, in bytes.
+    /// The size by the directory, in bytes.
     pub size: u64,
     /// Its places; less than `size` if its chain is damaged.
     pub extents: Vec<Extent>,

@@ -6,7 +6,7 @@ use sha2::{Digest as _, Sha256};
 use super::groups::{Group, Groups};
 use super::places::Log;
 
-/// Of every sector's number and checksum: equal of copies only.
+/// Hash of every sector's number and checksum: equal for copies only.
 pub type Fingerprint = [u8; 16];
 
 /// Makes the fingerprint of groups in their order.
@@ -23,7 +23,7 @@ impl Fingerprinter {
         }
     }
 
-    /// Of all that was taken.
+    /// The hash of all sectors.
     pub fn finish(self) -> Fingerprint {
         self.0.finalize().first_chunk().copied().unwrap_or_default()
     }

@@ -104,7 +104,7 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
     Ok(())
 }
 
-/// Looks at each entry of a folder as it is read: there may be millions that are not ours.
+/// Looks at each entry of a folder as it is read: there may be millions of foreign ones.
 fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
     let context = || format!("{}: cannot be read", dir.display());
     let mut entries = Entries::default();
@@ -133,7 +133,7 @@ impl Entries {
         match (content, segment_name(&path).or_else(|| segment_or_part(&path).filter(|_| is_log))) {
             (Err(error), _) => found.leave_out(format!("{error:#}")),
             (Ok(Content::Unread(unread)), _) => found.leave_out(format!("{shown}: {unread}")),
-            // Any content: if the file holds no log of ours, the report on its log says so.
+            // Any content is accepted: the report on a log says if the file holds none.
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;

@@ -11,7 +11,7 @@ use crate::plural::count;
 pub(super) const LOGS_MAX: usize = 10_000;
 /// Remarks that are kept.
 pub const REMARKS_MAX: usize = 20;
-/// Maximum number of log files and images told apart by their file numbers.
+/// Maximum number of log files and images distinguished by their file numbers.
 const SEEN_MAX: usize = 200_000;
 /// Result of a search.
 #[derive(Clone, Debug, Default)]

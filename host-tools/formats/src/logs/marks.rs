@@ -7,11 +7,11 @@ use hums_core::clock::Instant;
 
 use crate::loss::lost;
 
-/// The number of the event that says that the vehicle was armed.
+/// The number of the event of arming.
 const ARMED: u8 = 1;
-/// The number of the event that says that it took off.
+/// The number of the event of a take-off.
 pub const TAKE_OFF: u8 = 3;
-/// The number of the event that says that it landed.
+/// The number of the event of a landing.
 pub const LANDING: u8 = 4;
 /// The number of the event for a missing or unusable card.
 pub(super) const CARD_OUT: u8 = 7;
@@ -38,13 +38,13 @@ pub struct Marks {
     /// Whether the last take-off or landing is a take-off. The box stores its counts of a flight at the
     /// landing.
     pub took_off: Option<bool>,
-    /// Frames and records that the recorder says it lost.
+    /// Frames and records that the recorder lost, by its own records.
     pub lost: u64,
     /// The log before on the card, as the last boot record found it.
     pub before: Option<Before>,
     /// No recorder made it: it was packed on a PC.
     pub packed: bool,
-    /// A box recorded it: it says how it started.
+    /// A box recorded it: it has the record of its start.
     pub has_boot: bool,
     /// The card refused blocks: its recorder found that.
     pub refused: bool,

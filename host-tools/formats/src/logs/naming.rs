@@ -93,14 +93,14 @@ pub fn part_name(whole: &Path) -> PathBuf {
     whole.with_extension("part.HUM")
 }
 
-/// The segment that a file's name says it is, or is a part of.
+/// The segment by a file's name, or by the name of a part of it.
 pub fn segment_or_part(path: &Path) -> Option<SegmentName> {
     let whole = |stem: &str| Some(path.with_file_name(stem.get(..stem.len().checked_sub(PART.len())?)?));
     let part = path.file_stem().filter(|_| is_part(path)).and_then(|stem| whole(stem.to_str()?));
     segment_name(part.as_deref().unwrap_or(path))
 }
 
-/// Whether a file's name says that it is a part of a log.
+/// Whether a file's name marks a part of a log.
 pub fn is_part(path: &Path) -> bool {
     let is_hum = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());

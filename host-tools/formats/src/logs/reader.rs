@@ -90,7 +90,7 @@ pub struct Summary {
     pub first_number: Option<u32>,
     /// The number of the last sector.
     pub last_number: Option<u32>,
-    /// Of that there is only a copy that was made while it was in progress.
+    /// The last sector is only a copy that was made while it was in progress.
     pub ends_partial: bool,
     /// Frames of the session before its first group, modulo 2^32.
     pub frames_before: Option<u32>,
@@ -238,7 +238,7 @@ struct Decoded<C> {
     sectors: u32,
     /// The number of its first sector.
     number: u32,
-    /// Frames that its sectors say they complete.
+    /// Frames that its sectors complete, by their own counts.
     frames_said: u32,
     /// Its first time and the count of frames before it; `None` if it cannot be decoded at all.
     begun: Option<(Instant, u32)>,
@@ -510,7 +510,7 @@ pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |epoch| epoch.is_none())
 }
 
-/// Looks at the starts of all groups, and at the last one's records for as long as `go_on` says so.
+/// Looks at the starts of all groups, and at the last one's records while `go_on` is true.
 fn last_epoch(log: &Log, go_on: impl Fn(Option<u64>) -> bool) -> Result<Option<u64>> {
     let mut groups = Groups::new(log);
     let mut decoder = Box::new(GroupDecoder::new());

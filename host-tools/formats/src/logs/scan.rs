@@ -1,7 +1,7 @@
 //! Searches every block of a card for sectors of logs, and puts those of each session in order.
 //!
-//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card with more is not
-//! ours, or hostile. Of too many sessions those with the most sectors stay, and the others are counted.
+//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card with more is not ours,
+//! or hostile. Of too many sessions, those with the most sectors are listed, and the others are counted.
 
 use std::collections::BTreeMap;
 use std::path::Path;

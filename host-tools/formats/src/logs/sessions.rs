@@ -17,7 +17,7 @@ const LOOK_BLOCKS: usize = 128;
 pub struct Sessions {
     /// The numbers of its logs, by the prefix of their names, and by the session in their sectors.
     logs: BTreeMap<(String, u32), Vec<u32>>,
-    /// Of logs that hold the same as another one: the name of that.
+    /// Logs with equal content: the name of the first one, by the name of the copy.
     again: BTreeMap<String, String>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(card.anew(), [(7, None, false, false)]);
         card.write(8, after(7, 7));
         assert_eq!(card.anew(), [(7, None, false, true)]);
-        // No log has the number before it: somebody gave it that name.
+        // No log has the number before it: the name is a user's.
         card.remove(6);
         assert_eq!(card.anew(), []);
         // All of the power-on before the oldest one that is there.

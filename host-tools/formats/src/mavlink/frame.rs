@@ -52,7 +52,7 @@ pub struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    /// Whether the checksum holds. Looks at every byte: not for those who know it already.
+    /// Whether the checksum holds. It takes time for every byte.
     pub fn check(&self) -> Check {
         if self.message().is_none() {
             return Check::Unknown;
@@ -87,7 +87,7 @@ pub fn peek(bytes: &[u8]) -> Peek<'_> {
     Peek::Frame(Frame { bytes: frame, id, sequence, system, component, payload })
 }
 
-/// The length of the frame that begins here, as its header says; `None` where none begins.
+/// The length of the frame that begins here, by its header;
 fn length(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [MAGIC_V1, length, ..] => Some(6 + usize::from(length) + 2),

@@ -12,7 +12,7 @@ pub enum Value<'a> {
     Scalar(Scalar),
     /// An array of numbers.
     Array(Array<'a>),
-    /// A `char` array up to its first NUL. Meant to be UTF-8, but vehicles send what they like.
+    /// A `char` array up to its first NUL. It should be UTF-8, but vehicles send any bytes.
     Text(&'a [u8]),
 }
 
@@ -68,7 +68,7 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// The payload of a frame whose checksum says that `message` is its definition.
+    /// The payload of a frame whose checksum matches the definition `message`.
     pub fn new(message: &'static Message, payload: &[u8]) -> Self {
         let mut bytes = [0; 256];
         let known = payload.len().min(usize::from(message.len_max));
@@ -107,9 +107,9 @@ fn value<'a>(field: &Field, bytes: &'a [u8]) -> Value<'a> {
     }
 }
 
-/// `bytes` are as many as the kind has; a definition cannot say otherwise.
+/// `bytes` has the length of the kind, by its definition.
 fn scalar(kind: Kind, bytes: &[u8]) -> Scalar {
-    /// Of a known number, so that none of them is counted: a table has millions.
+    /// A known number of bytes, without a count at run time: a table has millions of values.
     fn these<const N: usize>(bytes: &[u8]) -> [u8; N] {
         bytes.first_chunk().copied().unwrap_or([0; N])
     }

@@ -1,10 +1,9 @@
-//! The autopilot's own time in a ground station's recording: it tells a joint of two recordings from a clock
+//! The autopilot's own time in a ground station's recording: it distinguishes a joint of two recordings from a clock
 //! that was set.
 //!
-//! If a ground station's clock falls, or jumps by more than an hour, it was set, or another recording was
-//! joined on. The autopilot's messages have its time since power-on. If that time goes on, so does the
-//! recording. If it changes too, this is another recording: a restart in the air just when a clock is set is
-//! too unlikely.
+//! If a ground station's clock falls, or jumps by more than an hour, it was set, or another recording was joined on.
+//! The autopilot's messages have its time since power-on. If that time goes on, so does the recording. If it changes
+//! too, this is another recording: a restart in the air just when a clock is set is too unlikely.
 
 use std::collections::VecDeque;
 use std::io::Read;

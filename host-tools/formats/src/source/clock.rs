@@ -33,7 +33,7 @@ const SERIES_MAX: usize = 65_537;
 pub struct Stamp {
     /// Microseconds, by whatever clock the recording has.
     pub us: u64,
-    /// Of which messages it is one: a type of message, a topic. Small numbers.
+    /// The series of messages that it belongs to: a type of message, a topic. Small numbers.
     pub series: usize,
 }
 
@@ -49,7 +49,7 @@ pub struct Ahead {
 /// Differences between formats.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
-    /// The first time is the stream's time zero, whatever it says; otherwise times count from a power-on.
+    /// The first time is the stream's time zero, whatever its value; otherwise times count from a power-on.
     pub from_first: bool,
     /// A time that is behind may be an old value.
     pub old_values: bool,
@@ -86,7 +86,7 @@ pub enum Reading {
     Sound(Moment),
     /// It is an old value, and counts as now.
     Old,
-    /// The times around it say that it is wrong. Whether one of the same series had counted before it.
+    /// The times around it contradict it. Whether one of the same series had counted before it.
     Wrong {
         /// A time of the same series has counted.
         known: bool,

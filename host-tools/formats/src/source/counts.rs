@@ -15,7 +15,7 @@ const FAR_MAX: usize = 4_096;
 pub(super) struct Counts {
     near: Vec<Amount>,
     far: BTreeMap<(u32, bool), Amount>,
-    /// Of the ids beyond these.
+    /// Amount for all further ids.
     other: Amount,
 }
 

@@ -21,7 +21,7 @@ pub const RUN: i32 = 8;
 pub const DISORDER_US: u64 = 200_000;
 /// Times that are not further apart go on from each other.
 const GOES_ON_US: u64 = 500_000;
-/// A time that is not further from the next right one is out of order: slow topics come so late.
+/// A time within this of the next right one is only out of order: slow topics come late.
 const FAR_US: u64 = 800_000;
 
 /// Value of each time in a row.
@@ -70,7 +70,7 @@ impl Question<'_> {
     /// Whether the first of the times is wrong: the longest row goes on without it.
     pub fn is_wrong(&self) -> bool {
         let Some(&asked) = self.times.first() else { return false };
-        // Of rows that end with each time: the best with the first time in it, and the best without.
+        // For each time, two rows that end there: the best with the first time in it, and the best without.
         let mut rows: Vec<(Option<i32>, Option<i32>)> = Vec::with_capacity(self.times.len());
         // All until now go on from the first one.
         let mut climbs = true;

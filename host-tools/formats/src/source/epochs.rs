@@ -10,14 +10,14 @@ const PARTS_MAX: usize = 10_000;
 /// UTC at time zero by the clock of each part, microseconds since 1970; the parts begin with each restart of the clock.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Epochs {
-    /// Of the first part.
+    /// UTC of the first part's time zero.
     first_us: Option<u64>,
     /// When each later part began, and its UTC.
     later: Vec<(Instant, Option<u64>)>,
 }
 
 impl Epochs {
-    /// Of a log that has one clock, with this UTC at time zero.
+    /// For a log with one clock, with this UTC at time zero.
     pub fn of(epoch_us: Option<u64>) -> Self {
         Self { first_us: epoch_us, later: Vec::new() }
     }

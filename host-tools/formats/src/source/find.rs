@@ -126,7 +126,7 @@ impl Found {
         }
     }
 
-    /// Of several vehicles in each recording only that with this system id.
+    /// Reads only the vehicle with this system id.
     pub fn of_system(mut self, system: Option<u8>) -> Result<Self> {
         if let Some(own) = self.places.iter().find(|place| system.is_some() && place.own().is_some()) {
             return Err(usage(format!(
@@ -284,7 +284,7 @@ pub fn sessions_of(places: &[Place]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }
 
-/// Whether a file is a log of ours or a card's image.
+/// Whether a file is a HUMS log or a card's image.
 fn is_own(path: &Path) -> Result<bool> {
     const START_BYTES: usize = 512;
     // Nearly every recording of an autopilot: its first bytes show it, without a search for a sector or a
@@ -307,7 +307,7 @@ fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     Some(start)
 }
 
-/// The error without a log of ours, for a command that reads only those: it names an input that is another
+/// The error for inputs without a HUMS log, for a command that reads only those. It names an input that is another
 /// kind of recording.
 pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
     let is_ours = |input: &Path| input.is_dir() || is_own(input).unwrap_or(false);
@@ -327,8 +327,8 @@ pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// The error for a large file that may be a card without its first blocks. The user may have named another
-/// file by mistake, so the error does not say only that the card is empty.
+/// The error for a large file that may be a card without its first blocks. The user may have named a wrong file, so
+/// the error mentions both.
 fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
     if matches!(logs::find::look(path), Ok(Content::Image)) && !logs::is_card(path).unwrap_or(true) {
         return error.context(format!("{}: is no log of HUMS, and not {KNOWN}; as a card", path.display()));

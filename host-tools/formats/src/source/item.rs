@@ -210,8 +210,8 @@ pub enum Kind {
     Bytes,
 }
 
-/// One row, with one value for each column of its table. The value is of its column's kind or
-/// [`Value::Unknown`]; or [`Value::Text`], if a text log has a word in place of a number.
+/// One row, with one value for each column of its table. The value is of its column's kind or [`Value::Unknown`]; or
+/// [`Value::Text`], if a text log has a text in place of a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
     /// Its table. The same table is the same `Arc`.
@@ -256,7 +256,7 @@ pub struct Gap {
     pub bytes: u64,
     /// The data found there, as the end of a sentence: `a length of 3 bytes for FMT`.
     pub words: String,
-    /// The gap in the form of a log of ours, with counts of sectors and frames.
+    /// The gap as in a HUMS log, with counts of sectors and frames.
     pub own: Option<hums_blackbox::Gap>,
 }
 
@@ -300,7 +300,7 @@ pub enum Cause {
     Damaged,
     /// The file ends in the middle of something.
     Cut,
-    /// The recorder lost something while it recorded, and says so.
+    /// The recorder lost something while it recorded, by its own record.
     Lost,
     /// The recorder left it out on purpose.
     NotKept,
@@ -317,7 +317,7 @@ impl Cause {
         matches!(self, Self::Damaged | Self::Cut | Self::Silent | Self::NoTimes)
     }
 
-    /// In a word, for tables and JSON.
+    /// The name, for tables and JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Damaged => "damaged",
@@ -438,7 +438,7 @@ pub struct Summary {
     pub messages: Vec<MessageCount>,
     /// Messages of further ids, beyond the limit of ids counted one by one.
     pub other_messages: Amount,
-    /// Invalid frames in entries of a log of ours.
+    /// Invalid frames in entries of a HUMS log.
     pub not_frames: u64,
     /// The first and the last time of the frames, rows and observations that were handed on.
     pub span: Option<(Instant, Instant)>,
@@ -446,7 +446,7 @@ pub struct Summary {
     pub gaps: u64,
     /// Losses reported by the recorder.
     pub losses: u64,
-    /// The evidence of its end, for a log of ours.
+    /// The evidence of its end, for a HUMS log.
     pub ending: Option<Ending>,
 }
 

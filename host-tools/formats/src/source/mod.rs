@@ -75,7 +75,7 @@ use input::Input;
 
 pub use recording::RAW_BAUD;
 
-/// The way back to a source that hears.
+/// The way back to a source that receives.
 pub type Way = Box<dyn Write + Send>;
 
 /// Which times count.

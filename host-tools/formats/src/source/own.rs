@@ -24,7 +24,7 @@ use crate::plural::{are, count};
 /// The note in a packed log behind which another recording goes on: the input was joined of several.
 pub const JOINED: &str = "another recording begins here: the input was joined of several";
 
-/// A session of a log of ours.
+/// A session of a HUMS log.
 pub struct OwnReader {
     log: Log,
     progress: Progress,
@@ -174,7 +174,7 @@ struct Kept {
 }
 
 enum Stored {
-    /// A frame, which ends here in `bytes`; all that it says is made of it later.
+    /// A frame, which ends here in `bytes`; it is read later.
     Frame(Check, usize),
     Observation(Source, Box<Observation>),
     /// A record, which ends here in `bytes`.

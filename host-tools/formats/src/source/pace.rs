@@ -29,7 +29,7 @@ pub const SLOWER: u64 = 100;
 const WITNESSED: Span = Span::from_secs(10);
 /// A larger jump means that the other clock itself was set.
 const APART: Span = Span::from_secs(60);
-/// A clock that falls so often, ...
+/// A clock that falls this often, ...
 const FALLS: u32 = 8;
 /// ... with less than this between, runs backwards.
 const BETWEEN: Span = Span::from_secs(5);

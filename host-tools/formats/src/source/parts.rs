@@ -1,6 +1,6 @@
 //! The stream in parts, for commands that compute much for each item and put the results in order afterwards.
 //!
-//! A log of ours is decoded group by group, several in parallel, and the results of a group's items are made
+//! A HUMS log is decoded group by group, several in parallel, and the results of a group's items are made
 //! there too. So `decode` and `info` use all cores. Such a command has a [`Collect`] for each part, and a
 //! [`Deliver`] that gets the parts in their order. A recording of another format is one row of items: it is
 //! cut into parts of bounded size, on one thread.

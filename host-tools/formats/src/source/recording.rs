@@ -31,7 +31,7 @@ pub struct Place {
     pub title: String,
     /// A name for files made of it, unique within one call: the file's own, or a session's as in `hums info`.
     pub name: String,
-    /// Of several vehicles in it only that with this system id is read ([`Want::system`]).
+    /// Only the vehicle with this system id is read ([`Want::system`]).
     pub system: Option<u8>,
     source: From,
 }
@@ -55,7 +55,7 @@ impl Place {
         }
     }
 
-    /// A file other than a log of ours.
+    /// A file other than a HUMS log.
     pub fn file(path: &Path) -> Self {
         let name = path.file_name().map_or_else(|| "recording".into(), |name| name.to_string_lossy());
         Self {
@@ -66,12 +66,12 @@ impl Place {
         }
     }
 
-    /// A session of a log of ours.
+    /// A session of a HUMS log.
     pub fn log(title: String, log: Log) -> Self {
         Self { title, name: log.name.clone(), system: None, source: From::Log(Box::new(log)) }
     }
 
-    /// The log of ours, if it is one.
+    /// The HUMS log, if it is one.
     pub fn own(&self) -> Option<&Log> {
         match &self.source {
             From::Log(log) => Some(log),
@@ -124,7 +124,7 @@ impl Place {
         Ok(Recording { system: self.system, ..recording })
     }
 
-    /// Reads a log of ours in parts, as [`Self::in_parts`] does, and also hands on its items in order: one
+    /// Reads a HUMS log in parts, as [`Self::in_parts`] does, and also hands on its items in order: one
     /// reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
@@ -233,7 +233,7 @@ impl Recording {
         Ok(Self { format: format.format(), progress, name: name.to_owned(), system: None, reader })
     }
 
-    /// Reads it from its beginning to its end, or until `take` says [`Stop`].
+    /// Reads it from its beginning to its end, or until `take` returns [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let want = Want { system: self.system, ..want };
         let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());

@@ -1,4 +1,4 @@
-//! Reports of a log of ours besides frames, as far as a command that reads recordings uses them.
+//! Records of a HUMS log besides frames, for commands that read recordings.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Lost, Why};
@@ -118,7 +118,7 @@ impl Told {
                 let (value, start) = (parameter.value as f32, !parameter.changed);
                 Some(Self::Parameter { name: parameter.name.to_owned(), value, start })
             }
-            // Of a part that was replaced the figures are those of the old one.
+            // After a replacement, the figures belong to the old part.
             Record::Component(recorded) => {
                 let place = usize::from(recorded.place);
                 let mut component = Component::NONE;

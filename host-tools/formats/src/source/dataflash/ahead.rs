@@ -1,4 +1,4 @@
-//! The times of the next messages: they tell a jump of the clock from a single damaged time.
+//! The times of the next messages: they distinguish a jump of the clock from a single damaged time.
 
 use std::collections::BTreeMap;
 

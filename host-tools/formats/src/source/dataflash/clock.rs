@@ -55,7 +55,7 @@ pub(super) enum Own {
     None,
     /// It counts.
     Sound,
-    /// The times around it say that it is wrong: the message is likely damaged.
+    /// The times around it contradict it: the message is likely damaged.
     Wrong,
 }
 

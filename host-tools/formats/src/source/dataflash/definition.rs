@@ -17,7 +17,7 @@ pub(super) fn definition(message: &Message<'_>) -> Option<Format> {
         .or_else(|| message.text(4).map(|words| shortened(&words)))
         .unwrap_or_default();
     let (kind, length) = (byte(message, "Type")?, byte(message, "Length")?);
-    // A text log's lines have no length, whatever it says of one.
+    // A text log's lines have no length, whatever its definitions have.
     let length = if message.is_words() && kind != FMT_TYPE { 0 } else { length };
     let (name, characters) = (words(message, "Name")?, words(message, "Format")?);
     Some(Format::new(kind, length, &name, characters.as_bytes(), &columns))

@@ -65,7 +65,7 @@ const COLUMNS_BYTES: usize = 64;
 pub(super) const ARRAY_LENGTH: usize = 32;
 
 impl FieldKind {
-    /// Of a format character.
+    /// The kind of a format character.
     fn of(character: u8) -> Option<Self> {
         Some(match character {
             b'b' => Self::I8,
@@ -145,7 +145,7 @@ pub(super) struct Format {
     pub(super) kind: u8,
     /// Its name: `ATT`.
     pub(super) name: String,
-    /// Its length with its header, as FMT says.
+    /// Its length with its header, by FMT.
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
@@ -357,7 +357,7 @@ impl Formats {
         Self { units, unit_names, multipliers, has_boot_clock, ..Self::new() }
     }
 
-    /// Takes a definition. FMT itself stays as it is.
+    /// Takes a definition. The definition of FMT itself is fixed.
     pub(super) fn define(&mut self, format: Format) -> Defined {
         let place = usize::from(format.kind);
         if format.kind == FMT_TYPE {

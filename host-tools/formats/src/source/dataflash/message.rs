@@ -23,7 +23,7 @@ pub(super) enum Body<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// A message that says this.
+    /// A message of this format.
     pub(super) const fn new(format: &'a Format, body: Body<'a>) -> Self {
         Self { format, body }
     }
@@ -62,7 +62,7 @@ impl<'a> Message<'a> {
         Some(single).filter(|single| single.is_finite())
     }
 
-    /// A word in the place of a number in a text log.
+    /// A text in the place of a number, in a text log.
     pub(super) fn no_number(&self, column: usize) -> Option<&'a str> {
         match self.body {
             Body::Bytes(_) => None,

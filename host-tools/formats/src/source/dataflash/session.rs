@@ -177,7 +177,7 @@ pub(super) struct Session<'w> {
     clock: Clock,
     handlers: Handlers,
     tables: Tables,
-    /// Of each type, whether anything is to be done with its messages; not yet known after a definition.
+    /// For each type, whether its messages are needed; not yet known after a definition.
     needed: Vec<Option<bool>>,
     /// Messages and their bytes by type, those of a name that a type had before.
     counts: Vec<(u64, u64)>,

@@ -12,7 +12,7 @@ fn record(tenth: &u64) -> Vec<u8> {
     [&(1_700_000_000 * SECOND + tenth * SECOND / 10).to_be_bytes()[..], &HEARTBEAT].concat()
 }
 
-/// Of a tlog with these times, in tenths of seconds: gaps, restarts, and the last time in tenths.
+/// Results for a tlog with these times, in tenths of seconds: gaps, restarts, and the last time in tenths.
 fn told(tenths: &[u64]) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
     told_of(tenths.iter().flat_map(record).collect())
 }
@@ -254,7 +254,7 @@ fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_an
             let ends = (at + 1..60).any(|next| place(next + 1) - place(at + 1) == longer as u64);
             swallow += usize::from(ends);
             let (frames, gaps) = frames_and_gaps(bytes);
-            // Of the record, or of its frame.
+            // The place of the record, or of its frame.
             let is_told =
                 gaps.iter().any(|gap| [place(at), place(at) + TIME_BYTES as u64].map(Some).contains(&gap.1));
             assert!(frames == 59 && is_told, "{at} {length}: {frames} {gaps:?}");

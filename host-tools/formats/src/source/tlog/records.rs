@@ -13,7 +13,7 @@ pub(in crate::source) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
 /// Enough to see a record and the header of the next one.
 const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
-/// Enough to see those after it too that are asked whether its time is right, behind damage as well.
+/// Enough to see the records that confirm a time, behind damage as well.
 const AHEAD_BYTES: usize = 256 * 1024;
 /// After this many bytes without a record, the rest is not part of the log.
 const NOTHING_BYTES: usize = 64 * 1024;
@@ -48,12 +48,12 @@ pub struct Records<R> {
 }
 
 impl<R: Read> Records<R> {
-    /// Reads from `input`, no further than needs be: somebody may be writing it.
+    /// Reads from `input`, no further than necessary: another program may be writing it.
     pub fn new(input: R) -> Self {
         Self { input, buffer: Vec::new(), at: 0, ended: false, ahead_bytes: RECORD_BYTES }
     }
 
-    /// Reads from `input`, and further on, so that those that follow can be asked.
+    /// Reads from `input`, and further on, so that the following records can confirm a time.
     pub(in crate::source) fn ahead(input: R) -> Self {
         Self { ahead_bytes: AHEAD_BYTES, ..Self::new(input) }
     }
@@ -82,7 +82,7 @@ impl<R: Read> Records<R> {
         found
     }
 
-    /// Hands on the next records until one says no; whether the recording ends with them.
+    /// Hands on the next records until `each` returns `false`. Returns whether the recording ends with them.
     pub(in crate::source) fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
         let (mut rest, mut nothing) = (self.rest(), 0);
         while !rest.is_empty() {

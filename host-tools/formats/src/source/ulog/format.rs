@@ -99,7 +99,7 @@ pub(super) enum FormatError {
     Malformed,
     /// There are too many already.
     TooMany,
-    /// It is there already, and says something else.
+    /// It exists already, with another definition.
     Redefined(String),
     /// No definition has this name.
     Unknown(String),

@@ -44,7 +44,7 @@ pub(super) enum Message<'a> {
     Unsubscribe(u16),
     /// `D`
     Data { id: u16, data: &'a [u8] },
-    /// `L`, and `C` with a tag: the module that says it.
+    /// `L`, and `C` with a tag: the module that sends it.
     Text { level: u8, tag: Option<u16>, time_us: u64, words: &'a [u8] },
     /// `O`, milliseconds.
     Dropout(u16),
@@ -73,7 +73,7 @@ impl<'a> Keyed<'a> {
         Some(Self { name, number: Number::named(kind), array, value })
     }
 
-    /// Whether the value is as long as its type says.
+    /// Whether the value has the length of its type.
     fn fits(&self) -> bool {
         self.number
             .is_some_and(|number| number.bytes() * self.array.unwrap_or(1) as usize == self.value.len())
@@ -217,7 +217,7 @@ impl Parser<'_> {
 
     fn believe<'a>(&self, kind: u8, body: &'a [u8]) -> Belief<'a> {
         if !could_be(kind, body.len()) {
-            // Kinds that are newer than this reader are to be ignored, says the format: letters, by all that came.
+            // By the format, newer kinds are ignored: letters, so far always.
             let newer = kind.is_ascii_alphabetic() && !KINDS.contains(&kind) && !body.is_empty();
             return if newer { Belief::Likely(Message::Unknown) } else { Belief::Not };
         }

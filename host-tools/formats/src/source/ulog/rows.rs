@@ -6,7 +6,7 @@ use super::format::{Field, Layout, Number};
 use super::message::words;
 use crate::source::item::{Columns, Kind, Table, Value};
 
-/// The column that tells the instances of a topic apart: the first one, as there may be two batteries.
+/// The column with the instance of a topic. It is the first one, as there may be two batteries.
 pub(super) const INSTANCE: &str = "multi_id";
 
 /// The table of a topic's rows.

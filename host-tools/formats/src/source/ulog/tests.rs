@@ -381,7 +381,7 @@ fn a_version_that_is_not_known_is_told_and_what_can_be_read_is() {
     let gap = &told.gaps[0];
     assert_eq!((gap.cause, gap.place, told.gaps.len()), (Cause::Damaged, Some(7), 1));
     assert!(gap.words.contains("version 9") && gap.words.contains("read as version 1"), "{gap:?}");
-    // Of a log that was joined on, too.
+    // The same for a joined log.
     let first = small().bytes;
     let told = read(&[&first[..], &of_version(2)].concat());
     assert_eq!(told.gaps.iter().map(|gap| gap.place).collect::<Vec<_>>(), [Some(first.len() as u64 + 7)]);

@@ -21,7 +21,7 @@ pub(super) enum Word {
     Unknown,
     /// From throttle and speed.
     Evidence,
-    /// The log says it.
+    /// By a message of the log.
     Told,
 }
 
@@ -71,7 +71,7 @@ impl Arming {
         (self.armed, self.first_told) = (Some(true), Some(true));
     }
 
-    /// A message says it.
+    /// Takes a message about arming.
     pub(super) fn tell(&mut self, armed: bool) {
         self.first_told.get_or_insert(armed);
         self.armed = Some(armed);

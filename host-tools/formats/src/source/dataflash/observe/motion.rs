@@ -34,7 +34,7 @@ const TOGETHER: Span = Span::from_secs(2);
 /// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
 /// forces of nearly all flights.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
-/// Sensors that feel the same shock say so within this.
+/// Sensors that feel the same shock report it within this time.
 const AT_ONCE: Span = Span::from_millis(100);
 /// Angles beyond this are invalid.
 const TURN_DEG: f32 = 360.0;
@@ -266,7 +266,7 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if let Some(rate) = rate.filter(|_| instance == 0) {
         state.gyro.set(given.at, norm(rate.map(|axis| axis.0)));
     }
-    // A sensor without a thermometer says 0.
+    // A sensor without a thermometer has 0.
     let temperature = given.single(7).filter(|celsius| *celsius != 0.0).map(Celsius);
     let field = state.fields.get_mut(usize::from(instance)).and_then(Option::take);
     out.observe(&Observation::Imu(Imu { instance, acceleration, rate, field, temperature }));

@@ -112,7 +112,7 @@ fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         consumed: consumed_mah.map(|mah| AmpereHours(mah / 1e3)),
         energy: given.single(4).map(WattHours),
         remaining: remaining.map(Fraction),
-        // A battery without a thermometer says 0.
+        // A battery without a thermometer has 0.
         temperature: given.single(5).filter(|celsius| *celsius != 0.0).map(Celsius),
         ..Battery::default()
     }));

@@ -56,7 +56,7 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         "AHRS_EKF_TYPE" => facts.estimator = Some(number),
         // Before 2016: 0 if the older estimator (DCM) is in use, and the filter runs beside it.
         "AHRS_EKF_USE" => facts.estimator = if number == 0 { Some(0) } else { facts.estimator },
-        // Of helicopters alone; the name of the firmware is a copter's.
+        // Only helicopters have these parameters; the name of the firmware is a copter's.
         "H_RSC_MODE" | "H_SV_MAN" if matches!(facts.craft, Craft::Unknown | Craft::Copter) => {
             facts.craft = Craft::Heli;
         }

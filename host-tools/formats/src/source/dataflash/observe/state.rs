@@ -88,7 +88,7 @@ pub(super) enum ToldArming {
     /// Nowhere, as far as the file is known.
     #[default]
     Nowhere,
-    /// In the first part of the file; the first of them says this.
+    /// In the first part of the file; its value is that of the first message.
     First(bool),
     /// Before the last power-on that the file holds.
     Before,
@@ -157,7 +157,7 @@ pub(in crate::source::dataflash) struct State {
     pub(super) voltage: Dated<f32>,
     pub(super) current: Dated<f32>,
     pub(super) remaining: Dated<f32>,
-    /// Sensors that say that they are not healthy: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
+    /// Unhealthy sensors, by their own flags: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
     pub(super) unhealthy: [u32; INSTANCES],
     pub(super) rates: Dated<Rates>,
     /// The first gyro's rate, rad/s, and the unit of `RATE` by it.
@@ -488,7 +488,7 @@ impl State {
         })
     }
 
-    /// A sensor says whether it is healthy. `bit` is its bit in `MAV_SYS_STATUS_SENSOR`.
+    /// Takes a sensor's flag of its health. `bit` is its bit in `MAV_SYS_STATUS_SENSOR`.
     pub(super) fn health(&mut self, instance: u8, bit: u32, healthy: Option<f32>) {
         if let (Some(bits), Some(healthy)) = (self.unhealthy.get_mut(usize::from(instance)), healthy) {
             *bits = if healthy == 0.0 { *bits | bit } else { *bits & !bit };

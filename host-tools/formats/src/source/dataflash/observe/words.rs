@@ -115,7 +115,7 @@ pub fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
     craft.mode_name(number)
 }
 
-/// Whether these words are the name and the version of a firmware of `ArduPilot`, as it says them when it starts.
+/// Whether a text is the name and version of an `ArduPilot` firmware, as at its start.
 pub(in crate::source) fn is_firmware(words: &str) -> bool {
     Craft::of_firmware(words).is_some()
 }

@@ -109,7 +109,7 @@ fn a_wrong_time_of_the_last_messages_is_told_and_a_saved_parameter_after_half_a_
         tenths(&mut log, 300 - count..300);
         for message in 0..count {
             let tenth = (300 - count + message) as f64 / 10.0;
-            // Of the last tenths, those of whole seconds would have an attitude each.
+            // Tenths of whole seconds would have an attitude each.
             set_time(&mut log, last + message as usize * 12, tenth + shift);
         }
         let (gaps, restarts, end) = told(&log.bytes);

@@ -531,7 +531,7 @@ fn imu_status(px4: &mut Px4, said: &Said<'_>) {
         *clips = sum as u32;
     }
     let id = fields.count(0);
-    // A log that does not say which one flies has one, or the first one flies.
+    // A log without the id of the one in use has one, or the first one is in use.
     let flies =
         px4.motion.accelerometer.map_or(said.instance == 0, |accelerometer| id == Some(accelerometer));
     if flies {

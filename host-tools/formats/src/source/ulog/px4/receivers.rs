@@ -1,8 +1,8 @@
 //! GNSS receivers.
 //!
-//! Since v1.12 each receiver is an instance of `sensor_gps`, and `vehicle_gps_position` is the estimator's
-//! input; before, each is an instance of the latter. MAVLink sends the receivers, and reports "no receiver"
-//! after a second of silence. In a log, where receivers have one message a second, it takes [`SILENCE`].
+//! Since v1.12 each receiver is an instance of `sensor_gps`, and `vehicle_gps_position` is the estimator's input;
+//! before, each is an instance of the latter. MAVLink sends the receivers, and reports "no receiver" after a second
+//! of silence. In a log, in which receivers have one message a second, it takes [`SILENCE`].
 
 use std::num::NonZeroU32;
 
