@@ -1,4 +1,4 @@
-//! The `hums` command: the pipeline of the firmware on this PC, and everything that reads what it wrote.
+//! The `hums` command: the pipeline of the firmware on this PC, and all readers of its output.
 
 #![deny(
     clippy::print_stderr,

@@ -37,12 +37,12 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let mut inputs = Inputs::none().forcing(args.force);
     inputs.add_endpoint(&input);
     let source = source::open(&input, Timing { line_rate: None })?;
-    // Raw bytes have the times that the autopilot tells, as in `check`.
+    // Raw bytes have the autopilot's times, as in `check`.
     let mut source: Box<dyn Source> =
         if source.has_records() { source } else { Box::new(Booted::new(source)) };
     let context = || cannot_write(&path);
     let read = || format!("{name}: cannot be read");
-    // What waits for its first byte, as a pipe may for ever, leaves nothing behind.
+    // A pipe may wait for its first byte for ever, so no file is made before it.
     let (mut first, mut hash, mut bytes) = (VecDeque::new(), Sha256::new(), 0);
     while bytes < FIRST_BYTES
         && let Some(chunk) = source.next().with_context(read)?
@@ -136,7 +136,7 @@ fn session_of(hash: Sha256) -> u32 {
     u32::from_be_bytes(number) | 1
 }
 
-/// What packing did.
+/// The result of packing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Done {
     frames: u64,

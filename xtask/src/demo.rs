@@ -153,7 +153,7 @@ fn decode(card: &Path, to: &Path) -> Result<String> {
     done(decode.args(["--format", "tlog,csv"])).context("the card cannot be decoded")
 }
 
-/// The output of a command; losses are told, and no failure: so is a recording that ends in the air.
+/// The output of a command. Losses are reported and are no failure; nor is a recording that ends in the air.
 fn done(command: Shell) -> Result<String> {
     match command.output_and_code()? {
         (text, 0 | DONE_WITH_LOSSES) => Ok(text),

@@ -57,7 +57,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     wine::try_out(&wine, &windows, &repo::root().join(FAULTY))?;
     let elsewhere = env::temp_dir().join(format!("hums-built-again-{}", std::process::id()));
     let again = Release::new(&commit, &elsewhere).and_then(|release| release.make());
-    // Gigabytes, and of no use to anybody, whatever came of it.
+    // It has gigabytes of no further use.
     fs::remove_dir_all(&elsewhere).with_context(|| format!("cannot remove {}", elsewhere.display()))?;
     let again = again?;
     let different = differences(&files, &again);
@@ -168,7 +168,7 @@ impl Release {
         Ok((format!("{name}.cdx.json"), text.into_bytes()))
     }
 
-    /// Information for a person who wants to build the same.
+    /// Information for a reproduction of the build.
     fn provenance(&self) -> Result<String> {
         let rustc = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
         let rustc = rustc.args(["--version", "--verbose"]).output()?;
@@ -240,8 +240,8 @@ fn without_std() -> Result<()> {
         .run()
 }
 
-/// Licences, bans and sources of the dependencies are those of deny.toml. Advisories need a network, which may be missing, and
-/// appear on their own day: told, and never a failure.
+/// Licences, bans and sources of the dependencies are those of deny.toml. Advisories need a network, which may be
+/// missing, and appear at any time: they are reported, and never a failure.
 fn dependencies() -> Result<()> {
     let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
     deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;

@@ -59,8 +59,8 @@ impl Board {
     }
 }
 
-/// The compiler's flags of everything that is released from `tree`, as cargo takes them. Paths of the machine are replaced by
-/// `/hums` and `/cargo`: who builds the same commit elsewhere gets the same bytes.
+/// The compiler's flags of everything that is released from `tree`, as cargo takes them. Paths of the machine are
+/// replaced by `/hums` and `/cargo`: the same commit gives the same bytes everywhere.
 pub(crate) fn flags(tree: &Path) -> Result<OsString> {
     let cargo_home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let cargo_home = cargo_home.or_else(|| Some(env::home_dir()?.join(".cargo")));

@@ -9,7 +9,8 @@ use crate::repo;
 #[path = "../../host-tools/grafana/resolve.rs"]
 mod resolve;
 
-/// Writes the dashboards into the folders of the databases, beside their data sources, where `compose.yaml` takes them.
+/// Writes the dashboards into the folders of the databases, beside their data sources: `compose.yaml` takes them from
+/// there.
 pub(crate) fn write() -> Result<()> {
     let folder = repo::root().join("host-tools/grafana");
     for name in ["flight.json", "health.json"] {

@@ -7,13 +7,13 @@ use anyhow::Result;
 use crate::repo;
 use crate::shell::Shell;
 
-/// The build that the tests share (profile `dev`, optimised as `Cargo.toml` says); returns the program's path.
+/// Builds the program that the tests share (profile `dev`, optimised as in `Cargo.toml`); returns its path.
 pub(crate) fn build() -> Result<PathBuf> {
     Shell::cargo().args(["build", "--package=hums"]).run()?;
     Ok(program())
 }
 
-/// Where [`build`] leaves the program.
+/// The program's path after [`build`].
 pub(crate) fn program() -> PathBuf {
     repo::target().join("debug/hums")
 }

@@ -1,7 +1,7 @@
 //! Requirements of the other commands: a table with purpose, search and installation of each.
 //!
-//! Rust's own parts come from `rustup`, the rest from `apt-get` as root or by a `sudo` that asks for no password. Where that is
-//! not possible, or with `HUMS_SETUP=never` in the environment, the command to type is printed.
+//! Rust's own parts come from `rustup`, the rest from `apt-get` as root or by a `sudo` that asks for no password.
+//! Otherwise, or with `HUMS_SETUP=never` in the environment, the command to type is printed.
 
 use std::collections::BTreeSet;
 use std::env;

@@ -87,7 +87,7 @@ struct LogJson {
     worst: Option<WorstJson>,
     /// `null` if not counted.
     checks_judged: Option<usize>,
-    /// Of this many.
+    /// The number of all checks.
     checks_all: Option<usize>,
     /// The vehicle was first received in the air.
     begins_in_air: bool,

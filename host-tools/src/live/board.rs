@@ -59,7 +59,7 @@ pub struct Board {
 #[derive(Clone, Copy)]
 struct Known {
     level: Level,
-    /// Whether any has something to say.
+    /// Whether any of them has a report.
     is_heard: bool,
     /// Checks that are good, each once, however many parts it is of.
     good: usize,
@@ -154,7 +154,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     let onboard = craft.companion.level(now, subsystem);
     let recorder = subsystem == Subsystem::Recorder;
     let silent = is_silent(craft, now);
-    // Of a vehicle that is silent one thing is known: that it is.
+    // Only the silence of a silent vehicle is known.
     let unknown = recorder || (silent && (subsystem != Subsystem::Link || !craft.on_the_wire));
     let here = if unknown { Level::Stale } else { known.level };
     let before = craft.worries.values().filter(|finding| silent && is_bad(finding));
@@ -256,7 +256,7 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
         (_, Level::Ok) if good == 1 => "its check is good".to_owned(),
         (_, Level::Ok) if good > 0 => format!("all {good} checks good"),
         (_, Level::Ok) => "within its limits".to_owned(),
-        // The box hears more than this PC does.
+        // The box receives more than this PC does.
         _ if here == Level::Ok => "seen on board; within limits by what this link carries".to_owned(),
         _ => "seen on board".to_owned(),
     }

@@ -60,7 +60,7 @@ pub struct Craft {
     pub speed_sensors: [Option<(Instant, f32)>; 2],
     /// The last finding of each check that is not well.
     pub worries: BTreeMap<(&'static str, u8), Finding>,
-    /// Of those that were not well, and are not judged any more: until it is armed again, or they are good.
+    /// Findings that were not good, and are no longer judged: until it is armed again, or they are good.
     pub unjudged: BTreeMap<(&'static str, u8), Finding>,
     /// The cell count of its battery is unknown, and the vehicle flies or will not report it.
     pub cells_unknown: bool,
@@ -316,7 +316,7 @@ impl Craft {
             keep(history, now, Note::finding(now, &finding).of_part(self.due(&finding).as_ref()));
         }
         self.happenings(now, history);
-        // Snapshots are not used here, and are made again.
+        // Snapshots are not used here and are dropped; the monitor makes new ones.
         while self.monitor.take_snapshot(now.into()).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
         if let Some(history) = history {

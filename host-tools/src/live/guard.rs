@@ -76,7 +76,7 @@ impl Guard {
 fn host(headers: &HeaderMap) -> Option<&str> {
     let mut hosts = headers.get_all(header::HOST).iter();
     let host = hosts.next()?.to_str().ok()?;
-    // Two of them are somebody's trick.
+    // Two of them are an attack.
     hosts.next().is_none().then_some(host)
 }
 

@@ -1,5 +1,5 @@
-//! Playback of an autopilot's own log. It has no frames for a file of ours ([`super::spool`]). So a thread
-//! reads it again from its beginning to the requested place, a little ahead.
+//! Playback of an autopilot's own log. It has no frames for a file in [`super::spool`]. So a thread reads it again
+//! from its beginning to the requested place, a little ahead.
 
 use std::collections::VecDeque;
 use std::io;

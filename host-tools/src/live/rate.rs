@@ -10,7 +10,7 @@ pub const PUBLISH: Duration = Duration::from_millis(50);
 pub struct Rate {
     since: Wall,
     frames: u64,
-    /// Of the last whole second.
+    /// Frames in the last whole second.
     pub frames_s: f64,
 }
 

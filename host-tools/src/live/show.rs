@@ -31,7 +31,7 @@ pub struct SourceJson {
     pub words: String,
     /// The end of a HUMS log, in words.
     pub log_end: Option<String>,
-    /// Of reading, 0 to 1.
+    /// Progress of reading, 0 to 1.
     pub progress: f64,
     /// A recording's beginning and end, seconds.
     pub start_s: f64,

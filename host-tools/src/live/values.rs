@@ -52,7 +52,7 @@ pub struct Values<'a> {
 }
 
 impl<'a> Values<'a> {
-    /// Of a vehicle.
+    /// The values of a vehicle.
     pub fn of(craft: &'a Craft, now: Instant) -> Self {
         Self { craft, now }
     }

@@ -561,7 +561,7 @@ mod tests {
         assert!(world.crafts[&1].knows_life(0));
         assert_eq!(world.crafts[&1].monitor.component_used_percent(0), Some(0.0));
 
-        // A later file of the log repeats the table; the part stays as it is.
+        // A later file of the log repeats the table; the part is unchanged.
         world.told(Instant::from_millis(3_500), &motor(), None);
         tell_limits(&mut world);
         world.advance(Instant::from_millis(4_000), Some(&mut histories));

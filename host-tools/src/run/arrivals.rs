@@ -30,7 +30,7 @@ pub struct Arrivals {
     waiting: VecDeque<Chunk>,
     tap: Beside,
     bytes: u64,
-    /// To the autopilot, where there is a live one.
+    /// The way to the autopilot, if a live one is connected.
     autopilot: Option<Box<dyn Write + Send>>,
     /// The run was ended before its end.
     broken_off: bool,
@@ -99,7 +99,7 @@ impl Arrivals {
         Ok(self.waiting.pop_front())
     }
 
-    /// The run is over: the copy of the bytes is whole, unless something failed, which was said.
+    /// The end of the run: the copy of the bytes is complete, or its error was reported.
     pub fn finish(&self) -> Outcome {
         self.tap.finish()
     }
@@ -162,7 +162,7 @@ fn until_frame(
     Err(source::no_frame(input))
 }
 
-/// A file for a copy of the bytes, which is none of the inputs.
+/// A file for a copy of the bytes. It must not be one of the inputs.
 fn tap_of(path: &Path, inputs: &Inputs) -> Result<Beside> {
     Ok(Beside::file("--tap", Output::create(path, inputs)?))
 }

@@ -1,6 +1,6 @@
 //! The sessions that are on a card before a run. A card without room makes the recorder overwrite the oldest of them:
-//! right on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full, unless it is
-//! told to. Overwritten logs are reported by session.
+//! right on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full, unless a flag
+//! allows it. Overwritten logs are reported by session.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::source::input::Input;
 /// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
 const SEGMENTS_MIN: u64 = 16;
 
-/// A session by its name on the card and by what its sectors name, with how many files it has.
+/// A session by its name on the card and by the number in its sectors, with the number of its files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Session {
     name: String,

@@ -20,7 +20,7 @@ pub struct Ground {
     got: Beside,
 }
 
-/// Opens both directions as the command line says it. Outputs must differ from the inputs.
+/// Opens both directions by the command line. Outputs must differ from the inputs.
 pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
     let sink::Ground { writer, heard } = match &run.gs {
         Some(endpoint) => sink::open(endpoint, inputs)?,

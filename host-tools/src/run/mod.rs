@@ -1,7 +1,8 @@
 //! `hums sim`: a recording goes in at the UART and comes out on a card.
 //!
-//! Both get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]); what differs is the machine:
-//! [`sim`] runs the tasks' bodies on this PC, `emulate` the image that is flashed on the model of its chip.
+//! Both machines get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]). They differ in
+//! the machine: [`sim`] runs the tasks' bodies on this PC, `emulate` the image that is flashed on the model of its
+//! chip.
 
 pub mod arrivals;
 mod earlier;
@@ -33,7 +34,7 @@ use ground::Ground;
 /// In real time the machine's clock goes on at least this often, also while nothing arrives.
 const STEP: Duration = Duration::from_millis(20);
 
-/// What bytes are given to.
+/// A machine that receives the bytes.
 pub trait Machine {
     /// Time goes on to the chunk's, then its bytes are there. `false`: the run is over (power went).
     fn arrive(&mut self, chunk: &Chunk) -> Result<bool>;
@@ -42,7 +43,7 @@ pub trait Machine {
     fn hear(&mut self, chunk: &Chunk) -> Result<bool>;
 }
 
-/// Gives everything that arrives to the machine, in the time that was asked for. `false`: power went.
+/// Gives all arriving bytes to the machine, at the requested pace.
 fn drive(
     arrivals: &mut Arrivals,
     ground: &mut Ground,
@@ -88,7 +89,7 @@ fn drive(
     Ok(true)
 }
 
-/// Gives the machine what the ground station sent by now.
+/// Gives the machine the bytes that the ground station has sent by now.
 fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<bool> {
     while let Some(chunk) = ground.until(now_us)? {
         if !machine.hear(&chunk)? {

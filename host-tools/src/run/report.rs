@@ -1,4 +1,4 @@
-//! What `hums sim` prints: counters of the run, and what the card's newest logs say was found.
+//! The output of `hums sim`: counters of the run, and the findings in the card's newest logs.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -19,7 +19,7 @@ use crate::plural::count;
 use crate::summary::{FindingLine, Overview};
 use crate::utc::moment;
 
-/// What `hums sim --json` prints.
+/// The output of `hums sim --json`.
 const SCHEMA: Schema = Schema::first("hums-run");
 
 /// The object of `--json`; its names are a contract.
@@ -41,7 +41,7 @@ pub struct Report {
     pub blocks_written: u64,
     /// The fullest the sector queue was.
     pub queue_bytes_max: u64,
-    /// What it holds.
+    /// Its size.
     pub queue_bytes_capacity: u64,
     /// The longest the card took for one call.
     pub sd_stall_ms_max: u64,
@@ -70,16 +70,16 @@ pub struct Report {
     /// Power went at a block write that the command line chose.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
-    /// The deepest the firmware's stack was, where there is one.
+    /// The deepest use of the firmware's stack, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_bytes_max: Option<u64>,
-    /// What it holds.
+    /// Its size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_bytes: Option<u64>,
-    /// The deepest that each urgency alone took it, where measured.
+    /// The deepest use by each urgency alone, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_by_urgency: Option<serde_json::Value>,
-    /// Cycles of the processor by stage, where measured.
+    /// Cycles of the processor by stage, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycles: Option<serde_json::Value>,
     /// Load of the processor in the worst second except the first, in percent, if measured.
@@ -118,14 +118,14 @@ pub struct Finding {
     pub level: String,
     /// Seconds since the first input byte.
     pub time_s: f64,
-    /// What decided; `null` where the input stopped.
+    /// The decisive value; `null` where the input stopped.
     pub value: Option<f64>,
     /// Its unit.
     pub unit: String,
 }
 
 impl Finding {
-    /// What people read of its level: what no value tells is not good, it has ended.
+    /// The level for people. Without a value the level `ok` means an end, not health.
     fn word(&self) -> &str {
         if self.level == Level::Ok.name() && self.value.is_none() { "ended" } else { &self.level }
     }
@@ -185,7 +185,7 @@ impl Report {
     pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, OnCard)> {
         let mut frames = 0;
         let mut on_card = OnCard::default();
-        // A card that cannot be read has no log to tell of; the counters say what was lost.
+        // A card that cannot be read has no readable log; the counters have the losses.
         let logs = logs::on_card(card);
         if !logs.is_empty() {
             self.overwritten = earlier.overwritten(&logs);

@@ -51,7 +51,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
     }
 }
 
-/// Refuses what cannot be opened, before anything else is made.
+/// Refuses a store that cannot be opened, before other files are made.
 pub(super) fn check(path: &Path) -> Result<()> {
     if path.exists() {
         let (bytes, _) = read(path)?;
@@ -100,7 +100,7 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if !bytes.is_empty() && !is_store::<SECTOR>(&bytes) {
         bail!("--store {}: is no store, though it has the length of one; name a new file", path.display());
     }
-    // A board cannot refuse, and begins it anew; a file stays what it is.
+    // A board cannot refuse, and begins the store anew; here the file is left unchanged.
     if found(&bytes) == Some(Found::Unreadable) {
         bail!(
             "--store {}: is damaged: nothing in it can be read, and the run would begin it anew; move it away, or name a new file",
@@ -110,7 +110,7 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     Ok((bytes, Some(file)))
 }
 
-/// Flash as it is delivered.
+/// Writes flash in its state of delivery.
 fn fill(mut file: &File, path: &Path) -> Result<()> {
     file.write_all(&vec![0xFF; BYTES]).with_context(|| cannot_write(path))
 }
@@ -139,7 +139,7 @@ struct Inside {
 }
 
 impl FileFlash {
-    /// Power goes in the middle of the `steps`-th word or erase from now on.
+    /// Cuts power in the middle of the `steps`-th word or erase from now on.
     pub(super) fn cut_after(&self, steps: u64, seed: u64) {
         self.0.borrow_mut().flash.cut_after(steps, seed);
     }

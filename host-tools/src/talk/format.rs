@@ -91,7 +91,7 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
     ));
     let end = Instant::now() + limit;
     loop {
-        // Any frame of the board's says that it is there.
+        // Any frame from the board proves its presence.
         match client.until(end.min(Instant::now() + silence), |frame| Some(Said::read(frame)))? {
             // A result after the acceptance answers the repeated command.
             Some(Some(Said::Result(next))) if result == IN_PROGRESS => {

@@ -66,7 +66,7 @@ impl Client {
     /// # Errors
     /// No board is on the link. Several boards without `--system` are a usage error.
     pub fn connect(link: &Link) -> Result<Self> {
-        // Who says which one it is has not to wait for others.
+        // With a system id there is no wait for other boards.
         Self::find_on(link, if link.system.is_some() { Duration::ZERO } else { LISTEN })
     }
 

@@ -39,7 +39,7 @@ const TIMED: &str = "import resource, subprocess, sys\n\
     used = resource.getrusage(resource.RUSAGE_CHILDREN)\n\
     print(used.ru_utime + used.ru_stime, run.returncode)\n";
 
-/// Measures; the speeds are shown, the one that is asked for is checked.
+/// Measures and shows the speeds; checks the one with a target.
 pub(crate) fn run() -> Result<()> {
     println!("\nSpeed of hums check on one core, the best of {ROUNDS} rounds\n");
     let logs = logs()?;

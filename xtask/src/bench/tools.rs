@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result};
 
 use crate::repo;
 
-/// A program on the first core only, where `taskset` is there to see to it.
+/// A program on the first core only, if `taskset` is installed.
 pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
     if !one || Command::new("taskset").arg("--version").output().is_err() {
         return Command::new(program);

@@ -95,7 +95,7 @@ fn timed(run: impl FnOnce() -> Result<()>) -> Result<()> {
     done
 }
 
-/// What became of a step.
+/// The result of a step.
 struct Row {
     step: &'static str,
     /// None if a tool is missing.

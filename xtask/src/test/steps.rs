@@ -22,7 +22,7 @@ use crate::setup::Need::{
 };
 use crate::shell::Shell;
 
-/// One thing that is checked.
+/// One step of checks.
 pub(super) struct Step {
     pub(super) stage: Stage,
     pub(super) name: &'static str,

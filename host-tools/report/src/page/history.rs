@@ -244,7 +244,7 @@ impl History {
         }
     }
 
-    /// Its series, who flies, and the limits that hold.
+    /// Its series, the autopilot, and the limits in use.
     pub(super) fn drawn(&self) -> (&Store<Plot>, Autopilot, Option<&Params>) {
         (&self.samples.store, self.autopilot, self.params.as_deref())
     }

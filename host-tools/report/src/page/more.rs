@@ -147,7 +147,7 @@ fn of_row(row: &Row<'_>, put: &mut Put<'_>) {
                 }
             }
         }
-        // Of the estimator's first core.
+        // Only the estimator's first core counts.
         "XKF2" | "NKF2" if number("C").is_none_or(|core| core < 0.5) => {
             if let Some((north, east)) = number("VWN").zip(number("VWE")) {
                 wind(north, east, put);
@@ -217,7 +217,7 @@ pub struct Default {
     pub name: String,
     /// Its default.
     pub value: f64,
-    /// Of the airframe's configuration.
+    /// It belongs to the airframe's configuration.
     pub is_of_airframe: bool,
 }
 
@@ -257,7 +257,7 @@ fn flag(row: &Row<'_>, name: &str) -> bool {
     matches!(value_of(row, name), Some(Value::Flag(true)))
 }
 
-/// Of several instances of a topic the first one.
+/// Whether it is the first instance of a topic.
 fn is_first(row: &Row<'_>) -> bool {
     number(row, "multi_id").is_none_or(|instance| instance < 0.5)
 }

@@ -29,7 +29,7 @@ pub struct Note {
     pub kind: &'static str,
     /// A level's name; of a text, by its severity.
     pub level: &'static str,
-    /// Who says it: `here` (these checks), `on board` (a HUMS on the vehicle), `autopilot`, `component 42`.
+    /// Its source: `here` (these checks), `on board` (a HUMS on the vehicle), `autopilot`, `component 42`.
     pub from: String,
     /// The subsystem, for findings.
     pub subsystem: &'static str,
@@ -95,7 +95,7 @@ fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).unwrap_or(words);
     let parts = |said: &Said| match instances(said.check) {
-        // Of a trend, which boxes judged themselves.
+        // A trend that a box judged itself.
         0 if said.part.is_empty() => 1,
         0 => MOTORS_MAX as u8,
         parts => parts,

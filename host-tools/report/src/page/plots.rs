@@ -64,7 +64,7 @@ pub enum Plot {
     EngineLoad,
     /// In the unit of the engine's controller.
     EngineFuelFlow,
-    /// Of the cylinder head, degC.
+    /// Temperature of the cylinder head, degC.
     EngineCelsius,
     /// A line an axis, in the unit of the autopilot.
     Vibration,
@@ -90,7 +90,7 @@ pub enum Plot {
     Temperature,
     /// Static, of the first barometer, and as the inertial sensor's message has it, hPa.
     Pressure,
-    /// Of the autopilot's processor, %.
+    /// Load of the autopilot's processor, %.
     Load,
 }
 

@@ -165,7 +165,7 @@ impl Samples {
             Observation::Imu(imu) if imu.instance == 0 => self.imu(at, imu),
             Observation::ImuAndAir(imu, air) if imu.instance == 0 => {
                 self.imu(at, imu);
-                // Of another sensor than the barometer's own messages.
+                // From another sensor than the barometer's own messages.
                 self.air(at, air, [3, 1]);
             }
             Observation::Processor(processor) => {

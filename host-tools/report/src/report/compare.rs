@@ -54,7 +54,7 @@ struct Data {
 struct FlightJson {
     name: String,
     page: Option<String>,
-    /// Of its take-off.
+    /// UTC of its take-off.
     start_utc: Option<String>,
     vehicle: Option<String>,
     airframe: Option<String>,

@@ -53,7 +53,7 @@ pub struct Row {
 /// The pages of a folder.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Pages {
-    /// Of the program that made it.
+    /// Version of the program that made it.
     pub version: String,
     /// Each with its recording.
     pub pages: Vec<Row>,
@@ -65,7 +65,7 @@ pub struct Pages {
 const BYTES_MAX: u64 = 64 << 20;
 
 impl Pages {
-    /// The pages in a folder's table; `None` without a table of ours.
+    /// The pages in a folder's table; `None` without a table of this program.
     pub fn of(folder: &Path) -> Option<Self> {
         let mut text = String::new();
         File::open(folder.join(FILE)).ok()?.take(BYTES_MAX).read_to_string(&mut text).ok()?;
@@ -106,7 +106,7 @@ fn faults(log: &Overview) -> Vec<String> {
 }
 
 impl Row {
-    /// Of a page.
+    /// The entry of a page.
     pub fn new(file: String, log: &Overview, replay: &Replay) -> Self {
         let (summary, contents) = (&log.ending.summary, &log.contents);
         let flights = &replay.flights;

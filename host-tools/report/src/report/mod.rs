@@ -188,7 +188,7 @@ impl Making<'_> {
         Ok(())
     }
 
-    /// Makes the page of a session, and says so.
+    /// Makes the page of a session, and reports it.
     fn page(
         &mut self,
         index: usize,
@@ -254,7 +254,7 @@ impl Making<'_> {
         if self.wanted.directory {
             let folder = &self.wanted.output;
             let known = index::Pages::of(folder);
-            // A table of ours is extended: pages of other flights in it are not a reason to ask.
+            // The program's own table is extended: pages of other flights in it are not a reason to ask.
             let inputs =
                 if known.is_some() { self.inputs.clone().forcing(true) } else { self.inputs.clone() };
             let pages =

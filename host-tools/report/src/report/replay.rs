@@ -32,7 +32,7 @@ const TEXTS_MAX: usize = 1_000;
 pub struct Missing {
     /// Start, if known.
     from_s: Option<f64>,
-    /// What, and why.
+    /// The content and its reason.
     words: String,
 }
 

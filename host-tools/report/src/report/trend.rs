@@ -62,7 +62,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Of a session that was read.
+    /// The trend's entry for a session.
     pub fn of(log: &Overview) -> Self {
         let start_utc = log.ending.summary.first.and_then(|first| log.utc_us(first)).map(iso8601);
         let vehicle = log

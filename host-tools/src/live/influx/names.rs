@@ -30,7 +30,7 @@ fn random<const N: usize>() -> Result<[u8; N]> {
     Ok(random)
 }
 
-/// Who is who, as far as it is known.
+/// Names of vehicles and sessions, as far as known.
 #[derive(Debug)]
 pub struct Names {
     session: String,

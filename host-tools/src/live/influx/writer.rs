@@ -1,8 +1,8 @@
 //! The thread that writes batches: each until the database has it, or refuses it as invalid.
 //!
-//! A refused batch is tried again in halves, and these in halves: so a bad point costs only itself. A point
-//! written twice is the same point. `InfluxDB` 1.x and 2 write the good points of a batch themselves. They
-//! still answer 400 or 422, and say how many points they dropped; then the batch is not tried again.
+//! A refused batch is tried again in halves, and these in halves: so a bad point costs only itself. A point written
+//! twice is the same point. `InfluxDB` 1.x and 2 write the good points of a batch themselves. They still answer 400
+//! or 422, with the number of dropped points; then the batch is not tried again.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;

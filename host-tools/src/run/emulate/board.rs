@@ -40,7 +40,7 @@ const CARD: (usize, Pin) = (0, Pin(0, 4));
 /// The stages of the firmware's own account, in its order; the first is idle.
 const STAGES: [&str; 9] =
     ["idle", "tasks", "framer", "monitor", "encode", "observe", "summary", "tick", "storage"];
-/// Where that account is.
+/// The symbol of that account.
 const STAGE_CYCLES: &str = "STAGE_CYCLES";
 /// What runs as which exceptions, from the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
 const URGENCIES: [(&str, &[u16]); 8] = [
@@ -57,7 +57,7 @@ const URGENCIES: [(&str, &[u16]); 8] = [
 /// A line into a port.
 #[derive(Debug, Default)]
 struct Line {
-    /// When what was sent last ends.
+    /// The end of the last transfer.
     free: Ps,
 }
 
@@ -154,7 +154,7 @@ impl Board {
 
     fn send(&mut self, port: usize, chunk: &Chunk) -> Result<()> {
         let at = Self::moment(chunk.at_us);
-        // An input may come faster than the line can: what waits for it is held, a second of it and no more.
+        // An input may be faster than the line. At most a second of it waits.
         let waits = self.lines.get(port).map_or(0, |line| line.free.saturating_sub(SECOND));
         let power = self.reboots.front().map_or(Ps::MAX, |at_us| Self::moment(*at_us));
         self.run_until(at.max(waits.min(power)))?;

@@ -1,4 +1,4 @@
-//! A power-on with somebody at the ground station's port, step by step: for those who ask how the two sides go together.
+//! A power-on with a ground station at its port, step by step, to see how both sides work together.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,7 +19,7 @@ use crate::source::Chunk;
 /// The number under which the store keeps the signing key.
 const ITEM_KEY: u8 = 32;
 
-/// Where bytes come from.
+/// The side that sends bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The autopilot.

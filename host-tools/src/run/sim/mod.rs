@@ -119,10 +119,10 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
 }
 
 /// Records all chunks on any card, as one power-on. It is for callers that need more of the recorder than the command
-/// line offers. `boots` tells one power-on on a card from another.
+/// line offers. `boots` distinguishes the power-ons on a card.
 ///
-/// `gs` gets what the ground station does. `moment` is called with each chunk before it arrives. A card whose power
-/// went ends it.
+/// `gs` gets the bytes for the ground station. `moment` is called with each chunk before it arrives. A card whose
+/// power went ends it.
 pub fn power_on(
     card: &SimCard,
     params: &Params,
@@ -165,7 +165,7 @@ pub struct PowerOn {
     pub stats: Stats,
     /// Frames that were still in memory when it ended.
     pub frames_left: u64,
-    /// What storage says of the card.
+    /// The state of the card, by storage.
     pub card: CardReading,
 }
 
@@ -179,7 +179,7 @@ fn identity(boots: u32) -> Boot<'static> {
     }
 }
 
-/// What outlives a power-on: the card, the store, the ground station, and what is told at the end.
+/// The parts that outlive a power-on: the card, the store, the ground station, and the report.
 struct World<'a> {
     card: &'a SimCard,
     flash: &'a FileFlash,
@@ -191,7 +191,7 @@ struct World<'a> {
     boots: u32,
     entropy: u32,
     power_on_us: u64,
-    /// The writer's counts tell what is on the card: every power-on ended in order and with an empty queue.
+    /// The writer's counts match the card: every power-on ended in order and with an empty queue.
     frames_on_card: bool,
     /// The oldest segments were overwritten: those of this run may be among them.
     overwritten: bool,
@@ -238,7 +238,7 @@ impl World<'_> {
         self.add(&stats, lost);
         let cut = self.card.is_dead() || self.flash.is_dead();
         self.report.power_cut |= cut;
-        // A sector in the queue may be on the card in part: only the card tells how much of it.
+        // A sector in the queue may be on the card in part: only the card shows how much of it.
         self.frames_on_card &= ended && !cut && lost == 0;
         if ended || cut {
             return Ok(false);
@@ -262,7 +262,7 @@ impl World<'_> {
         report.gs_bytes += stats.gs_bytes;
     }
 
-    /// The report, with what the card itself tells.
+    /// The report, with the data of the card itself.
     fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<Report> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();
@@ -275,7 +275,7 @@ impl World<'_> {
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         } else if !self.frames_on_card {
-            // Frames were left in memory: only the card tells which made it.
+            // Frames were left in memory: only the card shows which were saved.
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         }

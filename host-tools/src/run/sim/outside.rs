@@ -43,7 +43,7 @@ impl Memory {
         }
     }
 
-    /// What storage says of the card.
+    /// The state of the card, by storage.
     pub(super) fn card_reading(&self) -> CardReading {
         self.card_status.read()
     }

@@ -53,7 +53,7 @@ pub(super) struct Pipeline<'a, 'w> {
     uplink_silent_at: Option<Instant>,
 }
 
-/// What happens next.
+/// The next event.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Event {
     Silence,
@@ -229,7 +229,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     fn send_gs(&mut self) -> Result<()> {
         let mut frame = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
-            // An autopilot that has gone does not hear: its end shows in its own bytes.
+            // An autopilot that has gone receives nothing: its own bytes show its end.
             let _ = self.outside.autopilot.write_all(frame.get(..length).unwrap_or_default());
             let _ = self.outside.autopilot.flush();
         }
@@ -245,7 +245,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         Ok(())
     }
 
-    /// Storage does one thing, and is busy for as long as the card took.
+    /// Storage does one task, and is busy while the card is.
     fn storage(&mut self) {
         let begin_us = self.outside.power_on_us.saturating_add(self.now.as_micros());
         self.outside.card.set_clock(begin_us);
@@ -265,12 +265,12 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.outside.card.is_dead() || self.outside.flash.is_dead()
     }
 
-    /// Saves what was handed over.
+    /// Saves the waiting items.
     fn keep(&mut self, may_erase: bool) {
         while !self.is_dead() && self.store_writer.service(may_erase) == Saved::Took {}
     }
 
-    /// Records what is new about the store.
+    /// Records news of the store.
     fn note(&mut self) {
         while let Some(news) = self.handover.news() {
             self.monitoring.note(self.now, news.severity, news.text, &mut self.ends.sectors_in);

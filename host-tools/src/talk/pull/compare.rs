@@ -1,5 +1,5 @@
-//! Compares bytes on this PC with the beginning of a board's log. Logs of two cards have the same names and
-//! often the same lengths: only their content tells them apart.
+//! Compares bytes on this PC with the beginning of a board's log. Logs of two cards have the same names and often the
+//! same lengths: only their content differs.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};

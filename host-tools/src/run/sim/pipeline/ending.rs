@@ -1,4 +1,4 @@
-//! How a power-on ends, and what it came to.
+//! The end of a power-on, and its result.
 
 use anyhow::Result;
 use hums_blackbox::record::Stats;
@@ -10,7 +10,7 @@ use hums_recorder::CardState;
 
 use super::Pipeline;
 
-/// How long the end of a run waits for a card that is out, before what waits for it is lost.
+/// Longest wait at the end of a run for a card that is out; then the waiting data is lost.
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
 impl Pipeline<'_, '_> {
@@ -32,7 +32,7 @@ impl Pipeline<'_, '_> {
         }
         self.now = self.now.max(self.busy_until);
         self.storage.finish();
-        // The port sends what it has, at its pace.
+        // The port sends its waiting bytes, at its pace.
         self.now = self.now.max(self.gs_at);
         for _ in 0..1000 {
             self.send_gs()?;
