@@ -35,8 +35,8 @@ pub enum Request<'a> {
     ParamNamed(&'a str),
     /// `PARAM_SET`, its value as a number (`C_CAST`).
     ParamSet(&'a str, f32),
-    /// `COMMAND_LONG` or `COMMAND_INT`: `MAV_CMD` and the first two parameters.
-    Command(u16, [f32; 2]),
+    /// `COMMAND_LONG` or `COMMAND_INT`: `MAV_CMD` and its parameters, all seven of `COMMAND_LONG`.
+    Command(u16, [f32; 7]),
     /// `LOG_REQUEST_LIST`: first and last id.
     LogList(u16, u16),
     /// `LOG_REQUEST_DATA`: id, offset, bytes.
@@ -74,7 +74,9 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
         },
         21 => (target(0), Request::ParamList),
         23 => (target(4), Request::ParamSet(fields.text(6, 16)?, fields.f32(0))),
-        75 | 76 => (target(30), Request::Command(fields.u16(28), [fields.f32(0), fields.f32(4)])),
+        75 | 76 => {
+            (target(30), Request::Command(fields.u16(28), [0, 4, 8, 12, 16, 20, 24].map(|at| fields.f32(at))))
+        }
         110 => (target(1), Request::File(frame.payload().get(3..).unwrap_or_default())),
         117 => (target(4), Request::LogList(fields.u16(0), fields.u16(2))),
         119 => (target(10), Request::LogData(fields.u16(8), fields.u32(0), fields.u32(4))),
@@ -235,7 +237,7 @@ mod tests {
     #[test]
     fn a_command_that_nobody_knows_is_a_command() {
         let command = Packet::new(76).u16(28, 65_535).u8(30, 1).u8(31, 191);
-        with(&command, |asked| assert_eq!(asked.request, Request::Command(65_535, [0.0, 0.0])));
+        with(&command, |asked| assert_eq!(asked.request, Request::Command(65_535, [0.0; 7])));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! | 519, 520 | the same by their older commands |
 //! | 526 `STORAGE_FORMAT` | formats a card that cannot be recorded on as it is: while disarmed |
 //! | 2510, 2511 `LOGGING_START`, `_STOP` | records again; stops recording, while disarmed |
-//! | 31010 `USER_1` | another part is in a component's place, from 1; 0 and, as param 2, 1: propellers, a battery or the payload changed: while disarmed |
+//! | 31010 `USER_1` | another part is in a component's place, from 1, with its serial number in params 2 to 7 ([`characters`]); 0 and, as param 2, 1: propellers, a battery or the payload changed: while disarmed |
 //! | 31011 `USER_2` | cancels the protective action that is announced |
 
 use hums_blackbox::record::Boot;
@@ -48,6 +48,15 @@ pub(crate) const DENIED: u8 = 2;
 const UNSUPPORTED: u8 = 3;
 const FAILED: u8 = 4;
 
+/// The characters in params 2 to 7 of a command: three in each, as a whole number of 24 bits, which single precision holds exactly.
+fn characters(params: &[f32; 7]) -> [u8; 18] {
+    let mut text = [0; 18];
+    for (characters, value) in text.chunks_exact_mut(3).zip(params.iter().skip(1)) {
+        characters.copy_from_slice(&(*value as u32).to_be_bytes()[1..]);
+    }
+    text
+}
+
 /// Whether a command only requests a message, and changes nothing.
 pub(crate) const fn only_asks(command: u16) -> bool {
     matches!(command, MESSAGE | PROTOCOL | CAPABILITIES | PREFLIGHT)
@@ -83,7 +92,7 @@ impl Commands {
         now: Instant,
         asker: Asker,
         command: u16,
-        params: [f32; 2],
+        params: [f32; 7],
         book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
     ) -> u8 {
@@ -103,12 +112,12 @@ impl Commands {
             // The storage number and a confirmation: a command sent by mistake has neither.
             (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
             // Likewise: the ground station's button without numbers must not reset the baselines.
-            (REPLACED, 0) if params.map(f32::to_bits) != [0.0_f32, 1.0].map(f32::to_bits) => DENIED,
+            (REPLACED, 0) if params[0].abs() > 0.0 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
             (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
                 if !self.allows(now, asker.port) {
                     return TEMPORARILY_REJECTED;
                 }
-                self.act(now, asker, command, number, book, sectors)
+                self.act(now, asker, (command, number, &params), book, sectors)
             }
             _ => UNSUPPORTED,
         }
@@ -118,8 +127,7 @@ impl Commands {
         &mut self,
         now: Instant,
         asker: Asker,
-        command: u16,
-        number: u32,
+        (command, number, params): (u16, u32, &[f32; 7]),
         book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
     ) -> u8 {
@@ -138,8 +146,14 @@ impl Commands {
             }
             REPLACED => {
                 let place = (number as usize).wrapping_sub(1);
-                // Its serial number can be set later; the component's record names the sender.
-                if records::replace_component(now, place, "", by, book, sectors) { ACCEPTED } else { DENIED }
+                // The component's record names the sender.
+                let serial = characters(params);
+                let serial = core::str::from_utf8(&serial).unwrap_or_default();
+                if records::replace_component(now, place, serial, by, book, sectors) {
+                    ACCEPTED
+                } else {
+                    DENIED
+                }
             }
             _ => {
                 self.stop_or_record(now, command == STOP, asker, &mut book.journal, sectors);

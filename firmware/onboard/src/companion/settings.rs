@@ -11,6 +11,7 @@
 //! read, [`LINE_MAX`] of a line. The last line is refused if the file's end was not read.
 
 use hums_core::clock::Instant;
+use hums_core::component::Label;
 use hums_link::param_line::{self, Line};
 use hums_recorder::CardState;
 
@@ -18,6 +19,7 @@ use super::library::Library;
 use crate::journal::{Arming, Logbook};
 use crate::notices::Notices;
 use crate::queues::SectorsIn;
+use crate::records;
 use crate::shelf::{DATA_MAX, Reader, Want, What, Which};
 
 /// Enough for all parameters, each in the longest line.
@@ -160,8 +162,11 @@ impl Settings {
         let set = match core::str::from_utf8(&line).map(param_line::read) {
             _ if is_cut => false,
             Ok(Line::Nothing) => true,
-            Ok(Line::Set(name, value)) => param_line::value(value)
-                .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
+            Ok(Line::Set(name, value)) => match place_of_serial(name) {
+                Some(place) => is_part(place, value, now, book, sectors),
+                None => param_line::value(value)
+                    .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
+            },
             Ok(Line::Wrong) | Err(_) => false,
         };
         if !set {
@@ -169,6 +174,23 @@ impl Settings {
             book.journal.by_hand(now, format_args!("PARAMS.TXT: line {number} is refused"), sectors);
         }
     }
+}
+
+/// The place of a component, from 0, of which a name is that of the serial number: of `CMP1_SERIAL` 0.
+fn place_of_serial(name: &str) -> Option<usize> {
+    name.strip_prefix("CMP")?.strip_suffix("_SERIAL")?.parse::<usize>().ok()?.checked_sub(1)
+}
+
+/// Another serial number than the known one is another part. The file is read at each power-on, and replaces a part once.
+fn is_part(
+    place: usize,
+    serial: &str,
+    now: Instant,
+    book: &mut Logbook<'_>,
+    sectors: &mut SectorsIn,
+) -> bool {
+    let known = book.monitor.components().get(place).map(|part| part.serial);
+    known == Some(Label::new(serial)) || records::replace_component(now, place, serial, (0, 0), book, sectors)
 }
 
 #[cfg(test)]

@@ -50,6 +50,22 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
 
 /// The same with this text in the file, on a card that answers every `ticks_an_answer`.
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
+    let is = |params: &Params, param, value: f32| params.get(param).to_bits() == value.to_bits();
+    after(text, cause, ticks_an_answer, comes, |monitor| {
+        let params = monitor.params();
+        let set = [is(params, Param::BatRemWarn, 31.0), is(params, Param::ProtAction, 1.0)];
+        (set, params.get(Param::ApBaud))
+    })
+}
+
+/// What the monitor knows after it.
+fn after<T>(
+    text: &str,
+    cause: ResetCause,
+    ticks_an_answer: u64,
+    comes: &[(u64, Comes)],
+    known: impl FnOnce(&Monitor) -> T,
+) -> T {
     let (card, port) = (CardStatus::new(), PortStatus::new());
     let (mut monitor, mut writer) = (Box::new(Monitor::new(Params::defaults())), Box::new(Writer::new()));
     let mut queues = Box::new(Queues::new());
@@ -93,10 +109,7 @@ fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, 
         while ends.autopilot_out.take(&mut out).is_some() {}
         ends.sectors_out.abandon();
     }
-    let params = body.monitor().params();
-    let is = |param, value: f32| params.get(param).to_bits() == value.to_bits();
-    let set = [is(Param::BatRemWarn, 31.0), is(Param::ProtAction, 1.0)];
-    (set, params.get(Param::ApBaud))
+    known(body.monitor())
 }
 
 const DEFAULT: f32 = 921_600.0;
@@ -157,6 +170,17 @@ fn without_a_heartbeat_no_parameters_are_read_nor_long_after_the_last_one() {
     assert_eq!(run(ResetCause::PowerOn, &[(0, Card), (60, Card)]), NOTHING);
     assert_eq!(run(ResetCause::PowerOn, &[(1, DISARMED), (10, Card)]), NOTHING);
     assert_eq!(run(ResetCause::PowerOn, &[(1, ARMED), (10, Card), (60, Card)]), NOTHING);
+}
+
+#[test]
+fn another_serial_number_in_the_file_is_another_part_once() {
+    let text = "CMP2_KIND 3\nCMP2_NUMBER 3\nCMP2_SERIAL A-4711\nCMP9_SERIAL 1\n";
+    let once = [(0, Card), (1, DISARMED), (2, DISARMED)];
+    let twice = [&once[..], &[(4, NoCard), (6, OtherCard), (7, DISARMED), (8, DISARMED)]].concat();
+    for comes in [&once[..], &twice[..]] {
+        let part = after(text, ResetCause::PowerOn, 1, comes, |monitor| monitor.components()[1]);
+        assert_eq!((part.serial.as_str(), part.replaced), ("A-4711", 1));
+    }
 }
 
 #[test]
