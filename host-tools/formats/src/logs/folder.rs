@@ -1,9 +1,10 @@
-//! Walks a folder for logs and images of cards. Only files and folders count: links, pipes, sockets and
-//! devices are passed over with a remark. So a loop of links is not followed, a pipe without another end does
-//! not block, and a linked log is not found twice.
+//! Walks a folder for logs and images of cards. Links are followed, and each file and folder is read once, so a loop of
+//! links ends. Pipes, sockets, devices and links to nothing are passed over with a remark: a pipe without another end does
+//! not block.
 
-use std::collections::BTreeMap;
-use std::fs::{self, FileType};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, DirEntry, FileType};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -13,7 +14,7 @@ use super::found::{Found, LOGS_MAX};
 use super::look::{Content, look};
 use super::naming::{SegmentName, is_part, segment_name, segment_or_part};
 use super::places::Log;
-use crate::files::why_unread;
+use crate::files::{FileId, why_unread};
 
 /// Folders deeper than this are not walked.
 const DEPTH_MAX: usize = 16;
@@ -41,8 +42,11 @@ struct Entries {
 
 /// Walks a folder: segments of one session in one folder are one log.
 pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
-    let mut waiting = vec![(root.to_owned(), 0)];
+    let (mut waiting, mut walked) = (vec![(root.to_owned(), 0)], Walked::default());
     while let Some((dir, depth)) = waiting.pop() {
+        if !walked.is_new(&dir) {
+            continue;
+        }
         let Entries { sessions, mut files, mut folders, .. } = match entries(&dir, found) {
             Err(error) if depth > 0 => {
                 found.leave_out(format!("{error:#}"));
@@ -104,13 +108,31 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
     Ok(())
 }
 
+/// Folders that were walked, however links lead to them.
+#[derive(Default)]
+pub struct Walked(BTreeSet<FileId>);
+
+impl Walked {
+    /// Whether a folder was not walked before.
+    pub fn is_new(&mut self, dir: &Path) -> bool {
+        FileId::of(dir).map_or(true, |id| self.0.insert(id))
+    }
+}
+
+/// The kind of an entry, or of the target of a link; a link to nothing stays a link.
+pub fn kind_of(entry: &DirEntry) -> io::Result<FileType> {
+    let kind = entry.file_type()?;
+    let target = kind.is_symlink().then(|| fs::metadata(entry.path()).ok()).flatten();
+    Ok(target.map_or(kind, |target| target.file_type()))
+}
+
 /// Looks at each entry of a folder as it is read: there may be millions of foreign ones.
 fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
     let context = || format!("{}: cannot be read", dir.display());
     let mut entries = Entries::default();
     for entry in fs::read_dir(dir).with_context(context)? {
         let entry = entry.with_context(context)?;
-        let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
+        let (path, kind) = (entry.path(), kind_of(&entry).with_context(context)?);
         if let Some(why) = why_unread(&path) {
             found.pass_over(format!("{}: {why}", path.display()));
         } else if kind.is_dir() && entries.folders.len() < WAITING_MAX {
@@ -191,7 +213,7 @@ fn nothing_of_ours(path: &Path) -> String {
 /// Remark about an entry of a folder that is not a file.
 pub fn passed_over(path: &Path, kind: FileType) -> String {
     let what = if kind.is_symlink() {
-        "a link"
+        "a link to nothing"
     } else if kind.is_dir() {
         "one folder too many"
     } else {

@@ -336,11 +336,12 @@ fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
     error
 }
 
-/// The files of a folder, and of those in it, that are recordings other than our own logs. Links are not followed, and
-/// pipes, sockets and devices are not opened.
+/// The files of a folder, and of those in it, that are recordings other than our own logs. Links are followed to each folder
+/// once; pipes, sockets and devices are not opened.
 #[derive(Default)]
 struct Walk {
     paths: Vec<PathBuf>,
+    walked: logs::Walked,
     /// Recordings and folders for which there was no room.
     left_out: u64,
     /// Files of our own logs and of cards.
@@ -390,11 +391,14 @@ impl Walk {
 
     /// Other files are dropped at once: there may be millions of them.
     fn folder(&mut self, dir: &Path, depth: usize) -> Result<()> {
+        if !self.walked.is_new(dir) {
+            return Ok(());
+        }
         let context = || format!("{}: cannot be read", dir.display());
         let mut inside: Vec<(PathBuf, bool)> = Vec::new();
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
-            let (path, kind) = (entry.path(), entry.file_type().with_context(context)?);
+            let (path, kind) = (entry.path(), logs::kind_of(&entry).with_context(context)?);
             // Incomplete or replaced files of this program are reported with our own logs.
             if why_unread(&path).is_some() || self.ours.contains(&path) {
                 continue;

@@ -312,9 +312,10 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Whether the recording has less than it should: exit code 3.
+    /// Whether the recording has less than it should: exit code 3. A message cut off by the end is what a
+    /// power-off leaves.
     pub const fn is_damage(self) -> bool {
-        matches!(self, Self::Damaged | Self::Cut | Self::Silent | Self::NoTimes)
+        matches!(self, Self::Damaged | Self::Silent | Self::NoTimes)
     }
 
     /// The name, for tables and JSON.

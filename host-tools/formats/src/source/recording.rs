@@ -252,7 +252,7 @@ impl Recording {
         if let Some(words) = self.progress.damage() {
             let place = Some(self.progress.taken());
             let gap =
-                Gap { from: Some(last), to: None, cause: Cause::Cut, place, bytes: 0, words, own: None };
+                Gap { from: Some(last), to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None };
             seen.item(last, &Item::Gap(&gap));
             match take(last, Item::Gap(&gap)) {
                 Err(error) if !error.is::<Stop>() => return Err(error),

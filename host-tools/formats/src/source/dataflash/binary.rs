@@ -15,6 +15,8 @@ use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
+/// No message is as long.
+const MESSAGE_BYTES_MAX: u64 = 256;
 /// The longest message, and the head of the one after it.
 const LOOKAHEAD_BYTES: usize = 2 * 258;
 
@@ -43,8 +45,8 @@ pub(super) struct Damage {
     pub(super) place: u64,
     /// Their number.
     pub(super) bytes: u64,
-    /// Whether the file ends with them.
-    pub(super) at_end: bool,
+    /// Whether the file ends with them, and they are what a power-off leaves: a part of a message, or a fill.
+    pub(super) is_cut: bool,
     /// Their description.
     pub(super) words: String,
 }
@@ -132,6 +134,7 @@ impl<R: Read> Binary<R> {
 impl Skipped {
     fn told(self, at_end: bool) -> Damage {
         let Self { place, bytes, only, undefined, cut } = self;
+        let is_cut = at_end && (only.is_some() || bytes < MESSAGE_BYTES_MAX);
         let words = match (only, undefined, cut) {
             (Some(0), ..) if bytes > 1 => "nothing but zeros".to_owned(),
             (Some(0xFF), ..) if bytes > 1 => "nothing but erased memory (0xFF)".to_owned(),
@@ -139,7 +142,7 @@ impl Skipped {
             (_, _, Some(kind)) => format!("a message of type {kind} that is not whole"),
             _ => "no message begins here".to_owned(),
         };
-        Damage { place, bytes, at_end, words }
+        Damage { place, bytes, is_cut, words }
     }
 }
 

@@ -130,8 +130,8 @@ pub fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) ->
                 let length = (HEADER_BYTES + payload.len()) as u64;
                 session.message((kind, Body::Bytes(payload)), place, length, after, take)?;
             }
-            Piece::Damage(Damage { place, bytes, at_end, words }) => {
-                let cause = if at_end { Cause::Cut } else { Cause::Damaged };
+            Piece::Damage(Damage { place, bytes, is_cut, words }) => {
+                let cause = if is_cut { Cause::Cut } else { Cause::Damaged };
                 session.gap(cause, Some(place), bytes, words, take)?;
             }
         }

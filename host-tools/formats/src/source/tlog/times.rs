@@ -29,6 +29,9 @@ const STILL_RECORDS: u64 = 100;
 /// A lead of the autopilot's clock from which the recorder's clock counts as stopped: a link that holds
 /// frames back makes them late, never early.
 const EARLY_US: i64 = 2_000_000;
+/// A ground station writes at once what it held back while it started. The recorder's clock may stand for so much of the
+/// autopilot's time at the beginning of a recording; microseconds.
+const START_US: u64 = 30_000_000;
 /// An autopilot's times further apart than this are of two power-ons, or of two recordings; microseconds.
 const APART_US: i64 = 60_000_000;
 /// Messages of an autopilot are out of order by this at most, microseconds.
@@ -88,7 +91,8 @@ impl Beside {
 
     /// Faults of the recorder's clock.
     fn gap(&self) -> Option<Gap> {
-        let (at, place) = self.began?;
+        let is_start = |at: Instant| at.as_micros() <= START_US && self.passed_us <= START_US && !self.stands;
+        let (at, place) = self.began.filter(|(at, _)| !is_start(*at))?;
         let words = format!(
             "the recorded times stand still, or go on {SLOWER} times slower than the autopilot's, from here on for {} s: there its \
              clock counts",

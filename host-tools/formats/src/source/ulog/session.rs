@@ -74,7 +74,7 @@ pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut T
     }
     if let Some(error) = window.take_trouble() {
         let words = format!("an input that cannot be read further: {error}");
-        session.gap(Cause::Cut, Some(window.place()), 0, words)?;
+        session.gap(Cause::Damaged, Some(window.place()), 0, words)?;
     }
     session.end()
 }
@@ -202,7 +202,7 @@ impl<'a, 'b> Session<'a, 'b> {
         if let Some(&place) = self.appended.first() {
             let words =
                 format!("no appended data at {place}, which the header names: the file ends before it");
-            self.gap(Cause::Cut, Some(place), 0, words)?;
+            self.gap(Cause::Damaged, Some(place), 0, words)?;
         }
         for gap in self.pace.gaps(&self.wrong) {
             self.tell(Item::Gap(&gap))?;
