@@ -27,9 +27,10 @@ pub mod talk;
 pub mod verify;
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory as _, Parser as _};
 
 use cli::{BoxAction, Cli, Command};
 use outcome::Outcome;
@@ -37,7 +38,7 @@ use outcome::Outcome;
 /// Runs the program with these arguments (the first is the program's own name).
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
-    match Cli::try_parse_from(arguments) {
+    match Cli::try_parse_from(with_command(arguments.into_iter().collect())) {
         Ok(cli) => outcome::exit_code(command(&cli.command)),
         Err(error) => {
             // Help and version go to standard output and succeed; so does output to a reader that has gone.
@@ -47,6 +48,20 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// The arguments with `check` before a file that is named in place of a command.
+fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let is_file = |first: &OsString| {
+        let is_command = Cli::command().find_subcommand(first).is_some() || first == "help";
+        // A path that is missing is an error of that path, not of a command.
+        let is_path = first.to_string_lossy().contains(['.', '/', '\\']) || Path::new(first).exists();
+        !is_command && !first.to_string_lossy().starts_with('-') && is_path
+    };
+    if arguments.get(1).is_some_and(is_file) {
+        arguments.insert(1, "check".into());
+    }
+    arguments
+}
+
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Check(args) => check::run(&args.request()),
@@ -54,10 +69,12 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Live(args) => live::run(args),
         Command::Decode(args) => decode::run(args),
         Command::Info(args) => info::run(args),
+        Command::Due(args) => info::due::run(args),
         Command::Sim(args) => run::sim::run(args),
         Command::Box(args) => match &args.action {
             BoxAction::Pull(args) => talk::pull::run(args),
             BoxAction::Params(args) => talk::params::run(args),
+            BoxAction::Replaced(args) => talk::replaced::run(args),
             BoxAction::FormatCard(args) => talk::format::run(args),
         },
         Command::Completions(args) => shell::completions(args),

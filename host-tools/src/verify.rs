@@ -191,6 +191,8 @@ pub fn verdict(log: &Overview) -> Verdict {
     if log.ok { log.verdict } else { Verdict::NotProved }
 }
 
+/// The check of sectors that the card has lost, and that parity has rebuilt.
+const INTACT: &str = "sectors intact";
 /// The check of where a log ends.
 const END: &str = "end";
 /// The check of the session that was recorded before a log.
@@ -279,7 +281,11 @@ fn without_before(mut log: Overview) -> Overview {
 
 fn print(checks: &[Check]) -> Result<()> {
     for check in checks {
-        let verdict = level(if check.failed == 0 { "ok" } else { "FAILED" });
+        let verdict = level(match check.name {
+            _ if check.failed == 0 => "ok",
+            INTACT => "rebuilt",
+            _ => "FAILED",
+        });
         let detail = if check.detail.is_empty() { String::new() } else { format!("; {}", check.detail) };
         output::line(&format!(
             "  {verdict:<7} {:<18} {} checked, {} failed{detail}",
@@ -415,8 +421,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
         detail: if failed > 0 { words.to_owned() } else { String::new() },
     };
     let sectors = summary.blocks.sectors;
-    let intact =
-        check("sectors intact", sectors, ending.made_again(), "made again from parity, without a loss");
+    let intact = check(INTACT, sectors, ending.made_again(), "made again from parity, without a loss");
     if ending.aside().is_some() || ending.begun_anew.is_some() {
         // Of a copy, too, it is told that its card is damaged.
         return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();

@@ -20,7 +20,7 @@ fn cards(dir: &Path) {
         ("second", "2", "ap_quad_guided.tlog"),
         ("second", "2", "ap_quad_faults.tlog"),
     ] {
-        let mut sim = command(["sim", "--seed", seed, "--speed", "max", "--input"]);
+        let mut sim = command(["sim", "--seed", seed, "--speed", "max"]);
         let image = dir.join("cards").join(format!("{card}.img"));
         child::run(sim.arg(own(flight)).arg("--sd").arg(image), LIMIT).expect_code(&[0]);
     }

@@ -148,7 +148,7 @@ pub(crate) fn shoot(page: &mut LivePage, name: &str) {
 fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there() {
     let recording = own("ap_quad_faults.tlog");
     let frames = frames(&recording);
-    let live = Live::start(&["--input", recording.to_str().unwrap()]);
+    let live = Live::start(&[recording.to_str().unwrap()]);
     let mut page = LivePage::start();
     page.open(&live.address, "light", 1440, 900);
     page.wait("return document.documentElement.dataset.ready === 'true'", 60);
@@ -212,7 +212,7 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
     // A motor that may turn six minutes: two of these flights are more.
     std::fs::write(&params, "CMP1_KIND 3\nCMP1_NUMBER 2\nCMP1_MOT_HOURS 0.1\n").unwrap();
     for _ in 0..2 {
-        let mut sim = command(["sim", "--speed", "max", "--input"]);
+        let mut sim = command(["sim", "--speed", "max"]);
         sim.arg(own("px4_hil_quad_low.tlog")).arg("--sd").arg(&card);
         sim.arg("--store").arg(&store).arg("--params").arg(&params);
         hums_tests::child::run(&mut sim, hums_tests::program::LIMIT).expect_code(&[0]);
@@ -226,7 +226,7 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
     let mut page = LivePage::start();
     let mut used = Vec::new();
     for flags in [&["--session", names[0]][..], &["--session", names[1]], &[]] {
-        let live = Live::start(&[&["--input", input][..], flags].concat());
+        let live = Live::start(&[&[input][..], flags].concat());
         page.open(&live.address, "light", 1440, 900);
         page.wait("return document.documentElement.dataset.ready === 'true'", 60);
         page.press(&[" "]);
@@ -251,8 +251,7 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
     assert!((second.0.1 - first.1.1).abs() < 15.0, "it goes on where it was: {used:?}");
     assert_eq!((first.0.0.as_str(), second.1.0.as_str()), ("good", "due"), "{used:?}");
 
-    let wrong =
-        hums(["live", "--listen", "127.0.0.1:0", "--input", input, "--session", "99999"]).expect_code(&[2]);
+    let wrong = hums(["live", "--listen", "127.0.0.1:0", input, "--session", "99999"]).expect_code(&[2]);
     assert!(wrong.stderr.contains(names[0]), "it says which there are");
 }
 
@@ -267,11 +266,11 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
     let recording = cut(&own("ap_quad_faults.tlog"), 75.0, &dir.path().join("late.tlog"));
     let frames = frames(&recording);
     let port = free_port();
-    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{port}")]);
     let mut page = LivePage::start();
     page.open(&live.address, "dark", 1440, 900);
     page.wait("return document.getElementById('source').textContent === 'waiting'", 20);
-    let mut sim = command(["sim", "--speed", "real", "--input"]);
+    let mut sim = command(["sim", "--speed", "real"]);
     sim.arg(&recording).arg("--sd").arg(dir.path().join("card.img"));
     sim.arg("--gs").arg(format!("udpout:127.0.0.1:{port}")).stdout(Stdio::null()).stderr(Stdio::null());
     let began = Instant::now();
@@ -331,7 +330,7 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
 #[test]
 fn a_page_that_has_lost_hums_says_at_once_that_the_vehicles_state_is_not_known() {
     let recording = own("px4_hil_quad_low.tlog");
-    let live = Live::start(&["--input", recording.to_str().unwrap()]);
+    let live = Live::start(&[recording.to_str().unwrap()]);
     let mut page = LivePage::start();
     page.open(&live.address, "light", 1440, 900);
     page.wait("return document.documentElement.dataset.ready === 'true'", 60);
@@ -357,7 +356,7 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
     ];
     let seeds = &Manifest::own().seeds;
     let port = free_port();
-    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{port}")]);
     let mut page = LivePage::start();
     page.open(&live.address, "light", 390, 844);
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -411,7 +410,7 @@ const UPGRADE: [(&str, &str); 4] = [
 #[test]
 fn a_foreign_page_a_foreign_name_and_a_stranger_are_refused() {
     let recording = own("ap_quad_guided.tlog");
-    let input = ["--input", recording.to_str().unwrap()];
+    let input = [recording.to_str().unwrap()];
     let open = Live::start(&input);
     assert!(ask(&open.address, "/", &[]).ends_with("200 OK"));
     let with = |more: &[(&'static str, &'static str)]| [&UPGRADE[..], more].concat();
@@ -444,7 +443,7 @@ new MutationObserver(note).observe(roll, { childList: true, characterData: true,
 #[test]
 fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
     let port = free_port();
-    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{port}")]);
     let mut page = LivePage::start();
     page.open(&live.address, "light", 1440, 900);
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -486,7 +485,7 @@ fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
 #[test]
 fn a_link_is_paused_and_rewound_while_it_goes_on() {
     let port = free_port();
-    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{port}")]);
     let mut page = LivePage::start();
     page.open(&live.address, "light", 1440, 900);
     let flies = AtomicBool::new(true);
@@ -528,7 +527,7 @@ fn a_link_is_paused_and_rewound_while_it_goes_on() {
 #[test]
 fn two_vehicles_on_one_link_are_told_apart() {
     let port = free_port();
-    let live = Live::start(&["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{port}")]);
     let mut page = LivePage::start();
     page.open(&live.address, "light", 1024, 768);
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();

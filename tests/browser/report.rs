@@ -231,7 +231,7 @@ fn several_sessions_of_a_card_become_a_trend() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
     for flight in ["ap_quad_guided.tlog", "ap_quad_faults.tlog"] {
-        let mut sim = command(["sim", "--speed", "max", "--input"]);
+        let mut sim = command(["sim", "--speed", "max"]);
         child::run(sim.arg(own(flight)).arg("--sd").arg(&image), LIMIT).expect_code(&[0]);
     }
     let (_dir, page) = report(&image, &[0]);

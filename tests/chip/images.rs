@@ -76,7 +76,7 @@ fn emulated(elf: &[u8], code: i32) -> String {
     let dir = tempfile::tempdir().unwrap();
     let (image, card) = (dir.path().join("hums.elf"), dir.path().join("card.img"));
     fs::write(&image, elf).unwrap();
-    let mut command = program::command(["sim", "--card-size", "64", "--input"]);
+    let mut command = program::command(["sim", "--card-size", "64"]);
     command.arg(hostile::raw_heartbeats(dir.path(), 10)).arg("--sd").arg(card).arg("--firmware").arg(image);
     child::run(&mut command, program::LIMIT).expect_code(&[code]).stderr
 }

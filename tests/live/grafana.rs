@@ -234,8 +234,7 @@ impl Points {
         let dir = tempfile::tempdir().unwrap();
         let (image, out) = (dir.path().join("card.img"), dir.path().join("out.lp"));
         let recording = own(recording);
-        let sim =
-            ["sim".as_ref(), "--input".as_ref(), recording.as_os_str(), "--sd".as_ref(), image.as_os_str()];
+        let sim = ["sim".as_ref(), recording.as_os_str(), "--sd".as_ref(), image.as_os_str()];
         hums(sim).expect_code(&[0]);
         let decode = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
         hums([&decode[..], &["--format".as_ref(), "influx".as_ref()]].concat()).expect_code(&[0]);

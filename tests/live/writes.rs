@@ -44,7 +44,7 @@ fn fly(database: &mut Database, flags: &[&str]) -> (u64, BTreeMap<u32, u64>) {
     let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
     let (input, url) =
         (format!("tcp:{}", vehicle.local_addr().unwrap()), format!("http://127.0.0.1:{}", database.port));
-    let live = Live::start(&[&["--input", &input, "--influx", &url][..], flags].concat());
+    let live = Live::start(&[&[&input, "--influx", &url][..], flags].concat());
     let (mut stream, _) = vehicle.accept().unwrap();
     let put = |frame: &[u8]| stream.write_all(frame).unwrap();
     send(frames.iter().map(Vec::as_slice), RATE, put, |gone| match gone {
@@ -144,7 +144,7 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
     let flight = |database: &Database| {
         let url = format!("http://127.0.0.1:{}", database.port);
         let recording = own("px4_hil_quad_low.tlog");
-        let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
+        let live = Live::start(&[recording.to_str().unwrap(), "--influx", &url]);
         std::thread::sleep(Duration::from_secs(3));
         live.terminate(Duration::from_mins(1))
     };

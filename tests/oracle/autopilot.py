@@ -1,7 +1,7 @@
 """An ArduCopter in the air whose battery runs empty, and the ground station of its pilot, both at the box.
 
 usage: autopilot.py DIALECT.py AUTOPILOT_PORT GS_PORT PILOT        prints JSON
-  AUTOPILOT_PORT, GS_PORT  the UDP ports at which `hums sim --input udpin:... --gs udpin:...` listens
+  AUTOPILOT_PORT, GS_PORT  the UDP ports at which `hums sim udpin:... --gs udpin:...` listens
   PILOT                    what the pilot does when the action is announced: nothing, cancels, or on_ground: it never flew;
                            two_systems: nothing, and the heartbeat of another vehicle, system 7, is forwarded, first of all
 

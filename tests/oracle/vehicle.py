@@ -1,7 +1,7 @@
 """Plays the autopilot at one port of the box and the ground station at the other, with pymavlink, and prints what came.
 
 usage: vehicle.py DIALECT.py AUTOPILOT_PORT GS_PORT KIND        prints JSON
-  AUTOPILOT_PORT  where `hums sim --input udpin:127.0.0.1:PORT` listens
+  AUTOPILOT_PORT  where `hums sim udpin:127.0.0.1:PORT` listens
   GS_PORT         where its `--gs udpin:127.0.0.1:PORT` does; its GS_PASS is 1
   KIND            px4: takes SET_MESSAGE_INTERVAL, and refuses what it does not know
                   ardupilot: knows no SET_MESSAGE_INTERVAL, as versions before 4.0

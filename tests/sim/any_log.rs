@@ -193,7 +193,7 @@ fn decode(known: &Known) {
 /// The time line of `hums live` has the findings of the whole log, from its beginning on.
 fn live(known: &Known) {
     let (path, checked) = (known.path(), known.checked());
-    let live = Live::start(&["--input", path.to_str().unwrap()]);
+    let live = Live::start(&[path.to_str().unwrap()]);
     let mut page = live.page();
     let next = |page: &mut hums_tests::live::Page, kind: &str| loop {
         let message: Value = serde_json::from_str(&page.message()).unwrap();

@@ -32,7 +32,7 @@ impl Board {
     /// With another input.
     pub(crate) fn start_with(input: &OsStr, dir: TempDir, flags: &[&str]) -> Self {
         let port = free_port();
-        let mut command: Command = program::command(["sim", "--json", "--speed", "real", "--input"]);
+        let mut command: Command = program::command(["sim", "--json", "--speed", "real"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.args(["--gs", &format!("udpin:127.0.0.1:{port}")]).args(flags);
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();

@@ -230,7 +230,6 @@ fn mavproxy_shows_what_the_box_says_with_the_module_and_nothing_without_it() {
     let flight = root().join("tests/labelled/f40_baro_off.tlog.gz");
     let arguments: [&OsStr; 7] = [
         "sim".as_ref(),
-        "--input".as_ref(),
         flight.as_os_str(),
         "--sd".as_ref(),
         card.as_os_str(),
@@ -268,7 +267,7 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     let flight = own("ap_quad_faults.tlog");
     let record = |further: &[&str], codes: &[i32]| {
         let input = flight.as_os_str();
-        let command = ["sim".as_ref(), "--input".as_ref(), input, "--sd".as_ref(), image.as_os_str()];
+        let command = ["sim".as_ref(), input, "--sd".as_ref(), image.as_os_str()];
         hums(command.into_iter().chain(further.iter().map(AsRef::as_ref))).expect_code(codes);
     };
     record(&[], &[0]);
@@ -292,8 +291,7 @@ fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
     let recording = own("px4_hil_quad_low.tlog");
     let record = |expected: &[i32]| {
         let input = recording.as_os_str();
-        hums(["sim".as_ref(), "--input".as_ref(), input, "--sd".as_ref(), image.as_os_str()])
-            .expect_code(expected);
+        hums(["sim".as_ref(), input, "--sd".as_ref(), image.as_os_str()]).expect_code(expected);
     };
     record(&[0]);
     let long = "x".repeat(300);
@@ -387,7 +385,7 @@ fn card_with_a_log() -> (TempDir, Vec<u8>) {
     fs::write(dir.path().join("short.raw"), &recording[..80_000]).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
     let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
-    hums(["sim".as_ref(), "--input".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()])
+    hums(["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()])
         .expect_code(&[0]);
     // A download has the recorded part of the file.
     let card = fs::read(&image).unwrap();

@@ -27,7 +27,7 @@ fn record(image: &Path, cut: Option<u64>) -> u64 {
 /// Records a flight likewise: the output of `hums sim --json`.
 fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
     let mut arguments = vec!["sim".into(), "--json".into(), "--card-size".into(), "64".into()];
-    arguments.extend(["--input".into(), flight.display().to_string()]);
+    arguments.extend([flight.display().to_string()]);
     arguments.extend(["--sd".into(), image.display().to_string()]);
     arguments.extend(cut.iter().flat_map(|cut| ["--cut-after-writes".into(), cut.to_string()]));
     serde_json::from_str(&hums(arguments).expect_code(&[0, 3]).text()).unwrap()

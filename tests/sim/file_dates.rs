@@ -25,8 +25,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
     let record = |input: &Path, codes: &[i32]| {
-        let arguments =
-            ["sim".as_ref(), "--input".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()];
+        let arguments = ["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()];
         hums(arguments).expect_code(codes);
     };
     record(&own("ap_quad_guided.tlog"), &[0]);

@@ -107,7 +107,7 @@ fn an_image_that_is_no_fat_costs_counted_frames_and_is_left_as_it_was() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
     let flight = own("px4_hil_quad_low.tlog");
-    let sim = ["sim".as_ref(), "--json".as_ref(), "--input".as_ref(), flight.as_os_str()];
+    let sim = ["sim".as_ref(), "--json".as_ref(), flight.as_os_str()];
     let sim = || hums(sim.into_iter().chain(["--sd".as_ref(), image.as_os_str()]));
     let somebodys = Random::new(6).bytes(40 << 20);
     fs::write(&image, &somebodys).unwrap();
@@ -234,7 +234,7 @@ fn a_read_only_image_is_read_and_not_recorded_to() {
     let before = fs::read(&image).unwrap();
     let flight = own("px4_hil_quad_low.tlog");
     let arguments =
-        ["sim".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
+        ["sim".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
     // Also for root, who has permission to write to it.
     hums(arguments).expect_clear_failure();
     assert!(fs::read(&image).unwrap() == before, "the image changed");
@@ -251,8 +251,7 @@ fn a_folder_that_cannot_be_made_is_a_clear_failure() {
     // A folder that does not exist, for the image.
     let nowhere = recording.image().with_file_name("nowhere").join("card.img");
     let flight = own("px4_hil_quad_low.tlog");
-    let arguments =
-        ["sim".as_ref(), "--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), nowhere.as_os_str()];
+    let arguments = ["sim".as_ref(), flight.as_os_str(), "--sd".as_ref(), nowhere.as_os_str()];
     hums(arguments).expect_clear_failure();
 }
 
@@ -262,10 +261,10 @@ fn words_that_are_no_command_are_a_usage_error() {
     for arguments in [
         vec!["no-such-command"],
         vec!["sim"],
-        vec!["sim", "--input", &flight],
-        vec!["sim", "--input", &flight, "--sd", "/tmp/never-made.img", "--speed", "fast"],
-        vec!["sim", "--input", &flight, "--sd", "/tmp/never-made.img", "--noise", "often"],
-        vec!["sim", "--input", &flight, "--sd", "/tmp/never-made.img", "--stall", "2500"],
+        vec!["sim", &flight],
+        vec!["sim", &flight, "--sd", "/tmp/never-made.img", "--speed", "fast"],
+        vec!["sim", &flight, "--sd", "/tmp/never-made.img", "--noise", "often"],
+        vec!["sim", &flight, "--sd", "/tmp/never-made.img", "--stall", "2500"],
         vec!["decode", &flight],
         vec!["decode", &flight, "-o", "/tmp/never-made", "--format", "docx"],
         vec!["info"],

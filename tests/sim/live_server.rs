@@ -21,7 +21,7 @@ fn answer(stream: TcpStream) -> String {
 #[test]
 fn two_hundred_broken_off_handshakes_take_no_pages_place() {
     let recording = own("px4_hil_quad_low.tlog");
-    let live = Live::start(&["--input", recording.to_str().unwrap()]);
+    let live = Live::start(&[recording.to_str().unwrap()]);
     let host = live.address.trim_start_matches("http://").trim_end_matches('/');
     for number in 0..200_u64 {
         let stream = handshake(host);
@@ -46,7 +46,7 @@ fn two_hundred_broken_off_handshakes_take_no_pages_place() {
 fn a_link_that_is_gone_keeps_neither_the_page_nor_the_end_waiting() {
     let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = vehicle.local_addr().unwrap();
-    let mut live = Live::start(&["--input", &format!("tcp:{address}")]);
+    let mut live = Live::start(&[&format!("tcp:{address}")]);
     // A queue of one that is full: the system drops further connections' first packets.
     rustix::net::listen(&vehicle, 0).unwrap();
     drop(vehicle.accept().unwrap());
@@ -62,7 +62,7 @@ fn a_link_that_is_gone_keeps_neither_the_page_nor_the_end_waiting() {
 
 #[test]
 fn a_phone_is_given_an_address_and_the_token() {
-    let mut live = command(["live", "--listen", "0.0.0.0:0", "--input"]);
+    let mut live = command(["live", "--listen", "0.0.0.0:0"]);
     live.arg(own("px4_hil_quad_low.tlog")).stdout(Stdio::piped()).stderr(Stdio::null());
     let mut child = live.spawn().unwrap();
     let stdout = child.stdout.take().unwrap();
@@ -87,7 +87,7 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
     let port = free_port();
-    let mut sim = command(["sim", "--json", "--input", &format!("udpin:127.0.0.1:{port}"), "--sd"]);
+    let mut sim = command(["sim", "--json", &format!("udpin:127.0.0.1:{port}"), "--sd"]);
     let child = sim.arg(&image).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let mut sim = Running(child);
     let start = Instant::now();
@@ -108,7 +108,7 @@ fn sigterm_ends_a_recording_as_ctrl_c_does_with_the_log_closed() {
 fn a_recording_that_is_broken_off_is_not_called_whole() {
     let dir = tempfile::tempdir().unwrap();
     let (image, said) = (dir.path().join("card.img"), dir.path().join("said"));
-    let mut sim = command(["sim", "--speed", "real", "--input"]);
+    let mut sim = command(["sim", "--speed", "real"]);
     sim.arg(own("px4_hil_quad_low.tlog")).arg("--sd").arg(&image);
     let child = sim.stdout(Stdio::null()).stderr(std::fs::File::create(&said).unwrap()).spawn().unwrap();
     let mut sim = Running(child);
@@ -144,7 +144,7 @@ fn a_server_that_takes_no_point_refuses_none() {
         }
     });
     let recording = own("px4_hil_quad_low.tlog");
-    let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
+    let live = Live::start(&[recording.to_str().unwrap(), "--influx", &url]);
     live.program.signal("TERM");
     std::thread::sleep(Duration::from_millis(500));
     let (code, words) = live.terminate(Duration::from_secs(10));
@@ -158,7 +158,7 @@ fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_end
     // A port without a listener.
     let url = format!("http://127.0.0.1:{}", free_port());
     let recording = own("px4_hil_quad_low.tlog");
-    let input = ["--input", recording.to_str().unwrap(), "--influx", &url];
+    let input = [recording.to_str().unwrap(), "--influx", &url];
     let live = Live::start(&input);
     live.program.signal("TERM");
     std::thread::sleep(Duration::from_millis(500));
@@ -194,7 +194,7 @@ fn sigterm_ends_what_waits_for_a_board() {
 fn two_signals_at_once_are_one_wish_and_end_nothing_without_a_word() {
     let url = format!("http://127.0.0.1:{}", free_port());
     let recording = own("px4_hil_quad_low.tlog");
-    let live = Live::start(&["--input", recording.to_str().unwrap(), "--influx", &url]);
+    let live = Live::start(&[recording.to_str().unwrap(), "--influx", &url]);
     // Like `timeout -s INT`: to the program and to its group.
     let interrupt = || live.program.signal("INT");
     interrupt();

@@ -69,7 +69,7 @@ fn tried(command: &str) -> Tried {
                 formats.map(|format| format!("decode IN -o OUT/{format}/ --format {format}")).collect(),
             )
         }
-        "sim" => lines(&["sim --json --input IN --sd OUT/card.img --gs OUT/gs --tap OUT/tap"]),
+        "sim" => lines(&["sim --json IN --sd OUT/card.img --gs OUT/gs --tap OUT/tap"]),
         "live" => Tried::Live,
         "completions" | "man" => Tried::Nothing("it reads no file"),
         "box" => Tried::Nothing(
@@ -106,7 +106,7 @@ fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bo
 
 /// `hums live`, until it has read all, or refuses the input.
 fn assert_live_bounded(log: &Path, empty: u64) {
-    let Some(live) = Live::attempt(&["--input", log.to_str().unwrap()]) else { return };
+    let Some(live) = Live::attempt(&[log.to_str().unwrap()]) else { return };
     let (mut before, mut quiet) = (0.0, 0);
     let most = loop {
         thread::sleep(Duration::from_millis(300));
@@ -225,7 +225,7 @@ fn what_is_recorded_and_packed_and_a_cards_image_take_little_memory_with_any_com
     for input in [&tlog, &raw] {
         assert_all_bounded(input, empty);
         let image = dir.path().join("card.img");
-        run(&["sim".as_ref(), "--input".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()]);
+        run(&["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()]);
         assert_all_bounded(&image, empty);
         fs::remove_file(image).unwrap();
     }
@@ -250,10 +250,10 @@ fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_littl
     let endless = "/dev/zero";
     for words in [
         &["check", "--params", endless, &log][..],
-        &["live", "--listen", "127.0.0.1:0", "--params", endless, "--input", &log],
-        &["sim", "--params", endless, "--input", &raw, "--sd", &image],
+        &["live", "--listen", "127.0.0.1:0", "--params", endless, &log],
+        &["sim", "--params", endless, &raw, "--sd", &image],
         &["box", "params", "list", "--link", "tcp:127.0.0.1:1", "--key", endless],
-        &["sim", "--firmware", endless, "--input", &raw, "--sd", &image],
+        &["sim", "--firmware", endless, &raw, "--sd", &image],
     ] {
         let outcome = run(words);
         assert!(matches!(outcome.code, Some(1 | 2)), "{words:?}: {}", outcome.stderr);

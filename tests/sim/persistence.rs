@@ -239,7 +239,7 @@ fn a_parameter_file_that_is_wrong_is_told_with_line_and_range_and_leaves_nothing
     ] {
         fs::write(&file, text).unwrap();
         for flags in [&[][..], &["--firmware", "hums.elf"]] {
-            let mut sim = command(["sim", "--input"]);
+            let mut sim = command(["sim"]);
             sim.arg(own(FLIGHT)).arg("--sd").arg(&image).arg("--params").arg(&file).args(flags);
             let outcome = child::run(&mut sim, program::LIMIT).expect_code(&[1, 2]);
             assert!(outcome.stderr.contains(why), "{}", outcome.stderr);

@@ -41,7 +41,7 @@ fn fly(params: &str, pilot: &str) -> Outcome {
     fs::write(&file, params).unwrap();
     let (autopilot, gs) = (free_port(), free_port());
     let mut command: Command = program::command(["sim", "--json", "--speed", "real"]);
-    command.arg("--input").arg(format!("udpin:127.0.0.1:{autopilot}"));
+    command.arg(format!("udpin:127.0.0.1:{autopilot}"));
     command.arg("--gs").arg(format!("udpin:127.0.0.1:{gs}"));
     command.arg("--sd").arg(&image).arg("--params").arg(&file);
     let board = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();

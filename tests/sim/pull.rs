@@ -26,7 +26,7 @@ fn card(part: std::ops::Range<usize>, seed: &str) -> (TempDir, Vec<u8>) {
     let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
     fs::write(&input, &recording[part]).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
-    let mut sim = command(["sim", "--seed", seed, "--input"]);
+    let mut sim = command(["sim", "--seed", seed]);
     sim.arg(&input).arg("--sd").arg(&image);
     hums_tests::child::run(&mut sim, Duration::from_mins(1)).expect_code(&[0]);
     let card = fs::read(&image).unwrap();
@@ -222,7 +222,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     // The autopilot declares a failsafe 35 s after its start, in the second group of the log.
     fs::write(&input, cut(&fs::read(own("ap_quad_faults.tlog")).unwrap(), 232, 272)).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
-    let mut sim = command(["sim", "--input"]);
+    let mut sim = command(["sim"]);
     sim.arg(&input).arg("--sd").arg(&image);
     hums_tests::child::run(&mut sim, Duration::from_mins(1)).expect_code(&[0]);
     let card = fs::read(&image).unwrap();

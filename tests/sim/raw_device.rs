@@ -62,11 +62,11 @@ fn a_raw_device_is_read_like_its_image_by_each_command_and_never_written() {
     for line in [
         format!("decode --format hum {tlog} -o {device}"),
         format!("report {tlog} -o {device}"),
-        format!("sim --input {tlog} --sd {device}"),
+        format!("sim {tlog} --sd {device}"),
         // Before any wait.
-        format!("sim --input udpin:127.0.0.1:14559 --sd {device}"),
-        format!("sim --input {tlog} --sd {}/card.img --gs {device}", out.path().display()),
-        format!("sim --input {tlog} --sd {}/card.img --tap {device}", out.path().display()),
+        format!("sim udpin:127.0.0.1:14559 --sd {device}"),
+        format!("sim {tlog} --sd {}/card.img --gs {device}", out.path().display()),
+        format!("sim {tlog} --sd {}/card.img --tap {device}", out.path().display()),
     ] {
         let refused = hums(line.split(' ')).expect_code(&[2]);
         assert!(refused.stderr.contains("is a disk or a card"), "{line}: {}", refused.stderr);

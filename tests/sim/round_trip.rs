@@ -126,7 +126,7 @@ fn a_recording_on_stdin_is_the_same_as_from_its_file() {
     let flight = own("px4_hil_quad_low.tlog");
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
-    let mut command = program::command(["sim", "--input", "-", "--speed", "max", "--sd"]);
+    let mut command = program::command(["sim", "-", "--speed", "max", "--sd"]);
     let input = File::open(&flight).unwrap();
     child::run_with_input(command.arg(&image), Some(input), LIMIT).expect_code(&[0]);
     let seeds = &Manifest::own().seeds;
@@ -140,7 +140,7 @@ fn a_second_flight_on_the_same_card_leaves_the_first_as_it_was() {
     let dir = tempfile::tempdir().unwrap();
     let image = dir.path().join("card.img");
     for flight in ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"] {
-        let mut command = program::command(["sim", "--speed", "max", "--input"]);
+        let mut command = program::command(["sim", "--speed", "max"]);
         child::run(command.arg(own(flight)).arg("--sd").arg(&image), LIMIT).expect_code(&[0]);
     }
     let manifest = Manifest::own();

@@ -350,8 +350,7 @@ pub fn wide_dataflash(dir: &Path) -> PathBuf {
 fn card(dir: &Path, name: &str) -> (PathBuf, File, Layout) {
     let (recording, image) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.img")));
     fs::write(&recording, HEARTBEAT.repeat(100)).unwrap();
-    let sim =
-        ["sim".as_ref(), "--input".as_ref(), recording.as_os_str(), "--card-size".as_ref(), "64".as_ref()];
+    let sim = ["sim".as_ref(), recording.as_os_str(), "--card-size".as_ref(), "64".as_ref()];
     hums(sim.into_iter().chain(["--sd".as_ref(), image.as_os_str()])).expect_code(&[0]);
     let file = File::options().read(true).write(true).open(&image).unwrap();
     let layout = Layout::read(&ReadOnlyImage::new(file.try_clone().unwrap()).unwrap()).unwrap();

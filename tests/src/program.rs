@@ -90,7 +90,7 @@ impl Recording {
             Machine::Sim => LIMIT,
             Machine::Chip => LIMIT_CHIP,
         };
-        let mut command = command(["sim", "--json", "--input"]);
+        let mut command = command(["sim", "--json"]);
         command.arg(input).arg("--sd").arg(dir.path().join("card.img"));
         command.arg("--gs").arg(dir.path().join("gs.bin")).args(flags);
         match machine {

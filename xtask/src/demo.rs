@@ -16,6 +16,9 @@ use crate::shell::Shell;
 /// A quadcopter's flight with faults that the monitor finds: vibration, satellites lost, GPS jammed, a battery that sags.
 const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
 
+/// Lines of the verdict that are shown: with the rest of the demo's output a screen of 25 lines.
+const VERDICT_LINES_MAX: usize = 12;
+
 /// `hums` did all it could, and there are losses to report.
 const DONE_WITH_LOSSES: i32 = 3;
 
@@ -54,6 +57,7 @@ pub(crate) fn as_test() -> Result<()> {
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
+    eprintln!("building hums and the firmware: some minutes the first time");
     let start = Instant::now();
     let outcome = setup::ensure(&[Need::Linker, Need::FirmwareTarget], false);
     let flashed = !options.pc && outcome.has(Need::FirmwareTarget);
@@ -88,69 +92,58 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     let json = record(pipeline, &flight, &card, &gs)?;
     fs::write(&figures, &json)?;
     let recorded = recording.elapsed();
-    let decoded = folder.join("decoded");
-    decode(&card, &decoded)?;
+    let (decoded, page) = (folder.join("decoded"), folder.join("report.html"));
+    let hums = || Shell::new(hums::program());
+    done(hums().args(["decode", "--format", "tlog,csv", "-o"]).arg(&decoded).arg(&card))
+        .context("the card cannot be decoded")?;
+    done(hums().args(["report", "-o"]).arg(&page).arg(&card)).context("the report cannot be made")?;
+    let (verdict, _) = hums().arg("check").arg(&card).output_and_code()?;
 
-    println!();
-    Shell::new(hums::program()).arg("info").arg(&card).run()?;
+    println!("\n$ hums check {}", repo::shown(&card));
+    shortened(&verdict).for_each(|line| println!("{line}"));
     let run: serde_json::Value = serde_json::from_str(&json).context("what hums --json printed")?;
-    show_figures(&run);
-    println!("{:<30} {}", "the flight", repo::shown(&flight));
+    let figure = |key: &str| run.get(key).map_or_else(|| "?".to_owned(), ToString::to_string);
     let by = if image.is_some() {
-        "the image that is flashed, on a model of its chip"
+        "the firmware's image on a model of its chip"
     } else {
-        "this PC, with the firmware's pipeline"
+        "the firmware's pipeline on this PC"
     };
-    println!("{:<30} {by}", "recorded by");
-    for (label, path) in [
-        ("the SD card's image", &card),
-        ("the decoded log", &decoded),
-        ("what the ground station got", &gs),
-        ("all figures of the run", &figures),
-    ] {
-        println!("{label:<30} {}", repo::shown(path));
-    }
     let (built, recorded) = (built.as_secs(), recorded.as_secs());
-    println!("{:<30} {built} s to build, {recorded} s to record", "it took");
+    println!(
+        "\nrecorded by  {by}: {} frames in, {} logged, {} lost",
+        figure("frames_in"),
+        figure("frames_logged"),
+        figure("frames_lost")
+    );
+    println!("the flight   {}", repo::shown(&flight));
+    println!("it took      {built} s to build, {recorded} s to record");
+    for (label, path) in
+        [("the report", &page), ("the card", &card), ("for tools", &decoded), ("figures", &figures)]
+    {
+        println!("{label:<12} {}", repo::shown(path));
+    }
     if run.get("frames_lost").and_then(serde_json::Value::as_u64) != Some(0) {
         bail!("frames were lost");
     }
-    if !options.no_dashboard && std::io::stdout().is_terminal() {
-        println!("{:<30} until Ctrl-C, at", "the dashboard plays it");
-        return Shell::new(hums::program())
-            .args(["live", "--listen", "127.0.0.1:0", "--input"])
-            .arg(card)
-            .run();
-    }
     let program = repo::shown(&hums::program());
-    println!("{:<30} {program} live --open --input {}", "the dashboard", repo::shown(&card));
+    println!("try next     {program} YOUR_LOG");
+    println!("             {program} live --open {}", repo::shown(&card));
+    if !options.no_dashboard && std::io::stdout().is_terminal() {
+        println!("it plays     until Ctrl-C, at");
+        return hums().args(["live", "--listen", "127.0.0.1:0"]).arg(card).run();
+    }
     Ok(())
 }
 
-fn show_figures(run: &serde_json::Value) {
-    println!();
-    for (label, key) in [
-        ("frames in", "frames_in"),
-        ("frames logged", "frames_logged"),
-        ("frames lost", "frames_lost"),
-        ("bytes in", "bytes_in"),
-        ("bytes logged", "bytes_logged"),
-        ("frames to the ground station", "gs_frames"),
-    ] {
-        println!("{label:<30} {:>10}", run.get(key).map_or_else(|| "?".to_owned(), ToString::to_string));
-    }
-    println!();
+/// The verdict, the vehicle and the worst finding: the first two paragraphs.
+fn shortened(verdict: &str) -> impl Iterator<Item = &str> {
+    verdict.split("\n\n").take(2).flat_map(str::lines).take(VERDICT_LINES_MAX)
 }
 
 /// Runs the flight through a pipeline; returns its figures.
 fn record(pipeline: Shell, flight: &Path, card: &Path, gs: &Path) -> Result<String> {
-    let paths = ["--input".as_ref(), flight.as_os_str(), "--sd".as_ref(), card.as_os_str()];
+    let paths = [flight.as_os_str(), "--sd".as_ref(), card.as_os_str()];
     done(pipeline.arg("--json").args(paths).arg("--gs").arg(gs)).context("the recording failed")
-}
-
-fn decode(card: &Path, to: &Path) -> Result<String> {
-    let decode = Shell::new(hums::program()).arg("decode").arg(card).arg("-o").arg(to);
-    done(decode.args(["--format", "tlog,csv"])).context("the card cannot be decoded")
 }
 
 /// The output of a command. Losses are reported and are no failure; nor is a recording that ends in the air.

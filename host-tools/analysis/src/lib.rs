@@ -2,7 +2,7 @@
 //!
 //! * [`check`]: the monitor of the board, run over a recording: flights, findings, and checks without data, with the
 //!   reason
-//! * [`summary`]: the contents of a recording, counted
+//! * [`summary`]: the contents of a recording, counted; [`soundness`]: what it lacks
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
 //! * [`reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
@@ -27,6 +27,7 @@ pub mod params;
 pub mod part;
 pub mod reference;
 pub mod series;
+pub mod soundness;
 pub mod states;
 pub mod summary;
 pub mod track;

@@ -1,5 +1,7 @@
 //! Parts that wear: their names, and the limit that each reaches first.
 
+use std::fmt;
+
 use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
 use hums_core::health::Subsystem;
@@ -25,23 +27,45 @@ pub fn name(kind: &str, number: u8, given: &str) -> String {
     format!("{kind}{number}{given}")
 }
 
-/// The limit that a part reaches first, in words; `None` where it has none.
-pub fn limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<String> {
-    let [hours, flights, cycles, motor_hours] = *limits;
+/// The limit that a part reaches first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// What the part has run.
+    pub run: f64,
+    /// What it may run.
+    pub limit: f64,
+    /// Of both: `h`, `flights`, `cycles`.
+    pub unit: &'static str,
+    /// How the hours count: `turning`; empty for other units.
+    pub how: &'static str,
+    /// How the name of its parameter ends.
+    pub end: &'static str,
+}
+
+impl fmt::Display for Limit {
+    /// The limit with its unit: `25 h turning`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let space = if self.how.is_empty() { "" } else { " " };
+        // A parameter has single precision.
+        write!(f, "{} {}{space}{}", self.limit as f32, self.unit, self.how)
+    }
+}
+
+/// The limit that a part reaches first; `None` where it has none.
+pub fn first_limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<Limit> {
     let is_powered = [Kind::Card, Kind::Other].iter().any(|of| of.name() == kind);
     let (run_s, how) =
         if is_powered { (figures.powered_s, "powered") } else { (figures.flight_s, "in the air") };
-    let all = [
-        (run_s / 3_600.0, hours, "h ", how),
-        (figures.flights, flights, "flights", ""),
-        (figures.cycles, cycles, "cycles", ""),
-        (figures.motor_s / 3_600.0, motor_hours, "h ", "turning"),
+    let run = [
+        (run_s / 3_600.0, "h", how),
+        (figures.flights, "flights", ""),
+        (figures.cycles, "cycles", ""),
+        (figures.motor_s / 3_600.0, "h", "turning"),
     ];
-    let used = |(run, limit, ..): &(f64, f64, &str, &str)| run / limit;
-    let first = all.into_iter().filter(|(_, limit, ..)| *limit > 0.0);
-    let (_, limit, unit, how) = first.max_by(|one, other| used(one).total_cmp(&used(other)))?;
-    // A parameter has single precision.
-    Some(format!("{} {unit}{how}", limit as f32))
+    let all = run.into_iter().zip(limits).zip(ENDS);
+    let all = all.map(|(((run, unit, how), limit), end)| Limit { run, limit: *limit, unit, how, end });
+    all.filter(|of| of.limit > 0.0)
+        .max_by(|one, other| (one.run / one.limit).total_cmp(&(other.run / other.limit)))
 }
 
 /// The most used part of a subsystem, as a check judges it: its name, and its limit.
@@ -66,7 +90,8 @@ pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
         }
     }
     let kind = part.kind.name();
-    Some((name(kind, part.number, part.name.as_str()), limit(kind, &figures, &limits)))
+    let limit = first_limit(kind, &figures, &limits);
+    Some((name(kind, part.number, part.name.as_str()), limit.map(|limit| limit.to_string())))
 }
 
 /// A due part in words: `motor 3 (limit 25 h turning)`.
@@ -86,7 +111,7 @@ mod tests {
     #[test]
     fn a_part_is_named_with_the_limit_that_it_reaches_first() {
         let figures = Figures { flight_s: 3_600.0, motor_s: 7_200.0, flights: 3.0, ..Figures::ZERO };
-        let limit = |kind, limits| limit(kind, &figures, &limits);
+        let limit = |kind, limits| first_limit(kind, &figures, &limits).map(|limit| limit.to_string());
         assert_eq!(limit("motor", [10.0, 50.0, 0.0, 4.0]).as_deref(), Some("4 h turning"));
         assert_eq!(limit("airframe", [1.5, 50.0, 0.0, 0.0]).as_deref(), Some("1.5 h in the air"));
         assert_eq!(limit("airframe", [100.0, 5.0, 0.0, 0.0]).as_deref(), Some("5 flights"));

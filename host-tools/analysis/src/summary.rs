@@ -21,6 +21,7 @@ use crate::names::counter_name;
 use crate::part;
 use crate::plural::are;
 use crate::progress;
+use crate::soundness::Soundness;
 use crate::source::epochs::Epochs;
 use crate::source::item::{self, Amount, Item, MessageCount, Take, Want};
 use crate::source::own::OwnReader;
@@ -369,9 +370,14 @@ impl Contents {
 
     /// The name of a part, and the limit that it reaches first, by its place from 1.
     pub fn part(&self, place: u8, line: &ComponentLine) -> (String, Option<String>) {
-        let limits = self.part_limits.get(usize::from(place).wrapping_sub(1)).copied().unwrap_or_default();
         let name = part::name(line.kind, line.number, &line.name);
-        (name, part::limit(line.kind, &line.figures, &limits))
+        (name, self.first_limit(place, line).map(|limit| limit.to_string()))
+    }
+
+    /// The limit that a part reaches first, by its place from 1.
+    pub fn first_limit(&self, place: u8, line: &ComponentLine) -> Option<part::Limit> {
+        let limits = self.part_limits.get(usize::from(place).wrapping_sub(1)).copied().unwrap_or_default();
+        part::first_limit(line.kind, &line.figures, &limits)
     }
 
     /// The due part of a finding; `None` for another check.
@@ -616,6 +622,16 @@ impl Overview {
     /// of another format has nothing that could prove its end.
     pub fn is_sound(&self) -> bool {
         self.faults().is_empty()
+    }
+
+    /// What it lacks.
+    pub fn soundness(&self) -> Soundness {
+        match self.format {
+            None => Soundness::of(&self.ending),
+            Some(_) if self.ending.summary.gaps > 0 => Soundness::Damaged,
+            Some(_) if self.contents.is_lossy => Soundness::Lossy,
+            Some(_) => Soundness::Whole,
+        }
     }
 
     /// Why it is not, as parts of sentences.

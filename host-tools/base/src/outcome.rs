@@ -6,7 +6,7 @@
 //! | 1 | failed: the message says what, and where it can what to do |
 //! | 2 | usage: the command line itself is wrong |
 //! | 3 | done, but the log has losses or damage: all that could be read was read |
-//! | 4 | done, the log is whole, and `hums check` found something wrong with the vehicle |
+//! | 4 | done, and `hums check` found something wrong with the vehicle, in a whole or a damaged log |
 
 use std::error::Error as StdError;
 use std::fmt;
@@ -19,10 +19,10 @@ use std::process::ExitCode;
 pub enum Outcome {
     /// Everything, exactly.
     Done,
-    /// Everything, and a check of the vehicle found something wrong.
-    Findings,
     /// All possible results; they report losses or damage.
     Losses,
+    /// A check of the vehicle found something wrong, whatever was lost.
+    Findings,
 }
 
 impl Outcome {

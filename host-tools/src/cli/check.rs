@@ -8,7 +8,8 @@ use super::read::input;
 use crate::check;
 
 const EXAMPLES: &str = "Examples:
-  hums check flight.tlog
+  hums flight.tlog
+  hums check flight.tlog -v
   hums check --json flight.tlog
   hums check cards/
   hums check card.img --session 00001
@@ -18,9 +19,10 @@ const EXAMPLES: &str = "Examples:
 Reads a ground station's tlog, raw MAVLink, ArduPilot's logs (.bin, .log), PX4's logs (.ulg), each also as .gz, logs of
 HUMS, cards and their images; told apart by what is in them. The checks and their limits are those of the monitor on
 board. A log of HUMS is shown with what the monitor on board found, unless --params or --past asks for another judgement.
-Exit codes: 0 nothing wrong in what could be judged (a log with too little in it says so: \"not enough to judge\"); 4 something
-wrong (a warning or worse); 3 the log has losses or damage, or no times, or nothing proves that it has its end, whatever was found; 1 failed; 2 usage.
-Of several logs: 1 where one failed, otherwise 3 where one has losses, otherwise 4 where one has findings. Where no autopilot was heard, nothing is judged: 0.";
+`hums FILE...` is `hums check FILE...`.
+Exit codes: 4 a finding (a warning or worse), also in a damaged log; 3 no finding, but the log has losses, damage or an end that is not
+proved; 0 nothing wrong in the checks that had data, also if they were too few to judge; 1 failed; 2 usage.
+Of several logs the first of 1, 4, 3, 0 that applies to one of them.";
 
 /// `hums check`
 #[derive(Args, Clone, Debug)]
@@ -44,6 +46,9 @@ pub struct Check {
     /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
     #[arg(long)]
     pub salvage: bool,
+    /// List the checks that were not judged, each with the reason
+    #[arg(long, short)]
+    pub verbose: bool,
     /// Print a line with a JSON object for each log (docs/check.md)
     #[arg(long)]
     pub json: bool,
@@ -59,6 +64,7 @@ impl Check {
             session: self.session.as_deref(),
             system: self.system,
             salvage: self.salvage,
+            verbose: self.verbose,
             json: self.json,
         }
     }

@@ -7,12 +7,12 @@ use clap::Args;
 use crate::endpoint::Endpoint;
 
 const LIVE_EXAMPLES: &str = "Examples:
-  hums live --input udpin:0.0.0.0:14550 --open
-  hums live --input serial:/dev/ttyUSB0:57600
-  hums live --input flight.tlog --open
-  hums live --input card.img --session 00001
-  hums live --input udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
-  hums live --input udpin:0.0.0.0:14550 --listen 0.0.0.0:8080
+  hums live udpin:0.0.0.0:14550 --open
+  hums live serial:/dev/ttyUSB0:57600
+  hums live flight.tlog --open
+  hums live card.img --session 00001
+  hums live udpin:0.0.0.0:14550 --influx http://127.0.0.1:8086 --org drones --bucket hums --token T
+  hums live udpin:0.0.0.0:14550 --listen 0.0.0.0:8080
 
 The address to open is printed to standard output. Ctrl-C ends it. A recording or a log is played, and can be paused,
 wound back and forth, and played at other speeds. Nothing is sent to the vehicle.
@@ -24,7 +24,7 @@ as a code for the phone's camera. Such an address ends with a token; the page sh
 #[command(after_help = LIVE_EXAMPLES)]
 pub struct Live {
     /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
-    #[arg(long, value_name = "SRC")]
+    #[arg(value_name = "SRC")]
     pub input: Endpoint,
     /// Of several sessions this one, by the name that `hums info --list` prints; otherwise the newest
     #[arg(long, value_name = "NAME")]

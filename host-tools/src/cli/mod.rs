@@ -11,10 +11,10 @@ use clap::{Parser, Subcommand};
 
 pub use check::Check;
 pub use live::Live;
-pub use read::{Decode, Format, Info, Report, Split};
+pub use read::{Decode, Due, Format, Info, Report, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
-pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull};
+pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull, Replaced};
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
 
@@ -30,15 +30,15 @@ const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
   serial:DEVICE:BAUD    a serial port, e.g. serial:/dev/ttyUSB0:921600
 
 Examples:
-  hums check flight.tlog                                     what is wrong with a flight
-  hums sim --input flight.tlog --sd card.img                 record a flight onto an SD card image
+  hums flight.tlog                                           what is wrong with a flight: the same as hums check flight.tlog
+  hums sim flight.tlog --sd card.img                 record a flight onto an SD card image
   hums info --list card.img                                  the flights on a card, a line each
   hums info card.img --session 00001                         all that is known of one of them
   hums decode card.img -o out --format tlog,csv              a card's logs for other tools
-  hums live --input udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
+  hums live udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
 
 Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read);
-4 done, and `hums check` found something wrong with the vehicle.
+4 done, and `hums check` found something wrong with the vehicle, also in a damaged log.
 Results go to standard output, everything else to standard error. Colours are for terminals only, and NO_COLOR=1 turns them off.";
 
 /// The whole command line.
@@ -63,6 +63,8 @@ pub enum Command {
     Decode(Decode),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
+    /// Say which parts are due: used, limit, left at the present rate; and the hours of each vehicle
+    Due(Due),
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
     Sim(Sim),
     /// Talk with the box over MAVLink: its logs, its parameters, its card
@@ -99,7 +101,8 @@ mod tests {
                 // A remark stands after three spaces.
                 let line = line.split("   ").next().unwrap_or_default();
                 let line = without_redirection(line);
-                let words = std::iter::once("hums").chain(line.split_whitespace());
+                let words = std::iter::once("hums").chain(line.split_whitespace()).map(Into::into);
+                let words = crate::with_command(words.collect());
                 assert!(Cli::try_parse_from(words).is_ok(), "hums {line}");
                 examples += 1;
             }
@@ -122,7 +125,8 @@ mod tests {
                 let (name, arguments) = line.split_once(' ').unwrap_or((line, ""));
                 let arguments = arguments.trim_start().split("   ").next().unwrap_or_default();
                 let line = format!("{name} {}", without_redirection(arguments));
-                let words = std::iter::once("hums").chain(line.split_whitespace());
+                let words = std::iter::once("hums").chain(line.split_whitespace()).map(Into::into);
+                let words = crate::with_command(words.collect());
                 let parsed = Cli::try_parse_from(words);
                 assert!(parsed.is_ok(), "{}: hums {line}: {parsed:?}", path.display());
                 commands += 1;

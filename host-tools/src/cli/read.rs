@@ -138,24 +138,48 @@ pub struct Info {
     pub json: bool,
 }
 
+const DUE_EXAMPLES: &str = "Examples:
+  hums due card.img
+  hums due cards/ --json
+  hums due flights/ --vehicle quad-7
+
+A box counts what each of its parts runs (docs/usage.md). From logs without a box come the hours and flights of each vehicle.
+Logs belong to one vehicle if the autopilot's unique id is the same. Logs without an id belong to the vehicle of their folder.
+Exit code 4: a part is due.";
+
+/// `hums due`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = DUE_EXAMPLES)]
+pub struct Due {
+    /// Cards, card images, logs, recordings, or directories with such
+    #[arg(required = true, value_name = "CARD|LOG|DIR", value_parser = input())]
+    pub inputs: Vec<PathBuf>,
+    /// The vehicle of all logs that have no unique id
+    #[arg(long, value_name = "NAME")]
+    pub vehicle: Option<String>,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
 const REPORT_EXAMPLES: &str = "Examples:
+  hums report flight.tlog
   hums report card.img -o report.html
   hums report card.img -o pages/
   hums report card.img --session 00001 -o report.html
-  hums report flight.tlog -o flight.html
   hums report before.tlog after.tlog --compare -o both.html
 
-With a directory for -o each session gets a page, named after log, box and session, and index.html is a table of them; otherwise only the
+Without -o the page of flight.tlog is flight.html, beside it. With a directory for -o each session gets a page, named after log, box and session, and index.html is a table of them; otherwise only the
 newest session gets a page. A page compares with the sessions before on the same card, and the parameters with those of the airframe's last flight.";
 
 /// `hums report`
 #[derive(Args, Clone, Debug)]
-#[command(after_help = REPORT_EXAMPLES, override_usage = "hums report [OPTIONS] -o <OUT> <LOG|IMAGE|DIR>...")]
+#[command(after_help = REPORT_EXAMPLES, override_usage = "hums report [OPTIONS] <LOG|IMAGE|DIR>... [-o <OUT>]")]
 pub struct Report {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
-    /// The page to write, or a directory for a page a session
+    /// The page to write, or a directory for a page a session; otherwise beside the input, with its name
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Only this session, by the name that `hums info --list` prints

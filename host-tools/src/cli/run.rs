@@ -9,14 +9,14 @@ use crate::endpoint::Endpoint;
 use crate::utc::parse_seconds;
 
 const SIM_EXAMPLES: &str = "Examples:
-  hums sim --input flight.tlog --sd card.img --gs gs.bin
-  hums sim --input flight.tlog --sd card.img --json --line-rate 921600
-  hums sim --input udpin:0.0.0.0:14550 --sd card.img --gs udpout:127.0.0.1:14551
-  hums sim --input flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
-  hums sim --input flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
-  hums sim --input flight.tlog --sd card.img --cut-after-writes 1000:torn
-  hums sim --input flight.tlog --sd card.img --store store.bin --params hums.param
-  hums sim --input flight.tlog --sd card.img --firmware hums-f405.elf
+  hums sim flight.tlog --sd card.img --gs gs.bin
+  hums sim flight.tlog --sd card.img --json --line-rate 921600
+  hums sim udpin:0.0.0.0:14550 --sd card.img --gs udpout:127.0.0.1:14551
+  hums sim flight.tlog --sd card.img --gs udpin:127.0.0.1:14551 --speed real
+  hums sim flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
+  hums sim flight.tlog --sd card.img --cut-after-writes 1000:torn
+  hums sim flight.tlog --sd card.img --store store.bin --params hums.param
+  hums sim flight.tlog --sd card.img --firmware hums-f405.elf
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. A file without a MAVLink frame is refused before anything
 is written. The image of --sd is kept: a second run adds a session to it; a file that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
@@ -28,7 +28,7 @@ With --firmware a second of flight takes some 0.15 s; `cargo xtask firmware` bui
 #[command(after_help = SIM_EXAMPLES)]
 pub struct Sim {
     /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink, also as .gz), `-`, udpin:, udpout:, tcp: or serial:
-    #[arg(long, value_name = "SRC")]
+    #[arg(value_name = "SRC")]
     pub input: Endpoint,
     /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
     #[arg(long, value_name = "IMAGE")]

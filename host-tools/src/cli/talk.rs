@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use hums_core::clock::Span;
+use hums_core::component::Kind;
 use hums_core::health::Level;
 
 use crate::endpoint::Endpoint;
@@ -13,6 +14,7 @@ use crate::utc::{When, parse_seconds};
 const BOX_EXAMPLES: &str = "Examples:
   hums box pull --link serial:/dev/ttyUSB0:57600 -o logs
   hums box params list --link serial:/dev/ttyUSB0:57600
+  hums box replaced motor 3 --serial 4711 --link serial:/dev/ttyUSB0:57600
   hums box format-card --yes --link serial:/dev/ttyUSB0:57600";
 
 /// `hums box`
@@ -31,6 +33,8 @@ pub enum BoxAction {
     Pull(Pull),
     /// List, read or set the board's parameters over MAVLink
     Params(Params),
+    /// Say that a part was replaced: over the link, or by a file on the card
+    Replaced(Replaced),
     /// Have the board format a card that it cannot record on
     FormatCard(FormatCard),
 }
@@ -193,6 +197,52 @@ impl std::str::FromStr for Around {
             )
         })
     }
+}
+
+const REPLACED_EXAMPLES: &str = "Examples:
+  hums box replaced motor 3 --serial 4711 --link serial:/dev/ttyUSB0:57600
+  hums box replaced battery 1 --serial B7 --link udpin:0.0.0.0:14550
+  hums box replaced airframe --serial 2 --card /media/card
+
+The vehicle must be disarmed. The log records the old part's figures, and the new part begins at zero. With --card a line in the
+card's PARAMS.TXT does it at the next start of the box, once: the box compares the serial number with that of the part that it knows.";
+
+/// `hums box replaced`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = REPLACED_EXAMPLES)]
+pub struct Replaced {
+    /// The kind of part: airframe, battery, motor, propeller, esc, card, engine, other
+    #[arg(value_name = "PART", value_parser = kind)]
+    pub part: Kind,
+    /// Which one of its kind, from 1, as CMPn_NUMBER has it
+    #[arg(value_name = "N", default_value_t = 0)]
+    pub number: u8,
+    /// The serial number of the new part
+    #[arg(long, value_name = "S")]
+    pub serial: Option<String>,
+    /// Where the board is: udpin:, udpout:, tcp: or serial:
+    #[arg(long, value_name = "SRC", required_unless_present = "card")]
+    pub link: Option<Endpoint>,
+    /// Sign what is sent with the key in this file
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    pub system: Option<u8>,
+    /// The root of the box's card, in place of a link
+    #[arg(long, value_name = "DIR", conflicts_with = "link")]
+    pub card: Option<PathBuf>,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn kind(text: &str) -> Result<Kind, String> {
+    let known = || Kind::ALL.into_iter().filter(|kind| *kind != Kind::None);
+    known().find(|kind| kind.name() == text).ok_or_else(|| {
+        let names: Vec<&str> = known().map(Kind::name).collect();
+        format!("there is no such kind of part: {}", names.join(", "))
+    })
 }
 
 const FORMAT_EXAMPLES: &str = "Examples:

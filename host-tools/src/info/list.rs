@@ -163,13 +163,11 @@ fn line(log: &Overview, width: usize) -> String {
         // The box marks arming, take-off and landing.
         let _ = write!(text, "; {}", warning("ends armed or in the air"));
     }
-    if log.contents.is_lossy {
-        let _ = write!(text, "; {}", warning("part of the time was not recorded"));
-    }
-    if !log.is_sound() {
+    let lacks = log.soundness().words();
+    if !lacks.is_empty() {
         // A recording of another format is judged by another command.
         let teller = if log.format.is_some() { "check says where" } else { "info --verify says why" };
-        let _ = write!(text, "; {} (hums {teller})", warning("not proved to be whole"));
+        let _ = write!(text, "; {} (hums {teller})", warning(lacks));
     }
     text
 }
@@ -202,13 +200,13 @@ fn worst(log: &Overview) -> Option<WorstJson> {
     })
 }
 
-fn start_utc_us(log: &Overview) -> Option<u64> {
+pub(super) fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 
 /// Time in the air by the usage counters. They count from power-on: a later log of one power-on begins with
 /// the counts of the logs before it.
-fn flight_s(log: &Overview) -> Option<f64> {
+pub(super) fn flight_s(log: &Overview) -> Option<f64> {
     let is_later = log.ending.summary.first_number.is_some_and(|first| first > 0);
     let before = log.contents.flight_before_s.filter(|_| is_later).unwrap_or(0.0);
     log.contents.usage.get(UsageCounter::Flight.name()).map(|all| (all - before).max(0.0))
@@ -336,7 +334,10 @@ mod tests {
         let mut log = Overview { format: Some(Format::Tlog), ..Overview::default() };
         (log.contents.begins_in_air, log.contents.is_lossy) = (true, true);
         let line = crate::colour::shown(&line(&log, 5), false).into_owned();
-        assert!(line.ends_with("; begins in the air; part of the time was not recorded"), "{line}");
+        assert!(
+            line.ends_with("; begins in the air; part of it was not recorded (hums check says where)"),
+            "{line}"
+        );
     }
 
     #[test]

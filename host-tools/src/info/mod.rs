@@ -1,6 +1,7 @@
 //! `hums info`: the contents of a log or a recording; with `--list` a line for each, with `--verify` each
 //! check. For people and as JSON.
 
+pub mod due;
 mod each;
 mod list;
 mod number;

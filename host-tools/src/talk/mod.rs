@@ -1,10 +1,11 @@
-//! Talking with a board as a ground station does: `hums box params`, `hums box pull` and `hums box format-card`.
+//! Talking with a board as a ground station does: `hums box params`, `pull`, `replaced` and `format-card`.
 
 #[cfg(test)]
 mod fake;
 pub mod format;
 pub mod params;
 pub mod pull;
+pub mod replaced;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;

@@ -184,6 +184,11 @@ fn value_of(frame: &Frame<'_>) -> Option<Param> {
     })
 }
 
+/// The value of a parameter.
+pub(super) fn value(client: &mut Client, name: &str) -> Result<f32> {
+    read(client, name).map(|param| param.value)
+}
+
 fn read(client: &mut Client, name: &str) -> Result<Param> {
     let (system, component) = client.target();
     let packet =

@@ -13,8 +13,7 @@ pub(crate) const BLOCK: usize = 512;
 /// A segment of the cards here, with its parity at its end.
 pub(crate) const SEGMENT: usize = 7_999 * BLOCK;
 
-/// Every command that reads, with these inputs: its exit code and its output on both streams. A finding about the
-/// vehicle's health is not damage.
+/// Every command that reads, with these inputs: its exit code and its output on both streams.
 pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, String)> {
     ["decode -o out --format csv", "report -o pages/", "info --verify", "info", "check"]
         .into_iter()
@@ -24,7 +23,7 @@ pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, Strin
                 let _ = fs::remove_dir_all(dir.join(made));
             }
             let said = [ended.stdout, ended.stderr].concat();
-            let code = ended.status.code().filter(|code| *code != 4).unwrap_or_default();
+            let code = ended.status.code().unwrap_or_default();
             (command, code, String::from_utf8_lossy(&said).into_owned())
         })
         .collect()
@@ -34,7 +33,9 @@ pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, Strin
 #[track_caller]
 pub(crate) fn all_say(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
     for (command, ended, said) in readers(dir, inputs) {
-        assert_eq!(ended, code, "hums {command} {inputs}: {said}");
+        // A finding of the vehicle's health comes before what the log lacks.
+        let is_finding = command == "check" && ended == 4;
+        assert!(ended == code || is_finding, "hums {command} {inputs} ended with {ended}: {said}");
         for words in words {
             assert!(said.contains(words), "hums {command} {inputs}: `{words}` is not in {said}");
         }
@@ -51,7 +52,7 @@ fn copy(dir: &Path, sessions: usize) {
     let recordings = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"].map(|name| end_of(name, dir));
     for session in 0..sessions {
         let recording = recordings[session % 2].display();
-        attempt(dir, &format!("sim --input {recording} --sd card.img --card-size 64"));
+        attempt(dir, &format!("sim {recording} --sd card.img --card-size 64"));
     }
     let image = fs::read(dir.join("card.img")).expect("an image");
     let mut starts: Vec<usize> = Vec::new();

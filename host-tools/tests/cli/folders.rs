@@ -138,10 +138,10 @@ fn a_pipe_or_a_device_as_a_recording_is_refused_at_once_and_nothing_is_left() {
     for line in [
         "decode --format hum /dev/zero -o new.hum",
         "decode --format hum pipe -o new.hum",
-        "sim --input pipe --sd new.img",
-        "sim --input PX4 --gs-input pipe --sd new.img",
-        "sim --input PX4 --sd pipe",
-        "sim --input PX4 --sd new.img --store pipe",
+        "sim pipe --sd new.img",
+        "sim PX4 --gs-input pipe --sd new.img",
+        "sim PX4 --sd pipe",
+        "sim PX4 --sd new.img --store pipe",
     ] {
         let said = run(dir.path(), line, 1);
         let said = String::from_utf8_lossy(&said.stderr).into_owned();

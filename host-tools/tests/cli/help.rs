@@ -73,7 +73,7 @@ fn furnished() -> TempDir {
     let path = |name: &str| dir.path().join(name);
     fs::copy(px4(), path("flight.tlog")).expect("a copy");
     fs::write(path("hums.param"), "CELL_VOLT_WARN 3.6\n").expect("a file");
-    run(dir.path(), "sim --input flight.tlog --sd card.img", 0);
+    run(dir.path(), "sim flight.tlog --sd card.img", 0);
     fs::create_dir(path("cards")).expect("a directory");
     copy(&path("card.img"), &path("cards/card.img"));
     run(dir.path(), "decode --format hum flight.tlog -o 00001_00.HUM", 0);
@@ -125,7 +125,8 @@ fn every_example_that_needs_nobody_works_as_it_is_typed() {
             }
         }
     }
-    let commands = ["check", "completions", "decode", "info", "live", "man", "report", "sim"];
+    let commands =
+        ["check", "completions", "decode", "due", "flight.tlog", "info", "live", "man", "report", "sim"];
     let commands = commands.map(String::from);
     assert_eq!(ran, BTreeSet::from(commands), "each of these ran");
     assert_eq!(elsewhere, BTreeSet::from(ELSEWHERE), "each of these has an example");

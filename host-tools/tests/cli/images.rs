@@ -18,7 +18,7 @@ fn numbers_begin_anew_where_all_logs_were_deleted() {
         fs::write(&path, image).expect("written");
     };
     let record = |flight: &Path| {
-        run(dir.path(), &format!("sim --input {} --sd card.img", flight.display()), 0);
+        run(dir.path(), &format!("sim {} --sd card.img", flight.display()), 0);
     };
     rewrite(&[b"00001_00HUM", b"00002_00HUM"]);
     // Its clock is 23 minutes behind that of the deleted session 00002.
@@ -87,7 +87,7 @@ fn a_newest_log_that_was_deleted_is_told_whatever_its_clock_says() {
     // The clocks of the later ones are 23 minutes and more behind that of the first.
     for name in ["ap_quad_faults.tlog", "px4_hil_quad_low.tlog", "px4_hil_quad_low.tlog"] {
         let recording = end_of(name, dir.path());
-        run(dir.path(), &format!("sim --input {} --sd card.img --card-size 64", recording.display()), 0);
+        run(dir.path(), &format!("sim {} --sd card.img --card-size 64", recording.display()), 0);
     }
     let path = dir.path().join("card.img");
     let mut image = fs::read(&path).expect("an image");

@@ -17,7 +17,7 @@ fn is_begun(dir: &Path) -> bool {
 fn two_runs_do_not_use_one_card_or_one_store() {
     let dir = recorded();
     let mut first = Command::new(env!("CARGO_BIN_EXE_hums"))
-        .args(["sim", "--input", "-", "--sd", "card.img", "--store", "store", "--gs", "gs"])
+        .args(["sim", "-", "--sd", "card.img", "--store", "store", "--gs", "gs"])
         .current_dir(dir.path())
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
@@ -27,7 +27,7 @@ fn two_runs_do_not_use_one_card_or_one_store() {
     let mut input = first.stdin.take().expect("it is piped");
     input.write_all(&tlog[..tlog.len() / 2]).expect("it reads");
     until("it records", || is_begun(dir.path()));
-    for line in ["sim --input PX4 --sd card.img", "sim --input PX4 --sd new.img --store store"] {
+    for line in ["sim PX4 --sd card.img", "sim PX4 --sd new.img --store store"] {
         let said = run(dir.path(), line, 1);
         let said = String::from_utf8_lossy(&said.stderr);
         assert!(said.contains("another run of hums is using it; wait for its end"), "{said}");
@@ -35,7 +35,7 @@ fn two_runs_do_not_use_one_card_or_one_store() {
     drop(input);
     // The half ends in the middle of a record.
     assert_eq!(first.wait().expect("it is ours").code(), Some(3));
-    run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
+    run(dir.path(), "sim PX4 --sd card.img --store store", 0);
     run(dir.path(), "info --verify card.img", 0);
 }
 
@@ -54,14 +54,13 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
     write("same.raw.gz", &packed(raw));
     write("cut.raw.gz", &packed(raw)[..9_000]);
     let frames = |name: &str, code: i32| {
-        let ended =
-            run(dir.path(), &format!("sim --input {name} --sd {name}.img --card-size 34 --json"), code);
+        let ended = run(dir.path(), &format!("sim {name} --sd {name}.img --card-size 34 --json"), code);
         json(&ended)["frames_in"].as_u64().expect("a count")
     };
     let all = frames("plain.raw", 0);
     assert_eq!(frames("same.raw.gz", 0), all);
     assert!((1..all).contains(&frames("cut.raw.gz", 3)), "a part of it");
-    run(dir.path(), "sim --input plain.raw --sd plain.raw.img --store store", 0);
+    run(dir.path(), "sim plain.raw --sd plain.raw.img --store store", 0);
 
     let text = "no frame in here\n".repeat(500);
     write("text", text.as_bytes());
@@ -79,7 +78,7 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
         for to in ["plain.raw.img --store store --overwrite-oldest", "new.img --store new --tap tap --gs gs"]
         {
             let mut command = hums();
-            let line = format!("sim --input {input} --sd {to}");
+            let line = format!("sim {input} --sd {to}");
             let ended =
                 command.current_dir(dir.path()).args(line.split(' ')).write_stdin(text.as_str()).output();
             let ended = ended.expect("it runs");
@@ -95,7 +94,7 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
 fn an_image_that_is_removed_while_it_is_recorded_on_is_told() {
     let dir = recorded();
     let first = Command::new(env!("CARGO_BIN_EXE_hums"))
-        .args(["sim", "--input", "-", "--sd", "card.img", "--gs", "gs"])
+        .args(["sim", "-", "--sd", "card.img", "--gs", "gs"])
         .current_dir(dir.path())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -121,7 +120,7 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
     let dir = tempfile::tempdir().expect("directory");
     let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
     fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
-    let sim = "sim --input short.raw --sd card.img --store store";
+    let sim = "sim short.raw --sd card.img --store store";
     let store = dir.path().join("store");
     let boots = || {
         let told = json(&run(dir.path(), "info card.img --json", 0));
@@ -166,7 +165,7 @@ fn a_damaged_store_is_told_and_one_that_cannot_be_read_is_refused_and_stays() {
 #[test]
 fn a_store_that_is_read_only_is_refused_as_an_image_is() {
     let dir = recorded();
-    run(dir.path(), "sim --input PX4 --sd new.img --store store", 0);
+    run(dir.path(), "sim PX4 --sd new.img --store store", 0);
     for name in ["card.img", "store"] {
         let path = dir.path().join(name);
         let mut permissions = path.metadata().expect("there").permissions();
@@ -174,7 +173,7 @@ fn a_store_that_is_read_only_is_refused_as_an_image_is() {
         fs::set_permissions(path, permissions).expect("ours");
     }
     let before = contents(dir.path());
-    for line in ["sim --input PX4 --sd card.img", "sim --input PX4 --sd new.img --store store"] {
+    for line in ["sim PX4 --sd card.img", "sim PX4 --sd new.img --store store"] {
         let said = run(dir.path(), line, 1);
         let said = String::from_utf8_lossy(&said.stderr);
         assert!(said.contains(": is read-only; make it writable or name another"), "{line}: {said}");
@@ -188,7 +187,7 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     let image = dir.path().join("card.img");
     // No file may be longer than 1 MiB: the image cannot be made.
     let program = env!("CARGO_BIN_EXE_hums");
-    let limited = format!("ulimit -f 1024; exec {program} sim --input {} --sd card.img", px4().display());
+    let limited = format!("ulimit -f 1024; exec {program} sim {} --sd card.img", px4().display());
     let ended =
         Command::new("bash").args(["-c", &limited]).current_dir(dir.path()).output().expect("it runs");
     let said = String::from_utf8_lossy(&ended.stderr);
@@ -197,11 +196,11 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 0, "nothing is left");
     // Leftovers of a killed run do no harm, and stay.
     fs::write(dir.path().join(".card.img.hums-part"), [0; 512]).expect("written");
-    run(dir.path(), "sim --input PX4 --sd card.img", 0);
+    run(dir.path(), "sim PX4 --sd card.img", 0);
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 2);
     // A leftover of an earlier version, killed while it made the image.
     fs::File::create(&image).and_then(|file| file.set_len(64 << 20)).expect("made");
-    let said = run(dir.path(), "sim --input PX4 --sd card.img", 3);
+    let said = run(dir.path(), "sim PX4 --sd card.img", 3);
     let said = String::from_utf8_lossy(&said.stderr);
     assert!(
         said.contains("the card has no partition table (MBR), so that nothing can be recorded on it"),
@@ -213,7 +212,7 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
 #[test]
 fn a_store_beside_recordings_is_named_and_is_no_loss() {
     let dir = recorded();
-    run(dir.path(), "sim --input PX4 --sd new.img --store store.bin", 0);
+    run(dir.path(), "sim PX4 --sd new.img --store store.bin", 0);
     for line in
         ["info .", "check .", "info --list .", "info --verify .", "decode . -o out --format tlog --to 1"]
     {
@@ -232,7 +231,7 @@ fn a_store_beside_recordings_is_named_and_is_no_loss() {
 #[test]
 fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     let dir = tempfile::tempdir().expect("a folder");
-    run(dir.path(), "sim --input PX4 --sd card.img --card-size 34", 0);
+    run(dir.path(), "sim PX4 --sd card.img --card-size 34", 0);
     let (before, program) = (contents(dir.path()), env!("CARGO_BIN_EXE_hums"));
     // No file may be longer than this, in KiB: a write beyond it fails as on a full disk. A store has 32.
     let limited = |kib: u32, line: &str| {
@@ -244,7 +243,7 @@ fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
         assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
         said
     };
-    let said = limited(20, "sim --input PX4 --sd card.img --store store");
+    let said = limited(20, "sim PX4 --sd card.img --store store");
     assert!(said.contains("store: cannot be written"), "{said}");
     assert!(contents(dir.path()) == before, "{said}");
 }
@@ -255,7 +254,7 @@ fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with
     let dir = recorded();
     for after_ms in [0, 3, 10, 30, 60] {
         let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"))
-            .args(["sim", "--sd", "card.img", "--store", "store", "--input"])
+            .args(["sim", "--sd", "card.img", "--store", "store"])
             .arg(px4())
             .current_dir(dir.path())
             .stdout(Stdio::null())
@@ -269,7 +268,7 @@ fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with
         let told = text(&attempt(dir.path(), "info --verify card.img"));
         assert!(told.contains("  ok      file system"), "{after_ms} ms: {told}");
     }
-    run(dir.path(), "sim --input PX4 --sd card.img --store store", 0);
+    run(dir.path(), "sim PX4 --sd card.img --store store", 0);
     let told = json(&attempt(dir.path(), "info card.img --json"));
     let logs = told["logs"].as_array().expect("logs");
     assert!(logs[0]["frames"] == 16_645 && logs.last().expect("one")["frames"] == 16_645, "{told}");
@@ -279,7 +278,7 @@ fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with
 fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
     let dir = tempfile::tempdir().expect("directory");
     let at = |name: &str| dir.path().join(name);
-    run(dir.path(), "sim --input PX4 --sd card.img --card-size 34", 0);
+    run(dir.path(), "sim PX4 --sd card.img --card-size 34", 0);
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let [tlog, log] = [px4(), at("log.hum")].map(|path| fs::read(path).expect("a recording"));
     let card = fs::read(at("card.img")).expect("an image");
@@ -301,13 +300,13 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
         fs::write(at(name), bytes).expect("written");
         fs::File::options().write(true).open(at(name)).and_then(|file| file.set_len(40 << 20)).expect("room");
         let before = fs::read(at(name)).expect("there");
-        let said = run(dir.path(), &format!("sim --input PX4 --sd {name}"), 1);
+        let said = run(dir.path(), &format!("sim PX4 --sd {name}"), 1);
         let said = String::from_utf8_lossy(&said.stderr);
         assert!(said.contains(why) && said.contains("what is in it stays; name an image"), "{name}: {said}");
         assert!(fs::read(at(name)).expect("there") == before, "{name}");
     }
     fs::write(at("few.tlog"), &tlog[..4000]).expect("written");
-    let said = run(dir.path(), "sim --input PX4 --sd few.tlog", 1);
+    let said = run(dir.path(), "sim PX4 --sd few.tlog", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("is no image of an SD card"));
     // A card with nothing but a table may be formatted by command, and is reported.
     fs::write(at("new.img"), &exfat).expect("written");
@@ -316,7 +315,7 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
         .open(at("new.img"))
         .and_then(|file| file.set_len(40 << 20))
         .expect("room");
-    run(dir.path(), "sim --input PX4 --sd new.img", 3);
+    run(dir.path(), "sim PX4 --sd new.img", 3);
 }
 
 #[test]
@@ -324,10 +323,10 @@ fn a_store_that_is_refused_leaves_no_card_and_a_card_that_is_refused_no_store() 
     let dir = tempfile::tempdir().expect("directory");
     fs::write(dir.path().join("text"), "no store").expect("written");
     for store in ["text", ".", "missing/store"] {
-        run(dir.path(), &format!("sim --input PX4 --sd card.img --store {store}"), 1);
+        run(dir.path(), &format!("sim PX4 --sd card.img --store {store}"), 1);
     }
     fs::create_dir(dir.path().join("folder")).expect("made");
-    run(dir.path(), "sim --input PX4 --sd folder --store store", 1);
+    run(dir.path(), "sim PX4 --sd folder --store store", 1);
     for name in ["card.img", "store", "missing"] {
         assert!(!dir.path().join(name).exists(), "{name}");
     }

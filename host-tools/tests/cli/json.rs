@@ -50,12 +50,15 @@ fn documented(document: &str, heading: &str, around: &str, names: &mut BTreeSet<
 #[test]
 fn every_object_says_which_one_it_is_and_the_document_has_all_of_its_names() {
     let dir = recorded();
-    run(dir.path(), "sim --input PX4 --sd second.img --noise 0.001 --stall 2500@20", 0);
+    std::fs::write(dir.path().join("parts.param"), "CMP1_KIND 1\nCMP1_HOURS 50\n").expect("a file");
+    run(dir.path(), "sim PX4 --sd parts.img --params parts.param", 0);
+    run(dir.path(), "sim PX4 --sd second.img --noise 0.001 --stall 2500@20", 0);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/json.md");
     let document = std::fs::read_to_string(path).expect("the document");
     let mut schemas = BTreeSet::new();
     for line in [
         "info --list --json card.img PX4",
+        "due --json parts.img",
         "info --json card.img",
         "info --json PX4",
         "info --json second.img",
@@ -63,7 +66,7 @@ fn every_object_says_which_one_it_is_and_the_document_has_all_of_its_names() {
         "decode card.img -o out --format tlog,csv,thesis,parquet --json",
         "report card.img -o pages/ --json",
         "decode --format hum PX4 -o packed.hum --json",
-        "sim --input PX4 --sd another.img --json --cut-after-writes 900",
+        "sim PX4 --sd another.img --json --cut-after-writes 900",
     ] {
         let output = attempt(dir.path(), line);
         let object: Value = serde_json::from_slice(&output.stdout)
@@ -81,7 +84,7 @@ fn every_object_says_which_one_it_is_and_the_document_has_all_of_its_names() {
         assert!(missing.is_empty(), "{schema}: docs/json.md does not have {missing:#?}");
         schemas.insert(schema.to_owned());
     }
-    assert_eq!(schemas.len(), 6, "{schemas:?}");
+    assert_eq!(schemas.len(), 7, "{schemas:?}");
 }
 
 #[test]
@@ -89,7 +92,7 @@ fn a_session_alone_is_what_it_is_among_all() {
     let dir = recorded();
     for seed in 1..=5 {
         // The place of the power cut in the flight depends on the size of the log.
-        attempt(dir.path(), &format!("sim --input PX4 --sd card.img --seed {seed} --cut-after-writes 400"));
+        attempt(dir.path(), &format!("sim PX4 --sd card.img --seed {seed} --cut-after-writes 400"));
     }
     let all: Value =
         serde_json::from_slice(&attempt(dir.path(), "info --json card.img").stdout).expect("JSON");

@@ -64,7 +64,7 @@ fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
     let dir = tempfile::tempdir().expect("directory");
     let frames =
         |image: &str| json(&run(dir.path(), &format!("info {image} --json"), 0))["logs"][0]["frames"].clone();
-    let said = run(dir.path(), "sim --input PX4 --sd full.img --gs /dev/full --tap /dev/full", 3);
+    let said = run(dir.path(), "sim PX4 --sd full.img --gs /dev/full --tap /dev/full", 3);
     let said = String::from_utf8_lossy(&said.stderr);
     for flag in ["--gs", "--tap"] {
         let words = format!("{flag}: /dev/full: cannot be written");
@@ -73,7 +73,7 @@ fn what_is_written_beside_a_recording_may_fail_and_the_recording_goes_on() {
     assert_eq!(frames("full.img"), 16_645);
     // The reader has closed the pipe.
     let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"));
-    sim.args(["sim", "--sd", "pipe.img", "--gs", "-", "--input"]).arg(px4()).current_dir(dir.path());
+    sim.args(["sim", "--sd", "pipe.img", "--gs", "-"]).arg(px4()).current_dir(dir.path());
     let mut sim = sim.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
     drop(sim.stdout.take());
     let ended = sim.wait_with_output().expect("it ends");
@@ -156,7 +156,7 @@ fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     let server = TcpListener::bind("127.0.0.1:0").expect("a port");
     let mut sim = Command::new(env!("CARGO_BIN_EXE_hums"))
-        .args(["sim", "--sd", "card.img", "--tap", "tap.bin", "--input"])
+        .args(["sim", "--sd", "card.img", "--tap", "tap.bin"])
         .arg(format!("tcp:{}", server.local_addr().expect("an address")))
         .current_dir(dir.path())
         .spawn()
@@ -170,8 +170,8 @@ fn what_came_live_before_a_kill_is_there_and_no_command_takes_it_away() {
     sim.wait().expect("it is ours");
     run(dir.path(), "check tap.bin", 0);
     for line in [
-        "sim --input PX4 --sd other.img --tap tap.bin",
-        "sim --input PX4 --sd other.img --gs tap.bin",
+        "sim PX4 --sd other.img --tap tap.bin",
+        "sim PX4 --sd other.img --gs tap.bin",
         "decode --format hum PX4 -o tap.bin",
     ] {
         run(dir.path(), line, 1);
@@ -203,7 +203,7 @@ fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
 #[test]
 fn two_signals_right_after_each_other_end_the_page_in_good_order() {
     let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
-    live.args(["live", "--listen", "127.0.0.1:0", "--input"]).arg(flight("ap_quad_guided.tlog"));
+    live.args(["live", "--listen", "127.0.0.1:0"]).arg(flight("ap_quad_guided.tlog"));
     let mut live = live.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
     // It serves, so it handles signals.
     let mut said = [0; 1];
@@ -221,7 +221,7 @@ fn a_signal_while_it_starts_ends_the_writing_of_a_recording_with_words() {
     let made = Command::new("mkfifo").arg(&params).status();
     assert!(made.expect("it runs").success());
     let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));
-    live.args(["live", "--influx", "http://127.0.0.1:9", "--listen", "127.0.0.1:0", "--input"]).arg(px4());
+    live.args(["live", "--influx", "http://127.0.0.1:9", "--listen", "127.0.0.1:0"]).arg(px4());
     live.arg("--params").arg(&params);
     let mut live = live.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
     // It reads its parameters, and has opened nothing else.
@@ -250,7 +250,7 @@ fn a_standard_error_on_a_full_disk_ends_nothing() {
     };
     assert_eq!(shell("hums info --list nosuch 2> /dev/full"), Some(1));
     // The texts in flight cannot be printed: the card has all of it.
-    let line = "hums sim --input flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
+    let line = "hums sim flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
     assert_eq!(shell(line), Some(3));
     assert_eq!(shell("hums decode card.img -o all.tlog --format tlog"), Some(0));
     assert_eq!(frames_of(&dir.path().join("all.tlog")).len(), frames_of(&px4()).len());

@@ -5,6 +5,7 @@ mod check;
 mod copied;
 mod copies;
 mod damaged;
+mod due;
 mod folders;
 mod help;
 mod images;

@@ -65,7 +65,7 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         let middle = bytes.len() / 2;
         bytes[middle..middle + 1_000].fill(0xff);
         fs::write(dir.path().join(name), bytes).expect("written");
-        let checked = json(&run(dir.path(), &format!("check --json {name}"), 3));
+        let checked = json(&run(dir.path(), &format!("check --json {name}"), 4));
         assert_eq!(checked["damaged"], true, "{name}");
         let gaps = checked["gaps"].as_array().expect("gaps");
         let place = |gap: &serde_json::Value| gap["place"].as_u64().unwrap_or(0);
@@ -76,7 +76,7 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         // The data before and behind it is judged.
         let (from, to) = (checked["from_s"].as_f64(), checked["to_s"].as_f64());
         assert!(to.zip(from).is_some_and(|(to, from)| to - from > 60.0), "{name}: {checked}");
-        let said = text(&run(dir.path(), &format!("check {name}"), 3));
+        let said = text(&run(dir.path(), &format!("check {name}"), 4));
         assert!(said.contains(&place(gap).to_string()), "{name}: its place is for people too: {said}");
     }
 }

@@ -258,7 +258,7 @@ fn where_files_go_depends_on_how_many_there_are() {
     run(at, "decode card.img -o both --format tlog,csv", 0);
     let name = format!("both/{}", named(&at.join("both"), "00001"));
     assert!(at.join(format!("{name}.tlog")).is_file() && at.join(name).join("ATTITUDE.csv").is_file());
-    run(at, "sim --input PX4 --sd card.img", 0);
+    run(at, "sim PX4 --sd card.img", 0);
     run(at, "decode card.img -o two --format tlog", 0);
     let tlog = |dir: &str, base: &str, ending: &str| {
         at.join(dir).join(named(&at.join(dir), base) + ending).is_file()
@@ -424,15 +424,15 @@ fn slips_of_the_command_line_are_usage_errors() {
         "",
         "fly",
         "sim",
-        "sim --input PX4",
-        "sim --input udp:1.2.3.4:5 --sd c.img",
-        "sim --input PX4 --sd c.img --stall 5",
-        "sim --input PX4 --sd c.img --noise 2",
-        "sim --input PX4 --sd c.img --card-size 5",
-        "sim --input PX4 --sd c.img --gs - --json",
-        "sim --input udpin:127.0.0.1:1 --sd c.img --speed max",
-        "sim --firmware x.elf --input PX4 --sd c.img --card-out 1..2",
-        "sim --input PX4 --sd c.img --costs",
+        "sim PX4",
+        "sim udp:1.2.3.4:5 --sd c.img",
+        "sim PX4 --sd c.img --stall 5",
+        "sim PX4 --sd c.img --noise 2",
+        "sim PX4 --sd c.img --card-size 5",
+        "sim PX4 --sd c.img --gs - --json",
+        "sim udpin:127.0.0.1:1 --sd c.img --speed max",
+        "sim --firmware x.elf PX4 --sd c.img --card-out 1..2",
+        "sim PX4 --sd c.img --costs",
         "decode c.img -o out --format xml",
         "decode --format hum,tlog PX4 -o out",
         "decode --format hum PX4 -o out.hum --from 1",
@@ -471,11 +471,7 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
 {
     let dir = tempfile::tempdir().expect("directory");
     let input = flight("ap_quad_faults.tlog");
-    run(
-        dir.path(),
-        &format!("sim --input {} --sd z.img --store store.bin --reboot-at 244.7", input.display()),
-        3,
-    );
+    run(dir.path(), &format!("sim {} --sd z.img --store store.bin --reboot-at 244.7", input.display()), 3);
     fs::copy(flight("ap_quad_guided.tlog"), dir.path().join("y.tlog")).expect("copied");
     let lines = text(&run(dir.path(), "info --list .", 3));
     let name = |line: &str| line.split_whitespace().next().unwrap_or_default().to_owned();
@@ -483,7 +479,7 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
     assert_eq!(names, ["y.tlog", "z/00001", "z/00002"], "{lines}");
     let broken = lines.lines().find(|line| line.starts_with("z/00001")).expect("it is there");
     assert!(broken.contains("  3:16  ") && broken.contains("; ends in the air; "), "{lines}");
-    let checked = text(&run(dir.path(), "check z.img --session 1", 3));
+    let checked = text(&run(dir.path(), "check z.img --session 1", 4));
     assert!(checked.contains("  in air   3:16 in 1 flight, whose landing is not in the log"), "{checked}");
     let info = text(&run(dir.path(), "info z.img/ --session 1", 3));
     let counted = "(counted here to the end of the log; the box had stored its own last at 4:00.0)";
@@ -496,7 +492,22 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
     let next = text(&run(dir.path(), "info z.img --session 2", 0));
     assert_eq!(counter(&next, "Take-offs").as_deref(), Some("0"), "{next}");
     assert_eq!(counter(&next, "Landings").as_deref(), Some("1"), "{next}");
-    let report = run(dir.path(), "report y.tlog", 2);
+    // Without -o a page lies beside its log, and is not overwritten.
+    fs::create_dir(dir.path().join("beside")).expect("a folder");
+    fs::copy(dir.path().join("y.tlog"), dir.path().join("beside/y.tlog")).expect("a copy");
+    for (line, code) in
+        [("report beside/y.tlog", 0), ("report beside/y.tlog", 1), ("report beside/y.tlog --force", 0)]
+    {
+        run(dir.path(), line, code);
+    }
+    // Nothing in it tells of the folders of this computer.
+    run(dir.path(), &format!("report {} -o pages/", dir.path().join("beside").display()), 0);
+    for page in ["beside/y.html", "pages/index.html"] {
+        let page = fs::read_to_string(dir.path().join(page)).expect("a page");
+        assert!(page.contains("y.tlog") && !page.contains("beside/"), "a folder is in the page");
+        assert!(!page.contains(&dir.path().display().to_string()), "a folder is in the page");
+    }
+    let report = run(dir.path(), "report y.tlog beside/y.tlog", 2);
     assert!(String::from_utf8_lossy(&report.stderr).contains("-o is missing"));
 }
 

@@ -9,10 +9,10 @@ use crate::support::{attempt, end_of, flight, frames_of, hums, json, px4, run, t
 #[test]
 fn the_tap_shows_what_the_uart_got() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "sim --input PX4 --sd card.img --tap clean.bin", 0);
+    run(dir.path(), "sim PX4 --sd card.img --tap clean.bin", 0);
     let clean = fs::read(dir.path().join("clean.bin")).expect("tap");
     assert_eq!(clean, frames_of(&px4()).concat());
-    run(dir.path(), "sim --input PX4 --sd card2.img --tap noisy.bin --noise 0.01", 0);
+    run(dir.path(), "sim PX4 --sd card2.img --tap noisy.bin --noise 0.01", 0);
     let noisy = fs::read(dir.path().join("noisy.bin")).expect("tap");
     let damaged = clean.iter().zip(&noisy).filter(|(a, b)| a != b).count();
     assert!((clean.len() / 200..clean.len() / 50).contains(&damaged), "{damaged} of {}", clean.len());
@@ -21,7 +21,7 @@ fn the_tap_shows_what_the_uart_got() {
 #[test]
 fn a_reboot_is_a_new_session_on_the_same_card() {
     let dir = tempfile::tempdir().expect("directory");
-    let output = run(dir.path(), "sim --input PX4 --sd card.img --json --reboot-at 100 --reboot-at 200", 3);
+    let output = run(dir.path(), "sim PX4 --sd card.img --json --reboot-at 100 --reboot-at 200", 3);
     let json = json(&output);
     assert_eq!(json["log_files"].as_array().map(Vec::len), Some(3), "{json}");
     assert!(json["frames_lost"].as_u64().is_some_and(|lost| lost < 60), "{json}");
@@ -31,7 +31,7 @@ fn a_reboot_is_a_new_session_on_the_same_card() {
 #[test]
 fn the_recorded_times_can_be_ignored() {
     let dir = tempfile::tempdir().expect("directory");
-    run(dir.path(), "sim --input PX4 --sd card.img --line-rate 115200", 0);
+    run(dir.path(), "sim PX4 --sd card.img --line-rate 115200", 0);
     let info = json(&run(dir.path(), "info card.img --json", 0));
     let seconds = info["logs"][0]["duration_s"].as_f64().expect("duration");
     let bytes: usize = frames_of(&px4()).iter().map(Vec::len).sum();
@@ -43,7 +43,7 @@ fn standard_input_and_output_and_raw_bytes_do_as_well() {
     let dir = tempfile::tempdir().expect("directory");
     let raw = frames_of(&px4()).concat();
     let mut command = hums();
-    command.current_dir(dir.path()).args(["sim", "--input", "-", "--sd", "card.img", "--gs", "-"]);
+    command.current_dir(dir.path()).args(["sim", "-", "--sd", "card.img", "--gs", "-"]);
     let output = command.write_stdin(raw).output().expect("it runs");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(
@@ -67,7 +67,7 @@ fn a_tcp_server_is_listened_to_until_it_closes() {
         let (mut stream, _) = server.accept().expect("a connection");
         stream.write_all(&recording.get(..2000).unwrap_or_default().concat()).expect("sent");
     });
-    let line = format!("sim --input tcp:{address} --sd card.img --gs udpout:{sink} --json");
+    let line = format!("sim tcp:{address} --sd card.img --gs udpout:{sink} --json");
     let json = json(&run(dir.path(), &line, 0));
     sender.join().expect("the server");
     // A frame in two pieces that a busy machine reads 20 ms apart is lost, as on a UART.
@@ -84,12 +84,12 @@ fn parameters_come_from_a_file_and_slips_in_it_are_told() {
     let dir = tempfile::tempdir().expect("directory");
     let params = |text: &str| fs::write(dir.path().join("p.param"), text).expect("written");
     params("# limits\nCELL_VOLT_WARN 4.1\nVIBE_WARN,25.5\n");
-    let output = run(dir.path(), "sim --input PX4 --sd a.img --params p.param --json", 0);
+    let output = run(dir.path(), "sim PX4 --sd a.img --params p.param --json", 0);
     let findings = json(&output)["findings"].to_string();
     assert!(findings.contains("cell_voltage"), "4.1 V are wanted: {findings}");
     for wrong in ["NO_SUCH_NAME 1", "VIBE_WARN", "VIBE_WARN x", "VIBE_WARN 1e9", "VIBE_WARN 1 2"] {
         params(wrong);
-        let output = run(dir.path(), "sim --input PX4 --sd b.img --params p.param", 2);
+        let output = run(dir.path(), "sim PX4 --sd b.img --params p.param", 2);
         assert!(String::from_utf8_lossy(&output.stderr).contains("line 1"), "{wrong}");
     }
     assert!(!dir.path().join("b.img").exists(), "a slip left an image behind");
@@ -100,7 +100,7 @@ fn a_card_whose_file_system_is_damaged_stays_as_it_is() {
     let dir = tempfile::tempdir().expect("directory");
     let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
     fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
-    let sim = "sim --input short.raw --sd card.img";
+    let sim = "sim short.raw --sd card.img";
     run(dir.path(), &format!("{sim} --card-size 34"), 0);
     let image = dir.path().join("card.img");
     let mut bytes = fs::read(&image).expect("an image");
@@ -118,7 +118,7 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     let dir = tempfile::tempdir().expect("directory");
     let recording = fs::read(flight("ap_quad_signed.raw")).expect("a recording");
     fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
-    let sim = "sim --input short.raw --sd card.img --json";
+    let sim = "sim short.raw --sd card.img --json";
     run(dir.path(), &format!("{sim} --card-size 34"), 0);
     // The smallest card has room for some sixteen sessions.
     let refused = (0..40).map(|_| attempt(dir.path(), sim)).find(|ended| ended.status.code() != Some(0));
@@ -137,7 +137,7 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     let stored = attempt(dir.path(), &format!("{sim} --store store.bin"));
     assert_eq!(stored.status.code(), Some(2), "{}", String::from_utf8_lossy(&stored.stderr));
     assert_eq!(sessions("info card.img --json"), before);
-    let other = "sim --input short.raw --sd other.img --json";
+    let other = "sim short.raw --sd other.img --json";
     run(dir.path(), &format!("{other} --card-size 34"), 0);
     let starts = " --reboot-at 0.1".repeat(19);
     assert_eq!(attempt(dir.path(), &format!("{other}{starts}")).status.code(), Some(2));
@@ -160,7 +160,7 @@ fn what_came_damaged_over_the_line_is_said_by_verify_and_is_no_damage_of_the_log
     let recording = end_of("px4_hil_quad_low.tlog", dir.path());
     for (noise, is_told) in [("", false), (" --noise 0.002", true)] {
         let _ = fs::remove_file(dir.path().join("card.img"));
-        run(dir.path(), &format!("sim --input {} --sd card.img{noise}", recording.display()), 0);
+        run(dir.path(), &format!("sim {} --sd card.img{noise}", recording.display()), 0);
         let told = text(&run(dir.path(), "info --verify card.img", 0));
         let words = "of no frame came over the line, before the recorder: no damage of the log";
         assert_eq!(

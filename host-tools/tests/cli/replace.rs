@@ -18,7 +18,7 @@ fn two_cards() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     for (name, recording) in [("c1", "px4_hil_quad_low.tlog"), ("c2", "ap_quad_guided.tlog")] {
         let recording = end_of(recording, dir.path());
-        let code = attempt(dir.path(), &format!("sim --input {} --sd {name}.img", recording.display()));
+        let code = attempt(dir.path(), &format!("sim {} --sd {name}.img", recording.display()));
         assert!(code.status.success(), "{name}");
     }
     dir
@@ -155,7 +155,7 @@ fn every_command_with_the_flag_makes_the_same_again_with_it() {
 #[test]
 fn a_slip_in_the_name_of_an_output_costs_no_recording() {
     let dir = furnished();
-    run(dir.path(), "sim --input PX4 --sd card.img --card-size 64", 0);
+    run(dir.path(), "sim PX4 --sd card.img --card-size 64", 0);
     let at = |name: &str| dir.path().join(name);
     fs::write(at("thesis.txt"), "months of work").expect("written");
     // Bytes of a port, and a log from a card: originals of the kinds that the commands make.
@@ -166,8 +166,8 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
         "decode folder/log.hum -o OUT --format tlog",
         "report folder/log.hum -o OUT",
         "decode --format hum folder/flight.tlog -o OUT",
-        "sim --input folder/flight.tlog --sd new.img --gs OUT",
-        "sim --input folder/flight.tlog --sd new.img --tap OUT",
+        "sim folder/flight.tlog --sd new.img --gs OUT",
+        "sim folder/flight.tlog --sd new.img --tap OUT",
     ] {
         for name in names {
             let line = line.replace("OUT", name);
@@ -178,7 +178,7 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
             assert_eq!(said.contains("--force"), !line.starts_with("sim"), "{line}: {said}");
         }
     }
-    let said = run(dir.path(), "sim --input PX4 --sd new.img --gs both --tap ./both", 2);
+    let said = run(dir.path(), "sim PX4 --sd new.img --gs both --tap ./both", 2);
     assert!(String::from_utf8_lossy(&said.stderr).contains("are one file"));
 }
 

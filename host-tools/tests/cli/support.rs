@@ -90,7 +90,7 @@ pub(crate) fn json(output: &Output) -> serde_json::Value {
 /// A directory with a card on which the PX4 flight was recorded.
 pub(crate) fn recorded() -> TempDir {
     made_once("recorded", |dir| {
-        run(dir, "sim --input PX4 --sd card.img", 0);
+        run(dir, "sim PX4 --sd card.img", 0);
     })
 }
 

@@ -46,7 +46,7 @@ fn measure(hums: &Path, seconds: u32, rate: f64, recording: &Path) -> Result<()>
     let frames: Vec<Vec<u8>> =
         frames.iter().filter(|frame| frame.verified).map(|frame| frame.bytes.to_vec()).collect();
     let port = free_port();
-    let live = Live::start_at(hums, &["--input", &format!("udpin:127.0.0.1:{port}")]);
+    let live = Live::start_at(hums, &[&format!("udpin:127.0.0.1:{port}")]);
     let address = live.address.clone();
     let count = (f64::from(seconds) * rate) as usize;
     let socket = UdpSocket::bind("127.0.0.1:0")?;

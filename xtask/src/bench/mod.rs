@@ -104,7 +104,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("{:22} {:>9} {:>9} {:>9} {:>7} {:>7}", "recording", "tlog", "xz -9e", "session", "tlog/", "xz/");
     for flight in unsigned(flights) {
         let _ = fs::remove_file(&card);
-        let sim = ["sim", "--json", "--speed", "max", "--input"];
+        let sim = ["sim", "--json", "--speed", "max"];
         let (json, _) =
             Shell::new(&program).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
         let report: Value = serde_json::from_str(&json).context("the report of hums sim")?;
@@ -205,7 +205,6 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
     let (json, _) = Shell::new(program)
         .args(["sim", "--json", "--costs", "--firmware"])
         .arg(image)
-        .arg("--input")
         .arg(&input)
         // On a small card the first segment alone takes 0.7 s.
         .args(["--line-rate", BAUD, "--card-size", "4096", "--sd"])

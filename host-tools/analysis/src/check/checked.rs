@@ -3,6 +3,8 @@
 use super::judged::Judged;
 use crate::ending::Ending;
 use crate::outcome::Outcome;
+use crate::soundness::Soundness;
+use crate::source::item::Gap;
 use crate::source::recording::Format;
 
 /// A recording, judged.
@@ -18,6 +20,18 @@ pub struct Checked {
 }
 
 impl Checked {
+    /// What the log lacks.
+    pub fn soundness(&self) -> Soundness {
+        let judged = &self.judged;
+        let read = match () {
+            () if judged.damages > 0 => Soundness::Damaged,
+            () if judged.is_lossy() => Soundness::Lossy,
+            () if judged.gaps.iter().any(Gap::is_noise) => Soundness::NotFrames,
+            () => Soundness::Whole,
+        };
+        self.ending.as_ref().map_or(Soundness::Whole, Soundness::of).max(read)
+    }
+
     /// How the run ended for this one.
     pub(super) fn outcome(&self) -> Outcome {
         let wrong = !self.judged.problems.is_empty();

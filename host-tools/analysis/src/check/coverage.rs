@@ -18,6 +18,8 @@ const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_
 const CELL_VOLTAGE: &str = "cell_voltage";
 /// Why checks of earlier flights and of worn parts are not judged.
 const UNTOLD: &str = "only earlier flights (--past) or a monitor on board tell";
+/// Why a check without a limit is not judged.
+pub(super) const OFF: &str = "its limit is off";
 /// Period of the notes.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
@@ -154,7 +156,7 @@ impl Recording<'_> {
             _ => {}
         }
         if is_off(check, self.monitor.params()) {
-            return not("its limit is off");
+            return not(OFF);
         }
         if words.scope == Scope::Stored {
             return not(UNTOLD);

@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 
 use hums_core::alert::{HOLDS, of_estimator};
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
-use hums_core::clock::Instant;
+use hums_core::clock::{Instant, Span};
 use hums_core::health::{Level, checks};
-use hums_core::observation::{AutopilotIdentity, Estimator, Heartbeat, Source, SystemStatus};
+use hums_core::observation::{AutopilotIdentity, Estimator, Gnss, Heartbeat, Source, SystemStatus};
 use hums_core::params::{Param, Params};
+use hums_core::units::Position;
 use hums_core::vehicle::BATTERIES_MAX;
 
 use super::problem::Problems;
@@ -16,9 +17,17 @@ use crate::names::autopilot_name;
 use crate::source::item::AUTOPILOT;
 use crate::source::told::Finding;
 use crate::states;
+use crate::utc::moment;
 
 /// The check of the autopilot's own state.
 pub(super) const FAILSAFE: &str = "autopilot_state";
+
+/// The check of a GPS receiver's speed against its positions.
+const GPS_SPEED: &str = "gps_speed";
+/// A position so far from where the speed leads is a jump, m: more than a receiver strays in its seconds.
+const JUMP_M: f64 = 10.0;
+/// Fixes further apart are not compared. A jump is named up to this long before its finding.
+const NEAR: Span = Span::from_secs(20);
 
 /// The present states.
 #[derive(Debug, Default)]
@@ -29,6 +38,10 @@ pub(super) struct Details {
     doubted: Option<Causes>,
     /// The autopilot's last text about each cause, and its time.
     said: [Option<(Instant, String)>; Cause::COUNT],
+    /// The last position of the first GPS receiver.
+    fix: Option<(Instant, Position)>,
+    /// The last jump of that, in metres, and its time.
+    jump: Option<(Instant, f64)>,
     /// Batteries that are followed, in the order in which they came: component and id.
     batteries: Vec<(u8, u8)>,
     /// Those beyond them, up to [`BEYOND_MAX`].
@@ -114,6 +127,20 @@ impl Details {
             *said = Some((at, words));
         }
         is_wrong
+    }
+
+    /// A GPS receiver reports its position and speed.
+    pub(super) fn gnss(&mut self, at: Instant, gnss: &Gnss) {
+        let Some(position) = gnss.position.filter(|_| gnss.instance == 0 && gnss.fix >= 3) else { return };
+        let before = self.fix.replace((at, position)).filter(|(then, _)| at.since(*then) <= NEAR);
+        let Some((then, from)) = before else { return };
+        let flown_m =
+            f64::from(gnss.speed.map_or(0.0, |speed| speed.0)) * at.since(then).as_micros() as f64 / 1e6;
+        let jump_m = distance_m(from, position) - flown_m;
+        let is_worse = self.jump.is_none_or(|(then, known_m)| at.since(then) > NEAR || jump_m > known_m);
+        if jump_m > JUMP_M && is_worse {
+            self.jump = Some((at, jump_m));
+        }
     }
 
     /// An autopilot reports its type.
@@ -233,9 +260,25 @@ impl Details {
                 let names = self.failsafes.split(", ").filter(|name| !name.is_empty());
                 names.for_each(|name| problems.detail(check, name));
             }
+            GPS_SPEED => {
+                let since = problems.open_since(check);
+                if let Some((at, jump_m)) =
+                    self.jump.filter(|(at, _)| since.is_some_and(|since| since.since(*at) <= NEAR))
+                {
+                    problems.detail(check, &format!("its position jumped {jump_m:.0} m at {}", moment(at)));
+                }
+            }
             _ => self.tell_alert(check, problems),
         }
     }
+}
+
+/// The way between two places, m, on a sphere.
+fn distance_m(one: Position, other: Position) -> f64 {
+    const METRES_A_DEGREE: f64 = 111_195.0;
+    let north = other.latitude_deg - one.latitude_deg;
+    let east = (other.longitude_deg - one.longitude_deg + 540.0).rem_euclid(360.0) - 180.0;
+    north.hypot(east * one.latitude_deg.to_radians().cos()) * METRES_A_DEGREE
 }
 
 /// That these batteries are not judged, as one sentence: `batteries 5 to 256 are not judged`.

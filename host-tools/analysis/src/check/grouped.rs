@@ -13,7 +13,7 @@ use super::problem::{Problem, mishaps};
 pub struct Group<'a> {
     /// Problems of one check and one level, which differ only in the part; at least one.
     pub members: Vec<&'a Problem>,
-    /// The effects: the problems of each check and level.
+    /// The effects: the problems of each check and level, in order of time.
     pub effects: Vec<Vec<&'a Problem>>,
     /// The cause is a warning, and one of its effects became critical.
     pub is_raised: bool,
@@ -46,7 +46,11 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
             || alike.iter().zip(&causes).filter(|(_, cause)| **cause == Some(check)).map(|(one, _)| one);
         groups.push(Group {
             members: one.clone(),
-            effects: explained().cloned().collect(),
+            effects: {
+                let mut effects: Vec<_> = explained().cloned().collect();
+                effects.sort_by_key(|effect| effect.first().map(|problem| problem.at));
+                effects
+            },
             is_raised: !is_critical(one) && explained().any(|one| is_critical(one)),
         });
     }

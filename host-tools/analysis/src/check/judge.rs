@@ -231,6 +231,7 @@ impl Judge {
                 match observation {
                     Observation::SystemStatus(status) => self.sensors(source, status),
                     Observation::Estimator(estimator) => self.doubts(source, estimator),
+                    Observation::Gnss(gnss) if self.is_vehicle(source) => self.details.gnss(at, gnss),
                     Observation::Battery(battery) => self.details.battery(source, battery.id),
                     Observation::Heartbeat(heartbeat) => self.details.heartbeat(source, heartbeat),
                     Observation::Identity(identity) => self.details.identity(source, identity),

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Level, Scope};
+use hums_core::health::{Level, Scope, Subsystem, check_named};
 use hums_core::vehicle::Vehicle;
 
+use super::coverage::OFF;
 use super::flights::{Flight, begin_in_air};
 use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
 use super::trends::{Baselines, Episode, because};
@@ -188,7 +189,19 @@ impl Judged {
                 .is_some_and(|words| matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored))
         };
         let (judged, of_box) = (self.judged.len(), self.judged.iter().filter(is_of_box).count());
-        JudgedChecks { judged, of_box, all: judged + self.not_judged.len() }
+        let lacking = self.not_judged.iter().filter(|(check, why)| self.could_apply(check, why));
+        JudgedChecks { judged, of_box, all: judged + lacking.count() }
+    }
+
+    /// Whether a check that was not judged could have been, with more data: it needs neither a box nor earlier
+    /// flights nor an engine, and has a limit.
+    fn could_apply(&self, check: &str, why: &str) -> bool {
+        let is_of_engine =
+            |check: &str| check_named(check).is_some_and(|check| check.subsystem == Subsystem::Engine);
+        let is_of_box = vocabulary(check)
+            .is_none_or(|words| matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored));
+        let has_engine = || self.judged.iter().any(|check| is_of_engine(check));
+        !is_of_box && why != OFF && (!is_of_engine(check) || has_engine())
     }
 
     /// Whether too few checks had data for a clean result to mean anything.

@@ -62,6 +62,8 @@ pub struct Request<'a> {
     pub system: Option<u8>,
     /// Look at every block of an image.
     pub salvage: bool,
+    /// List the checks that were not judged.
+    pub verbose: bool,
     /// Print JSON.
     pub json: bool,
 }
@@ -90,7 +92,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
                 table.add(&checked);
                 text::line(&checked)
             } else {
-                text::screen(&checked)
+                text::screen(&checked, args.verbose)
             };
             bar.suspend(|| {
                 checked.aside().iter().chain(&checked.faults()).for_each(|why| note!("{name}: {why}"));

@@ -17,8 +17,10 @@ use super::problem::{Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
 use crate::names::{autopilot_name, type_name, unit_name, vocabulary};
+use crate::part;
 use crate::plural::count;
 use crate::printable::word;
+use crate::soundness::Soundness;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
 use crate::states::{Shown, meaning, shown};
@@ -30,23 +32,28 @@ const SHOWN_MAX: usize = 6;
 /// Reasons and places that are shown; `--json` has them all.
 const LINES_MAX: usize = 8;
 
+/// Details in the verdict.
+const HEADLINE_DETAILS_MAX: usize = 2;
 /// Name of the worst level, at the beginning of a line.
 const CRITICAL: &str = "CRITICAL";
 
-/// One log, as a screen.
-pub fn screen(checked: &Checked) -> String {
+/// One log, as a screen; `verbose`: with the checks that were not judged.
+pub fn screen(checked: &Checked, verbose: bool) -> String {
     let judged = &checked.judged;
-    let mut text = format!("{}: {}\n", word(&checked.name), checked.format.words());
-    let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
-    let _ = writeln!(text, "  when     {}", when(checked));
-    let _ = writeln!(text, "  in air   {}", in_air(judged));
-    let _ = writeln!(text, "  verdict  {}{}", verdict(judged), but(checked));
-    text.push('\n');
+    let mut text = format!("{}: {}{}\n", word(&checked.name), word(&verdict(judged)), but(checked));
+    let has_data = judged.worst().is_some() && judged.checks().judged > 0;
+    if has_data || judged.facts.contains_key(&About::Firmware) {
+        let _ = writeln!(text, "  log      {}", checked.format.words());
+        let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
+        let _ = writeln!(text, "  when     {}", when(checked));
+        let _ = writeln!(text, "  in air   {}", in_air(judged));
+        text.push('\n');
+    }
     problems(&mut text, &judged.problems);
     if judged.by == JudgedBy::Board && judged.findings_count > 0 {
         text.push_str("  (found by the monitor on board)\n");
     }
-    not_judged(&mut text, judged);
+    not_judged(&mut text, judged, verbose);
     damage(&mut text, judged);
     if let Some(end) = &judged.ends_in_air {
         let _ = writeln!(text, "  the end  {:>9}  {}", moment(end.at), end);
@@ -60,17 +67,17 @@ pub fn screen(checked: &Checked) -> String {
 /// One log of many, as a line.
 pub fn line(checked: &Checked) -> String {
     let judged = &checked.judged;
-    let level = match (judged.verdict(), state(checked)) {
+    let level = match (judged.verdict(), checked.soundness()) {
         ("too_little", _) => "little",
         // A damaged log without problems is not all right.
-        ("ok", State::Damaged) => "damaged",
-        ("ok", State::NotProved) => "unproved",
+        ("ok", Soundness::Damaged) => "damaged",
+        ("ok", Soundness::NotProved) => "unproved",
         (verdict, _) => verdict,
     };
-    let mut names: Vec<&str> = Vec::new();
+    let mut names: Vec<String> = Vec::new();
     for group in grouped(&judged.problems) {
         for problem in group.members.iter().chain(group.effects.iter().flatten()) {
-            let name = name(&problem.check);
+            let name = kind_of_alarm(&problem.check);
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -78,7 +85,7 @@ pub fn line(checked: &Checked) -> String {
     }
     let found = names.join(", ");
     let ends = if judged.ends_in_air.is_some() { "ends in the air" } else { "" };
-    let what: Vec<&str> = [found.as_str(), ends, state(checked).words()]
+    let what: Vec<&str> = [found.as_str(), ends, checked.soundness().words()]
         .into_iter()
         .filter(|words| !words.is_empty())
         .collect();
@@ -88,76 +95,15 @@ pub fn line(checked: &Checked) -> String {
         .to_owned()
 }
 
-/// Faults of the recording itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    /// No known fault.
-    Whole,
-    /// The last message of an autopilot's log is incomplete. Each power cut before the log is closed leaves
-    /// that, so it differs from damage inside.
-    Cut,
-    Damaged,
-    /// The recorder reports a loss, or the recording shows one.
-    Lossy,
-    /// All bytes were written, and some of them are noise on the line, or text before the first frame.
-    NotFrames,
-    /// A HUMS log without damage and without proof that it is complete.
-    NotProved,
-    /// A complete HUMS log, with lost sectors rebuilt from parity.
-    MadeAgain,
-    /// A complete HUMS log without its parity.
-    Unprotected,
-}
-
-impl State {
-    const fn words(self) -> &'static str {
-        match self {
-            Self::Whole => "",
-            Self::Cut => "cut at its end",
-            Self::Damaged => "part of it is missing or damaged",
-            Self::Lossy => "part of it was not recorded",
-            Self::NotFrames => "bytes of no frame are in it",
-            Self::NotProved => "not proved to be whole",
-            Self::MadeAgain => "damaged, and made whole from its parity",
-            Self::Unprotected => "whole, without all of its parity",
-        }
-    }
-}
-
-fn state(checked: &Checked) -> State {
-    let judged = &checked.judged;
-    let mut damages = judged.gaps.iter().filter(|gap| gap.cause.is_damage());
-    match judged.damages {
-        0 if checked.ending.as_ref().is_some_and(|ending| !ending.unproved().is_empty()) => State::NotProved,
-        0 if judged.losses > 0 && !judged.gaps.is_empty() && judged.gaps.iter().all(Gap::is_noise) => {
-            State::NotFrames
-        }
-        0 if judged.losses > 0 => State::Lossy,
-        0 if checked.ending.as_ref().is_some_and(|ending| ending.made_again() > 0) => State::MadeAgain,
-        0 if checked.ending.as_ref().is_some_and(|ending| ending.unprotected() > 0) => State::Unprotected,
-        0 => State::Whole,
-        _ if damages.all(|gap| gap.cause == Cause::Cut) => State::Cut,
-        _ => State::Damaged,
-    }
-}
-
 /// Limits of the verdict: the end of its line.
 fn but(checked: &Checked) -> String {
     let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
-    let what = match state(checked) {
-        State::Whole => String::new(),
-        State::Cut => "; the log is cut at its end".to_owned(),
-        State::Damaged => "; part of the log is missing or damaged, and was not judged".to_owned(),
-        State::Lossy => "; part of the time was not recorded".to_owned(),
-        State::NotFrames => "; bytes of no frame are in it".to_owned(),
-        State::NotProved if checked.judged.is_lossy() => {
-            "; part of the time was not recorded; the log is not proved to be whole".to_owned()
-        }
-        State::NotProved => "; the log is not proved to be whole".to_owned(),
-        State::MadeAgain => "; the log was damaged, and made whole from its parity".to_owned(),
-        State::Unprotected => "; the log is whole, without all of its parity".to_owned(),
-    };
-    format!("{ends}{what}")
+    match checked.soundness() {
+        Soundness::Whole => ends.to_owned(),
+        Soundness::Damaged => format!("{ends}; part of the log is missing or damaged, and was not judged"),
+        what @ (Soundness::NotFrames | Soundness::Lossy) => format!("{ends}; {}", what.words()),
+        what => format!("{ends}; the log is {}", what.words()),
+    }
 }
 
 /// Many logs, added up.
@@ -167,13 +113,10 @@ pub struct Table {
     /// Logs by their findings.
     checks: BTreeMap<String, (u64, u64)>,
     logs: u64,
-    damaged: u64,
-    cut: u64,
+    /// Logs that lack something.
+    unsound: BTreeMap<Soundness, u64>,
     /// Logs that hold a session of another one.
     copies: u64,
-    not_proved: u64,
-    made_again: u64,
-    unprotected: u64,
     little: u64,
     flown_us: u64,
 }
@@ -187,12 +130,9 @@ impl Table {
             return;
         }
         self.logs += 1;
-        let state = state(checked);
-        self.damaged += u64::from(state == State::Damaged);
-        self.cut += u64::from(state == State::Cut);
-        self.not_proved += u64::from(state == State::NotProved);
-        self.made_again += u64::from(state == State::MadeAgain);
-        self.unprotected += u64::from(state == State::Unprotected);
+        if checked.soundness() > Soundness::Whole {
+            *self.unsound.entry(checked.soundness()).or_default() += 1;
+        }
         self.flown_us = self.flown_us.saturating_add(judged.flown().as_micros());
         let level = judged.worst().map_or("unknown", Level::name);
         self.little += u64::from(judged.worst() == Some(Level::Ok) && judged.is_little());
@@ -216,20 +156,20 @@ impl Table {
             logs(self.logs),
             clock(Span::from_micros(self.flown_us))
         );
-        for (count, what) in [
-            (count("ok").saturating_sub(self.little), "nothing wrong"),
-            (self.little, "not enough in it to judge"),
-            (count("warning"), "warnings"),
-            (count("critical"), "critical"),
-            (count("unknown"), "no vehicle in it"),
-            (self.damaged, "with parts missing or damaged (counted above too)"),
-            (self.cut, "cut at their end (counted above too)"),
-            (self.not_proved, "not proved to be whole (counted above too)"),
-            (self.made_again, "damaged, and made whole from their parity (counted above too)"),
-            (self.unprotected, "whole, without all of their parity (counted above too)"),
-            (self.copies, "the same session once more (not counted above)"),
-            (failed as u64, "could not be read"),
-        ] {
+        let levels = [
+            (count("ok").saturating_sub(self.little), "nothing wrong".to_owned()),
+            (self.little, "not enough in it to judge".to_owned()),
+            (count("warning"), "warnings".to_owned()),
+            (count("critical"), "critical".to_owned()),
+            (count("unknown"), "no vehicle in it".to_owned()),
+        ];
+        let unsound = self.unsound.iter().rev();
+        let unsound = unsound.map(|(what, count)| (*count, format!("{} (counted above too)", what.words())));
+        let others = [
+            (self.copies, "the same session once more (not counted above)".to_owned()),
+            (failed as u64, "could not be read".to_owned()),
+        ];
+        for (count, what) in levels.into_iter().chain(unsound).chain(others) {
             if count > 0 {
                 let _ = writeln!(text, "  {count:>6}  {what}");
             }
@@ -240,7 +180,11 @@ impl Table {
         let mut checks: Vec<_> = self.checks.iter().collect();
         checks.sort_by_key(|(_, (critical, warning))| Reverse((*critical, *warning)));
         for (check, (critical, warning)) in checks {
-            let _ = writeln!(text, "             {critical:>8}  {warning:>7}  {} [{check}]", name(check));
+            let _ = writeln!(
+                text,
+                "             {critical:>8}  {warning:>7}  {} [{check}]",
+                kind_of_alarm(check)
+            );
         }
         text.trim_end().to_owned()
     }
@@ -363,39 +307,47 @@ fn not_seen(flights: &[Flight]) -> String {
     text
 }
 
-/// The verdict, as a line.
-fn verdict(judged: &Judged) -> String {
-    let count = |level| judged.problems.iter().filter(|problem| problem.level == level).count();
-    let plural = |count: usize, one: &str| match count {
-        1 => format!("1 {one}"),
-        count => format!("{count} {one}s"),
+/// The verdict, as a sentence: the worst finding with its time, and what it means for the next flight.
+pub fn verdict(judged: &Judged) -> String {
+    let counted = |level, one: &str| {
+        let count = judged.problems.iter().filter(|problem| problem.level == level).count();
+        (count > 0).then(|| self::count(count as u64, one))
     };
-    let (critical, warnings) = (count(Level::Critical), count(Level::Warning));
+    let counts = [counted(Level::Critical, "critical finding"), counted(Level::Warning, "warning")];
+    let counts = counts.into_iter().flatten().collect::<Vec<_>>().join(", ");
     let checks = judged.checks();
-    match judged.worst() {
+    let what = match judged.worst() {
         None if judged.is_timeless || judged.gaps.iter().any(|gap| gap.cause == Cause::NoTimes) => {
-            "unknown: the log has no times, and nothing was judged".to_owned()
+            return "unknown: the log has no times, and nothing was judged".to_owned();
         }
         None if judged.vehicle().source.is_some() => {
-            "unknown: no heartbeat of the vehicle was heard, and nothing was judged".to_owned()
+            return "unknown: no heartbeat of the vehicle was heard, and nothing was judged".to_owned();
         }
-        None => "unknown: no autopilot was heard, and nothing was judged".to_owned(),
-        Some(Level::Critical) if warnings > 0 => format!(
-            "not fit to fly before this is cleared up: {}, {}",
-            plural(critical, "critical finding"),
-            plural(warnings, "warning")
-        ),
-        Some(Level::Critical) => {
-            format!("not fit to fly before this is cleared up: {}", plural(critical, "critical finding"))
+        None => return "unknown: no autopilot was heard, and nothing was judged".to_owned(),
+        Some(_) if judged.problems.is_empty() && checks.judged == 0 => {
+            return "nothing in it to judge: no check had data".to_owned();
         }
-        Some(Level::Warning) => {
-            format!("look at this before the next flight: {}", plural(warnings, "warning"))
+        Some(_) if judged.problems.is_empty() && judged.is_little() => {
+            return format!("not enough to judge: {checks} had data, and nothing was wrong there");
         }
-        Some(_) if judged.is_little() => {
-            format!("not enough to judge: {checks} had something to judge, and nothing was wrong there")
-        }
-        Some(_) => format!("nothing wrong in {checks}; the others had nothing to judge"),
-    }
+        Some(_) if judged.problems.is_empty() => return format!("nothing wrong in {checks}"),
+        Some(_) if judged.problems.iter().all(|problem| part::is_due(&problem.check)) => "maintenance is due",
+        Some(Level::Critical) => "do not fly before this is cleared up",
+        Some(_) => "look at this before the next flight",
+    };
+    format!("{}; {what} ({counts})", headline(&judged.problems))
+}
+
+/// The first of the findings, with its value and time.
+fn headline(problems: &[Problem]) -> String {
+    let groups = grouped(problems);
+    let Some((group, first)) = groups.first().and_then(|group| Some((group, group.first()?))) else {
+        return String::new();
+    };
+    let worst = worst_of(&group.members);
+    let value = worst.and_then(value).map_or_else(String::new, |(value, _)| format!(", {value}"));
+    let details = worst.map_or_else(String::new, |worst| details(worst, HEADLINE_DETAILS_MAX));
+    format!("{}{value}{details} at {}", alarm(&group.members), moment(first.at))
 }
 
 fn problems(text: &mut String, problems: &[Problem]) {
@@ -414,8 +366,9 @@ fn problems(text: &mut String, problems: &[Problem]) {
         for effect in &group.effects {
             let Some(of_it) = effect.first() else { continue };
             let (at, level) = (moment(of_it.at), level_of(is_critical(effect)));
-            let _ =
-                writeln!(text, "                      with it {at}  {level}: {}", word(&sentence(effect)));
+            // A consequence may be recognised before its cause.
+            let when = if of_it.at < first.at { "seen earlier," } else { "then" };
+            let _ = writeln!(text, "                      {when} {at}  {level}: {}", word(&sentence(effect)));
             // The side effects of a missing card have no meaning of their own.
             if place < SHOWN_MAX && first.subsystem != Subsystem::Recorder {
                 let _ = writeln!(text, "                              {}", meaning(&of_it.check));
@@ -452,47 +405,55 @@ fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     group.iter().copied().reduce(|worst, one| if is_worse(one, worst) { one } else { worst })
 }
 
-/// The problem: the check, the parts, the worst value, its limit, its duration.
+/// The fault of these parts in a pilot's words: `battery 1 cell low`.
+fn alarm(group: &[&Problem]) -> String {
+    let Some(first) = group.first() else { return String::new() };
+    let numbers: Vec<String> =
+        group.iter().map(|problem| (u16::from(problem.instance) + 1).to_string()).collect();
+    words_of_alarm(&first.check).replacen('#', &numbers.join(", "), 1)
+}
+
+/// The fault of any part: `battery cell low`.
+fn kind_of_alarm(check: &str) -> String {
+    words_of_alarm(check).replacen(" #", "", 1)
+}
+
+/// The fault that a check finds; `#` stands for the part.
+fn words_of_alarm(check: &str) -> &str {
+    let alarm = vocabulary(check).map_or(check, |words| words.said.alarm);
+    alarm.split_once('|').map_or(alarm, |(fault, _)| fault)
+}
+
+/// The first of the details, in parentheses.
+fn details(problem: &Problem, max: usize) -> String {
+    let details: Vec<&str> = problem.details.iter().take(max).map(String::as_str).collect();
+    if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
+}
+
+/// The worst value of a quantity with its unit, and the limit with its unit.
+fn value(problem: &Problem) -> Option<(String, Option<String>)> {
+    let Shown::Quantity(value, limit) = shown(&problem.check, problem.value, problem.limit) else {
+        return None;
+    };
+    let unit = if problem.unit.is_empty() { String::new() } else { format!(" {}", unit_name(&problem.unit)) };
+    let value = match value? {
+        value if is_possible(&value) => format!("{}{unit}", short(value)),
+        value => format!("{}{unit}, which no sensor can have", short(value)),
+    };
+    Some((value, limit.map(|limit| format!("{}{unit}", short(limit)))))
+}
+
+/// The problem: the fault, the parts, the worst value, its limit, its duration.
 fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
-    let part = vocabulary(&first.check).map_or("", |words| words.said.part);
-    let name = name(&first.check);
-    let mut text = match name.strip_prefix(part) {
-        Some(rest) if !part.is_empty() => {
-            let numbers: Vec<String> =
-                group.iter().map(|problem| (u16::from(problem.instance) + 1).to_string()).collect();
-            let parts = match (part, numbers.len()) {
-                (_, 1) | ("GPS", _) => part.to_owned(),
-                ("battery", _) => "batteries".to_owned(),
-                ("compass", _) => "compasses".to_owned(),
-                _ => format!("{part}s"),
-            };
-            format!("{parts} {}{rest}", numbers.join(", "))
-        }
-        _ => name.to_owned(),
-    };
-    let unit = if first.unit.is_empty() { String::new() } else { format!(" {}", unit_name(&first.unit)) };
-    let (state, value, limit) = match shown(&first.check, first.value, first.limit) {
-        Shown::State(state) => (state, None, None),
-        Shown::Quantity(value, limit) => (None, value, limit),
-    };
-    // An alert of the autopilot shows its texts, and the level is in front of them.
-    if let Some(state) = state.filter(|_| first.details.is_empty() || !first.check.ends_with("_alert")) {
-        let _ = write!(text, ": {state}");
+    let mut text = alarm(group);
+    let (value, limit) = value(first).unzip();
+    if let Some(value) = value {
+        let _ = write!(text, ": {value}");
     }
-    match value {
-        Some(value) if is_possible(&value) => {
-            let _ = write!(text, ": {}{unit}", short(value));
-        }
-        Some(value) => {
-            let _ = write!(text, ": {}{unit}, which no sensor can have", short(value));
-        }
-        None => {}
-    }
-    if !first.details.is_empty() {
-        let _ = write!(text, ": {}", first.details.join(", "));
-    } else if let Some(limit) = limit {
-        let _ = write!(text, " (limit {}{unit})", short(limit));
+    text.push_str(&details(first, usize::MAX));
+    if let Some(limit) = limit.flatten().filter(|_| first.details.is_empty()) {
+        let _ = write!(text, " (limit {limit})");
     }
     // A mishap is a moment: its level stays until the next arming.
     let is_moment = first.subsystem == Subsystem::Mishap;
@@ -514,7 +475,20 @@ fn name(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }
 
-fn not_judged(text: &mut String, judged: &Judged) {
+fn not_judged(text: &mut String, judged: &Judged, verbose: bool) {
+    let checks = judged.checks();
+    let count = checks.all - checks.judged;
+    if judged.worst().is_none() || judged.not_judged.is_empty() || checks.judged == 0 && !verbose {
+        return;
+    }
+    if !verbose {
+        let _ = writeln!(
+            text,
+            "  not judged: {count} of {} checks, which lack data in this log (-v lists them)",
+            checks.all
+        );
+        return;
+    }
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     for (check, why) in &judged.not_judged {
         let check = &name(check);
@@ -523,18 +497,14 @@ fn not_judged(text: &mut String, judged: &Judged) {
             None => reasons.push((why, vec![check])),
         }
     }
-    if reasons.is_empty() || judged.worst().is_none() {
-        return;
-    }
-    let all = judged.judged.len() + judged.not_judged.len();
-    let _ = writeln!(text, "  not judged: {} of {all} checks", judged.not_judged.len());
     reasons.sort_by_key(|(_, checks)| Reverse(checks.len()));
-    for (reason, checks) in reasons.iter().take(LINES_MAX) {
+    let _ = writeln!(
+        text,
+        "  not judged: {count} of {} checks, and those that need a box or earlier flights",
+        checks.all
+    );
+    for (reason, checks) in &reasons {
         let _ = writeln!(text, "    {reason}: {}", checks.join("; "));
-    }
-    let rest: Vec<&str> = reasons.iter().skip(LINES_MAX).map(|(reason, _)| *reason).collect();
-    if !rest.is_empty() {
-        let _ = writeln!(text, "    {}", rest.join("; "));
     }
 }
 
@@ -617,8 +587,8 @@ mod tests {
         assert!(lines[0].contains("CRITICAL"), "{text}");
         assert!(lines[0].ends_with("[gps_stuck] (itself a warning)"), "{text}");
         let has = |words: &str| lines.iter().any(|line| line.starts_with(words));
-        assert!(has("with it 0:00.0  CRITICAL: EKF test ratio"), "{text}");
-        assert!(has("with it 0:00.0  warning: attitudes of EKF and AHRS2"), "{text}");
+        assert!(has("then 0:00.0  CRITICAL: EKF rejects position or speed"), "{text}");
+        assert!(has("then 0:00.0  warning: EKF and AHRS2"), "{text}");
         let advice = vocabulary("ekf_test_ratio").map_or("", |words| words.action);
         assert!(has(advice), "{text}");
         let place = |words: &str| lines.iter().position(|line| line.contains(words));
@@ -633,7 +603,7 @@ mod tests {
             sentence(&all.iter().collect::<Vec<_>>())
         };
         let motors = shown("motor_imbalance", [f32::NAN, 12.0, 31.0]);
-        assert!(motors.contains("motors 1, 2, 3 balance: 31 "), "{motors}");
+        assert!(motors.contains("motor 1, 2, 3 speed differs: 31 "), "{motors}");
         let cells = shown("cell_voltage", [3.5, 3.2, 3.4]);
         assert!(cells.contains(": 3.2 "), "{cells}");
     }

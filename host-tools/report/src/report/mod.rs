@@ -78,11 +78,7 @@ pub struct Request<'a> {
 
 /// Runs `hums report`.
 pub fn run(args: &Request<'_>) -> Result<Outcome> {
-    let Some(output) = args.output else {
-        return Err(usage(
-            "-o is missing: say where the page goes, for instance -o flight.html, or -o pages/ for a page of each flight",
-        ));
-    };
+    let output = &args.output.map_or_else(|| beside(args.inputs), |output| Ok(output.to_owned()))?;
     let (given, remarks) = without_made(args.inputs);
     let found = find(&given, false)?.of_system(args.system)?;
     for remark in remarks.iter().chain(&found.remarks) {
@@ -135,6 +131,25 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
         );
     }
     making.end(args.compare)
+}
+
+/// The page of the only input: `flight.html` beside `flight.tlog` or `flight.bin.gz`.
+fn beside(inputs: &[PathBuf]) -> Result<PathBuf> {
+    let name =
+        |input: &PathBuf| Some(PathBuf::from(input.file_name()?)).filter(|name| name != Path::new("-"));
+    let Some((input, name)) =
+        inputs.first().filter(|_| inputs.len() == 1).and_then(|input| Some((input, name(input)?)))
+    else {
+        return Err(usage(
+            "-o is missing, and several inputs, or one without a name, name no page: say -o flight.html, or -o pages/ for a page of each flight",
+        ));
+    };
+    if input.is_dir() {
+        return Ok(appended(&input.with_file_name(name), "html"));
+    }
+    let is_packed = name.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
+    let name = if is_packed { name.with_extension("") } else { name };
+    Ok(input.with_file_name(name.with_extension("html")))
 }
 
 /// The pages in the making, session by session.
@@ -197,7 +212,7 @@ impl Making<'_> {
         this: &trend::Session,
         name: &str,
     ) -> Result<()> {
-        let path = self.wanted.path(name);
+        let (path, overview) = (self.wanted.path(name), &without_folders(overview));
         let on_card = self.earlier.iter().zip(self.places).filter(|(_, other)| are_of_one_card(place, other));
         let before: Vec<trend::Session> = on_card.filter_map(|(session, _)| session.clone()).collect();
         let trend = trend::of(this, &before);
@@ -312,6 +327,17 @@ impl Making<'_> {
         }
         Ok(comparisons)
     }
+}
+
+/// The same with the names of files alone: a page is given to others, and this computer's folders are not.
+fn without_folders(overview: &Overview) -> Overview {
+    let mut overview = overview.clone();
+    for file in &mut overview.ending.files {
+        if let Some(name) = Path::new(file).file_name() {
+            *file = name.to_string_lossy().into_owned();
+        }
+    }
+    overview
 }
 
 /// The kind of a page.

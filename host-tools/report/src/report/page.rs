@@ -32,8 +32,8 @@ struct Data<'a> {
     /// Number of checks with a critical problem, and with a warning.
     critical: usize,
     warning: usize,
-    /// Time and words of the worst of them.
-    first: Option<(f64, String)>,
+    /// The verdict of `hums check`, as a sentence.
+    verdict: &'a str,
     texts_count: u64,
     /// Number of checks with data, and of all; `null` if nothing was judged.
     judged: Option<(usize, usize)>,
@@ -114,7 +114,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         missing: &replay.missing,
         critical: replay.found.0,
         warning: replay.found.1,
-        first: replay.first.clone(),
+        verdict: &replay.verdict,
         texts_count: replay.texts_count,
         judged: replay.judged.map(|checks| (checks.judged, checks.all)),
         little: replay.judged.is_some_and(JudgedChecks::is_little),

@@ -9,11 +9,10 @@ use serde::Serialize;
 
 use super::flights::{Extents, Flight};
 use crate::check::causes::causes;
-use crate::check::grouped::{Group, grouped};
 use crate::check::judge::{Judge, Limits};
 use crate::check::judged::Judged;
+use crate::check::text::verdict;
 use crate::counters::tells_flight;
-use crate::names::check_name;
 use crate::page::history::History;
 use crate::page::more::{More, rows};
 use crate::page::note::Note;
@@ -55,8 +54,8 @@ pub struct Replay {
     pub missing: Vec<Missing>,
     /// Number of checks with a critical problem, and with a warning.
     pub found: (usize, usize),
-    /// Time and words of the first problem of `hums check`.
-    pub first: Option<(f64, String)>,
+    /// The verdict of `hums check`, as a sentence.
+    pub verdict: String,
     /// Its texts.
     notes: Vec<(Instant, Note)>,
     reference: Reference,
@@ -96,10 +95,7 @@ impl Replay {
         replay.gaps(&judged);
         let count = |level| judged.problems.iter().filter(|problem| problem.level == level).count();
         replay.found = (count(Level::Critical), count(Level::Warning));
-        replay.first = grouped(&judged.problems)
-            .first()
-            .and_then(Group::first)
-            .map(|first| (first.at.as_secs_f64(), check_name(&first.check, first.instance)));
+        replay.verdict = verdict(&judged);
         let findings = &overview.contents.findings;
         let causes = causes(findings);
         let found = findings.iter().zip(&causes);

@@ -38,10 +38,12 @@ const verdict =
         ? data.judged
           ? `No findings in ${data.judged[0]} of ${data.judged[1]} checks`
           : "No findings"
-        : (data.critical + data.warning ? ["critical", "warning"] : ["stale", "advisory"])
-            .filter(count)
-            .map((level) => counted(count(level), level))
-            .join(", ") + (data.first ? `; worst: ${data.first[1]}, ${moment(data.first[0] - flight.zero)}` : "");
+        : data.critical + data.warning
+          ? data.verdict
+          : ["stale", "advisory"]
+              .filter(count)
+              .map((level) => counted(count(level), level))
+              .join(", ");
 // Of a recording of frames alone it is the first of them.
 const POWER_ON = "the autopilot's power-on";
 const ZEROS = { hums: "the monitor's power-on", dataflash: POWER_ON, ulog: POWER_ON };
@@ -58,6 +60,9 @@ document
       [`${session}${log.name}`, when, span(log.duration_s), log.format === "hums" ? log.end.words : ""].filter(Boolean).join(" \u00b7 "),
     ),
     el("p", { class: `verdict ${little ? "stale" : worst}`, id: "verdict" }, verdict),
+    data.judged && data.judged[0] < data.judged[1]
+      ? el("p", { class: "dim", id: "unjudged" }, `Not judged: ${data.judged[1] - data.judged[0]} of ${data.judged[1]} checks, which lack data; hums check -v lists them.`)
+      : "",
     data.missing.length
       ? el(
           "p",
@@ -99,7 +104,7 @@ found.append(
         : log.checked_by === "nobody"
           ? "Not checked: what recorded this ran no checks."
           : data.judged
-            ? `${data.judged[0]} of ${data.judged[1]} checks had something to judge, and nothing was wrong there; hums check says why the others had not.`
+            ? `${data.judged[0]} of ${data.judged[1]} checks had data, and nothing was wrong there.`
             : "Nothing was found.",
     unlisted > 0 ? `And ${plural(unlisted, "finding")} more.` : "",
     unsaid > 0 ? `And ${plural(unsaid, "text")} more.` : "",
@@ -131,7 +136,7 @@ recorderSection();
 section("sent", "Messages sent").append(
   el(
     "div",
-    { class: "panel scroll tall" },
+    { class: "panel scroll" },
     rows(
       [["Message"], ["Frames", "n"], ["per s", "n"]],
       [...log.messages]

@@ -139,7 +139,7 @@ const counters = (wear, { plain, motors, ranges }) => {
       { class: "split" },
       el(
         "div",
-        { class: "panel scroll tall" },
+        { class: "panel scroll" },
         rows(
           [["Counter"], ["This session", "n"], ...ever([[life, "n"]])],
           plain.map((c) =>

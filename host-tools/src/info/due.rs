@@ -1,0 +1,373 @@
+//! `hums due`: what each part of a vehicle has run, and what is left of it; and the hours of each vehicle.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use serde::Serialize;
+
+use super::each::each;
+use super::json::finite;
+use super::list::{flight_s, start_utc_us};
+use super::number::short;
+use crate::cli;
+use crate::colour::level;
+use crate::names::type_name;
+use crate::outcome::Outcome;
+use crate::output::{self, Schema};
+use crate::part::Limit;
+use crate::plural::count;
+use crate::printable::word;
+use crate::source::find::{Found, find};
+use crate::source::recording::Place;
+use crate::summary::{ComponentLine, Overview};
+use crate::utc::{clock, iso8601};
+
+/// Output of `hums due --json`.
+const SCHEMA: Schema = Schema::first("hums-due");
+const DAY_US: f64 = 86_400e6;
+
+/// Runs `hums due`.
+pub fn run(args: &cli::Due) -> Result<Outcome> {
+    let found = find(&args.inputs, false)?;
+    let mut logs = Vec::new();
+    let read = each(&found, None, |log| {
+        if log.ending.is_counted() {
+            logs.push((vehicle(log, &found, args.vehicle.as_deref()), Log::of(log)));
+        }
+        Ok(())
+    })?;
+    let outcome = read.end()?;
+    // In the order of their starts; a log without a start stays after the one before it.
+    let mut begun_us = 0;
+    for (_, log) in &mut logs {
+        begun_us = log.start_us.unwrap_or(begun_us);
+        log.order_us = begun_us;
+    }
+    logs.sort_by_key(|(_, log)| log.order_us);
+    let mut vehicles: BTreeMap<String, Vehicle> = BTreeMap::new();
+    for (name, log) in logs {
+        vehicles.entry(name.clone()).or_insert_with(|| Vehicle { name, ..Vehicle::default() }).add(log);
+    }
+    let vehicles: Vec<VehicleJson> = vehicles.into_values().map(VehicleJson::from).collect();
+    let is_due = vehicles.iter().flat_map(|vehicle| &vehicle.parts).any(|part| part.status == "red");
+    if args.json {
+        output::json(SCHEMA, &DueJson { vehicles })?;
+    } else {
+        vehicles.iter().try_for_each(|vehicle| output::line(text(vehicle).trim_end()))?;
+    }
+    Ok(outcome.and(if is_due { Outcome::Findings } else { Outcome::Done }))
+}
+
+/// The vehicle of a log: by its unique id, else by the name that the user gave, else by the folder and the kind.
+fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
+    let known = log.contents.vehicle;
+    if let Some(vehicle) = known.filter(|vehicle| vehicle.uid != 0) {
+        return format!("uid {:016x}, {}", vehicle.uid, type_name(vehicle.vehicle_type));
+    }
+    if let Some(given) = given {
+        return given.to_owned();
+    }
+    let place = found.places.iter().find(|place| place.name == log.ending.name);
+    let file = place.and_then(|place| place.path().or_else(|| own_file(place)));
+    let folder = file.and_then(|file| file.canonicalize().ok()?.parent().map(Path::to_owned));
+    let folder = folder.map_or_else(|| "no folder".to_owned(), |folder| folder.display().to_string());
+    let kind = known.map_or_else(|| "unknown vehicle".to_owned(), |vehicle| type_name(vehicle.vehicle_type));
+    format!("folder {folder}, {kind}")
+}
+
+fn own_file(place: &Place) -> Option<&Path> {
+    Some(place.own()?.pieces.first()?.path.as_path())
+}
+
+/// Figures of one log.
+struct Log {
+    start_us: Option<u64>,
+    order_us: u64,
+    flight_s: f64,
+    flights: u64,
+    parts: Vec<(u8, ComponentLine, Option<Limit>)>,
+    is_of_box: bool,
+}
+
+impl Log {
+    fn of(log: &Overview) -> Self {
+        let contents = &log.contents;
+        let part =
+            |(place, line): (&u8, &ComponentLine)| (*place, line.clone(), contents.first_limit(*place, line));
+        Self {
+            start_us: start_utc_us(log),
+            order_us: 0,
+            flight_s: flight_s(log).unwrap_or(0.0),
+            flights: contents.flights().len() as u64,
+            parts: contents.components.iter().map(part).collect(),
+            is_of_box: contents.boot.is_some(),
+        }
+    }
+}
+
+/// One vehicle, over its logs.
+#[derive(Default)]
+struct Vehicle {
+    name: String,
+    logs: u64,
+    flights: u64,
+    flight_s: f64,
+    /// First and last start, microseconds since 1970.
+    span_us: Option<(u64, u64)>,
+    is_of_box: bool,
+    /// By place, from 1.
+    parts: BTreeMap<u8, Part>,
+}
+
+/// One part over the logs that have it.
+struct Part {
+    line: ComponentLine,
+    limit: Option<Limit>,
+    /// Run, flights and time of the first log that has it.
+    first: (f64, f64, Option<u64>),
+    last_us: Option<u64>,
+    /// The logs have one before it in its place.
+    is_new: bool,
+}
+
+impl Vehicle {
+    fn add(&mut self, log: Log) {
+        self.logs += 1;
+        self.flights += log.flights;
+        self.flight_s += log.flight_s;
+        self.is_of_box |= log.is_of_box;
+        if let Some(at) = log.start_us {
+            let (first, last) = self.span_us.unwrap_or((at, at));
+            self.span_us = Some((first.min(at), last.max(at)));
+        }
+        for (place, line, limit) in log.parts {
+            let first = (limit.map_or(0.0, |limit| limit.run), line.figures.flights, log.start_us);
+            let new = |is_new| Part { line: line.clone(), limit, first, last_us: log.start_us, is_new };
+            let part = self.parts.entry(place).or_insert_with(|| new(false));
+            let is_same = |of: &Part| {
+                (of.line.kind, of.line.number, &of.line.serial, of.line.replaced)
+                    == (line.kind, line.number, &line.serial, line.replaced)
+            };
+            if is_same(part) {
+                // A limit of another unit has another history.
+                if part.limit.map(|limit| limit.end) != limit.map(|limit| limit.end) {
+                    part.first = first;
+                }
+                (part.line, part.limit, part.last_us) = (line, limit, log.start_us.or(part.last_us));
+            } else {
+                *part = new(true);
+            }
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct DueJson {
+    vehicles: Vec<VehicleJson>,
+}
+
+#[derive(Debug, Serialize)]
+struct VehicleJson {
+    vehicle: String,
+    logs: u64,
+    flights: u64,
+    flight_s: f64,
+    first_utc: Option<String>,
+    last_utc: Option<String>,
+    #[serde(skip)]
+    is_of_box: bool,
+    /// The most used first.
+    parts: Vec<PartJson>,
+}
+
+#[derive(Debug, Serialize)]
+struct PartJson {
+    /// Its component, from 1.
+    place: u8,
+    part: String,
+    serial: String,
+    status: &'static str,
+    /// `null` without a limit.
+    used_percent: Option<f32>,
+    run: Option<f64>,
+    limit: Option<f64>,
+    left: Option<f64>,
+    /// `h`, `flights` or `cycles`.
+    unit: Option<&'static str>,
+    /// How hours count: in the air, powered, turning.
+    hours: Option<&'static str>,
+    /// At the present rate of use; `null` if that is not known.
+    left_flights: Option<f64>,
+    due_utc: Option<String>,
+    /// The first log that has it; it may be older if `since_known` is false.
+    since_utc: Option<String>,
+    since_known: bool,
+    /// The parameter that sets the limit.
+    rule: Option<String>,
+}
+
+impl From<Vehicle> for VehicleJson {
+    fn from(of: Vehicle) -> Self {
+        let (first, last) = of.span_us.unzip();
+        let mut parts: Vec<PartJson> =
+            of.parts.iter().map(|(place, part)| PartJson::of(*place, part)).collect();
+        let used = |part: &PartJson| part.used_percent.unwrap_or(f32::NEG_INFINITY);
+        parts.sort_by(|one, other| used(other).total_cmp(&used(one)));
+        Self {
+            vehicle: of.name,
+            logs: of.logs,
+            flights: of.flights,
+            flight_s: of.flight_s,
+            first_utc: first.map(iso8601),
+            last_utc: last.map(iso8601),
+            is_of_box: of.is_of_box,
+            parts,
+        }
+    }
+}
+
+impl PartJson {
+    fn of(place: u8, part: &Part) -> Self {
+        let Part { line, limit, first: (first_run, first_flights, first_us), last_us, is_new } = part;
+        let left = limit.map(|limit| (limit.limit - limit.run).max(0.0));
+        let ran = limit.map_or(0.0, |limit| limit.run);
+        // Over the logs; of a single log over the part's life.
+        let (recently, flights) = match (ran - first_run, line.figures.flights - first_flights) {
+            (recently, flights) if recently > 0.0 && flights > 0.0 => (recently, flights),
+            _ => (ran, line.figures.flights),
+        };
+        let left_flights = left.filter(|_| recently > 0.0 && flights > 0.0);
+        let left_flights = left_flights.map(|left| (left * flights / recently).floor());
+        let span_us = first_us.zip(*last_us).map_or(0.0, |(first, last)| last.saturating_sub(first) as f64);
+        let recently = ran - first_run;
+        let due_us = left.zip(*last_us).filter(|_| span_us >= DAY_US && recently > 0.0);
+        // The cast saturates: of a part that is hardly used the date is far.
+        let due_us = due_us.map(|(left, last)| last.saturating_add((left * span_us / recently) as u64));
+        Self {
+            place,
+            part: crate::part::name(line.kind, line.number, &line.name),
+            serial: line.serial.clone(),
+            status: line.status,
+            used_percent: finite(line.used_percent).filter(|_| limit.is_some()),
+            run: limit.map(|limit| limit.run),
+            limit: limit.map(|limit| limit.limit),
+            left,
+            unit: limit.map(|limit| limit.unit),
+            hours: limit.map(|limit| limit.how).filter(|how| !how.is_empty()),
+            left_flights,
+            due_utc: due_us.map(iso8601),
+            since_utc: first_us.map(iso8601),
+            since_known: *is_new,
+            rule: limit.map(|limit| format!("CMP{place}{}", limit.end)),
+        }
+    }
+
+    /// What is left of it, in words.
+    fn left_words(&self) -> String {
+        let (Some(left), Some(unit)) = (self.left, self.unit) else { return "no limit".to_owned() };
+        if left <= 0.0 {
+            return "due now".to_owned();
+        }
+        let mut text = amount(left, unit);
+        if let Some(flights) = self.left_flights.filter(|_| unit != "flights") {
+            let _ = write!(text, ", {}", count(flights as u64, "flight"));
+        }
+        if let Some(date) = &self.due_utc {
+            let _ = write!(text, ", to {}", day(date));
+        }
+        text
+    }
+}
+
+/// So much of a unit: `3 flights`, `2.1 h`.
+fn amount(value: f64, unit: &str) -> String {
+    match unit.strip_suffix('s') {
+        Some(one) if value.fract() == 0.0 => count(value as u64, one),
+        _ => format!("{} {unit}", tenths(value)),
+    }
+}
+
+/// A number to a tenth.
+fn tenths(value: f64) -> String {
+    short((value * 10.0).round() / 10.0)
+}
+
+/// The day of a time.
+fn day(utc: &str) -> &str {
+    utc.get(..10).unwrap_or(utc)
+}
+
+/// A vehicle: a line, and a table of its parts.
+fn text(vehicle: &VehicleJson) -> String {
+    let span = match (&vehicle.first_utc, &vehicle.last_utc) {
+        (Some(first), Some(last)) if day(first) == day(last) => format!(", {}", day(first)),
+        (Some(first), Some(last)) => format!(", {} to {}", day(first), day(last)),
+        _ => String::new(),
+    };
+    let time = clock(hums_core::clock::Span::from_micros((vehicle.flight_s * 1e6) as u64));
+    let mut text = format!(
+        "{}: {}, {}, {time} in the air{span}\n",
+        word(&vehicle.vehicle),
+        count(vehicle.logs, "log"),
+        count(vehicle.flights, "flight"),
+    );
+    if vehicle.parts.is_empty() {
+        let why = "  no part is registered with the box: CMP1_KIND and its limits do that\n";
+        text.push_str(if vehicle.is_of_box { why } else { "" });
+        return text;
+    }
+    let rows: Vec<[String; 7]> = vehicle.parts.iter().map(row).collect();
+    let heading =
+        ["", "used", "part", "serial", "run of limit", "left at this rate", "since"].map(str::to_owned);
+    let width = |column: usize| {
+        let cells = rows.iter().chain([&heading]).filter_map(|row| row.get(column));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    };
+    let widths: [usize; 7] = std::array::from_fn(width);
+    for row in [&heading].into_iter().chain(&rows) {
+        let mut cells = row.iter().zip(widths);
+        let status = cells.next().map_or("", |(status, _)| status);
+        let mut line = format!("  {:<8}", level(status));
+        for (cell, width) in cells {
+            let _ = write!(line, "  {cell:<width$}");
+        }
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+    let rules = vehicle.parts.iter().filter_map(|part| part.rule.as_deref()).collect::<Vec<_>>().join(", ");
+    if !rules.is_empty() {
+        let _ = writeln!(text, "  limits by {rules}");
+    }
+    text
+}
+
+/// The cells of a part.
+fn row(part: &PartJson) -> [String; 7] {
+    let status = match part.status {
+        "red" => "DUE",
+        "yellow" => "soon",
+        _ => "ok",
+    };
+    let used = part.used_percent.map_or_else(String::new, |used| format!("{used:.0} %"));
+    let run = match (part.run, part.limit, part.unit) {
+        (Some(run), Some(limit), Some(unit)) => {
+            format!("{} of {} {}", tenths(run), amount(limit, unit), part.hours.unwrap_or_default())
+        }
+        _ => String::new(),
+    };
+    let since = part.since_utc.as_deref().map_or("", day);
+    let since = match (since, part.since_known) {
+        ("", _) | (_, true) => since.to_owned(),
+        (since, false) => format!("before {since}"),
+    };
+    [
+        status.to_owned(),
+        used,
+        word(&part.part).into_owned(),
+        word(&part.serial).into_owned(),
+        run.trim_end().to_owned(),
+        part.left_words(),
+        since,
+    ]
+}

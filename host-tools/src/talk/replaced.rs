@@ -1,0 +1,229 @@
+//! `hums box replaced`: a part was replaced; the box counts what the new one runs. Over a link, or by a file on the card.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context as _, Result, bail};
+use hums_core::component::{COMPONENTS_MAX, Kind, LABEL_BYTES};
+use hums_link::messages;
+use hums_link::packet::Fields;
+use serde::Serialize;
+
+use super::{Client, is_for_us, params};
+use crate::check;
+use crate::cli::{self, Link};
+use crate::files::{Inputs, Output, settle};
+use crate::mavlink::ids::COMMAND_ACK;
+use crate::outcome::{Outcome, usage};
+use crate::output::{self, Schema};
+use crate::part;
+use crate::source::find::find;
+
+/// `MAV_CMD_USER_1`
+const REPLACED: u16 = 31_010;
+const ANSWER: Duration = Duration::from_secs(2);
+/// A command that is repeated because its answer was lost is recorded twice, and changes nothing more.
+const TRIES: usize = 3;
+/// The file of settings in a card's root, which the box reads at each power-on.
+const SETTINGS: &str = "PARAMS.TXT";
+/// Characters in a parameter of the command: what a number of single precision holds exactly.
+const CHARACTERS: usize = 3;
+
+/// Output of `hums box replaced --json`.
+const SCHEMA: Schema = Schema::first("hums-replaced");
+
+#[derive(Debug, Serialize)]
+struct ReplacedJson {
+    /// The component, from 1.
+    place: usize,
+    part: String,
+    serial: String,
+    /// The file that was written; `null` over a link.
+    file: Option<PathBuf>,
+}
+
+/// Runs `hums box replaced`.
+pub fn run(args: &cli::Replaced) -> Result<Outcome> {
+    let serial = args.serial.as_deref().unwrap_or_default();
+    let is_plain = |c: char| c.is_ascii_graphic() && !matches!(c, '#' | ',');
+    if serial.len() > LABEL_BYTES || !serial.chars().all(is_plain) {
+        return Err(usage(format!(
+            "--serial {serial}: a serial number has at most {LABEL_BYTES} letters, digits and signs, without spaces, `#` and `,`"
+        )));
+    }
+    let part = part::name(args.part.name(), args.number, "");
+    let (place, file) = match (&args.card, &args.link) {
+        (Some(card), _) => {
+            let place = on_card(card, args.part, args.number)?;
+            (place, Some(write(card, place, serial)?))
+        }
+        (None, Some(link)) => {
+            let at = Link { link: link.clone(), key: args.key.clone(), system: args.system };
+            let mut client = Client::connect_alone(&at)?;
+            let place = on_board(&mut client, args.part, args.number)?;
+            tell(&mut client, place, serial)?;
+            (place, None)
+        }
+        (None, None) => return Err(usage("where is the box? --link SRC, or --card DIR of its card")),
+    };
+    if args.json {
+        output::json(SCHEMA, &ReplacedJson { place, part, serial: serial.to_owned(), file })?;
+    } else {
+        let when = file.map_or_else(
+            || "replaced; the box counts from zero".to_owned(),
+            |file| format!("{} says so to the box, which replaces it at its next start", file.display()),
+        );
+        output::line(&format!("component {place}, {part}: {when}"))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// The place of a part, from 1, among the components of this kind and number.
+fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, number: u8) -> Result<usize> {
+    let known: Vec<_> = known.into_iter().filter(|(_, kind, _)| *kind != Kind::None).collect();
+    let mut mine = known.iter().filter(|(_, kind, of)| *kind == part && *of == number);
+    match (mine.next(), mine.next()) {
+        (Some((place, ..)), None) => Ok(*place),
+        (Some((one, ..)), Some((other, ..))) => bail!(
+            "components {one} and {other} are both {}: give them different CMPn_NUMBER",
+            part::name(part.name(), number, "")
+        ),
+        (None, _) => {
+            let names = known.iter().map(|(_, kind, number)| part::name(kind.name(), *number, ""));
+            let names = names.collect::<Vec<_>>().join(", ");
+            let there = if names.is_empty() { "no part".to_owned() } else { names };
+            Err(usage(format!(
+                "the box has no component {}; it has {there} (CMPn_KIND, CMPn_NUMBER)",
+                part::name(part.name(), number, "")
+            )))
+        }
+    }
+}
+
+/// The place of a part by the board's parameters.
+fn on_board(client: &mut Client, part: Kind, number: u8) -> Result<usize> {
+    let mut known = Vec::new();
+    for place in 1..=COMPONENTS_MAX {
+        let kind = params::value(client, &format!("CMP{place}_KIND"))?;
+        let number = params::value(client, &format!("CMP{place}_NUMBER"))?;
+        known.push((place, Kind::from_number(kind as u8).unwrap_or_default(), number as u8));
+    }
+    place_of(known, part, number)
+}
+
+/// Tells the board, and waits for its answer.
+fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
+    let (system, component) = client.target();
+    let number = |characters: &[u8]| {
+        let mut number = [0; 4];
+        number.iter_mut().skip(1).zip(characters).for_each(|(to, from)| *to = *from);
+        u32::from_be_bytes(number) as f32
+    };
+    let mut values = vec![place as f32];
+    values.extend(serial.as_bytes().chunks(CHARACTERS).map(number));
+    let packet = messages::command_long(REPLACED, &values, system, component);
+    let answer = client.ask(&packet, ANSWER, TRIES, |frame| {
+        let fields = Fields(frame.payload());
+        let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == REPLACED;
+        (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
+    })?;
+    match answer
+        .with_context(|| format!("system {system}: no answer; is its firmware as new as this program?"))?
+    {
+        0 => Ok(()),
+        1 => bail!(
+            "system {system}: not now: the vehicle is armed, or too much was asked of the board at once"
+        ),
+        2 => bail!(
+            "system {system}: the board refused: the command is not signed as GS_SIGN asks, or there is no such component"
+        ),
+        result => bail!("system {system}: the board refused (MAV_RESULT {result})"),
+    }
+}
+
+/// The place of a part by the newest log of a card that has components.
+fn on_card(card: &Path, part: Kind, number: u8) -> Result<usize> {
+    if !card.is_dir() {
+        return Err(usage(format!(
+            "--card {}: is no folder; mount the card, and name its root",
+            card.display()
+        )));
+    }
+    let found = find(&[card.to_owned()], false)?;
+    for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
+        let components = check::overview(place)?.contents.components;
+        if !components.is_empty() {
+            let kind =
+                |name: &str| Kind::ALL.into_iter().find(|kind| kind.name() == name).unwrap_or_default();
+            let known =
+                components.iter().map(|(place, line)| (usize::from(*place), kind(line.kind), line.number));
+            return place_of(known, part, number);
+        }
+    }
+    bail!("{}: no log on it has components; set CMPn_KIND first (docs/usage.md)", card.display())
+}
+
+/// Writes the new serial number into the card's settings; their other lines stay.
+fn write(card: &Path, place: usize, serial: &str) -> Result<PathBuf> {
+    if serial.is_empty() {
+        return Err(usage("--serial is missing: on a card, the box knows a new part by its serial number"));
+    }
+    let (path, name) = (card.join(SETTINGS), format!("CMP{place}_SERIAL"));
+    let before = if path.exists() { settle(fs::read_to_string(&path), &path)? } else { String::new() };
+    let is_other = |line: &&str| !line.trim_start().starts_with(&name);
+    let mut text: String = before.lines().filter(is_other).map(|line| format!("{line}\n")).collect();
+    let _ = writeln!(text, "{name} {serial}");
+    let mut file = Output::create(&path, &Inputs::of([]).forcing(true))?;
+    settle(file.write_all(text.as_bytes()), &path)?;
+    file.finish()?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::messages::command_ack;
+    use hums_link::packet::Packet;
+
+    use super::*;
+    use crate::mavlink::ids::PARAM_VALUE;
+    use crate::talk::fake::found;
+
+    #[test]
+    fn the_board_is_told_the_place_of_the_part_and_its_serial_number() {
+        let kinds = [1.0, 3.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let numbers = [0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut client = found(&[1], move |frame| {
+            let fields = Fields(frame.payload());
+            if frame.id() == 76 {
+                // Component 3; "A-4" and "711" as numbers of 24 bits.
+                let is_it = [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
+                    == [3.0, 4271412.0, 3617073.0, 0.0];
+                return vec![(1, command_ack(REPLACED, if is_it { 0 } else { 3 }, 255, 190))];
+            }
+            let Some(name) = fields.text(4, 16) else { return Vec::new() };
+            let place = usize::from(name.as_bytes()[3] - b'1');
+            let value = if name.ends_with("KIND") { kinds[place] } else { numbers[place] };
+            vec![(1, Packet::new(PARAM_VALUE).f32(0, value).u16(4, 16).text(8, 16, name))]
+        });
+        let place = on_board(&mut client, Kind::Motor, 3).expect("it is there");
+        assert_eq!(place, 3);
+        tell(&mut client, place, "A-4711").expect("accepted");
+        let refused = on_board(&mut client, Kind::Motor, 2).expect_err("no such part").to_string();
+        assert!(
+            refused.contains("no component motor 2") && refused.contains("airframe, motor 1, motor 3"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn the_settings_of_a_card_keep_their_other_lines() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join(SETTINGS);
+        fs::write(&path, "GS_BUDGET 1000\nCMP2_SERIAL old\n").expect("written");
+        write(dir.path(), 2, "new-7").expect("written");
+        assert_eq!(fs::read_to_string(&path).expect("there"), "GS_BUDGET 1000\nCMP2_SERIAL new-7\n");
+    }
+}
