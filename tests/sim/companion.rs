@@ -385,8 +385,7 @@ fn card_with_a_log() -> (TempDir, Vec<u8>) {
     fs::write(dir.path().join("short.raw"), &recording[..80_000]).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
     let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
-    hums(["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()])
-        .expect_code(&[0]);
+    hums(["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()]).expect_code(&[0]);
     // A download has the recorded part of the file.
     let card = fs::read(&image).unwrap();
     (dir, card)

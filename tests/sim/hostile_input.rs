@@ -233,8 +233,7 @@ fn a_read_only_image_is_read_and_not_recorded_to() {
     assert_eq!(recording.decode(&[0]).frames(&Manifest::own().seeds).len() as u64, frames);
     let before = fs::read(&image).unwrap();
     let flight = own("px4_hil_quad_low.tlog");
-    let arguments =
-        ["sim".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
+    let arguments = ["sim".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
     // Also for root, who has permission to write to it.
     hums(arguments).expect_clear_failure();
     assert!(fs::read(&image).unwrap() == before, "the image changed");

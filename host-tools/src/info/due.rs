@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use hums_analysis::log_json::finite;
 use serde::Serialize;
 
 use super::each::each;
-use super::json::finite;
 use super::list::{flight_s, start_utc_us};
 use super::number::short;
 use crate::cli;
