@@ -20,6 +20,7 @@ pub mod cli;
 pub mod decode;
 pub mod info;
 pub mod live;
+pub mod manifest;
 pub mod pack;
 pub mod run;
 pub mod shell;

@@ -1,6 +1,8 @@
 //! `hums info --verify`: every check there is, each with what it looked at and what failed.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use hums_blackbox::record::Lost;
@@ -13,11 +15,13 @@ use crate::ending::{
     BlocksJson, EndJson, Ending, SessionBefore, among_words, behind_words, copies_words, made_again_words,
     not_taken_words, unprotected_words,
 };
+use crate::files::Inputs;
 use crate::followed::EndResolver;
 use crate::logs::sessions::{Sessions, place};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::loss;
+use crate::manifest::Manifest;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
@@ -57,8 +61,10 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
             image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
         }
     }
+    let mut manifest = Manifest::default();
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
+        manifest.log(&overview.ending.name, Some(&overview.ending), &[]);
         worst = worst.max(log.verdict);
         weakened.made_again += overview.ending.made_again();
         weakened.unprotected += overview.ending.unprotected();
@@ -86,6 +92,11 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         let logs = count(logs, "session");
         let verdict = without_earlier.verdict(worst, weakened, found.has_passed_over());
         output::line(&format!("{logs}: {verdict}"))?;
+    }
+    if let Some(to) = &args.manifest {
+        let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
+        let refuse = Inputs::of(read.iter().map(PathBuf::as_path));
+        manifest.write(to, &read, &[], &refuse)?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));

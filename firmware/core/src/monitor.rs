@@ -369,7 +369,8 @@ impl Monitor {
         }
     }
 
-    fn describe_component(&mut self, place: usize) {
+    /// A component is what its parameters say, from now on.
+    pub fn describe_component(&mut self, place: usize) {
         let boots = self.boots();
         let Self { usage, params, components, saving, .. } = self;
         let wear = usage.wear();

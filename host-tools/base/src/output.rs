@@ -89,6 +89,11 @@ pub fn json(schema: Schema, value: &impl Serialize) -> Result<()> {
     json_line(&serde_json::to_string_pretty(&Named { schema, value })?)
 }
 
+/// The same as the text of a file.
+pub fn json_text(schema: Schema, value: &impl Serialize) -> Result<String> {
+    Ok(format!("{}\n", serde_json::to_string_pretty(&Named { schema, value })?))
+}
+
 /// A JSON object that is printed step by step: some members, then a list that is too long for memory. It prints the
 /// same text as [`json`].
 pub struct JsonList {

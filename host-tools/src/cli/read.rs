@@ -17,6 +17,7 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode cards/ -o fleet --format parquet
   hums decode card.img --session 00001 -o - --format influx | curl --data-binary @- http://localhost:8428/write
   hums decode card.img -o out --format tlog --split flights
+  hums decode flight.tlog -o found.tlog --format tlog --findings
   hums decode flight.tlog -o flight.hum --format hum
 
 Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
@@ -60,6 +61,12 @@ pub struct Decode {
     /// Write files of their own for each flight; the time on the ground between two is cut in its middle
     #[arg(long, value_enum, value_name = "WHAT", conflicts_with_all = ["from", "to"])]
     pub split: Option<Split>,
+    /// Write the findings into a tlog, as texts of the box at their times, for programs that show texts
+    #[arg(long)]
+    pub findings: bool,
+    /// Write a manifest of the files read and made, as JSON: SHA-256, repairs, losses (docs/json.md)
+    #[arg(long, value_name = "FILE")]
+    pub manifest: Option<PathBuf>,
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
@@ -104,6 +111,7 @@ const INFO_EXAMPLES: &str = "Examples:
   hums info --json 00001_00.HUM
   hums info --list cards/ flight.tlog
   hums info --verify card.img
+  hums info --verify --manifest card.json card.img
 
 --list: a line a log, in the order in which they began: date, length, time in the air, size, worst finding.
 --verify: the file system's structures, each sector's checksum and number, each group's decoding, each frame's checksum, the order
@@ -124,6 +132,9 @@ pub struct Info {
     /// Check all that can be checked about HUMS logs and cards, and print each check
     #[arg(long, conflicts_with_all = ["list", "session", "system"])]
     pub verify: bool,
+    /// With --verify: write a manifest of the files read, as JSON: SHA-256, repairs, losses (docs/json.md)
+    #[arg(long, value_name = "FILE", requires = "verify")]
+    pub manifest: Option<PathBuf>,
     /// Only this session, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,

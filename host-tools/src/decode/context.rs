@@ -1,6 +1,7 @@
 //! The request, and the context common to all parts of a log's decoding.
 
 use super::checked::Checked;
+use super::findings::Findings;
 use super::identity::Identity;
 use super::influx::Tags;
 use super::native::Tables;
@@ -75,6 +76,8 @@ pub struct Context {
     pub inputs: Inputs,
     /// This program's findings, if the recorder ran no checks and an earlier reading made them.
     pub checked: Option<Checked>,
+    /// The findings that go into a tlog as texts.
+    pub findings: Option<Findings>,
     /// It is judged while it is read.
     pub judges: bool,
     /// The tables of an autopilot's own log.

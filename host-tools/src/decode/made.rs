@@ -1,7 +1,7 @@
 //! The outputs of a decoding, for people and as JSON.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -48,6 +48,11 @@ impl OutputFile {
     /// With this description.
     pub fn with_words(path: PathBuf, format: &'static str, words: String) -> Self {
         Self { path, format, counts: BTreeMap::new(), words }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// For people.

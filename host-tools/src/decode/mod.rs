@@ -33,6 +33,7 @@ pub mod columns;
 pub mod context;
 pub mod destination;
 pub mod field_names;
+pub mod findings;
 pub mod identity;
 pub mod influx;
 pub mod made;
@@ -65,6 +66,7 @@ use crate::files::{Inputs, check_parent, means_standard_output, says_directory};
 use crate::followed::{EndResolver, HasEnding};
 use crate::logs::reader;
 use crate::logs::side_by_side::side_by_side;
+use crate::manifest::Manifest;
 use crate::naming::{self, Named};
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output::{self, Schema};
@@ -80,6 +82,7 @@ use checked::Checked;
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
+use findings::Findings;
 use identity::{Identity, identity};
 use influx::Tags;
 use made::{LogJson, MadeJson, OutputFile};
@@ -93,7 +96,15 @@ pub const SCHEMA: Schema = Schema::first("hums-decode");
 
 /// Runs `hums decode`.
 pub fn run(args: &cli::Decode) -> Result<Outcome> {
+    if args.findings && !args.format.contains(&cli::Format::Tlog) {
+        return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
+    }
     if args.format.contains(&cli::Format::Hum) {
+        if args.manifest.is_some() {
+            return Err(usage_error(
+                "--manifest: a log of one recording has none; hums info --verify makes it",
+            ));
+        }
         return pack::run(args);
     }
     let formats = Formats::new(&args.format, args.split.is_some());
@@ -121,16 +132,28 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let selection = Selection::new(args, native)?;
     let logs = asked;
     let mut followed = EndResolver::new(sessions);
-    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
+    let manifest_inputs = inputs.clone();
+    let task = Task {
+        formats,
+        selection,
+        inputs,
+        output: &args.output,
+        standard_output,
+        logs,
+        has_findings: args.findings,
+    };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);
+    let (mut manifest, mut made) = (Manifest::default(), Vec::new());
     let mut tell = |done: Done| {
         if !is_wanted(&done.name) {
             return Ok(());
         }
         outcome = outcome.and(done.outcome());
         written |= done.written;
+        manifest.log(&done.name, done.ending.as_ref(), &done.remarks);
+        made.extend(done.made.iter().map(|made| made.path().to_owned()));
         done.tell(json.as_mut())
     };
     side_by_side(
@@ -142,6 +165,10 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     )?;
     followed.finish().try_for_each(&mut tell)?;
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
+    if let Some(to) = &args.manifest {
+        let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
+        manifest.write(to, &read, &made, &manifest_inputs)?;
+    }
     if !written {
         bail!("nothing of what was asked for is there, so nothing was written");
     }
@@ -205,6 +232,8 @@ struct Task<'a> {
     output: &'a Path,
     standard_output: bool,
     logs: usize,
+    /// A tlog has the findings as texts.
+    has_findings: bool,
 }
 
 /// A log's outcome, reported in the logs' order.
@@ -385,6 +414,9 @@ impl Task<'_> {
             session: work.traits.identity(work.log),
             ..Context::default()
         };
+        if self.has_findings {
+            context.findings = Some(Findings::of(work.log)?);
+        }
         // A box's log begins with the record of its start, and its monitor checks.
         let judges = self.formats.has_records() && !work.traits.has_board();
         match work.log.own() {

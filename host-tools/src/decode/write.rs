@@ -12,6 +12,7 @@ use super::checked::{Checked, OnBoard};
 use super::collect::Collected;
 use super::context::Context;
 use super::destination::Destination;
+use super::findings::Texts;
 use super::influx::{Clock, Lines};
 use super::made::OutputFile;
 use super::parquet::ParquetTables;
@@ -98,6 +99,8 @@ pub struct Writers<'a> {
     gaps: Option<Single>,
     /// Gaps of a tlog that is not a file and so has no table beside it.
     gaps_left_out: u64,
+    /// Texts that go into the tlog.
+    texts: Option<Texts>,
     frames: u64,
     records: u64,
     /// JSON's.
@@ -179,6 +182,7 @@ impl<'a> Writers<'a> {
             csv,
             gaps: None,
             gaps_left_out: 0,
+            texts: Texts::of(context),
             frames: 0,
             records: 0,
             objects: 0,
@@ -220,7 +224,9 @@ impl<'a> Writers<'a> {
         self.objects += lines_of(&collected.jsonl);
         self.on_board.and(collected.on_board);
         self.rows_left_out += collected.rows_left_out;
-        for (file, bytes) in [(&mut self.tlog, &collected.tlog), (&mut self.jsonl, &collected.jsonl)] {
+        let with_texts = self.texts.as_mut().map(|texts| texts.among(&collected.tlog));
+        let tlog = with_texts.as_ref().unwrap_or(&collected.tlog);
+        for (file, bytes) in [(&mut self.tlog, tlog), (&mut self.jsonl, &collected.jsonl)] {
             if let Some(file) = file {
                 file.write(bytes)?;
             }
@@ -299,6 +305,9 @@ impl<'a> Writers<'a> {
         let stale = self.tlog.as_ref().filter(|_| self.gaps.is_none()).and_then(Single::gaps_path);
         if let Some(path) = stale.filter(|path| path.exists()) {
             settle(fs::remove_file(&path), &path)?;
+        }
+        if let (Some(tlog), Some(texts)) = (&mut self.tlog, &mut self.texts) {
+            tlog.write(&texts.rest())?;
         }
         let gaps = self.gaps.take().map(Single::finish).transpose()?;
         let mut singles =

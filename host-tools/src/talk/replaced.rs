@@ -176,7 +176,7 @@ fn write(card: &Path, place: usize, serial: &str) -> Result<PathBuf> {
     let is_other = |line: &&str| !line.trim_start().starts_with(&name);
     let mut text: String = before.lines().filter(is_other).map(|line| format!("{line}\n")).collect();
     let _ = writeln!(text, "{name} {serial}");
-    let mut file = Output::create(&path, &Inputs::of([]).forcing(true))?;
+    let mut file = Output::create(&path, &Inputs::none().forcing(true))?;
     settle(file.write_all(text.as_bytes()), &path)?;
     file.finish()?;
     Ok(path)

@@ -2,7 +2,84 @@
 
 use std::fs;
 
-use super::support::{flight, json, run, text};
+use super::support::{contents, flight, json, recorded, records, run, text};
+
+/// The manifest has the hash of what was read, and is not written over anything.
+#[test]
+fn a_manifest_names_each_file_with_its_hash() {
+    use sha2::Digest as _;
+    let dir = recorded();
+    run(dir.path(), "info --verify card.img --manifest made.json", 0);
+    let made = fs::read(dir.path().join("made.json")).expect("a manifest");
+    let made: serde_json::Value = serde_json::from_slice(&made).expect("JSON");
+    let image = fs::read(dir.path().join("card.img")).expect("an image");
+    let hash: String = sha2::Sha256::digest(&image).iter().map(|byte| format!("{byte:02x}")).collect();
+    let [input] = made["inputs"].as_array().expect("a list").as_slice() else { panic!("{made}") };
+    assert_eq!((&input["file"], &input["sha256"]), (&"card.img".into(), &hash.into()));
+    assert_eq!((&made["logs"][0]["frames"], &made["logs"][0]["lacks"]), (&16_645.into(), &"".into()));
+    run(dir.path(), "info --verify card.img --manifest made.json", 1);
+    run(dir.path(), "info --verify card.img --manifest card.img", 2);
+}
+
+/// A query over a fleet counts each session once, however often its logs were decoded.
+#[test]
+fn a_folder_that_is_decoded_again_and_again_has_each_session_once() {
+    let dir = tempfile::tempdir().expect("directory");
+    for name in ["ap_quad_faults.tlog", "ap_quad_guided.tlog", "px4_hil_quad_low.tlog", "ap_quad_signed.raw"]
+    {
+        fs::create_dir_all(dir.path().join("logs")).expect("a folder");
+        fs::copy(flight(name), dir.path().join("logs").join(name)).expect("a copy");
+    }
+    let mut first = Vec::new();
+    for (again, force) in [(0, ""), (1, " --force"), (2, " --force")] {
+        let line = format!("decode logs -o fleet --format parquet --message HEARTBEAT{force}");
+        let output = run(dir.path(), &line, 0);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!said.contains("other tables of a session"), "{said}");
+        let names = contents(&dir.path().join("fleet")).into_iter().map(|(name, _)| name);
+        let of_heartbeats: Vec<String> = names.filter(|name| name.contains("HEARTBEAT")).collect();
+        if again == 0 {
+            first.clone_from(&of_heartbeats);
+        }
+        assert_eq!((of_heartbeats.len(), &of_heartbeats), (4, &first), "run {again}");
+    }
+    run(dir.path(), "decode logs -o fleet --format parquet --message HEARTBEAT", 1);
+}
+
+/// The texts are those of the box, at the times of `hums check`; without them the frames are those of the recording.
+#[test]
+fn a_tlog_with_findings_has_them_as_texts_of_the_box() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::copy(flight("ap_quad_faults.tlog"), dir.path().join("faults.tlog")).expect("a copy");
+    run(dir.path(), "decode faults.tlog -o found.tlog --format tlog --findings --manifest made.json", 0);
+    let found = fs::read(dir.path().join("found.tlog")).expect("a tlog");
+    let all = records(&found);
+    // Component 191 of MAVLink 2.
+    let is_text = |frame: &[u8]| frame[0] == 0xFD && frame[6] == 191;
+    let others: Vec<_> = all.iter().filter(|(_, frame)| !is_text(frame)).map(|(_, frame)| *frame).collect();
+    let recording = fs::read(dir.path().join("faults.tlog")).expect("a recording");
+    let before = records(&recording);
+    assert!(
+        others == before.iter().map(|(_, frame)| *frame).collect::<Vec<_>>(),
+        "the frames are as they were"
+    );
+    assert!(all.is_sorted_by_key(|(us, _)| *us), "at their times");
+    let text =
+        |frame: &[u8]| String::from_utf8_lossy(&frame[11..frame.len() - 2]).trim_end_matches('\0').to_owned();
+    let texts: Vec<_> =
+        all.iter().filter(|(_, frame)| is_text(frame)).map(|(us, frame)| (*us, text(frame))).collect();
+    let (us, _) = texts
+        .iter()
+        .find(|(_, text)| text == "HUMS: battery 1 cell low: 3.40 V, LAND NOW")
+        .expect("it is found");
+    assert!(us.abs_diff(before[0].0 + 260_800_000) < 300_000, "{us}");
+    let made: serde_json::Value =
+        serde_json::from_slice(&fs::read(dir.path().join("made.json")).expect("a manifest")).expect("JSON");
+    assert_eq!(
+        (&made["inputs"][0]["file"], &made["outputs"][0]["file"]),
+        (&"faults.tlog".into(), &"found.tlog".into())
+    );
+}
 
 #[test]
 fn a_card_says_which_part_is_due_and_what_is_left_of_the_others() {

@@ -23,7 +23,7 @@ enum Role {
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
         "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
-        "output" | "sd" | "gs" | "tap" | "store" => Role::Output,
+        "output" | "sd" | "gs" | "tap" | "store" | "manifest" => Role::Output,
         "around" | "bucket" | "number" | "part" | "serial" | "card" | "card_out" | "command"
         | "card_size" | "cut_after_writes" | "cut_store_after" | "format" | "from" | "influx" | "last"
         | "line_rate" | "link" | "listen" | "listen_token" | "message" | "name" | "names" | "noise"

@@ -163,7 +163,7 @@ impl Settings {
             _ if is_cut => false,
             Ok(Line::Nothing) => true,
             Ok(Line::Set(name, value)) => match place_of_serial(name) {
-                Some(place) => is_part(place, value, now, book, sectors),
+                Some(place) => replace_unless_known(place, value, now, book, sectors),
                 None => param_line::value(value)
                     .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
             },
@@ -182,13 +182,15 @@ fn place_of_serial(name: &str) -> Option<usize> {
 }
 
 /// Another serial number than the known one is another part. The file is read at each power-on, and replaces a part once.
-fn is_part(
+fn replace_unless_known(
     place: usize,
     serial: &str,
     now: Instant,
     book: &mut Logbook<'_>,
     sectors: &mut SectorsIn,
 ) -> bool {
+    // Its kind may stand in a line before.
+    book.monitor.describe_component(place);
     let known = book.monitor.components().get(place).map(|part| part.serial);
     known == Some(Label::new(serial)) || records::replace_component(now, place, serial, (0, 0), book, sectors)
 }

@@ -1,0 +1,123 @@
+//! The findings of a log as texts of the box (`STATUSTEXT` of component 191) between the frames of a tlog, for programs
+//! that show texts. Without them a tlog has the vehicle's frames alone, bit for bit.
+
+use std::collections::VecDeque;
+
+use anyhow::Result;
+use hums_core::health::{self, Level, Orders, check_named};
+use hums_core::observation::Feeds;
+use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
+use hums_link::text::Severity;
+use hums_link::{messages, summary};
+
+use super::context::Context;
+use crate::check;
+use crate::check::judge::{Heard, Limits};
+use crate::source::recording::Place;
+use crate::source::told::Finding;
+
+/// Bytes of time before each frame of a tlog.
+const TIME_BYTES: usize = 8;
+
+/// The findings of a log, and the system that they are about.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    system: u8,
+    list: Vec<Finding>,
+}
+
+impl Findings {
+    /// As `hums check` has them.
+    pub fn of(place: &Place) -> Result<Self> {
+        let judged = check::recording(place, &Limits::default(), Heard::Somewhere)?.judged;
+        let system = judged.vehicle().source.map_or(1, |source| source.system);
+        Ok(Self { system, list: judged.findings })
+    }
+}
+
+/// The texts that are still to be written, the next first: their times in the tlog, and their frames.
+pub struct Texts(VecDeque<(u64, Vec<u8>)>);
+
+impl Texts {
+    /// Of the findings in the wanted part of a log.
+    pub fn of(context: &Context) -> Option<Self> {
+        let Findings { system, list } = context.findings.as_ref()?;
+        let mut encoder = Encoder::of(*system, COMPONENT);
+        let mut buffer = [0; FRAME_BYTES_MAX];
+        let wanted = list.iter().filter(|finding| context.selection.has_time(finding.at, &context.epochs));
+        let texts = wanted.filter_map(|finding| {
+            let packet = messages::status_text(severity(finding)?, summary::text(&of_box(finding)?).as_str());
+            let utc_us = context.epochs.utc_us(finding.at).unwrap_or_else(|| finding.at.as_micros());
+            Some((utc_us, encoder.frame(&mut buffer, &packet).to_vec()))
+        });
+        Some(Self(texts.collect()))
+    }
+
+    /// Records of a tlog with the texts that are due between them.
+    pub fn among(&mut self, mut records: &[u8]) -> Vec<u8> {
+        let mut merged = Vec::with_capacity(records.len());
+        while let Some((time, frame)) = records.split_first_chunk::<TIME_BYTES>() {
+            self.push_until(u64::from_be_bytes(*time), &mut merged);
+            let Some(bytes) = length(frame) else { break };
+            let (record, rest) = records.split_at(records.len().min(TIME_BYTES + bytes));
+            merged.extend_from_slice(record);
+            records = rest;
+        }
+        merged.extend_from_slice(records);
+        merged
+    }
+
+    /// The texts after the last record.
+    pub fn rest(&mut self) -> Vec<u8> {
+        let mut rest = Vec::new();
+        self.push_until(u64::MAX, &mut rest);
+        rest
+    }
+
+    fn push_until(&mut self, utc_us: u64, to: &mut Vec<u8>) {
+        let due = self.0.iter().take_while(|(at, _)| *at <= utc_us).count();
+        for (at, frame) in self.0.drain(..due) {
+            to.extend(at.to_be_bytes());
+            to.extend(frame);
+        }
+    }
+}
+
+/// How long the frame is that begins here.
+fn length(bytes: &[u8]) -> Option<usize> {
+    let [magic, payload, flags, ..] = *bytes else { return None };
+    match magic {
+        0xFE => Some(8 + usize::from(payload)),
+        0xFD => Some(12 + usize::from(payload) + if flags & 1 == 0 { 0 } else { 13 }),
+        _ => None,
+    }
+}
+
+/// How urgent a text about it is; `None` without a text.
+fn severity(finding: &Finding) -> Option<Severity> {
+    match (finding.level, finding.previous) {
+        (Level::Critical, _) => Some(Severity::Critical),
+        (Level::Warning, _) => Some(Severity::Warning),
+        (Level::Ok, Level::Warning | Level::Critical) => Some(Severity::Info),
+        _ => None,
+    }
+}
+
+/// As the box would have it; `None` of a check that no box makes.
+fn of_box(finding: &Finding) -> Option<health::Finding> {
+    let check = check_named(&finding.check)?;
+    Some(health::Finding {
+        at: finding.at.into(),
+        subsystem: finding.subsystem,
+        check: check.name,
+        instance: finding.instance,
+        level: finding.level,
+        previous: finding.previous,
+        value: finding.value,
+        limit: finding.limit,
+        unit: check.unit.name(),
+        feeds: Feeds::Unsaid,
+        because: "",
+        orders: Orders::Own,
+    })
+}
