@@ -3,6 +3,8 @@
 //! The baseline is the mean of the smoothed figure over the last minute; its range is [`SPREADS`] times the mean distance from that mean.
 //! The caller says which samples are learnt. So a fault does not become the baseline, and an offset from the beginning of a flight does.
 
+use crate::initial::{Initial, state};
+
 /// The baseline is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;
 const MEMORY_S: f32 = 60.0;
@@ -11,24 +13,24 @@ const FIGURE_MAX: f32 = 1e6;
 /// Of noise with a normal distribution four mean distances are 3.2 standard deviations.
 const SPREADS: f32 = 4.0;
 
-/// A figure and its usual level.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AdaptiveBaseline {
-    smooth: f32,
-    mean: f32,
-    spread: f32,
-    learnt_s: f32,
+state! {
+    /// A figure and its usual level.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct AdaptiveBaseline {
+        smooth: f32,
+        mean: f32,
+        spread: f32,
+        learnt_s: f32,
+    }
 }
 
 impl AdaptiveBaseline {
-    pub(crate) const NEW: Self = Self::after(0.0);
-
     /// It is known to be zero.
     pub(crate) const ZERO: Self = Self { learnt_s: MEMORY_S, ..Self::NEW };
 
     /// Nothing learnt, also not in the first seconds given, in which the figure settles.
     pub(crate) const fn after(settles_s: f32) -> Self {
-        Self { smooth: 0.0, mean: 0.0, spread: 0.0, learnt_s: -settles_s }
+        Self { learnt_s: -settles_s, ..Self::NEW }
     }
 
     /// Whether a sample is in the possible range.

@@ -13,8 +13,9 @@ mod texts;
 pub use events::name as event_name;
 
 use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
+use crate::initial::state;
 use crate::observation::{Estimator, EstimatorScale, Sensors};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, SILENT, Span, Stamp};
 
 /// Time for which a text or an event holds. PX4 repeats its failing checks when they change, some 2 s apart.
 pub const HOLDS: Span = Span::from_secs(10);
@@ -22,8 +23,6 @@ pub const HOLDS: Span = Span::from_secs(10);
 const DISARMED: Span = Span::from_secs(2);
 /// `MAV_STATE_CRITICAL`; `MAV_STATE_EMERGENCY` and worse states have larger numbers.
 const CRITICAL_STATE: u8 = 5;
-/// Flags come at 1 Hz or faster.
-const FLAGS_AGE: Span = Span::from_secs(5);
 
 /// In place of an [`Urgency`]: the alert is no longer reported, and no report says that all is well.
 pub const ENDED: f32 = -1.0;
@@ -99,74 +98,58 @@ const fn has_both(flags: u16) -> bool {
     flags & ATTITUDE != 0 && flags & POSITION != 0
 }
 
-/// The flags of the last two messages.
-#[derive(Clone, Copy, Debug)]
-struct Flags {
-    now: Causes,
-    before: Causes,
-    at: Stamp,
+state! {
+    /// The flags of the last two messages.
+    #[derive(Clone, Copy, Debug)]
+    struct Flags {
+        now: Causes,
+        before: Causes,
+        at: Stamp,
+    }
 }
 
 impl Flags {
-    const NONE: Self = Self { now: Causes::NONE, before: Causes::NONE, at: Stamp::NONE };
-
     const fn take(&mut self, at: Instant, causes: Causes) {
         *self = Self { now: causes, before: self.now, at: Stamp::at(at) };
     }
 
     fn has(&self, now: Instant, cause: Cause) -> bool {
-        self.now.both(self.before).has(cause) && self.at.age(now).is_some_and(|age| age <= FLAGS_AGE)
+        self.now.both(self.before).has(cause) && self.at.age(now).is_some_and(|age| age <= SILENT)
     }
 }
 
-/// The standing alerts of the autopilot. Only those of the armed time count: earlier ones are about arming.
-#[derive(Clone, Copy, Debug)]
-pub struct Alerts {
-    /// For each cause its reported urgency, and the time until which a single report holds, ms; then the time of the
-    /// last report.
-    told: [Option<Urgency>; Cause::COUNT],
-    until_ms: [u32; Cause::COUNT],
-    told_at: Stamp,
-    /// Last time of a cause that was not reported just before, or of an emergency state.
-    began_at: Stamp,
-    emergency: bool,
-    sensors: Flags,
-    failures: Flags,
-    estimator: Flags,
-    armed: bool,
-    armed_at: Stamp,
-    /// Causes that a flag called healthy once. Parts that never were healthy are not fitted or not switched on.
-    had: Causes,
-    /// Causes that flags of the last `SYS_STATUS` cover, healthy or not.
-    spoken_of: Causes,
-    /// The estimator had attitude and position.
-    had_both: bool,
+state! {
+    /// The standing alerts of the autopilot. Only those of the armed time count: earlier ones are about arming.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Alerts {
+        /// For each cause its reported urgency, and the time until which a single report holds, ms; then the time of the
+        /// last report.
+        told: [Option<Urgency>; Cause::COUNT],
+        until_ms: [u32; Cause::COUNT],
+        told_at: Stamp,
+        /// Last time of a cause that was not reported just before, or of an emergency state.
+        began_at: Stamp,
+        emergency: bool,
+        sensors: Flags,
+        failures: Flags,
+        estimator: Flags,
+        armed: bool,
+        armed_at: Stamp,
+        /// Causes that a flag called healthy once. Parts that never were healthy are not fitted or not switched on.
+        had: Causes,
+        /// Causes that flags of the last `SYS_STATUS` cover, healthy or not.
+        spoken_of: Causes,
+        /// The estimator had attitude and position.
+        had_both: bool,
+    }
 }
 
 impl Alerts {
-    pub(crate) const fn new() -> Self {
-        Self {
-            told: [None; Cause::COUNT],
-            until_ms: [0; Cause::COUNT],
-            told_at: Stamp::NONE,
-            began_at: Stamp::NONE,
-            emergency: false,
-            sensors: Flags::NONE,
-            failures: Flags::NONE,
-            estimator: Flags::NONE,
-            armed: false,
-            armed_at: Stamp::NONE,
-            had: Causes::NONE,
-            spoken_of: Causes::NONE,
-            had_both: false,
-        }
-    }
-
     /// A heartbeat. Each arming begins anew.
-    pub(crate) const fn take_armed(&mut self, at: Instant, armed: bool) {
+    pub(crate) fn take_armed(&mut self, at: Instant, armed: bool) {
         if armed && !self.armed {
             let Self { had, had_both, .. } = *self;
-            *self = Self { had, had_both, ..Self::new() };
+            *self = Self { had, had_both, ..Self::default() };
         }
         self.armed = armed;
         if armed {
@@ -265,7 +248,7 @@ impl Alerts {
     fn is_cleared(&self, now: Instant, cause: Cause) -> bool {
         let comes = |flags: &Flags| {
             let has = flags.now.both(flags.before).has(cause);
-            !has && flags.at.age(now).is_some_and(|age| age <= FLAGS_AGE)
+            !has && flags.at.age(now).is_some_and(|age| age <= SILENT)
         };
         let by_estimator = matches!(cause, Cause::Estimator | Cause::Gnss | Cause::Accelerometer);
         (self.spoken_of.has(cause) && comes(&self.sensors))

@@ -15,6 +15,7 @@
 //!    blamed on neither.
 
 use crate::gates::{self, Gates};
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::{SPEED_MAX_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
@@ -39,20 +40,20 @@ const AIR_S: f32 = 30.0;
 const LEAPS_MPS: f32 = 50.0;
 const LEAPS_M: f32 = 5.0;
 
-/// Movement of a height without a climb, within [`VOTE_S`].
-#[derive(Clone, Copy, Debug)]
-struct Leap {
-    /// The last height, m, and when it was measured.
-    height_m: f32,
-    at: Stamp,
-    leapt_m: f32,
-    /// The error of a late height, by the climb, m.
-    late_m: f32,
+state! {
+    /// Movement of a height without a climb, within [`VOTE_S`].
+    #[derive(Clone, Copy, Debug)]
+    struct Leap {
+        /// The last height, m, and when it was measured.
+        height_m: f32,
+        at: Stamp,
+        leapt_m: f32,
+        /// The error of a late height, by the climb, m.
+        late_m: f32,
+    }
 }
 
 impl Leap {
-    const NONE: Self = Self { height_m: 0.0, at: Stamp::NONE, leapt_m: 0.0, late_m: 0.0 };
-
     /// Takes a height; the climb is `None` if unknown.
     fn take(&mut self, at: Instant, height_m: f32, climb_mps: Option<f32>) {
         let step = self.at.age(at).filter(|step| *step <= PAUSE);
@@ -75,39 +76,35 @@ impl Leap {
     }
 }
 
-/// The last sample of the barometer: height above the first one, m; dynamic pressure of the ground speed as a height,
-/// m; climb, m/s.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sample {
-    at: Stamp,
-    height_m: f32,
-    wind_m: f32,
-    climb_mps: f32,
+state! {
+    /// The last sample of the barometer: height above the first one, m; dynamic pressure of the ground speed as a height,
+    /// m; climb, m/s.
+    #[derive(Clone, Copy, Debug)]
+    struct Sample {
+        at: Stamp,
+        height_m: f32,
+        wind_m: f32,
+        climb_mps: f32,
+    }
 }
 
-/// The heights of barometer and receiver.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Heights {
-    /// The first pressure of the flight, hPa; 0 before it.
-    first_hpa: f32,
-    sample: Sample,
-    /// The last sample leapt and was skipped.
-    is_doubted: bool,
-    /// Usual height and half of the usual dynamic pressure, both in m.
-    air: Option<[f32; 2]>,
-    /// The leaps of barometer and receiver.
-    leaps: [Leap; 2],
+state! {
+    /// The heights of barometer and receiver.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Heights {
+        /// The first pressure of the flight, hPa; 0 before it.
+        first_hpa: f32,
+        sample: Sample,
+        /// The last sample leapt and was skipped.
+        is_doubted: bool,
+        /// Usual height and half of the usual dynamic pressure, both in m.
+        air: Option<[f32; 2]>,
+        /// The leaps of barometer and receiver.
+        leaps: [Leap; 2],
+    }
 }
 
 impl Heights {
-    pub(crate) const NEW: Self = Self {
-        first_hpa: 0.0,
-        sample: Sample { at: Stamp::NONE, height_m: 0.0, wind_m: 0.0, climb_mps: 0.0 },
-        is_doubted: false,
-        air: None,
-        leaps: [Leap::NONE; 2],
-    };
-
     pub(crate) fn take_pressure(
         &mut self,
         residuals: &mut Residuals,

@@ -8,9 +8,8 @@ pub struct Unreadable;
 
 /// An item that outlives power.
 ///
-/// A later version only appends fields. An earlier one ignores them; fields that an older item lacks stay as in
-/// [`Self::EMPTY`].
-pub trait Item: Sized {
+/// A later version only appends fields. An earlier one ignores them; fields that an older item lacks stay as they are by default.
+pub trait Item: Default {
     /// The stored form's version, from 1.
     const VERSION: u8;
     /// The earliest version that can be read.
@@ -19,8 +18,6 @@ pub trait Item: Sized {
     const BYTES: usize;
     /// Whether numbers take only as many bytes as they need.
     const SHORT: bool = false;
-    /// Counts nothing.
-    const EMPTY: Self;
 
     /// Every field in its stored order.
     ///
@@ -42,7 +39,7 @@ pub trait Item: Sized {
     /// # Errors
     /// [`Unreadable`] if it ends too early, or has an unknown version.
     fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
-        let mut item = Self::EMPTY;
+        let mut item = Self::default();
         let mut fields = Fields::read(stored, Self::OLDEST, Self::VERSION)?;
         fields.short = Self::SHORT;
         item.fields(&mut fields)?;

@@ -17,6 +17,7 @@
 //!
 //! A pack is a new one when its voltage falls by a third while the vehicle is disarmed.
 
+use crate::initial::state;
 use crate::vehicle::BATTERIES_MAX;
 
 /// Maximum cells of one battery.
@@ -94,27 +95,31 @@ pub fn known(name: &str) -> Option<u8> {
     KNOWN.iter().position(|(_, known, ..)| *known == name).map(|place| place as u8)
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Pack {
-    highest_v: f32,
-    /// The autopilot's id of the battery, by which parameters go. The order of first messages may differ.
-    id: u8,
-    /// The highest voltage, or part of it, was measured at rest.
-    rested: bool,
-    /// The count of earlier flights; 0 for none.
-    before: u8,
-    /// The last flight did not confirm it.
-    doubted: bool,
-    /// 0: not known.
-    count: u8,
+state! {
+    #[derive(Clone, Copy, Debug)]
+    struct Pack {
+        highest_v: f32,
+        /// The autopilot's id of the battery, by which parameters go. The order of first messages may differ.
+        id: u8,
+        /// The highest voltage, or part of it, was measured at rest.
+        rested: bool,
+        /// The count of earlier flights; 0 for none.
+        before: u8,
+        /// The last flight did not confirm it.
+        doubted: bool,
+        /// 0: not known.
+        count: u8,
+    }
 }
 
-/// The cells of all batteries.
-#[derive(Clone, Copy, Debug)]
-pub struct Cells {
-    packs: [Pack; BATTERIES_MAX],
-    /// By the battery's id and [`Setting`]; 0: unknown, or not set.
-    settings: [[f32; SETTINGS]; SET_MAX],
+state! {
+    /// The cells of all batteries.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Cells {
+        packs: [Pack; BATTERIES_MAX],
+        /// By the battery's id and [`Setting`]; 0: unknown, or not set.
+        settings: [[f32; SETTINGS]; SET_MAX],
+    }
 }
 
 /// Counts as a set of bits: bit n stands for n cells.
@@ -126,11 +131,6 @@ fn counts(volts: f32, from_v: f32, to_v: f32) -> Counts {
 }
 
 impl Cells {
-    pub(crate) const fn new() -> Self {
-        const PACK: Pack = Pack { highest_v: 0.0, id: 0, rested: false, before: 0, doubted: false, count: 0 };
-        Self { packs: [PACK; BATTERIES_MAX], settings: [[0.0; SETTINGS]; SET_MAX] }
-    }
-
     /// The voltage of the battery at a place, with its id; `rests`: the vehicle stands; `armed`: motors may turn.
     pub(crate) fn take_voltage(&mut self, battery: usize, id: u8, pack_v: f32, rests: bool, armed: bool) {
         let Some(pack) = self.packs.get_mut(battery).filter(|_| pack_v.is_finite() && pack_v > PLUGGED_V)
@@ -259,7 +259,7 @@ mod tests {
     const EMPTY: u8 = 4;
 
     fn plugged(pack_v: f32) -> Cells {
-        let mut cells = Cells::new();
+        let mut cells = Cells::default();
         cells.take_voltage(0, 0, pack_v, true, false);
         cells
     }
@@ -353,7 +353,7 @@ mod tests {
     #[test]
     fn a_count_that_the_last_flight_did_not_confirm_is_not_believed_in_the_air() {
         for (stored, count) in [(6, 6), (6 | DOUBTED, 0), (DOUBTED, 0), (0xFF, 0)] {
-            let mut cells = Cells::new();
+            let mut cells = Cells::default();
             cells.remember(0, stored);
             cells.take_voltage(0, 0, 20.4, false, true);
             assert_eq!(cells.of(0), count, "{stored}");
@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn a_box_that_starts_in_the_air_believes_no_voltage_alone() {
-        let mut cells = Cells::new();
+        let mut cells = Cells::default();
         cells.take_voltage(0, 0, 20.4, false, true);
         assert_eq!(cells.of(0), 0, "5 full or 6 half empty");
         cells.remember(0, 6);

@@ -21,16 +21,13 @@ pub const LABEL_BYTES: usize = 16;
 pub struct Label([u8; LABEL_BYTES]);
 
 impl Label {
-    /// No text.
-    pub const EMPTY: Self = Self([0; LABEL_BYTES]);
-
     /// The first [`LABEL_BYTES`] printable ASCII characters of a text; others are left out.
     pub fn new(text: &str) -> Self {
         Self::of(text.bytes())
     }
 
     fn of(bytes: impl Iterator<Item = u8>) -> Self {
-        let mut label = Self::EMPTY;
+        let mut label = Self::default();
         let printable = bytes.filter(|byte| (b' '..=b'~').contains(byte));
         for (place, byte) in label.0.iter_mut().zip(printable) {
             *place = byte;
@@ -110,9 +107,6 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Nothing run.
-    pub const ZERO: Self = Self { powered_s: 0.0, flight_s: 0.0, motor_s: 0.0, flights: 0.0, cycles: 0.0 };
-
     fn zip(self, other: Self, with: fn(f64, f64) -> f64) -> Self {
         Self {
             powered_s: with(self.powered_s, other.powered_s),
@@ -126,7 +120,7 @@ impl Figures {
     /// The figures of a part of this kind and number in one session.
     pub fn after(wear: &Wear<'_>, kind: Kind, number: u8) -> Self {
         if kind == Kind::None {
-            return Self::ZERO;
+            return Self::default();
         }
         let total = |counter| wear.totals.value(counter).unwrap_or(0.0);
         let motors = &wear.totals.motors;
@@ -231,17 +225,6 @@ pub struct Component {
 }
 
 impl Component {
-    /// No component.
-    pub const NONE: Self = Self {
-        name: Label::EMPTY,
-        serial: Label::EMPTY,
-        kind: Kind::None,
-        number: 0,
-        replaced: 0,
-        base: Figures::ZERO,
-        as_of: 0,
-    };
-
     /// Its figures over its life.
     pub fn figures(&self, wear: &Wear<'_>) -> Figures {
         self.base.zip(Figures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
@@ -296,8 +279,8 @@ impl Component {
         let old = Self { base: self.figures(wear), ..*self };
         self.serial = serial;
         self.replaced = self.replaced.saturating_add(1);
-        self.base =
-            Figures::ZERO.zip(Figures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
+        self.base = Figures::default()
+            .zip(Figures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
         old
     }
 
@@ -343,7 +326,6 @@ impl Component {
 impl Item for Component {
     const VERSION: u8 = 2;
     const BYTES: usize = 65;
-    const EMPTY: Self = Self::NONE;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         let Figures { powered_s, flight_s, motor_s, flights, cycles } = &mut self.base;

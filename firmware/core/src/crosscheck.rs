@@ -9,7 +9,7 @@
 //! | receiver | its own positions; its baseline | [`crate::gnss_velocity_residual`], [`crate::gnss_constellation`] |
 //! | estimator | DCM | [`crate::ahrs2_residual`] |
 //! | accelerometer, attitude | velocity of the receiver | [`crate::imu_gnss`] |
-//! | vibration | its baseline | [`crate::vibration_baseline`] |
+//! | vibration | its baseline | [`Crosschecks::take_vibration`] |
 //! | body rates | their setpoint | [`crate::rate_tracking`] |
 //!
 //! An inertial sensor that sends nothing but zeros is not fitted.
@@ -19,64 +19,48 @@ use crate::flight::Flight;
 use crate::gates::{self, Gates};
 use crate::gnss_velocity_residual::GnssVelocity;
 use crate::imu_gnss::ImuGnssResidual;
-use crate::latest::{Latest, Reading};
+use crate::initial::state;
+use crate::latest::Reading;
 use crate::mag_heading_residual::{self, CompassUse};
 use crate::motion::{IDLE_THROTTLE, throttle};
-use crate::observation::{Air, Attitude, Estimator, Gnss, Hud, Imu, SecondEstimate, WantedRates};
+use crate::observation::{Air, Gnss, Imu, Observation, Vibration, VibrationScale};
 use crate::pairs::{Kind, Pairs, SENSORS_MAX};
 use crate::rate_tracking::{self, RateSetpoint, Thrust};
-use crate::residual::Residuals;
+use crate::residual::{Comparison, Residuals};
 use crate::stuck::Repeats;
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{FRESH, Instant, Span, Stamp};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
-use crate::{ahrs2_residual, gnss_constellation, vibration_baseline};
+use crate::{ahrs2_residual, gnss_constellation};
 
 /// A sample that is not compared: it is apart from none.
 const NOT_COMPARED: [f32; 3] = [f32::NAN; 3];
 /// Between steps.
 const EVERY: Span = Span::from_millis(100);
-/// Of what is integrated: a longer pause of the steps is none.
-const STEP_MAX: Span = Span::from_secs(1);
 
-/// The memory of all comparisons.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Crosschecks {
-    pub(crate) gates: Gates,
-    pub(crate) residuals: Residuals,
-    pub(crate) pairs: [Pairs; Kind::COUNT],
-    pub(crate) repeats: Repeats,
-    pub(crate) velocities: [GnssVelocity; RECEIVERS_MAX],
-    pub(crate) imu_gnss: ImuGnssResidual,
-    pub(crate) heights: Heights,
-    pub(crate) compass_use: CompassUse,
-    rate_setpoint: RateSetpoint,
-    pub(crate) thrust: Thrust,
-    /// The level of vibration in the last message, m/s2: a shock is in one message, and the lower of two counts.
-    vibration: f32,
-    /// The first sensor's messages are `HIGHRES_IMU`: of the sensor that PX4 has selected, less the offset of its estimator, which moves
-    /// after faults elsewhere. The compasses of the other messages are in axes of their own there.
-    selects: bool,
-    stepped_at: Stamp,
+state! {
+    /// The memory of all comparisons.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Crosschecks {
+        pub(crate) gates: Gates,
+        pub(crate) residuals: Residuals,
+        pub(crate) pairs: [Pairs; Kind::COUNT],
+        pub(crate) repeats: Repeats,
+        pub(crate) velocities: [GnssVelocity; RECEIVERS_MAX],
+        pub(crate) imu_gnss: ImuGnssResidual,
+        pub(crate) heights: Heights,
+        pub(crate) compass_use: CompassUse,
+        rate_setpoint: RateSetpoint,
+        pub(crate) thrust: Thrust,
+        /// The level of vibration in the last message, m/s2: a shock is in one message, and the lower of two counts.
+        vibration: f32,
+        /// The first sensor's messages are `HIGHRES_IMU`: of the sensor that PX4 has selected, less the offset of its estimator, which moves
+        /// after faults elsewhere. The compasses of the other messages are in axes of their own there.
+        selects: bool,
+        stepped_at: Stamp,
+    }
 }
 
 impl Crosschecks {
-    /// Nothing seen yet.
-    pub(crate) const NEW: Self = Self {
-        gates: Gates::CLOSED,
-        residuals: Residuals::NEW,
-        pairs: [Pairs::NEW; Kind::COUNT],
-        repeats: Repeats::NEW,
-        velocities: [GnssVelocity::NEW; RECEIVERS_MAX],
-        imu_gnss: ImuGnssResidual::NEW,
-        heights: Heights::NEW,
-        compass_use: CompassUse::UNKNOWN,
-        rate_setpoint: Latest::nothing(),
-        thrust: Thrust::NEW,
-        vibration: 0.0,
-        selects: false,
-        stepped_at: Stamp::NONE,
-    };
-
     /// Takes a sample of a sensor.
     fn take(&mut self, at: Instant, kind: Kind, instance: u8, sample: [f32; 3]) {
         let is_own = match kind {
@@ -92,12 +76,39 @@ impl Crosschecks {
         }
     }
 
-    /// `HIGHRES_IMU` comes. Of `ArduPilot` it is the first sensor as any.
-    pub(crate) fn select(&mut self, vehicle: &Vehicle) {
-        self.selects = !vehicle.is_ardupilot();
+    /// Takes an observation that the vehicle took.
+    pub(crate) fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
+        let Self { gates, residuals, rate_setpoint, .. } = self;
+        match observation {
+            Observation::Imu(imu) => self.take_imu(at, imu, vehicle),
+            Observation::Air(air) => self.take_air(at, air, vehicle),
+            Observation::ImuAndAir(imu, air) => {
+                // `HIGHRES_IMU`. Of `ArduPilot` it is the first sensor as any.
+                self.selects = !vehicle.is_ardupilot();
+                self.take_imu(at, imu, vehicle);
+                self.take_air(at, air, vehicle);
+            }
+            Observation::Gnss(gnss) => self.take_gnss(at, gnss, vehicle),
+            Observation::Attitude(attitude) => {
+                rate_tracking::take_attitude(residuals, at, attitude, rate_setpoint, *gates);
+            }
+            Observation::Wanted(wanted) => {
+                rate_tracking::take_setpoint(rate_setpoint, at, wanted.rates, vehicle);
+            }
+            Observation::SecondEstimate(second) => {
+                ahrs2_residual::take(residuals, at, second, vehicle, *gates);
+            }
+            Observation::Hud(hud) => self.thrust.take(at, hud, vehicle, *gates),
+            Observation::Estimator(estimator) => {
+                self.compass_use.take(at, estimator, gates.are(gates::AIRBORNE), residuals);
+            }
+            // On the scale that the vehicle knows.
+            Observation::Vibration(_) => self.take_vibration(at, vehicle),
+            _ => {}
+        }
     }
 
-    pub(crate) fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle) {
+    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle) {
         let force = imu.acceleration.map(|force| force.map(|axis| axis.0));
         let rate = imu.rate.map(|rate| rate.map(|axis| axis.0));
         let field = imu.field.map(|field| field.map(|axis| axis.0));
@@ -121,7 +132,7 @@ impl Crosschecks {
         }
     }
 
-    pub(crate) fn take_air(&mut self, at: Instant, air: &Air, vehicle: &Vehicle) {
+    fn take_air(&mut self, at: Instant, air: &Air, vehicle: &Vehicle) {
         if let Some(pressure) = air.pressure.filter(|pressure| pressure.0 > 0.0) {
             self.take(at, Kind::Barometer, air.instance, [pressure.0, 0.0, 0.0]);
             if air.instance == 0 {
@@ -130,7 +141,7 @@ impl Crosschecks {
         }
     }
 
-    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle) {
+    fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle) {
         let airborne = self.gates.are(gates::AIRBORNE);
         if airborne {
             self.repeats.take_gnss(at, gnss);
@@ -147,30 +158,10 @@ impl Crosschecks {
         }
     }
 
-    pub(crate) fn take_second(&mut self, at: Instant, second: &SecondEstimate, vehicle: &Vehicle) {
-        ahrs2_residual::take(&mut self.residuals, at, second, vehicle, self.gates);
-    }
-
-    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator) {
-        self.compass_use.take(at, estimator, self.gates.are(gates::AIRBORNE), &self.residuals);
-    }
-
-    pub(crate) fn take_rate_setpoint(&mut self, at: Instant, rates: Option<WantedRates>, vehicle: &Vehicle) {
-        rate_tracking::take_setpoint(&mut self.rate_setpoint, at, rates, vehicle);
-    }
-
-    pub(crate) fn take_attitude(&mut self, at: Instant, attitude: &Attitude) {
-        rate_tracking::take_attitude(&mut self.residuals, at, attitude, &self.rate_setpoint, self.gates);
-    }
-
-    pub(crate) fn take_hud(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle) {
-        self.thrust.take(at, hud, vehicle, self.gates);
-    }
-
-    pub(crate) fn take_vibration(&mut self, at: Instant, vehicle: &Vehicle) {
-        if let Some(level) = vibration_baseline::level_mps2(vehicle) {
+    fn take_vibration(&mut self, at: Instant, vehicle: &Vehicle) {
+        if let Some(level) = vehicle.vibration.get().and_then(Vibration::acceleration) {
             let lasting = level.min(core::mem::replace(&mut self.vibration, level));
-            self.residuals.take(vibration_baseline::comparison(vehicle), at, self.gates, lasting, 0.0);
+            self.residuals.take(vibration_of(vehicle), at, self.gates, lasting, 0.0);
         }
     }
 
@@ -178,7 +169,7 @@ impl Crosschecks {
     pub(crate) fn begin(&mut self) {
         self.pairs.iter_mut().for_each(Pairs::begin);
         let Self { gates, pairs, selects, .. } = *self;
-        *self = Self { gates, pairs, selects, repeats: self.repeats.begun(), ..Self::NEW };
+        *self = Self { gates, pairs, selects, repeats: self.repeats.begun(), ..Self::default() };
     }
 
     /// One step, at least every 50 ms.
@@ -188,7 +179,7 @@ impl Crosschecks {
         if !flight.airborne() || step.is_some_and(|step| step < EVERY) {
             return;
         }
-        let step_s = step.map_or(0.0, |step| step.min(STEP_MAX).as_secs_f32());
+        let step_s = step.map_or(0.0, |step| step.min(FRESH).as_secs_f32());
         self.stepped_at = Stamp::at(now);
         self.imu_gnss.step(now, step_s, vehicle);
         // A vehicle that stands does not move, whatever an estimator makes of the touch-down.
@@ -217,11 +208,19 @@ impl Crosschecks {
 
     /// Vibration as a multiple of its baseline.
     pub(crate) fn vibration_rise(&self, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
-        self.residuals.multiple(now, vibration_baseline::comparison(vehicle))
+        self.residuals.multiple(now, vibration_of(vehicle))
     }
 
     /// From which vibration on it is more than so many times its baseline, m/s2.
     pub(crate) fn vibration_limit(&self, vehicle: &Vehicle, times: f32) -> Option<f32> {
-        self.residuals.limit(vibration_baseline::comparison(vehicle), times)
+        self.residuals.limit(vibration_of(vehicle), times)
+    }
+}
+
+/// The comparison of vibration with its baseline, on the scale that the vehicle knows.
+fn vibration_of(vehicle: &Vehicle) -> Comparison {
+    match vehicle.vibration.get().map(|vibration| vibration.scale) {
+        Some(VibrationScale::Px4Metrics) => Comparison::VibrationPx4,
+        _ => Comparison::Vibration,
     }
 }

@@ -6,7 +6,9 @@ use crate::crosscheck::Crosschecks;
 use crate::flight::{Flight, FlightEvent};
 use crate::gates;
 use crate::inertial::FORCE_MAX;
+use crate::initial::state;
 use crate::latest::{Latest, Reading};
+use crate::motion::MOTION_AGE;
 use crate::motors::Motors;
 use crate::observation::{Battery, Imu, Observation, Vibration};
 use crate::outputs::MotorOutputs;
@@ -19,7 +21,6 @@ use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
 
 /// Vibration, m/s2 an axis, that is above all that a vehicle flies with: `ArduPilot`'s own limit for too much (wiki, "Measuring Vibration").
 const SHAKES_MPS2: f32 = 60.0;
-const SHAKEN: Span = Span::from_secs(3);
 /// So much of a cell's voltage may be its sag under the load, V. A cell that sags further is near its end, whatever its charge.
 const SAG_MAX_V: f32 = 0.3;
 /// A plane with less throttle glides: autopilots let its motor idle from some percents on.
@@ -35,40 +36,42 @@ const PAUSE_FADES: f32 = 1.0 / 64.0;
 /// How long a loss of frames stays a warning.
 const LOSS_MEMORY: Span = Span::from_secs(10);
 
-/// The memory of derived quantities.
-#[derive(Clone, Copy, Debug)]
-pub struct Derived {
-    pub(crate) cells: Cells,
-    resistance: [Resistance; BATTERIES_MAX],
-    pub(crate) motors: Motors,
-    pub(crate) crosschecks: Crosschecks,
-    pub(crate) outputs: MotorOutputs,
-    /// Of the last sample, and smoothed.
-    load_factor: Latest<[f32; 2]>,
-    /// When anything at all was heard of the vehicle.
-    heard: Option<Instant>,
-    /// When it was heard again after a silence, or a plane had no throttle last.
-    resumed: Instant,
-    /// The longest pause of late between two observations, s.
-    pause_s: f32,
-    had_fix: [bool; RECEIVERS_MAX],
-    clips: Lately,
-    clips_known: bool,
-    frames_lost: Lately,
-    write_errors: Lately,
+state! {
+    /// The memory of derived quantities.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Derived {
+        pub(crate) cells: Cells,
+        resistance: [Resistance; BATTERIES_MAX],
+        pub(crate) motors: Motors,
+        pub(crate) crosschecks: Crosschecks,
+        pub(crate) outputs: MotorOutputs,
+        /// Of the last sample, and smoothed.
+        load_factor: Latest<[f32; 2]>,
+        /// When anything at all was heard of the vehicle.
+        heard: Option<Instant>,
+        /// When it was heard again after a silence, or a plane had no throttle last.
+        resumed: Instant,
+        /// The longest pause of late between two observations, s.
+        pause_s: f32,
+        had_fix: [bool; RECEIVERS_MAX],
+        clips: Lately,
+        clips_known: bool,
+        frames_lost: Lately,
+        write_errors: Lately,
+    }
 }
 
-/// A count of the last ten seconds, of one that only rises.
-#[derive(Clone, Copy, Debug, Default)]
-struct Lately {
-    count: u32,
-    before: u32,
-    rose_at: Stamp,
+state! {
+    /// A count of the last ten seconds, of one that only rises.
+    #[derive(Clone, Copy, Debug)]
+    struct Lately {
+        count: u32,
+        before: u32,
+        rose_at: Stamp,
+    }
 }
 
 impl Lately {
-    const NONE: Self = Self { count: 0, before: 0, rose_at: Stamp::NONE };
-
     fn take(&mut self, now: Instant, count: u64) {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
         if count > self.count {
@@ -85,33 +88,7 @@ impl Lately {
     }
 }
 
-impl Default for Derived {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Derived {
-    /// Nothing seen yet.
-    pub const fn new() -> Self {
-        Self {
-            cells: Cells::new(),
-            resistance: [Resistance::new(); BATTERIES_MAX],
-            motors: Motors::NEW,
-            crosschecks: Crosschecks::NEW,
-            outputs: MotorOutputs::new(),
-            load_factor: Latest::nothing(),
-            heard: None,
-            resumed: Instant::ZERO,
-            pause_s: 0.0,
-            had_fix: [false; RECEIVERS_MAX],
-            clips: Lately::NONE,
-            clips_known: false,
-            frames_lost: Lately::NONE,
-            write_errors: Lately::NONE,
-        }
-    }
-
     /// Something was heard: after a silence of the link, or as usual.
     fn hear(&mut self, at: Instant) {
         let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
@@ -126,34 +103,21 @@ impl Derived {
     /// Takes an observation that the vehicle took.
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
         self.hear(at);
+        self.crosschecks.observe(at, vehicle, observation);
         match observation {
-            Observation::Imu(imu) => self.take_imu(at, imu, vehicle),
-            Observation::Air(air) => self.crosschecks.take_air(at, air, vehicle),
-            Observation::ImuAndAir(imu, air) => {
-                self.crosschecks.select(vehicle);
-                self.take_imu(at, imu, vehicle);
-                self.crosschecks.take_air(at, air, vehicle);
-            }
-            Observation::Attitude(attitude) => self.crosschecks.take_attitude(at, attitude),
-            Observation::Wanted(wanted) => self.crosschecks.take_rate_setpoint(at, wanted.rates, vehicle),
-            Observation::SecondEstimate(second) => self.crosschecks.take_second(at, second, vehicle),
+            Observation::Imu(imu) | Observation::ImuAndAir(imu, _) => self.take_imu(at, imu, vehicle),
             Observation::Hud(hud) => {
                 // On wings a motor is off without throttle, and its ESC may fall silent.
                 let is_off = hud.throttle.is_some_and(|throttle| throttle.0 < OFF_THROTTLE);
                 if is_off && vehicle.hovers(at) == Some(false) {
                     self.resumed = at;
                 }
-                self.crosschecks.take_hud(at, hud, vehicle);
             }
-            Observation::Estimator(estimator) => self.crosschecks.take_estimator(at, estimator),
-            // On the scale that the vehicle knows.
-            Observation::Vibration(_) => self.crosschecks.take_vibration(at, vehicle),
             Observation::Outputs(outputs) => {
                 let level = self.crosschecks.gates.are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
                 self.outputs.take(at, outputs, vehicle, flight, level);
             }
             Observation::Gnss(gnss) => {
-                self.crosschecks.take_gnss(at, gnss, vehicle);
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
                     *had_fix |= gnss.fix >= 3;
                 }
@@ -177,12 +141,11 @@ impl Derived {
     }
 
     fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle) {
-        self.crosschecks.take_imu(at, imu, vehicle);
         // What shakes so has no load factor: its samples are of the vibration, and too few to average that out.
         let shakes =
             |vibration: &Vibration| vibration.levels.iter().flatten().any(|level| *level >= SHAKES_MPS2);
         if imu.instance == 0
-            && !vehicle.vibration.within(at, SHAKEN).is_some_and(shakes)
+            && !vehicle.vibration.within(at, MOTION_AGE).is_some_and(shakes)
             && let Some(sample_g) = imu.acceleration.and_then(load_factor_g)
         {
             self.load_factor.set(at, [sample_g, norm(vehicle.inertial.force()) / GRAVITY]);
@@ -217,7 +180,7 @@ impl Derived {
         // Clips before this flight, or before the autopilot's restart, are not of this flight.
         if event.is_some() || clips < self.clips.count || !self.clips_known {
             self.clips_known = vehicle.vibration.get().is_some();
-            self.clips = Lately { count: clips, before: clips, ..Lately::NONE };
+            self.clips = Lately { count: clips, before: clips, ..Lately::default() };
         }
         self.clips.take(now, clips.into());
         self.motors.step();
@@ -228,7 +191,7 @@ impl Derived {
     /// The battery is another one.
     pub(crate) fn forget_resistance(&mut self, battery: usize) {
         if let Some(resistance) = self.resistance.get_mut(battery) {
-            *resistance = Resistance::new();
+            *resistance = Resistance::default();
         }
     }
 

@@ -9,6 +9,7 @@
 //! asked for streams. So while several send heartbeats and none streams by itself, each is asked for one `TURN`; the
 //! choice stands once all had theirs. The one at the port then streams more than one that is received over a radio.
 
+use crate::initial::state;
 use crate::observation::{Autopilot, Source};
 use crate::time::{Instant, Span};
 
@@ -48,36 +49,26 @@ impl Candidate {
     }
 }
 
-/// The systems on the port, and which of them is the vehicle.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Election {
-    candidates: [Option<Candidate>; CANDIDATES_MAX],
-    window: Instant,
-    /// When the first heartbeat was heard, or the vehicle was chosen anew.
-    since: Option<Instant>,
-    /// When the first heartbeat was heard: turns are counted from there.
-    first: Instant,
-    /// The vehicle makes a stream.
-    streams: bool,
-    /// It did so before anybody was asked.
-    by_itself: bool,
-    /// The choice stands.
-    settled: bool,
+state! {
+    /// The systems on the port, and which of them is the vehicle.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Election {
+        candidates: [Option<Candidate>; CANDIDATES_MAX],
+        window: Instant,
+        /// When the first heartbeat was heard, or the vehicle was chosen anew.
+        since: Option<Instant>,
+        /// When the first heartbeat was heard: turns are counted from there.
+        first: Instant,
+        /// The vehicle makes a stream.
+        streams: bool,
+        /// It did so before anybody was asked.
+        by_itself: bool,
+        /// The choice stands.
+        settled: bool,
+    }
 }
 
 impl Election {
-    pub(crate) const fn new() -> Self {
-        Self {
-            candidates: [None; CANDIDATES_MAX],
-            window: Instant::ZERO,
-            since: None,
-            first: Instant::ZERO,
-            streams: false,
-            by_itself: false,
-            settled: false,
-        }
-    }
-
     /// Whether the choice stands as long as heartbeats come.
     pub(crate) fn is_settled(&self, now: Instant) -> bool {
         self.settled || (self.lasts(now) >= SETTLES && self.heard(now).count() == 1)
@@ -220,7 +211,7 @@ mod tests {
 
     #[test]
     fn the_first_heartbeat_is_taken_at_once_and_one_that_streams_takes_its_place() {
-        let mut election = Election::new();
+        let mut election = Election::default();
         let vehicle = election.hear(Instant::ZERO, None, OTHER, Some(Autopilot::Px4));
         assert_eq!(vehicle, Some(OTHER));
         // The other one's heartbeats are forwarded; ours streams.
@@ -231,14 +222,14 @@ mod tests {
 
     #[test]
     fn nothing_but_a_heartbeat_makes_a_vehicle() {
-        let mut election = Election::new();
+        let mut election = Election::default();
         assert_eq!(election.hear(Instant::ZERO, None, OURS, None), None);
         assert_eq!(election.hear(Instant::ZERO, None, OURS, Some(Autopilot::Px4)), Some(OURS));
     }
 
     #[test]
     fn once_settled_the_choice_stands_whatever_others_say() {
-        let mut election = Election::new();
+        let mut election = Election::default();
         let vehicle = hear(&mut election, None, 0..15_000, &[(OURS, 500)]);
         let vehicle = hear(&mut election, vehicle, 15_000..120_000, &[(OURS, 1_000), (OTHER, 100)]);
         assert_eq!(vehicle, Some(OURS));
@@ -246,7 +237,7 @@ mod tests {
 
     #[test]
     fn after_half_a_minute_of_silence_the_one_that_streams_is_the_vehicle() {
-        let mut election = Election::new();
+        let mut election = Election::default();
         let vehicle = hear(&mut election, None, 0..20_000, &[(OURS, 100)]);
         let vehicle = hear(&mut election, vehicle, 20_000..49_000, &[(OTHER, 100)]);
         assert_eq!(vehicle, Some(OURS));
@@ -256,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_heartbeat_that_is_only_forwarded_never_takes_the_place_of_a_silent_vehicle() {
-        let mut election = Election::new();
+        let mut election = Election::default();
         let vehicle = hear(&mut election, None, 0..20_000, &[(OURS, 100), (OTHER, 1_000)]);
         assert_eq!(hear(&mut election, vehicle, 20_000..300_000, &[(OTHER, 1_000)]), Some(OURS));
     }
@@ -264,7 +255,7 @@ mod tests {
     #[test]
     fn a_stream_takes_the_place_of_a_vehicle_that_never_streamed_at_any_time() {
         for from_ms in [12_000, 200_000] {
-            let mut election = Election::new();
+            let mut election = Election::default();
             let vehicle = hear(&mut election, None, 0..from_ms, &[(OTHER, 1_000), (OURS, 1_000)]);
             assert_eq!(vehicle, Some(OTHER), "it was heard first");
             assert!(!election.is_settled(Instant::from_millis(from_ms)));
@@ -279,7 +270,7 @@ mod tests {
 
     /// Two minutes. The other system's heartbeat comes first; each streams for good once it was asked for 6 s.
     fn asked_in_turns(ours_ms: u64, others_ms: u64) -> (Option<Source>, Option<Source>, bool) {
-        let mut election = Election::new();
+        let mut election = Election::default();
         let (mut vehicle, mut asked) = (None, [(OTHER, 0), (OURS, 0)]);
         for now_ms in (0..120_000).step_by(100) {
             let now = Instant::from_millis(now_ms);
@@ -310,7 +301,7 @@ mod tests {
 
     #[test]
     fn more_systems_than_places_leave_room_for_the_vehicle() {
-        let mut election = Election::new();
+        let mut election = Election::default();
         let mut vehicle = None;
         for system in 10..60 {
             let source = Source { system, component: 1 };

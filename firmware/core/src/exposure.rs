@@ -1,15 +1,14 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
+use crate::initial::state;
 use crate::numbered::numbered;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, SILENT, Span};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;
 
 /// Ranges of a quantity.
 pub const BINS: usize = 8;
-/// A value holds this long.
-const FRESH: Span = Span::from_secs(5);
 /// Hotter than anything that still measures: garbage.
 const CELSIUS_MAX: f32 = 1_000.0;
 
@@ -59,20 +58,17 @@ impl Quantity {
         match self {
             Self::EscTemperature => {
                 let motors = vehicle.motors.iter();
-                let fresh = motors.filter(|motor| motor.state_at.is_some_and(|at| now.since(at) <= FRESH));
+                let fresh = motors.filter(|motor| motor.state_at.is_some_and(|at| now.since(at) <= SILENT));
                 fresh.fold(None, |hot, motor| hottest(motor.esc.temperature, hot))
             }
             Self::BatteryTemperature => {
-                let batteries = vehicle.batteries.iter().filter_map(|slot| slot.within(now, FRESH));
+                let batteries = vehicle.batteries.iter().filter_map(|slot| slot.within(now, SILENT));
                 batteries.fold(None, |hot, battery| hottest(battery.temperature, hot))
             }
             Self::McuTemperature => {
-                hottest(vehicle.processor.within(now, FRESH).and_then(|mcu| mcu.temperature), None)
+                hottest(vehicle.processor.within(now, SILENT).and_then(|mcu| mcu.temperature), None)
             }
-            Self::Vibration => {
-                let vibration = vehicle.vibration.within(now, FRESH).filter(|_| vehicle.armed())?;
-                vibration.levels.into_iter().flatten().reduce(f32::max)
-            }
+            Self::Vibration => vehicle.vibration.within(now, SILENT).filter(|_| vehicle.armed())?.highest(),
             Self::Current => current_a.filter(|_| vehicle.armed()),
         }
         .filter(|value| value.is_finite())
@@ -81,35 +77,23 @@ impl Quantity {
 
 /// Tenths of a second in each range of each quantity.
 pub(crate) type Tenths = [[u32; BINS]; Quantity::ALL.len()];
-pub(crate) const NOTHING: Tenths = [[0; BINS]; Quantity::ALL.len()];
 
-/// Time in ranges.
-#[derive(Clone, Copy, Debug)]
-pub struct Exposure {
-    last: Option<Instant>,
-    session: Tenths,
-    before: Tenths,
-    /// The power-on before which `before` counts.
-    as_of: u32,
+state! {
+    /// Time in ranges.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Exposure {
+        last: Option<Instant>,
+        session: Tenths,
+        before: Tenths,
+        /// The power-on before which `before` counts.
+        as_of: u32,
+    }
 }
 
 /// How often the time in ranges is counted.
 const EVERY: Span = Span::from_millis(100);
-/// A longer step is a gap and is not counted.
-const STEP_MAX: Span = Span::from_secs(2);
-
-impl Default for Exposure {
-    fn default() -> Self {
-        Self::new()
-    }
-}
 
 impl Exposure {
-    /// No time counted.
-    pub const fn new() -> Self {
-        Self { last: None, session: NOTHING, before: NOTHING, as_of: 0 }
-    }
-
     /// One step; `current_a` is the sum of all batteries, if known.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) {
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
@@ -120,7 +104,7 @@ impl Exposure {
         let tenths = (step.as_millis() / 100) as u32;
         let rest = Span::from_millis(step.as_millis() % 100);
         self.last = Some(now - rest);
-        if step > STEP_MAX {
+        if step > PAUSE {
             return;
         }
         for (quantity, bins) in Quantity::ALL.into_iter().zip(&mut self.session) {
@@ -149,7 +133,7 @@ impl Exposure {
 
     /// Forgets earlier sessions: they were another airframe's.
     pub(crate) fn forget_life(&mut self) {
-        self.before = NOTHING;
+        self.before = Tenths::default();
     }
 
     /// Tenths of a second of this session.
@@ -174,7 +158,6 @@ impl Exposure {
 impl Item for Exposure {
     const VERSION: u8 = 2;
     const BYTES: usize = 165;
-    const EMPTY: Self = Self::new();
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         fields!(fields: self.before, self.as_of);
@@ -204,7 +187,7 @@ mod tests {
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
     fn heat(exposure: &mut Exposure, from_ms: u64, to_ms: u64, celsius: f32) {
-        let mut vehicle = Vehicle::unknown();
+        let mut vehicle = Vehicle::default();
         vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(Heartbeat::default()));
         for now_ms in (from_ms..to_ms).step_by(50) {
             let now = Instant::from_millis(now_ms);
@@ -225,7 +208,7 @@ mod tests {
 
     #[test]
     fn time_goes_to_the_range_of_the_value_and_adds_up_over_sessions() {
-        let mut exposure = Exposure::new();
+        let mut exposure = Exposure::default();
         heat(&mut exposure, 0, 10_050, -5.0);
         heat(&mut exposure, 10_050, 20_050, 45.0);
         heat(&mut exposure, 20_050, 21_050, f32::NAN);

@@ -14,10 +14,11 @@
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
-use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind, VibrationScale};
+use crate::initial::state;
+use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind};
 use crate::params::Params;
 use crate::power_draw::drawn;
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::trend::Resistance;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
@@ -34,8 +35,6 @@ const CELL_V: f32 = 3.8;
 const SEA_LEVEL_HPA: f32 = 1_013.25;
 /// The exponent of density over pressure in the standard atmosphere, as a slope: 1 % wrong at 2,000 m.
 const DENSITY_SLOPE: f32 = 0.81;
-/// A value holds this long.
-const FRESH: Span = Span::from_secs(2);
 
 /// A quantity of steady flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,10 +122,12 @@ impl Quantity {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Track {
-    mean: f32,
-    samples: u16,
+state! {
+    #[derive(Clone, Copy, Debug)]
+    struct Track {
+        mean: f32,
+        samples: u16,
+    }
 }
 
 impl Track {
@@ -142,22 +143,18 @@ impl Track {
     }
 }
 
-/// The figures of a flight.
-#[derive(Clone, Copy, Debug)]
-pub struct Figures {
-    tracks: [Track; Quantity::COUNT],
-    /// Charge of the batteries before take-off.
-    charged: [Option<Charge>; BATTERIES_MAX],
-    sampled_at: Stamp,
+state! {
+    /// The figures of a flight.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Figures {
+        tracks: [Track; Quantity::COUNT],
+        /// Charge of the batteries before take-off.
+        charged: [Option<Charge>; BATTERIES_MAX],
+        sampled_at: Stamp,
+    }
 }
 
 impl Figures {
-    pub(crate) const NEW: Self = Self {
-        tracks: [Track { mean: 0.0, samples: 0 }; Quantity::COUNT],
-        charged: [None; BATTERIES_MAX],
-        sampled_at: Stamp::NONE,
-    };
-
     /// One step, after flight and derived quantities.
     pub(crate) fn step(
         &mut self,
@@ -169,8 +166,8 @@ impl Figures {
         params: &Params,
     ) {
         match event {
-            Some(FlightEvent::TakeOff) => *self = Self { charged: self.charged, ..Self::NEW },
-            Some(FlightEvent::Resumed) => *self = Self::NEW,
+            Some(FlightEvent::TakeOff) => *self = Self { charged: self.charged, ..Self::default() },
+            Some(FlightEvent::Resumed) => *self = Self::default(),
             Some(FlightEvent::Landing) | None => {}
         }
         if self.sampled_at.age(now).is_some_and(|age| age < EVERY) {
@@ -235,15 +232,9 @@ fn sample(
     params: &Params,
 ) -> Option<f32> {
     match quantity {
-        Quantity::Vibration => {
-            let vibration = vehicle.vibration.within(now, FRESH)?;
-            match vibration.scale {
-                VibrationScale::PerAxis => vibration.levels.into_iter().flatten().reduce(f32::max),
-                VibrationScale::Px4Metrics => vibration.levels[2],
-            }
-        }
+        Quantity::Vibration => vehicle.vibration.within(now, PAUSE)?.acceleration(),
         Quantity::HoverThrottle => {
-            let throttle = vehicle.hud.within(now, FRESH)?.throttle?.0;
+            let throttle = vehicle.hud.within(now, PAUSE)?.throttle?.0;
             Some(throttle * lift(now, vehicle, derived, params)?)
         }
         Quantity::HoverPower => {
@@ -253,7 +244,7 @@ fn sample(
         }
         Quantity::MotorSpeed(motor) => {
             let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
-            (now.since(at) <= FRESH).then(|| derived.motors.departure(motor)).flatten()
+            (now.since(at) <= PAUSE).then(|| derived.motors.departure(motor)).flatten()
         }
         Quantity::MotorOutput(motor) => derived.outputs.share(now, vehicle, motor),
         // Not figures of steady flight.

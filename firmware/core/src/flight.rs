@@ -38,6 +38,7 @@ mod witness;
 use crate::latest::{Latest, Reading};
 use crate::mishap::{Change, Kind, Place, Report};
 use crate::motion::{Kinematics, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
+use crate::numbered::numbered;
 use crate::observation::VehicleKind;
 use crate::params::Params;
 use crate::pressure::Pressure;
@@ -89,37 +90,23 @@ const RISES: Span = Span::from_millis(300);
 /// If a vehicle had throttle within this time before it lay over, its rotors turned it over.
 const DRIVEN: Span = Span::from_secs(5);
 
-/// A part of the flight.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
-    /// On the ground.
-    Ground,
-    /// The first metres up.
-    TakeOff,
-    /// Standing in the air.
-    Hover,
-    /// Going up.
-    Climb,
-    /// Going somewhere.
-    Cruise,
-    /// Going down.
-    Descent,
-    /// The last metres down.
-    Landing,
-}
-
-impl Phase {
-    /// The name that records and reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ground => "ground",
-            Self::TakeOff => "take_off",
-            Self::Hover => "hover",
-            Self::Climb => "climb",
-            Self::Cruise => "cruise",
-            Self::Descent => "descent",
-            Self::Landing => "landing",
-        }
+numbered! {
+    /// A part of the flight.
+    pub enum Phase {
+        /// On the ground.
+        Ground "ground",
+        /// The first metres up.
+        TakeOff "take_off",
+        /// Standing in the air.
+        Hover "hover",
+        /// Going up.
+        Climb "climb",
+        /// Going somewhere.
+        Cruise "cruise",
+        /// Going down.
+        Descent "descent",
+        /// The last metres down.
+        Landing "landing",
     }
 }
 
@@ -235,11 +222,6 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// On the ground.
-    pub fn grounded() -> Self {
-        Self::default()
-    }
-
     /// Whether it is in the air; in a mishap, whether it was.
     pub const fn airborne(&self) -> bool {
         self.airborne_since.is_some()

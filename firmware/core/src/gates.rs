@@ -1,9 +1,10 @@
 //! Conditions of the flight, as bits: computed once a step, read by every comparison that needs them.
 
 use crate::flight::Flight;
+use crate::initial::state;
 use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
 /// In the air.
@@ -29,29 +30,26 @@ pub(crate) const EXACT: u16 = 1 << 9;
 
 /// It has turned fast if it did so within this.
 pub(crate) const TURNED: Span = Span::from_secs(1);
-/// Older motion says nothing.
-const FRESH: Span = Span::from_secs(1);
 const EXACT_FOR: Span = Span::from_secs(15);
 pub(crate) const LEVEL_MPS: f32 = 2.0;
 /// 34 degrees: a bank in which all the thrust may not carry a multicopter.
 pub(crate) const LEANS_RAD: f32 = 0.6;
 
-/// The conditions at the last step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Gates {
-    open: u16,
-    /// When the first receiver was not exact last.
-    inexact_at: Stamp,
+state! {
+    /// The conditions at the last step.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Gates {
+        open: u16,
+        /// When the first receiver was not exact last.
+        inexact_at: Stamp,
+    }
 }
 
 impl Gates {
-    /// None is open.
-    pub(crate) const CLOSED: Self = Self { open: 0, inexact_at: Stamp::NONE };
-
     /// These are open.
     #[cfg(test)]
-    pub(crate) const fn open(open: u16) -> Self {
-        Self { open, ..Self::CLOSED }
+    pub(crate) fn open(open: u16) -> Self {
+        Self { open, ..Self::default() }
     }
 
     /// Whether all of these are open.

@@ -44,7 +44,7 @@ mod tests {
     /// The lost part and the rise of the dilution after seconds with these satellites and this dilution, five times a
     /// second.
     fn told(said: impl Iterator<Item = (usize, u8, f32)>) -> (Option<f32>, Option<f32>) {
-        let (mut residuals, mut now) = (Residuals::NEW, Instant::ZERO);
+        let (mut residuals, mut now) = (Residuals::default(), Instant::ZERO);
         for (seconds, satellites, hdop) in said {
             for _ in 0..5 * seconds {
                 now = now + crate::time::Span::from_millis(200);

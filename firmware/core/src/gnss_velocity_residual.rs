@@ -10,6 +10,7 @@
 
 use core::num::NonZeroU32;
 
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::SPEED_MAX_MPS;
 use crate::observation::Gnss;
@@ -36,29 +37,28 @@ struct Fix {
     measured_ms: NonZeroU32,
 }
 
-/// The memory of one receiver.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct GnssVelocity {
-    before: Option<Fix>,
-    /// Velocity less the movement of the positions, and velocity, both smoothed, m/s; seconds known; time of
-    /// measurement.
-    off: [f32; 2],
-    mean: [f32; 2],
-    known_s: f32,
-    at: Stamp,
+state! {
+    /// The memory of one receiver.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct GnssVelocity {
+        before: Option<Fix>,
+        /// Velocity less the movement of the positions, and velocity, both smoothed, m/s; seconds known; time of
+        /// measurement.
+        off: [f32; 2],
+        mean: [f32; 2],
+        known_s: f32,
+        at: Stamp,
+    }
 }
 
 impl GnssVelocity {
-    pub(crate) const NEW: Self =
-        Self { before: None, off: [0.0; 2], mean: [0.0; 2], known_s: 0.0, at: Stamp::NONE };
-
     /// Takes a receiver's message in flight.
     pub(crate) fn take(&mut self, at: Instant, gnss: &Gnss, airborne: bool) {
         let Some(fix) = fix(gnss).filter(|_| airborne) else {
-            *self = Self::NEW;
+            *self = Self::default();
             return;
         };
-        let begun = Self { before: Some(fix), mean: fix.velocity, ..Self::NEW };
+        let begun = Self { before: Some(fix), mean: fix.velocity, ..Self::default() };
         let Some(before) = self.before.replace(fix) else {
             *self = begun;
             return;
@@ -120,7 +120,7 @@ mod tests {
     /// The residual of a flight whose velocity turns once in `turn_s` and is reported with `error_mps`, north and
     /// east. Each position comes twice. `measured` is the time of a step, ms.
     fn heard((speed_mps, turn_s): (f32, f32), error_mps: [f32; 2], measured: fn(u64) -> u32) -> Option<f32> {
-        let mut velocity_residual = GnssVelocity::NEW;
+        let mut velocity_residual = GnssVelocity::default();
         let mut place = [47.0, 8.0];
         for step in 0_u64..100 {
             let now = Instant::from_millis(step * 200);

@@ -17,6 +17,7 @@
 
 use crate::gates::{self, Gates};
 use crate::inertial::FORCE_MAX;
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::climb_within;
 use crate::observation::Gnss;
@@ -42,42 +43,30 @@ const LEAP_MPS2: f32 = 6.0;
 /// Part of the force's steps from sample to sample that may be an offset.
 const SHAKE_PART: f32 = 0.5;
 
-/// The memory of the comparison.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ImuGnssResidual {
-    /// Sum of forces since the last step, their number, their mean, and its time.
-    sum: [f32; 3],
-    count: u16,
-    mean: [f32; 3],
-    mean_at: Stamp,
-    /// Change of velocity by the forces since the receiver's last one, m/s, and mean force between the two before,
-    /// m/s2.
-    delta_v: [f32; 3],
-    force_before: Option<[f32; 3]>,
-    /// The last velocity, m/s, and its time if it is compared.
-    velocity: [f32; 3],
-    at: Stamp,
-    /// The force, and the part that is missing in the velocity, both smoothed, m/s2.
-    force: [f32; 3],
-    missing: [f32; 3],
-    residual: Option<f32>,
+state! {
+    /// The memory of the comparison.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct ImuGnssResidual {
+        /// Sum of forces since the last step, their number, their mean, and its time.
+        sum: [f32; 3],
+        count: u16,
+        mean: [f32; 3],
+        mean_at: Stamp,
+        /// Change of velocity by the forces since the receiver's last one, m/s, and mean force between the two before,
+        /// m/s2.
+        delta_v: [f32; 3],
+        force_before: Option<[f32; 3]>,
+        /// The last velocity, m/s, and its time if it is compared.
+        velocity: [f32; 3],
+        at: Stamp,
+        /// The force, and the part that is missing in the velocity, both smoothed, m/s2.
+        force: [f32; 3],
+        missing: [f32; 3],
+        residual: Option<f32>,
+    }
 }
 
 impl ImuGnssResidual {
-    pub(crate) const NEW: Self = Self {
-        sum: [0.0; 3],
-        count: 0,
-        mean: [0.0; 3],
-        mean_at: Stamp::NONE,
-        delta_v: [0.0; 3],
-        force_before: None,
-        velocity: [0.0; 3],
-        at: Stamp::NONE,
-        force: [0.0; 3],
-        missing: [0.0; 3],
-        residual: None,
-    };
-
     pub(crate) fn take_force(&mut self, force: [f32; 3]) {
         if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
             return;
@@ -186,7 +175,7 @@ mod tests {
         // One swing in 5 s, and the velocity that it makes.
         let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;
         let velocity = |time_s: f32| -swings_mps2 * 5.0 / core::f32::consts::TAU * libm::cosf(turns(time_s));
-        let mut residual = ImuGnssResidual::NEW;
+        let mut residual = ImuGnssResidual::default();
         let missing = (0_u16..100).filter_map(|step| {
             let time_s = f32::from(step) * STEP_S;
             residual.delta_v[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
@@ -198,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_heading_that_is_wrong_is_no_force() {
-        let mut residual = ImuGnssResidual::NEW;
+        let mut residual = ImuGnssResidual::default();
         let mut most = 0.0_f32;
         for step in 0..100 {
             let (time_s, velocity) = (f32::from(step as u8) * STEP_S, 2.5 * STEP_S);
@@ -215,7 +204,7 @@ mod tests {
     #[test]
     fn velocities_that_come_in_unequal_steps_show_as_much_as_others() {
         let missing = |untrue_mps2: f32| {
-            let mut residual = ImuGnssResidual::NEW;
+            let mut residual = ImuGnssResidual::default();
             // Some are lost, or repeat themselves; it speeds up by 5 m/s2 throughout.
             let missing = (0..60_usize).map(|step| {
                 let step_s = [0.2, 0.4, 0.2][step % 3];
@@ -232,7 +221,7 @@ mod tests {
 
     #[test]
     fn forces_that_nothing_takes_for_hours_are_summed_no_more() {
-        let mut residual = ImuGnssResidual::NEW;
+        let mut residual = ImuGnssResidual::default();
         (0..200_000).for_each(|_| residual.take_force([0.0, 0.0, -9.8]));
         let mean = residual.sum[2] / f32::from(residual.count);
         assert!((-9.9..-9.7).contains(&mean), "{mean}");
@@ -248,7 +237,8 @@ mod tests {
 
     #[test]
     fn what_was_summed_before_the_first_velocity_is_of_no_step() {
-        let mut residual = ImuGnssResidual { delta_v: [30.0; 3], missing: [5.0; 3], ..ImuGnssResidual::NEW };
+        let mut residual =
+            ImuGnssResidual { delta_v: [30.0; 3], missing: [5.0; 3], ..ImuGnssResidual::default() };
         let mut take = |step| residual.take_velocity(step, [3.0, 0.0, 0.0], 3);
         let step = Some(Span::from_millis(200));
         assert_eq!([take(None), take(step), take(step)], [None, None, Some(0.0)]);
@@ -256,7 +246,7 @@ mod tests {
 
     #[test]
     fn garbage_is_no_force() {
-        let mut residual = ImuGnssResidual::NEW;
+        let mut residual = ImuGnssResidual::default();
         for force in [f32::NAN, f32::INFINITY, 1e9, 3.0] {
             residual.take_force([force, 0.0, -9.8]);
         }

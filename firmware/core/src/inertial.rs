@@ -15,9 +15,10 @@
 //! Forces are smoothed (`SMOOTHING_S`), because motors shake a vehicle that stands. Without both force and rates
 //! nothing is judged.
 
+use crate::initial::state;
 use crate::motion::TILTED_RAD;
 use crate::observation::Imu;
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{FRESH, Instant, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
 /// No autopilot's sensor measures more than 32 g an axis: beyond this, m/s2, a value is garbage.
@@ -26,8 +27,6 @@ pub(crate) const FORCE_MAX: f32 = 60.0 * GRAVITY;
 const SMOOTHING_S: f32 = 0.3;
 /// Minimum time level and still.
 const LASTS: Span = Span::from_millis(1_500);
-/// Maximum age of a sample.
-const FRESH: Span = Span::from_secs(1);
 /// A fast turn is above 0.7 rad/s (40 degrees a second). A still vehicle turns slower than 0.5 rad/s (29 degrees a second) on the average: more
 /// than the offset of a gyro that still flies.
 const TURNS_RATE: f32 = 0.7;
@@ -60,55 +59,37 @@ const GAP_S: f32 = 2.0;
 /// Time that it must lie over.
 pub(crate) const LIES: Span = Span::from_millis(700);
 
-/// The state of accelerometer and gyros.
-#[derive(Clone, Copy, Debug)]
-pub struct Inertial {
-    /// Specific force, smoothed, m/s2.
-    force: [f32; 3],
-    /// The last sample along the body's downward axis, and its smoothed step from sample to sample; m/s2.
-    down: f32,
-    step: f32,
-    steps_since: Instant,
-    /// The least step at rest; 0 if unknown.
-    step_at_rest: f32,
-    at: Option<Instant>,
-    /// Rates, smoothed, rad/s.
-    rate: [f32; 3],
-    rates_at: Stamp,
-    still: bool,
-    /// Time of the last fast turn.
-    turned_at: Stamp,
-    /// Whether the estimator's attitude contradicts the sensors, and since when that attitude has been far from
-    /// level.
-    contradicts: bool,
-    tilted_since: Stamp,
-    /// Since when the vehicle has been carried by its weight and still, in any attitude; then also level.
-    rests_since: Stamp,
-    level_since: Stamp,
-    over_since: Stamp,
+state! {
+    /// The state of accelerometer and gyros.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Inertial {
+        /// Specific force, smoothed, m/s2.
+        force: [f32; 3],
+        /// The last sample along the body's downward axis, and its smoothed step from sample to sample; m/s2.
+        down: f32,
+        step: f32,
+        steps_since: Instant,
+        /// The least step at rest; 0 if unknown.
+        step_at_rest: f32,
+        at: Option<Instant>,
+        /// Rates, smoothed, rad/s.
+        rate: [f32; 3],
+        rates_at: Stamp,
+        still: bool,
+        /// Time of the last fast turn.
+        turned_at: Stamp,
+        /// Whether the estimator's attitude contradicts the sensors, and since when that attitude has been far from
+        /// level.
+        contradicts: bool,
+        tilted_since: Stamp,
+        /// Since when the vehicle has been carried by its weight and still, in any attitude; then also level.
+        rests_since: Stamp,
+        level_since: Stamp,
+        over_since: Stamp,
+    }
 }
 
 impl Inertial {
-    pub(crate) const fn new() -> Self {
-        Self {
-            force: [0.0; 3],
-            down: 0.0,
-            step: 0.0,
-            steps_since: Instant::ZERO,
-            step_at_rest: 0.0,
-            at: None,
-            rate: [0.0; 3],
-            rates_at: Stamp::NONE,
-            still: false,
-            turned_at: Stamp::NONE,
-            contradicts: false,
-            tilted_since: Stamp::NONE,
-            rests_since: Stamp::NONE,
-            level_since: Stamp::NONE,
-            over_since: Stamp::NONE,
-        }
-    }
-
     /// A sample of the first sensor.
     pub(crate) fn take(&mut self, at: Instant, imu: &Imu) {
         self.take_rates(at, imu.rate);
@@ -278,7 +259,7 @@ mod tests {
     /// Whether a still vehicle, carried with this force for three seconds, contradicts an attitude rolled by
     /// `roll_deg`, and then a level one.
     fn contradicts(force: [f32; 3], roll_deg: f32) -> (bool, bool) {
-        let mut inertial = Inertial::new();
+        let mut inertial = Inertial::default();
         let mut now = Instant::ZERO;
         let mut said = [false; 2];
         for (roll_deg, said) in [roll_deg, 0.0].into_iter().zip(&mut said) {

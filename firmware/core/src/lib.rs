@@ -27,6 +27,7 @@ pub mod happening;
 pub mod health;
 mod imu_gnss;
 pub mod inertial;
+mod initial;
 mod latest;
 pub mod lifetime;
 mod mag_heading_residual;
@@ -57,6 +58,5 @@ mod trend;
 pub mod units;
 pub mod usage;
 pub mod vehicle;
-mod vibration_baseline;
 
 pub use monitor::Monitor;

@@ -4,6 +4,7 @@
 //! by its gyros.
 
 use crate::gates::Gates;
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale};
 use crate::residual::{Comparison, Residuals};
@@ -46,17 +47,17 @@ pub(crate) fn take(
     residuals.take(Comparison::MagHeading, at, gates, off_deg, 0.0);
 }
 
-/// The estimator's use of its compass.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CompassUse {
-    /// Compass ratios in this flight, and whether the last message had none.
-    ratios: u8,
-    unused: (Stamp, bool),
+state! {
+    /// The estimator's use of its compass.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct CompassUse {
+        /// Compass ratios in this flight, and whether the last message had none.
+        ratios: u8,
+        unused: (Stamp, bool),
+    }
 }
 
 impl CompassUse {
-    pub(crate) const UNKNOWN: Self = Self { ratios: 0, unused: (Stamp::NONE, false) };
-
     /// PX4 sends no ratio of a compass that it does not fuse.
     pub(crate) fn take(&mut self, at: Instant, estimator: &Estimator, airborne: bool, residuals: &Residuals) {
         if estimator.scale != EstimatorScale::TestRatio || !airborne {

@@ -5,32 +5,30 @@ use core::fmt::Write as _;
 use heapless::String;
 
 use crate::motion::height_m;
+use crate::numbered::numbered;
 use crate::params::Param;
 use crate::time::Instant;
 use crate::vehicle::Vehicle;
 
-/// What was seen. The numbers are those of the checks in their table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Kind {
-    /// Nothing carries the vehicle; in seconds.
-    FreeFall = 0,
-    /// It hit something; load factor in g.
-    Impact = 1,
-    /// It turns over and over; in degrees a second.
-    Tumbling = 2,
-    /// It was disarmed in the air; height above home in metres.
-    Disarmed = 3,
-    /// It sinks without being told to; in m/s.
-    Sinking = 4,
-    /// It was turned over by its own rotors, or lies over; degrees of tilt.
-    Overturned = 5,
+numbered! {
+    /// What was seen. The numbers are those of the checks in their table.
+    pub enum Kind {
+        /// Nothing carries the vehicle; in seconds.
+        FreeFall "free_fall",
+        /// It hit something; load factor in g.
+        Impact "impact",
+        /// It turns over and over; in degrees a second.
+        Tumbling "tumbling",
+        /// It was disarmed in the air; height above home in metres.
+        Disarmed "disarmed_in_air",
+        /// It sinks without being told to; in m/s.
+        Sinking "sinking",
+        /// It was turned over by its own rotors, or lies over; degrees of tilt.
+        Overturned "overturned",
+    }
 }
 
 impl Kind {
-    /// How many there are.
-    pub(crate) const COUNT: usize = 6;
-
     /// The limit that it is above.
     pub(crate) const fn limit(self) -> Param {
         match self {
@@ -40,18 +38,6 @@ impl Kind {
             Self::Disarmed => Param::MisDisarm,
             Self::Sinking => Param::MisSink,
             Self::Overturned => Param::MisOverturn,
-        }
-    }
-
-    /// The name of its check.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::FreeFall => "free_fall",
-            Self::Impact => "impact",
-            Self::Tumbling => "tumbling",
-            Self::Disarmed => "disarmed_in_air",
-            Self::Sinking => "sinking",
-            Self::Overturned => "overturned",
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
 use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
+use crate::initial::state;
 use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::observation::{Feeds, Observation, Source};
@@ -58,28 +59,19 @@ pub struct Monitor {
     parameters_asked: bool,
 }
 
-/// The state at the last tick.
-#[derive(Clone, Copy, Debug)]
-struct Before {
-    armed: bool,
-    reboots: u32,
-    /// The last reported phase; the next one, and since when.
-    phase: Phase,
-    /// Changes of the vehicle until then.
-    changes: u32,
-    next_phase: Phase,
-    next_since: Instant,
-}
-
-impl Before {
-    const NOTHING: Self = Self {
-        armed: false,
-        reboots: 0,
-        phase: Phase::Ground,
-        changes: 0,
-        next_phase: Phase::Ground,
-        next_since: Instant::ZERO,
-    };
+state! {
+    /// The state at the last tick.
+    #[derive(Clone, Copy, Debug)]
+    struct Before {
+        armed: bool,
+        reboots: u32,
+        /// The last reported phase; the next one, and since when.
+        phase: Phase = Phase::Ground,
+        /// Changes of the vehicle until then.
+        changes: u32,
+        next_phase: Phase = Phase::Ground,
+        next_since: Instant,
+    }
 }
 
 /// A phase that lasts less is not reported: speeds cross their limits back and forth.
@@ -113,23 +105,23 @@ impl Monitor {
             place,
             Monitor {
                 params: *params,
-                vehicle: Vehicle::unknown(),
-                flight: Flight::grounded(),
-                derived: Derived::new(),
-                health: Health::new(),
-                usage: Usage::new(),
-                before: Lifetime::new(),
-                exceedances: Exceedances::new(),
-                exposure: Exposure::new(),
-                components: [Component::NONE; COMPONENTS_MAX],
+                vehicle: Vehicle::default(),
+                flight: Flight::default(),
+                derived: Derived::default(),
+                health: Health::default(),
+                usage: Usage::default(),
+                before: Lifetime::default(),
+                exceedances: Exceedances::default(),
+                exposure: Exposure::default(),
+                components: [Component::default(); COMPONENTS_MAX],
                 wear: [None; COMPONENTS_MAX],
                 wear_next: 0,
-                figures: Figures::NEW,
-                snapshots: Snapshots::new(),
+                figures: Figures::default(),
+                snapshots: Snapshots::default(),
                 protect: Protect::default(),
-                saving: Saving::new(),
+                saving: Saving::default(),
                 happenings: Happenings::default(),
-                before_tick: Before::NOTHING,
+                before_tick: Before::default(),
                 ticked_at: Instant::ZERO,
                 cells_told: false,
                 parameters_asked: false,
@@ -155,10 +147,10 @@ impl Monitor {
     /// Another system on the port becomes the vehicle: all knowledge of the previous one is dropped.
     #[inline(never)] // Its new states are large: not on the stack of every observation.
     fn begin_with_another(&mut self) {
-        self.before_tick = Before { changes: self.vehicle.changes, ..Before::NOTHING };
-        apart(|| self.flight = Flight::grounded());
-        apart(|| self.derived = Derived::new());
-        apart(|| self.figures = Figures::NEW);
+        self.before_tick = Before { changes: self.vehicle.changes, ..Before::default() };
+        apart(|| self.flight = Flight::default());
+        apart(|| self.derived = Derived::default());
+        apart(|| self.figures = Figures::default());
         self.wear = [None; COMPONENTS_MAX];
         self.health.clear();
         self.exceedances.end(self.ticked_at);
@@ -170,14 +162,14 @@ impl Monitor {
 
     /// The autopilot was powered on again since the last observation: ends the previous flight, whose end is unknown.
     pub fn begin_anew(&mut self) {
-        self.flight = Flight::grounded();
+        self.flight = Flight::default();
         self.protect = Protect::default();
         self.usage.break_off();
     }
 
     /// Another recording begins, of another day or vehicle: only the counters stay.
     pub fn begin_another_recording(&mut self) {
-        self.vehicle = Vehicle::unknown();
+        self.vehicle = Vehicle::default();
         self.begin_with_another();
         self.cells_told = false;
     }

@@ -1,10 +1,12 @@
 //! How the vehicle moves, from the best source that is fresh: height, climb, speeds, and the throttle that it does so with.
 
-use crate::time::{Instant, Span};
+use crate::observation::Hud;
+use crate::time::{Instant, PAUSE, Span};
+use crate::units::MetresPerSecond;
 use crate::vehicle::Vehicle;
 
 /// Positions and speeds older than this decide nothing.
-const MOTION_AGE: Span = Span::from_secs(3);
+pub(crate) const MOTION_AGE: Span = Span::from_secs(3);
 /// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
 pub(crate) const SPEED_MAX_MPS: f32 = 1_000.0;
 
@@ -18,24 +20,24 @@ pub fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     global.or_else(local).filter(|height_m| height_m.is_finite())
 }
 
+/// A figure of the pilot's display that is finite.
+fn displayed(now: Instant, vehicle: &Vehicle, figure: impl FnOnce(&Hud) -> Option<f32>) -> Option<f32> {
+    vehicle.hud.within(now, MOTION_AGE).and_then(figure).filter(|figure| figure.is_finite())
+}
+
 /// The part of the throttle that the autopilot gives.
 pub fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let hud = vehicle.hud.within(now, MOTION_AGE);
-    hud.and_then(|hud| hud.throttle).map(|throttle| throttle.0).filter(|part| part.is_finite())
+    displayed(now, vehicle, |hud| Some(hud.throttle?.0))
 }
 
 /// The speed through the air, in m/s.
 pub(crate) fn airspeed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let hud = vehicle.hud.within(now, MOTION_AGE);
-    hud.and_then(|hud| hud.airspeed)
-        .map(|speed| speed.0)
-        .filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
+    displayed(now, vehicle, |hud| Some(hud.airspeed?.0)).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
 /// The altitude of the pilot's display, which is the barometer's without a position.
 pub(crate) fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let hud = vehicle.hud.within(now, MOTION_AGE);
-    hud.and_then(|hud| hud.altitude).map(|altitude| altitude.0).filter(|height_m| height_m.is_finite())
+    displayed(now, vehicle, |hud| Some(hud.altitude?.0))
 }
 
 /// Speed upwards from the best source that is fresh, in m/s.
@@ -53,20 +55,16 @@ pub(crate) fn climb_within(now: Instant, vehicle: &Vehicle, age: Span) -> Option
 
 /// Speed over ground from the best source that is fresh, in m/s.
 pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    let norm = |north: f32, east: f32| libm::sqrtf(north * north + east * east);
-    let global =
-        vehicle.global.within(now, MOTION_AGE).map(|global| norm(global.velocity[0].0, global.velocity[1].0));
-    let local =
-        || vehicle.local.within(now, MOTION_AGE).map(|local| norm(local.velocity[0].0, local.velocity[1].0));
-    let hud = || vehicle.hud.within(now, MOTION_AGE).and_then(|hud| hud.groundspeed).map(|speed| speed.0);
+    let level = |[north, east, _]: [MetresPerSecond; 3]| libm::sqrtf(north.0 * north.0 + east.0 * east.0);
+    let global = vehicle.global.within(now, MOTION_AGE).map(|global| level(global.velocity));
+    let local = || vehicle.local.within(now, MOTION_AGE).map(|local| level(local.velocity));
+    let hud = || displayed(now, vehicle, |hud| Some(hud.groundspeed?.0));
     global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
 }
 
 /// Beyond 45 degrees of roll or pitch rotors carry less than 0.7 of their thrust upwards. No level flight is there,
 /// and a vehicle at rest there has fallen over.
 pub(crate) const TILTED_RAD: f32 = core::f32::consts::FRAC_PI_4;
-/// Values older than this are none of now.
-pub(crate) const FRESH: Span = Span::from_secs(2);
 /// Above this height over the place of arming a vehicle is in the air and clear of the ground. Heights of receivers
 /// and barometers move by a metre while it stands.
 pub(crate) const CLEAR_M: f32 = 1.5;
@@ -106,12 +104,12 @@ impl WindowMax {
 
     /// The greatest of this window; nothing that is old.
     pub(crate) fn now(&self, at: Instant) -> f32 {
-        if at.since(self.window) <= FRESH { self.now } else { 0.0 }
+        if at.since(self.window) <= PAUSE { self.now } else { 0.0 }
     }
 
     /// The greatest of this window and the one before.
     pub(crate) fn greatest(&self, at: Instant) -> f32 {
-        if at.since(self.window) <= FRESH { self.now.max(self.before) } else { 0.0 }
+        if at.since(self.window) <= PAUSE { self.now.max(self.before) } else { 0.0 }
     }
 }
 
@@ -153,7 +151,7 @@ impl Kinematics {
 
     /// One step: whether the receiver stands, and the estimate moves.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle) {
-        let receiver = vehicle.gnss[0].within(now, FRESH).filter(|gnss| gnss.is_exact());
+        let receiver = vehicle.gnss[0].within(now, PAUSE).filter(|gnss| gnss.is_exact());
         let slow = receiver.and_then(|gnss| gnss.speed).filter(|speed| speed.0 < STILL_MPS);
         let height_m = receiver.and_then(|gnss| gnss.altitude).map_or(0.0, |altitude| altitude.0);
         let Some(speed) = slow.filter(|_| (height_m - self.stood_at_m).abs() <= RECEIVER_M) else {

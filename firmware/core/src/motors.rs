@@ -20,12 +20,13 @@
 use core::ops::Range;
 
 use crate::flight::Flight;
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{EscGroup, MOTORS_MAX, VehicleKind};
 use crate::outputs::MotorOutputs;
 use crate::thrust::CARRIES;
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
 use crate::trend::Rate;
 use crate::units::Rpm;
 use crate::vehicle::{Motor, Vehicle};
@@ -38,8 +39,6 @@ const TURNING_RPM: f32 = 100.0;
 const INTERVALS_MISSED: f32 = 3.0;
 const INTERVALS_MISSED_SLOW: f32 = 5.0;
 const SLOW_S: f32 = 0.7;
-/// Motors that are compared all sent something within this.
-const TOGETHER: Span = Span::from_secs(1);
 /// Below this part of their highest speed motors do not carry a vehicle (thrust goes by the square).
 const FLYING_PART: f32 = 0.2;
 /// Below this part of the middle speed a motor is lost; no control in steady flight drives it there.
@@ -67,29 +66,22 @@ enum Role {
     Pushes,
 }
 
-/// One motor.
-#[derive(Clone, Copy, Debug)]
-struct Track {
-    /// Errors that its ESC counted lately.
-    errors: Option<Rate>,
-    /// Smoothed interval between messages that carry speed or current, s; 0 before there are two.
-    interval_s: f32,
-    last: Stamp,
-    highest_rpm: f32,
-    smooth_rpm: f32,
-    role: Role,
+state! {
+    /// One motor.
+    #[derive(Clone, Copy, Debug)]
+    struct Track {
+        /// Errors that its ESC counted lately.
+        errors: Option<Rate>,
+        /// Smoothed interval between messages that carry speed or current, s; 0 before there are two.
+        interval_s: f32,
+        last: Stamp,
+        highest_rpm: f32,
+        smooth_rpm: f32,
+        role: Role = Role::Unknown,
+    }
 }
 
 impl Track {
-    const NEW: Self = Self {
-        errors: None,
-        interval_s: 0.0,
-        last: Stamp::NONE,
-        highest_rpm: 0.0,
-        smooth_rpm: 0.0,
-        role: Role::Unknown,
-    };
-
     fn is_fitted(&self) -> bool {
         self.highest_rpm > TURNING_RPM
     }
@@ -114,18 +106,17 @@ impl Track {
     }
 }
 
-/// All motors by number.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Motors {
-    tracks: [Track; MOTORS_MAX],
-    /// The motor whose speed is furthest from the others'.
-    furthest: u8,
+state! {
+    /// All motors by number.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Motors {
+        tracks: [Track; MOTORS_MAX],
+        /// The motor whose speed is furthest from the others'.
+        furthest: u8,
+    }
 }
 
 impl Motors {
-    /// Nothing seen yet.
-    pub(crate) const NEW: Self = Self { tracks: [Track::NEW; MOTORS_MAX], furthest: 0 };
-
     /// Takes what ESCs sent, once the vehicle knows it.
     pub(crate) fn take(&mut self, at: Instant, group: &EscGroup, vehicle: &Vehicle, airborne: bool) {
         if !vehicle.armed() {
@@ -152,24 +143,18 @@ impl Motors {
         if tracks.iter().all(|track| is_known(track.role)) {
             return;
         }
-        let total = Total::of(now, vehicle, |_| true);
         let winged = vehicle.kind() == VehicleKind::Vtol;
         for (track, motor) in tracks.iter_mut().zip(motors).filter(|(track, _)| !is_known(track.role)) {
             let Some(own_a) = current_a(now, vehicle, motor) else { continue };
             if on_wings && own_a > CURRENT_MIN_A {
                 track.role = Role::Pushes;
             }
-            match total.part(now, vehicle, own_a) {
+            match current_part(now, vehicle, motor, |_| true) {
                 Some(part) if winged && part < IDLE_PART => track.role = Role::Pushes,
                 Some(part) if part >= SHARE_PART => track.role = Role::Lifts,
                 _ => {}
             }
         }
-    }
-
-    /// One step.
-    pub(crate) fn step(&mut self) {
-        self.find_furthest();
     }
 
     fn track(&self, motor: u8) -> Option<&Track> {
@@ -241,8 +226,7 @@ impl Motors {
     /// on its rotors; `None` for a motor that was not seen lifting.
     fn current_share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let place = Some(usize::from(motor)).filter(|place| self.lifts(*place))?;
-        let own_a = current_a(now, vehicle, place)?;
-        let part = Total::of(now, vehicle, |motor| self.lifts(motor)).part(now, vehicle, own_a)?;
+        let part = current_part(now, vehicle, place, |motor| self.lifts(motor))?;
         if part < SHARE_PART && (self.slows_down(now, vehicle, place) || self.is_driven_so(now, vehicle)) {
             return None;
         }
@@ -253,14 +237,11 @@ impl Motors {
     /// Whether a motor turns slower than the others that lift, and not much slower.
     fn slows_down(&self, now: Instant, vehicle: &Vehicle, motor: usize) -> bool {
         let rpm = |motor: usize| {
-            let motor = vehicle.motors.get(motor).filter(|motor| is_fresh(now, motor))?;
+            let motor =
+                vehicle.motors.get(motor).filter(|known| self.lifts(motor) && is_fresh(now, known))?;
             motor.esc.rpm.map(|rpm| libm::fabsf(rpm.0)).filter(|rpm| rpm.is_finite())
         };
-        let Some(own) = rpm(motor) else { return false };
-        let others = (0..MOTORS_MAX).filter(|other| *other != motor && self.lifts(*other));
-        let (sum, count) =
-            others.filter_map(rpm).fold((0.0, 0_u8), |(sum, count), rpm| (sum + rpm, count + 1));
-        SLOWS_PART.contains(&(own * f32::from(count) / sum))
+        against_others(motor, rpm).is_some_and(|(own, mean, _)| SLOWS_PART.contains(&(own / mean)))
     }
 
     /// Whether half of the motors that lift stand nearly still and the vehicle does not spin.
@@ -293,7 +274,7 @@ impl Motors {
         let track = self.track(motor).filter(|track| track.is_fitted() && !outputs.is_off(motor))?;
         let middle = self.middle_speed()?;
         // On the ground, still armed, each motor idles as it likes.
-        let throttle = vehicle.hud.within(now, TOGETHER).and_then(|hud| hud.throttle);
+        let throttle = vehicle.hud.within(now, FRESH).and_then(|hud| hud.throttle);
         let idles = throttle.is_some_and(|throttle| throttle.0 < IDLE_THROTTLE);
         // If one is lost, the one opposite may stop too, and the vehicle may turn.
         let lost = track.smooth_rpm < LOST_PART * middle;
@@ -317,9 +298,9 @@ impl Motors {
         others.map(|(_, speed)| (speed - own).abs()).reduce(f32::min).unwrap_or(0.0)
     }
 
-    /// Which motor is furthest from the middle one. It stays the one that was found first until another is twice as far: if one is lost,
+    /// One step: which motor is furthest from the middle one. It stays the one that was found first until another is twice as far: if one is lost,
     /// others follow.
-    fn find_furthest(&mut self) {
+    pub(crate) fn step(&mut self) {
         let Some(middle) = self.middle_speed() else { return };
         let own = self.speeds().find(|(motor, _)| *motor == self.furthest);
         let own = own.map_or(0.0, |(_, speed)| 2.0 * (speed - middle).abs());
@@ -347,7 +328,7 @@ impl Motors {
     fn turn_as_in_flight(&self, now: Instant, middle_rpm: f32) -> bool {
         let mut fitted = self.tracks.iter().filter(|track| track.is_fitted());
         fitted.all(|track| {
-            track.last.age(now).is_some_and(|age| age <= TOGETHER)
+            track.last.age(now).is_some_and(|age| age <= FRESH)
                 && middle_rpm >= FLYING_PART * track.highest_rpm
         })
     }
@@ -355,11 +336,11 @@ impl Motors {
     /// How far a motor's speed is from the mean of the others, percent with its sign, wherever it flies; `None` for a motor that is not
     /// fitted, and while the others do not turn.
     pub(crate) fn departure(&self, motor: u8) -> Option<f32> {
-        let (_, own) = self.speeds().find(|(fitted, _)| *fitted == motor)?;
-        let others = self.speeds().filter(|(other, _)| *other != motor);
-        let (sum, count) = others.fold((0.0, 0_u8), |(sum, count), (_, speed)| (sum + speed, count + 1));
-        let mean = sum / f32::from(count);
-        (count > 0 && mean >= TURNING_RPM).then(|| (own - mean) / mean * 100.0)
+        let speed = |motor: usize| {
+            self.tracks.get(motor).filter(|track| track.is_fitted()).map(|track| track.smooth_rpm)
+        };
+        let (own, mean, _) = against_others(motor.into(), speed)?;
+        (mean >= TURNING_RPM).then(|| (own - mean) / mean * 100.0)
     }
 }
 
@@ -378,28 +359,25 @@ fn is_fresh(now: Instant, motor: &Motor) -> bool {
     motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE)
 }
 
-/// The current of several motors together.
-struct Total {
-    sum_a: f32,
-    count: u8,
+/// The current of a motor as a part of the mean of the others among these, while the throttle asks for thrust in hover.
+fn current_part(
+    now: Instant,
+    vehicle: &Vehicle,
+    motor: usize,
+    is_among: impl Fn(usize) -> bool,
+) -> Option<f32> {
+    let throttle = vehicle.hud.within(now, PAUSE)?.throttle?.0;
+    let current = |motor| current_a(now, vehicle, motor).filter(|_| is_among(motor));
+    let (own_a, mean_a, others) = against_others(motor, current)?;
+    // PX4's motor failure check: below this throttle no motor is asked for much.
+    let asked = vehicle.hovers(now) == Some(true) && throttle > CARRIES;
+    (asked && others >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
 }
 
-impl Total {
-    fn of(now: Instant, vehicle: &Vehicle, is_among: impl Fn(usize) -> bool) -> Self {
-        let motors = (0..MOTORS_MAX).filter(|motor| is_among(*motor));
-        let currents = motors.filter_map(|motor| current_a(now, vehicle, motor));
-        let (sum_a, count) =
-            currents.fold((0.0, 0), |(sum_a, count), current_a| (sum_a + current_a, count + 1));
-        Self { sum_a, count }
-    }
-
-    /// The current of one of them as a part of the mean of the others, while the throttle asks for thrust in hover.
-    fn part(&self, now: Instant, vehicle: &Vehicle, own_a: f32) -> Option<f32> {
-        let throttle = vehicle.hud.within(now, PAUSE)?.throttle?.0;
-        let others = self.count.checked_sub(1)?;
-        let mean_a = (self.sum_a - own_a) / f32::from(others);
-        // PX4's motor failure check: below this throttle no motor is asked for much.
-        let asked = vehicle.hovers(now) == Some(true) && throttle > CARRIES;
-        (asked && others >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
-    }
+/// A motor's figure, the mean of the others that have one, and how many these are.
+fn against_others(motor: usize, figure: impl Fn(usize) -> Option<f32>) -> Option<(f32, f32, u8)> {
+    let own = figure(motor)?;
+    let others = (0..MOTORS_MAX).filter(|other| *other != motor).filter_map(figure);
+    let (sum, count) = others.fold((0.0, 0_u8), |(sum, count), figure| (sum + figure, count + 1));
+    (count > 0).then(|| (own, sum / f32::from(count), count))
 }

@@ -1,13 +1,14 @@
 //! Names with numbers that are stored in logs: each stands once.
 
-/// An enumeration by number, with the name of each. A number and a name never change their meaning.
+/// An enumeration by number, with the name of each: from 0 on, or from the number that the first one has. A number and a name never change
+/// their meaning.
 macro_rules! numbered {
-    ($(#[$meta:meta])* $vis:vis enum $type:ident { $($(#[$doc:meta])* $variant:ident $name:literal,)* }) => {
+    ($(#[$meta:meta])* $vis:vis enum $type:ident { $($(#[$doc:meta])* $variant:ident $(= $number:literal)? $name:literal,)* }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
         $vis enum $type {
-            $($(#[$doc])* $variant,)*
+            $($(#[$doc])* $variant $(= $number)?,)*
         }
 
         impl $type {
@@ -26,7 +27,14 @@ macro_rules! numbered {
 
             /// That of a stored number; `None` for one that this version does not know.
             pub const fn from_number(number: u8) -> Option<Self> {
-                if (number as usize) < Self::COUNT { Some(Self::ALL[number as usize]) } else { None }
+                let mut place = 0;
+                while place < Self::COUNT {
+                    if Self::ALL[place] as u8 == number {
+                        return Some(Self::ALL[place]);
+                    }
+                    place += 1;
+                }
+                None
             }
         }
     };

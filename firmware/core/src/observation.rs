@@ -7,6 +7,7 @@
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::cause::{Alert, Causes};
+use crate::initial::state;
 use crate::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
@@ -339,34 +340,36 @@ pub struct Rails {
     pub servo: Option<Volts>,
 }
 
-/// One battery.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Battery {
-    /// Which one.
-    pub id: u8,
-    /// Voltage of each cell, if the battery measures them.
-    pub cells: [Option<CellVoltage>; CELLS_MAX],
-    /// Of the whole battery.
-    pub voltage: Option<Volts>,
-    /// Negative charges.
-    pub current: Option<Amperes>,
-    /// Charge taken since the start.
-    pub consumed: Option<AmpereHours>,
-    /// Energy taken since the start.
-    pub energy: Option<WattHours>,
-    /// What is left.
-    pub remaining: Option<Fraction>,
-    /// Of the battery.
-    pub temperature: Option<Celsius>,
-    /// `MAV_BATTERY_FAULT` bits.
-    pub faults: u32,
-    /// Lithium polymer or lithium ion, or unknown: the limits of a cell's voltage are for these.
-    pub lithium: bool,
-    /// What it feeds.
-    pub feeds: Feeds,
-    /// Charge state by the autopilot: `MAV_BATTERY_CHARGE_STATE` (0 not said, 1 ok, 2 low, 3 critical, 4 emergency, 5
-    /// failed, 6 unhealthy, 7 charging).
-    pub charge: u8,
+state! {
+    /// One battery.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Battery {
+        /// Which one.
+        pub id: u8,
+        /// Voltage of each cell, if the battery measures them.
+        pub cells: [Option<CellVoltage>; CELLS_MAX],
+        /// Of the whole battery.
+        pub voltage: Option<Volts>,
+        /// Negative charges.
+        pub current: Option<Amperes>,
+        /// Charge taken since the start.
+        pub consumed: Option<AmpereHours>,
+        /// Energy taken since the start.
+        pub energy: Option<WattHours>,
+        /// What is left.
+        pub remaining: Option<Fraction>,
+        /// Of the battery.
+        pub temperature: Option<Celsius>,
+        /// `MAV_BATTERY_FAULT` bits.
+        pub faults: u32,
+        /// Lithium polymer or lithium ion, or unknown: the limits of a cell's voltage are for these.
+        pub lithium: bool = true,
+        /// What it feeds.
+        pub feeds: Feeds = Feeds::Unsaid,
+        /// Charge state by the autopilot: `MAV_BATTERY_CHARGE_STATE` (0 not said, 1 ok, 2 low, 3 critical, 4 emergency, 5
+        /// failed, 6 unhealthy, 7 charging).
+        pub charge: u8,
+    }
 }
 
 /// The voltage of a cell in whole millivolts, as in messages: two bytes each, for [`CELLS_MAX`] cells of each
@@ -401,25 +404,6 @@ pub enum Feeds {
     Avionics,
     /// The payload only.
     Payload,
-}
-
-impl Default for Battery {
-    fn default() -> Self {
-        Self {
-            id: 0,
-            cells: [None; CELLS_MAX],
-            voltage: None,
-            current: None,
-            consumed: None,
-            energy: None,
-            remaining: None,
-            temperature: None,
-            faults: 0,
-            lithium: true,
-            feeds: Feeds::Unsaid,
-            charge: 0,
-        }
-    }
 }
 
 impl Battery {
@@ -475,6 +459,21 @@ pub struct Vibration {
     pub levels: [Option<f32>; 3],
     /// Clipped samples of three accelerometers since boot.
     pub clips: [u32; 3],
+}
+
+impl Vibration {
+    /// The greatest level.
+    pub fn highest(&self) -> Option<f32> {
+        self.levels.into_iter().flatten().reduce(f32::max)
+    }
+
+    /// The level of acceleration, m/s2: of the worst axis, or PX4's metric.
+    pub(crate) fn acceleration(&self) -> Option<f32> {
+        match self.scale {
+            VibrationScale::PerAxis => self.highest(),
+            VibrationScale::Px4Metrics => self.levels[2],
+        }
+    }
 }
 
 /// One motor's ESC; each message fills what it carries.

@@ -38,6 +38,7 @@ use core::ops::RangeInclusive;
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::figures::OUTPUTS_MAX;
 use crate::flight::Flight;
+use crate::initial::state;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{MOTORS_MAX, Outputs};
 use crate::time::{Instant, PAUSE, Span, Stamp};
@@ -149,76 +150,54 @@ impl Verdict {
     }
 }
 
-/// One output.
-#[derive(Clone, Copy, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
-struct Output {
-    /// Command against the average of all, percent.
-    share: AdaptiveBaseline,
-    /// It was given as little on the ground as a motor that does not turn.
-    idles: bool,
-    /// It carried in any flight.
-    carried: bool,
-    /// It is given next to nothing now, or is at the end of its range.
-    off: bool,
-    full: bool,
-    /// Of a flight whose take-off was not received: the first output, and whether it moved since.
-    first: u16,
-    moved: bool,
+state! {
+    /// One output.
+    #[derive(Clone, Copy, Debug)]
+    #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
+    struct Output {
+        /// Command against the average of all, percent.
+        share: AdaptiveBaseline,
+        /// It was given as little on the ground as a motor that does not turn.
+        idles: bool,
+        /// It carried in any flight.
+        carried: bool,
+        /// It is given next to nothing now, or is at the end of its range.
+        off: bool,
+        full: bool,
+        /// Of a flight whose take-off was not received: the first output, and whether it moved since.
+        first: u16,
+        moved: bool,
+    }
 }
 
-impl Output {
-    const NEW: Self = Self {
-        share: AdaptiveBaseline::NEW,
-        idles: false,
-        carried: false,
-        off: false,
-        full: false,
-        first: 0,
-        moved: false,
-    };
-}
-
-/// The memory of the motors' commands.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MotorOutputs {
-    /// The group that has the motors: the first one that has any output.
-    port: Option<u8>,
-    /// How many motors there are in this flight; 0 before it is known.
-    count: u8,
-    range: Range,
-    outputs: [Output; JUDGED_MAX],
-    at: Stamp,
-    /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
-    summed: (u8, f32),
-    /// The motor that is judged, and how; none of the others is anything but good.
-    verdict: (u8, Verdict),
-    /// The take-off was not received; since when one output alone is at an end of its range then.
-    takeoff_not_recorded: bool,
-    at_end_since: Stamp,
+state! {
+    /// The memory of the motors' commands.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct MotorOutputs {
+        /// The group that has the motors: the first one that has any output.
+        port: Option<u8>,
+        /// How many motors there are in this flight; 0 before it is known.
+        count: u8,
+        range: Range = Range::Pulses,
+        outputs: [Output; JUDGED_MAX],
+        at: Stamp,
+        /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
+        summed: (u8, f32),
+        /// The motor that is judged, and how; none of the others is anything but good.
+        verdict: (u8, Verdict) = (0, Verdict::Ok),
+        /// The take-off was not received; since when one output alone is at an end of its range then.
+        takeoff_not_recorded: bool,
+        at_end_since: Stamp,
+    }
 }
 
 impl MotorOutputs {
-    /// Nothing seen yet.
-    pub(crate) const fn new() -> Self {
-        Self {
-            port: None,
-            count: 0,
-            range: Range::Pulses,
-            outputs: [Output::NEW; JUDGED_MAX],
-            at: Stamp::NONE,
-            summed: (0, 0.0),
-            verdict: (0, Verdict::Ok),
-            takeoff_not_recorded: false,
-            at_end_since: Stamp::NONE,
-        }
-    }
-
     /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
         let Self { port, range, outputs, .. } = *self;
-        let outputs = outputs.map(|Output { idles, carried, .. }| Output { idles, carried, ..Output::NEW });
-        *self = Self { port, range, outputs, ..Self::new() };
+        let outputs =
+            outputs.map(|Output { idles, carried, .. }| Output { idles, carried, ..Output::default() });
+        *self = Self { port, range, outputs, ..Self::default() };
     }
 
     pub(crate) fn take(
@@ -509,7 +488,7 @@ mod tests {
     /// The verdict on a flat octocopter whose first motor lost this share of its thrust, percent, for 60 s. In one
     /// message of seven another motor gets a higher command.
     fn octocopter(lost: f32) -> Vec<(u8, f32)> {
-        let mut outputs = MotorOutputs::new();
+        let mut outputs = MotorOutputs::default();
         let steps = 0..350_usize;
         let judged = steps.map(|step| {
             let mut figures = [0.0; JUDGED_MAX];

@@ -10,6 +10,7 @@
 
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};
@@ -79,24 +80,26 @@ impl Kind {
     }
 }
 
-/// The last sample of a sensor.
-#[derive(Clone, Copy, Debug)]
-struct Sample {
-    at: Stamp,
-    axes: [f32; 3],
+state! {
+    /// The last sample of a sensor.
+    #[derive(Clone, Copy, Debug)]
+    struct Sample {
+        at: Stamp,
+        axes: [f32; 3],
+    }
 }
 
-/// Two sensors of a kind.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    /// How far they are apart, smoothed.
-    difference: [f32; 3],
-    residual: Residual,
+state! {
+    /// Two sensors of a kind.
+    #[derive(Clone, Copy, Debug)]
+    struct Pair {
+        /// How far they are apart, smoothed.
+        difference: [f32; 3],
+        residual: Residual = Residual::after(SETTLES_S),
+    }
 }
 
 impl Pair {
-    const NEW: Self = Self { difference: [0.0; 3], residual: Residual::after(SETTLES_S) };
-
     fn take(&mut self, at: Instant, kind: Kind, difference: [f32; 3]) {
         if !difference.into_iter().all(AdaptiveBaseline::is_sane) {
             return;
@@ -119,20 +122,16 @@ impl Pair {
     }
 }
 
-/// All sensors of one kind.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pairs {
-    samples: [Sample; SENSORS_MAX],
-    pairs: [Pair; SENSORS_MAX],
+state! {
+    /// All sensors of one kind.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Pairs {
+        samples: [Sample; SENSORS_MAX],
+        pairs: [Pair; SENSORS_MAX],
+    }
 }
 
 impl Pairs {
-    /// Nothing seen.
-    pub(crate) const NEW: Self = Self {
-        samples: [Sample { at: Stamp::NONE, axes: [0.0; 3] }; SENSORS_MAX],
-        pairs: [Pair::NEW; SENSORS_MAX],
-    };
-
     /// Takes a sample, and compares it with those of the others of the same moment.
     pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: usize, axes: [f32; 3], gates: Gates) {
         let Self { samples, pairs } = self;
@@ -156,7 +155,7 @@ impl Pairs {
 
     /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
-        self.pairs = [Pair::NEW; SENSORS_MAX];
+        self.pairs = [Pair::default(); SENSORS_MAX];
     }
 
     /// Whether a sensor has measured, and does so still.

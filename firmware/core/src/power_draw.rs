@@ -1,14 +1,12 @@
 //! The power drawn from the batteries, from the best fresh source.
 
-use crate::time::{Instant, PAUSE, Span};
+use crate::time::{Instant, PAUSE, SILENT};
 use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
 
 /// Beyond these a value is garbage: no vehicle here reaches them.
 const VOLTS_MAX: f32 = 1_000.0;
 const AMPERES_MAX: f32 = 10_000.0;
-/// A battery figure holds this long.
-const BATTERY_AGE: Span = Span::from_secs(5);
 
 /// Voltage of the first battery (or the autopilot's figure if none reports itself), and discharge current and power
 /// of all batteries. Without a battery current: the sum of all ESCs (PX4 in simulation).
@@ -22,11 +20,11 @@ pub(crate) struct Drawn {
 pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
     let mut drawn = Drawn::default();
     let batteries = vehicle.batteries.iter();
-    for battery in batteries.clone().filter_map(|slot| slot.within(now, BATTERY_AGE)) {
+    for battery in batteries.clone().filter_map(|slot| slot.within(now, SILENT)) {
         drawn.add(battery.voltage, battery.current);
     }
     let none_reported = batteries.clone().all(|slot| slot.get().is_none());
-    if let Some(system) = vehicle.system.within(now, BATTERY_AGE).filter(|_| none_reported) {
+    if let Some(system) = vehicle.system.within(now, SILENT).filter(|_| none_reported) {
         drawn.add(system.voltage, system.current);
     }
     if drawn.current_a.is_none() {
@@ -42,7 +40,7 @@ pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
 pub(crate) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f64 {
     let Some(slot) = vehicle.batteries.get(battery) else { return 0.0 };
     let mut drawn = Drawn::default();
-    if let Some(reported) = slot.within(now, BATTERY_AGE) {
+    if let Some(reported) = slot.within(now, SILENT) {
         drawn.add(reported.voltage, reported.current);
     } else if battery == 0 && vehicle.batteries.iter().all(|slot| slot.get().is_none()) {
         drawn = self::drawn(now, vehicle);

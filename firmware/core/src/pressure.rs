@@ -3,12 +3,10 @@
 //! A change of pressure `dp` at the pressure `p` is a change of height of `-SCALE_HEIGHT_M * dp / p`. So a metre is 0.120 hPa at sea level
 //! and 0.073 hPa at 4,000 m.
 
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 
 /// Metres of height for a relative change of pressure: the scale height of air at 15 degrees, R T / (M g).
 pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
-/// Age of a pressure, and how long it may stay the same.
-const FRESH: Span = Span::from_secs(2);
 /// A barometer that repeats its value for longer is stuck: its height is not known. One at rest repeats a value for a second or two.
 const STUCK: Span = Span::from_secs(5);
 /// A pressure is compared with one that is one to two windows older.
@@ -43,7 +41,7 @@ impl Pressure {
             return;
         }
         if at.since(self.window) >= WINDOW {
-            let goes_on = at.since(self.window) <= FRESH;
+            let goes_on = at.since(self.window) <= PAUSE;
             (self.before_hpa, self.began_hpa, self.window) =
                 (if goes_on { self.began_hpa } else { 0.0 }, hpa, at);
         }
@@ -68,12 +66,12 @@ impl Pressure {
     }
 
     fn is_fresh(&self, now: Instant) -> bool {
-        self.hpa > 0.0 && now.since(self.window) <= FRESH
+        self.hpa > 0.0 && now.since(self.window) <= PAUSE
     }
 
     /// Pressure, hPa, of a barometer that measures.
     pub(crate) fn now(&self, now: Instant) -> Option<f32> {
-        (self.is_fresh(now) && now.since(self.changed_at) <= FRESH).then_some(self.hpa)
+        (self.is_fresh(now) && now.since(self.changed_at) <= PAUSE).then_some(self.hpa)
     }
 
     /// Height above the place of arming, m; `None` if the arming was not received, or the barometer is stuck.

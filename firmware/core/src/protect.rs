@@ -37,6 +37,7 @@ use crate::flight::{Flight, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
 use crate::motion;
+use crate::numbered::numbered;
 use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
@@ -74,27 +75,19 @@ const TEMPORARILY_REJECTED: u8 = 1;
 /// `MAV_RESULT_IN_PROGRESS`: the answer is to come.
 const IN_PROGRESS: u8 = 5;
 
-/// A requested action. The numbers are those of `PROT_ACTION`, and are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Action {
-    /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`
-    #[default]
-    Return = 1,
-    /// `MAV_CMD_NAV_LAND`
-    Land = 2,
+numbered! {
+    /// A requested action. The numbers are those of `PROT_ACTION`, and are stored.
+    #[derive(Default)]
+    pub enum Action {
+        /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`
+        #[default]
+        Return = 1 "return",
+        /// `MAV_CMD_NAV_LAND`
+        Land "land",
+    }
 }
 
 impl Action {
-    /// The action of `PROT_ACTION`.
-    pub fn from_number(number: u8) -> Option<Self> {
-        match number {
-            1 => Some(Self::Return),
-            2 => Some(Self::Land),
-            _ => None,
-        }
-    }
-
     /// `MAV_CMD`
     pub const fn command(self) -> u16 {
         match self {
@@ -102,76 +95,31 @@ impl Action {
             Self::Land => 21,
         }
     }
-
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Return => "return",
-            Self::Land => "land",
-        }
-    }
 }
 
-/// What happened. The numbers are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Stage {
-    /// The action follows in `detail` seconds.
-    Announced = 1,
-    /// `detail` seconds are left.
-    Counting = 2,
-    /// The pilot changed the flight mode.
-    CancelledByMode = 3,
-    /// The flight is over: it was disarmed, landed, or lies where it came down.
-    CancelledOnGround = 4,
-    /// The cancel command was received.
-    CancelledByCommand = 5,
-    /// The critical level is over; it may be announced again.
-    CancelledClear = 6,
-    /// The autopilot is on its way already.
-    AlreadyDone = 7,
-    /// The action was requested, for the `detail`-th time.
-    Asked = 8,
-    /// The autopilot answered: `detail` is the `MAV_RESULT`.
-    Answered = 9,
-    /// The autopilot did not answer.
-    Unanswered = 10,
-}
-
-impl Stage {
-    /// All stages, by number.
-    pub const ALL: [Self; 10] = [
-        Self::Announced,
-        Self::Counting,
-        Self::CancelledByMode,
-        Self::CancelledOnGround,
-        Self::CancelledByCommand,
-        Self::CancelledClear,
-        Self::AlreadyDone,
-        Self::Asked,
-        Self::Answered,
-        Self::Unanswered,
-    ];
-
-    /// The stage of a stored number.
-    pub fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|stage| *stage as u8 == number)
-    }
-
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Announced => "announced",
-            Self::Counting => "counting",
-            Self::CancelledByMode => "cancelled_by_mode",
-            Self::CancelledOnGround => "cancelled_on_ground",
-            Self::CancelledByCommand => "cancelled_by_command",
-            Self::CancelledClear => "cancelled_clear",
-            Self::AlreadyDone => "already_done",
-            Self::Asked => "asked",
-            Self::Answered => "answered",
-            Self::Unanswered => "unanswered",
-        }
+numbered! {
+    /// What happened. The numbers are stored.
+    pub enum Stage {
+        /// The action follows in `detail` seconds.
+        Announced = 1 "announced",
+        /// `detail` seconds are left.
+        Counting "counting",
+        /// The pilot changed the flight mode.
+        CancelledByMode "cancelled_by_mode",
+        /// The flight is over: it was disarmed, landed, or lies where it came down.
+        CancelledOnGround "cancelled_on_ground",
+        /// The cancel command was received.
+        CancelledByCommand "cancelled_by_command",
+        /// The critical level is over; it may be announced again.
+        CancelledClear "cancelled_clear",
+        /// The autopilot is on its way already.
+        AlreadyDone "already_done",
+        /// The action was requested, for the `detail`-th time.
+        Asked "asked",
+        /// The autopilot answered: `detail` is the `MAV_RESULT`.
+        Answered "answered",
+        /// The autopilot did not answer.
+        Unanswered "unanswered",
     }
 }
 

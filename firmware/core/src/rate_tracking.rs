@@ -8,6 +8,7 @@
 //! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
 
 use crate::gates::{self, Gates};
+use crate::initial::state;
 use crate::latest::{Latest, Reading};
 use crate::modes::has_pilots_throttle;
 use crate::motion::climb_mps;
@@ -72,16 +73,16 @@ pub(crate) fn take_attitude(
     }
 }
 
-/// Duration of full throttle without a climb.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Thrust {
-    full_since: Option<Instant>,
-    full_at: Option<Instant>,
+state! {
+    /// Duration of full throttle without a climb.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Thrust {
+        full_since: Option<Instant>,
+        full_at: Option<Instant>,
+    }
 }
 
 impl Thrust {
-    pub(crate) const NEW: Self = Self { full_since: None, full_at: None };
-
     /// A pilot's display: throttle.
     pub(crate) fn take(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, gates: Gates) {
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };

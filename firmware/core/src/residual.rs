@@ -23,6 +23,7 @@
 
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
+use crate::initial::{Initial, state};
 use crate::latest::Reading;
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::RECEIVERS_MAX;
@@ -195,21 +196,20 @@ pub(crate) fn smooth<const N: usize>(figure: &mut [f32; N], sample: [f32; N], we
     }
 }
 
-/// The memory of one comparison.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Residual {
-    at: Stamp,
-    allowance: f32,
-    figure: AdaptiveBaseline,
+state! {
+    /// The memory of one comparison.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Residual {
+        at: Stamp,
+        allowance: f32,
+        figure: AdaptiveBaseline,
+    }
 }
 
 impl Residual {
-    /// Nothing compared yet.
-    pub(crate) const NEW: Self = Self::after(0.0);
-
     /// A residual of many samples: it settles for this time, s, before it is learnt.
     pub(crate) const fn after(settles_s: f32) -> Self {
-        Self { at: Stamp::NONE, allowance: 0.0, figure: AdaptiveBaseline::after(settles_s) }
+        Self { figure: AdaptiveBaseline::after(settles_s), ..Self::NEW }
     }
 
     /// When it was compared last.
@@ -224,7 +224,7 @@ impl Residual {
         }
         let step = self.at.age(at);
         if row.learn == Learn::Nothing && step.is_none_or(|step| step > PAUSE) {
-            *self = Self { figure: AdaptiveBaseline::ZERO, ..Self::NEW };
+            *self = Self { figure: AdaptiveBaseline::ZERO, ..Self::default() };
         }
         let clamp = if self.at.is_set() { row.clamp } else { f32::INFINITY };
         let step = step.filter(|_| self.at.is_set()).unwrap_or(Span::ZERO);
@@ -255,17 +255,18 @@ impl Residual {
     }
 }
 
-/// The memory of all comparisons but pairs.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Residuals([Residual; Comparison::COUNT]);
+state! {
+    /// The memory of all comparisons but pairs.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Residuals {
+        each: [Residual; Comparison::COUNT],
+    }
+}
 
 impl Residuals {
-    /// Nothing compared yet.
-    pub(crate) const NEW: Self = Self([Residual::NEW; Comparison::COUNT]);
-
     /// Whether a sample counts now, and the last one is old enough.
     pub(crate) fn is_due(&self, of: Comparison, at: Instant, gates: Gates, every: Span) -> bool {
-        of.row().is_open(gates) && self.0[of as usize].at.age(at).is_none_or(|age| age >= every)
+        of.row().is_open(gates) && self.each[of as usize].at.age(at).is_none_or(|age| age >= every)
     }
 
     /// Takes a sample if its gates are open; returns the learnt part, s.
@@ -278,12 +279,12 @@ impl Residuals {
         allowance: f32,
     ) -> f32 {
         let row = of.row();
-        if row.is_open(gates) { self.0[of as usize].take(row, at, sample, allowance) } else { 0.0 }
+        if row.is_open(gates) { self.each[of as usize].take(row, at, sample, allowance) } else { 0.0 }
     }
 
     /// The residual beyond its baseline.
     pub(crate) fn excess(&self, of: Comparison) -> Option<f32> {
-        self.0[of as usize].excess(of.row())
+        self.each[of as usize].excess(of.row())
     }
 
     /// The same, when it was measured.
@@ -293,18 +294,18 @@ impl Residuals {
 
     /// Another figure of the same sample.
     fn as_measured(&self, now: Instant, of: Comparison, value: Option<f32>) -> Option<Reading> {
-        Reading::new(self.0[of as usize].at.instant(now), value)
+        Reading::new(self.each[of as usize].at.instant(now), value)
     }
 
     /// The figure as a multiple of its baseline, if it exceeds it by more than its hold; 1 otherwise.
     pub(crate) fn multiple(&self, now: Instant, of: Comparison) -> Option<Reading> {
-        let multiple = self.0[of as usize].figure.multiple(of.row().hold);
+        let multiple = self.each[of as usize].figure.multiple(of.row().hold);
         self.as_measured(now, of, multiple)
     }
 
     /// The figure from which on it is more than this multiple.
     pub(crate) fn limit(&self, of: Comparison, times: f32) -> Option<f32> {
-        self.0[of as usize].figure.limit(times, of.row().hold)
+        self.each[of as usize].figure.limit(times, of.row().hold)
     }
 }
 
@@ -317,7 +318,7 @@ mod tests {
 
     /// Takes figures ten times a second.
     fn taken(row: &Row, figures: impl Iterator<Item = f32>) -> Residual {
-        let mut residual = Residual::NEW;
+        let mut residual = Residual::default();
         for (tenth, figure) in (0..).zip(figures) {
             residual.take(row, Instant::from_millis(tenth * 100), figure, 0.0);
         }

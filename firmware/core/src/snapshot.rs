@@ -6,7 +6,9 @@
 
 use crate::half;
 use crate::health::{Finding, Inputs, Level, Subsystem};
-use crate::observation::{Battery, SystemStatus};
+use crate::initial::state;
+use crate::motion::MOTION_AGE;
+use crate::observation::{Battery, Estimator, SystemStatus};
 use crate::time::{Instant, Span};
 use crate::vehicle::Vehicle;
 
@@ -20,8 +22,6 @@ pub const COLUMNS_MAX: usize = 8;
 const PENDING_MAX: usize = 4;
 
 const AFTER: Span = Span::from_millis(INTERVAL.as_millis() * SAMPLES as u64);
-/// Maximum age of a value.
-const FRESH: Span = Span::from_secs(3);
 
 type Read = fn(&Inputs<'_>) -> Option<f32>;
 
@@ -43,62 +43,40 @@ const COLUMNS: [&[usize]; Subsystem::ALL.len()] = [
 ];
 
 const KEPT: [Quantity; 24] = [
-    Quantity("voltage_v", |inputs| Some(of_battery(inputs, |it| it.voltage, |it| it.voltage)?.0)),
-    Quantity("current_a", |inputs| Some(of_battery(inputs, |it| it.current, |it| it.current)?.0)),
-    Quantity("cell_lowest_v", |inputs| {
-        inputs.derived.cell_voltage(inputs.vehicle, inputs.params, 0).map(|reading| reading.value)
+    Quantity("voltage_v", |it| Some(of_battery(it, |it| it.voltage, |it| it.voltage)?.0)),
+    Quantity("current_a", |it| Some(of_battery(it, |it| it.current, |it| it.current)?.0)),
+    Quantity("cell_lowest_v", |it| {
+        it.derived.cell_voltage(it.vehicle, it.params, 0).map(|reading| reading.value)
     }),
-    Quantity("remaining_percent", |inputs| {
-        Some(of_battery(inputs, |it| it.remaining, |it| it.remaining)?.0 * 100.0)
-    }),
-    Quantity("throttle_percent", |inputs| {
-        Some(inputs.vehicle.hud.within(inputs.now, FRESH)?.throttle?.0 * 100.0)
-    }),
-    Quantity("rpm_lowest", |inputs| speeds(inputs).reduce(f32::min)),
-    Quantity("rpm_highest", |inputs| speeds(inputs).reduce(f32::max)),
-    Quantity("esc_hottest_degc", |inputs| {
-        let fresh = |at: Instant| inputs.now.since(at) <= FRESH;
-        let motors = inputs.vehicle.motors.iter().filter(|motor| motor.state_at.is_some_and(fresh));
+    Quantity("remaining_percent", |it| Some(of_battery(it, |it| it.remaining, |it| it.remaining)?.0 * 100.0)),
+    Quantity("throttle_percent", |it| Some(it.vehicle.hud.within(it.now, MOTION_AGE)?.throttle?.0 * 100.0)),
+    Quantity("rpm_lowest", |it| speeds(it).reduce(f32::min)),
+    Quantity("rpm_highest", |it| speeds(it).reduce(f32::max)),
+    Quantity("esc_hottest_degc", |it| {
+        let fresh = |at: Instant| it.now.since(at) <= MOTION_AGE;
+        let motors = it.vehicle.motors.iter().filter(|motor| motor.state_at.is_some_and(fresh));
         motors.filter_map(|motor| Some(motor.esc.temperature?.0)).reduce(f32::max)
     }),
-    Quantity("engine_rpm", |inputs| Some(inputs.vehicle.engine.within(inputs.now, FRESH)?.rpm?.0)),
-    Quantity("cylinder_degc", |inputs| {
-        Some(inputs.vehicle.engine.within(inputs.now, FRESH)?.cylinder_head?.0)
+    Quantity("engine_rpm", |it| Some(it.vehicle.engine.within(it.now, MOTION_AGE)?.rpm?.0)),
+    Quantity("cylinder_degc", |it| Some(it.vehicle.engine.within(it.now, MOTION_AGE)?.cylinder_head?.0)),
+    Quantity("vibration_m_s2", |it| it.vehicle.vibration.within(it.now, MOTION_AGE)?.highest()),
+    Quantity("load_factor_g", |it| it.derived.load_factor_g()),
+    Quantity("estimator_worst", |it| {
+        let Estimator { velocity, position_horizontal, position_vertical, compass, .. } =
+            *it.vehicle.estimator.within(it.now, MOTION_AGE)?;
+        [velocity, position_horizontal, position_vertical, compass].into_iter().flatten().reduce(f32::max)
     }),
-    Quantity("vibration_m_s2", |inputs| {
-        let vibration = inputs.vehicle.vibration.within(inputs.now, FRESH)?;
-        vibration.levels.into_iter().flatten().reduce(f32::max)
-    }),
-    Quantity("load_factor_g", |inputs| inputs.derived.load_factor_g()),
-    Quantity("estimator_worst", |inputs| {
-        let estimator = inputs.vehicle.estimator.within(inputs.now, FRESH)?;
-        let figures = [
-            estimator.velocity,
-            estimator.position_horizontal,
-            estimator.position_vertical,
-            estimator.compass,
-        ];
-        figures.into_iter().flatten().reduce(f32::max)
-    }),
-    Quantity("satellites", |inputs| {
-        Some(f32::from(inputs.vehicle.gnss[0].within(inputs.now, FRESH)?.satellites?))
-    }),
-    Quantity("fix", |inputs| Some(f32::from(inputs.vehicle.gnss[0].within(inputs.now, FRESH)?.fix))),
-    Quantity("hdop", |inputs| inputs.vehicle.gnss[0].within(inputs.now, FRESH)?.hdop),
-    Quantity("heartbeat_age_s", |inputs| {
-        Some(inputs.now.since(inputs.vehicle.heartbeat.at()?).as_secs_f32())
-    }),
-    Quantity("frames_lost_percent", |inputs| Some(inputs.link.frames_lost? * 100.0)),
-    Quantity("load_percent", |inputs| Some(inputs.vehicle.system.within(inputs.now, FRESH)?.load?.0 * 100.0)),
-    Quantity("queue_percent", |inputs| Some(inputs.recorder.queue * 100.0)),
-    Quantity("roll_deg", |inputs| {
-        Some(inputs.vehicle.attitude.within(inputs.now, FRESH)?.roll.0.to_degrees())
-    }),
-    Quantity("pitch_deg", |inputs| {
-        Some(inputs.vehicle.attitude.within(inputs.now, FRESH)?.pitch.0.to_degrees())
-    }),
-    Quantity("climb_m_s", |inputs| crate::motion::climb_mps(inputs.now, inputs.vehicle)),
-    Quantity("height_m", |inputs| Some(inputs.vehicle.global.within(inputs.now, FRESH)?.relative_altitude.0)),
+    Quantity("satellites", |it| Some(f32::from(it.vehicle.gnss[0].within(it.now, MOTION_AGE)?.satellites?))),
+    Quantity("fix", |it| Some(f32::from(it.vehicle.gnss[0].within(it.now, MOTION_AGE)?.fix))),
+    Quantity("hdop", |it| it.vehicle.gnss[0].within(it.now, MOTION_AGE)?.hdop),
+    Quantity("heartbeat_age_s", |it| Some(it.now.since(it.vehicle.heartbeat.at()?).as_secs_f32())),
+    Quantity("frames_lost_percent", |it| Some(it.link.frames_lost? * 100.0)),
+    Quantity("load_percent", |it| Some(it.vehicle.system.within(it.now, MOTION_AGE)?.load?.0 * 100.0)),
+    Quantity("queue_percent", |it| Some(it.recorder.queue * 100.0)),
+    Quantity("roll_deg", |it| Some(it.vehicle.attitude.within(it.now, MOTION_AGE)?.roll.0.to_degrees())),
+    Quantity("pitch_deg", |it| Some(it.vehicle.attitude.within(it.now, MOTION_AGE)?.pitch.0.to_degrees())),
+    Quantity("climb_m_s", |it| crate::motion::climb_mps(it.now, it.vehicle)),
+    Quantity("height_m", |it| Some(it.vehicle.global.within(it.now, MOTION_AGE)?.relative_altitude.0)),
 ];
 
 /// A figure of the first battery; of `SYS_STATUS` if none reports itself.
@@ -113,7 +91,7 @@ fn of_battery<T>(
 
 fn speeds(inputs: &Inputs<'_>) -> impl Iterator<Item = f32> {
     let (now, motors) = (inputs.now, inputs.vehicle.motors.iter());
-    let fresh = motors.filter(move |motor| motor.moved_at.is_some_and(|at| now.since(at) <= FRESH));
+    let fresh = motors.filter(move |motor| motor.moved_at.is_some_and(|at| now.since(at) <= MOTION_AGE));
     fresh.filter_map(|motor| Some(motor.esc.rpm?.0.abs()))
 }
 
@@ -131,16 +109,18 @@ struct Pending {
     before_told: bool,
 }
 
-/// The last seconds, and the snapshots that are being taken.
-#[derive(Clone, Copy, Debug)]
-pub struct Snapshots {
-    /// The newest is before `next`.
-    ring: [[u16; KEPT.len()]; SAMPLES],
-    next: u8,
-    filled: u8,
-    newest: Instant,
-    pending: [Option<Pending>; PENDING_MAX],
-    left_out: u16,
+state! {
+    /// The last seconds, and the snapshots that are being taken.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Snapshots {
+        /// The newest is before `next`.
+        ring: [[u16; KEPT.len()]; SAMPLES],
+        next: u8,
+        filled: u8,
+        newest: Instant,
+        pending: [Option<Pending>; PENDING_MAX],
+        left_out: u16,
+    }
 }
 
 /// One half of a snapshot.
@@ -174,25 +154,7 @@ impl Snapshot<'_> {
     }
 }
 
-impl Default for Snapshots {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Snapshots {
-    /// Nothing kept yet.
-    pub const fn new() -> Self {
-        Self {
-            ring: [[0; KEPT.len()]; SAMPLES],
-            next: 0,
-            filled: 0,
-            newest: Instant::ZERO,
-            pending: [None; PENDING_MAX],
-            left_out: 0,
-        }
-    }
-
     /// Keeps a sample where one is due.
     pub(crate) fn step(&mut self, inputs: &Inputs<'_>) {
         if self.filled > 0 && inputs.now.since(self.newest) < INTERVAL {

@@ -13,6 +13,7 @@
 //! Two messages may report the same sensor with different digits, so a value counts as repeated if it is one of the
 //! last two.
 
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
@@ -48,37 +49,27 @@ const ALL_REPEAT_TIMES: f32 = 10.0;
 const HANGS_MPS: f32 = 0.3;
 const TREMBLES_RAD: f32 = 0.01;
 
-/// One sensor.
-#[derive(Clone, Copy, Debug)]
-struct Stuck {
-    /// Check sums of the last two values that differed.
-    values: [u16; 2],
-    /// When the last one came first: milliseconds modulo 2^32.
-    since_ms: u32,
-    /// For how long it has come, and the longest that one did before: up to 65.5 s.
-    lasts_ms: u16,
-    usual_ms: u16,
-    /// How far the vehicle had moved when the last one came first.
-    moved: f32,
-    repeats: u8,
-    changes: u8,
-    /// Changes for which the vehicle had not moved.
-    trembles: u8,
+state! {
+    /// One sensor.
+    #[derive(Clone, Copy, Debug)]
+    struct Stuck {
+        /// Check sums of the last two values that differed.
+        values: [u16; 2],
+        /// When the last one came first: milliseconds modulo 2^32.
+        since_ms: u32,
+        /// For how long it has come, and the longest that one did before: up to 65.5 s.
+        lasts_ms: u16,
+        usual_ms: u16,
+        /// How far the vehicle had moved when the last one came first.
+        moved: f32,
+        repeats: u8,
+        changes: u8,
+        /// Changes for which the vehicle had not moved.
+        trembles: u8,
+    }
 }
 
 impl Stuck {
-    /// Nothing seen.
-    const NEW: Self = Self {
-        values: [0; 2],
-        since_ms: 0,
-        lasts_ms: 0,
-        usual_ms: 0,
-        moved: 0.0,
-        repeats: 0,
-        changes: 0,
-        trembles: 0,
-    };
-
     /// Takes a value, as the bits of all it consists of; and how far it has moved in this flight.
     fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
         // FNV-1a, of words.
@@ -135,19 +126,19 @@ impl Stuck {
     }
 }
 
-/// How far the vehicle has moved in this flight, to and fro.
-#[derive(Clone, Copy, Debug)]
-struct Moved {
-    climbed_m: f32,
-    travelled_m: f32,
-    turned_rad: f32,
-    /// The attitude when a turn was counted last, rad; none since a hole.
-    attitude: Option<[f32; 3]>,
+state! {
+    /// How far the vehicle has moved in this flight, to and fro.
+    #[derive(Clone, Copy, Debug)]
+    struct Moved {
+        climbed_m: f32,
+        travelled_m: f32,
+        turned_rad: f32,
+        /// The attitude when a turn was counted last, rad; none since a hole.
+        attitude: Option<[f32; 3]>,
+    }
 }
 
 impl Moved {
-    const NONE: Self = Self { climbed_m: 0.0, travelled_m: 0.0, turned_rad: 0.0, attitude: None };
-
     fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
         let climb_mps = climb_mps(now, vehicle).map_or(0.0, libm::fabsf);
         self.climbed_m += if climb_mps > HANGS_MPS { climb_mps * step_s } else { 0.0 };
@@ -171,25 +162,20 @@ impl Moved {
     }
 }
 
-/// All sensors by kind, and the receivers.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Repeats {
-    moved: Moved,
-    sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT],
-    receivers: [Stuck; RECEIVERS_MAX],
+state! {
+    /// All sensors by kind, and the receivers.
+    #[derive(Clone, Copy, Debug)]
+    pub(crate) struct Repeats {
+        moved: Moved,
+        sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT],
+        receivers: [Stuck; RECEIVERS_MAX],
+    }
 }
 
 impl Repeats {
-    /// Nothing seen.
-    pub(crate) const NEW: Self = Self {
-        moved: Moved::NONE,
-        sensors: [[Stuck::NEW; SENSORS_MAX]; Kind::COUNT],
-        receivers: [Stuck::NEW; RECEIVERS_MAX],
-    };
-
     /// The same, as another flight begins.
     pub(crate) fn begun(&self) -> Self {
-        let mut begun = Self::NEW;
+        let mut begun = Self::default();
         begun.sensors[Kind::Barometer as usize] = self.sensors[Kind::Barometer as usize].map(Stuck::begun);
         begun
     }
@@ -273,7 +259,7 @@ mod tests {
 
     /// Values a tenth of a second apart.
     fn taken(values: impl IntoIterator<Item = u32>) -> Option<f32> {
-        let mut stuck = Stuck::NEW;
+        let mut stuck = Stuck::default();
         for (tenth, value) in (0_u64..).zip(values) {
             stuck.take(Instant::from_millis(tenth * 100), [value, 7], 0.0);
         }
@@ -291,7 +277,7 @@ mod tests {
     #[test]
     fn what_trembled_where_nothing_moved_is_silent_after_a_while() {
         let silent = |moves: f32, repeats: u64| {
-            let mut stuck = Stuck::NEW;
+            let mut stuck = Stuck::default();
             for tenth in 0_u64..100 + repeats {
                 let moved = moves * tenth as f32;
                 stuck.take(Instant::from_millis(tenth * 100), [tenth.min(100) as u32], moved);
@@ -306,7 +292,7 @@ mod tests {
     #[test]
     fn a_hole_is_no_repetition() {
         let after = |repeats: u64| {
-            let mut stuck = Stuck::NEW;
+            let mut stuck = Stuck::default();
             for tenth in 0..60 + repeats {
                 let hole_ms = if tenth > 60 { 8_000 } else { 0 };
                 stuck.take(Instant::from_millis(tenth * 100 + hole_ms), [tenth.min(60) as u32], 0.0);
@@ -327,7 +313,7 @@ mod tests {
     #[test]
     fn a_witness_changes_while_another_repeats_and_not_at_its_last_change() {
         let taken = |values: &mut dyn Iterator<Item = u32>| {
-            let mut stuck = Stuck::NEW;
+            let mut stuck = Stuck::default();
             for (tenth, value) in (0_u64..).zip(values) {
                 stuck.take(Instant::from_millis(u64::from(u32::MAX) - 3_000 + tenth * 100), [value], 0.0);
             }

@@ -4,7 +4,7 @@
 //! is learnt, a multicopter hovers at a quarter to three quarters of its throttle and idles below a tenth.
 
 use crate::motion::IDLE_THROTTLE;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 
 /// Above this the vehicle may fly, while the hover throttle is unknown.
 pub(crate) const CARRIES: f32 = 0.2;
@@ -14,8 +14,6 @@ pub(crate) const FULL: f32 = 0.95;
 const HOVER_PART: f32 = 0.5;
 /// Time constant of the hover throttle, and the hover time until it is known, s.
 const HOVER_S: f32 = 10.0;
-/// Throttles come more often than this, s.
-const STEP_MAX_S: f32 = 2.0;
 
 /// The effect of a throttle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +48,7 @@ impl Thrust {
 
     /// Takes a throttle of an armed vehicle, and whether it hovers.
     pub(crate) fn take(&mut self, at: Instant, part: f32, hovers: bool) {
-        let step_s = at.since(core::mem::replace(&mut self.at, at)).as_secs_f32().min(STEP_MAX_S);
+        let step_s = at.since(core::mem::replace(&mut self.at, at)).min(PAUSE).as_secs_f32();
         if part > self.idle().min(IDLE_THROTTLE) {
             self.driven_at = at;
         }

@@ -134,6 +134,12 @@ impl Stamp {
 /// Longest gap between samples of one course, and largest age of a current sample: two messages of a stream at 1 Hz.
 pub(crate) const PAUSE: Span = Span::from_secs(2);
 
+/// What is younger is of now, of streams at 2 Hz and more.
+pub(crate) const FRESH: Span = Span::from_secs(1);
+
+/// What is older is of no use, of streams at 0.5 Hz and more: they have stopped.
+pub(crate) const SILENT: Span = Span::from_secs(5);
+
 /// A length of time in milliseconds, up to 49.7 days.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Span(u32);

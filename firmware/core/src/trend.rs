@@ -1,21 +1,24 @@
 //! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
 
+use crate::initial::state;
 use crate::time::Instant;
 use crate::units::{Amperes, Volts};
 
-/// A battery's internal resistance: the slope of its voltage over its current, from exponential means.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Resistance {
-    current_a: f32,
-    voltage_v: f32,
-    variance_a2: f32,
-    variance_v2: f32,
-    covariance_va: f32,
-    samples: u16,
-    /// The baseline of later figures, ohm; 0 before there is one.
-    baseline_ohm: f32,
-    /// The last figure from a large change of the current, ohm; 0 before there is one.
-    sag_ohm: f32,
+state! {
+    /// A battery's internal resistance: the slope of its voltage over its current, from exponential means.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub(crate) struct Resistance {
+        current_a: f32,
+        voltage_v: f32,
+        variance_a2: f32,
+        variance_v2: f32,
+        covariance_va: f32,
+        samples: u16,
+        /// The baseline of later figures, ohm; 0 before there is one.
+        baseline_ohm: f32,
+        /// The last figure from a large change of the current, ohm; 0 before there is one.
+        sag_ohm: f32,
+    }
 }
 
 impl Resistance {
@@ -34,19 +37,6 @@ impl Resistance {
     /// failing cell lowers the voltage without such a change.
     const SAMPLES_SAG: u16 = 20;
     const SPREAD_SAG: f32 = 0.2;
-
-    pub(crate) const fn new() -> Self {
-        Self {
-            current_a: 0.0,
-            voltage_v: 0.0,
-            variance_a2: 0.0,
-            variance_v2: 0.0,
-            covariance_va: 0.0,
-            samples: 0,
-            baseline_ohm: 0.0,
-            sag_ohm: 0.0,
-        }
-    }
 
     /// Takes a measurement of the battery.
     pub(crate) fn take(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
@@ -99,12 +89,6 @@ impl Resistance {
     pub(crate) fn rise_percent(&self) -> Option<f32> {
         let ohm = self.ohm()?;
         (self.baseline_ohm > 0.0).then(|| (ohm / self.baseline_ohm - 1.0) * 100.0)
-    }
-}
-
-impl Default for Resistance {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -166,7 +150,7 @@ mod tests {
 
     #[test]
     fn resistance_is_found_under_a_changing_load_and_its_rise_against_the_baseline() {
-        let mut resistance = Resistance::new();
+        let mut resistance = Resistance::default();
         load(&mut resistance, 0.020, 600);
         assert!((resistance.ohm().expect("known") - 0.020).abs() < 0.001, "{resistance:?}");
         assert!(resistance.rise_percent().expect("known").abs() < 5.0);
@@ -176,14 +160,14 @@ mod tests {
 
     #[test]
     fn a_steady_current_says_nothing_about_resistance() {
-        let mut resistance = Resistance::new();
+        let mut resistance = Resistance::default();
         (0..1_000).for_each(|_| resistance.take(Some(Volts(15.0)), Some(Amperes(12.0))));
         assert_eq!((resistance.ohm(), resistance.rise_percent()), (None, None));
     }
 
     #[test]
     fn a_voltage_that_falls_by_itself_is_no_resistance() {
-        let mut resistance = Resistance::new();
+        let mut resistance = Resistance::default();
         for sample in 0..1_000_u16 {
             let current = 12.0 + f32::from(sample * 7 % 10);
             let voltage = if sample < 600 { 12.6 } else { 11.0 };
@@ -194,7 +178,7 @@ mod tests {
 
     #[test]
     fn the_sag_of_a_take_off_is_known_for_the_flight_and_a_failing_cell_is_no_sag() {
-        let mut resistance = Resistance::new();
+        let mut resistance = Resistance::default();
         let mut take = |volts, amperes, samples| {
             (0..samples).for_each(|_| resistance.take(Some(Volts(volts)), Some(Amperes(amperes))));
             resistance.sag_v(Amperes(amperes))

@@ -6,6 +6,7 @@
 use crate::alert::Alerts;
 use crate::election::Election;
 use crate::inertial::Inertial;
+use crate::initial::state;
 use crate::latest::Latest;
 use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
@@ -31,25 +32,21 @@ const REBOOT_MS: i64 = 3_000;
 /// s), and a landing, a disarming or another battery may have passed unseen.
 const OFF: Span = Span::from_secs(10);
 
-/// One motor, put together from two kinds of ESC messages: PX4 sends both, ArduPilot's one message is of both kinds. The fields of a kind
-/// are those of its last message.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motor {
-    /// The fields of the last message of each kind.
-    pub esc: Esc,
-    /// When `rpm`, `voltage` and `current` came (`ESC_STATUS`).
-    pub moved_at: Option<Instant>,
-    /// When `temperature`, `failures` and `errors` came (`ESC_INFO`).
-    pub state_at: Option<Instant>,
+state! {
+    /// One motor, put together from two kinds of ESC messages: PX4 sends both, ArduPilot's one message is of both kinds. The fields of a kind
+    /// are those of its last message.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Motor {
+        /// The fields of the last message of each kind.
+        pub esc: Esc = Esc { rpm: None, voltage: None, current: None, temperature: None, failures: None, errors: None },
+        /// When `rpm`, `voltage` and `current` came (`ESC_STATUS`).
+        pub moved_at: Option<Instant>,
+        /// When `temperature`, `failures` and `errors` came (`ESC_INFO`).
+        pub state_at: Option<Instant>,
+    }
 }
 
 impl Motor {
-    const UNKNOWN: Self = Self {
-        esc: Esc { rpm: None, voltage: None, current: None, temperature: None, failures: None, errors: None },
-        moved_at: None,
-        state_at: None,
-    };
-
     fn take(&mut self, at: Instant, esc: Esc) {
         let Esc { rpm, voltage, current, temperature, failures, errors } = esc;
         if rpm.is_some() || voltage.is_some() || current.is_some() {
@@ -72,154 +69,99 @@ fn known(places: impl Iterator<Item = bool>) -> u8 {
     (1..).zip(places).fold(0, |count, (place, is_known)| if is_known { place } else { count })
 }
 
-/// The vehicle as it is known now.
-#[derive(Clone, Copy, Debug)]
-pub struct Vehicle {
-    /// The autopilot, once it has sent a heartbeat.
-    pub source: Option<Source>,
-    /// The autopilot's heartbeat.
-    pub heartbeat: Latest<Heartbeat>,
-    /// `SYS_STATUS`
-    pub system: Latest<SystemStatus>,
-    /// Alerts: problems that the autopilot reports.
-    pub alerts: Alerts,
-    /// `SYSTEM_TIME`
-    pub time: Latest<SystemTime>,
-    /// Receivers by instance.
-    pub gnss: [Latest<Gnss>; RECEIVERS_MAX],
-    /// Receivers by instance.
-    pub gnss_integrity: [Latest<GnssIntegrity>; RECEIVERS_MAX],
-    /// The first inertial sensor.
-    pub imu: Latest<Imu>,
-    /// Judgement of its motion and attitude by accelerometer and gyros alone.
-    pub inertial: Inertial,
-    /// The air.
-    pub air: Latest<Air>,
-    /// Attitude.
-    pub attitude: Latest<Attitude>,
-    /// Roll and pitch that the autopilot wants.
-    pub wanted: Latest<[Radians; 2]>,
-    /// Position from the local origin.
-    pub local: Latest<LocalPosition>,
-    /// The fused position.
-    pub global: Latest<GlobalPosition>,
-    /// The pilot's display.
-    pub hud: Latest<Hud>,
-    /// Radio control.
-    pub rc: Latest<RadioControl>,
-    /// The telemetry radio.
-    pub radio: Latest<TelemetryRadio>,
-    /// The autopilot's rails.
-    pub rails: Latest<Rails>,
-    /// Batteries in the order in which they were first seen.
-    pub batteries: [Latest<Battery>; BATTERIES_MAX],
-    /// The component that each battery is told by: two components may both have a battery 0.
-    battery_of: [u8; BATTERIES_MAX],
-    /// The place of the battery that was told of last.
-    pub(crate) told_battery: Option<usize>,
-    /// The estimator.
-    pub estimator: Latest<Estimator>,
-    /// Vibration.
-    pub vibration: Latest<Vibration>,
-    /// Motors by number.
-    pub motors: [Motor; MOTORS_MAX],
-    /// The combustion engine.
-    pub engine: Latest<Engine>,
-    /// The generator.
-    pub generator: Latest<Generator>,
-    /// Its highest speed since it was switched on; `None` until it runs in this flight, from arming to disarming.
-    pub(crate) generator_top: Option<Rpm>,
-    /// The autopilot's word on flying.
-    pub landed: Latest<LandedState>,
-    /// The lift of a VTOL, as old as `landed`.
-    pub vtol: VtolState,
-    /// The autopilot's processor.
-    pub processor: Latest<Processor>,
-    /// The autopilot's identity.
-    pub identity: Latest<AutopilotIdentity>,
-    /// The last answer to a command.
-    pub command_ack: Latest<CommandAck>,
-    /// The mission's item that was reached last.
-    pub mission_reached: Latest<u16>,
-    /// How often the autopilot has rebooted since our power-on.
-    pub reboots: u32,
-    /// When it did last.
-    pub rebooted_at: Option<Instant>,
-    /// Whether it was armed then: a restart on the ground is none that endangers anybody.
-    pub rebooted_armed: bool,
-    /// How often another system has become the vehicle: everything else here is then of that one.
-    pub changes: u32,
-    election: Election,
-    /// The highest boot time since its last boot, milliseconds, and when it came.
-    boot: Option<(u32, Instant)>,
-    /// One that does not follow it, until the next one agrees with either.
-    odd_boot: Option<(u32, Instant)>,
-    /// Whether it was armed when a boot time was believed last.
-    boot_armed: bool,
-    /// Since when it has called its flight terminated.
-    pub terminated_since: Option<Instant>,
-    /// The climb that the autopilot wants.
-    pub(crate) climb_wanted: Latest<MetresPerSecond>,
-}
-
-impl Default for Vehicle {
-    fn default() -> Self {
-        Self::unknown()
+state! {
+    /// The vehicle as it is known now.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Vehicle {
+        /// The autopilot, once it has sent a heartbeat.
+        pub source: Option<Source>,
+        /// The autopilot's heartbeat.
+        pub heartbeat: Latest<Heartbeat>,
+        /// `SYS_STATUS`
+        pub system: Latest<SystemStatus>,
+        /// Alerts: problems that the autopilot reports.
+        pub alerts: Alerts,
+        /// `SYSTEM_TIME`
+        pub time: Latest<SystemTime>,
+        /// Receivers by instance.
+        pub gnss: [Latest<Gnss>; RECEIVERS_MAX],
+        /// Receivers by instance.
+        pub gnss_integrity: [Latest<GnssIntegrity>; RECEIVERS_MAX],
+        /// The first inertial sensor.
+        pub imu: Latest<Imu>,
+        /// Judgement of its motion and attitude by accelerometer and gyros alone.
+        pub inertial: Inertial,
+        /// The air.
+        pub air: Latest<Air>,
+        /// Attitude.
+        pub attitude: Latest<Attitude>,
+        /// Roll and pitch that the autopilot wants.
+        pub wanted: Latest<[Radians; 2]>,
+        /// Position from the local origin.
+        pub local: Latest<LocalPosition>,
+        /// The fused position.
+        pub global: Latest<GlobalPosition>,
+        /// The pilot's display.
+        pub hud: Latest<Hud>,
+        /// Radio control.
+        pub rc: Latest<RadioControl>,
+        /// The telemetry radio.
+        pub radio: Latest<TelemetryRadio>,
+        /// The autopilot's rails.
+        pub rails: Latest<Rails>,
+        /// Batteries in the order in which they were first seen.
+        pub batteries: [Latest<Battery>; BATTERIES_MAX],
+        /// The component that each battery is told by: two components may both have a battery 0.
+        battery_of: [u8; BATTERIES_MAX],
+        /// The place of the battery that was told of last.
+        pub(crate) told_battery: Option<usize>,
+        /// The estimator.
+        pub estimator: Latest<Estimator>,
+        /// Vibration.
+        pub vibration: Latest<Vibration>,
+        /// Motors by number.
+        pub motors: [Motor; MOTORS_MAX],
+        /// The combustion engine.
+        pub engine: Latest<Engine>,
+        /// The generator.
+        pub generator: Latest<Generator>,
+        /// Its highest speed since it was switched on; `None` until it runs in this flight, from arming to disarming.
+        pub(crate) generator_top: Option<Rpm>,
+        /// The autopilot's word on flying.
+        pub landed: Latest<LandedState>,
+        /// The lift of a VTOL, as old as `landed`.
+        pub vtol: VtolState = VtolState::Unknown,
+        /// The autopilot's processor.
+        pub processor: Latest<Processor>,
+        /// The autopilot's identity.
+        pub identity: Latest<AutopilotIdentity>,
+        /// The last answer to a command.
+        pub command_ack: Latest<CommandAck>,
+        /// The mission's item that was reached last.
+        pub mission_reached: Latest<u16>,
+        /// How often the autopilot has rebooted since our power-on.
+        pub reboots: u32,
+        /// When it did last.
+        pub rebooted_at: Option<Instant>,
+        /// Whether it was armed then: a restart on the ground is none that endangers anybody.
+        pub rebooted_armed: bool,
+        /// How often another system has become the vehicle: everything else here is then of that one.
+        pub changes: u32,
+        election: Election,
+        /// The highest boot time since its last boot, milliseconds, and when it came.
+        boot: Option<(u32, Instant)>,
+        /// One that does not follow it, until the next one agrees with either.
+        odd_boot: Option<(u32, Instant)>,
+        /// Whether it was armed when a boot time was believed last.
+        boot_armed: bool,
+        /// Since when it has called its flight terminated.
+        pub terminated_since: Option<Instant>,
+        /// The climb that the autopilot wants.
+        pub(crate) climb_wanted: Latest<MetresPerSecond>,
     }
 }
 
 impl Vehicle {
-    /// Nothing known.
-    #[expect(clippy::inline_always, reason = "else it is on the stack twice: 2 KiB more")]
-    #[inline(always)]
-    pub const fn unknown() -> Self {
-        Self {
-            source: None,
-            heartbeat: Latest::nothing(),
-            system: Latest::nothing(),
-            alerts: Alerts::new(),
-            time: Latest::nothing(),
-            gnss: [const { Latest::nothing() }; RECEIVERS_MAX],
-            gnss_integrity: [const { Latest::nothing() }; RECEIVERS_MAX],
-            imu: Latest::nothing(),
-            inertial: Inertial::new(),
-            air: Latest::nothing(),
-            attitude: Latest::nothing(),
-            wanted: Latest::nothing(),
-            local: Latest::nothing(),
-            global: Latest::nothing(),
-            hud: Latest::nothing(),
-            rc: Latest::nothing(),
-            radio: Latest::nothing(),
-            rails: Latest::nothing(),
-            batteries: [const { Latest::nothing() }; BATTERIES_MAX],
-            battery_of: [0; BATTERIES_MAX],
-            told_battery: None,
-            estimator: Latest::nothing(),
-            vibration: Latest::nothing(),
-            motors: [Motor::UNKNOWN; MOTORS_MAX],
-            engine: Latest::nothing(),
-            generator: Latest::nothing(),
-            generator_top: None,
-            landed: Latest::nothing(),
-            vtol: VtolState::Unknown,
-            processor: Latest::nothing(),
-            identity: Latest::nothing(),
-            command_ack: Latest::nothing(),
-            mission_reached: Latest::nothing(),
-            reboots: 0,
-            rebooted_at: None,
-            rebooted_armed: false,
-            changes: 0,
-            election: Election::new(),
-            boot: None,
-            odd_boot: None,
-            boot_armed: false,
-            terminated_since: None,
-            climb_wanted: Latest::nothing(),
-        }
-    }
-
     /// Motors up to the last one whose ESC has said anything.
     pub(crate) fn motors_known(&self) -> u8 {
         known(self.motors.iter().map(Motor::is_known))
@@ -244,7 +186,7 @@ impl Vehicle {
     #[inline(never)] // A whole vehicle: not on the stack of every observation.
     fn become_another(&mut self, chosen: Option<Source>) {
         let changes = self.changes.saturating_add(u32::from(self.source.is_some()));
-        *self = Self { source: chosen, changes, election: self.election, ..Self::unknown() };
+        *self = Self { source: chosen, changes, election: self.election, ..Self::default() };
     }
 
     /// What kind of vehicle it is.
@@ -530,7 +472,7 @@ mod tests {
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
     fn known() -> Vehicle {
-        let mut vehicle = Vehicle::unknown();
+        let mut vehicle = Vehicle::default();
         let heartbeat = Heartbeat { autopilot: Autopilot::Px4, ..Heartbeat::default() };
         assert!(vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat)));
         vehicle

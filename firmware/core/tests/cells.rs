@@ -96,7 +96,7 @@ fn what_the_autopilot_the_setting_or_an_earlier_flight_tells_makes_it_known() {
     set.set("BAT_CELLS", 6.0).unwrap();
     assert_eq!(fly(&mut Monitor::new(set), 25.2, 18.0, &[]).cells(), [(0, Level::Critical)]);
     let mut monitor = Monitor::new(protected());
-    let life = Lifetime { cells: [6, 0, 0, 0], ..Lifetime::new() };
+    let life = Lifetime { cells: [6, 0, 0, 0], ..Lifetime::default() };
     let mut stored = [0; Lifetime::BYTES];
     life.encode(&mut stored);
     monitor.restore(ItemKey::Lifetime, &stored).unwrap();

@@ -17,7 +17,7 @@ const OTHER: Source = Source { system: 7, component: 1 };
 /// A monitor whose stored life is of this airframe.
 fn with_life_of(airframe: Airframe) -> Run {
     let mut run = Run::new(&Params::defaults());
-    let life = Lifetime { airframe, boots: 41, ..Lifetime::new() };
+    let life = Lifetime { airframe, boots: 41, ..Lifetime::default() };
     let mut bytes = [0; Lifetime::BYTES];
     life.encode(&mut bytes);
     run.monitor.restore(ItemKey::Lifetime, &bytes).unwrap();

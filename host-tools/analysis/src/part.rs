@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_part_is_named_with_the_limit_that_it_reaches_first() {
-        let figures = Figures { flight_s: 3_600.0, motor_s: 7_200.0, flights: 3.0, ..Figures::ZERO };
+        let figures = Figures { flight_s: 3_600.0, motor_s: 7_200.0, flights: 3.0, ..Figures::default() };
         let limit = |kind, limits| first_limit(kind, &figures, &limits).map(|limit| limit.to_string());
         assert_eq!(limit("motor", [10.0, 50.0, 0.0, 4.0]).as_deref(), Some("4 h turning"));
         assert_eq!(limit("airframe", [1.5, 50.0, 0.0, 0.0]).as_deref(), Some("1.5 h in the air"));

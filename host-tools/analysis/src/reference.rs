@@ -152,8 +152,8 @@ impl Reference {
     /// Empty.
     pub fn new() -> Self {
         Self {
-            vehicle: Vehicle::unknown(),
-            flight: Flight::grounded(),
+            vehicle: Vehicle::default(),
+            flight: Flight::default(),
             flown: Span::from_secs(0),
             heard: None,
         }

@@ -222,7 +222,7 @@ impl World {
                 // their earlier hours: a part not listed has run zero hours.
                 let new = |place: &usize| matches!(self.parts.get(*place), Some(None));
                 if let Some(place) = place_of(name).filter(|_| *start && at < BEGINNING).filter(new) {
-                    self.part(place, Component::NONE);
+                    self.part(place, Component::default());
                 }
                 for craft in self.crafts.values_mut() {
                     self.limits.take(craft.monitor.params_mut(), name, *value);
@@ -525,9 +525,9 @@ mod tests {
 
     /// The second motor, which has turned nine and a half of them.
     fn motor() -> Told {
-        let mut component = Component::NONE;
+        let mut component = Component::default();
         (component.kind, component.number) = (Kind::Motor, 2);
-        let ran = Figures { motor_s: 9.5 * 3_600.0, ..Figures::ZERO };
+        let ran = Figures { motor_s: 9.5 * 3_600.0, ..Figures::default() };
         Told::Part { place: 0, component: component.having_run(ran) }
     }
 

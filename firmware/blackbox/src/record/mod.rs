@@ -268,7 +268,7 @@ mod tests {
             replaced: 3,
             name: "prop 4",
             serial: "SN 1",
-            figures: Figures { flight_s: 3_600.5, flights: 12.0, ..Figures::ZERO },
+            figures: Figures { flight_s: 3_600.5, flights: 12.0, ..Figures::default() },
             used_percent: 101.0,
             by: (255, 190),
             new_serial: "SN 2",

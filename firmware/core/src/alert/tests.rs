@@ -115,7 +115,7 @@ fn an_event_tells_its_cause_by_its_number_and_its_arguments() {
 
 /// Alerts of a vehicle that is armed.
 fn armed() -> Alerts {
-    let mut alerts = Alerts::new();
+    let mut alerts = Alerts::default();
     alerts.take_armed(T0, true);
     alerts
 }
@@ -127,7 +127,7 @@ fn armed() -> Alerts {
 /// - flags of `SYS_STATUS` (`flags`, and the bit of an unhealthy sensor);
 /// - the expected level of a cause (`Gnss = 2`; `-` if it was never reported).
 fn play(script: &str) {
-    let mut alerts = Alerts::new();
+    let mut alerts = Alerts::default();
     for step in script.split("; ") {
         let words: Vec<&str> = step.split(' ').collect();
         let at = after(words[0].parse().unwrap());

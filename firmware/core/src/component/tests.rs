@@ -10,7 +10,7 @@ fn params(set: &[(&str, f32)]) -> Params {
 }
 
 fn flown(hours: f64, flights: f64) -> Totals {
-    let mut totals = Totals::nothing();
+    let mut totals = Totals::default();
     totals.add(UsageCounter::Flight, hours * 3_600.0);
     totals.add(UsageCounter::Flights, flights);
     totals.motors[1].seconds = hours * 3_600.0;
@@ -20,7 +20,7 @@ fn flown(hours: f64, flights: f64) -> Totals {
 #[test]
 fn the_limit_that_trips_first_decides() {
     let params = params(&[("CMP2_KIND", 1.0), ("CMP2_HOURS", 100.0), ("CMP2_FLIGHTS", 10.0)]);
-    let mut component = Component::NONE;
+    let mut component = Component::default();
     for (hours, flights, status) in [
         (89.0, 1.0, Status::Green),
         (91.0, 1.0, Status::Yellow),
@@ -40,15 +40,15 @@ fn the_limit_that_trips_first_decides() {
 #[test]
 fn a_replaced_part_has_run_nothing_and_the_old_ones_figures_are_told() {
     let params = params(&[("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 50.0)]);
-    let mut component = Component::NONE;
-    let totals = Totals::nothing();
+    let mut component = Component::default();
+    let totals = Totals::default();
     assert!(component.describe(0, &Wear { totals: &totals, battery_cycles: &[] }, &params));
     let totals = flown(60.0, 5.0);
     let wear = Wear { totals: &totals, battery_cycles: &[] };
     assert_eq!(component.status(0, &wear, &params), Status::Red);
     let old = component.replace(Label::new("SN 2"), &wear);
-    assert_eq!((old.serial, old.ran().flights), (Label::EMPTY, 5.0));
-    assert_eq!((component.figures(&wear), component.serial.as_str()), (Figures::ZERO, "SN 2"));
+    assert_eq!((old.serial, old.ran().flights), (Label::default(), 5.0));
+    assert_eq!((component.figures(&wear), component.serial.as_str()), (Figures::default(), "SN 2"));
     assert_eq!(component.status(0, &wear, &params), Status::Green);
 }
 
@@ -57,14 +57,14 @@ fn a_component_reads_back_and_the_session_is_added_once() {
     let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
     let totals = flown(1.0, 2.0);
     let wear = Wear { totals: &totals, battery_cycles: &[0.75] };
-    let none = Totals::nothing();
-    let mut component = Component { name: Label::new("pack A"), ..Component::NONE };
+    let none = Totals::default();
+    let mut component = Component { name: Label::new("pack A"), ..Component::default() };
     component.describe(0, &Wear { totals: &none, battery_cycles: &[] }, &params);
     let ran = Figures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 };
     let mut replaced = component;
     replaced.replace(Label::new("pack B"), &wear);
     for (component, boots, expected) in
-        [(component, 5, ran), (component, 6, Figures::ZERO), (replaced, 5, Figures::ZERO)]
+        [(component, 5, ran), (component, 6, Figures::default()), (replaced, 5, Figures::default())]
     {
         let mut stored = [0; Component::BYTES];
         component.as_of(boots).encode(&mut stored);

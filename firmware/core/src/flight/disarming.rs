@@ -6,9 +6,9 @@
 use super::witness::on_rotors;
 use super::{Flight, STILL};
 use crate::mishap::Kind;
-use crate::motion::{FRESH, STILL_MPS, WINGS_MPS, WindowMax, climb_mps, ground_speed_mps};
+use crate::motion::{STILL_MPS, WINGS_MPS, WindowMax, climb_mps, ground_speed_mps};
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 use crate::vehicle::Vehicle;
 
 /// How long it is watched.
@@ -88,7 +88,7 @@ impl Flight {
             && !on_rotors(now, vehicle)
             && ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > WINGS_MPS);
         // An autopilot that lost its estimate terminates the flight, and tells no more of heights and speeds.
-        let drops = passed > FRESH && vehicle.armed() && self.pressure.follows(now, -DROPS_MPS) == Some(true);
+        let drops = passed > PAUSE && vehicle.armed() && self.pressure.follows(now, -DROPS_MPS) == Some(true);
         watch.is_unloaded || falls || glides || drops
     }
 
@@ -113,5 +113,5 @@ impl Flight {
 
 /// Height above mean sea level, m: home is another one once it is disarmed.
 pub(super) fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    vehicle.global.within(now, FRESH).map(|global| global.altitude.0)
+    vehicle.global.within(now, PAUSE).map(|global| global.altitude.0)
 }

@@ -8,11 +8,11 @@ use crate::gates::LEANS_RAD;
 use crate::inertial::LIES;
 use crate::mishap::Kind;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
-use crate::motion::{FRESH, STILL_MPS, TILTED_RAD, climb_mps, ground_speed_mps, height_m, throttle};
+use crate::motion::{STILL_MPS, TILTED_RAD, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::{Attitude, EstimatorScale, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::thrust::{FULL, Power};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 use crate::vehicle::Vehicle;
 
@@ -47,8 +47,7 @@ const LASTS: Span = Span::from_millis(500);
 const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
 /// Rotors that pull downwards for a moment more than level, by the estimator's attitude alone.
 const OVERTURNED_DEG: f32 = 100.0;
-/// Age of a climb setpoint, and by how much the vehicle may sink faster, m/s.
-const SETPOINT_AGE: Span = Span::from_secs(1);
+/// A vehicle may sink so much faster than its setpoint, m/s.
 const FOLLOWS_MPS: f32 = 2.0;
 /// A vehicle that stalls or has lost a propeller loses so much height with all its thrust, m; gusts take less.
 const LOST_M: f32 = 7.0;
@@ -76,7 +75,7 @@ impl Lasting {
             self.samples = 0;
             return None;
         }
-        if self.samples == 0 || at.since(self.last) > FRESH {
+        if self.samples == 0 || at.since(self.last) > PAUSE {
             (self.since, self.samples) = (at, 0);
         }
         self.last = at;
@@ -86,7 +85,7 @@ impl Lasting {
 
     /// Whether it was so in the last samples, for so long.
     fn lasts(&self, now: Instant, span: Span) -> bool {
-        self.samples >= 2 && now.since(self.last) <= FRESH && now.since(self.since) >= span
+        self.samples >= 2 && now.since(self.last) <= PAUSE && now.since(self.since) >= span
     }
 }
 
@@ -201,7 +200,7 @@ impl Flight {
         let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
             && self.pressure.follows(now, -FALLING_MPS) != Some(true);
         let others_fly = (votes.flies & !INERTIAL).count_ones() >= 2 && votes.stands == 0;
-        let goes_on = now.since(self.signs.falls.last.later(self.signs.tumbles.last)) <= FRESH;
+        let goes_on = now.since(self.signs.falls.last.later(self.signs.tumbles.last)) <= PAUSE;
         self.signs.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
     }
 
@@ -467,7 +466,7 @@ impl Flight {
 /// Whether the autopilot wants a faster sink than the limit, and the vehicle sinks little faster than that. A
 /// mission, a script or an offboard computer then asks for it.
 fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
-    let wanted_mps = vehicle.climb_wanted.within(at, SETPOINT_AGE).map(|climb| -climb.0);
+    let wanted_mps = vehicle.climb_wanted.within(at, FRESH).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
 }
 
@@ -475,7 +474,7 @@ fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle
 fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
     vehicle
         .wanted
-        .within(at, SETPOINT_AGE)
+        .within(at, FRESH)
         .is_some_and(|[roll, pitch]| vehicle.is_multicopter() && roll.0.abs().max(pitch.0.abs()) > LEANS_RAD)
 }
 
@@ -483,7 +482,7 @@ fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
 /// of a fall that neither the barometer nor the inertial sensors know of.
 fn is_displayed(at: Instant, sink_mps: f32, vehicle: &Vehicle) -> bool {
     const PART: f32 = 0.3;
-    let climb_mps = vehicle.hud.within(at, FRESH).and_then(|hud| hud.climb).map(|climb| climb.0);
+    let climb_mps = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
     climb_mps
         .filter(|climb_mps| libm::fabsf(*climb_mps) > 0.0)
         .is_none_or(|climb_mps| -climb_mps > PART * sink_mps)

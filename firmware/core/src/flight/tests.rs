@@ -49,7 +49,7 @@ fn observations(words: &str, for_s: f32, kind: VehicleKind) -> Vec<Observation> 
 
 /// The events of a script: when each was found, and the take-off or the last moment in the air, s.
 fn fly(kind: VehicleKind, script: &str) -> String {
-    let (mut vehicle, mut flight, mut events) = (Vehicle::unknown(), Flight::grounded(), Vec::new());
+    let (mut vehicle, mut flight, mut events) = (Vehicle::default(), Flight::default(), Vec::new());
     let (mut now_ms, mut flew_ms) = (0, 0);
     for piece in script.split(" | ") {
         let (until_s, words) = piece.split_once(' ').unwrap();

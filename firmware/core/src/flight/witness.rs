@@ -15,14 +15,14 @@ use super::{Flight, Stage};
 use crate::gates::TURNED;
 use crate::mishap::Kind;
 use crate::motion::{
-    CLEAR_M, FRESH, LOW_M, MOVES_MPS, STILL_MPS, TILTED_RAD, WINGS_MPS, airspeed_mps, climb_mps,
-    ground_speed_mps, throttle,
+    CLEAR_M, LOW_M, MOVES_MPS, STILL_MPS, TILTED_RAD, WINGS_MPS, airspeed_mps, climb_mps, ground_speed_mps,
+    throttle,
 };
 use crate::observation::{LandedState, VehicleKind};
 use crate::params::Params;
 use crate::pressure::NOISE_M;
 use crate::thrust::Power;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 use crate::units::{GRAVITY, norm};
 use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
 
@@ -295,7 +295,7 @@ impl Flight {
         let rests = self.arming.is_on
             && self.thrust.is_learnt()
             && self.power(now, vehicle) == Some(Power::Idle)
-            && now.since(self.felt.at) <= FRESH
+            && now.since(self.felt.at) <= PAUSE
             && WEIGHT_G.contains(&(norm(vehicle.inertial.force()) / GRAVITY))
             && self.is_slow_to_turn();
         self.supported = match (self.pressure.now(now).filter(|_| rests), self.supported) {
@@ -335,7 +335,7 @@ fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
     !vehicle.inertial.contradicts(now)
         && vehicle
             .attitude
-            .within(now, FRESH)
+            .within(now, PAUSE)
             .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD)
 }
 

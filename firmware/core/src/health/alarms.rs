@@ -2,6 +2,7 @@
 
 use super::finding::Level;
 use super::tables::STATES;
+use crate::initial::state;
 use crate::time::{Instant, Span};
 
 /// Alarms that are kept. One more is reported, explains nothing and is not explained.
@@ -23,25 +24,20 @@ pub(super) struct Standing {
     cause_ended: Option<Instant>,
 }
 
-/// All of them.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Alarms {
-    standing: [Option<Standing>; ALARMS_MAX],
-    /// The states that are stale because of a silent link, a bit each.
-    silenced: [u32; STATES.div_ceil(32)],
-    /// The state whose alarm explains these, and when that ended.
-    silence: Option<u16>,
-    silence_ended: Option<Instant>,
+state! {
+    /// All of them.
+    #[derive(Clone, Copy, Debug)]
+    pub(super) struct Alarms {
+        standing: [Option<Standing>; ALARMS_MAX],
+        /// The states that are stale because of a silent link, a bit each.
+        silenced: [u32; STATES.div_ceil(32)],
+        /// The state whose alarm explains these, and when that ended.
+        silence: Option<u16>,
+        silence_ended: Option<Instant>,
+    }
 }
 
 impl Alarms {
-    pub(super) const NONE: Self = Self {
-        standing: [None; ALARMS_MAX],
-        silenced: [0; STATES.div_ceil(32)],
-        silence: None,
-        silence_ended: None,
-    };
-
     pub(super) fn iter(&self) -> impl Iterator<Item = &Standing> + Clone {
         self.standing.iter().flatten()
     }

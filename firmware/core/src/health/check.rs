@@ -23,6 +23,7 @@ use core::num::NonZeroU8;
 use super::finding::{Finding, Level, Orders, Subsystem};
 use super::inputs::Inputs;
 use super::suppression::Role;
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
@@ -164,15 +165,15 @@ impl Debounce {
     /// A single measurement is not enough all the same ([`SAMPLES`]).
     pub const NONE: Self = Self(0);
 
-    /// In milliseconds.
-    pub(super) const fn millis(millis: u16) -> Self {
-        Self(millis)
-    }
-
     /// In seconds, up to 65.
     pub(super) const fn secs(secs: u16) -> Self {
         assert!(secs <= 65, "a debounce is kept in 16 bits of milliseconds");
         Self(secs * 1_000)
+    }
+
+    /// In milliseconds.
+    pub(super) const fn millis(millis: u16) -> Self {
+        Self(millis)
     }
 
     /// As a span.
@@ -274,7 +275,6 @@ pub const SAMPLES: u8 = 2;
 struct Samples(u8);
 
 impl Samples {
-    const NONE: Self = Self(0);
     const BAD: u8 = 0;
     const VERY_BAD: u8 = 4;
 
@@ -292,7 +292,6 @@ impl Samples {
 struct Repeats(u8);
 
 impl Repeats {
-    const NONE: Self = Self(0);
     const MOST: u32 = 2;
 
     const fn count(self) -> u32 {
@@ -327,21 +326,23 @@ pub(super) struct How {
     pub(super) latched: bool,
 }
 
-/// The memory of one instance of a check.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct State {
-    /// `None` until the value has been seen while the check applied.
-    level: Option<Level>,
-    /// The lowest level while levels are held: a warning or critical.
-    held: Option<Level>,
-    /// Measurements in a row beyond the warning's limit, and beyond the critical one.
-    samples: Samples,
-    repeats: Repeats,
-    bad: Stamp,
-    very_bad: Stamp,
-    better: Stamp,
-    /// When the value was measured last.
-    seen: Stamp,
+state! {
+    /// The memory of one instance of a check.
+    #[derive(Clone, Copy, Debug)]
+    pub struct State {
+        /// `None` until the value has been seen while the check applied.
+        level: Option<Level>,
+        /// The lowest level while levels are held: a warning or critical.
+        held: Option<Level>,
+        /// Measurements in a row beyond the warning's limit, and beyond the critical one.
+        samples: Samples = Samples(0),
+        repeats: Repeats = Repeats(0),
+        bad: Stamp,
+        very_bad: Stamp,
+        better: Stamp,
+        /// When the value was measured last.
+        seen: Stamp,
+    }
 }
 
 const _: () = assert!(size_of::<State>() <= 20);
@@ -403,20 +404,6 @@ impl Check {
 }
 
 impl State {
-    /// Nothing seen yet.
-    pub const fn new() -> Self {
-        Self {
-            level: None,
-            held: None,
-            samples: Samples::NONE,
-            repeats: Repeats::NONE,
-            bad: Stamp::NONE,
-            very_bad: Stamp::NONE,
-            better: Stamp::NONE,
-            seen: Stamp::NONE,
-        }
-    }
-
     /// The level, or `None` while the check has had nothing to say.
     pub const fn level(&self) -> Option<Level> {
         self.level
@@ -442,7 +429,7 @@ impl State {
 
     /// Whether it is good and no change is pending.
     fn is_calm(&self) -> bool {
-        let counts = self.bad.is_set() || self.very_bad.is_set() || self.samples != Samples::NONE;
+        let counts = self.bad.is_set() || self.very_bad.is_set() || self.samples != Samples(0);
         self.level == Some(Level::Ok) && self.better.is_set() && !counts
     }
 
@@ -493,7 +480,7 @@ impl State {
         if !applies {
             // A check that no longer applies is neither bad nor known to be good: it has no level.
             let previous = self.level.filter(|level| *level != Level::Ok);
-            *self = Self::new();
+            *self = Self::default();
             return previous.map(|previous| Change {
                 level: Level::Ok,
                 previous,
@@ -508,7 +495,7 @@ impl State {
         if self.stale_after(check).is_some_and(|limit| self.seen.older_than(now, limit)) {
             // Measurements that were bad still count: a stream may be slower than values stay fresh.
             let Self { level, samples, repeats, seen, .. } = *self;
-            *self = Self { level, samples, repeats, seen, ..Self::new() };
+            *self = Self { level, samples, repeats, seen, ..Self::default() };
             return self.go(Level::Stale, f32::NAN, f32::NAN);
         }
         self.judge(check, now, reading?.value, measured, params)

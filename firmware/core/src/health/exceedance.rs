@@ -8,36 +8,30 @@ use super::check::{Check, Side};
 use super::finding::{Finding, Level};
 use super::tables::checks;
 use crate::bytes::{Fields, Unreadable, fields, fnv1a};
+use crate::initial::state;
 use crate::time::Instant;
 
 /// Checks and instances that are kept.
 pub const EXCEEDANCES_MAX: usize = 24;
 
-/// Crossings of one check's limits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossings {
-    /// How often a warning began.
-    pub warnings: u16,
-    /// How often it became critical.
-    pub criticals: u16,
-    /// How long it was a warning, tenths of a second.
-    pub warning_tenths: u32,
-    /// How long it was critical, tenths of a second.
-    pub critical_tenths: u32,
-    /// The worst value, in the check's unit; NaN before there was one.
-    pub peak: f32,
-}
-
-impl Default for Crossings {
-    fn default() -> Self {
-        Self::NONE
+state! {
+    /// Crossings of one check's limits.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Crossings {
+        /// How often a warning began.
+        pub warnings: u16,
+        /// How often it became critical.
+        pub criticals: u16,
+        /// How long it was a warning, tenths of a second.
+        pub warning_tenths: u32,
+        /// How long it was critical, tenths of a second.
+        pub critical_tenths: u32,
+        /// The worst value, in the check's unit; NaN before there was one.
+        pub peak: f32 = f32::NAN,
     }
 }
 
 impl Crossings {
-    const NONE: Self =
-        Self { warnings: 0, criticals: 0, warning_tenths: 0, critical_tenths: 0, peak: f32::NAN };
-
     /// Whether anything was exceeded at all.
     pub const fn happened(&self) -> bool {
         self.warnings > 0 || self.criticals > 0
@@ -106,11 +100,13 @@ impl Entry {
     }
 }
 
-/// All exceedances.
-#[derive(Clone, Copy, Debug)]
-pub struct Exceedances {
-    entries: [Option<Entry>; EXCEEDANCES_MAX],
-    left_out: u16,
+state! {
+    /// All exceedances.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Exceedances {
+        entries: [Option<Entry>; EXCEEDANCES_MAX],
+        left_out: u16,
+    }
 }
 
 /// One check's exceedances.
@@ -129,21 +125,10 @@ pub struct Exceedance {
 const VERSION: u8 = 1;
 const ENTRY_BYTES: usize = 4 + 1 + 2 + 2 + 4 + 4 + 4;
 
-impl Default for Exceedances {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Exceedances {
     /// The longest stored form: version, then the entries. Each has the FNV-1a hash of the check's name (u32),
     /// instance, warnings and criticals (u16), tenths of a second of both (u32), peak (f32).
     pub const BYTES: usize = 1 + EXCEEDANCES_MAX * ENTRY_BYTES;
-
-    /// Nothing exceeded.
-    pub const fn new() -> Self {
-        Self { entries: [None; EXCEEDANCES_MAX], left_out: 0 }
-    }
 
     /// Takes a check's change of level; `check` is its place among all checks.
     pub(crate) fn change(&mut self, check: u16, side: Side, finding: &Finding) {
@@ -203,8 +188,8 @@ impl Exceedances {
             instance: finding.instance,
             level: Level::Ok,
             since: finding.at,
-            session: Crossings::NONE,
-            before: Crossings::NONE,
+            session: Crossings::default(),
+            before: Crossings::default(),
         }))
     }
 
@@ -241,7 +226,7 @@ impl Exceedances {
     pub(crate) fn forget_life(&mut self) {
         for place in &mut self.entries {
             match place {
-                Some(entry) if entry.session.happened() => entry.before = Crossings::NONE,
+                Some(entry) if entry.session.happened() => entry.before = Crossings::default(),
                 _ => *place = None,
             }
         }
@@ -263,12 +248,12 @@ impl Exceedances {
     /// [`Unreadable`] if it ends within an entry, or has no version.
     pub fn decode(stored: &[u8]) -> Result<Self, Unreadable> {
         let mut fields = Fields::read(stored, VERSION, VERSION)?;
-        let mut exceedances = Self::new();
+        let mut exceedances = Self::default();
         for place in &mut exceedances.entries {
             if fields.is_read() {
                 break;
             }
-            let (mut name, mut instance, mut before) = (0, 0, Crossings::NONE);
+            let (mut name, mut instance, mut before) = (0, 0, Crossings::default());
             before.code(&mut name, &mut instance, &mut fields)?;
             let check = checks().position(|check| fnv1a(check.name) == name && instance < check.instances);
             *place = check.map(|check| Entry {
@@ -276,7 +261,7 @@ impl Exceedances {
                 instance,
                 level: Level::Ok,
                 since: Instant::ZERO,
-                session: Crossings::NONE,
+                session: Crossings::default(),
                 before,
             });
         }

@@ -33,43 +33,33 @@ pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
+use crate::initial::state;
 use crate::latest::Reading;
 use crate::params::Param;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, SILENT};
 use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
 
-/// A vehicle that has not been heard for so long is silent.
-const SILENT: Span = Span::from_secs(5);
 /// Subsystems that every vehicle has, in the air and on the ground.
 pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsystem::Computer];
 
-/// The memory of all checks.
-#[derive(Clone, Copy, Debug)]
-pub struct Health {
-    states: [State; STATES],
-    alarms: Alarms,
+state! {
+    /// The memory of all checks.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Health {
+        states: [State; STATES],
+        alarms: Alarms,
+    }
 }
 
 const _: () = assert!(size_of::<Health>() <= 20 * STATES + 512 + 80);
 
-impl Default for Health {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Health {
-    /// Nothing seen yet.
-    pub const fn new() -> Self {
-        Self { states: [const { State::new() }; STATES], alarms: Alarms::NONE }
-    }
-
     /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
-        self.states.fill(State::new());
-        self.alarms = Alarms::NONE;
+        self.states.fill(State::default());
+        self.alarms = Alarms::default();
     }
 
     /// One step of all checks, at least every 50 ms. Each change of level is a finding, and so is an alarm that
@@ -333,7 +323,7 @@ mod tests {
 
     #[test]
     fn nothing_known_is_not_ok() {
-        let health = Health::new();
+        let health = Health::default();
         assert_eq!(health.overall(), Level::Stale);
         assert_eq!(worst([Level::Ok, Level::Stale].into_iter()), Level::Stale);
         assert_eq!(worst([Level::Critical, Level::Stale].into_iter()), Level::Critical);

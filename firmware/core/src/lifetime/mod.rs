@@ -27,6 +27,7 @@ pub use crate::bytes::{Item, Unreadable};
 use crate::component::{COMPONENTS_MAX, Component};
 use crate::exposure::Exposure;
 use crate::health::exceedance::Exceedances;
+use crate::initial::state;
 use crate::usage::{Form, Totals, UsageCounter};
 use crate::vehicle::BATTERIES_MAX;
 
@@ -104,13 +105,15 @@ impl ItemKey {
     }
 }
 
-/// Which airframe it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Airframe {
-    /// MAVLink system id; 0 unknown.
-    pub system: u8,
-    /// The autopilot's unique id; 0 unknown.
-    pub uid: u64,
+state! {
+    /// Which airframe it is.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct Airframe {
+        /// MAVLink system id; 0 unknown.
+        pub system: u8,
+        /// The autopilot's unique id; 0 unknown.
+        pub uid: u64,
+    }
 }
 
 impl Airframe {
@@ -133,21 +136,23 @@ impl Airframe {
     }
 }
 
-/// Totals over an airframe's life. The stored form is as of the beginning of power-on [`Self::boots`]; the stored
-/// [`Session`] of that power-on is added to it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lifetime {
-    /// Whose life it is.
-    pub airframe: Airframe,
-    /// Power-ons of this monitor.
-    pub boots: u32,
-    /// Power-ons in which the airframe was heard.
-    pub sessions: u32,
-    /// Last known cells of its batteries: 0 not known, plus 128 if they were not confirmed since. They confirm a
-    /// count, and prove none.
-    pub cells: [u8; BATTERIES_MAX],
-    /// Every counter of usage.
-    pub totals: Totals,
+state! {
+    /// Totals over an airframe's life. The stored form is as of the beginning of power-on [`Self::boots`]; the stored
+    /// [`Session`] of that power-on is added to it.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Lifetime {
+        /// Whose life it is.
+        pub airframe: Airframe,
+        /// Power-ons of this monitor.
+        pub boots: u32,
+        /// Power-ons in which the airframe was heard.
+        pub sessions: u32,
+        /// Last known cells of its batteries: 0 not known, plus 128 if they were not confirmed since. They confirm a
+        /// count, and prove none.
+        pub cells: [u8; BATTERIES_MAX],
+        /// Every counter of usage.
+        pub totals: Totals,
+    }
 }
 
 /// Counters of version 1: the first of [`UsageCounter::ALL`]. Those of later versions stand at the item's end.
@@ -176,25 +181,11 @@ fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable
     )
 }
 
-impl Lifetime {
-    /// No life yet.
-    pub const fn new() -> Self {
-        Self {
-            airframe: Airframe { system: 0, uid: 0 },
-            boots: 0,
-            sessions: 0,
-            cells: [0; BATTERIES_MAX],
-            totals: Totals::nothing(),
-        }
-    }
-}
-
 /// Version, system id, unique id, boots, sessions; counters by their [`Form`]; seconds and revolutions of each motor.
 /// Since version 2: the counters after the first 32, and the cells of each battery.
 impl Item for Lifetime {
     const VERSION: u8 = 2;
     const BYTES: usize = 314;
-    const EMPTY: Self = Self::new();
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         let Self { airframe, boots, sessions, cells, totals } = self;
@@ -214,7 +205,8 @@ mod tests {
 
     fn life(cells: [u8; BATTERIES_MAX], value: fn(Form) -> f64, motor: (f64, f64)) -> Lifetime {
         let airframe = Airframe { system: 3, uid: 0x0102_0304_0506_0708 };
-        let mut lifetime = Lifetime { airframe, boots: 40_000, sessions: 39_000, cells, ..Lifetime::new() };
+        let mut lifetime =
+            Lifetime { airframe, boots: 40_000, sessions: 39_000, cells, ..Lifetime::default() };
         for counter in UsageCounter::ALL {
             lifetime.totals.set(*counter, value(counter.form()));
         }
@@ -283,7 +275,7 @@ mod tests {
     #[test]
     fn what_was_lived_reads_back_to_the_last_digit_and_is_as_long_as_the_sums_say() {
         assert_eq!(reads_back(old()).len(), Lifetime::BYTES);
-        assert_eq!(reads_back(Lifetime::new()).len(), Lifetime::BYTES);
+        assert_eq!(reads_back(Lifetime::default()).len(), Lifetime::BYTES);
         assert!(reads_back(half_an_hour()).len() <= Session::BYTES_TYPICAL);
         assert_eq!(stored(longest()).len(), Session::BYTES);
     }
@@ -328,7 +320,7 @@ mod tests {
     #[test]
     fn a_session_is_added_once() {
         for (boots, sum) in [(70_000, (10, 11)), (70_001, (9, 10))] {
-            let mut life = Lifetime { boots, sessions: 9, ..Lifetime::new() };
+            let mut life = Lifetime { boots, sessions: 9, ..Lifetime::default() };
             life.totals.set(UsageCounter::Flights, 10.0);
             life.add(&half_an_hour());
             assert_eq!((life.sessions, life.totals.raw(UsageCounter::Flights) as u32), sum);

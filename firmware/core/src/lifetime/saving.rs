@@ -11,6 +11,7 @@
 //! hour, 63 in three, 81 in five and a half. The flash sets this limit; `hums_onboard::persist` has the sums.
 
 use super::ItemKey;
+use crate::initial::state;
 use crate::time::{Instant, Span};
 
 /// The first save: late enough for the store to be ready and the vehicle to be heard.
@@ -32,36 +33,22 @@ pub enum Room {
     Reserve,
 }
 
-/// The items that wait to be saved.
-#[derive(Clone, Copy, Debug)]
-pub struct Saving {
-    /// Items that changed since they were saved, one bit each by [`ItemKey::index`].
-    changed: u16,
-    /// Of these, the ones whose time has come.
-    due: u16,
-    next: Instant,
-    session_at: Instant,
+state! {
+    /// The items that wait to be saved.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Saving {
+        /// Items that changed since they were saved, one bit each by [`ItemKey::index`].
+        changed: u16 = Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
+        /// Of these, the ones whose time has come.
+        due: u16,
+        next: Instant = Instant::from_millis(FIRST.as_millis()),
+        session_at: Instant,
+    }
 }
 
 const _: () = assert!(ItemKey::COUNT <= 16);
 
-impl Default for Saving {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Saving {
-    /// Totals and exposure are due: they are as of a new session now.
-    pub const fn new() -> Self {
-        Self {
-            changed: Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
-            due: 0,
-            next: Instant::from_millis(FIRST.as_millis()),
-            session_at: Instant::ZERO,
-        }
-    }
-
     const fn bit(key: ItemKey) -> u16 {
         1 << key.index()
     }
@@ -129,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_change_waits_for_its_time_and_a_hand_does_not() {
-        let mut saving = Saving::new();
+        let mut saving = Saving::default();
         assert_eq!(saving.due(Instant::from_millis(9_999), false, Room::Enough), NOTHING);
         let first = Some(ItemKey::Lifetime);
         assert_eq!(saving.due(Instant::from_millis(10_000), false, Room::Enough), first);
@@ -144,7 +131,7 @@ mod tests {
 
     #[test]
     fn armed_the_session_is_saved_every_two_minutes_and_in_a_long_one_every_thirtieth_of_it() {
-        let mut saving = Saving::new();
+        let mut saving = Saving::default();
         let mut times_s = Vec::new();
         for at_s in 0..20_000 {
             saving.change(ItemKey::Session);
@@ -161,7 +148,7 @@ mod tests {
 
     #[test]
     fn what_is_left_for_the_landing_is_not_used_by_time_alone() {
-        let mut saving = Saving::new();
+        let mut saving = Saving::default();
         take(&mut saving, 10, true);
         saving.change(ItemKey::Session);
         let at = Instant::from_millis(2_000_000);

@@ -22,14 +22,14 @@
 
 use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
 use crate::bytes::{Fields, fields};
-use crate::exposure::{BINS, Exposure, NOTHING, Quantity, Tenths};
+use crate::exposure::{BINS, Exposure, Quantity, Tenths};
 use crate::usage::{Form, Totals, UsageCounter, Wear};
 use crate::vehicle::BATTERIES_MAX;
 
 const RANGE_BYTES: usize = (BINS * Quantity::ALL.len()).div_ceil(8);
 
 /// A session as it was stored.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Session {
     /// The number of its power-on.
     pub boots: u32,
@@ -84,13 +84,6 @@ impl Item for Session {
     const VERSION: u8 = 2;
     const BYTES: usize = 503;
     const SHORT: bool = true;
-    const EMPTY: Self = Self {
-        boots: 0,
-        heard: false,
-        totals: Totals::nothing(),
-        battery_cycles: [0.0; BATTERIES_MAX],
-        exposure: NOTHING,
-    };
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         let Self { boots, heard, totals, battery_cycles, exposure } = self;

@@ -26,7 +26,7 @@ impl Monitor {
         if self.before.airframe.differs(seen) {
             // A lifetime belongs to an airframe: this one's begins with this session.
             self.happenings.push(Happening::OtherAirframe);
-            self.before = Lifetime { boots: self.before.boots, ..Lifetime::new() };
+            self.before = Lifetime { boots: self.before.boots, ..Lifetime::default() };
             self.exceedances.forget_life();
             self.exposure.forget_life();
             for key in [ItemKey::Lifetime, ItemKey::Exceedances, ItemKey::Exposure] {
@@ -95,7 +95,7 @@ impl Monitor {
             ItemKey::Exceedances => self.exceedances.encode(self.usage.until(), out),
             ItemKey::Exposure => self.exposure.as_of(boots).encode(out),
             ItemKey::Component(place) => {
-                let component = self.components.get(usize::from(place)).unwrap_or(&Component::NONE);
+                let component = self.components.get(usize::from(place)).copied().unwrap_or_default();
                 component.as_of(boots).encode(out)
             }
             ItemKey::Session => {

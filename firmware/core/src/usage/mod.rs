@@ -11,17 +11,16 @@ pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, Phase};
+use crate::initial::state;
 use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::power_draw::{Drawn, discharge_a, drawn};
 use crate::rainflow::Rainflow;
-use crate::time::{Instant, PAUSE, Span};
+use crate::time::{Instant, PAUSE, SILENT, Span};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
-/// A longer integration step is a gap and is not counted.
-const STEP_MAX: Span = Span::from_secs(2);
 /// Beyond these a value is garbage: no vehicle here reaches them.
 const RPM_MAX: f32 = 1e6;
 const HEIGHT_MAX_M: f32 = 100_000.0;
@@ -37,52 +36,32 @@ const LOAD_CYCLES: [UsageCounter; 7] = [
     UsageCounter::LoadCycles6,
 ];
 
-/// Usage since power-on.
-#[derive(Clone, Copy, Debug)]
-pub struct Usage {
-    last: Option<Instant>,
-    /// The discharge current now.
-    current_a: Option<f32>,
-    /// All counters but the cycles of the load factor, which are computed when asked for.
-    totals: Totals,
-    capacity_ah: f32,
-    /// Full discharges of each battery, if the capacity is known. Batteries share it equally.
-    battery_cycles: [f64; BATTERIES_MAX],
-    load_cycles: Rainflow<7>,
-    /// Seconds armed and in the air that wait for the vehicle to report again.
-    held_s: [f64; 2],
-    /// Seconds of a possible landing, not yet of a phase.
-    landing_s: f64,
+state! {
+    /// Usage since power-on.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Usage {
+        last: Option<Instant>,
+        /// The discharge current now.
+        current_a: Option<f32>,
+        /// All counters but the cycles of the load factor, which are computed when asked for.
+        totals: Totals,
+        capacity_ah: f32,
+        /// Full discharges of each battery, if the capacity is known. Batteries share it equally.
+        battery_cycles: [f64; BATTERIES_MAX],
+        load_cycles: Rainflow<7> = Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
+        /// Seconds armed and in the air that wait for the vehicle to report again.
+        held_s: [f64; 2],
+        /// Seconds of a possible landing, not yet of a phase.
+        landing_s: f64,
+    }
 }
 
 /// Lowest ranges of the load factor's cycles, g.
 const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// A load factor that turns back by less is vibration and noise.
 const LOAD_TURN_G: f32 = 0.1;
-/// After this silence the autopilot may be off.
-const HEARD: Span = Span::from_secs(5);
-
-impl Default for Usage {
-    fn default() -> Self {
-        Self::new()
-    }
-}
 
 impl Usage {
-    /// All zero.
-    pub const fn new() -> Self {
-        Self {
-            last: None,
-            current_a: None,
-            totals: Totals::nothing(),
-            capacity_ah: 0.0,
-            battery_cycles: [0.0; BATTERIES_MAX],
-            load_cycles: Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
-            held_s: [0.0; 2],
-            landing_s: 0.0,
-        }
-    }
-
     /// Takes an observation's extremes, which a step could miss.
     pub fn observe(
         &mut self,
@@ -94,7 +73,7 @@ impl Usage {
     ) {
         match observation {
             Observation::Vibration(vibration) if vehicle.armed() => {
-                let highest = vibration.levels.into_iter().flatten().fold(0.0, f32::max);
+                let highest = vibration.highest().unwrap_or(0.0);
                 self.extend(UsageCounter::VibrationMax, highest, ACCELERATION_MAX);
             }
             Observation::Imu(_) | Observation::ImuAndAir(..) if flight.airborne() => {
@@ -157,7 +136,7 @@ impl Usage {
         let step = before.map_or(Span::ZERO, |last| now.since(last));
         let powered = now.since(before.unwrap_or(Instant::ZERO));
         self.totals.add(UsageCounter::Powered, f64::from(powered.as_secs_f32()));
-        if step > STEP_MAX {
+        if step > PAUSE {
             return;
         }
         let step_s = f64::from(step.as_secs_f32());
@@ -173,7 +152,7 @@ impl Usage {
     /// A silence counts once the vehicle reports again and is still armed or in the air. So does the time of a
     /// possible landing.
     fn step_times(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, step_s: f64) {
-        let reports = vehicle.heartbeat.within(now, HEARD).is_some();
+        let reports = vehicle.heartbeat.within(now, SILENT).is_some();
         let is_known = reports && !flight.may_have_landed();
         let states = [
             (UsageCounter::Armed, vehicle.armed(), reports),

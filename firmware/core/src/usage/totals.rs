@@ -1,43 +1,39 @@
 //! Sums, maxima and minima of all counters, of one session or of many.
 
 use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter};
+use crate::initial::state;
 use crate::observation::MOTORS_MAX;
 
-/// Run time and revolutions of one motor.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MotorTotals {
-    /// Seconds that it turned.
-    pub seconds: f64,
-    /// Revolutions.
-    pub revolutions: f64,
+state! {
+    /// Run time and revolutions of one motor.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct MotorTotals {
+        /// Seconds that it turned.
+        pub seconds: f64,
+        /// Revolutions.
+        pub revolutions: f64,
+    }
 }
 
-/// Every counter, added up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Totals {
-    counters: [f64; UsageCounter::ALL.len()],
-    /// Motors by number.
-    pub motors: [MotorTotals; MOTORS_MAX],
-}
-
-impl Default for Totals {
-    fn default() -> Self {
-        Self::nothing()
+state! {
+    /// Every counter, added up.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Totals {
+        counters: [f64; UsageCounter::ALL.len()] = {
+            let mut counters = [0.0; _];
+            let mut place = 0;
+            while place < counters.len() {
+                counters[place] = UsageCounter::ALL[place].form().nothing();
+                place += 1;
+            }
+            counters
+        },
+        /// Motors by number.
+        pub motors: [MotorTotals; MOTORS_MAX],
     }
 }
 
 impl Totals {
-    /// Nothing counted.
-    pub const fn nothing() -> Self {
-        let mut counters = [0.0; UsageCounter::ALL.len()];
-        let mut place = 0;
-        while place < counters.len() {
-            counters[place] = UsageCounter::ALL[place].form().nothing();
-            place += 1;
-        }
-        Self { counters, motors: [MotorTotals { seconds: 0.0, revolutions: 0.0 }; MOTORS_MAX] }
-    }
-
     /// A counter's raw value: infinite for a minimum that was never measured.
     pub const fn raw(&self, counter: UsageCounter) -> f64 {
         self.counters[counter.place()]
@@ -118,7 +114,7 @@ mod tests {
 
     #[test]
     fn sums_add_up_and_extremes_stay() {
-        let (mut first, mut second) = (Totals::nothing(), Totals::nothing());
+        let (mut first, mut second) = (Totals::default(), Totals::default());
         for (totals, flights, height, voltage) in
             [(&mut first, 2.0, 80.0, 14.1), (&mut second, 3.0, 60.0, 13.7)]
         {
@@ -132,13 +128,13 @@ mod tests {
         assert_eq!(both.value(UsageCounter::HeightMax), Some(80.0));
         assert_eq!(both.value(UsageCounter::VoltageMin), Some(13.7));
         assert_eq!(both.motors[3].revolutions.to_bits(), 2e6_f64.to_bits());
-        assert_eq!(Totals::nothing().join(&first), first);
+        assert_eq!(Totals::default().join(&first), first);
     }
 
     #[test]
     fn what_was_never_measured_has_no_value() {
-        assert_eq!(Totals::nothing().value(UsageCounter::VoltageMin), None);
-        assert_eq!(Totals::nothing().value(UsageCounter::BatteryCycles), None);
-        assert_eq!(Totals::nothing().value(UsageCounter::Flights), Some(0.0));
+        assert_eq!(Totals::default().value(UsageCounter::VoltageMin), None);
+        assert_eq!(Totals::default().value(UsageCounter::BatteryCycles), None);
+        assert_eq!(Totals::default().value(UsageCounter::Flights), Some(0.0));
     }
 }

@@ -121,7 +121,7 @@ impl Told {
             // After a replacement, the figures belong to the old part.
             Record::Component(recorded) => {
                 let place = usize::from(recorded.place);
-                let mut component = Component::NONE;
+                let mut component = Component::default();
                 (component.kind, component.number) = (recorded.kind, recorded.number);
                 component.replaced = recorded.replaced.try_into().unwrap_or(u16::MAX);
                 component.name = Label::new(recorded.name);

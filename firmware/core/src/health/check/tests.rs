@@ -27,7 +27,7 @@ const CHECK: Check = Check {
 /// - `-` stops the measurements;
 /// - `off`: the check does not apply.
 fn changes(check: &Check, script: &str, start_ms: u64) -> String {
-    let (mut state, mut told) = (State::new(), Vec::new());
+    let (mut state, mut told) = (State::default(), Vec::new());
     let mut parts = script.split(", ").peekable();
     while let Some((from, what)) = parts.next().and_then(|part| part.split_once(' ')) {
         let ms = |text: &str| text.parse::<u64>().unwrap();
@@ -55,8 +55,8 @@ fn a_level_is_what_its_values_of_some_time_say() {
     let alone = Limits { warn: None, ..above };
     let battery = Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0);
     let cell = Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05);
-    let minute = Debounce::secs(60);
-    let [usual, none, long] = [CHECK.debounce, [Debounce::NONE; 2], [minute; 2]];
+    let minute = Debounce::millis(60_000);
+    let [usual, none, long] = [CHECK.debounce, [Debounce::millis(0); 2], [minute; 2]];
     for (limits, debounce, stale_s, script, expected) in [
         // It rises after its debounce, and falls after the time that it must be good.
         (
@@ -126,7 +126,7 @@ fn a_change_tells_its_value_and_the_limit_it_crossed() {
         (&CHECK, 70.0, Level::Critical, 60.0, 45.0),
         (&no_warning, 70.0, Level::Critical, 60.0, 60.0),
     ] {
-        let (mut state, mut told) = (State::new(), Vec::new());
+        let (mut state, mut told) = (State::default(), Vec::new());
         for now_ms in (0..6_000).step_by(50) {
             let at = Instant::from_millis(now_ms);
             let value = if now_ms <= 2_000 { value } else { 10.0 };

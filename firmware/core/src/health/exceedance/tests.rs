@@ -25,7 +25,7 @@ fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
 
 #[test]
 fn a_crossing_is_counted_with_its_peak_and_its_time() {
-    let mut exceedances = Exceedances::new();
+    let mut exceedances = Exceedances::default();
     exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
     exceedances.note(TILT, 0, Side::Above, 55.0);
     exceedances.change(TILT, Side::Above, &finding(12_000, Level::Warning, Level::Critical, 62.0));
@@ -43,7 +43,7 @@ fn a_crossing_is_counted_with_its_peak_and_its_time() {
 #[test]
 fn what_is_exceeded_ends_with_its_vehicle_in_the_session_and_in_the_life() {
     for level in [Level::Warning, Level::Critical] {
-        let mut exceedances = Exceedances::new();
+        let mut exceedances = Exceedances::default();
         exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, level, 50.0));
         exceedances.end(Instant::from_millis(14_000));
         let tilt = exceedances.iter(Instant::from_millis(90_000)).next().expect("exceeded");
@@ -56,7 +56,7 @@ fn what_is_exceeded_ends_with_its_vehicle_in_the_session_and_in_the_life() {
 
 #[test]
 fn what_neither_began_nor_lasted_nor_ended_since_has_not_changed() {
-    let mut exceedances = Exceedances::new();
+    let mut exceedances = Exceedances::default();
     exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
     let changed = |exceedances: &Exceedances, since_ms| {
         let now = Instant::from_millis(60_000);
@@ -71,7 +71,7 @@ fn what_neither_began_nor_lasted_nor_ended_since_has_not_changed() {
 
 #[test]
 fn not_knowing_is_neither_a_crossing_nor_a_time() {
-    let mut exceedances = Exceedances::new();
+    let mut exceedances = Exceedances::default();
     exceedances.change(TILT, Side::Above, &finding(1_000, Level::Ok, Level::Stale, f32::NAN));
     assert_eq!(exceedances.iter(Instant::from_millis(2_000)).count(), 0);
     exceedances.change(TILT, Side::Above, &finding(3_000, Level::Stale, Level::Warning, 50.0));
@@ -101,7 +101,7 @@ fn a_life_adds_up_over_sessions() {
 
 #[test]
 fn only_a_warning_or_worse_that_is_there_now_lasts() {
-    let mut exceedances = Exceedances::new();
+    let mut exceedances = Exceedances::default();
     assert!(!exceedances.lasting());
     let levels = [Level::Warning, Level::Critical, Level::Stale, Level::Warning, Level::Ok, Level::Advisory];
     let mut previous = Level::Ok;
@@ -128,7 +128,7 @@ fn kept(exceedances: &Exceedances) -> Vec<u8> {
 
 #[test]
 fn one_too_many_is_counted_and_a_critical_one_makes_room() {
-    let mut exceedances = Exceedances::new();
+    let mut exceedances = Exceedances::default();
     for instance in 0..30 {
         let warning = Finding { instance, ..finding(0, Level::Ok, Level::Warning, 50.0) };
         exceedances.change(TILT, Side::Above, &warning);
@@ -145,7 +145,7 @@ fn one_too_many_is_counted_and_a_critical_one_makes_room() {
 
 #[test]
 fn what_was_critical_now_or_ever_before_makes_no_room() {
-    let mut now = Exceedances::new();
+    let mut now = Exceedances::default();
     for instance in 0..EXCEEDANCES_MAX as u8 {
         let critical = Finding { instance, ..finding(0, Level::Ok, Level::Critical, 70.0) };
         now.change(TILT, Side::Above, &critical);
@@ -202,7 +202,7 @@ fn full() -> Vec<u8> {
 
 #[test]
 fn a_crossing_is_stored_as_it_always_was() {
-    let mut exceedances = Exceedances::new();
+    let mut exceedances = Exceedances::default();
     let roll = place("roll");
     for (at_ms, previous, level, value) in [
         (1_000, Level::Ok, Level::Warning, 50.0),

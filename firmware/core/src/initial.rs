@@ -1,0 +1,68 @@
+//! The state before the first input, described with the fields that it is of.
+
+use crate::cause::Causes;
+use crate::latest::Latest;
+use crate::time::{Instant, Span, Stamp};
+
+/// A value before the first input: nothing, none, zero.
+pub(crate) trait Initial: Sized {
+    /// It.
+    const NEW: Self;
+}
+
+macro_rules! initial {
+    ($($type:ty = $value:expr),* $(,)?) => {
+        $(impl Initial for $type {
+            const NEW: Self = $value;
+        })*
+    };
+}
+
+initial! {
+    bool = false, u8 = 0, u16 = 0, u32 = 0, u64 = 0, f32 = 0.0, f64 = 0.0,
+    Instant = Self::ZERO, Span = Self::ZERO, Stamp = Self::NONE, Causes = Self::NONE,
+}
+
+impl<T> Initial for Option<T> {
+    const NEW: Self = None;
+}
+
+impl<T> Initial for Latest<T> {
+    const NEW: Self = Self::nothing();
+}
+
+impl<T: Initial, const N: usize> Initial for [T; N] {
+    const NEW: Self = [const { T::NEW }; N];
+}
+
+impl<T: Initial, U: Initial> Initial for (T, U) {
+    const NEW: Self = (T::NEW, U::NEW);
+}
+
+/// A structure whose fields begin with [`Initial::NEW`] of their types, or with the value behind them. Its `Default` writes field by
+/// field: a constant of a large one would be a copy in flash.
+macro_rules! state {
+    (@new $type:ty) => { <$type as $crate::initial::Initial>::NEW };
+    (@new $type:ty, $value:expr) => { $value };
+    ($(#[$meta:meta])* $vis:vis struct $name:ident {
+        $($(#[$doc:meta])* $field_vis:vis $field:ident: $type:ty $(= $value:expr)?,)*
+    }) => {
+        $(#[$meta])*
+        $vis struct $name {
+            $($(#[$doc])* $field_vis $field: $type,)*
+        }
+
+        impl $crate::initial::Initial for $name {
+            const NEW: Self = Self { $($field: $crate::initial::state!(@new $type $(, $value)?),)* };
+        }
+
+        impl Default for $name {
+            #[inline(always)]
+            fn default() -> Self {
+                Self { $($field: $crate::initial::state!(@new $type $(, $value)?),)* }
+            }
+        }
+    };
+}
+
+pub(crate) use state;
