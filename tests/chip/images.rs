@@ -31,7 +31,7 @@ fn what_is_flashed_is_what_the_model_has() {
         assert_eq!(loaded, wanted, "{kind}");
         assert!(rest.iter().all(|byte| *byte == 0xFF), "{kind} has more than the image");
         let hex = loaded.iter().fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"));
-        println!("hums-f405.{kind}: what the model has loaded is {hex}, as hums-f405.bin");
+        println!("{kind}: what the model has loaded is {hex}, as in the raw image");
     }
 }
 

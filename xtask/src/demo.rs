@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
@@ -57,7 +57,7 @@ pub(crate) fn as_test() -> Result<()> {
     const SHORT: &str = "tests/flights/px4_hil_quad_low.tlog";
     let flight = repo::root().join(SHORT);
     let options = Options { flight, pc: false, dashboard: false };
-    fly(&options, Some(&Board::F405.image()), Duration::ZERO)
+    fly(&options, Some(&firmware::image_of(firmware::default_board())), Duration::ZERO)
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
@@ -69,7 +69,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     }
     let program = || hums::build().map(drop);
     let image = if flashed {
-        Some(firmware::build_beside(Board::F405, program)?)
+        Some(firmware::build_beside(firmware::default_board(), program)?)
     } else {
         program()?;
         None

@@ -12,6 +12,9 @@ const PROBE_RS: (&str, &str) =
     ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
 const DFU_UTIL: (&str, &str) = ("dfu-util", "apt-get install dfu-util (macOS: brew install dfu-util)");
 
+/// The chip of every board, as probe-rs calls it.
+const CHIP: &str = "STM32F405RGTx";
+
 /// How the firmware gets onto the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Way {
@@ -24,19 +27,20 @@ pub(crate) enum Way {
 /// Arguments of `flash` and `attach`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Options {
-    pub(crate) board: Board,
+    pub(crate) board: &'static Board,
     pub(crate) way: Way,
 }
 
 impl Options {
     /// `with_dfu`: whether `--dfu` means anything.
     pub(crate) fn parse(words: &[&str], with_dfu: bool) -> Result<Self> {
-        let mut options = Self { board: Board::F405, way: Way::Probe };
+        let mut options = Self { board: firmware::default_board(), way: Way::Probe };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             match *word {
                 "--board" => {
-                    options.board = Board::parse(words.next().context("--board wants the name of a board")?)?;
+                    options.board =
+                        firmware::board(words.next().context("--board wants the name of a board")?)?;
                 }
                 "--dfu" if with_dfu => options.way = Way::Dfu,
                 other => bail!(
@@ -57,8 +61,8 @@ pub(crate) fn flash(options: Options) -> Result<()> {
         Way::Probe => {
             require(PROBE_RS)?;
             // Without --chip-erase it erases the sectors that the image has bytes in, and no others.
-            probe("download", options.board, &elf).run()?;
-            Shell::new(PROBE_RS.0).args(["reset", "--chip", chip(options.board)]).run()
+            probe("download", &elf).run()?;
+            Shell::new(PROBE_RS.0).args(["reset", "--chip", CHIP]).run()
         }
         Way::Dfu => {
             let path = elf.with_extension("dfu");
@@ -73,11 +77,11 @@ pub(crate) fn flash(options: Options) -> Result<()> {
 pub(crate) fn attach(options: Options) -> Result<()> {
     let elf = firmware::build_with_log(options.board)?;
     require(PROBE_RS)?;
-    probe("run", options.board, &elf).run()
+    probe("run", &elf).run()
 }
 
-fn probe(command: &str, board: Board, elf: &PathBuf) -> Shell {
-    Shell::new(PROBE_RS.0).args([command, "--chip", chip(board)]).arg(elf)
+fn probe(command: &str, elf: &PathBuf) -> Shell {
+    Shell::new(PROBE_RS.0).args([command, "--chip", CHIP]).arg(elf)
 }
 
 /// The boot loader's alternate setting 0 is the flash; afterwards the firmware starts.
@@ -85,14 +89,6 @@ fn load(file: &Path) -> Shell {
     Shell::new(DFU_UTIL.0)
         .args(["--device", "0483:df11", "--alt", "0", "--dfuse-address", ":leave", "--download"])
         .arg(file)
-}
-
-/// As probe-rs calls it.
-fn chip(board: Board) -> &'static str {
-    match board {
-        Board::F405 => "STM32F405RGTx",
-        Board::F429 => "STM32F429ZITx",
-    }
 }
 
 fn require((program, how): (&str, &str)) -> Result<()> {
@@ -116,9 +112,12 @@ mod tests {
     #[test]
     fn boards_and_ways_are_chosen() {
         let parse = |line: &str, dfu| Options::parse(&line.split_whitespace().collect::<Vec<_>>(), dfu);
-        assert_eq!(parse("", true).unwrap(), Options { board: Board::F405, way: Way::Probe });
-        let both = Options { board: Board::F429, way: Way::Dfu };
-        assert_eq!(parse("--dfu --board f429", true).unwrap(), both);
+        for (line, name, way) in
+            [("", hums_boards::DEFAULT, Way::Probe), ("--dfu --board micoair405", "micoair405", Way::Dfu)]
+        {
+            let options = parse(line, true).unwrap();
+            assert_eq!((options.board.name.as_str(), options.way), (name, way));
+        }
         for line in ["--board", "--board f407", "--board emulated", "--erase"] {
             assert!(parse(line, true).is_err(), "{line}");
         }
@@ -128,8 +127,8 @@ mod tests {
     #[test]
     fn nothing_erases_the_whole_chip() {
         let elf = PathBuf::from("hums.elf");
-        let probe = probe("download", Board::F429, &elf);
-        assert_eq!(probe.shown(), "probe-rs download --chip STM32F429ZITx hums.elf");
+        let probe = probe("download", &elf);
+        assert_eq!(probe.shown(), "probe-rs download --chip STM32F405RGTx hums.elf");
         let load = load(Path::new("hums.dfu"));
         assert_eq!(
             load.shown(),

@@ -26,11 +26,11 @@ mod shell;
 mod test;
 mod wine;
 
+use std::fs;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 
-use crate::firmware::Board;
 use crate::setup::Need;
 
 const HELP: &str = "\
@@ -49,9 +49,11 @@ cargo xtask COMMAND
                                  faults found and false alarms, on the labelled flights of the repository and of folders;
                                  --write makes docs/diagnosis.md
   prove chip [TEST]...           the long tests of the image that is flashed, on the model of its chip
+  prove boards                   the image of every board, each on that model with its own pins
   prove foreign [EMBASSY]        programs of others on that model, built from what their packages bring; and embassy's examples, from
                                  the folder of a checkout of its repository
-  firmware [--board BOARD]       build the firmware: f405 (the default) or f429
+  firmware [--board BOARD]       build the firmware of a board (boards/BOARD.toml; olimex-stm32-h405 if none is named)
+  boards                         make docs/boards.md and the table of README.md from the files in boards/
   bench [sizes|speed|logs]...    what the record takes: bytes and decoding time; how fast logs are checked
   fuzz [--seconds N]             the fuzz targets, each for so long (300); needs nightly Rust and cargo-fuzz
   dist [--check]                 the files of a release, in target/dist; --check builds them twice, compares,
@@ -59,7 +61,7 @@ cargo xtask COMMAND
   flash [--board BOARD] [--dfu]  build the firmware and program it: by a debug probe (probe-rs), or over USB by the chip's own
                                  boot loader (dfu-util); what the board has stored stays
   attach [--board BOARD]         build the firmware with a log, program it and show the log (probe-rs)
-  size [--write]                 flash and RAM of all boards against budgets.toml; --write notes what is taken there and in
+  size [--write]                 flash and RAM of the default board against budgets.toml; --write notes what is taken there and in
                                  ARCHITECTURE.md
   costs                          cycles, load and stack, on the model of the chip, against budgets.toml
   setup [--dry-run]              install what demo and test need, or only say what is missing
@@ -93,7 +95,8 @@ enum Command {
     Demo(demo::Options),
     Test(Tests),
     Prove(Vec<String>),
-    Firmware(Board),
+    Firmware(String),
+    Boards,
     Flash(flash::Options),
     Attach(flash::Options),
     Bench(Vec<bench::Bench>),
@@ -132,9 +135,9 @@ impl Command {
             "bench" => Ok(Self::Bench(bench::Bench::parse(&rest)?)),
             "fuzz" => Ok(Self::Fuzz { seconds: fuzz::parse(&rest)? }),
             "firmware" => match rest.as_slice() {
-                [] => Ok(Self::Firmware(Board::F405)),
-                ["--board", board] => Ok(Self::Firmware(Board::parse(board)?)),
-                _ => bail!("firmware takes --board f405 or f429"),
+                [] => Ok(Self::Firmware(hums_boards::DEFAULT.to_owned())),
+                ["--board", board] => Ok(Self::Firmware(firmware::board(board)?.name.clone())),
+                _ => bail!("firmware takes --board BOARD"),
             },
             "dist" => match rest.as_slice() {
                 [] => Ok(Self::Dist { check: false }),
@@ -153,9 +156,10 @@ impl Command {
                 ["--write"] => Ok(Self::Size { write: true }),
                 _ => bail!("size takes nothing or --write"),
             },
-            "costs" | "grafana" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
+            "boards" | "costs" | "grafana" | "manifest" | "help" | "--help" | "-h" if !rest.is_empty() => {
                 bail!("{name} takes nothing")
             }
+            "boards" => Ok(Self::Boards),
             "costs" => Ok(Self::Costs),
             "grafana" => Ok(Self::Grafana),
             "manifest" => Ok(Self::Manifest),
@@ -176,18 +180,19 @@ impl Command {
             Self::Prove(arguments) => prove::run(&arguments),
             Self::Firmware(board) => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
-                println!("{}", firmware::build(board)?.display());
+                println!("{}", firmware::build(firmware::board(&board)?)?.display());
                 Ok(())
             }
             Self::Flash(options) => flash::flash(options),
             Self::Attach(options) => flash::attach(options),
+            Self::Boards => write_boards(),
             Self::Costs => costs::check(),
             Self::Bench(what) => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Dist { check } => dist::run(check),
             Self::Size { write } => {
                 setup::ensure(&[Need::Linker, Need::FirmwareTarget], false).require_all()?;
-                budgets::check(&Board::ALL, write)
+                budgets::check(&[firmware::default_board()], write)
             }
             Self::Setup { dry_run } => {
                 let outcome = setup::ensure(&Need::all(), dry_run);
@@ -207,6 +212,18 @@ impl Command {
             }
         }
     }
+}
+
+/// Writes the page of the boards, and their table into the README: from its head up to the next empty line.
+fn write_boards() -> Result<()> {
+    let table = hums_boards::page::table("docs/boards.md");
+    let path = repo::root().join("README.md");
+    let text = fs::read_to_string(&path)?;
+    let head = table.lines().next().unwrap_or_default();
+    let (before, old) = text.split_once(head).context("README.md has no table of boards")?;
+    let (_, after) = old.split_once("\n\n").context("README.md: the table of boards has no end")?;
+    fs::write(&path, format!("{before}{table}\n{after}"))?;
+    Ok(fs::write(repo::root().join("docs/boards.md"), hums_boards::page::render())?)
 }
 
 fn parse_test(rest: &[&str]) -> Result<Command> {

@@ -1,12 +1,12 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
-//! The campaigns themselves are in the tests' crate; this builds them and their requirements. Three parts are separate
+//! The campaigns themselves are in the tests' crate; this builds them and their requirements. Four parts are separate
 //! from the campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` has the long tests on the model of the chip
-//! for want of time; `foreign` judges that model by programs that are not ours.
+//! for want of time; `boards` runs the image of every board there; `foreign` judges that model by programs that are not ours.
 
 use anyhow::Result;
 
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::foreign;
 use crate::oracle;
 use crate::pc;
@@ -19,6 +19,9 @@ pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 /// The part that runs the image that is flashed.
 const CHIP: &str = "chip";
 
+/// The part that runs the image of every board.
+const BOARDS: &str = "boards";
+
 /// The part that judges the model of the chip.
 const FOREIGN: &str = "foreign";
 
@@ -30,6 +33,10 @@ const DIAGNOSIS: &str = "diagnosis";
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
         Some((CHIP, rest)) => return chip(rest),
+        Some((BOARDS, [])) => {
+            firmware::build_all(hums_boards::all())?;
+            return chip(&["boards::".to_owned()]);
+        }
         Some((FOREIGN, rest)) => return foreign::run(rest),
         _ => {}
     }
@@ -45,7 +52,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
 fn chip(names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
     setup::ensure(&needs, false).require_all()?;
-    firmware::build_beside(Board::F405, pc::build)?;
+    firmware::build_beside(firmware::default_board(), pc::build)?;
     oracle::prepare()?;
     let mut options = vec!["--ignored", "--nocapture"];
     options.extend(names.iter().map(String::as_str));

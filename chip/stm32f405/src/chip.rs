@@ -16,6 +16,7 @@ use crate::rcc::{Cause, Clocks, Rcc};
 use crate::small::{Crc, Iwdg, Rng};
 use crate::spi::Spi;
 use crate::tim::Tim;
+use crate::tim11::Tim11;
 use crate::time::{NEVER, Now, Timebase};
 use crate::usart::Usart;
 
@@ -78,6 +79,8 @@ pub struct Chip {
     pub spis: [Spi; 3],
     /// Timers.
     pub tims: [Tim; 5],
+    /// TIM11.
+    pub tim11: Tim11,
     /// DMA.
     pub dmas: [Dma; 2],
     /// The watchdog.
@@ -88,6 +91,8 @@ pub struct Chip {
     pub crc: Crc,
     /// The chip's own number, 96 bits.
     pub uid: [u32; 3],
+    /// `DBGMCU_IDCODE`.
+    pub idcode: u32,
     /// `DBGMCU_CR` and the two freeze registers.
     pub dbgmcu: [u32; 3],
     /// The select pin of each bus.
@@ -130,11 +135,14 @@ impl Chip {
             usarts: std::array::from_fn(|_| Usart::new()),
             spis: std::array::from_fn(|_| Spi::new()),
             tims: [Tim::new(32, 4), Tim::new(16, 4), Tim::new(16, 4), Tim::new(32, 4), Tim::new(16, 2)],
+            tim11: Tim11::default(),
             dmas: [Dma::new(), Dma::new()],
             iwdg: Iwdg::new(lsi_hz),
             rng: Rng::new(seed),
             crc: Crc::new(),
             uid: [0x0031_0045, 0x3136_510E, 0x3336_3734],
+            // Revision Y of the STM32F405 and F407.
+            idcode: 0x100F_6413,
             dbgmcu: [0; 3],
             selects: [None; 3],
             notes: BTreeMap::new(),
@@ -172,6 +180,7 @@ impl Chip {
         self.usarts.iter_mut().for_each(|usart| usart.reset(now.ps));
         self.spis.iter_mut().for_each(Spi::reset);
         self.tims.iter_mut().for_each(|tim| tim.reset(now.cycle));
+        self.tim11.reset();
         self.dmas = [Dma::new(), Dma::new()];
         self.iwdg.reset();
         self.rng.reset();

@@ -21,5 +21,6 @@ mod serve;
 pub mod small;
 pub mod spi;
 pub mod tim;
+pub mod tim11;
 pub mod time;
 pub mod usart;

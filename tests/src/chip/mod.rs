@@ -90,9 +90,30 @@ pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slo
 /// A board of this image with this card.
 pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
     let slot = Slot::new(Some(card));
+    let wired = wired(&image);
     let mut machine = Machine::new(image, board);
-    machine.connect(0, Pin(0, 4), Box::new(Card::new(&slot)));
+    let bus = wired.card.bus.as_ref().expect("a card on SPI");
+    machine.connect(usize::from(bus.spi) - 1, pin(wired.card.cs), Box::new(Card::new(&slot)));
     (machine, slot)
+}
+
+/// The board that the image is for.
+///
+/// # Panics
+/// If the image names none.
+pub fn wired(image: &Image) -> &'static hums_boards::Board {
+    let name = image.pieces.iter().find_map(|(_, bytes)| hums_boards::name_in(bytes));
+    hums_boards::find(name.expect("the image names its board")).expect("a board of this version")
+}
+
+/// A pin, as the model counts it.
+pub fn pin(pin: hums_boards::Pin) -> Pin {
+    Pin(pin.port, pin.number)
+}
+
+/// A port, as the model counts it.
+pub fn usart(port: &hums_boards::Port) -> usize {
+    usize::from(port.usart) - 1
 }
 
 /// Writes a card's image to a file.

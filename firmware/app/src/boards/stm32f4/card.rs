@@ -8,7 +8,7 @@ use core::future::Future;
 use core::pin::pin;
 use core::task::{Context, Waker};
 
-use embassy_stm32::gpio::{Level, Output};
+use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
@@ -46,7 +46,9 @@ pub(crate) struct CardPort {
 impl CardPort {
     /// No more before a card is identified; the bus's slowest is 328 kHz, 84 MHz by 256.
     pub(crate) const IDENTIFICATION: Hertz = Hertz(400_000);
-    /// Cards take 25 MHz; the next slower clock of these chips is 21, 84 MHz by 4.
+    /// Pins of the backup domain, which some boards select the card with, allow 2 MHz only (DS8626, table 7).
+    pub(crate) const SELECT_SPEED: Speed = Speed::Low;
+    /// Cards take 25 MHz; the next slower clock of these chips is 21: 84 MHz by 4, or 42 by 2.
     const TRANSFER: Hertz = Hertz(21_000_000);
 
     /// The port on this bus, mode 0, with its select pin high.
