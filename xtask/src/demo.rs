@@ -69,7 +69,8 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     }
     let program = || hums::build().map(drop);
     let image = if flashed {
-        Some(firmware::build_beside(firmware::default_board(), program)?)
+        firmware::build_beside([firmware::default_board()], program)?;
+        Some(firmware::image_of(firmware::default_board()))
     } else {
         program()?;
         None

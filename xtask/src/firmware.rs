@@ -94,10 +94,14 @@ pub(crate) fn build(board: &Board) -> Result<PathBuf> {
     Ok(image)
 }
 
-/// [`build`] and, at the same time, what is built for this PC: the last part of each is one core's work.
-pub(crate) fn build_beside(board: &Board, pc: impl FnOnce() -> Result<()>) -> Result<PathBuf> {
+/// [`build`] for these boards, one after the other, and, at the same time, what is built for this PC: the last part of each is one
+/// core's work.
+pub(crate) fn build_beside(
+    boards: impl IntoIterator<Item = &'static Board> + Send,
+    pc: impl FnOnce() -> Result<()>,
+) -> Result<()> {
     std::thread::scope(|scope| {
-        let firmware = scope.spawn(|| build(board));
+        let firmware = scope.spawn(|| boards.into_iter().try_for_each(|board| build(board).map(drop)));
         pc()?;
         firmware.join().unwrap_or_else(|_| bail!("the build of the firmware panicked"))
     })
@@ -120,11 +124,6 @@ pub(crate) fn check_all() -> Result<()> {
     hums_boards::all()
         .iter()
         .try_for_each(|board| cargo(board)?.args(["check", "--quiet"]).args(cargo_arguments()).run())
-}
-
-/// Builds the firmware for these boards.
-pub(crate) fn build_all(boards: impl IntoIterator<Item = &'static Board>) -> Result<()> {
-    boards.into_iter().try_for_each(|board| build(board).map(drop))
 }
 
 /// Lints the firmware for `board`, which is built; a warning is an error.

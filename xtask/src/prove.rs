@@ -6,7 +6,7 @@
 
 use anyhow::Result;
 
-use crate::firmware;
+use crate::firmware::{self, Board};
 use crate::foreign;
 use crate::oracle;
 use crate::pc;
@@ -32,10 +32,9 @@ const DIAGNOSIS: &str = "diagnosis";
 /// or `foreign` with theirs.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
-        Some((CHIP, rest)) => return chip(rest),
+        Some((CHIP, rest)) => return chip(&[firmware::default_board()], rest),
         Some((BOARDS, [])) => {
-            firmware::build_all(hums_boards::all())?;
-            return chip(&["boards::".to_owned()]);
+            return chip(&hums_boards::all().iter().collect::<Vec<_>>(), &["boards::".to_owned()]);
         }
         Some((FOREIGN, rest)) => return foreign::run(rest),
         _ => {}
@@ -48,11 +47,11 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
     Shell::cargo().args(run).args(arguments).run()
 }
 
-/// The long tests, some of them or all.
-fn chip(names: &[String]) -> Result<()> {
+/// The long tests, some of them or all, with the images of these boards.
+fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
     setup::ensure(&needs, false).require_all()?;
-    firmware::build_beside(firmware::default_board(), pc::build)?;
+    firmware::build_beside(boards.iter().copied(), pc::build)?;
     oracle::prepare()?;
     let mut options = vec!["--ignored", "--nocapture"];
     options.extend(names.iter().map(String::as_str));

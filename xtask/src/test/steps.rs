@@ -72,7 +72,7 @@ pub(super) const STEPS: [Step; 18] = [
         needs: &[Need::FirmwareTarget],
         stage: Stage::Build,
         after: &[],
-        run: || firmware::build_beside(firmware::default_board(), pc::build).map(drop),
+        run: || firmware::build_beside(hums_boards::families(), pc::build),
     },
     Step {
         name: "budgets",
@@ -207,7 +207,6 @@ fn chip() -> Result<()> {
     let elf = firmware::image_of(board);
     let files = firmware::files(board, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
     print!("{}", dist::sums(&files));
-    firmware::build_all(hums_boards::families())?;
     pc::end_to_end("chip", &[])
 }
 
