@@ -142,6 +142,9 @@ pub struct Hold {
     /// Low: beepers and switches.
     #[serde(default)]
     pub low: BTreeMap<Pin, String>,
+    /// Pulled up: unused lines of the card.
+    #[serde(default)]
+    pub pull_up: BTreeMap<Pin, String>,
 }
 
 /// For the owner.
@@ -295,6 +298,7 @@ impl Board {
         pins.extend(detect);
         pins.extend(hold.high.keys().map(|pin| ("hold-high", *pin)));
         pins.extend(hold.low.keys().map(|pin| ("hold-low", *pin)));
+        pins.extend(hold.pull_up.keys().map(|pin| ("pull-up", *pin)));
         pins
     }
 

@@ -19,6 +19,18 @@ levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If yo
   regulator; ask the maker before you feed it.
 ";
 
+const TAIL: &str = "
+## Add a board
+For a board with an STM32F405RG and a crystal of 4 to 26 MHz (an even number). No code changes.
+
+1. Copy the file of the most similar board to `boards/NAME.toml`, and change it. DMA streams: RM0090, tables 42 and 43. Without `bus` the processor moves
+   the card's pins itself.
+2. Add a line to `boards/facts.csv` for each pin, with its source and the commit of the source.
+3. `cargo test -p hums-boards` compares both, after `cargo xtask boards` has made this page.
+4. `cargo xtask firmware --board NAME` builds it. A pin without the wanted function, or a DMA stream that does not serve a port, does not compile.
+5. `cargo xtask prove boards` runs the image: boot, flight, card pulled, power cut.
+";
+
 /// The page.
 pub fn render() -> String {
     let mut page = format!("{HEAD}\n{}", table(""));
@@ -26,7 +38,7 @@ pub fn render() -> String {
         // Cannot fail: it is a text.
         let _ = section(&mut page, board);
     }
-    page
+    page + TAIL
 }
 
 /// What to buy: a line for each board, with links to the page at this path.
@@ -37,7 +49,8 @@ pub fn table(page: &str) -> String {
         let input = if owner.takes_5v { "documented" } else { "not documented" };
         let (anchor, usb, price) = (anchor(title), &owner.usb, &owner.price);
         // Cannot fail: it is a text.
-        let _ = writeln!(table, "| [{title}]({page}#{anchor}) `{name}` | {slot} | {usb} | {price} | {input} |");
+        let _ =
+            writeln!(table, "| [{title}]({page}#{anchor}) `{name}` | {slot} | {usb} | {price} | {input} |");
     }
     table
 }
@@ -67,10 +80,10 @@ fn section(page: &mut String, board: &Board) -> std::fmt::Result {
     }
     let waits = if led.pin.is_debug() { "; a debug probe can connect in the first second only" } else { "" };
     writeln!(page, "| LED | on the board | {}, lit when {}{waits} |", led.pin, led.lit.name())?;
-    for (level, pins) in [("high", &hold.high), ("low", &hold.low)] {
+    for (level, pins) in [("held high", &hold.high), ("held low", &hold.low), ("pulled up", &hold.pull_up)] {
         if !pins.is_empty() {
             let pins: Vec<_> = pins.iter().map(|(pin, part)| format!("{pin} ({part})")).collect();
-            writeln!(page, "| held {level} | | {} |", pins.join(", "))?;
+            writeln!(page, "| {level} | | {} |", pins.join(", "))?;
         }
     }
     writeln!(page, "| crystal | | {} MHz |", crystal_hz / 1_000_000)?;

@@ -51,8 +51,8 @@ fn code(board: &Board) -> String {
         .into_iter()
         .map(|stream| format!("DMA{}_STREAM{} {} ", stream.controller, stream.number, channel(stream)));
     format!(
-        "board! {{\n tag {tag:?} {skip} {end};\n crystal {crystal_hz} DIV{divider};\n autopilot {autopilot};\n gs {gs};\n card {card};\n \
-         led {led} {lit} {wait};\n high {{ {high} }} low {{ {low} }}\n streams {{ {streams} }}\n}}\n",
+        "board! {{\n tag {tag:?} {skip} {end};\n crystal {crystal_hz} DIV{divider};\n autopilot {autopilot};\n gs {gs};\n card {{ {card} }};\n \
+         led {led} {lit} {wait};\n high {{ {high} }} low {{ {low} }} pull {{ {pull} }}\n streams {{ {streams} }}\n}}\n",
         tag = format!("{}{name}{}", hums_boards::TAG, hums_boards::TAG_END),
         skip = hums_boards::TAG.len(),
         end = hums_boards::TAG.len() + name.len(),
@@ -64,6 +64,7 @@ fn code(board: &Board) -> String {
         wait = led.pin.is_debug(),
         high = held(hold.high.keys().collect()),
         low = held(hold.low.keys().collect()),
+        pull = held(hold.pull_up.keys().collect()),
         streams = streams.collect::<String>(),
     )
 }

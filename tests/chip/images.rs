@@ -101,6 +101,21 @@ fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
 }
 
 #[test]
+fn an_image_of_no_known_board_is_refused() {
+    let [elf, ..] = files();
+    let name = format!("{}{}{}", hums_boards::TAG, hums_boards::DEFAULT, hums_boards::TAG_END);
+    for (new, wanted) in
+        [("hums-boarD:", "does not name its board"), ("hums-board:x", "there is no board xlimex")]
+    {
+        let mut other = elf.clone();
+        let at = other.windows(name.len()).position(|bytes| bytes == name.as_bytes()).unwrap();
+        other[at..at + new.len()].copy_from_slice(new.as_bytes());
+        let said = emulated(&other, 1);
+        assert!(said.contains(wanted), "{said}");
+    }
+}
+
+#[test]
 fn a_board_that_resets_itself_again_and_again_is_told() {
     let (elf, _) = with_main(&RESET);
     let said = emulated(&elf, 3);

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use crate::art::Art;
+use crate::bits::Bits;
 use crate::dma::Dma;
 use crate::flash::Flash;
 use crate::gpio::{Exti, Gpio, Pin};
@@ -95,6 +96,8 @@ pub struct Chip {
     pub idcode: u32,
     /// `DBGMCU_CR` and the two freeze registers.
     pub dbgmcu: [u32; 3],
+    /// A device on pins that the program moves itself.
+    pub bits: Option<Bits>,
     /// The select pin of each bus.
     pub selects: [Option<Pin>; 3],
     /// Oddities, with their counts.
@@ -144,6 +147,7 @@ impl Chip {
             // Revision Y of the STM32F405 and F407.
             idcode: 0x100F_6413,
             dbgmcu: [0; 3],
+            bits: None,
             selects: [None; 3],
             notes: BTreeMap::new(),
             clocks: Clocks::default(),
@@ -411,6 +415,9 @@ impl Chip {
 
     /// Pins changed their use or level.
     pub fn pins_changed(&mut self, now: Now) {
+        if let Some((pin, level)) = self.bits.as_mut().and_then(|bits| bits.look(&self.gpio, now.ps)) {
+            self.gpio.drive(pin, Some(level));
+        }
         let gpio = &self.gpio;
         for (usart, (function, rx, tx)) in self.usarts.iter_mut().zip(map::USART_PINS) {
             let is = |pins: &[Pin]| pins.iter().any(|pin| gpio.is_routed(*pin, function));

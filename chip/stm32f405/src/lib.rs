@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod art;
+pub mod bits;
 pub mod chip;
 pub mod dma;
 pub mod flash;

@@ -7,7 +7,7 @@ pub mod rig;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use hums_sdcard::{Card, Kind, Medium, Model, Plan, Slot};
+use hums_sdcard::{Kind, Medium, Model, Plan, Slot};
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
@@ -92,8 +92,7 @@ pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
     let slot = Slot::new(Some(card));
     let wired = wired(&image);
     let mut machine = Machine::new(image, board);
-    let bus = wired.card.bus.as_ref().expect("a card on SPI");
-    machine.connect(usize::from(bus.spi) - 1, pin(wired.card.cs), Box::new(Card::new(&slot)));
+    hums_sdcard::connect(&mut machine, wired, &slot);
     (machine, slot)
 }
 

@@ -1,7 +1,7 @@
 //! The app's interface to a machine.
 //!
-//! Code above this module does not depend on the board. [`machine`] has the parts of a board, [`board`] the one that this image is
-//! for, made from its file `boards/NAME.toml`; `stm32f4` has what all of them share. [`board`] has
+//! Code above this module does not depend on the board. [`board`] is the board of this image, made from
+//! its file `boards/NAME.toml`; [`machine`] has the data of any machine; `stm32f4` has what all of them share. [`board`] has
 //!
 //! | name | what |
 //! |---|---|
@@ -16,4 +16,5 @@
 
 pub(crate) mod board;
 pub(crate) mod machine;
+#[expect(dead_code, unused_imports, reason = "a board uses one of the two kinds of card ports")]
 mod stm32f4;

@@ -5,14 +5,12 @@ use std::io::Write;
 
 use anyhow::{Context as _, Result, anyhow};
 use hums_link::framer::Framer;
-use hums_sdcard::{Card, Kind, Medium, Model, Slot};
-use stm32f405_model::gpio::Pin;
+use hums_sdcard::{Kind, Medium, Model, Slot};
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board as Parts, Machine as Chip, Reset};
 use stm32f405_model::map;
 use stm32f405_model::memory::FLASH;
 use stm32f405_model::rcc::Cause;
-use stm32f405_model::spi::Wire;
 use stm32f405_model::time::{MS, Ps, SECOND, US};
 use stm32f405_model::usart::Usart;
 
@@ -115,7 +113,7 @@ impl Board {
         let mut chip = Chip::new(image, parts);
         // The image's own handler would reset it, again and again.
         chip.core.stop_at_faults(true);
-        connect(&mut chip, wired, Box::new(Card::new(&slot)));
+        hums_sdcard::connect(&mut chip, wired, &slot);
         if let Some(flash) = chip.chip.flash.content.all_mut().get_mut(STORE) {
             flash.copy_from_slice(store);
         }
@@ -263,14 +261,6 @@ impl Wiring {
             Some(16 + controller.get(usize::from(stream.number))?)
         };
         Self { ports, dma: board.streams().into_iter().filter_map(line).collect() }
-    }
-}
-
-/// Puts a card into the board's slot.
-fn connect(chip: &mut Chip, board: &hums_boards::Board, card: Box<dyn Wire>) {
-    let pin = |pin: hums_boards::Pin| Pin(pin.port, pin.number);
-    if let Some(bus) = &board.card.bus {
-        chip.connect(usize::from(bus.spi).saturating_sub(1), pin(board.card.cs), card);
     }
 }
 

@@ -3,6 +3,7 @@
 mod card;
 mod clock;
 mod flash;
+mod pins;
 mod port;
 mod random;
 mod reset;
@@ -17,9 +18,10 @@ use embassy_stm32::gpio::{Flex, Level, Pull, Speed};
 use embassy_stm32::{Peripherals, pac, usart};
 use embassy_time::{Duration, Instant};
 
-pub(crate) use card::{Card, CardPort};
+pub(crate) use card::SpiPort;
 pub(crate) use clock::{Crystal, crystal_failed, crystal_is_wrong};
 pub(crate) use flash::StoreFlash;
+pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
