@@ -50,8 +50,8 @@ impl Bits {
             self.wire.select(ps, selected);
         }
         let is_high = gpio.is_high(self.pins.clock);
-        let rises = is_high && !std::mem::replace(&mut self.is_high, is_high);
-        if !rises {
+        let was_high = std::mem::replace(&mut self.is_high, is_high);
+        if was_high || !is_high {
             return None;
         }
         let (bits, count) = self.taken;
