@@ -1,13 +1,19 @@
-//! Gives the linker the memory map and its scripts, and the program its commit. Only for the bare-metal target: a host
-//! build of the workspace must not see them.
+//! Gives the linker the memory map and its scripts, and the program its board and its commit. The board is the one that
+//! `HUMS_BOARD` names, from its file in `boards/`. Only for the bare-metal target: a host build of the workspace must not see them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
+use hums_boards::{Board, Level, Pin, Port, Stream};
+
+/// Input of the chip's PLL (RM0090, 7.3.2): the crystal is divided down to it.
+const PLL_INPUT_HZ: u32 = 2_000_000;
+
 fn main() {
     println!("cargo::rustc-env=HUMS_GIT={}", commit());
     println!("cargo::rerun-if-env-changed=DEFMT_LOG");
+    println!("cargo::rerun-if-env-changed=HUMS_BOARD");
     if env::var_os("DEFMT_LOG").is_none() {
         // defmt's own default is errors only.
         println!("cargo::rustc-env=DEFMT_LOG=info");
@@ -17,13 +23,54 @@ fn main() {
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     copy("../../memory.x", &out.join("memory.x"));
-    let board = if env::var_os("CARGO_FEATURE_BOARD_F429").is_some() { "f429" } else { "f405" };
-    copy(&format!("src/boards/{board}.x"), &out.join("board.x"));
+    let name = env::var("HUMS_BOARD").unwrap_or_else(|_| hums_boards::DEFAULT.to_owned());
+    let board = hums_boards::find(&name).unwrap_or_else(|why| panic!("HUMS_BOARD: {why}"));
+    fs::write(out.join("board.rs"), code(board)).expect("OUT_DIR can be written");
     println!("cargo::rustc-link-search={}", out.display());
     let logs = env::var_os("CARGO_FEATURE_LOG").is_some();
     for argument in ["--nmagic", "-Tlink.x"].into_iter().chain(logs.then_some("-Tdefmt.x")) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
+}
+
+/// The board as a call of the macro in `src/boards/board.rs`, by the names of `embassy_stm32`.
+fn code(board: &Board) -> String {
+    let Board { name, crystal_hz, autopilot, radio, card, led, hold, .. } = board;
+    let port = |port: &Port| {
+        let [rx, tx] = [channel(port.rx.dma), channel(port.tx.dma)];
+        format!("{} {{ {} {} }} {{ {rx} {tx} }}", port.peripheral(), port.rx.pin, port.tx.pin)
+    };
+    let pins = format!("{} {} {} {}", card.sck, card.mosi, card.miso, card.cs);
+    let card = card.bus.as_ref().map_or_else(
+        || format!("pins {{ {pins} }}"),
+        |bus| format!("SPI{} {{ {pins} }} {{ {} {} }}", bus.spi, channel(bus.tx), channel(bus.rx)),
+    );
+    let held = |pins: Vec<&Pin>| pins.into_iter().map(|pin| format!("{pin} ")).collect::<String>();
+    let streams = board
+        .streams()
+        .into_iter()
+        .map(|stream| format!("DMA{}_STREAM{} {} ", stream.controller, stream.number, channel(stream)));
+    format!(
+        "board! {{\n tag {tag:?} {skip} {end};\n crystal {crystal_hz} DIV{divider};\n autopilot {autopilot};\n gs {gs};\n card {{ {card} }};\n \
+         led {led} {lit} {wait};\n high {{ {high} }} low {{ {low} }} pull {{ {pull} }}\n streams {{ {streams} }}\n}}\n",
+        tag = format!("{}{name}{}", hums_boards::TAG, hums_boards::TAG_END),
+        skip = hums_boards::TAG.len(),
+        end = hums_boards::TAG.len() + name.len(),
+        divider = crystal_hz / PLL_INPUT_HZ,
+        autopilot = port(autopilot),
+        gs = port(radio),
+        led = led.pin,
+        lit = if led.lit == Level::High { "High" } else { "Low" },
+        wait = led.pin.is_debug(),
+        high = held(hold.high.keys().collect()),
+        low = held(hold.low.keys().collect()),
+        pull = held(hold.pull_up.keys().collect()),
+        streams = streams.collect::<String>(),
+    )
+}
+
+fn channel(stream: Stream) -> String {
+    format!("DMA{}_CH{}", stream.controller, stream.number)
 }
 
 fn copy(from: &str, to: &Path) {

@@ -31,7 +31,7 @@ fn what_is_flashed_is_what_the_model_has() {
         assert_eq!(loaded, wanted, "{kind}");
         assert!(rest.iter().all(|byte| *byte == 0xFF), "{kind} has more than the image");
         let hex = loaded.iter().fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"));
-        println!("hums-f405.{kind}: what the model has loaded is {hex}, as hums-f405.bin");
+        println!("{kind}: what the model has loaded is {hex}, as in the raw image");
     }
 }
 
@@ -98,6 +98,21 @@ fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
     let report = Machine::new(image, Board::default()).run_until(SECOND).unwrap_err();
     assert!(report.reason.contains("locked up"), "{report}");
     assert_eq!(report.registers[15], 0x3000_0000, "{report}");
+}
+
+#[test]
+fn an_image_of_no_known_board_is_refused() {
+    let [elf, ..] = files();
+    let name = format!("{}{}{}", hums_boards::TAG, hums_boards::DEFAULT, hums_boards::TAG_END);
+    for (new, wanted) in
+        [("hums-boarD:", "does not name its board"), ("hums-board:x", "there is no board xlimex")]
+    {
+        let mut other = elf.clone();
+        let at = other.windows(name.len()).position(|bytes| bytes == name.as_bytes()).unwrap();
+        other[at..at + new.len()].copy_from_slice(new.as_bytes());
+        let said = emulated(&other, 1);
+        assert!(said.contains(wanted), "{said}");
+    }
 }
 
 #[test]

@@ -5,6 +5,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "chip")]
+mod boards;
+#[cfg(feature = "chip")]
 mod bounds;
 #[cfg(feature = "chip")]
 mod faults;
@@ -31,12 +33,18 @@ mod recompute;
 #[ignore = "the image on the model of its chip: `cargo xtask test` runs it"]
 fn the_image_on_the_model_of_its_chip() {}
 
-/// The F405's image, and a PX4 flight's frames to send.
+/// The default board's image, and a PX4 flight's frames to send.
 #[cfg(feature = "chip")]
 fn bench() -> hums_tests::chip::rig::Bench {
-    use hums_tests::{chip, flights, program};
+    bench_of(&hums_tests::program::firmware())
+}
 
-    let file = std::fs::read(program::firmware()).unwrap();
+/// The same with this image.
+#[cfg(feature = "chip")]
+fn bench_of(image: &std::path::Path) -> hums_tests::chip::rig::Bench {
+    use hums_tests::{chip, flights};
+
+    let file = std::fs::read(image).unwrap_or_else(|why| panic!("{}: {why}", image.display()));
     let image = stm32f405_model::image::Image::parse(&file).unwrap();
     let tlog = std::fs::read(flights::own("px4_hil_quad_low.tlog")).unwrap();
     let frames = chip::frames(&tlog).into_iter().map(|(_, frame)| frame.to_vec()).collect();

@@ -39,13 +39,13 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
-/// The F405's image, made like a release: the ELF file of `HUMS_FIRMWARE`, otherwise the one from xtask.
+/// The default board's image, made like a release: the ELF file of `HUMS_FIRMWARE`, otherwise the one from xtask.
 ///
 /// # Panics
 ///
 /// If it is not there.
 pub fn firmware() -> PathBuf {
-    let built = || root().join("target/firmware/hums-f405.elf");
+    let built = || root().join(format!("target/firmware/hums-{}.elf", hums_boards::DEFAULT));
     let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
     assert!(path.is_file(), "{} is missing: `cargo xtask firmware`", path.display());
     path

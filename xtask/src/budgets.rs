@@ -16,14 +16,14 @@ use serde::Deserialize;
 use crate::firmware::{self, Board};
 use crate::repo;
 
-/// The memories: name, first address, end on the largest board, and size on the f405 (`memory.x`, `boards/f405.x`).
-/// Flash is the half of one program; CCM is without the stack.
+/// The chip's memories: name, first address, one past the last, and the bytes for the program (`memory.x`): flash is the half
+/// of a program, CCM is without the stack.
 const MEMORIES: [(&str, u64, u64, u64); 3] = [
-    ("flash", 0x0800_0000, 0x0820_0000, 448 * 1024),
-    ("ram", 0x2000_0000, 0x2003_0000, 128 * 1024),
+    ("flash", 0x0800_0000, 0x0810_0000, 448 * 1024),
+    ("ram", 0x2000_0000, 0x2002_0000, 128 * 1024),
     ("ccm", 0x1000_0000, 0x1001_0000, 48 * 1024),
 ];
-/// The f405's stack: the rest of CCM.
+/// The stack: the rest of CCM.
 const STACK_BYTES: u64 = 16 * 1024;
 
 const FILE: &str = "budgets.toml";
@@ -37,7 +37,7 @@ const TABLE: [&str; 2] = ["<!-- taken: cargo xtask size --write -->\n", "<!-- en
 pub(crate) struct Limit {
     /// When the limit was set, or `--write` was given last.
     pub(crate) taken: u64,
-    /// The rest of the f405's; of a stack there is one rest for all urgencies.
+    /// The rest; of a stack there is one rest for all urgencies.
     free: Option<u64>,
     pub(crate) bytes_max: u64,
     pub(crate) reason: String,
@@ -97,7 +97,7 @@ impl Budgets {
         self.stack.values().map(|budget| budget.bytes_max).sum()
     }
 
-    /// Used and free memory on the f405, in KiB and percent.
+    /// Used and free memory, in KiB and percent.
     fn table(&self) -> String {
         let mut table = "\n| | of | taken | free | limit |\n|---|---|---|---|---|\n".to_owned();
         let kib = |bytes: u64| bytes as f64 / 1024.0;
@@ -120,19 +120,19 @@ impl Budgets {
 
 /// Builds for these boards, prints their usage and fails if one exceeds its budget. `write`: the first one's usage is
 /// written into the budgets and the table of ARCHITECTURE.md.
-pub(crate) fn check(boards: &[Board], write: bool) -> Result<()> {
+pub(crate) fn check(boards: &[&Board], write: bool) -> Result<()> {
     let budgets = Budgets::read()?;
     let mut rows = Vec::new();
-    for (index, &board) in boards.iter().enumerate() {
+    for (index, board) in boards.iter().enumerate() {
         let image = firmware::build(board)?;
         let used = sizes(&fs::read(&image)?).with_context(|| format!("{}", image.display()))?;
-        rows.extend(compare(board.name(), &used, &budgets.memory)?);
+        rows.extend(compare(&board.name, &used, &budgets.memory)?);
         if write && index == 0 {
             write_taken(&used)?;
         }
     }
     println!(
-        "{:<10} {:<6} {:>9} {:>9} {:>9}  reason of the limit",
+        "{:<20} {:<6} {:>9} {:>9} {:>9}  reason of the limit",
         "board", "memory", "bytes", "limit", "free"
     );
     for row in &rows {
@@ -192,7 +192,7 @@ fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Li
             let bytes = used.get(memory).copied().unwrap_or(0);
             let over = bytes > budget.bytes_max;
             let text = format!(
-                "{board:<10} {memory:<6} {bytes:>9} {:>9} {:>9}  {}{}",
+                "{board:<20} {memory:<6} {bytes:>9} {:>9} {:>9}  {}{}",
                 budget.bytes_max,
                 all.saturating_sub(bytes),
                 if over { "OVER: " } else { "" },
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn one_byte_over_is_over() {
         let used = BTreeMap::from([("flash", 100), ("ram", 101)]);
-        let rows = compare("f405", &used, &limits(100)).unwrap();
+        let rows = compare("matek", &used, &limits(100)).unwrap();
         assert_eq!(rows.iter().map(|row| row.over).collect::<Vec<_>>(), [false, true, false]);
         assert!(rows[1].text.contains("OVER: because"));
     }
@@ -254,7 +254,7 @@ mod tests {
     fn a_memory_without_a_budget_is_an_error() {
         let mut limits = limits(100);
         limits.remove("ccm");
-        assert!(compare("f405", &BTreeMap::new(), &limits).is_err());
+        assert!(compare("matek", &BTreeMap::new(), &limits).is_err());
     }
 
     /// A limit far above the usage is useless: it hides growth.

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::bench::{BYTES_PER_S, record_at_full_rate};
 use crate::budgets::{Budgets, Row};
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
@@ -27,7 +27,7 @@ const STAGES: [(&str, &str); 5] = [
 /// Builds, measures and compares.
 pub(crate) fn check() -> Result<()> {
     setup::require(&[Need::Linker, Need::FirmwareTarget])?;
-    let image = firmware::build(Board::F405)?;
+    let image = firmware::build(firmware::default_board())?;
     check_built(&hums::build()?, &image)
 }
 

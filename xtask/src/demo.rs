@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
@@ -53,7 +53,7 @@ pub(crate) fn as_test() -> Result<()> {
     let flight = repo::target().join("beginning.tlog");
     fs::write(&flight, beginning)?;
     let options = Options { flight: Some(flight), pc: false, no_dashboard: true };
-    fly(&options, Some(&Board::F405.image()), Duration::ZERO)
+    fly(&options, Some(&firmware::image_of(firmware::default_board())), Duration::ZERO)
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
@@ -66,7 +66,8 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     }
     let program = || hums::build().map(drop);
     let image = if flashed {
-        Some(firmware::build_beside(Board::F405, program)?)
+        firmware::build_beside([firmware::default_board()], program)?;
+        Some(firmware::image_of(firmware::default_board()))
     } else {
         program()?;
         None

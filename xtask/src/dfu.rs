@@ -73,11 +73,11 @@ mod tests {
 
     #[test]
     fn each_piece_is_an_element_with_its_address() {
-        let file = file("hums f405", &pieces());
+        let file = file("hums-mate", &pieces());
         assert_eq!(&file[..6], b"DfuSe\x01");
         assert_eq!(word(&file, 6) as usize, file.len() - SUFFIX_BYTES);
         assert_eq!(&file[11..17], b"Target");
-        assert_eq!(&file[22..31], b"hums f405");
+        assert_eq!(&file[22..31], b"hums-mate");
         assert_eq!(word(&file, 277), 392 + 1000 + 16);
         assert_eq!(word(&file, 281), 2);
         assert_eq!((word(&file, 285), word(&file, 289)), (0x0800_0000, 392));

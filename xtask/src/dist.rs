@@ -14,7 +14,7 @@ use anyhow::{Context as _, Result, bail};
 use sha2::{Digest as _, Sha256};
 
 use crate::budgets;
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, MAC_TARGET, Need, STATIC_TARGET, WINDOWS_TARGET};
 use crate::shell::Shell;
@@ -30,8 +30,8 @@ pub(crate) fn run(check: bool) -> Result<()> {
     // It has little to do: building it without optimisation takes a third of the time.
     ensure_tool("deny", &["--debug"])?;
     // `cargo xtask test` leaves out the board that none of its steps runs on.
-    budgets::check(&Board::ALL, false)?;
-    for board in Board::ALL {
+    budgets::check(&hums_boards::all().iter().collect::<Vec<_>>(), false)?;
+    for board in hums_boards::all() {
         firmware::lint(board)?;
     }
     without_std()?;
@@ -93,12 +93,13 @@ impl Release {
 
     fn make(&self) -> Result<Vec<File>> {
         let mut files = Vec::new();
-        for board in Board::ALL {
-            self.cargo("rustc", &[&board.cargo_arguments()[..], &firmware::LAST.map(Into::into)].concat())?;
+        for board in hums_boards::all() {
+            let arguments = [&firmware::cargo_arguments()[..], &firmware::LAST.map(Into::into)].concat();
+            self.cargo("rustc", &arguments, &board.name)?;
             let (_, elf) = read("", &self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))?;
             files.extend(firmware::files(board, elf)?);
-            files.push(self.sbom(&format!("hums-{}", board.name()), "firmware/app", &board.choice())?);
         }
+        files.push(self.sbom("hums-firmware", "firmware/app", &[firmware::target()])?);
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
         let program = self.target().join(STATIC_TARGET).join("release/hums");
         // The tests run a program that is built for tests. This is the one that is released.
@@ -125,14 +126,15 @@ impl Release {
     }
 
     fn build(&self, arguments: &[&str]) -> Result<()> {
-        self.cargo("build", arguments)
+        self.cargo("build", arguments, hums_boards::DEFAULT)
     }
 
-    fn cargo<A: AsRef<std::ffi::OsStr>>(&self, command: &str, arguments: &[A]) -> Result<()> {
+    fn cargo<A: AsRef<std::ffi::OsStr>>(&self, command: &str, arguments: &[A], board: &str) -> Result<()> {
         Shell::cargo()
             .within(&self.tree)
             .env("CARGO_TARGET_DIR", self.target())
             .env("CARGO_ENCODED_RUSTFLAGS", &self.flags)
+            .env(firmware::BOARD, board)
             // The linker for Windows writes it instead of the time of day.
             .env("SOURCE_DATE_EPOCH", self.stamp()?)
             .args([command, "--locked"])
@@ -235,7 +237,7 @@ fn ensure_tool(name: &str, options: &[&str]) -> Result<()> {
 /// `hums-onboard` depends on all other crates that fly. The target has no std, so a crate or dependency that needs
 /// std does not compile. `hums-app` takes no part: it turns further features on.
 fn without_std() -> Result<()> {
-    firmware::cargo()?
+    firmware::cargo(firmware::default_board())?
         .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])
         .run()
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 use anyhow::{Context as _, Result, bail};
+pub(crate) use hums_boards::Board;
 
 use crate::dfu;
 use crate::image;
@@ -15,48 +16,24 @@ use crate::shell::Shell;
 /// the compiler's own limit. 4.7 KB of flash less, at 0.2 % more load.
 pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
 
-/// The firmware's targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Board {
-    /// A real board with an STM32F405.
-    F405,
-    /// A NUCLEO-F429ZI.
-    F429,
+/// The board that every change is tried for.
+pub(crate) fn default_board() -> &'static Board {
+    hums_boards::find(hums_boards::DEFAULT).expect("the default board has a file")
 }
 
-impl Board {
-    pub(crate) const ALL: [Self; 2] = [Self::F405, Self::F429];
+/// The target, for any cargo command on the firmware's package.
+pub(crate) fn target() -> String {
+    format!("--target={FIRMWARE_TARGET}")
+}
 
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::F405 => "f405",
-            Self::F429 => "f429",
-        }
-    }
+/// The same with package and profile, for builds from the root.
+pub(crate) fn cargo_arguments() -> [String; 3] {
+    ["--package=hums-app".into(), "--profile=firmware".into(), target()]
+}
 
-    /// The arguments that choose this board, for any cargo command on the firmware's package.
-    pub(crate) fn choice(self) -> [String; 4] {
-        [
-            format!("--target={FIRMWARE_TARGET}"),
-            "--no-default-features".into(),
-            "--features".into(),
-            format!("board-{}", self.name()),
-        ]
-    }
-
-    /// The same with package and profile, for builds from the root.
-    pub(crate) fn cargo_arguments(self) -> Vec<String> {
-        ["--package=hums-app", "--profile=firmware"]
-            .map(Into::into)
-            .into_iter()
-            .chain(self.choice())
-            .collect()
-    }
-
-    /// Where [`build`] leaves the image: one file a board, so that building one does not replace the other.
-    pub(crate) fn image(self) -> PathBuf {
-        repo::target().join("firmware").join(format!("hums-{}.elf", self.name()))
-    }
+/// Where [`build`] leaves the image: one file a board, so that building one does not replace the other.
+pub(crate) fn image_of(board: &Board) -> PathBuf {
+    repo::target().join("firmware").join(format!("hums-{}.elf", board.name))
 }
 
 /// The compiler's flags of everything that is released from `tree`, as cargo takes them. Paths of the machine are
@@ -81,27 +58,30 @@ pub(crate) fn flags(tree: &Path) -> Result<OsString> {
     Ok(flags)
 }
 
-/// cargo with the flags of a release, for the firmware.
-pub(crate) fn cargo() -> Result<Shell> {
-    Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?))
+/// The variable that names the board to the firmware's build script.
+pub(crate) const BOARD: &str = "HUMS_BOARD";
+
+/// cargo with the flags of a release, for the firmware of this board.
+pub(crate) fn cargo(board: &Board) -> Result<Shell> {
+    Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?).env(BOARD, &board.name))
 }
 
 /// Compiles the firmware with these further arguments; the compiler's ELF file.
-fn compile(board: Board, further: &[&str]) -> Result<PathBuf> {
-    cargo()?.arg("rustc").args(board.cargo_arguments()).args(further).args(LAST).run()?;
+fn compile(board: &Board, further: &[&str]) -> Result<PathBuf> {
+    cargo(board)?.arg("rustc").args(cargo_arguments()).args(further).args(LAST).run()?;
     Ok(repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))
 }
 
 /// Builds the firmware with logs for a debug probe, and returns its ELF file's path.
-pub(crate) fn build_with_log(board: Board) -> Result<PathBuf> {
+pub(crate) fn build_with_log(board: &Board) -> Result<PathBuf> {
     compile(board, &["--features=log"])
 }
 
 /// Builds the firmware for `board` as a release does and returns its ELF file's path; beside it are the other files of a release.
-pub(crate) fn build(board: Board) -> Result<PathBuf> {
+pub(crate) fn build(board: &Board) -> Result<PathBuf> {
     let built = compile(board, &[])?;
     let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
-    let image = board.image();
+    let image = image_of(board);
     for (name, data) in files(board, elf)? {
         let path = image.with_file_name(name);
         write_if_different(&path, &data).with_context(|| format!("cannot write {}", path.display()))?;
@@ -109,29 +89,41 @@ pub(crate) fn build(board: Board) -> Result<PathBuf> {
     Ok(image)
 }
 
-/// [`build`], and programs for this PC at the same time: the last part of each is one core's work.
-pub(crate) fn build_beside(board: Board, pc: impl FnOnce() -> Result<()>) -> Result<PathBuf> {
+/// [`build`] for these boards, one after the other, and, at the same time, what is built for this PC: the last part of each is one
+/// core's work.
+pub(crate) fn build_beside(
+    boards: impl IntoIterator<Item = &'static Board> + Send,
+    pc: impl FnOnce() -> Result<()>,
+) -> Result<()> {
     std::thread::scope(|scope| {
-        let firmware = scope.spawn(|| build(board));
+        let firmware = scope.spawn(|| boards.into_iter().try_for_each(|board| build(board).map(drop)));
         pc()?;
         firmware.join().unwrap_or_else(|_| bail!("the build of the firmware panicked"))
     })
 }
 
 /// The flashable files of the firmware of `board`: the name and the content of each file, the ELF file last.
-pub(crate) fn files(board: Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 3]> {
-    let name = format!("hums-{}", board.name());
+pub(crate) fn files(board: &Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 4]> {
+    let name = format!("hums-{}", board.name);
     let pieces = image::pieces(&elf).with_context(|| name.clone())?;
     Ok([
         (format!("{name}.dfu"), dfu::file(&name, &pieces)),
+        (format!("{name}.hex"), image::hex(&pieces)),
         (format!("{name}.bin"), image::flat(&pieces)),
         (format!("{name}.elf"), elf),
     ])
 }
 
+/// Type-checks the firmware for each board.
+pub(crate) fn check_all() -> Result<()> {
+    hums_boards::all()
+        .iter()
+        .try_for_each(|board| cargo(board)?.args(["check", "--quiet"]).args(cargo_arguments()).run())
+}
+
 /// Lints the firmware for `board`, which is built; a warning is an error.
-pub(crate) fn lint(board: Board) -> Result<()> {
-    cargo()?.arg("clippy").args(board.cargo_arguments()).args(["--", "-D", "warnings"]).run()
+pub(crate) fn lint(board: &Board) -> Result<()> {
+    cargo(board)?.arg("clippy").args(cargo_arguments()).args(["--", "-D", "warnings"]).run()
 }
 
 /// An unchanged image keeps its time, so that nothing that depends on it is made anew.
@@ -141,21 +133,4 @@ fn write_if_different(to: &Path, new: &[u8]) -> io::Result<()> {
     }
     fs::create_dir_all(to.parent().unwrap_or(to))?;
     fs::write(to, new)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn boards_are_known_by_name() {
-        for board in Board::ALL {
-            assert_eq!(<Board as clap::ValueEnum>::from_str(board.name(), false), Ok(board));
-        }
-    }
-
-    #[test]
-    fn each_board_keeps_its_own_image() {
-        assert_ne!(Board::F405.image(), Board::F429.image());
-    }
 }

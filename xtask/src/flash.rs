@@ -12,11 +12,15 @@ const PROBE_RS: (&str, &str) =
     ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
 const DFU_UTIL: (&str, &str) = ("dfu-util", "apt-get install dfu-util (macOS: brew install dfu-util)");
 
+/// The chip of every board, as probe-rs calls it.
+const CHIP: &str = "STM32F405RGTx";
+
 /// Arguments of `flash`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    #[arg(long, value_enum, default_value_t = Board::F405)]
-    board: Board,
+    /// One of the files in boards/, by its name
+    #[arg(long, value_parser = hums_boards::find, default_value = hums_boards::DEFAULT)]
+    board: &'static Board,
     /// Over USB by the chip's own boot loader (dfu-util), not by a debug probe (probe-rs)
     #[arg(long)]
     dfu: bool,
@@ -34,19 +38,19 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     }
     require(PROBE_RS)?;
     // Without --chip-erase it erases the sectors that the image has bytes in, and no others.
-    probe("download", options.board, &elf).run()?;
-    Shell::new(PROBE_RS.0).args(["reset", "--chip", chip(options.board)]).run()
+    probe("download", &elf).run()?;
+    Shell::new(PROBE_RS.0).args(["reset", "--chip", CHIP]).run()
 }
 
 /// Builds the firmware with its feature `log`, programs it and shows the log as it goes on.
-pub(crate) fn attach(board: Board) -> Result<()> {
+pub(crate) fn attach(board: &Board) -> Result<()> {
     let elf = firmware::build_with_log(board)?;
     require(PROBE_RS)?;
-    probe("run", board, &elf).run()
+    probe("run", &elf).run()
 }
 
-fn probe(command: &str, board: Board, elf: &PathBuf) -> Shell {
-    Shell::new(PROBE_RS.0).args([command, "--chip", chip(board)]).arg(elf)
+fn probe(command: &str, elf: &PathBuf) -> Shell {
+    Shell::new(PROBE_RS.0).args([command, "--chip", CHIP]).arg(elf)
 }
 
 /// The boot loader's alternate setting 0 is the flash; afterwards the firmware starts.
@@ -54,14 +58,6 @@ fn load(file: &Path) -> Shell {
     Shell::new(DFU_UTIL.0)
         .args(["--device", "0483:df11", "--alt", "0", "--dfuse-address", ":leave", "--download"])
         .arg(file)
-}
-
-/// As probe-rs calls it.
-fn chip(board: Board) -> &'static str {
-    match board {
-        Board::F405 => "STM32F405RGTx",
-        Board::F429 => "STM32F429ZITx",
-    }
 }
 
 fn require((program, how): (&str, &str)) -> Result<()> {
@@ -85,8 +81,8 @@ mod tests {
     #[test]
     fn nothing_erases_the_whole_chip() {
         let elf = PathBuf::from("hums.elf");
-        let probe = probe("download", Board::F429, &elf);
-        assert_eq!(probe.shown(), "probe-rs download --chip STM32F429ZITx hums.elf");
+        let probe = probe("download", &elf);
+        assert_eq!(probe.shown(), "probe-rs download --chip STM32F405RGTx hums.elf");
         let load = load(Path::new("hums.dfu"));
         assert_eq!(
             load.shown(),

@@ -1,5 +1,7 @@
 //! The parts of a firmware's ELF file, with their places in the flash.
 
+use std::fmt::Write as _;
+
 use anyhow::{Context as _, Result, bail};
 use object::Endianness;
 use object::elf::{FileHeader32, PT_LOAD};
@@ -64,9 +66,55 @@ pub(crate) fn flat(pieces: &[Piece]) -> Vec<u8> {
     flat
 }
 
+/// The pieces as Intel HEX, which keeps the gap between them: for Betaflight Configurator and `STM32CubeProgrammer`.
+pub(crate) fn hex(pieces: &[Piece]) -> Vec<u8> {
+    let mut text = String::new();
+    let mut upper = None;
+    for piece in pieces {
+        let mut at = piece.address;
+        let mut rest = &piece.bytes[..];
+        while !rest.is_empty() {
+            if upper != Some(at >> 16) {
+                upper = Some(at >> 16);
+                record(&mut text, 0, 4, &((at >> 16) as u16).to_be_bytes());
+            }
+            // No record crosses a line of 16 bytes, and so none a bank of 64 KiB.
+            let (line, behind) = rest.split_at(rest.len().min(16 - at as usize % 16));
+            record(&mut text, at as u16, 0, line);
+            (at, rest) = (at + line.len() as u32, behind);
+        }
+    }
+    record(&mut text, 0, 1, &[]);
+    text.into_bytes()
+}
+
+/// A record: length, address, kind, bytes, and what makes the sum of all of them zero.
+fn record(text: &mut String, address: u16, kind: u8, bytes: &[u8]) {
+    let [high, low] = address.to_be_bytes();
+    let head = [bytes.len() as u8, high, low, kind];
+    let all = head.iter().chain(bytes);
+    let sum = all.clone().fold(0_u8, |sum, byte| sum.wrapping_add(*byte)).wrapping_neg();
+    text.push(':');
+    for byte in all.chain([&sum]) {
+        // Cannot fail: it is a text.
+        let _ = write!(text, "{byte:02X}");
+    }
+    text.push('\n');
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The data record is the example of the format's article in Wikipedia.
+    #[test]
+    fn a_hex_file_has_each_address_and_the_gap() {
+        let bytes = b"\x21\x46\x01\x36\x01\x21\x47\x01\x36\x00\x7E\xFE\x09\xD2\x19\x01".to_vec();
+        let pieces = [Piece { address: 0x0800_0100, bytes }, piece(0x0800_FFFF, 2)];
+        let wanted = ":020000040800F2\n:10010000214601360121470136007EFE09D2190140\n:01FFFF0007FA\n:020000040801F1\n\
+                      :0100000007F8\n:00000001FF\n";
+        assert_eq!(String::from_utf8(hex(&pieces)).unwrap(), wanted);
+    }
 
     fn piece(address: u32, bytes: usize) -> Piece {
         Piece { address, bytes: vec![7; bytes] }

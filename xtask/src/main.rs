@@ -26,12 +26,12 @@ mod shell;
 mod test;
 mod wine;
 
+use std::fs;
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use clap::Parser;
 
-use crate::firmware::Board;
 use crate::setup::Need;
 
 /// The tasks of this repository
@@ -44,12 +44,14 @@ enum Command {
     Test(test::Options),
     /// Run the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise
     ///
-    /// All of them take an hour and make docs/proof.md. Three names are no campaigns:
+    /// All of them take an hour and make docs/proof.md. Four names are no campaigns:
     ///
     /// `prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]` counts found faults and false alarms in labelled
     /// flights; --write makes docs/diagnosis.md.
     ///
     /// `prove chip [TEST]...` runs the long tests of the image on the model of its chip.
+    ///
+    /// `prove boards` runs the image of every board there, each with its own pins.
     ///
     /// `prove foreign [EMBASSY]` runs other people's programs on that model: examples of registry packages, and of a
     /// checkout of embassy's repository.
@@ -60,9 +62,12 @@ enum Command {
     },
     /// Build the firmware and print the image's path
     Firmware {
-        #[arg(long, value_enum, default_value_t = Board::F405)]
-        board: Board,
+        /// One of the files in boards/, by its name
+        #[arg(long, value_parser = hums_boards::find, default_value = hums_boards::DEFAULT)]
+        board: &'static firmware::Board,
     },
+    /// Make docs/boards.md and the README's table from the files in boards/
+    Boards,
     /// Measure what the record takes, and how fast logs are decoded and checked
     Bench {
         /// All, if none is named
@@ -84,10 +89,11 @@ enum Command {
     Flash(flash::Options),
     /// Build the firmware with a log, program it and show the log (probe-rs)
     Attach {
-        #[arg(long, value_enum, default_value_t = Board::F405)]
-        board: Board,
+        /// One of the files in boards/, by its name
+        #[arg(long, value_parser = hums_boards::find, default_value = hums_boards::DEFAULT)]
+        board: &'static firmware::Board,
     },
-    /// Compare flash and RAM of all boards with budgets.toml
+    /// Compare flash and RAM of the default board with budgets.toml
     Size {
         /// Note what is taken there and in ARCHITECTURE.md
         #[arg(long)]
@@ -131,9 +137,10 @@ impl Command {
             Self::Dist { check } => dist::run(check),
             Self::Flash(options) => flash::flash(&options),
             Self::Attach { board } => flash::attach(board),
+            Self::Boards => write_boards(),
             Self::Size { write } => {
                 setup::require(&[Need::Linker, Need::FirmwareTarget])?;
-                budgets::check(&Board::ALL, write)
+                budgets::check(&[firmware::default_board()], write)
             }
             Self::Costs => costs::check(),
             Self::Setup { dry_run } => {
@@ -146,6 +153,18 @@ impl Command {
             Self::Grafana => grafana::write(),
         }
     }
+}
+
+/// Writes the page of the boards, and their table into the README: from its head up to the next empty line.
+fn write_boards() -> Result<()> {
+    let table = hums_boards::page::table("docs/boards.md");
+    let path = repo::root().join("README.md");
+    let text = fs::read_to_string(&path)?;
+    let head = table.lines().next().unwrap_or_default();
+    let (before, old) = text.split_once(head).context("README.md has no table of boards")?;
+    let (_, after) = old.split_once("\n\n").context("README.md: the table of boards has no end")?;
+    fs::write(&path, format!("{before}{table}\n{after}"))?;
+    Ok(fs::write(repo::root().join("docs/boards.md"), hums_boards::page::render())?)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 use cargo_metadata::diagnostic::DiagnosticLevel;
 use cargo_metadata::{Artifact, Message, Metadata, MetadataCommand, TargetKind};
 
-use crate::firmware::Board;
+use crate::firmware;
 use crate::hums;
 use crate::oracle;
 use crate::repo;
@@ -135,7 +135,7 @@ pub(crate) fn short_campaigns() -> Result<()> {
 fn run(program: &TestProgram, options: &[&str]) -> Result<()> {
     println!("\n{} {}", program.package, program.name);
     Shell::new(&program.path)
-        .env("HUMS_FIRMWARE", Board::F405.image())
+        .env("HUMS_FIRMWARE", firmware::image_of(firmware::default_board()))
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_BIN", hums::program())

@@ -1,8 +1,8 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
-//! The campaigns themselves are in the tests' crate; this builds them and their requirements. Three parts are separate
+//! The campaigns themselves are in the tests' crate; this builds them and their requirements. Four parts are separate
 //! from the campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` has the long tests on the model of the chip
-//! for want of time; `foreign` judges that model by programs that are not ours.
+//! for want of time; `boards` runs the image of every board there; `foreign` judges that model by programs that are not ours.
 
 use anyhow::Result;
 
@@ -19,6 +19,9 @@ pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 /// The part that runs the image that is flashed.
 const CHIP: &str = "chip";
 
+/// The part that runs the image of every board.
+const BOARDS: &str = "boards";
+
 /// The part that judges the model of the chip.
 const FOREIGN: &str = "foreign";
 
@@ -29,7 +32,10 @@ const DIAGNOSIS: &str = "diagnosis";
 /// or `foreign` with theirs.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
-        Some((CHIP, rest)) => return chip(rest),
+        Some((CHIP, rest)) => return chip(&[firmware::default_board()], rest),
+        Some((BOARDS, [])) => {
+            return chip(&hums_boards::all().iter().collect::<Vec<_>>(), &["boards::".to_owned()]);
+        }
         Some((FOREIGN, rest)) => return foreign::run(rest),
         _ => {}
     }
@@ -41,11 +47,11 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
     Shell::cargo().args(run).args(arguments).run()
 }
 
-/// The long tests, some of them or all.
-fn chip(names: &[String]) -> Result<()> {
+/// The long tests, some of them or all, with the images of these boards.
+fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
     setup::require(&needs)?;
-    firmware::build_beside(Board::F405, pc::build)?;
+    firmware::build_beside(boards.iter().copied(), pc::build)?;
     oracle::prepare()?;
     let mut options = vec!["--ignored", "--nocapture"];
     options.extend(names.iter().map(String::as_str));

@@ -11,6 +11,7 @@ use crate::dma::Port;
 use crate::map::{self, Unit};
 use crate::memory::{CCM, FLASH, SRAM};
 use crate::rcc::Bank;
+use crate::tim11::Input;
 use crate::time::Now;
 
 /// DCKCFGR of other chips: embassy reads it, and writes 0. It is reserved here, and harmless.
@@ -94,6 +95,7 @@ impl Chip {
         let offset = word & 0x3FF;
         let value = match unit {
             Unit::Tim(number) => self.tims[number as usize].read(offset, now.cycle),
+            Unit::Tim11 => self.tim11.read(offset, self.tim11_input(now)),
             Unit::Usart(number) => self.usarts[number as usize].read(offset),
             Unit::Spi(number) => self.spis[number as usize].read(offset, now, &self.time),
             Unit::Iwdg => self.iwdg.read(offset, now.ps),
@@ -132,7 +134,8 @@ impl Chip {
         }
         let offset = word & 0x3FF;
         let value = match (unit, size) {
-            (_, Size::Word) | (Unit::Usart(_) | Unit::Spi(_) | Unit::Tim(_) | Unit::Iwdg, _)
+            (_, Size::Word)
+            | (Unit::Usart(_) | Unit::Spi(_) | Unit::Tim(_) | Unit::Tim11 | Unit::Iwdg, _)
                 if address == word =>
             {
                 value
@@ -162,6 +165,7 @@ impl Chip {
         let now = self.moment;
         match unit {
             Unit::Tim(number) => self.tims[number as usize].write(offset, value, now.cycle),
+            Unit::Tim11 => self.tim11.write(offset, value, self.tim11_input(now)),
             Unit::Usart(number) => self.usarts[number as usize].write(offset, value, now.ps),
             Unit::Spi(number) => self.spis[number as usize].write(offset, value, now, &self.time),
             Unit::Iwdg => {
@@ -195,8 +199,11 @@ impl Chip {
     }
 
     fn read_dbgmcu(&self, offset: u32) -> Option<u32> {
-        // Revision Y of the STM32F405 and F407.
-        if offset == 0 { Some(0x100F_6413) } else { self.dbgmcu.get(offset as usize / 4 - 1).copied() }
+        if offset == 0 { Some(self.idcode) } else { self.dbgmcu.get(offset as usize / 4 - 1).copied() }
+    }
+
+    fn tim11_input(&self, now: Now) -> Input {
+        Input { ps: now.ps, timer_hz: self.clocks.timer[1], edges_mhz: self.rcc.crystal_for_rtc_mhz(now.ps) }
     }
 
     fn write_rcc(&mut self, offset: u32, value: u32, now: Now) -> Option<()> {
@@ -236,6 +243,7 @@ impl Chip {
     fn reset_unit(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Tim(number) => self.tims[number as usize].reset(now.cycle),
+            Unit::Tim11 => self.tim11.reset(),
             Unit::Usart(number) => self.usarts[number as usize].reset(now.ps),
             Unit::Spi(number) => self.spis[number as usize].reset(),
             Unit::Pwr => self.pwr.reset(),

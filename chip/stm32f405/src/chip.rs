@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use crate::art::Art;
+use crate::bits::Bits;
 use crate::dma::Dma;
 use crate::flash::Flash;
 use crate::gpio::{Exti, Gpio, Pin};
@@ -16,6 +17,7 @@ use crate::rcc::{Cause, Clocks, Rcc};
 use crate::small::{Crc, Iwdg, Rng};
 use crate::spi::Spi;
 use crate::tim::Tim;
+use crate::tim11::Tim11;
 use crate::time::{NEVER, Now, Timebase};
 use crate::usart::Usart;
 
@@ -78,6 +80,8 @@ pub struct Chip {
     pub spis: [Spi; 3],
     /// Timers.
     pub tims: [Tim; 5],
+    /// TIM11.
+    pub tim11: Tim11,
     /// DMA.
     pub dmas: [Dma; 2],
     /// The watchdog.
@@ -88,8 +92,12 @@ pub struct Chip {
     pub crc: Crc,
     /// The chip's own number, 96 bits.
     pub uid: [u32; 3],
+    /// `DBGMCU_IDCODE`.
+    pub idcode: u32,
     /// `DBGMCU_CR` and the two freeze registers.
     pub dbgmcu: [u32; 3],
+    /// A device on pins that the program moves itself.
+    pub bits: Option<Bits>,
     /// The select pin of each bus.
     pub selects: [Option<Pin>; 3],
     /// Oddities, with their counts.
@@ -130,12 +138,16 @@ impl Chip {
             usarts: std::array::from_fn(|_| Usart::new()),
             spis: std::array::from_fn(|_| Spi::new()),
             tims: [Tim::new(32, 4), Tim::new(16, 4), Tim::new(16, 4), Tim::new(32, 4), Tim::new(16, 2)],
+            tim11: Tim11::default(),
             dmas: [Dma::new(), Dma::new()],
             iwdg: Iwdg::new(lsi_hz),
             rng: Rng::new(seed),
             crc: Crc::new(),
             uid: [0x0031_0045, 0x3136_510E, 0x3336_3734],
+            // Revision Y of the STM32F405 and F407.
+            idcode: 0x100F_6413,
             dbgmcu: [0; 3],
+            bits: None,
             selects: [None; 3],
             notes: BTreeMap::new(),
             clocks: Clocks::default(),
@@ -172,6 +184,7 @@ impl Chip {
         self.usarts.iter_mut().for_each(|usart| usart.reset(now.ps));
         self.spis.iter_mut().for_each(Spi::reset);
         self.tims.iter_mut().for_each(|tim| tim.reset(now.cycle));
+        self.tim11.reset();
         self.dmas = [Dma::new(), Dma::new()];
         self.iwdg.reset();
         self.rng.reset();
@@ -402,6 +415,9 @@ impl Chip {
 
     /// Pins changed their use or level.
     pub fn pins_changed(&mut self, now: Now) {
+        if let Some((pin, level)) = self.bits.as_mut().and_then(|bits| bits.look(&self.gpio, now.ps)) {
+            self.gpio.drive(pin, Some(level));
+        }
         let gpio = &self.gpio;
         for (usart, (function, rx, tx)) in self.usarts.iter_mut().zip(map::USART_PINS) {
             let is = |pins: &[Pin]| pins.iter().any(|pin| gpio.is_routed(*pin, function));

@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod art;
+pub mod bits;
 pub mod chip;
 pub mod dma;
 pub mod flash;
@@ -21,5 +22,6 @@ mod serve;
 pub mod small;
 pub mod spi;
 pub mod tim;
+pub mod tim11;
 pub mod time;
 pub mod usart;

@@ -6,6 +6,7 @@
 
 use cortex_m4_model::{Core, Outcome};
 
+use crate::bits::{Bits, Pins};
 use crate::chip::Chip;
 use crate::gpio::Pin;
 use crate::image::Image;
@@ -232,9 +233,8 @@ impl Machine {
             return;
         }
         self.chip.flash.cut(self.now);
-        for spi in &mut self.chip.spis {
-            spi.wire.power(self.now, false);
-        }
+        let now = self.now;
+        self.wires().for_each(|wire| wire.power(now, false));
         self.is_off = true;
     }
 
@@ -247,9 +247,8 @@ impl Machine {
         self.seed = self.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(1);
         garbage(self.chip.sram.all_mut(), self.seed);
         garbage(self.chip.ccm.all_mut(), self.seed ^ 0x55);
-        for spi in &mut self.chip.spis {
-            spi.wire.power(self.now, true);
-        }
+        let now = self.now;
+        self.wires().for_each(|wire| wire.power(now, true));
         self.now += START;
         self.reset(Cause::Power, self.moment());
     }
@@ -301,6 +300,17 @@ impl Machine {
     pub fn connect(&mut self, bus: usize, select: Pin, wire: Box<dyn Wire>) {
         self.chip.spis[bus].wire = wire;
         self.chip.selects[bus] = Some(select);
+    }
+
+    /// Connects something to pins that the program moves itself.
+    pub fn connect_pins(&mut self, pins: Pins, wire: Box<dyn Wire>) {
+        self.chip.bits = Some(Bits::new(pins, wire));
+    }
+
+    /// The other ends of all buses.
+    fn wires(&mut self) -> impl Iterator<Item = &mut Box<dyn Wire>> {
+        let bits = self.chip.bits.iter_mut().map(|bits| &mut bits.wire);
+        self.chip.spis.iter_mut().map(|spi| &mut spi.wire).chain(bits)
     }
 
     /// Bytes of memory as a debugger sees them; fewer at the memory's end.

@@ -9,6 +9,8 @@ use crate::rcc::Bank;
 pub enum Unit {
     /// TIM2 to TIM5: 0 to 3; TIM12: 4.
     Tim(u8),
+    /// TIM11.
+    Tim11,
     /// USART1, USART2, USART3, UART4, UART5, USART6: 0 to 5.
     Usart(u8),
     /// SPI1 to SPI3: 0 to 2.
@@ -65,6 +67,7 @@ pub fn unit_at(address: u32) -> Option<(Unit, Option<Gate>)> {
         0x4001_3000 => (Unit::Spi(0), Some((Apb2, 12))),
         0x4001_3800 => (Unit::Syscfg, Some((Apb2, 14))),
         0x4001_3C00 => (Unit::Exti, None),
+        0x4001_4800 => (Unit::Tim11, Some((Apb2, 18))),
         port @ GPIO..=0x4002_2000 => {
             let number = ((port - GPIO) >> 10) as u8;
             (Unit::Gpio(number), Some((Ahb1, number)))
@@ -87,7 +90,8 @@ pub fn unit_of(gate: Gate) -> Option<Unit> {
 }
 
 /// Start of each device with a gate.
-const BASES: [u32; 29] = [
+const BASES: [u32; 30] = [
+    0x4001_4800,
     0x4000_1800,
     0x4000_0000,
     0x4000_0400,

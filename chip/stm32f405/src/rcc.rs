@@ -189,7 +189,18 @@ impl Rcc {
         self.since[LSI] = self.since[LSI].min(now);
     }
 
-    fn pll_on_hse(&self) -> bool {
+    /// The crystal divided by `RTCPRE`, in millihertz; 0 without it.
+    pub fn crystal_for_rtc_mhz(&self, now: Ps) -> u64 {
+        let divider = self.cfgr >> 16 & 0x1F;
+        if divider < 2 || !self.is_ready(HSE, now) {
+            0
+        } else {
+            u64::from(self.hse_hz) * 1_000 / u64::from(divider)
+        }
+    }
+
+    /// Whether the PLL runs from the crystal.
+    pub fn pll_on_hse(&self) -> bool {
         self.pllcfgr & 1 << 22 != 0
     }
 

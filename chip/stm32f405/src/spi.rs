@@ -31,6 +31,11 @@ pub trait Wire {
     /// A byte goes over the bus, its last clock at this moment in picoseconds, at this clock. Gives the answer.
     fn exchange(&mut self, ps: u64, hz: u32, sent: u8) -> u8;
 
+    /// Its answer to the byte that is about to begin, whose end [`Wire::exchange`] tells: for a bus whose program reads each bit.
+    fn begin(&mut self, _ps: u64, _hz: u32) -> u8 {
+        0xFF
+    }
+
     /// The select pin changed.
     fn select(&mut self, ps: u64, selected: bool);
 

@@ -16,7 +16,7 @@ const SIM_EXAMPLES: &str = "Examples:
   hums sim flight.tlog --sd card.img --stall 2500@60 --noise 0.001 --seed 7
   hums sim flight.tlog --sd card.img --cut-after-writes 1000:torn
   hums sim flight.tlog --sd card.img --store store.bin --params hums.param
-  hums sim flight.tlog --sd card.img --firmware hums-f405.elf
+  hums sim flight.tlog --sd card.img --firmware hums-olimex-stm32-h405.elf
 
 Raw bytes carry no times: they come as on a line at 115,200 baud. A file without a MAVLink frame is refused before anything
 is written. The image of --sd is kept: a second run adds a session to it; a file that is no card is refused. Where --gs or --tap fails the recording goes on (exit code 3).
@@ -54,7 +54,7 @@ pub struct Sim {
     /// Also write the bytes as they arrived at the UART, noise and all, to this file
     #[arg(long, value_name = "FILE")]
     pub tap: Option<PathBuf>,
-    /// Run this firmware image of the board f405 (ELF, DFU or raw) on a model of its chip, instead of the pipeline on this PC
+    /// Run this firmware image (ELF, DFU or raw) on a model of its board's chip, instead of the pipeline on this PC
     #[arg(long, value_name = "IMAGE", conflicts_with_all = ["cut_after_writes", "cut_store_after", "stall", "card_out", "write_error"])]
     pub firmware: Option<PathBuf>,
     /// With --firmware: measure what the stages of the pipeline cost the processor and the stack: `cycles`, `stack_by_urgency`

@@ -69,6 +69,8 @@ pub(crate) struct SdCard {
     /// The block that is being programmed while it is busy, and its content before.
     programmed: Option<(u32, [u8; 512])>,
     noise: u32,
+    /// The answer to a byte that has begun.
+    begun: Option<u8>,
 }
 
 impl SdCard {
@@ -91,6 +93,7 @@ impl SdCard {
             transfer: Transfer::None,
             programmed: None,
             noise: 1,
+            begun: None,
         }
     }
 
@@ -111,7 +114,7 @@ impl SdCard {
             self.clocks = self.clocks.saturating_add(8);
             return 0xFF;
         }
-        let answer = self.answer(now_ns);
+        let answer = self.begun.take().unwrap_or_else(|| self.answer(now_ns));
         self.take(now_ns, sent, wrong);
         if self.model.has(now_ns, |fault| fault == Fault::Noise).is_some() {
             self.noise = self.noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -120,8 +123,15 @@ impl SdCard {
         answer
     }
 
+    /// Its answer to the byte that begins now.
+    pub(crate) fn begin(&mut self, now_ns: u64) -> u8 {
+        let answer = self.answer(now_ns);
+        *self.begun.insert(answer)
+    }
+
     /// The select pin goes up: not during a transfer (7.2).
     pub(crate) fn deselected(&mut self, wrong: &mut impl FnMut(String)) {
+        self.begun = None;
         if !self.command.is_empty() {
             wrong(format!("deselected within command {}", self.command[0] & 0x3F));
         }

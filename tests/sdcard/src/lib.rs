@@ -19,7 +19,7 @@ pub use fault::{Fault, Plan};
 pub use medium::Medium;
 pub use model::{Kind, Model};
 pub use slot::{Counts, Event, SimPort, Slot};
-pub use wire::Card;
+pub use wire::{Card, connect};
 
 /// Nanoseconds of a millisecond.
 pub const MS: u64 = 1_000_000;

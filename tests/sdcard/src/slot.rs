@@ -130,6 +130,16 @@ impl Slot {
     }
 }
 
+impl Slot {
+    /// The card's answer to the byte that begins now; its end is an exchange.
+    pub(crate) fn begin(&self) -> u8 {
+        let mut inner = self.0.borrow_mut();
+        inner.happen_what_is_due();
+        let Inner { card, now_ns, selected, .. } = &mut *inner;
+        card.as_mut().filter(|_| *selected).map_or(0xFF, |card| card.begin(*now_ns))
+    }
+}
+
 impl Inner {
     fn happen(&mut self, event: Event) {
         if let (Some(card), Event::Pull | Event::Bounce) = (&self.card, &event) {

@@ -1,9 +1,27 @@
 //! The card at a bus of the chip's model, for the flashed image.
 
+use hums_boards::Board;
 use hums_recorder::spi::{Clock, Port as _};
+use stm32f405_model::bits::Pins;
+use stm32f405_model::gpio::Pin;
+use stm32f405_model::machine::Machine;
 use stm32f405_model::spi::Wire;
 
 use crate::{Event, SimPort, Slot};
+
+/// Wires the slot to the chip as the board does.
+pub fn connect(machine: &mut Machine, board: &Board, slot: &Slot) {
+    let pin = |pin: hums_boards::Pin| Pin(pin.port, pin.number);
+    let (wires, card) = (&board.card, Box::new(Card::new(slot)));
+    match &wires.bus {
+        Some(bus) => machine.connect(usize::from(bus.spi).saturating_sub(1), pin(wires.cs), card),
+        None => {
+            let [clock, to_device, from_device, select] =
+                [wires.sck, wires.mosi, wires.miso, wires.cs].map(pin);
+            machine.connect_pins(Pins { clock, to_device, from_device, select }, card);
+        }
+    }
+}
 
 /// A card in its slot, byte by byte at a bus.
 pub struct Card {
@@ -30,6 +48,11 @@ impl Wire for Card {
         let mut byte = [sent];
         let _ = self.port.exchange(&mut byte);
         byte[0]
+    }
+
+    fn begin(&mut self, ps: u64, _: u32) -> u8 {
+        self.slot.advance_to(ps / 1_000);
+        self.slot.begin()
     }
 
     fn select(&mut self, ps: u64, selected: bool) {

@@ -7,7 +7,7 @@ pub mod rig;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use hums_sdcard::{Card, Kind, Medium, Model, Plan, Slot};
+use hums_sdcard::{Kind, Medium, Model, Plan, Slot};
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
@@ -90,9 +90,29 @@ pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slo
 /// A board of this image with this card.
 pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
     let slot = Slot::new(Some(card));
+    let wired = wired(&image);
     let mut machine = Machine::new(image, board);
-    machine.connect(0, Pin(0, 4), Box::new(Card::new(&slot)));
+    hums_sdcard::connect(&mut machine, wired, &slot);
     (machine, slot)
+}
+
+/// The board that the image is for.
+///
+/// # Panics
+/// If the image names none.
+pub fn wired(image: &Image) -> &'static hums_boards::Board {
+    let name = image.pieces.iter().find_map(|(_, bytes)| hums_boards::name_in(bytes));
+    hums_boards::find(name.expect("the image names its board")).expect("a board of this version")
+}
+
+/// A pin, as the model counts it.
+pub fn pin(pin: hums_boards::Pin) -> Pin {
+    Pin(pin.port, pin.number)
+}
+
+/// A port, as the model counts it.
+pub fn usart(port: &hums_boards::Port) -> usize {
+    usize::from(port.usart) - 1
 }
 
 /// Writes a card's image to a file.

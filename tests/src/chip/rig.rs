@@ -1,7 +1,6 @@
 //! A board on a bench: frames come at its first port at full rate, and the record is compared with them.
 
 use hums_sdcard::{Medium, Plan, Slot};
-use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::memory::FLASH;
@@ -9,10 +8,7 @@ use stm32f405_model::report::Report;
 use stm32f405_model::time::{MS, Ps, SECOND};
 
 use super::record::{Compared, Session, compare, read};
-use super::{BAUD, board_with};
-
-/// The board's LED, lit when low.
-const LED: Pin = Pin(2, 12);
+use super::{BAUD, board_with, pin, usart, wired};
 
 /// Frames and the image that records them.
 #[derive(Debug)]
@@ -43,6 +39,8 @@ impl Bench {
 
 /// A board on a bench.
 pub struct Rig {
+    /// The board that the image is for.
+    pub wired: &'static hums_boards::Board,
     /// The board.
     pub machine: Machine,
     /// Its card's slot.
@@ -69,7 +67,8 @@ impl Rig {
     /// The same with a card that has these faults.
     pub fn with(image: &Image, parts: Board, frames: Vec<Vec<u8>>, plans: Vec<Plan>) -> Self {
         let (machine, slot, medium) = board_with(image.clone(), parts, plans);
-        Self { machine, slot, medium, sent: Vec::new(), frames, next: 0, free: 0, fast: 0.0, led: Vec::new() }
+        let (wired, sent, led) = (wired(image), Vec::new(), Vec::new());
+        Self { wired, machine, slot, medium, sent, frames, next: 0, free: 0, fast: 0.0, led }
     }
 
     /// Runs until this moment; with `busy` the line is full of frames.
@@ -80,11 +79,20 @@ impl Rig {
             while busy && self.free < to {
                 let frame = self.frames[self.next % self.frames.len()].clone();
                 self.next += 1;
-                self.free = self.machine.send(0, &frame, self.free, BAUD * (1.0 + self.fast));
+                self.free = self.machine.send(
+                    usart(&self.wired.autopilot),
+                    &frame,
+                    self.free,
+                    BAUD * (1.0 + self.fast),
+                );
                 self.sent.push((self.free, frame));
             }
             self.machine.run_until(to)?;
-            let lit = !self.machine.chip.gpio.is_high(LED) && self.machine.chip.gpio.pulls_low(LED);
+            let (gpio, led) = (&self.machine.chip.gpio, pin(self.wired.led.pin));
+            let lit = match self.wired.led.lit {
+                hums_boards::Level::Low => gpio.pulls_low(led),
+                hums_boards::Level::High => gpio.is_high(led),
+            };
             if self.led.last().is_none_or(|(_, last)| *last != lit) {
                 self.led.push((self.machine.now(), lit));
             }

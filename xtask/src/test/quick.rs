@@ -5,7 +5,6 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use cargo_metadata::{MetadataCommand, Package};
 
-use super::steps::FLOWN;
 use crate::firmware;
 use crate::pc;
 use crate::repo;
@@ -28,7 +27,7 @@ pub(super) fn run() -> Result<()> {
     changed.sort_unstable();
     changed.dedup();
     if changed.contains(&FIRMWARE) {
-        firmware::lint(FLOWN)?;
+        firmware::lint(firmware::default_board())?;
     }
     let choice: Vec<String> =
         changed.iter().filter(|name| **name != FIRMWARE).map(|name| format!("--package={name}")).collect();

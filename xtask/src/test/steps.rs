@@ -10,7 +10,7 @@ use crate::budgets;
 use crate::costs;
 use crate::demo;
 use crate::dist;
-use crate::firmware::{self, Board};
+use crate::firmware;
 use crate::hums;
 use crate::lines;
 use crate::oracle;
@@ -71,7 +71,7 @@ pub(super) const STEPS: [Step; 18] = [
     Step::new(Build, "page", "formatting and lints of the page, by Biome", &[PythonVenv], page),
     Step::new(Build, "build", "hums, all tests and the firmware compile", &[FirmwareTarget], build),
     Step::new(Build, "budgets", "the size of the firmware, within budgets.toml", &[FirmwareTarget], size),
-    Step::new(Lint, "clippy-firmware", "lints of the firmware", &[Clippy, FirmwareTarget], lint),
+    Step::new(Lint, "clippy-firmware", "lints of the firmware, and the types of every board", &[Clippy, FirmwareTarget], lint),
     Step::new(Lint, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
     Step::new(Lint, "doc", "the documentation builds without a warning", &[], pc::document),
     Step::new(Test, "chip", "the image that is flashed, on the model of its chip", CHIP, chip),
@@ -93,21 +93,19 @@ pub(super) const STEPS: [Step; 18] = [
 
 const CHIP: &[Need] = &[FirmwareTarget, PythonVenv, Dosfstools];
 
-/// The board that every change is tried for. `cargo xtask dist` looks at all of them.
-pub(super) const FLOWN: Board = Board::F405;
-
 fn build() -> Result<()> {
-    firmware::build_beside(FLOWN, pc::build).map(drop)
+    firmware::build_beside(hums_boards::families(), pc::build)
 }
 
 fn size() -> Result<()> {
-    println!("NOT TESTED: board f429 (cargo xtask dist lints and measures it)");
+    println!("NOT TESTED: images of the other boards (cargo xtask prove boards)");
     println!("NOT TESTED: licences and sources of the dependencies (cargo xtask dist)");
-    budgets::check(&[FLOWN], false)
+    budgets::check(&[firmware::default_board()], false)
 }
 
 fn lint() -> Result<()> {
-    firmware::lint(FLOWN)
+    firmware::lint(firmware::default_board())?;
+    firmware::check_all()
 }
 
 /// As `host-tools/report/src/page/biome.json` has it. To format: `target/venv/bin/biome format --write` in that folder.
@@ -119,8 +117,9 @@ fn page() -> Result<()> {
 
 /// The tested files are the flashed ones: the sums are those of `cargo xtask dist` of the same sources.
 fn chip() -> Result<()> {
-    let elf = FLOWN.image();
-    let files = firmware::files(FLOWN, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
+    let board = firmware::default_board();
+    let elf = firmware::image_of(board);
+    let files = firmware::files(board, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
     print!("{}", dist::sums(&files));
     pc::end_to_end("chip", &[])
 }
@@ -146,7 +145,7 @@ fn live() -> Result<()> {
 }
 
 fn measure_costs() -> Result<()> {
-    costs::check_built(&hums::program(), &FLOWN.image())
+    costs::check_built(&hums::program(), &firmware::image_of(firmware::default_board()))
 }
 
 /// The tests of further recordings are left out without such recordings. On the model of the chip they are for `cargo xtask prove`.

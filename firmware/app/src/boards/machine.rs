@@ -1,8 +1,6 @@
-//! Parts common to all boards: their types, and the data of a start.
+//! Data of any machine, and of a start.
 
 use hums_onboard::ResetCause;
-
-use super::stm32f4::{Card, Idle, Led, PortRx, PortTx, StoreFlash, Watchdog};
 
 /// Reload value of `SysTick`: all bits set, 0.1 s at 168 MHz.
 pub(crate) const SYSTICK_RELOAD: u32 = (1 << 24) - 1;
@@ -10,19 +8,6 @@ pub(crate) const SYSTICK_RELOAD: u32 = (1 << 24) - 1;
 /// Bytes that reception fetches at a time: 2.8 ms at 921,600 baud, nearly three times the input between two reads.
 /// After a delay it takes several, without a pause between them.
 pub(crate) const FETCH_BYTES: usize = 256;
-
-/// Parts of a board: reception and transmission of each port, and the rest.
-pub(crate) struct Parts {
-    pub(crate) autopilot: (PortRx, PortTx),
-    pub(crate) gs: (PortRx, PortTx),
-    pub(crate) card: Card,
-    /// Two sectors.
-    pub(crate) store: Option<StoreFlash>,
-    pub(crate) led: Led,
-    pub(crate) watchdog: Watchdog,
-    pub(crate) idle: Idle,
-    pub(crate) boot: Boot,
-}
 
 /// The receive buffer overflowed because the reception task ran too late. The number of lost bytes is unknown: at most those of
 /// this many milliseconds.

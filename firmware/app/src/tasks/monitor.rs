@@ -50,7 +50,7 @@ pub(crate) async fn run(
 ) -> ! {
     body.start(now(), &mut ends.sectors);
     tell_fault(body, &mut ends, boot.cause);
-    let mut told = [false; 4];
+    let mut told = [false; 6];
     wake_others();
     let mut ticker = Ticker::every(links::wait(TICK));
     let mut ticks: u32 = 0;
@@ -112,10 +112,16 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
 
 /// Reports missing parts of the board once; `told` stores the reported ones.
 #[inline(never)]
-fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 4], has_random: bool) {
+fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 6], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);
     let faults = [
-        (board::crystal_failed(), 4, "HUMS: crystal failed, times may be off by 4 %"),
+        (board::chip_is_wrong(), 2, "HUMS: wrong chip, it needs an STM32F405"),
+        (board::crystal_is_wrong(), 4, "HUMS: wrong crystal, load this board's firmware"),
+        (
+            board::crystal_failed() && !board::crystal_is_wrong(),
+            4,
+            "HUMS: crystal failed, times may be off by 4 %",
+        ),
         (stood_still(&AUTOPILOT_STOOD_STILL), 4, "HUMS: sending to the autopilot stands still"),
         (stood_still(&GS_STOOD_STILL), 4, "HUMS: sending to the radio stands still"),
         (!has_random, 5, "HUMS: no random numbers, starts are counted"),
@@ -200,7 +206,7 @@ fn wake_others() {
 /// Slow blinking: recording. Two short flashes a second: recording with a fault of the board. Fast: no usable card.
 fn lit(ticks: u32) -> bool {
     let half = match CARD_STATUS.read().state {
-        CardState::Recording if board::crystal_failed() => {
+        CardState::Recording if board::crystal_failed() || board::chip_is_wrong() => {
             return matches!(ticks % (2 * BLINK_RECORDING) / BLINK_TROUBLE, 0 | 2);
         }
         CardState::Recording => BLINK_RECORDING,

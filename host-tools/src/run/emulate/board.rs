@@ -5,10 +5,10 @@ use std::io::Write;
 
 use anyhow::{Context as _, Result, anyhow};
 use hums_link::framer::Framer;
-use hums_sdcard::{Card, Kind, Medium, Model, Slot};
-use stm32f405_model::gpio::Pin;
+use hums_sdcard::{Kind, Medium, Model, Slot};
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board as Parts, Machine as Chip, Reset};
+use stm32f405_model::map;
 use stm32f405_model::memory::FLASH;
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, Ps, SECOND, US};
@@ -30,12 +30,8 @@ const QUIET: Ps = 200 * MS;
 const MOST: Ps = 3_000 * MS;
 /// The ports are looked after this often.
 const STEP: Ps = 20 * MS;
-/// The autopilot's port and the radio's.
-const PORTS: [usize; 2] = [0, 1];
 /// The rate of the autopilot's port, and that of the radio's until a parameter sets another.
 const BAUDS: [f64; 2] = [921_600.0, 57_600.0];
-/// The card's bus and its select pin.
-const CARD: (usize, Pin) = (0, Pin(0, 4));
 
 /// The stages of the firmware's own account, in its order; the first is idle.
 const STAGES: [&str; 9] =
@@ -43,9 +39,8 @@ const STAGES: [&str; 9] =
 /// The symbol of that account.
 const STAGE_CYCLES: &str = "STAGE_CYCLES";
 /// What runs as which exceptions, from the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
-const URGENCIES: [(&str, &[u16]); 8] = [
+const URGENCIES: [(&str, &[u16]); 7] = [
     ("watch", &[15, 17]),
-    ("ports", &[32, 33, 72, 74, 75, 86]),
     ("clock", &[44]),
     ("reception", &[35]),
     ("monitor", &[36]),
@@ -63,6 +58,7 @@ struct Line {
 
 /// The board.
 pub(super) struct Board {
+    wiring: Wiring,
     chip: Chip,
     medium: Medium,
     to_ground: Box<dyn Write + Send>,
@@ -74,6 +70,14 @@ pub(super) struct Board {
     came: Framer,
     went: Framer,
     load: Load,
+}
+
+/// The places of a board's parts in the chip.
+struct Wiring {
+    /// The autopilot's port and the radio's.
+    ports: [usize; 2],
+    /// Exceptions of the DMA of ports and card.
+    dma: Vec<u16>,
 }
 
 /// The part of each second that the processor did not sleep; not of the first one, in which the card is mounted.
@@ -97,7 +101,7 @@ pub(super) struct Traffic {
 impl Board {
     /// A board with this program, card and store, whose power comes a moment before the first byte.
     pub(super) fn new(
-        image: Image,
+        (wired, image): (&hums_boards::Board, Image),
         seed: u32,
         medium: &Medium,
         store: &[u8],
@@ -105,14 +109,16 @@ impl Board {
         reboots: VecDeque<u64>,
     ) -> Self {
         let slot = Slot::new(Some(Model::new(Kind::Sdhc, medium.clone())));
-        let mut chip = Chip::new(image, Parts { seed: u64::from(seed), ..Parts::default() });
+        let parts = Parts { hse_hz: wired.crystal_hz, seed: u64::from(seed), ..Parts::default() };
+        let mut chip = Chip::new(image, parts);
         // The image's own handler would reset it, again and again.
         chip.core.stop_at_faults(true);
-        chip.connect(CARD.0, CARD.1, Box::new(Card::new(&slot)));
+        hums_sdcard::connect(&mut chip, wired, &slot);
         if let Some(flash) = chip.chip.flash.content.all_mut().get_mut(STORE) {
             flash.copy_from_slice(store);
         }
         Self {
+            wiring: Wiring::of(wired),
             chip,
             medium: medium.clone(),
             to_ground,
@@ -141,8 +147,10 @@ impl Board {
     }
 
     fn take_sent(&mut self) -> Result<()> {
-        let [autopilot, ground] =
-            PORTS.map(|port| self.chip.take_sent(port).into_iter().map(|(_, byte)| byte).collect::<Vec<_>>());
+        let [autopilot, ground] = self
+            .wiring
+            .ports
+            .map(|port| self.chip.take_sent(port).into_iter().map(|(_, byte)| byte).collect::<Vec<_>>());
         self.to_autopilot.write_all(&autopilot).context("to the autopilot")?;
         if !ground.is_empty() {
             self.went.push(&ground, &mut |_| {});
@@ -158,11 +166,12 @@ impl Board {
         let waits = self.lines.get(port).map_or(0, |line| line.free.saturating_sub(SECOND));
         let power = self.reboots.front().map_or(Ps::MAX, |at_us| Self::moment(*at_us));
         self.run_until(at.max(waits.min(power)))?;
-        let (Some(line), Some(usual)) = (self.lines.get_mut(port), BAUDS.get(port)) else { return Ok(()) };
+        let usual = self.wiring.ports.get(port).zip(BAUDS.get(port));
+        let (Some(line), Some((usart, usual))) = (self.lines.get_mut(port), usual) else { return Ok(()) };
         // Both ends are set alike.
-        let set = self.chip.chip.usarts.get(port).map_or(0.0, Usart::baud);
+        let set = self.chip.chip.usarts.get(*usart).map_or(0.0, Usart::baud);
         let baud = if set > 0.0 { nearest(set) } else { *usual };
-        line.free = self.chip.send(port, &chunk.bytes, at.max(line.free), baud);
+        line.free = self.chip.send(*usart, &chunk.bytes, at.max(line.free), baud);
         Ok(())
     }
 
@@ -235,10 +244,23 @@ impl Board {
         let deepest = |exceptions: &[u16]| {
             exceptions.iter().map(|number| self.chip.core.stack_depth(*number)).max().unwrap_or(0)
         };
-        URGENCIES
-            .iter()
-            .map(|(name, exceptions)| ((*name).to_owned(), serde_json::Value::from(deepest(exceptions))))
+        let ports = [("ports", &self.wiring.dma[..])];
+        ports
+            .into_iter()
+            .chain(URGENCIES)
+            .map(|(name, exceptions)| (name.to_owned(), serde_json::Value::from(deepest(exceptions))))
             .collect()
+    }
+}
+
+impl Wiring {
+    fn of(board: &hums_boards::Board) -> Self {
+        let ports = [&board.autopilot, &board.radio].map(|port| usize::from(port.usart).saturating_sub(1));
+        let line = |stream: hums_boards::Stream| {
+            let controller = map::DMA.get(usize::from(stream.controller).checked_sub(1)?)?;
+            Some(16 + controller.get(usize::from(stream.number))?)
+        };
+        Self { ports, dma: board.streams().into_iter().filter_map(line).collect() }
     }
 }
 

@@ -33,7 +33,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     let (speed, live) = pace(run)?;
     let inputs = paths::inputs(run)?;
     let params = params::read(run.params.as_deref())?;
-    let image = image(firmware)?;
+    let (wired, image) = image(firmware)?;
     // Open, so that no other run uses them.
     let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;
@@ -51,7 +51,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     let (is_card, medium) = (is_card(&card).with_context(unread)?, Medium::load(&card).with_context(unread)?);
     let table = medium.get(0);
     let mut board =
-        Board::new(image, seed, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
+        Board::new((wired, image), seed, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
     let flown = drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)
         .and_then(|_| board.settle());
     if is_card && medium.get(0) != table {
@@ -107,9 +107,13 @@ fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     }
 }
 
-/// What the file holds.
-fn image(path: &Path) -> Result<Image> {
+/// The image in the file, and its board.
+fn image(path: &Path) -> Result<(&'static hums_boards::Board, Image)> {
     let file = read_short(path, IMAGE_FILE_BYTES_MAX)?;
-    Image::parse(&file)
-        .map_err(|why| anyhow!("{}: is no firmware image of the STM32F405: {why}", path.display()))
+    let image = Image::parse(&file)
+        .map_err(|why| anyhow!("{}: is no firmware image of the STM32F405: {why}", path.display()))?;
+    let name = image.pieces.iter().find_map(|(_, bytes)| hums_boards::name_in(bytes));
+    let name = name.with_context(|| format!("{}: does not name its board", path.display()))?;
+    let board = hums_boards::find(name).map_err(|why| anyhow!("{}: {why}", path.display()))?;
+    Ok((board, image))
 }

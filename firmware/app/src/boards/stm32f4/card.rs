@@ -13,7 +13,6 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
 use hums_core::clock::{Instant, Span};
-use hums_recorder::SpiCard;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
 use super::time;
@@ -32,45 +31,63 @@ const TRANSFER_MAX: Span = Span::from_millis(20);
 /// RAM begins here; below is core coupled memory, which DMA does not reach.
 const RAM: usize = 0x2000_0000;
 
-/// The microSD card. Nothing less urgent runs while its driver waits for the card: only the least urgent task may use it.
-pub(crate) type Card = SpiCard<CardPort>;
-
 /// The card's port.
-pub(crate) struct CardPort {
+pub(crate) struct SpiPort {
     bus: Spi<'static, Async, Master>,
     select: Output<'static>,
+    pause: Pause,
+}
+
+/// Sleeps between polls of a busy card.
+pub(crate) struct Pause {
     /// Unsuccessful polls in a row.
     looks: u32,
 }
 
-impl CardPort {
+impl Pause {
+    pub(super) const fn new() -> Self {
+        Self { looks: 0 }
+    }
+
+    /// Before bytes are exchanged.
+    pub(super) fn before(&self) {
+        if self.looks > LOOKS {
+            time::nap(NAP_US);
+        }
+    }
+
+    /// After these were received.
+    pub(super) fn after(&mut self, bytes: &[u8]) {
+        let is_busy = bytes.len() <= LOOK_BYTES && bytes.iter().all(|byte| *byte == 0);
+        self.looks = if is_busy || *bytes == [0xFF] { self.looks.saturating_add(1) } else { 0 };
+    }
+}
+
+impl SpiPort {
     /// No more before a card is identified; the bus's slowest is 328 kHz, 84 MHz by 256.
     pub(crate) const IDENTIFICATION: Hertz = Hertz(400_000);
-    /// Cards take 25 MHz; the next slower clock of these chips is 21, 84 MHz by 4.
+    /// Cards take 25 MHz; the next slower clock of these chips is 21: 84 MHz by 4, or 42 by 2.
     const TRANSFER: Hertz = Hertz(21_000_000);
 
     /// The port on this bus, mode 0, with its select pin high.
     pub(crate) const fn new(bus: Spi<'static, Async, Master>, select: Output<'static>) -> Self {
-        Self { bus, select, looks: 0 }
+        Self { bus, select, pause: Pause::new() }
     }
 }
 
-impl Port for CardPort {
+impl Port for SpiPort {
     fn select(&mut self, selected: bool) {
         self.select.set_level(if selected { Level::Low } else { Level::High });
     }
 
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
-        if self.looks > LOOKS {
-            time::nap(NAP_US);
-        }
+        self.pause.before();
         if by_dma(bytes) {
             wait(self.bus.transfer_in_place(bytes))?;
         } else {
             self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
         }
-        let is_busy = bytes.len() <= LOOK_BYTES && bytes.iter().all(|byte| *byte == 0);
-        self.looks = if is_busy || *bytes == [0xFF] { self.looks.saturating_add(1) } else { 0 };
+        self.pause.after(bytes);
         Ok(())
     }
 

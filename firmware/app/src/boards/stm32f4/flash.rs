@@ -135,7 +135,7 @@ impl NorFlash for StoreFlash {
 }
 
 /// Runs `work` with the flash control unlocked, earlier errors cleared and the data cache off; the cache is empty afterwards. The
-/// cache would keep erased data (RM0090, 3.5.2). A write to one of two banks also corrupts it (`STM32F42x`, ES0206, 2.2.12).
+/// cache would keep erased data (RM0090, 3.5.2).
 fn unlocked(work: impl FnOnce() -> Result<(), FlashError>) -> Result<(), FlashError> {
     if supply::is_low() {
         return Err(FlashError::Supply);

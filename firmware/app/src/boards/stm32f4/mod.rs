@@ -3,6 +3,7 @@
 mod card;
 mod clock;
 mod flash;
+mod pins;
 mod port;
 mod random;
 mod reset;
@@ -10,14 +11,17 @@ mod supply;
 mod time;
 mod watchdog;
 
-use cortex_m::peripheral::syst::SystClkSource;
-use embassy_stm32::gpio::{Level, Output, Pull};
-use embassy_stm32::{Peripherals, rcc, usart};
-use embassy_time::Duration;
+use core::ptr;
 
-pub(crate) use card::{Card, CardPort};
-pub(crate) use clock::crystal_failed;
+use cortex_m::peripheral::syst::SystClkSource;
+use embassy_stm32::gpio::{Flex, Level, Pull, Speed};
+use embassy_stm32::{Peripherals, pac, usart};
+use embassy_time::{Duration, Instant};
+
+pub(crate) use card::SpiPort;
+pub(crate) use clock::{Crystal, crystal_failed, crystal_is_wrong};
 pub(crate) use flash::StoreFlash;
+pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
@@ -44,15 +48,30 @@ pub(crate) const GS_RING_BYTES: usize = 512;
 /// Period of the uplink, which is not urgent.
 pub(crate) const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
 
-/// Starts clocks, counters and monitors of the machine. Returns the chip's parts. `mode`: crystal or external clock.
-pub(crate) fn start(mode: rcc::HseMode) -> Peripherals {
+/// Starts clocks, counters and monitors of the machine. Returns the chip's parts.
+pub(crate) fn start(crystal: Crystal) -> Peripherals {
     watchdog::start();
-    let parts = embassy_stm32::init(clock::config(mode));
+    let parts = embassy_stm32::init(clock::config(crystal));
     clock::finish();
     time::start();
     supply::watch();
     start_counters();
     parts
+}
+
+/// `DEV_ID` of the STM32F405 and F407 (RM0090, 38.6.1).
+const DEVICE: u16 = 0x413;
+/// Address of the flash's size in KiB (RM0090, 39.2).
+const FLASH_KIB: usize = 0x1FFF_7A22;
+/// Flash of the memory map (`memory.x`).
+const FLASH_KIB_MIN: u16 = 512;
+
+/// Whether the chip is another one, or has too little flash.
+pub(crate) fn chip_is_wrong() -> bool {
+    let flash = ptr::with_exposed_provenance::<u16>(FLASH_KIB);
+    // SAFETY: an aligned constant of the factory's, which can always be read.
+    let kib = unsafe { flash.read_volatile() };
+    pac::DBGMCU.idcode().read().dev_id() != DEVICE || kib < FLASH_KIB_MIN
 }
 
 /// Starts the cycle counter, and `SysTick` for `crate::watch`.
@@ -76,20 +95,29 @@ pub(crate) fn line(baudrate: u32) -> usart::Config {
     line
 }
 
+/// A pin of the debug port becomes the LED's only so long after the start, so that a probe can connect before.
+const PROBE_TIME: Duration = Duration::from_secs(1);
+
 /// The LED.
 pub(crate) struct Led {
-    pin: Output<'static>,
+    pin: Flex<'static>,
     lit: Level,
+    from: Instant,
 }
 
 impl Led {
-    /// On this pin, lit at this level.
-    pub(crate) const fn new(pin: Output<'static>, lit: Level) -> Self {
-        Self { pin, lit }
+    /// On this pin, lit at this level. `waits`: the pin belongs to the debug port.
+    pub(crate) fn new(pin: Flex<'static>, lit: Level, waits: bool) -> Self {
+        let from = if waits { Instant::MIN + PROBE_TIME } else { Instant::MIN };
+        Self { pin, lit, from }
     }
 
     pub(crate) fn set(&mut self, lit: bool) {
+        if Instant::now() < self.from {
+            return;
+        }
         self.pin.set_level(if lit == bool::from(self.lit) { Level::High } else { Level::Low });
+        self.pin.set_as_output(Speed::Low);
     }
 }
 

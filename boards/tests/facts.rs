@@ -1,0 +1,53 @@
+//! Each board file against `facts.csv`: pins by function, with a source for each.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::collections::BTreeSet;
+
+/// Board, function, pin.
+type Fact = (String, String, String);
+
+fn facts() -> BTreeSet<Fact> {
+    let mut lines = include_str!("../facts.csv").lines();
+    assert_eq!(lines.next(), Some("board,function,pin,source,commit"));
+    let fact = |line: &str| {
+        let [board, function, pin, source, commit] =
+            <[&str; 5]>::try_from(line.split(',').collect::<Vec<_>>())
+                .unwrap_or_else(|fields| panic!("{} fields: {line}", fields.len()));
+        assert!(!source.is_empty() && !commit.is_empty(), "no source: {line}");
+        (board.to_owned(), function.to_owned(), pin.to_owned())
+    };
+    lines.map(fact).collect()
+}
+
+#[test]
+fn each_pin_of_each_board_is_that_of_its_sources_and_none_is_missing() {
+    let in_files: BTreeSet<Fact> = hums_boards::all()
+        .iter()
+        .flat_map(|board| {
+            let crystal = ("crystal-mhz", (board.crystal_hz / 1_000_000).to_string());
+            let pins = board.pins().into_iter().map(|(function, pin)| (function, pin.to_string()));
+            pins.chain([crystal]).map(|(function, pin)| (board.name.clone(), function.to_owned(), pin))
+        })
+        .collect();
+    let facts = facts();
+    let unsourced: Vec<_> = in_files.difference(&facts).collect();
+    let missing: Vec<_> = facts.difference(&in_files).collect();
+    assert!(
+        unsourced.is_empty() && missing.is_empty(),
+        "without a source: {unsourced:?}; not in a file: {missing:?}"
+    );
+}
+
+#[test]
+fn the_page_is_that_of_the_files() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../");
+    let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).unwrap();
+    assert!(
+        read("docs/boards.md") == hums_boards::page::render(),
+        "docs/boards.md is old: cargo xtask boards"
+    );
+    assert!(
+        read("README.md").contains(&hums_boards::page::table("docs/boards.md")),
+        "README.md: cargo xtask boards"
+    );
+}

@@ -1,0 +1,127 @@
+//! The board of this image, from its file in `boards/`: the build script makes a call of [`board!`] from it.
+//!
+//! The compiler checks each pin and DMA stream by the traits of `embassy_stm32`: a pin without the wanted function, a stream
+//! that does not serve a port, and a part that is used twice are errors.
+
+use embassy_stm32::gpio::{self, Flex, Level, Output, Pin, Speed};
+use embassy_stm32::usart::Uart;
+use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, peripherals, rcc};
+use hums_recorder::SpiCard;
+use static_cell::ConstStaticCell;
+
+use super::machine::Boot;
+use super::stm32f4;
+use super::stm32f4::{
+    AUTOPILOT_BAUD, Crystal, FETCH_EVERY, GS_BAUD, GS_FETCH_EVERY, GS_RING_BYTES, RING_BYTES, halves, line,
+    random_number, reset_cause, start,
+};
+pub(crate) use super::stm32f4::{
+    Idle, LATE_TURNS, Led, PortRx, PortTx, StoreFlash, Watchdog, chip_is_wrong, crystal_failed,
+    crystal_is_wrong, restart,
+};
+
+static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
+static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
+
+/// Parts of a board: reception and transmission of each port, and the rest.
+pub(crate) struct Parts {
+    pub(crate) autopilot: (PortRx, PortTx),
+    pub(crate) gs: (PortRx, PortTx),
+    pub(crate) card: Card,
+    /// Two sectors.
+    pub(crate) store: Option<StoreFlash>,
+    pub(crate) led: Led,
+    pub(crate) watchdog: Watchdog,
+    pub(crate) idle: Idle,
+    pub(crate) boot: Boot,
+}
+
+/// Pins of the backup domain, which some boards select the card with, allow 2 MHz only (DS8626, table 7).
+const SELECT_SPEED: Speed = Speed::Low;
+
+/// A port's halves: `port!(parts, USART1 { rx pin, tx pin } { rx stream, tx stream } ...)`.
+macro_rules! port {
+    ($p:ident, $usart:ident { $rx:ident $tx:ident } { $rx_dma:ident $tx_dma:ident }, $baud:expr, $ring:expr, $every:expr) => {{
+        let port = Uart::new_blocking($p.$usart, $p.$rx, $p.$tx, line($baud));
+        let (registers, channels) = (pac::$usart, ($p.$rx_dma, $p.$tx_dma));
+        halves::<peripherals::$usart, _, _>(port, registers, channels, Irqs, $ring, $every)
+    }};
+}
+
+/// The card's port and its type: on an SPI, or on pins that the processor moves itself.
+macro_rules! card {
+    (type pins $pins:tt) => {
+        stm32f4::PinPort
+    };
+    (type $spi:ident $pins:tt $dma:tt) => {
+        stm32f4::SpiPort
+    };
+    ($p:ident pins { $sck:ident $mosi:ident $miso:ident $cs:ident }) => {
+        stm32f4::PinPort::new($p.$sck, $p.$mosi, $p.$miso, Output::new($p.$cs, Level::High, SELECT_SPEED))
+    };
+    ($p:ident $spi:ident { $sck:ident $mosi:ident $miso:ident $cs:ident } { $tx_dma:ident $rx_dma:ident }) => {{
+        let mut bus = embassy_stm32::spi::Config::default();
+        bus.frequency = stm32f4::SpiPort::IDENTIFICATION;
+        bus.miso_pull = gpio::Pull::Up;
+        let bus = embassy_stm32::spi::Spi::new(
+            $p.$spi, $p.$sck, $p.$mosi, $p.$miso, $p.$tx_dma, $p.$rx_dma, Irqs, bus,
+        );
+        stm32f4::SpiPort::new(bus, Output::new($p.$cs, Level::High, SELECT_SPEED))
+    }};
+}
+
+/// The board's name, interrupts and parts.
+macro_rules! board {
+    (
+        tag $tag:literal $skip:literal $end:literal;
+        crystal $hz:literal $divider:ident;
+        autopilot $autopilot:ident $autopilot_pins:tt $autopilot_dma:tt;
+        gs $gs:ident $gs_pins:tt $gs_dma:tt;
+        card { $($card:tt)* };
+        led $led:ident $lit:ident $waits:literal;
+        high { $($high:ident)* } low { $($low:ident)* } pull { $($pull:ident)* }
+        streams { $($stream:ident $channel:ident)* }
+    ) => {
+        /// The board's name. It stands behind a mark in the image, so that tools know the image's board.
+        pub(crate) const NAME: &str = $tag.split_at($end).0.split_at($skip).1;
+
+        /// Interrupts of the ports and the card, more urgent than every task.
+        pub(crate) const PORT_INTERRUPTS: &[interrupt::Interrupt] = &[$(interrupt::$stream),*];
+
+        /// The microSD card. Nothing less urgent runs while its driver waits for the card: only the least urgent task may use it.
+        pub(crate) type Card = SpiCard<card!(type $($card)*)>;
+
+        bind_interrupts!(struct Irqs { $($stream => dma::InterruptHandler<peripherals::$channel>;)* });
+
+        /// Starts clocks, watchdog, ports and card.
+        pub(crate) fn take() -> Parts {
+            let (cause, cause_register) = reset_cause();
+            let p = start(Crystal { hz: $hz, divider: rcc::PllPreDiv::$divider });
+            // Before the first clock to the card: a selected part on its bus would answer for it.
+            $(hold(p.$high, Level::High);)*
+            $(hold(p.$low, Level::Low);)*
+            $(core::mem::forget(gpio::Input::new(p.$pull, gpio::Pull::Up));)*
+
+            let autopilot = port!(p, $autopilot $autopilot_pins $autopilot_dma, AUTOPILOT_BAUD, RING.take(), FETCH_EVERY);
+            let gs = port!(p, $gs $gs_pins $gs_dma, GS_BAUD, GS_RING.take(), GS_FETCH_EVERY);
+            Parts {
+                autopilot,
+                gs,
+                card: Card::new(card!(p $($card)*)),
+                store: Some(StoreFlash::new()),
+                led: Led::new(Flex::new(p.$led), Level::$lit, $waits),
+                watchdog: Watchdog::new(),
+                idle: Idle(()),
+                boot: Boot { id: embassy_stm32::uid::uid(), cause, cause_register, entropy: random_number() },
+            }
+        }
+    };
+}
+
+/// Drives a pin to this level for ever.
+#[allow(dead_code, reason = "not every board holds pins")]
+fn hold(pin: Peri<'static, impl Pin>, level: Level) {
+    core::mem::forget(Output::new(pin, level, Speed::Low));
+}
+
+include!(concat!(env!("OUT_DIR"), "/board.rs"));

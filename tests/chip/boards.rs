@@ -1,0 +1,111 @@
+//! Other boards' images, each with its own crystal, ports, card's bus and held pins.
+
+use hums_boards::Board;
+use hums_sdcard::{Event, Kind, Model};
+use hums_tests::chip::{pin, record::Compared, rig::Rig};
+use hums_tests::program;
+use stm32f405_model::machine::Board as Parts;
+use stm32f405_model::rcc::Cause;
+use stm32f405_model::time::{MS, SECOND, US};
+
+use crate::bench_of;
+
+/// Frames in memory at full rate: a quarter of a second of them, and a sector in progress.
+const IN_MEMORY_MAX: usize = 700;
+
+/// A new rig with the board's own image.
+fn rig(board: &Board) -> Rig {
+    let image = program::firmware().with_file_name(format!("hums-{}.elf", board.name));
+    bench_of(&image).rig(Parts { hse_hz: board.crystal_hz, ..Parts::default() })
+}
+
+/// Each held pin has its level before the first clock to the card, and afterwards.
+#[track_caller]
+fn assert_held(rig: &Rig) {
+    let (gpio, hold) = (&rig.machine.chip.gpio, &rig.wired.hold);
+    for high in hold.high.keys() {
+        assert!(gpio.is_high(pin(*high)), "{}: {high}", rig.wired.name);
+    }
+    for low in hold.low.keys() {
+        assert!(gpio.pulls_low(pin(*low)), "{}: {low}", rig.wired.name);
+    }
+}
+
+/// Boots, records at full rate, loses its card and its power, and records again.
+fn fly(board: &Board) {
+    println!("{}", board.name);
+    let mut rig = rig(board);
+    while rig.slot.counts().bytes == 0 {
+        assert!(rig.machine.now() < SECOND, "{}: no clock to the card", board.name);
+        rig.run(rig.machine.now() + 20 * US, false).unwrap();
+    }
+    assert_held(&rig);
+    rig.run(2 * SECOND, false).unwrap();
+    rig.run(4 * SECOND, true).unwrap();
+    assert!(rig.machine.chip.rcc.pll_on_hse(), "{}: not on its crystal", board.name);
+    let blinks = |rig: &Rig| rig.led.len();
+    let before = blinks(&rig);
+    rig.slot.event(Event::Pull);
+    rig.run(6 * SECOND, true).unwrap();
+    let blinks_without_a_card = blinks(&rig) - before;
+    assert!(blinks_without_a_card > 10, "{}: {blinks_without_a_card} changes of the LED", board.name);
+    rig.slot.event(Event::Insert(Model::new(Kind::Sdhc, rig.medium.clone())));
+    rig.run(8 * SECOND, false).unwrap();
+    rig.run(9 * SECOND, true).unwrap();
+    rig.machine.power_off();
+    rig.run(9 * SECOND + 100 * MS, false).unwrap();
+    rig.machine.power_on();
+    rig.run(11 * SECOND, false).unwrap();
+    rig.run(12 * SECOND, true).unwrap();
+    rig.run(14 * SECOND, false).unwrap();
+    assert_held(&rig);
+    assert!(rig.machine.resets.iter().all(|(_, cause)| *cause == Cause::Power), "{:?}", rig.machine.resets);
+    assert!(rig.slot.violations().is_empty(), "{}: {:?}", board.name, rig.slot.violations());
+    let compared = rig.compared();
+    let rate = rig.sent.len() / 6;
+    println!("{compared:?} of {}", rig.sent.len());
+    // All but the frames without a card, which the queue held in part, and those in memory when power went.
+    assert!(
+        compared.wrong == 0 && compared.missing < 2 * rate + 2 * IN_MEMORY_MAX,
+        "{}: {compared:?}",
+        board.name
+    );
+    assert!(rig.sessions().len() >= 2, "{}", board.name);
+}
+
+#[test]
+fn a_board_of_each_family_records_and_survives_the_loss_of_card_and_power() {
+    hums_boards::families().for_each(fly);
+}
+
+#[test]
+#[ignore = "wants the images of all boards: `cargo xtask prove boards`"]
+fn each_board_records_and_survives_the_loss_of_card_and_power() {
+    hums_boards::all().iter().for_each(fly);
+}
+
+/// The image of a board with another crystal or chip was loaded by mistake.
+#[test]
+fn a_wrong_crystal_or_chip_is_told_and_the_board_records() {
+    const STM32F446: u32 = 0x1000_6421;
+    let cases = [
+        (12_000_000, None, "HUMS: wrong crystal, load this board's firmware"),
+        (8_000_000, Some(STM32F446), "HUMS: wrong chip, it needs an STM32F405"),
+    ];
+    for (hse_hz, idcode, text) in cases {
+        let mut rig = bench_of(&program::firmware()).rig(Parts { hse_hz, ..Parts::default() });
+        rig.machine.chip.idcode = idcode.unwrap_or(rig.machine.chip.idcode);
+        rig.run(2 * SECOND, false).unwrap();
+        rig.run(3 * SECOND, true).unwrap();
+        rig.run(5 * SECOND, false).unwrap();
+        assert_eq!(rig.machine.chip.rcc.pll_on_hse(), idcode.is_some(), "{text}");
+        let session = rig.sessions().pop().unwrap();
+        assert_eq!(session.texts.iter().filter(|told| *told == text).count(), 1, "{:?}", session.texts);
+        assert!(session.texts.iter().all(|told| !told.contains("crystal failed")), "{:?}", session.texts);
+        let wanted = Compared { right: rig.sent.len(), ends: (0, 0), ..Compared::default() };
+        assert_eq!(rig.compared(), wanted, "{text}");
+        // Two brief blinks a second.
+        let lit = rig.led.iter().filter(|(at, lit)| *at > 3 * SECOND && *lit).count();
+        assert!((3..=5).contains(&lit), "{lit} in two seconds");
+    }
+}
