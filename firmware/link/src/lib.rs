@@ -7,6 +7,7 @@ pub mod events;
 pub mod frame;
 pub mod framer;
 pub mod ftp;
+pub mod long_text;
 pub mod messages;
 mod observe;
 pub mod outlet;
@@ -22,4 +23,5 @@ pub mod text;
 
 pub use frame::{Check, Frame};
 pub use framer::{Framer, FramerCounts};
+pub use long_text::LongTexts;
 pub use observe::observe;

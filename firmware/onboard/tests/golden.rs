@@ -13,8 +13,10 @@ use std::{env, fs, thread};
 use flate2::read::GzDecoder;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
+use hums_core::observation::Observation;
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
+use hums_link::LongTexts;
 use hums_link::frame::Check;
 use hums_link::framer::Framer;
 use hums_link::sequence::Sequences;
@@ -136,6 +138,7 @@ fn frame_length(bytes: &[u8]) -> Option<usize> {
 struct BoxUnderTest {
     framer: Framer,
     sequences: Sequences,
+    long_texts: LongTexts,
     monitor: Monitor,
     ticked: Instant,
     list: String,
@@ -146,7 +149,8 @@ impl BoxUnderTest {
         let mut params = Params::defaults();
         params.set("PROT_ACTION", 1.0).expect("a return is a protective action");
         let (framer, sequences) = (Framer::new(), Sequences::new());
-        Self { framer, sequences, monitor: Monitor::new(params), ticked: Instant::ZERO, list: String::new() }
+        let (long_texts, monitor) = (LongTexts::new(), Monitor::new(params));
+        Self { framer, sequences, long_texts, monitor, ticked: Instant::ZERO, list: String::new() }
     }
 
     fn take(&mut self, at_us: u64, bytes: &[u8]) {
@@ -155,10 +159,13 @@ impl BoxUnderTest {
             self.ticked = self.ticked + TICK;
             self.tick();
         }
-        let Self { framer, sequences, monitor, .. } = self;
+        let Self { framer, sequences, long_texts, monitor, .. } = self;
         let mut observe = |frame: hums_link::frame::Frame<'_>| {
             if frame.check() == Check::Verified {
                 sequences.frame(at, &frame);
+                long_texts.frame(at, &frame, &mut |source, alert| {
+                    monitor.observe(at.into(), source, &Observation::Alert(alert));
+                });
                 if let Some((source, observation)) = hums_link::observe(&frame) {
                     monitor.observe(at.into(), source, &observation);
                 }

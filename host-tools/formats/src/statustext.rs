@@ -1,5 +1,6 @@
 //! What a vehicle's components say in words: `STATUSTEXT`, long ones put together from their parts.
 
+use hums_core::alert;
 use hums_core::cause::Alert;
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
@@ -25,7 +26,7 @@ pub struct Text {
     pub severity: u8,
     /// Text of the world, never markup.
     pub words: String,
-    /// What its first part says is wrong.
+    /// The alert in it, once it is put together.
     pub alert: Option<Alert>,
     /// The number that its parts share; 0 where there is but one.
     id: u16,
@@ -70,41 +71,37 @@ pub fn level(severity: u8) -> &'static str {
     }
 }
 
-/// Puts texts together.
+/// Puts texts together: one of each sender at a time.
 #[derive(Clone, Debug, Default)]
-pub struct Texts(Option<Text>);
+pub struct Texts(Vec<Text>);
 
 impl Texts {
     /// Takes the next message; gives what is whole.
     pub fn take(&mut self, next: Text, whole: &mut impl FnMut(Text)) {
         self.pass(next.at, whole);
-        let ends = next.ends;
-        match &mut self.0 {
-            Some(open) if next.id != 0 && open.id == next.id && open.source == next.source => {
-                if open.words.len() < BYTES_MAX {
-                    open.words.push_str(&next.words);
-                }
-            }
-            _ => {
-                self.end(whole);
-                self.0 = Some(next);
-            }
+        let (source, id, ends) = (next.source, next.id, next.ends);
+        self.complete(whole, |open| open.source == source && (open.id != id || id == 0));
+        match self.0.iter_mut().find(|open| open.source == source) {
+            Some(open) if open.words.len() < BYTES_MAX => open.words.push_str(&next.words),
+            Some(_) => {}
+            None => self.0.push(next),
         }
-        if ends {
-            self.end(whole);
-        }
+        self.complete(whole, |open| open.source == source && ends);
     }
 
     /// Time passes: what has waited long enough is whole.
     pub fn pass(&mut self, now: Instant, whole: &mut impl FnMut(Text)) {
-        if self.0.as_ref().is_some_and(|open| now.since(open.at) > PATIENCE) {
-            self.end(whole);
-        }
+        self.complete(whole, |open| now.since(open.at) > PATIENCE);
     }
 
     /// Nothing follows.
     pub fn end(&mut self, whole: &mut impl FnMut(Text)) {
-        if let Some(text) = self.0.take() {
+        self.complete(whole, |_| true);
+    }
+
+    fn complete(&mut self, whole: &mut impl FnMut(Text), is_complete: impl Fn(&Text) -> bool) {
+        for mut text in self.0.extract_if(.., |open| is_complete(open)) {
+            text.alert = alert::of_text(Some(text.severity), text.words.as_bytes());
             whole(text);
         }
     }
@@ -138,6 +135,15 @@ mod tests {
         let parts =
             [part(0, 7, &long), part(10, 7, "b"), part(20, 7, "c"), part(30, 0, "d"), part(40, 0, "e")];
         assert_eq!(told(parts), [format!("{long}b"), "c".into(), "d".into(), "e".into()]);
+    }
+
+    #[test]
+    fn two_senders_may_talk_at_the_same_time() {
+        let long = "a".repeat(50);
+        let other = |text: Text| Text { source: Source { system: 1, component: 191 }, ..text };
+        let parts =
+            [part(0, 7, &long), other(part(1, 7, &long)), part(2, 7, "b"), other(part(3, 7, "c"))];
+        assert_eq!(told(parts), [format!("{long}b"), format!("{long}c")]);
     }
 
     #[test]

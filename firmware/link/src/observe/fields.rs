@@ -1,5 +1,6 @@
 //! Decoding of message fields, and the values that stand for "unknown".
 
+use hums_core::clock::UTC_MICROS;
 use hums_core::units::{Amperes, Fraction, Volts};
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{MavlinkVersion, MessageData};
@@ -22,11 +23,10 @@ pub(super) fn unless<T: PartialEq + Copy>(value: T, unknown: T) -> Option<T> {
     (value != unknown).then_some(value)
 }
 
-/// UTC is told from the time since boot by its size: no vehicle has been up since before 2000.
+/// UTC, if it can be: the field also holds the time since boot, and a receiver without a fix reports the date of its
+/// firmware or of an earlier GPS week.
 pub(super) fn unix_time(micros: u64) -> Option<u64> {
-    const YEAR_2000_US: u64 = 946_684_800_000_000;
-    const YEAR_2200_US: u64 = 7_258_118_400_000_000;
-    (YEAR_2000_US..YEAR_2200_US).contains(&micros).then_some(micros)
+    UTC_MICROS.contains(&micros).then_some(micros)
 }
 
 /// Millivolts; 65535 is unknown, and nothing runs from 0 V.

@@ -14,6 +14,7 @@ use hums_core::observation::{Observation, Source};
 use hums_dialect::ardupilotmega as ap;
 
 use crate::frame::{Check, Frame};
+use crate::long_text::alert_of_text;
 use fields::read;
 
 /// Observation and sender of a frame. `None` for an unused id, an unverified checksum, or the HEARTBEAT of a component that is
@@ -63,7 +64,7 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         235 => Observation::Failing(system::failing(payload)),
         241 => Observation::Vibration(motion::vibration(payload)?),
         245 => system::landed(payload),
-        253 => Observation::Alert(system::alert_of_text(payload)?),
+        253 => Observation::Alert(alert_of_text(payload)?),
         264 => system::flight_information(payload)?,
         290 => Observation::Escs(propulsion::esc_info(payload)?),
         291 => Observation::Escs(propulsion::esc_status(payload)?),

@@ -12,7 +12,6 @@ use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, unix_time, unless, voltage};
 use crate::packet::Fields;
-use crate::text::TEXT_BYTES_MAX;
 
 /// A vehicle is a sender whose autopilot is not INVALID. Some ground stations and companions claim one nevertheless,
 /// so types that cannot be vehicles are left out too. Type, autopilot and state are bytes 4, 5 and 7: read as they
@@ -128,19 +127,6 @@ pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {
     let bits = value.to_bits();
     let value = if (1..1 << 16).contains(&bits) { bits as f32 } else { value };
     Some(Observation::Parameter(place, value))
-}
-
-/// `STATUSTEXT` that says that something is wrong. Of a text in several parts the first counts: it names what it is about.
-pub(super) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
-    const TEXT: usize = 1;
-    let fields = Fields(payload);
-    let (severity, part) = (fields.u8(0), fields.u8(53));
-    if part > 0 {
-        return None;
-    }
-    let text = payload.get(TEXT..payload.len().min(TEXT + TEXT_BYTES_MAX))?;
-    let text = text.split(|byte| *byte == 0).next().filter(|text| !text.is_empty())?;
-    alert::of_text(Some(severity), text)
 }
 
 /// `EVENT` of PX4 that says that something is wrong: number, level outside (the low nibble), arguments.

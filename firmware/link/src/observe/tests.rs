@@ -119,7 +119,6 @@ fn what_the_autopilot_says_is_wrong_is_read_of_texts_events_and_flags() {
     };
     let warning = |cause| Some(Observation::Alert(Alert { cause, urgency: Urgency::Warning }));
     assert_eq!(text(2, "EKF3 lane switch 1", 0), warning(Cause::Estimator));
-    assert_eq!(text(2, "of a longer text", 1), None, "its first part said it");
     assert_eq!((text(6, "EKF3 lane switch 1", 0), text(2, "", 0), text(200, "x", 0)), (None, None, None));
     assert_eq!(by_id(253, &[2, 0xFF, b'!']), warning(Cause::Other), "no UTF-8");
     // commander_failsafe_enter_hold; level 2 outside, 5 in the log; its cause is a lost remote control.

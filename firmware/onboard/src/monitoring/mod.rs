@@ -14,7 +14,9 @@ use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, Event, Fault, FindingRecord, Moment, Note, Record, Stats};
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Finding, Level};
+use hums_core::observation::Observation;
 use hums_core::{Monitor, monitor};
+use hums_link::LongTexts;
 use hums_link::frame::{Check, Frame};
 use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
@@ -71,6 +73,7 @@ pub struct Monitoring<'a> {
     summary: Summary,
     companion: Companion,
     sequences: Sequences,
+    long_texts: LongTexts,
     identity: Boot<'a>,
     recorded: Recorded,
     notices: Notices,
@@ -99,6 +102,7 @@ impl<'a> Monitoring<'a> {
             companion: Companion::new(monitor.params()),
             book: Logbook { monitor, journal: Journal::new(writer), card, cause },
             sequences: Sequences::new(),
+            long_texts: LongTexts::new(),
             identity,
             recorded: Recorded::new(),
             notices: Notices::new(),
@@ -204,8 +208,12 @@ impl<'a> Monitoring<'a> {
     #[inline(never)]
     fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
         self.sequences.frame(at, frame);
+        let Self { book, long_texts, .. } = self;
+        long_texts.frame(at, frame, &mut |source, alert| {
+            book.monitor.observe(at.into(), source, &Observation::Alert(alert));
+        });
         if let Some((source, observation)) = hums_link::observe(frame) {
-            self.book.monitor.observe(at.into(), source, &observation);
+            book.monitor.observe(at.into(), source, &observation);
         }
     }
 

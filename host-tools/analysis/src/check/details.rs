@@ -6,9 +6,9 @@ use std::collections::BTreeSet;
 use hums_core::alert::{HOLDS, of_estimator};
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Level, checks};
+use hums_core::health::{Check, Level, checks};
 use hums_core::observation::{AutopilotIdentity, Estimator, Gnss, Heartbeat, Source, SystemStatus};
-use hums_core::params::{Param, Params};
+use hums_core::params::Params;
 use hums_core::units::Position;
 use hums_core::vehicle::BATTERIES_MAX;
 
@@ -317,21 +317,25 @@ fn named(autopilots: &[Heard]) -> String {
     autopilots.iter().map(words).collect::<Vec<_>>().join(", ")
 }
 
-/// The findings of an emergency that is over at once: the state (`MAV_STATE`), and its end.
-pub(super) fn emergency(at: Instant, params: &Params) -> Vec<Finding> {
-    const EMERGENCY: f32 = 6.0;
-    let limit = params.get(Param::StateCrit);
-    let Some(check) = checks().find(|check| check.name == FAILSAFE).filter(|_| EMERGENCY > limit) else {
-        return Vec::new();
-    };
+/// What an autopilot's log reports in words of its own: the check, and the value that the report stands for.
+pub(super) const EMERGENCY: (&str, f32) = (FAILSAFE, 6.0); // MAV_STATE_EMERGENCY
+/// A restart of the autopilot after a fault of its processor.
+pub(super) const PROCESSOR_FAULT: (&str, f32) = ("processor_alert", Urgency::Critical as u8 as f32);
+
+/// The two findings of a critical report that is over at once: its begin and its end. None if the limit is above it.
+/// The monitor's debounce would miss such a short state.
+pub(super) fn reported(at: Instant, (name, value): (&str, f32), params: &Params) -> Vec<Finding> {
+    let limited = |check: &'static Check| Some((check, params.get(check.limits.critical?)));
+    let found = checks().find(|check| check.name == name).and_then(limited);
+    let Some((check, limit)) = found.filter(|(_, limit)| value > *limit) else { return Vec::new() };
     let change = |previous, level| Finding {
         at,
         subsystem: check.subsystem,
-        check: FAILSAFE.to_owned(),
+        check: name.to_owned(),
         instance: 0,
         level,
         previous,
-        value: EMERGENCY,
+        value,
         limit,
         unit: check.unit.name().to_owned(),
     };

@@ -246,7 +246,12 @@ impl Judge {
                 self.details.failsafes(words);
                 self.tell(details::FAILSAFE);
             }
-            Item::Fact(Fact { about: About::Emergency, words }) => self.emergency(at, words),
+            Item::Fact(Fact { about: About::Emergency, words }) => {
+                self.reported(at, details::EMERGENCY, words);
+            }
+            Item::Fact(Fact { about: About::ProcessorFault, words }) => {
+                self.reported(at, details::PROCESSOR_FAULT, words);
+            }
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
             }
@@ -472,17 +477,16 @@ impl Judge {
         self.monitor.begin_another_recording();
     }
 
-    /// The autopilot stops its motors at the moment of its text with the reason. That state is too short for
-    /// the monitor's debounce.
-    fn emergency(&mut self, at: Instant, words: &str) {
+    /// Something is over at the moment of its report: the autopilot stops its motors, or its processor restarts.
+    fn reported(&mut self, at: Instant, what: (&str, f32), words: &str) {
         self.advance(at);
-        if self.here.is_open(details::FAILSAFE) {
-            self.here.detail(details::FAILSAFE, words);
+        if self.here.is_open(what.0) {
+            self.here.detail(what.0, words);
             return;
         }
-        for finding in details::emergency(at, self.monitor.params()) {
+        for finding in details::reported(at, what, self.monitor.params()) {
             self.here.take(&finding, self.clock.behind());
-            self.here.detail(details::FAILSAFE, words);
+            self.here.detail(what.0, words);
         }
     }
 

@@ -23,6 +23,8 @@ pub struct BootTimes {
     /// The first system with an autopilot that reports its time: only its times count.
     system: Option<u8>,
     timeline: Option<Timeline>,
+    /// The autopilot's last time since boot, with the bits that 32 bits of milliseconds do not hold (49.7 days).
+    boot_ms: u64,
     /// The line's time at the first of them.
     base: Instant,
 }
@@ -32,7 +34,8 @@ impl BootTimes {
     pub fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
         let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
         if let Some(boot_ms) = told {
-            let boot_us = u64::from(boot_ms) * 1_000;
+            self.boot_ms = extend(self.boot_ms, boot_ms);
+            let boot_us = self.boot_ms.saturating_mul(1_000);
             if self.timeline.is_none() {
                 (self.system, self.base) = (Some(frame.system()), line);
             }
@@ -56,6 +59,19 @@ impl BootTimes {
 
     fn after_base(&self, at: Instant) -> Instant {
         Instant::from_micros(self.base.as_micros().saturating_add(at.as_micros()))
+    }
+}
+
+/// A time since boot by its lower 32 bits: the one near the last time; otherwise a later one of the same 49.7 days, or that of
+/// another boot.
+fn extend(last_ms: u64, boot_ms: u32) -> u64 {
+    const NEAR_MS: u32 = 60_000;
+    let step = boot_ms.wrapping_sub(last_ms as u32).cast_signed();
+    let same = last_ms & !u64::from(u32::MAX) | u64::from(boot_ms);
+    match last_ms.checked_add_signed(step.into()) {
+        Some(near) if step.unsigned_abs() < NEAR_MS => near,
+        _ if same >= last_ms => same,
+        _ => boot_ms.into(),
     }
 }
 
@@ -150,6 +166,23 @@ mod tests {
     use super::super::paced::Paced;
     use super::super::raw::Raw;
     use super::*;
+
+    #[test]
+    fn the_time_since_boot_goes_on_when_its_32_bits_begin_again() {
+        const WRAP: u64 = 1 << 32;
+        for (name, last_ms, boot_ms, expected) in [
+            ("first", 0, 5_000, 5_000),
+            ("goes on", 5_000, 65_000, 65_000),
+            ("out of order", 5_000, 4_000, 4_000),
+            ("begins again", WRAP - 500, 500, WRAP + 500),
+            ("from before that", WRAP + 500, u32::MAX, WRAP - 1),
+            ("long after that", WRAP + 500, 3_600_000, WRAP + 3_600_000),
+            ("another boot", 3_600_000, 900, 900),
+            ("another boot, after that", WRAP + 3_600_000, 900, 900),
+        ] {
+            assert_eq!(extend(last_ms, boot_ms), expected, "{name}");
+        }
+    }
 
     #[test]
     fn no_frame_is_cut_in_two_and_each_comes_when_the_autopilot_says() {

@@ -128,6 +128,8 @@ pub enum About {
     Failsafes,
     /// An emergency that happens here, in which the autopilot stops the motors at once, by its name.
     Emergency,
+    /// A fault after which the autopilot's processor restarted, from its own log: a sentence.
+    ProcessorFault,
     /// The source of the arming state, if the recording does not report it: a sentence. Empty if it does.
     Arming,
     /// Parts of the recording that cannot be checked for damage: a sentence.

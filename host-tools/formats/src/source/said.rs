@@ -8,7 +8,7 @@ use hums_core::clock::Instant;
 use hums_core::observation::{Autopilot, Observation};
 use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
-use hums_link::{Check, Frame, observe};
+use hums_link::{Check, Frame, LongTexts, observe};
 
 use super::dataflash::is_firmware;
 use super::item::{AUTOPILOT, About, Event, Fact, Item, Mode, Parameter, Take, Text, Want};
@@ -19,6 +19,7 @@ use crate::statustext::{self, Texts};
 #[derive(Debug, Default)]
 pub(super) struct Said {
     texts: Texts,
+    long_texts: LongTexts,
     /// Who speaks, as far as it matters how a parameter is coded.
     autopilot: Autopilot,
 }
@@ -41,13 +42,20 @@ impl Said {
         if frame.check() != Check::Verified {
             return Ok(());
         }
+        let mut result = Ok(());
+        self.long_texts.frame(at, frame, &mut |source, alert| {
+            if want.observations && result.is_ok() {
+                result = take(at, Item::Observation(source, &Observation::Alert(alert)));
+            }
+        });
+        result?;
         let observed = observe(frame);
         let alert = match &observed {
             Some((_, Observation::Alert(alert))) => Some(*alert),
             _ => None,
         };
         match frame.id() {
-            STATUSTEXT => self.text(at, frame, alert, take)?,
+            STATUSTEXT => self.text(at, frame, take)?,
             EVENT => event(at, frame, alert, take)?,
             PARAM_VALUE => {
                 if let Some((name, value)) = parameter(frame, self.autopilot) {
@@ -69,15 +77,8 @@ impl Said {
         hand_texts(take, |hand| self.texts.end(&mut |text| hand(text)))
     }
 
-    fn text(
-        &mut self,
-        at: Instant,
-        frame: &Frame<'_>,
-        alert: Option<Alert>,
-        take: &mut Take<'_>,
-    ) -> Result<()> {
-        let Some(mut text) = statustext::Text::of(at, frame.source(), frame.payload()) else { return Ok(()) };
-        text.alert = alert;
+    fn text(&mut self, at: Instant, frame: &Frame<'_>, take: &mut Take<'_>) -> Result<()> {
+        let Some(text) = statustext::Text::of(at, frame.source(), frame.payload()) else { return Ok(()) };
         hand_texts(take, |hand| self.texts.take(text, &mut |text| hand(text)))
     }
 }

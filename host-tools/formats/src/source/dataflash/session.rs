@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::Result;
+use hums_core::alert;
 use hums_core::clock::Instant;
 use hums_core::observation::Source;
 
@@ -508,6 +509,10 @@ impl<'w> Session<'w> {
 
     /// Totals of the reading.
     pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
+        if let Some((_, words)) = self.state.open_text.take() {
+            let alert = alert::of_text(None, words.as_bytes());
+            take(self.clock.now(), Item::Text(Text { source: SOURCE, severity: 6, words: &words, alert }))?;
+        }
         for gap in self.pace.gaps(&self.wrong) {
             take(self.clock.now(), Item::Gap(&gap))?;
         }
@@ -565,6 +570,7 @@ impl Said<'_, '_> {
             Say::Arming(words) => Item::Fact(Fact { about: About::Arming, words }),
             Say::Failsafes(words) => Item::Fact(Fact { about: About::Failsafes, words }),
             Say::Emergency(words) => Item::Fact(Fact { about: About::Emergency, words }),
+            Say::ProcessorFault(words) => Item::Fact(Fact { about: About::ProcessorFault, words }),
             Say::Frame(words) => Item::Fact(Fact { about: About::Frame, words }),
             Say::Firmware(words) if words == self.firmware => return Ok(()),
             Say::Firmware(words) => {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use hums_core::alert::{self, event_name};
-use hums_core::clock::Span;
+use hums_core::clock::{Span, UTC_MICROS};
 
 use super::fields::Fields;
 use super::format::Formats;
@@ -39,6 +39,8 @@ const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
 const APPENDED_MAX: usize = 3;
 /// Topics that PX4 keeps on its card, with the time of the boot at which they were made.
 const KEPT_OVER_BOOTS: [&str; 1] = ["mission"];
+/// The dump that PX4 appends to the last log after a hard fault (`hardfault_log`).
+const HARD_FAULT: &str = "hardfault_plain";
 /// Words of one piece of information at most.
 const WORDS_BYTES_MAX: usize = 256;
 
@@ -117,6 +119,7 @@ struct Session<'a, 'b> {
     own: OwnTables,
     information: BTreeMap<&'static str, String>,
     told_facts: bool,
+    told_hard_fault: bool,
     /// Places of appended data still to be read, in order.
     appended: Vec<u64>,
     /// Place of the present log in the file.
@@ -155,6 +158,7 @@ impl<'a, 'b> Session<'a, 'b> {
             own: OwnTables::new(want.rows),
             information: BTreeMap::new(),
             told_facts: false,
+            told_hard_fault: false,
             appended: Vec::new(),
             base: 0,
             strays: (0, 0),
@@ -308,6 +312,12 @@ impl<'a, 'b> Session<'a, 'b> {
             words.truncate(words.floor_char_boundary(WORDS_BYTES_MAX));
             self.information.insert(*key, words);
             self.epoch_from_boot()?;
+        }
+        if value.name == HARD_FAULT && !std::mem::replace(&mut self.told_hard_fault, true) {
+            let first = text.unwrap_or_default().lines().find(|line| !line.trim().is_empty());
+            let first = first.map_or_else(String::new, |line| format!(": {}", line.trim()));
+            let words = format!("the autopilot's processor had a hard fault{first}");
+            self.tell(Item::Fact(Fact { about: About::ProcessorFault, words: &words }))?;
         }
         let Some(table) = self.own.information.clone() else { return Ok(()) };
         let number = value.number().map_or(Value::Unknown, Value::Double);
@@ -472,8 +482,8 @@ impl<'a, 'b> Session<'a, 'b> {
     fn epoch(&mut self, boot_us: i128) -> Result<()> {
         let zero_us = i128::from(self.recorded()) - i128::from(self.clock.now().as_micros());
         match u64::try_from(boot_us + zero_us) {
-            Ok(epoch) => self.tell(Item::Epoch(epoch)),
-            Err(_) => Ok(()),
+            Ok(epoch) if UTC_MICROS.contains(&epoch) => self.tell(Item::Epoch(epoch)),
+            _ => Ok(()),
         }
     }
 

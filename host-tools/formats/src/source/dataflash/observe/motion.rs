@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use hums_core::clock::Span;
+use hums_core::clock::{Span, UTC_MICROS};
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, MOTORS_MAX,
     Observation, Outputs, SecondEstimate, SystemTime, Vibration, VibrationScale, Wanted, WantedRates,
@@ -322,11 +322,9 @@ fn receiver_ms(given: &Given<'_>) -> Option<NonZeroU32> {
 fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
     /// 1980-01-06 in seconds since 1970.
     const GPS_EPOCH_S: u64 = 315_964_800;
-    /// A week before 2010 or after 2100 is not known, but made up.
-    const WEEKS: std::ops::Range<u64> = 1_564..6_260;
     const SAID_EVERY: Span = Span::from_secs(1);
     let (Some(week), Some(ms)) = (given.unsigned(10), given.unsigned(11)) else { return };
-    if fix < FIX_3D || !WEEKS.contains(&week) || ms > WEEK_MS {
+    if fix < FIX_3D || week > u64::from(u16::MAX) || ms > WEEK_MS {
         return;
     }
     // Leap seconds came at the ends of June 2012, June 2015 and December 2016 (IERS Bulletin C).
@@ -337,7 +335,7 @@ fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
         _ => 18,
     };
     let utc_us = (GPS_EPOCH_S - leap_s) * 1_000_000 + (week * WEEK_MS + ms) * 1_000;
-    if state.utc_said.is_some_and(|at| given.at.since(at) < SAID_EVERY) {
+    if !UTC_MICROS.contains(&utc_us) || state.utc_said.is_some_and(|at| given.at.since(at) < SAID_EVERY) {
         return;
     }
     state.utc_said = Some(given.at);

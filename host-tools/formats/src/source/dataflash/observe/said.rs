@@ -9,6 +9,8 @@ use super::words::{self, CRASH_CHECK, Craft};
 
 /// `MAV_SEVERITY_INFO`: MSG has no severity.
 const INFO: u8 = 6;
+/// The bytes of a part that another one follows.
+const TEXT_BYTES: usize = 64;
 /// `MAV_SEVERITY_NOTICE`
 const NOTICE: u8 = 5;
 /// `MAV_SEVERITY_ERROR`
@@ -24,7 +26,13 @@ pub(super) const HANDLERS: &[Handler] = &[
         take: parameter,
         ..SAID
     },
-    Handler { names: &[("MSG", 0)], columns: &[&["Message", "Msg"]], is_fact: true, take: message, ..SAID },
+    Handler {
+        names: &[("MSG", 0)],
+        columns: &[&["Message", "Msg"], &["ID", "Id"], &["Seq"]],
+        is_fact: true,
+        take: message,
+        ..SAID
+    },
     Handler {
         names: &[("VER", 0)],
         columns: &[&["FWS"], &["Maj"], &["Min"], &["Pat"], &["FWT"], &["BU"]],
@@ -36,6 +44,12 @@ pub(super) const HANDLERS: &[Handler] = &[
     Handler { names: &[("ARM", 0)], columns: &[&["ArmState"]], is_fact: true, take: arm, ..SAID },
     Handler { names: &[("EV", 0)], columns: &[&["Id"]], is_fact: true, take: event, ..SAID },
     Handler { names: &[("ERR", 0)], columns: &[&["Subsys"], &["ECode"]], take: error, ..SAID },
+    Handler {
+        names: &[("WDOG", 0)],
+        columns: &[&["FT", "FaultType"], &["SmLn"], &["FL"]],
+        take: watchdog,
+        ..SAID
+    },
     Handler { names: &[("DSF", 0)], columns: &[&["Dp"]], take: dropped, ..SAID },
 ];
 
@@ -77,24 +91,50 @@ fn capacity_of(name: &str) -> Option<usize> {
     if number.is_empty() { Some(0) } else { number.parse::<usize>().ok()?.checked_sub(1) }
 }
 
+/// A text of a log. Since version 4.7 a long one is several messages with one ID (`LogStructure.h`).
 fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    let Some(words) = given.text(0).filter(|words| !words.is_empty()) else { return };
-    if let Some(craft) = Craft::of_firmware(&words) {
-        firmware(state, craft, &words, out);
-        if let Some(version) = version_of(&words).filter(|_| !state.identified) {
+    let Some(part) = given.text(0).filter(|words| !words.is_empty()) else { return };
+    let (Some(id), Some(sequence)) = (given.unsigned(1), given.unsigned(2)) else {
+        return text(state, &part, out);
+    };
+    let is_last = part.len() < TEXT_BYTES;
+    match &mut state.open_text {
+        Some((open, words)) if *open == id && sequence > 0 => words.push_str(&part),
+        open => {
+            if let Some((_, words)) = open.replace((id, part)) {
+                text(state, &words, out);
+            }
+        }
+    }
+    if is_last {
+        end_text(state, out);
+    }
+}
+
+/// No further part follows.
+fn end_text(state: &mut State, out: &mut Out<'_>) {
+    if let Some((_, words)) = state.open_text.take() {
+        text(state, &words, out);
+    }
+}
+
+fn text(state: &mut State, words: &str, out: &mut Out<'_>) {
+    if let Some(craft) = Craft::of_firmware(words) {
+        firmware(state, craft, words, out);
+        if let Some(version) = version_of(words).filter(|_| !state.identified) {
             identify(state, version);
         }
     } else if let Some(frame) = words.strip_prefix("Frame: ") {
         out.say(&Say::Frame(frame));
     } else {
-        match words.as_str() {
+        match words {
             "Arming motors" | "ARMING MOTORS" | "Throttle armed" => state.arm(true),
             "Disarming motors" | "DISARMING MOTORS" | "Throttle disarmed" => state.arm(false),
             _ => {}
         }
     }
     // A log keeps no severity of its texts.
-    out.say(&Say::Text(INFO, &words, alert::of_text(None, words.as_bytes())));
+    out.say(&Say::Text(INFO, words, alert::of_text(None, words.as_bytes())));
 }
 
 fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
@@ -169,6 +209,19 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let number = u32::from(subsystem) << 8 | u32::from(code);
     let alert = words::alert(subsystem, code);
     out.say(&Say::Event(number, severity, &words::error(subsystem, code), alert));
+}
+
+/// The watchdog restarted the autopilot before this log. `ArduPilot` writes the message once, after such a start
+/// (`AP_Scheduler`, `persistent_data`). The fault's number is the processor's exception (Armv7-M manual, B1.5.2).
+fn watchdog(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let fault = match given.unsigned(0) {
+        Some(3) => ", after a hard fault",
+        Some(4) => ", after a memory fault",
+        Some(5) => ", after a bus fault",
+        Some(6) => ", after a usage fault",
+        _ => "",
+    };
+    out.say(&Say::ProcessorFault(&format!("the watchdog restarted the autopilot{fault}")));
 }
 
 /// The autopilot counts the messages that its logger had no room for.

@@ -23,6 +23,8 @@ pub(in crate::source::dataflash) enum Say<'a> {
     Failsafes(&'a str),
     /// An emergency in which the motors stop at once, by its name.
     Emergency(&'a str),
+    /// The processor restarted after a fault, as a sentence.
+    ProcessorFault(&'a str),
     /// How arming is known.
     Arming(&'a str),
     /// UTC at this message, microseconds since 1970.

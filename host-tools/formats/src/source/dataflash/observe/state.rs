@@ -191,6 +191,10 @@ pub(in crate::source::dataflash) struct State {
     pub(super) clips: [u32; 3],
     pub(super) cells: [Dated<[Option<CellVoltage>; CELLS_MAX]>; INSTANCES],
     pub(super) messages_lost: Option<u64>,
+    /// Bits of the internal errors so far.
+    pub(super) internal_errors: u64,
+    /// The text of which parts have come, with its number.
+    pub(in crate::source::dataflash) open_text: Option<(u64, String)>,
     /// Time of the last report of UTC.
     pub(super) utc_said: Option<Instant>,
     /// When the event of arming came last.

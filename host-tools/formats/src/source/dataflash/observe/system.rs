@@ -1,18 +1,28 @@
 //! The autopilot's processor, its radios, and a plane's state.
 
+use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::clock::Span;
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
 
 use super::handler::{Given, Handler};
-use super::say::Out;
+use super::say::{Out, Say};
 use super::state::State;
 use super::words::Craft;
+
+/// `MAV_SEVERITY_WARNING`
+const WARNING: u8 = 4;
 
 const SYSTEM: Handler =
     Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
 
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler { names: &[("PM", 0)], columns: &[&["Load"]], take: performance, ..SYSTEM },
+    Handler {
+        names: &[("PM", 0)],
+        columns: &[&["Load"], &["IntE"]],
+        is_said: true,
+        take: performance,
+        ..SYSTEM
+    },
     Handler {
         names: &[("RAD", 0)],
         columns: &[&["RSSI"], &["RemRSSI"], &["Noise"], &["RemNoise"], &["RxErrors"]],
@@ -23,8 +33,15 @@ pub(super) const HANDLERS: &[Handler] = &[
     Handler { names: &[("STAT", 0)], columns: &[&["isFlying"], &["Armed"]], take: status, ..SYSTEM },
 ];
 
-/// Load in thousandths, as in `SYS_STATUS`.
-fn performance(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
+/// Load in thousandths, as in `SYS_STATUS`; internal errors since power-on as bits (`AP_InternalError`).
+fn performance(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
+    let errors = given.unsigned(1).unwrap_or(0);
+    let new = errors & !std::mem::replace(&mut state.internal_errors, errors);
+    if new != 0 {
+        let alert = Alert { cause: Cause::Processor, urgency: Urgency::Warning };
+        let words = format!("Internal errors {errors:#x}");
+        out.say(&Say::Text(WARNING, &words, Some(alert)));
+    }
     if let Some(permille) = given.single(0).filter(|permille| (0.0..=1_000.0).contains(permille)) {
         state.load.set(given.at, permille / 1e3);
     }
