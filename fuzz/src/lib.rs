@@ -16,8 +16,8 @@
 //! 2. Add `pub mod NAME;` and a row of [`TARGETS`] to this file.
 //! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are
 //!    generated, never taken from foreign recordings. Without a corpus the mutations begin from noise and reach
-//!    little. Inputs that our own writers can make come from `fuzz/src/corpus.rs`; `cargo run -p hums-fuzz` writes
-//!    them.
+//!    little. Inputs that our own writers can make come from `fuzz/src/corpus.rs`; `cargo run -p hums-fuzz --example
+//!    corpus` writes them.
 //!
 //! An input that breaks a target is written to `target/fuzz/NAME-HASH`; it goes into the corpus with the fix.
 #![allow(clippy::missing_panics_doc, reason = "a target panics where something does not hold")]

@@ -1,4 +1,4 @@
-//! Mutations of inputs: the same ones for the same seed, without other tools. LibFuzzer also follows the branches of
+//! Mutations of inputs: the same ones for the same seed, without other tools. `libFuzzer` also follows the branches of
 //! the code.
 
 use std::fs;

@@ -46,7 +46,8 @@ fn compare(recording: &Path) {
 
 #[test]
 fn every_field_of_every_message_of_our_recordings_reads_back_the_same() {
-    for name in OWN {
+    // `ap_quad_guided.tlog` has no message that the flight with faults lacks.
+    for name in OWN.into_iter().filter(|name| *name != "ap_quad_guided.tlog") {
         compare(&own(name));
     }
 }

@@ -9,7 +9,7 @@ use stm32f405_model::rcc::Cause;
 use stm32f405_model::small::Randomness;
 use stm32f405_model::time::{MS, SECOND};
 
-use crate::bench;
+use super::bench;
 
 /// The low-speed oscillator at its fastest (DS8626, table 36).
 const LSI_FASTEST: u32 = 47_000;

@@ -19,7 +19,7 @@ use serde_json::Value;
 use stm32f405_model::machine::Board;
 use stm32f405_model::time::SECOND;
 
-use crate::bench;
+use super::bench;
 
 /// The flight of the demo.
 const FLIGHT: &str = "ap_quad_faults.tlog";

@@ -14,8 +14,8 @@ use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, Ps, SECOND, US};
 
-use crate::bench;
-use crate::flights::assert_verifies;
+use super::bench;
+use super::flights::assert_verifies;
 
 /// Highest difference between the record's time of a frame and the sender's.
 const OFF_MS_MAX: u64 = 2;

@@ -15,7 +15,7 @@ use stm32f405_model::machine::Board;
 use stm32f405_model::report::Report;
 use stm32f405_model::time::{MS, Ps, SECOND};
 
-use crate::bench;
+use super::bench;
 
 /// Results of all flips.
 #[derive(Debug, Default)]

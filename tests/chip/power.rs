@@ -8,7 +8,7 @@ use stm32f405_model::line::{Char, Flaw, chars};
 use stm32f405_model::machine::Board;
 use stm32f405_model::time::{MS, SECOND, US};
 
-use crate::bench;
+use super::bench;
 
 /// Frames in memory at full rate: a quarter of a second of them, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;

@@ -7,7 +7,7 @@ use stm32f405_model::memory::CCM;
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, SECOND};
 
-use crate::bench;
+use super::bench;
 
 /// The tasks' handlers, by their names in the vector table.
 const RECEPTION: &str = "CAN1_TX";

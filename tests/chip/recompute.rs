@@ -10,7 +10,7 @@ use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::memory::SRAM;
 use stm32f405_model::time::{SECOND, US};
 
-use crate::bench;
+use super::bench;
 
 /// Addresses of the registers, behind an instruction to return to, and of the stack.
 const REGISTERS: u32 = SRAM.0 + 0x100;

@@ -4,8 +4,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::Value;
 
-use crate::database::Database;
-use crate::grafana::{INFLUXQL, Kind, VICTORIA, dashboards, panels};
+use super::database::Database;
+use super::grafana::{INFLUXQL, Kind, VICTORIA, dashboards, panels};
 
 /// Panels without data for an `ArduPilot` vehicle without `ESC_INFO`.
 const OF_PX4: [&str; 3] = ["ESC Fails", "ESC currently failing", "Estimator, PX4"];

@@ -12,8 +12,8 @@ use hums_tests::frames::of_tlog;
 use hums_tests::live::{Live, send};
 use hums_tests::{child, program};
 
-use crate::answers;
-use crate::database::{Database, Kind};
+use super::answers;
+use super::database::{Database, Kind};
 
 /// Messages a second of a fast link.
 const RATE: f64 = 2_000.0;

@@ -17,7 +17,7 @@ use hums_tests::program::hums;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::board::{Board, assert_on_card, pulled_log};
+use super::board::{Board, assert_on_card, pulled_log};
 
 #[test]
 fn a_ground_station_lists_reads_sets_and_commands() {

@@ -1,7 +1,7 @@
 //! The component information. Ground stations read the box's parameters with the words of the table, in files that
 //! follow MAVLink's schemas, and get them whole over the link.
 //!
-//! `HUMS_WRITE_DOCS=1 cargo test -p hums-tests --features oracle --test sim metadata` writes
+//! `HUMS_WRITE_DOCS=1 cargo test -p hums-tests --features oracle metadata` writes
 //! `firmware/onboard/metadata` anew.
 #![cfg(feature = "oracle")]
 
@@ -15,7 +15,7 @@ use hums_tests::flights::root;
 use hums_tests::oracle;
 use serde_json::{Value, json};
 
-use crate::board::Board;
+use super::board::Board;
 
 /// The version of both files that `QGroundControl` reads. The schema of the parameters has 3 as its minimum
 /// (mavlink/mavlink f368676f).

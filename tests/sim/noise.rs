@@ -101,13 +101,12 @@ fn each_frame_that_is_not_itself_damaged_survives() {
 
 #[test]
 fn each_frame_that_the_programs_own_noise_leaves_whole_survives() {
-    for (name, probability) in OWN.into_iter().zip(["0.001", "0.001", "0.003", "0.01"]) {
-        let dir = tempfile::tempdir().unwrap();
-        let tap = dir.path().join("tap.raw");
-        let flags = ["--noise", probability, "--seed", "1", "--tap", &tap.display().to_string()];
-        let recording = Recording::make(Machine::Sim, &own(name), &flags);
-        Clean::read(name).assert_whole_frames_survive(&fs::read(&tap).unwrap(), &recording);
-    }
+    const FLIGHT: &str = "px4_hil_quad_low.tlog";
+    let dir = tempfile::tempdir().unwrap();
+    let tap = dir.path().join("tap.raw");
+    let flags = ["--noise", "0.01", "--seed", "1", "--tap", &tap.display().to_string()];
+    let recording = Recording::make(Machine::Sim, &own(FLIGHT), &flags);
+    Clean::read(FLIGHT).assert_whole_frames_survive(&fs::read(&tap).unwrap(), &recording);
 }
 
 /// The number of frames that survive the program's own noise follows chance, within five standard deviations.

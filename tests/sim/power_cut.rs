@@ -5,9 +5,8 @@ use hums_tests::fat;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording};
 
-/// Enough to meet each kind of write (data, FAT, directory) whole and torn; the long campaign belongs to the
-/// recorder.
-const CUTS: usize = 50;
+/// A sample by the program itself; each kind of write (data, FAT, directory), whole and torn, is the campaign's.
+const CUTS: usize = 12;
 
 /// Frames of the second in which a log begins, or that wait in memory for their sector.
 const LOST_MAX: u64 = 100;

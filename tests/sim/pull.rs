@@ -14,7 +14,7 @@ use hums_tests::live::Running;
 use hums_tests::program::{command, hums};
 use tempfile::TempDir;
 
-use crate::board::{Board, assert_on_card, pulled_log, pulled_logs};
+use super::board::{Board, assert_on_card, pulled_log, pulled_logs};
 
 const LOG: &str = "00001_00.HUM";
 const NUMBER: &str = "00001";

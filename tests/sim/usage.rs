@@ -1,7 +1,7 @@
 //! Findings and usage of each recording, against pymavlink's own computation and the documentation.
 //!
 //! `cargo xtask test --only sim` prints none of it; the tables of all recordings: `HUMS_FLIGHTS=... cargo test -p
-//! hums-tests --features oracle --test sim usage -- --nocapture`.
+//! hums-tests --features oracle usage -- --nocapture`.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -38,9 +38,11 @@ struct TestProgram {
 /// Those that [`build`] built.
 static PROGRAMS: OnceLock<Vec<TestProgram>> = OnceLock::new();
 
-/// Builds `hums`, the campaigns, all tests and the examples by one call of cargo; a warning is an error.
+/// Builds `hums`, the campaigns and all tests by one call of cargo; a warning is an error. Examples are linted only.
 pub(crate) fn build() -> Result<()> {
-    let cargo = Shell::cargo().args(["test", "--no-run", "--message-format=json"]).args(CHOICE);
+    let cargo = Shell::cargo()
+        .args(["test", "--no-run", "--message-format=json", "--lib", "--bins", "--tests"])
+        .args(CHOICE);
     let (messages, code) = cargo.output_and_code()?;
     let (mut artifacts, mut warned) = (Vec::new(), false);
     for message in Message::parse_stream(messages.as_bytes()) {
@@ -97,14 +99,11 @@ pub(crate) fn unit_tests() -> Result<()> {
     Ok(())
 }
 
-/// Runs one program of the end-to-end tests, with all that it may use; `options` are the test runner's. The oracle is
+/// Runs the end-to-end tests that these arguments of the test runner choose, with all that they may use. The oracle is
 /// prepared before.
-pub(crate) fn end_to_end(name: &str, options: &[&str]) -> Result<()> {
-    let programs = programs()?;
-    match programs.iter().find(|one| one.is_integration && one.package == END_TO_END && one.name == name) {
-        Some(program) => run(program, options),
-        None => bail!("{END_TO_END} has no tests named {name}"),
-    }
+pub(crate) fn end_to_end(arguments: &[&str]) -> Result<()> {
+    let program = programs()?.iter().find(|one| one.is_integration && one.package == END_TO_END);
+    run(program.with_context(|| format!("{END_TO_END} has no tests"))?, arguments)
 }
 
 /// The formatting of all packages.

@@ -53,7 +53,7 @@ fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
     setup::require(&needs)?;
     firmware::build_beside(boards.iter().copied(), pc::build)?;
     oracle::prepare()?;
-    let mut options = vec!["--ignored", "--nocapture"];
-    options.extend(names.iter().map(String::as_str));
-    pc::end_to_end("chip", &options)
+    let names = names.iter().map(String::as_str);
+    let names: Vec<&str> = if names.len() == 0 { vec!["chip::"] } else { names.collect() };
+    pc::end_to_end(&[&["--ignored", "--nocapture"], &names[..]].concat())
 }

@@ -1,5 +1,5 @@
 //! Exceptions against QEMU: a program of scenarios prints its observations, there and on the model.
-mod common;
+use crate::common;
 
 /// Differences of QEMU from the architecture or the Cortex-M4, line by line: theirs, and ours.
 ///
@@ -19,7 +19,7 @@ const DIFFERENT: &[(&str, &str)] = &[
 ];
 
 #[test]
-#[ignore = "needs qemu-system-arm: cargo test -p cortex-m4-model --test exceptions -- --ignored"]
+#[ignore = "needs qemu-system-arm: cargo test -p cortex-m4-model exceptions:: -- --ignored"]
 fn exceptions_go_as_they_go_in_qemu() {
     let folder = common::folder("exceptions");
     let elf = common::build("exceptions", &folder);

@@ -1,5 +1,5 @@
 //! The flow of exceptions without a counterpart in QEMU (cycles, paths): by the tables of the architecture's manual and the TRM.
-mod common;
+use crate::common;
 
 use common::Flat;
 use cortex_m4_model::{Core, Outcome};

@@ -1,5 +1,5 @@
 //! A whole program, the same text from QEMU and from the model; and how fast the model is.
-mod common;
+use crate::common;
 
 /// Interrupts at any moment, one in another, with handlers that change all that a handler may, leave no trace.
 #[test]
@@ -36,7 +36,7 @@ fn on_processor() -> u64 {
 }
 
 #[test]
-#[ignore = "needs qemu-system-arm: cargo test -p cortex-m4-model --test work -- --ignored --nocapture"]
+#[ignore = "needs qemu-system-arm: cargo test -p cortex-m4-model work:: -- --ignored --nocapture"]
 fn a_program_prints_what_it_prints_in_qemu() {
     let folder = common::folder("work");
     let elf = common::build("work", &folder);

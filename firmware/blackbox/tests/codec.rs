@@ -1,11 +1,8 @@
 //! The codec, from outside: any input of a link comes back bit for bit, with its times.
-#![expect(clippy::panic, reason = "that is how a test fails")]
 
-#[path = "common/card.rs"]
-mod card;
-mod common;
-#[path = "common/frames.rs"]
-mod frames;
+use crate::card;
+use crate::common;
+use crate::frames;
 
 use card::Card;
 use common::Random;

@@ -1,10 +1,9 @@
 //! Golden files: version 3 on the card. They never change; a new version adds its own.
 //!
 //! `mixed-3.log` holds frames and records made by `stream` below, in several groups. To write it anew (only before
-//! the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox --test golden`.
+//! the version is published): `HUMS_GOLDEN=write cargo test -p hums-blackbox golden::`.
 
-#[path = "common/card.rs"]
-mod card;
+use crate::card;
 
 use std::path::PathBuf;
 

@@ -10,7 +10,7 @@ mod reader;
 #[path = "../../../fuzz/src/round_trip.rs"]
 mod round_trip;
 
-mod common;
+use crate::common;
 
 use common::Random;
 use hums_blackbox::{GROUP_SECTORS, SECTOR_BYTES};

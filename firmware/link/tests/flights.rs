@@ -4,9 +4,8 @@
 //! height above the place of arming, landing from `EXTENDED_SYS_STATE` if sent. Distance is the sum of the speeds of
 //! `GLOBAL_POSITION_INT`. Charge and energy come from `BATTERY_STATUS` (or `SYS_STATUS`, or `ESC_STATUS`) by
 //! trapezoids.
-#![expect(clippy::panic, reason = "that is how a test fails")]
 
-mod common;
+use crate::common;
 
 use common::{Recording, flight};
 use hums_core::Monitor;

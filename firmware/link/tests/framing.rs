@@ -1,7 +1,6 @@
 //! The framer on real and damaged lines. The counts were made independently, with pymavlink's definitions.
-#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
-mod common;
+use crate::common;
 
 use common::{Random, crc32, excerpt, flight};
 use hums_link::{Check, Frame, Framer};

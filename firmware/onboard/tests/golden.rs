@@ -3,7 +3,7 @@
 //! Each `tests/FOLDER/*.tlog` (or `.tlog.gz`) is parsed and monitored by the code that the box runs. The list in
 //! `tests/golden` has one line for each finding: time, check, instance, new level, cause, and whether the ground is told.
 //! A commit that only moves code leaves the list as it is. A commit that changes behaviour contains the difference.
-//! `HUMS_GOLDEN=write cargo test -p hums-onboard --test golden` writes the list anew.
+//! `HUMS_GOLDEN=write cargo test -p hums-onboard golden::` writes the list anew.
 
 use std::fmt::Write as _;
 use std::io::Read as _;

@@ -1,5 +1,4 @@
 //! Scripted flights of `tests/monitor`, judged as its README describes.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "that is how a test fails")]
 
 use std::fs::File;
 use std::io::Read as _;

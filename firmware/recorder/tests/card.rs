@@ -1,6 +1,6 @@
 //! The card layer against a card in memory with a journal of block writes, so that power can be cut at each of them.
 
-mod common;
+use crate::common;
 
 use common::{Broken, MIB_BLOCKS, MemCard, held};
 use hums_recorder::card::{Card, CardError, LogEntry};

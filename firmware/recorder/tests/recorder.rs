@@ -1,6 +1,6 @@
 //! The recorder on a card in memory: its sectors when the card is pulled, swapped, full or failing.
 
-mod common;
+use crate::common;
 
 use std::cell::RefCell;
 use std::rc::Rc;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::copied::{BLOCK, all_say, copied, without};
+use crate::copied::{BLOCK, all_say, copied, each_says, without};
 use crate::support::{attempt, end_of, run, text};
 
 #[test]
@@ -115,7 +115,7 @@ fn what_is_wrong_with_a_copy_is_told_by_every_command() {
     let mut damaged = fs::read(at("00001_00.HUM")).expect("there");
     damaged[20 * BLOCK..21 * BLOCK].fill(0);
     fs::write(at("Copy of 00001_00.HUM"), damaged).expect("written");
-    all_say(dir.path(), "copied", 3, &["1 sector had to be made again from parity"]);
+    each_says(dir.path(), "copied", 3, &["1 sector had to be made again from parity"]);
 }
 
 #[test]

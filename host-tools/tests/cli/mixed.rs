@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::copied::{BLOCK, SEGMENT, all_say, copied};
+use crate::copied::{BLOCK, SEGMENT, all_say, copied, each_says};
 use crate::support::{end_of, run};
 
 #[test]
@@ -11,7 +11,7 @@ fn another_session_under_the_number_of_the_session_before_is_told_by_every_comma
     all_say(dir.path(), "copied", 0, &[]);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::rename(at("00001_00.HUM"), at("00002_00.HUM")).expect("renamed");
-    all_say(
+    each_says(
         dir.path(),
         "copied",
         3,
@@ -65,7 +65,7 @@ fn segments_of_two_boxes_under_one_sessions_name_are_told_by_every_command() {
     let dir = copied(2);
     let at = |name: &str| dir.path().join("copied").join(name);
     fs::rename(at("00002_00.HUM"), at("00001_01.HUM")).expect("renamed");
-    all_say(
+    each_says(
         dir.path(),
         "copied",
         3,

@@ -1,7 +1,7 @@
 //! The card campaign. After any fault of the card the recorder records, or reports its state to the pilot, and
 //! records again with the card. Every frame is on a card or counted as lost.
 
-mod rig;
+use crate::rig;
 
 use hums_blackbox::{Header, NotASector};
 use hums_core::clock::Span;

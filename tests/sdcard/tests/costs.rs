@@ -1,6 +1,6 @@
 //! The driver's costs on the bus, and its results for a card's faults (`docs/cards.md`).
 //!
-//! `cargo test -p hums-sdcard --test costs -- --nocapture` prints them.
+//! `cargo test -p hums-sdcard costs:: -- --nocapture` prints them.
 
 use hums_recorder::{Block, CardDevice as _, SpiCard};
 use hums_sdcard::{Counts, Fault, Kind, MS, Medium, Model, Plan, Slot};

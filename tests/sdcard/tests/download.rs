@@ -1,6 +1,6 @@
 //! Downloads from a card that changes meanwhile: a download continues with the same log, or ends with an error.
 
-mod rig;
+use crate::rig;
 
 use hums_blackbox::Header;
 use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName};

@@ -1,6 +1,6 @@
 //! Foreign cards: reported with their kind, never touched unasked, and formatted on request.
 
-mod rig;
+use crate::rig;
 
 use hums_core::clock::Instant;
 use hums_recorder::CardState;

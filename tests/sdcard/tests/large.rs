@@ -1,7 +1,7 @@
 //! Cards with long directories, of our own logs and of other files: recorded soon after power-on. The time
 //! of our own search does not count as the card's.
 
-mod rig;
+use crate::rig;
 
 use hums_core::clock::Span;
 use hums_recorder::card::SEGMENT_BYTES_MAX;

@@ -1,6 +1,6 @@
 //! A mishap: all frames go to the card at once, because the next moment may be the last.
 
-mod rig;
+use crate::rig;
 
 use hums_blackbox::record::Resting;
 use hums_recorder::CardState;

@@ -113,7 +113,7 @@ pub(super) const LABELS: Labels = Labels {
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    let runs = options.runs(10_000, 240);
+    let runs = options.runs(10_000, 96);
     let share = runs.div_ceil(SCENARIOS.len() as u64);
     // The split of a log takes minutes of recording, and is left to the long form.
     let chosen: Vec<_> =

@@ -121,27 +121,26 @@ fn chip() -> Result<()> {
     let elf = firmware::image_of(board);
     let files = firmware::files(board, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
     print!("{}", dist::sums(&files));
-    pc::end_to_end("chip", &[])
+    pc::end_to_end(&["chip::"])
 }
 
 fn sim() -> Result<()> {
     // Half of their time they wait: links are as slow as radios are.
     let threads = (2 * std::thread::available_parallelism().map_or(1, usize::from)).to_string();
-    let mut options = vec!["--test-threads", &threads];
-    options.extend(further());
-    pc::end_to_end("sim", &options)
+    pc::end_to_end(&[&["sim::", "--test-threads", &threads], further()].concat())
 }
 
 fn browser() -> Result<()> {
-    pc::end_to_end("browser", &[])
+    pc::end_to_end(&["browser::"])
 }
 
 fn answer() -> Result<()> {
-    pc::end_to_end("answer", further())
+    pc::end_to_end(&[&["answer::"], further()].concat())
 }
 
 fn live() -> Result<()> {
-    pc::end_to_end("live", &[])
+    // There is also `browser::live`.
+    pc::end_to_end(&["live::", "--skip", "browser::"])
 }
 
 fn measure_costs() -> Result<()> {

@@ -81,7 +81,7 @@ pub(in crate::prove) const LABELS: Labels = Labels {
 
 pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
     let scenarios = if options.short { &SCENARIOS[..SCENARIOS_SHORT] } else { SCENARIOS };
-    let share = options.runs(3_000, 72).div_ceil(scenarios.len() as u64);
+    let share = options.runs(3_000, 36).div_ceil(scenarios.len() as u64);
     let outcomes = scenarios.par_iter().enumerate().with_max_len(1).map(|(index, scenario)| {
         let what = || format!("{} ({}), seed {}", scenario.name, scenario.flight, options.seed);
         let seed = options.seed.wrapping_add(index as u64);

@@ -1,29 +1,21 @@
-//! Speed from a card to an answer, as ratios in one run, and memory for a long log.
+//! Memory and time for a long log: `long_log HUMS MIB RECORDING.tlog [WHAT...]`.
 //!
-//! ```text
-//! answer_speed HUMS PYTHON RECORDING.tlog...      the ratios: pymavlink's mavlogdump and gzip beside it
-//! answer_speed HUMS --long MIB RECORDING.tlog [WHAT...]
-//!                                                 memory: a log of so many MiB, made of one recording over and over, and
-//!                                                 all that can be made of it, or only what is named (`info`, `csv`, …)
-//! ```
-//! Output files take up to 30 times the log's size while it is measured.
+//! The log has so many MiB, made of one recording over and over. All that can be made of it is made, or only `WHAT`
+//! (`info`, `csv`, …). Output files take up to 30 times the log's size meanwhile.
 //!
-//! For instance: `cargo run --release -p hums-tests --bin answer_speed -- target/release/hums target/venv/bin/python
-//! tests/flights/ap_quad_guided.tlog`.
+//! For instance: `cargo run --release -p hums-tests --example long_log -- target/release/hums 128
+//! tests/flights/ap_quad_faults.tlog`.
 
-use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{Header, Preamble, SECTOR_BYTES, Sector};
 use hums_tests::child;
 
-/// Runs of a program. The fastest counts: other load only adds time.
-const RUNS: u32 = 5;
 /// Time limit of a run; only a long log on a busy machine comes near.
 const LIMIT: Duration = Duration::from_hours(2);
 /// Offsets in a group's sector: its start in ms, and the number of earlier frames.
@@ -36,117 +28,17 @@ const ROUND_MS: u64 = 1 << 32;
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let result = match *words.as_slice() {
-        [hums, "--long", mib, recording, ref what @ ..] => {
-            long(Path::new(hums), mib, Path::new(recording), what)
-        }
-        [hums, python, ref recordings @ ..] if !recordings.is_empty() => {
-            recordings.iter().try_for_each(|one| ratios(Path::new(hums), Path::new(python), Path::new(one)))
-        }
-        _ => {
-            eprintln!(
-                "usage: answer_speed HUMS PYTHON RECORDING.tlog... | answer_speed HUMS --long MIB RECORDING.tlog [WHAT...]"
-            );
-            return ExitCode::from(2);
-        }
+    let [hums, mib, recording, ref what @ ..] = *words.as_slice() else {
+        eprintln!("usage: long_log HUMS MIB RECORDING.tlog [WHAT...]");
+        return ExitCode::from(2);
     };
-    match result {
+    match long(Path::new(hums), mib, Path::new(recording), what) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
     }
-}
-
-/// The fastest of some runs.
-fn fastest(runs: u32, mut command: impl FnMut() -> Command) -> Result<Duration> {
-    let mut best = Duration::MAX;
-    for _ in 0..runs {
-        let start = Instant::now();
-        let status = command().stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status()?;
-        if !matches!(status.code(), Some(0 | 3)) {
-            bail!("{:?} ended with {status}", command());
-        }
-        best = best.min(start.elapsed());
-    }
-    Ok(best)
-}
-
-fn ratios(hums: &Path, python: &Path, recording: &Path) -> Result<()> {
-    let dir = tempfile::tempdir()?;
-    let log = dir.path().join("log.hum");
-    let pack =
-        Command::new(hums).args(["decode", "--format", "hum"]).arg(recording).arg("-o").arg(&log).output()?;
-    if !matches!(pack.status.code(), Some(0 | 3)) {
-        bail!("hums decode --format hum: {}", String::from_utf8_lossy(&pack.stderr));
-    }
-    let types = types(python, recording)?;
-    let list = types.iter().cloned().collect::<Vec<_>>().join(",");
-    let dump = fastest(1, || {
-        let mut command = Command::new(python);
-        command
-            .args(["-m", "pymavlink.tools.mavlogdump", "--format", "csv", "--types", &list])
-            .arg(recording);
-        command
-    })?;
-    let out = dir.path().join("out");
-    let decode = fastest(RUNS, || {
-        let mut command = Command::new(hums);
-        command.arg("decode").arg(&log).arg("-o").arg(&out).args(["--force", "--format", "csv"]);
-        for name in &types {
-            command.args(["--message", name]);
-        }
-        command
-    })?;
-    let gz = dir.path().join("flight.tlog.gz");
-    let packed = Command::new("gzip").arg("-c").arg(recording).output().context("gzip")?;
-    fs::write(&gz, packed.stdout)?;
-    let gunzip = fastest(RUNS, || {
-        let mut command = Command::new("gzip");
-        command.arg("-dc").arg(&gz);
-        command
-    })?;
-    let info = fastest(RUNS, || {
-        let mut command = Command::new(hums);
-        command.arg("info").arg(&log);
-        command
-    })?;
-    let name = recording.file_name().unwrap_or_default().to_string_lossy();
-    let ms = |time: Duration| time.as_secs_f64() * 1e3;
-    println!(
-        "{name}: {} types; csv: mavlogdump {:.0} ms, hums {:.1} ms: {:.0} times faster; info {:.1} ms, gzip -d {:.1} ms: {:.2} of its time",
-        types.len(),
-        ms(dump),
-        ms(decode),
-        dump.as_secs_f64() / decode.as_secs_f64(),
-        ms(info),
-        ms(gunzip),
-        info.as_secs_f64() / gunzip.as_secs_f64(),
-    );
-    Ok(())
-}
-
-/// The types that pymavlink's own dialect knows in a recording.
-fn types(python: &Path, recording: &Path) -> Result<BTreeSet<String>> {
-    const SCRIPT: &str = "import sys
-from pymavlink import mavutil
-log = mavutil.mavlink_connection(sys.argv[1], dialect='ardupilotmega')
-types = set()
-while (message := log.recv_msg()) is not None:
-    types.add(message.get_type())
-print('\\n'.join(sorted(t for t in types if t != 'BAD_DATA' and not t.startswith('UNKNOWN'))))";
-    let output = Command::new(python).args(["-c", SCRIPT]).arg(recording).output()?;
-    let types: BTreeSet<String> =
-        String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect();
-    if types.is_empty() {
-        bail!(
-            "pymavlink finds nothing in {}: {}",
-            recording.display(),
-            String::from_utf8_lossy(&output.stderr)
-        );
-    }
-    Ok(types)
 }
 
 /// Outputs of a long log: name and words of the command. Standard output is not stored: all of a long log is hundreds

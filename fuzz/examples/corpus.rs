@@ -1,4 +1,4 @@
-//! Writes the inputs of the corpus that our own code makes: `cargo run -p hums-fuzz`.
+//! Writes the inputs of the corpus that our own code makes: `cargo run -p hums-fuzz --example corpus`.
 
 use std::fs;
 use std::path::Path;

@@ -2,7 +2,6 @@
 //!
 //! Each module is one promise: the output of the card, the output to the ground station, the effects of noise,
 //! hostile files, failing cards and power cuts.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod any_log;
 mod board;

@@ -1,6 +1,6 @@
 //! Consecutive flights: the normal figures are learnt, and a flight that leaves them is found.
 
-#[path = "../../firmware/core/tests/common/mod.rs"]
+#[path = "../../../firmware/core/tests/common/mod.rs"]
 mod common;
 
 use common::{AUTOPILOT, Quad};

@@ -4,8 +4,7 @@
 //! model; registers, flags, floating-point registers and status, fault status, return address and memory are compared after each.
 //! `CORTEX_BATCHES` is the number of batches (1), `CORTEX_SEED` the seed.
 mod cases;
-#[path = "../common/mod.rs"]
-mod common;
+use crate::common;
 mod patterns;
 mod random;
 
@@ -88,7 +87,7 @@ fn word_name(i: usize) -> String {
 }
 
 #[test]
-#[ignore = "needs qemu-system-arm and some seconds a batch: cargo test -p cortex-m4-model --test steps -- --ignored"]
+#[ignore = "needs qemu-system-arm and some seconds a batch: cargo test -p cortex-m4-model steps:: -- --ignored"]
 fn every_instruction_does_what_it_does_in_qemu() {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let (batches, seed): (u64, u64) =

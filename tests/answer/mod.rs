@@ -1,5 +1,4 @@
 //! From card to answer, checked by foreign readers.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "oracle")]
 mod damaged;

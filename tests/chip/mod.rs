@@ -2,7 +2,6 @@
 //! when devices around it fail. Times and loads are modelled, not measured.
 //!
 //! Without the feature `chip` none of this is built: `cargo xtask test` turns it on, and builds the image.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[cfg(feature = "chip")]
 mod boards;
