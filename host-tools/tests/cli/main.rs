@@ -5,6 +5,7 @@ mod check;
 mod copied;
 mod copies;
 mod damaged;
+mod field;
 mod folders;
 mod help;
 mod images;
