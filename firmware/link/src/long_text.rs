@@ -98,7 +98,11 @@ impl LongTexts {
 }
 
 /// Gives the alert of an open text if no further part comes to it.
-fn complete(open: &mut Option<Open>, give: &mut impl FnMut(Source, Alert), is_complete: impl Fn(&Open) -> bool) {
+fn complete(
+    open: &mut Option<Open>,
+    give: &mut impl FnMut(Source, Alert),
+    is_complete: impl Fn(&Open) -> bool,
+) {
     if let Some(text) = open.take_if(|open| is_complete(open))
         && let Some(alert) = alert::of_text(Some(text.severity), &text.words)
     {
@@ -156,11 +160,20 @@ mod tests {
             ),
             (
                 "a third sender",
-                vec![(0, 1, 7, 0, first), (1, 2, 7, 0, first), (2, 3, 7, 0, first), (3, 2, 7, 1, "ance"),
-                    (5_000, 1, 0, 0, "EKF variance")],
+                vec![
+                    (0, 1, 7, 0, first),
+                    (1, 2, 7, 0, first),
+                    (2, 3, 7, 0, first),
+                    (3, 2, 7, 1, "ance"),
+                    (5_000, 1, 0, 0, "EKF variance"),
+                ],
                 vec![Cause::Other, Cause::Estimator, Cause::Other, Cause::Estimator],
             ),
-            ("too long", vec![(0, 1, 7, 0, first); 9].into_iter().chain([(9, 1, 7, 9, "")]).collect(), vec![Cause::Other]),
+            (
+                "too long",
+                vec![(0, 1, 7, 0, first); 9].into_iter().chain([(9, 1, 7, 9, "")]).collect(),
+                vec![Cause::Other],
+            ),
         ] {
             assert_eq!(causes(&parts), expected, "{name}");
         }

@@ -141,8 +141,7 @@ mod tests {
     fn two_senders_may_talk_at_the_same_time() {
         let long = "a".repeat(50);
         let other = |text: Text| Text { source: Source { system: 1, component: 191 }, ..text };
-        let parts =
-            [part(0, 7, &long), other(part(1, 7, &long)), part(2, 7, "b"), other(part(3, 7, "c"))];
+        let parts = [part(0, 7, &long), other(part(1, 7, &long)), part(2, 7, "b"), other(part(3, 7, "c"))];
         assert_eq!(told(parts), [format!("{long}b"), format!("{long}c")]);
     }
 

@@ -6,6 +6,7 @@ mod copied;
 mod copies;
 mod damaged;
 mod due;
+mod field;
 mod folders;
 mod formats;
 mod help;
