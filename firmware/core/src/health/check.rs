@@ -23,7 +23,6 @@ use core::num::NonZeroU8;
 use super::finding::{Finding, Level, Orders, Subsystem};
 use super::inputs::Inputs;
 use super::suppression::Role;
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
