@@ -3,7 +3,7 @@
 //! The baseline is the mean of the smoothed figure over the last minute; its range is [`SPREADS`] times the mean distance from that mean.
 //! The caller says which samples are learnt. So a fault does not become the baseline, and an offset from the beginning of a flight does.
 
-use crate::initial::{Initial, state};
+use crate::initial::Initial;
 
 /// The baseline is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;

@@ -13,7 +13,6 @@ mod texts;
 pub use events::name as event_name;
 
 use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
-use crate::initial::state;
 use crate::observation::{Estimator, EstimatorScale, Sensors};
 use crate::time::{Instant, SILENT, Span, Stamp};
 

@@ -15,7 +15,6 @@
 //!    blamed on neither.
 
 use crate::gates::{self, Gates};
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::{SPEED_MAX_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Gnss;

@@ -1,7 +1,5 @@
 //! Causes: faults as an autopilot reports them, in common terms, and the status flags that report each.
 
-use crate::numbered::numbered;
-
 numbered! {
     /// A fault that the autopilot reports. It has the name of its check.
     pub enum Cause {

@@ -17,7 +17,6 @@
 //!
 //! A pack is a new one when its voltage falls by a third while the vehicle is disarmed.
 
-use crate::initial::state;
 use crate::vehicle::BATTERIES_MAX;
 
 /// Maximum cells of one battery.

@@ -6,7 +6,6 @@
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::health::finding::Subsystem;
-use crate::numbered::numbered;
 use crate::observation::MOTORS_MAX;
 use crate::params::{Param, Params};
 use crate::usage::{UsageCounter, Wear};

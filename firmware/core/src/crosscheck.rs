@@ -19,7 +19,6 @@ use crate::flight::Flight;
 use crate::gates::{self, Gates};
 use crate::gnss_velocity_residual::GnssVelocity;
 use crate::imu_gnss::ImuGnssResidual;
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::mag_heading_residual::{self, CompassUse};
 use crate::motion::{IDLE_THROTTLE, throttle};

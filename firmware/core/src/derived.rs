@@ -6,7 +6,6 @@ use crate::crosscheck::Crosschecks;
 use crate::flight::{Flight, FlightEvent};
 use crate::gates;
 use crate::inertial::FORCE_MAX;
-use crate::initial::state;
 use crate::latest::{Latest, Reading};
 use crate::motion::MOTION_AGE;
 use crate::motors::Motors;

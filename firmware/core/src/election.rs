@@ -9,7 +9,6 @@
 //! asked for streams. So while several send heartbeats and none streams by itself, each is asked for one `TURN`; the
 //! choice stands once all had theirs. The one at the port then streams more than one that is received over a radio.
 
-use crate::initial::state;
 use crate::observation::{Autopilot, Source};
 use crate::time::{Instant, Span};
 

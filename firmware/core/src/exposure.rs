@@ -1,8 +1,6 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
-use crate::initial::state;
-use crate::numbered::numbered;
 use crate::time::{Instant, PAUSE, SILENT, Span};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;

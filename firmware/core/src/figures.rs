@@ -14,7 +14,6 @@
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
-use crate::initial::state;
 use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind};
 use crate::params::Params;
 use crate::power_draw::drawn;

@@ -38,7 +38,6 @@ mod witness;
 use crate::latest::{Latest, Reading};
 use crate::mishap::{Change, Kind, Place, Report};
 use crate::motion::{Kinematics, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
-use crate::numbered::numbered;
 use crate::observation::VehicleKind;
 use crate::params::Params;
 use crate::pressure::Pressure;

@@ -1,7 +1,6 @@
 //! Conditions of the flight, as bits: computed once a step, read by every comparison that needs them.
 
 use crate::flight::Flight;
-use crate::initial::state;
 use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
 use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};

@@ -10,7 +10,6 @@
 
 use core::num::NonZeroU32;
 
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::SPEED_MAX_MPS;
 use crate::observation::Gnss;

@@ -17,7 +17,6 @@
 
 use crate::gates::{self, Gates};
 use crate::inertial::FORCE_MAX;
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::climb_within;
 use crate::observation::Gnss;

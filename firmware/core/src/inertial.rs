@@ -15,7 +15,6 @@
 //! Forces are smoothed (`SMOOTHING_S`), because motors shake a vehicle that stands. Without both force and rates
 //! nothing is judged.
 
-use crate::initial::state;
 use crate::motion::TILTED_RAD;
 use crate::observation::Imu;
 use crate::time::{FRESH, Instant, Span, Stamp};

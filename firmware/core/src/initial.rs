@@ -53,16 +53,14 @@ macro_rules! state {
         }
 
         impl $crate::initial::Initial for $name {
-            const NEW: Self = Self { $($field: $crate::initial::state!(@new $type $(, $value)?),)* };
+            const NEW: Self = Self { $($field: state!(@new $type $(, $value)?),)* };
         }
 
         impl Default for $name {
             #[inline(always)]
             fn default() -> Self {
-                Self { $($field: $crate::initial::state!(@new $type $(, $value)?),)* }
+                Self { $($field: state!(@new $type $(, $value)?),)* }
             }
         }
     };
 }
-
-pub(crate) use state;

@@ -2,6 +2,11 @@
 //! executor; time comes in as an argument.
 #![cfg_attr(not(test), no_std)]
 
+#[macro_use]
+mod initial;
+#[macro_use]
+mod numbered;
+
 mod adaptive_baseline;
 mod ahrs2_residual;
 pub mod alert;
@@ -27,7 +32,6 @@ pub mod happening;
 pub mod health;
 mod imu_gnss;
 pub mod inertial;
-mod initial;
 mod latest;
 pub mod lifetime;
 mod mag_heading_residual;
@@ -36,7 +40,6 @@ pub mod modes;
 pub mod monitor;
 pub mod motion;
 mod motors;
-mod numbered;
 pub mod observation;
 mod outputs;
 mod pairs;

@@ -4,7 +4,6 @@
 //! by its gyros.
 
 use crate::gates::Gates;
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale};
 use crate::residual::{Comparison, Residuals};

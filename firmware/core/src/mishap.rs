@@ -5,7 +5,6 @@ use core::fmt::Write as _;
 use heapless::String;
 
 use crate::motion::height_m;
-use crate::numbered::numbered;
 use crate::params::Param;
 use crate::time::Instant;
 use crate::vehicle::Vehicle;

@@ -15,7 +15,6 @@ use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
 use crate::health::exceedance::Exceedances;
 use crate::health::{Finding, Health, Inputs, Subsystem};
-use crate::initial::state;
 use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::observation::{Feeds, Observation, Source};

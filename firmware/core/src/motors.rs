@@ -20,7 +20,6 @@
 use core::ops::Range;
 
 use crate::flight::Flight;
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{EscGroup, MOTORS_MAX, VehicleKind};

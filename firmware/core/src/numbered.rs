@@ -39,5 +39,3 @@ macro_rules! numbered {
         }
     };
 }
-
-pub(crate) use numbered;

@@ -7,7 +7,6 @@
 use core::num::{NonZeroU16, NonZeroU32};
 
 use crate::cause::{Alert, Causes};
-use crate::initial::state;
 use crate::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,

@@ -38,7 +38,6 @@ use core::ops::RangeInclusive;
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::figures::OUTPUTS_MAX;
 use crate::flight::Flight;
-use crate::initial::state;
 use crate::motion::IDLE_THROTTLE;
 use crate::observation::{MOTORS_MAX, Outputs};
 use crate::time::{Instant, PAUSE, Span, Stamp};
@@ -153,7 +152,6 @@ impl Verdict {
 state! {
     /// One output.
     #[derive(Clone, Copy, Debug)]
-    #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
     struct Output {
         /// Command against the average of all, percent.
         share: AdaptiveBaseline,

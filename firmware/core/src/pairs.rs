@@ -10,7 +10,6 @@
 
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};

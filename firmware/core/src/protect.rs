@@ -37,7 +37,6 @@ use crate::flight::{Flight, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
 use crate::motion;
-use crate::numbered::numbered;
 use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };

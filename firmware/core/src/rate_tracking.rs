@@ -8,7 +8,6 @@
 //! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
 
 use crate::gates::{self, Gates};
-use crate::initial::state;
 use crate::latest::{Latest, Reading};
 use crate::modes::has_pilots_throttle;
 use crate::motion::climb_mps;

@@ -23,7 +23,7 @@
 
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
-use crate::initial::{Initial, state};
+use crate::initial::Initial;
 use crate::latest::Reading;
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::RECEIVERS_MAX;

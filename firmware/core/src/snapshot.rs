@@ -6,7 +6,6 @@
 
 use crate::half;
 use crate::health::{Finding, Inputs, Level, Subsystem};
-use crate::initial::state;
 use crate::motion::MOTION_AGE;
 use crate::observation::{Battery, Estimator, SystemStatus};
 use crate::time::{Instant, Span};

@@ -13,7 +13,6 @@
 //! Two messages may report the same sensor with different digits, so a value counts as repeated if it is one of the
 //! last two.
 
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;

@@ -1,6 +1,5 @@
 //! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
 
-use crate::initial::state;
 use crate::time::Instant;
 use crate::units::{Amperes, Volts};
 

@@ -6,7 +6,6 @@
 use crate::alert::Alerts;
 use crate::election::Election;
 use crate::inertial::Inertial;
-use crate::initial::state;
 use crate::latest::Latest;
 use crate::observation::{
     Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,

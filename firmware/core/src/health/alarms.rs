@@ -2,7 +2,6 @@
 
 use super::finding::Level;
 use super::tables::STATES;
-use crate::initial::state;
 use crate::time::{Instant, Span};
 
 /// Alarms that are kept. One more is reported, explains nothing and is not explained.

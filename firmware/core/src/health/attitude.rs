@@ -4,8 +4,8 @@
 //! counts only if it is further than [`FOLLOWS_RAD`] from the setpoint. Without a setpoint it counts, except in modes that let the pilot bank
 //! freely.
 
-use super::check::{Check, Debounce, Limits, Unit, When};
-use super::common::{PLAIN, STALE, alert};
+use super::check::{Check, Limits, Unit, When};
+use super::common::{PLAIN, STALE, after, alert, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
@@ -14,21 +14,19 @@ use crate::latest::Reading;
 use crate::modes::{is_banked_by_hand, is_made_to_turn};
 use crate::observation::{Attitude, VehicleKind};
 use crate::params::Param;
-use crate::time::Span;
+use crate::time::PAUSE;
 use crate::units::Radians;
 
 /// 25 degrees: an attitude follows the wanted one within this, but for moments that are shorter than the debounce. The thrust loss
 /// and crash checks of `ArduCopter` take 30 degrees.
 const FOLLOWS_RAD: f32 = 0.436;
-/// Attitude setpoints come at 1 Hz or faster.
-const WANTED_AGE: Span = Span::from_secs(2);
 
 const ROLL: Check = Check {
     name: "roll",
     subsystem: Subsystem::Attitude,
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
-    debounce: [Debounce::millis(500), Debounce::millis(300)],
+    debounce: after(500, 300),
     // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
     when: When::InFlight,
     stale_s: STALE,
@@ -38,12 +36,8 @@ const ROLL: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Other, DRIVE | GYROS | Group::RollRate.bit()), ..ROLL },
-    Check {
-        name: "pitch",
-        role: Role::of(Group::Other, DRIVE | GYROS | Group::PitchRate.bit()),
-        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, 1),
-        ..ROLL
-    },
+    row!("pitch" ROLL, role: Role::of(Group::Other, DRIVE | GYROS | Group::PitchRate.bit()),
+        read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, 1)),
     alert::<{ Cause::Attitude as usize }>(Subsystem::Attitude, Role::of(Group::Other, DRIVE | GYROS | RATES)),
 ];
 
@@ -52,7 +46,7 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
     if !matches!(vehicle.kind(), VehicleKind::Rotorcraft | VehicleKind::Vtol) {
         return None;
     }
-    let told = vehicle.wanted.within(now, WANTED_AGE);
+    let told = vehicle.wanted.within(now, PAUSE);
     let told = told.map(|told| told[axis].0);
     let degrees = |attitude: &Attitude| {
         let is = angle(attitude).0;

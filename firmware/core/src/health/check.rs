@@ -23,7 +23,6 @@ use core::num::NonZeroU8;
 use super::finding::{Finding, Level, Orders, Subsystem};
 use super::inputs::Inputs;
 use super::suppression::Role;
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
@@ -162,15 +161,6 @@ const fn is_same(one: &str, other: &str) -> bool {
 pub struct Debounce(u16);
 
 impl Debounce {
-    /// A single measurement is not enough all the same ([`SAMPLES`]).
-    pub const NONE: Self = Self(0);
-
-    /// In seconds, up to 65.
-    pub(super) const fn secs(secs: u16) -> Self {
-        assert!(secs <= 65, "a debounce is kept in 16 bits of milliseconds");
-        Self(secs * 1_000)
-    }
-
     /// In milliseconds.
     pub(super) const fn millis(millis: u16) -> Self {
         Self(millis)

@@ -22,7 +22,7 @@ pub(super) const PLAIN: Check = Check {
     subsystem: Subsystem::Power,
     unit: Unit::of(""),
     limits: Limits::above(None, None, 0.0),
-    debounce: [Debounce::NONE; 2],
+    debounce: after(0, 0),
     when: When::Always,
     stale_s: None,
     instances: 1,
@@ -31,6 +31,28 @@ pub(super) const PLAIN: Check = Check {
     of: InstanceOf::Vehicle,
     read: |_, _| None,
 };
+
+/// A debounce of a warning, and of a critical level, ms.
+pub(super) const fn after(warning_ms: u16, critical_ms: u16) -> [Debounce; 2] {
+    [Debounce::millis(warning_ms), Debounce::millis(critical_ms)]
+}
+
+/// A row of a table of checks: its name, the row that it is like, its limits, and the fields in which it differs. The limits are those of a
+/// warning and of a critical level (`_`: none), and the hysteresis.
+macro_rules! row {
+    (@limit _) => { None };
+    (@limit $param:ident) => { Some($crate::params::Param::$param) };
+    ($name:literal $like:expr, $side:ident($warning:tt $critical:tt $hysteresis:expr) $(, $field:ident: $value:expr)*) => {
+        Check {
+            name: $name,
+            limits: $crate::health::Limits::$side(row!(@limit $warning), row!(@limit $critical), $hysteresis),
+            $($field: $value,)*
+            ..$like
+        }
+    };
+    ($name:literal $like:expr $(, $field:ident: $value:expr)*) => { Check { name: $name, $($field: $value,)* ..$like } };
+}
+pub(super) use row;
 
 /// The autopilot's own word on `CAUSE`, the number of a [`Cause`]: 1 is a warning, 2 is critical.
 pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
@@ -57,7 +79,7 @@ pub(super) const fn due(subsystem: Subsystem) -> Check {
         subsystem,
         unit: Unit::of("%"),
         limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
-        debounce: [Debounce::secs(1); 2],
+        debounce: after(1_000, 1_000),
         // A part that is not due does not make its subsystem healthy.
         alarm_only: true,
         read: match subsystem {

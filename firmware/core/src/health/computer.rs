@@ -1,7 +1,7 @@
 //! The autopilot's processor.
 
-use super::check::{Check, Debounce, Limits, Unit, When};
-use super::common::{PLAIN, STALE, alert};
+use super::check::{Check, Limits, Unit, When};
+use super::common::{PLAIN, STALE, after, alert, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{FAILSAFES, Group, Role};
@@ -23,7 +23,7 @@ const LOAD: Check = Check {
     subsystem: Subsystem::Computer,
     unit: Unit::of("%"),
     limits: Limits::above(Some(Param::CpuLoadWarn), Some(Param::CpuLoadCrit), 2.0),
-    debounce: [Debounce::secs(2); 2],
+    debounce: after(2_000, 2_000),
     stale_s: STALE,
     read: |inputs, _| inputs.vehicle.system.read(|system| Some(system.load?.0 * 100.0)),
     ..PLAIN
@@ -31,35 +31,13 @@ const LOAD: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     LOAD,
-    Check {
-        name: "mcu_temperature",
-        unit: Unit::of("degC"),
-        limits: Limits::above(Some(Param::McuTempWarn), Some(Param::McuTempCrit), 2.0),
-        read: |inputs, _| inputs.vehicle.processor.read(|processor| Some(processor.temperature?.0)),
-        ..LOAD
-    },
-    Check {
-        name: "autopilot_reboot",
-        role: Role::of(Group::Reboot, 0),
-        unit: Unit::FLAG,
-        limits: Limits::above(None, Some(Param::RebootCrit), 0.0),
-        debounce: [Debounce::secs(2), Debounce::NONE],
-        stale_s: None,
-        alarm_only: true,
-        read: restarted,
-        ..LOAD
-    },
-    Check {
-        name: "autopilot_state",
-        role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()),
-        unit: Unit::FLAG,
-        limits: Limits::above(None, Some(Param::StateCrit), 0.0),
-        debounce: [Debounce::secs(2), Debounce::millis(500)],
-        when: When::Armed,
-        alarm_only: true,
-        read: state,
-        ..LOAD
-    },
+    row!("mcu_temperature" LOAD, above(McuTempWarn McuTempCrit 2.0), unit: Unit::of("degC"),
+        read: |inputs, _| inputs.vehicle.processor.read(|processor| Some(processor.temperature?.0))),
+    row!("autopilot_reboot" LOAD, above(_ RebootCrit 0.0), role: Role::of(Group::Reboot, 0), unit: Unit::FLAG,
+        debounce: after(2_000, 0), stale_s: None, alarm_only: true, read: restarted),
+    row!("autopilot_state" LOAD, above(_ StateCrit 0.0),
+        role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()), unit: Unit::FLAG,
+        debounce: after(2_000, 500), when: When::Armed, alarm_only: true, read: state),
     alert::<{ Cause::Processor as usize }>(Subsystem::Computer, Role::NONE),
     alert::<{ Cause::Logging as usize }>(Subsystem::Computer, Role::NONE),
     alert::<{ Cause::Fence as usize }>(Subsystem::Computer, Role::NONE),

@@ -1,8 +1,8 @@
 //! The combustion engine (EFI) and the generator. Normal values depend on the engine, so the limits are off (at the end of
 //! their range that no value passes) until they are set.
 
-use super::check::{Check, Debounce, Limits, Unit, When};
-use super::common::{PLAIN, STALE, due};
+use super::check::{Check, Limits, Unit, When};
+use super::common::{PLAIN, STALE, after, due, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use crate::latest::Reading;
@@ -16,7 +16,7 @@ const ENGINE: Check = Check {
     subsystem: Subsystem::Engine,
     unit: Unit::of("degC"),
     limits: Limits::above(Some(Param::EngChtWarn), Some(Param::EngChtCrit), 5.0),
-    debounce: [Debounce::secs(2), Debounce::secs(1)],
+    debounce: after(2_000, 1_000),
     stale_s: STALE,
     read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.cylinder_head?.0)),
     ..PLAIN
@@ -24,28 +24,12 @@ const ENGINE: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     ENGINE,
-    Check {
-        name: "exhaust_gas",
-        limits: Limits::above(Some(Param::EngEgtWarn), Some(Param::EngEgtCrit), 5.0),
-        read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.exhaust?.0)),
-        ..ENGINE
-    },
-    Check {
-        name: "fuel_pressure",
-        unit: Unit::of("hPa"),
-        limits: Limits::below(Some(Param::EngFuelWarn), Some(Param::EngFuelCrit), 5.0),
-        when: When::Armed,
-        read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.fuel_pressure?.0)),
-        ..ENGINE
-    },
-    Check {
-        name: "generator_speed",
-        unit: Unit::of("rpm"),
-        limits: Limits::below(Some(Param::GenSpeedWarn), Some(Param::GenSpeedCrit), GENERATOR_HYSTERESIS_RPM),
-        when: When::Armed,
-        read: generator_rpm,
-        ..ENGINE
-    },
+    row!("exhaust_gas" ENGINE, above(EngEgtWarn EngEgtCrit 5.0),
+        read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.exhaust?.0))),
+    row!("fuel_pressure" ENGINE, below(EngFuelWarn EngFuelCrit 5.0), unit: Unit::of("hPa"), when: When::Armed,
+        read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.fuel_pressure?.0))),
+    row!("generator_speed" ENGINE, below(GenSpeedWarn GenSpeedCrit GENERATOR_HYSTERESIS_RPM),
+        unit: Unit::of("rpm"), when: When::Armed, read: generator_rpm),
     Check { name: "engine_due", ..due(Subsystem::Engine) },
 ];
 

@@ -8,7 +8,6 @@ use super::check::{Check, Side};
 use super::finding::{Finding, Level};
 use super::tables::checks;
 use crate::bytes::{Fields, Unreadable, fields, fnv1a};
-use crate::initial::state;
 use crate::time::Instant;
 
 /// Checks and instances that are kept.

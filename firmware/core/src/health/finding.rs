@@ -1,6 +1,5 @@
 //! A finding: one check changed its level. The numbers and names here are stored in logs and never change meaning.
 
-use crate::numbered::numbered;
 use crate::observation::Feeds;
 use crate::time::Instant;
 

@@ -1,7 +1,7 @@
 //! The autopilot's, the pilot's and the ground station's links.
 
-use super::check::{Check, Debounce, Limits, Unit, When};
-use super::common::{PLAIN, STALE, alert};
+use super::check::{Check, Limits, Unit, When};
+use super::common::{PLAIN, STALE, after, alert, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, RECEIVERS, Role};
@@ -23,7 +23,7 @@ const RADIO: Check = Check {
     name: "rc_rssi",
     unit: Unit::of(""),
     limits: Limits::below(Some(Param::RcRssiWarn), Some(Param::RcRssiCrit), 2.0),
-    debounce: [Debounce::secs(2), Debounce::secs(1)],
+    debounce: after(2_000, 1_000),
     when: When::Armed,
     stale_s: STALE,
     read: |inputs, _| inputs.vehicle.rc.read(|rc| rc.rssi.map(f32::from)),
@@ -32,41 +32,21 @@ const RADIO: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Silence, 0), ..HEARTBEAT },
-    Check {
-        name: "frames_lost",
-        role: Role::of(Group::FramesLost, Group::Silence.bit()),
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::LinkLossWarn), Some(Param::LinkLossCrit), 0.2),
-        debounce: [Debounce::secs(2); 2],
-        read: |inputs, _| Some(Reading { at: inputs.link.at, value: inputs.link.frames_lost? * 100.0 }),
-        ..HEARTBEAT
-    },
-    Check {
-        name: "position_silent",
+    row!("frames_lost" HEARTBEAT, above(LinkLossWarn LinkLossCrit 0.2),
+        role: Role::of(Group::FramesLost, Group::Silence.bit()), unit: Unit::of("%"),
+        debounce: after(2_000, 2_000),
+        read: |inputs, _| Some(Reading { at: inputs.link.at, value: inputs.link.frames_lost? * 100.0 })),
+    // Positions that come tell nothing about their quality.
+    row!("position_silent" HEARTBEAT, above(PosAgeWarn _ 0.0),
         role: Role::of(Group::Other, Group::Silence.bit() | Group::FramesLost.bit() | RECEIVERS),
-        limits: Limits::above(Some(Param::PosAgeWarn), None, 0.0),
-        when: When::InFlight,
-        // Positions that come tell nothing about their quality.
-        alarm_only: true,
-        read: position_age_s,
-        ..HEARTBEAT
-    },
+        when: When::InFlight, alarm_only: true, read: position_age_s),
     RADIO,
-    Check {
-        name: "radio_rssi",
-        limits: Limits::below(Some(Param::RadioRssiWarn), None, 2.0),
-        read: |inputs, _| {
-            let weaker = |ends: [Option<u8>; 2]| ends.into_iter().flatten().min().map(f32::from);
-            inputs.vehicle.radio.read(|radio| weaker([radio.rssi, radio.remote_rssi]))
-        },
-        ..RADIO
-    },
-    Check {
-        name: "radio_margin",
-        limits: Limits::below(Some(Param::RadioMargWarn), None, 2.0),
-        read: |inputs, _| inputs.vehicle.radio.read(radio_margin),
-        ..RADIO
-    },
+    row!("radio_rssi" RADIO, below(RadioRssiWarn _ 2.0), read: |inputs, _| {
+        let weaker = |ends: [Option<u8>; 2]| ends.into_iter().flatten().min().map(f32::from);
+        inputs.vehicle.radio.read(|radio| weaker([radio.rssi, radio.remote_rssi]))
+    }),
+    row!("radio_margin" RADIO, below(RadioMargWarn _ 2.0),
+        read: |inputs, _| inputs.vehicle.radio.read(radio_margin)),
     alert::<{ Cause::RemoteControl as usize }>(Subsystem::Link, Role::of(Group::FailsafeCause, 0)),
     alert::<{ Cause::GroundStation as usize }>(
         Subsystem::Link,

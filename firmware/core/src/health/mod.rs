@@ -33,7 +33,6 @@ pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_
 pub use tables::{check_named, checks, instances};
 pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
-use crate::initial::state;
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::{Instant, SILENT};

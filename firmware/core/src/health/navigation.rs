@@ -1,7 +1,7 @@
 //! Estimator and GNSS.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE, alert, vibration};
+use super::common::{PLAIN, STALE, after, alert, row, vibration};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{
@@ -17,9 +17,9 @@ use crate::residual::Comparison;
 use crate::vehicle::RECEIVERS_MAX;
 
 /// Of values that are smoothed and beyond their usual range: three comparisons.
-const SMOOTHED: Debounce = Debounce::millis(200);
+const SMOOTHED: [Debounce; 2] = after(200, 1_000);
 /// Four messages of a receiver at 5 Hz, two at 2 Hz. Dilutions of precision leap as satellites come and go, and wait longer.
-const RECEIVER_SAYS: Debounce = Debounce::millis(600);
+const RECEIVER_SAYS: [Debounce; 2] = after(600, 1_000);
 /// Hysteresis of these checks.
 const MARGIN: f32 = 0.5;
 
@@ -28,7 +28,7 @@ const ESTIMATOR: Check = Check {
     subsystem: Subsystem::Navigation,
     limits: Limits::above(Some(Param::EkfVarWarn), None, 0.05),
     // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
-    debounce: [Debounce::millis(500), Debounce::secs(1)],
+    debounce: after(500, 1_000),
     when: When::InFlight,
     stale_s: STALE,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
@@ -38,7 +38,7 @@ const ESTIMATOR: Check = Check {
 const GNSS: Check = Check {
     name: "gps_satellites",
     limits: Limits::below(Some(Param::GpsSatsWarn), None, 0.0),
-    debounce: [Debounce::secs(2), Debounce::secs(1)],
+    debounce: after(2_000, 1_000),
     instances: RECEIVERS_MAX as u8,
     of: InstanceOf::Receiver,
     read: |inputs, receiver| {
@@ -69,7 +69,7 @@ const STUCK: Check = Check {
     name: "accel_stuck",
     unit: Unit::of("s"),
     limits: Limits::above(Some(Param::StuckWarn), None, 0.0),
-    debounce: [Debounce::NONE, Debounce::secs(1)],
+    debounce: after(0, 1_000),
     alarm_only: true,
     of: InstanceOf::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
@@ -83,7 +83,7 @@ const SECOND: Check = Check {
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::Ahrs2TiltWarn), None, 2.0),
     // A check that names the faulty sensor comes first.
-    debounce: [Debounce::secs(1); 2],
+    debounce: after(1_000, 1_000),
     instances: 1,
     of: InstanceOf::Vehicle,
     read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
@@ -92,295 +92,121 @@ const SECOND: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()), ..ESTIMATOR },
-    Check {
-        // ArduPilot's failsafe needs two of compass, velocity and position beyond the limit. Planes have none: they
-        // fly on by airspeed.
-        name: "ekf_failsafe",
+    // ArduPilot's failsafe needs two of compass, velocity and position beyond the limit. Planes have none: they
+    // fly on by airspeed.
+    row!("ekf_failsafe" ESTIMATOR, above(_ EkfVarCrit 0.05),
+    role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()), read: |inputs, _| {
+        let reading = estimator(inputs, EstimatorScale::Variance, second_largest);
+        reading.filter(|_| inputs.vehicle.kind() != VehicleKind::Plane)
+    }),
+    row!("ekf_compass" ESTIMATOR, role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
+        read: |inputs, _| estimator(inputs, EstimatorScale::Variance, |estimator| estimator.compass)),
+    row!("ekf_test_ratio" ESTIMATOR, above(EkfRatioWarn EkfRatioCrit 0.05),
         role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
-        limits: Limits::above(None, Some(Param::EkfVarCrit), 0.05),
-        read: |inputs, _| {
-            let reading = estimator(inputs, EstimatorScale::Variance, second_largest);
-            reading.filter(|_| inputs.vehicle.kind() != VehicleKind::Plane)
-        },
-        ..ESTIMATOR
-    },
-    Check {
-        name: "ekf_compass",
-        role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
-        read: |inputs, _| estimator(inputs, EstimatorScale::Variance, |estimator| estimator.compass),
-        ..ESTIMATOR
-    },
-    Check {
-        name: "ekf_test_ratio",
-        role: Role::of(Group::Ekf, DISTURBANCES | Group::EkfClimb.bit()),
-        limits: Limits::above(Some(Param::EkfRatioWarn), Some(Param::EkfRatioCrit), 0.05),
-        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest),
-        ..ESTIMATOR
-    },
-    Check {
-        name: "ekf_mag_ratio",
-        role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS),
-        limits: Limits::above(Some(Param::EkfRatioWarn), Some(Param::EkfRatioCrit), 0.05),
-        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass),
-        // PX4 reports no ratio of a compass that it does not use: see `compass_unused`.
-        stale_s: None,
-        ..ESTIMATOR
-    },
-    Check {
-        name: "compass_unused",
-        role: Role::of(Group::CompassUse, COMPASS | TURNS),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::AlertWarn), None, 0.05),
-        // A compass in use is not thereby good.
-        alarm_only: true,
-        read: |inputs, _| inputs.derived.crosschecks.compass_use.unused(inputs.now),
-        ..ESTIMATOR
-    },
+        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, largest)),
+    // PX4 reports no ratio of a compass that it does not use: see `compass_unused`.
+    row!("ekf_mag_ratio" ESTIMATOR, above(EkfRatioWarn EkfRatioCrit 0.05),
+        role: Role::of(Group::Sensor, COMPASS | Group::CompassUse.bit() | TURNS), stale_s: None,
+        read: |inputs, _| estimator(inputs, EstimatorScale::TestRatio, |estimator| estimator.compass)),
+    // A compass in use is not thereby good.
+    row!("compass_unused" ESTIMATOR, above(AlertWarn _ 0.05),
+        role: Role::of(Group::CompassUse, COMPASS | TURNS), unit: Unit::FLAG, alarm_only: true,
+        read: |inputs, _| inputs.derived.crosschecks.compass_use.unused(inputs.now)),
     Check { role: Role::of(Group::AccelMismatch, Group::AccelFault.bit() | VIBRATION), ..MISMATCH },
-    Check {
-        name: "gyro_mismatch",
-        role: Role::of(Group::GyroMismatch, Group::GyroFault.bit() | VIBRATION),
-        unit: Unit::of("rad/s"),
-        limits: Limits::above(Some(Param::GyroMismWarn), None, 0.02),
-        debounce: [SMOOTHED, Debounce::secs(1)],
-        read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor),
-        ..MISMATCH
-    },
-    Check {
-        name: "gyro_noise",
-        role: Role::of(Group::GyroNoise, 0),
-        unit: Unit::of("rad/s"),
-        limits: Limits::above(Some(Param::GyroNoiseWarn), None, 0.05),
-        instances: 1,
-        stale_s: STALE,
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate),
-        ..MISMATCH
-    },
-    Check {
-        name: "imu_gps",
-        role: Role::of(Group::ImuGnss, WRONG_RECEIVERS | INERTIAL | VIBRATION),
-        limits: Limits::above(Some(Param::ImuGpsWarn), None, 0.3),
-        instances: 1,
-        // It goes by the attitude and a receiver too.
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now),
-        ..MISMATCH
-    },
-    Check {
-        name: "compass_mismatch",
-        role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()),
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::MagMismWarn), None, 5.0),
-        debounce: [SMOOTHED, Debounce::secs(1)],
-        read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor),
-        ..MISMATCH
-    },
-    Check {
-        name: "compass_heading",
-        role: Role::of(Group::CompassUse, COMPASS | TURNS),
-        unit: Unit::of("deg"),
-        limits: Limits::above(Some(Param::MagHeadWarn), None, 3.0),
-        debounce: [SMOOTHED, Debounce::secs(1)],
-        instances: 1,
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| residual(inputs, Comparison::MagHeading),
-        ..MISMATCH
-    },
-    Check {
-        name: "baro_mismatch",
-        role: Role::of(Group::Sensor, Group::BaroFault.bit()),
-        unit: Unit::of("m"),
-        limits: Limits::above(Some(Param::BaroMismWarn), None, 1.0),
-        debounce: [SMOOTHED, Debounce::secs(1)],
-        read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor),
-        ..MISMATCH
-    },
-    Check {
-        name: "baro_height",
-        role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS),
-        unit: Unit::of("m"),
-        limits: Limits::above(Some(Param::BaroGpsWarn), None, 1.0),
-        debounce: [Debounce::secs(1); 2],
-        instances: 1,
-        of: InstanceOf::Sensor,
-        read: |inputs, _| residual(inputs, Comparison::BaroGnss),
-        ..MISMATCH
-    },
-    Check {
-        name: "baro_noise",
-        role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()),
-        unit: Unit::of("m"),
-        limits: Limits::above(Some(Param::BaroNoiseWarn), None, 0.5),
-        instances: 1,
-        of: InstanceOf::Sensor,
-        read: |inputs, _| residual(inputs, Comparison::BaroNoise),
-        ..MISMATCH
-    },
-    Check {
-        name: "ekf_climb",
-        role: Role::of(Group::EkfClimb, DISTURBANCES),
-        unit: Unit::of("m/s"),
-        limits: Limits::above(Some(Param::EkfClimbWarn), Some(Param::EkfClimbCrit), 1.0),
-        debounce: [Debounce::millis(500); 2],
-        instances: 1,
-        of: InstanceOf::Sensor,
-        read: |inputs, _| residual(inputs, Comparison::BaroClimb),
-        ..MISMATCH
-    },
+    row!("gyro_mismatch" MISMATCH, above(GyroMismWarn _ 0.02),
+        role: Role::of(Group::GyroMismatch, Group::GyroFault.bit() | VIBRATION), unit: Unit::of("rad/s"),
+        debounce: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
+    row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, 0),
+        unit: Unit::of("rad/s"), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate)),
+    // It goes by the attitude and a receiver too.
+    row!("imu_gps" MISMATCH, above(ImuGpsWarn _ 0.3),
+        role: Role::of(Group::ImuGnss, WRONG_RECEIVERS | INERTIAL | VIBRATION), instances: 1,
+        of: InstanceOf::Vehicle, read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now)),
+    row!("compass_mismatch" MISMATCH, above(MagMismWarn _ 5.0),
+        role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()), unit: Unit::of("%"),
+        debounce: SMOOTHED,
+        read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor)),
+    row!("compass_heading" MISMATCH, above(MagHeadWarn _ 3.0),
+        role: Role::of(Group::CompassUse, COMPASS | TURNS), unit: Unit::of("deg"),
+        debounce: SMOOTHED, instances: 1, of: InstanceOf::Vehicle,
+        read: |inputs, _| residual(inputs, Comparison::MagHeading)),
+    row!("baro_mismatch" MISMATCH, above(BaroMismWarn _ 1.0),
+        role: Role::of(Group::Sensor, Group::BaroFault.bit()), unit: Unit::of("m"),
+        debounce: SMOOTHED,
+        read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor)),
+    row!("baro_height" MISMATCH, above(BaroGpsWarn _ 1.0),
+        role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS), unit: Unit::of("m"),
+        debounce: after(1_000, 1_000), instances: 1, of: InstanceOf::Sensor,
+        read: |inputs, _| residual(inputs, Comparison::BaroGnss)),
+    row!("baro_noise" MISMATCH, above(BaroNoiseWarn _ 0.5),
+        role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()), unit: Unit::of("m"),
+        instances: 1, of: InstanceOf::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroNoise)),
+    row!("ekf_climb" MISMATCH, above(EkfClimbWarn EkfClimbCrit 1.0),
+        role: Role::of(Group::EkfClimb, DISTURBANCES), unit: Unit::of("m/s"), debounce: after(500, 500),
+        instances: 1, of: InstanceOf::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroClimb)),
     SECOND,
-    Check {
-        name: "ahrs2_height",
-        unit: Unit::of("m"),
-        limits: Limits::above(Some(Param::Ahrs2HgtWarn), Some(Param::Ahrs2HgtCrit), 1.0),
-        read: |inputs, _| residual(inputs, Comparison::Ahrs2Height),
-        ..SECOND
-    },
-    Check {
-        name: "ahrs2_position",
-        unit: Unit::of("m"),
-        limits: Limits::above(Some(Param::Ahrs2PosWarn), None, 2.0),
-        read: |inputs, _| residual(inputs, Comparison::Ahrs2Position),
-        ..SECOND
-    },
+    row!("ahrs2_height" SECOND, above(Ahrs2HgtWarn Ahrs2HgtCrit 1.0), unit: Unit::of("m"),
+        read: |inputs, _| residual(inputs, Comparison::Ahrs2Height)),
+    row!("ahrs2_position" SECOND, above(Ahrs2PosWarn _ 2.0), unit: Unit::of("m"),
+        read: |inputs, _| residual(inputs, Comparison::Ahrs2Position)),
     Check { role: Role::of(Group::AccelFault, 0), ..STUCK },
-    Check {
-        name: "gyro_stuck",
-        role: Role::of(Group::GyroFault, 0),
-        read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor),
-        ..STUCK
-    },
-    Check {
-        name: "compass_stuck",
-        role: Role::of(Group::CompassFault, 0),
-        // What changed all compasses is in one message up to 0.2 s before another.
-        debounce: [Debounce::millis(300), Debounce::secs(1)],
-        read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor),
-        ..STUCK
-    },
-    Check {
-        name: "baro_stuck",
-        role: Role::of(Group::BaroFault, 0),
-        read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor),
-        ..STUCK
-    },
-    Check {
-        name: "gps_stuck",
-        role: Role::of(Group::GnssFrozen, 0),
-        instances: RECEIVERS_MAX as u8,
-        // It goes by how far the vehicle moved.
+    row!("gyro_stuck" STUCK, role: Role::of(Group::GyroFault, 0),
+        read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor)),
+    // What changed all compasses is in one message up to 0.2 s before another.
+    row!("compass_stuck" STUCK, role: Role::of(Group::CompassFault, 0), debounce: after(300, 1_000),
+        read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor)),
+    row!("baro_stuck" STUCK, role: Role::of(Group::BaroFault, 0),
+        read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor)),
+    // It goes by how far the vehicle moved.
+    row!("gps_stuck" STUCK, role: Role::of(Group::GnssFrozen, 0), instances: RECEIVERS_MAX as u8,
         of: InstanceOf::Vehicle,
-        read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver),
-        ..STUCK
-    },
-    Check {
-        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
-        debounce: [RECEIVER_SAYS, Debounce::secs(1)],
-        ..GNSS
-    },
-    Check {
-        name: "gps_sats_fall",
-        role: Role::of(Group::SatellitesLost, Group::GnssLost.bit() | Group::GnssQuality.bit()),
-        unit: Unit::of("%"),
-        stale_s: None,
-        limits: Limits::above(Some(Param::GpsSatsFall), None, 5.0),
-        debounce: [Debounce::secs(1); 2],
-        read: |inputs, receiver| {
-            let residuals = &inputs.derived.crosschecks.residuals;
-            gnss_constellation::satellites_lost(residuals, inputs.now, receiver)
-        },
-        ..GNSS
-    },
-    Check {
-        name: "gps_speed",
-        role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()),
-        unit: Unit::of("m/s"),
-        // Never stale: only a moving receiver can be judged.
-        stale_s: None,
-        limits: Limits::above(Some(Param::GpsSpeedWarn), None, 0.2),
-        read: |inputs, receiver| {
-            inputs.derived.crosschecks.velocities.get(usize::from(receiver))?.residual(inputs.now)
-        },
-        ..GNSS
-    },
-    Check {
-        name: "gps_height",
-        role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()),
-        unit: Unit::of("m"),
-        stale_s: None,
-        limits: Limits::above(Some(Param::GpsHeightWarn), None, 1.0),
-        // Two messages at 5 Hz.
-        debounce: [Debounce::millis(200), Debounce::secs(1)],
-        instances: 1,
-        // It goes by the barometer too.
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks.heights.receiver_leapt(inputs.now),
-        ..GNSS
-    },
-    Check {
-        name: "gps_hdop",
-        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
-        limits: Limits::above(Some(Param::GpsHdopWarn), None, 0.1),
-        read: |inputs, receiver| {
-            let little = inputs.params.get(Param::GpsHdopWarn) - MARGIN;
-            gnss(inputs, receiver, |gnss| {
-                gnss.hdop.map(|hdop| if is_exact(inputs, gnss) { hdop.min(little) } else { hdop })
-            })
-        },
-        ..GNSS
-    },
-    Check {
-        name: "gps_hdop_rise",
-        role: Role::of(
-            Group::GnssWord,
-            Group::GnssLost.bit() | Group::GnssQuality.bit() | Group::SatellitesLost.bit(),
-        ),
-        unit: Unit::of("times"),
-        stale_s: None,
-        limits: Limits::above(Some(Param::GpsHdopRise), None, 0.1),
-        debounce: [Debounce::secs(1); 2],
-        read: |inputs, receiver| {
-            gnss_constellation::hdop_rise(&inputs.derived.crosschecks.residuals, inputs.now, receiver)
-        },
-        ..GNSS
-    },
-    Check {
-        name: "gps_accuracy",
-        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
-        unit: Unit::of("m"),
-        limits: Limits::above(Some(Param::GpsHaccWarn), None, 0.1),
-        debounce: [RECEIVER_SAYS, Debounce::secs(1)],
-        read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.accuracy.map(|accuracy| accuracy.0)),
-        ..GNSS
-    },
-    Check {
-        name: "gps_fix",
-        role: Role::of(Group::GnssLost, 0),
-        unit: Unit::FLAG,
-        limits: Limits::below(None, Some(Param::GpsFixCrit), 0.0),
-        // Two messages without one.
-        debounce: [Debounce::secs(2), Debounce::millis(200)],
-        read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix))),
-        ..GNSS
-    },
-    Check {
-        name: "gps_jamming",
-        role: Role::of(Group::GnssLost, 0),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::GpsJamWarn), Some(Param::GpsJamCrit), 0.0),
-        when: When::Always,
-        read: |inputs, receiver| integrity(inputs, receiver, |known| known.jamming),
-        ..GNSS
-    },
-    Check {
-        name: "gps_spoofing",
-        role: Role::of(Group::GnssLost, 0),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::GpsJamWarn), Some(Param::GpsJamCrit), 0.0),
-        when: When::Always,
-        read: |inputs, receiver| integrity(inputs, receiver, |known| known.spoofing),
-        ..GNSS
-    },
+        read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver)),
+    Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce: RECEIVER_SAYS, ..GNSS },
+    row!("gps_sats_fall" GNSS, above(GpsSatsFall _ 5.0),
+    role: Role::of(Group::SatellitesLost, Group::GnssLost.bit() | Group::GnssQuality.bit()),
+    unit: Unit::of("%"), debounce: after(1_000, 1_000), stale_s: None, read: |inputs, receiver| {
+        let residuals = &inputs.derived.crosschecks.residuals;
+        gnss_constellation::satellites_lost(residuals, inputs.now, receiver)
+    }),
+    // Never stale: only a moving receiver can be judged.
+    row!("gps_speed" GNSS, above(GpsSpeedWarn _ 0.2),
+    role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()), unit: Unit::of("m/s"), stale_s: None,
+    read: |inputs, receiver| {
+        inputs.derived.crosschecks.velocities.get(usize::from(receiver))?.residual(inputs.now)
+    }),
+    // Two messages at 5 Hz.
+    // It goes by the barometer too.
+    row!("gps_height" GNSS, above(GpsHeightWarn _ 1.0),
+        role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()), unit: Unit::of("m"),
+        debounce: after(200, 1_000), stale_s: None, instances: 1, of: InstanceOf::Vehicle,
+        read: |inputs, _| inputs.derived.crosschecks.heights.receiver_leapt(inputs.now)),
+    row!("gps_hdop" GNSS, above(GpsHdopWarn _ 0.1), role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
+    read: |inputs, receiver| {
+        let little = inputs.params.get(Param::GpsHdopWarn) - MARGIN;
+        gnss(inputs, receiver, |gnss| {
+            gnss.hdop.map(|hdop| if is_exact(inputs, gnss) { hdop.min(little) } else { hdop })
+        })
+    }),
+    row!("gps_hdop_rise" GNSS, above(GpsHdopRise _ 0.1),
+    role: Role::of(Group::GnssWord, Group::GnssLost.bit() | Group::GnssQuality.bit() | Group::SatellitesLost.bit()),
+    unit: Unit::of("times"), debounce: after(1_000, 1_000), stale_s: None, read: |inputs, receiver| {
+        gnss_constellation::hdop_rise(&inputs.derived.crosschecks.residuals, inputs.now, receiver)
+    }),
+    row!("gps_accuracy" GNSS, above(GpsHaccWarn _ 0.1),
+        role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), unit: Unit::of("m"),
+        debounce: RECEIVER_SAYS,
+        read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.accuracy.map(|accuracy| accuracy.0))),
+    // Two messages without one.
+    row!("gps_fix" GNSS, below(_ GpsFixCrit 0.0), role: Role::of(Group::GnssLost, 0), unit: Unit::FLAG,
+        debounce: after(2_000, 200),
+        read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix)))),
+    row!("gps_jamming" GNSS, above(GpsJamWarn GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
+        unit: Unit::FLAG, when: When::Always,
+        read: |inputs, receiver| integrity(inputs, receiver, |known| known.jamming)),
+    row!("gps_spoofing" GNSS, above(GpsJamWarn GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
+        unit: Unit::FLAG, when: When::Always,
+        read: |inputs, receiver| integrity(inputs, receiver, |known| known.spoofing)),
     alert::<{ Cause::Gyro as usize }>(Subsystem::Navigation, Role::of(Group::GyroFault, 0)),
     alert::<{ Cause::Accelerometer as usize }>(Subsystem::Navigation, Role::of(Group::AccelFault, 0)),
     alert::<{ Cause::Compass as usize }>(Subsystem::Navigation, Role::of(Group::CompassFault, TURNS)),

@@ -1,7 +1,7 @@
 //! Batteries and rails.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE, STALE_SLOW, alert, due};
+use super::check::{Check, InstanceOf, Limits, Unit, When};
+use super::common::{PLAIN, STALE, STALE_SLOW, after, alert, due, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, Role};
@@ -19,7 +19,7 @@ const BATTERY: Check = Check {
     subsystem: Subsystem::Power,
     unit: Unit::of("%"),
     limits: Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0),
-    debounce: [Debounce::secs(2); 2],
+    debounce: after(2_000, 2_000),
     stale_s: STALE_SLOW,
     instances: BATTERIES,
     of: InstanceOf::Supply,
@@ -29,111 +29,45 @@ const BATTERY: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Battery, 0), ..BATTERY },
-    Check {
-        name: "cell_voltage",
-        role: Role::of(Group::Battery, 0),
-        unit: Unit::of("V"),
-        limits: Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05),
-        // ArduPilot's low voltage timer is 10 s: a sag under full throttle is not an empty battery.
-        debounce: [Debounce::secs(10), Debounce::secs(5)],
-        read: |inputs, battery| inputs.derived.cell_voltage(inputs.vehicle, inputs.params, battery),
-        when: When::Armed,
-        ..BATTERY
-    },
-    Check {
-        name: "cell_deviation",
-        role: Role::of(Group::FailsafeCause, 0),
-        unit: Unit::of("V"),
-        limits: Limits::above(Some(Param::CellDevWarn), Some(Param::CellDevCrit), 0.01),
-        debounce: [Debounce::secs(10); 2],
+    // ArduPilot's low voltage timer is 10 s: a sag under full throttle is not an empty battery.
+    row!("cell_voltage" BATTERY, below(CellVoltWarn CellVoltCrit 0.05), role: Role::of(Group::Battery, 0),
+        unit: Unit::of("V"), debounce: after(10_000, 5_000), when: When::Armed,
+        read: |inputs, battery| inputs.derived.cell_voltage(inputs.vehicle, inputs.params, battery)),
+    row!("cell_deviation" BATTERY, above(CellDevWarn CellDevCrit 0.01),
+        role: Role::of(Group::FailsafeCause, 0), unit: Unit::of("V"), debounce: after(10_000, 10_000),
+        when: When::Armed, of: InstanceOf::Battery, read: |inputs, battery| of(inputs, battery, spread_v)),
+    // AirData: above the warning's limit for a minute is as bad as far above it.
+    row!("cell_dev_lasting" BATTERY, above(_ CellDevWarn 0.01), unit: Unit::of("V"),
+        debounce: after(2_000, 60_000), when: When::Armed, of: InstanceOf::Battery,
+        read: |inputs, battery| of(inputs, battery, spread_v)),
+    // A trend holds until the next figure.
+    row!("batt_resistance" BATTERY, above(BatResWarn BatResCrit 5.0), debounce: after(10_000, 10_000),
+    when: When::InFlight, stale_s: None, of: InstanceOf::Battery, read: |inputs, battery| {
+        let resistance = inputs.derived.resistance(usize::from(battery))?;
+        of(inputs, battery, |_| resistance.rise_percent())
+    }),
+    row!("batt_fault" BATTERY, above(BatFaultWarn _ 0.0), role: Role::of(Group::FailsafeCause, 0),
+        unit: Unit::FLAG, of: InstanceOf::Battery, alarm_only: true,
+        read: |inputs, battery| of(inputs, battery, |battery| Some(battery.faults.count_ones() as f32))),
+    row!("batt_temperature" BATTERY, above(BatTempWarn BatTempCrit 3.0), unit: Unit::of("degC"),
         of: InstanceOf::Battery,
-        read: |inputs, battery| of(inputs, battery, spread_v),
-        when: When::Armed,
-        ..BATTERY
-    },
-    Check {
-        name: "cell_dev_lasting",
-        limits: Limits::above(None, Some(Param::CellDevWarn), 0.01),
-        unit: Unit::of("V"),
-        // AirData: above the warning's limit for a minute is as bad as far above it.
-        debounce: [Debounce::secs(2), Debounce::secs(60)],
-        of: InstanceOf::Battery,
-        read: |inputs, battery| of(inputs, battery, spread_v),
-        when: When::Armed,
-        ..BATTERY
-    },
-    Check {
-        name: "batt_resistance",
-        limits: Limits::above(Some(Param::BatResWarn), Some(Param::BatResCrit), 5.0),
-        debounce: [Debounce::secs(10); 2],
-        when: When::InFlight,
-        // A trend holds until the next figure.
-        stale_s: None,
-        of: InstanceOf::Battery,
-        read: |inputs, battery| {
-            let resistance = inputs.derived.resistance(usize::from(battery))?;
-            of(inputs, battery, |_| resistance.rise_percent())
-        },
-        ..BATTERY
-    },
-    Check {
-        name: "batt_fault",
-        role: Role::of(Group::FailsafeCause, 0),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::BatFaultWarn), None, 0.0),
-        alarm_only: true,
-        of: InstanceOf::Battery,
-        read: |inputs, battery| of(inputs, battery, |battery| Some(battery.faults.count_ones() as f32)),
-        ..BATTERY
-    },
-    Check {
-        name: "batt_temperature",
-        unit: Unit::of("degC"),
-        limits: Limits::above(Some(Param::BatTempWarn), Some(Param::BatTempCrit), 3.0),
-        of: InstanceOf::Battery,
-        read: |inputs, battery| of(inputs, battery, |battery| Some(battery.temperature?.0)),
-        ..BATTERY
-    },
-    Check {
-        name: "batt_state",
-        role: Role::of(Group::BatteryState, Group::Battery.bit()),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::BatStateWarn), Some(Param::BatStateCrit), 0.0),
-        of: InstanceOf::Battery,
-        read: |inputs, battery| {
-            of(inputs, battery, |battery| match battery.charge {
-                1 | 7 => Some(0.0),
-                2 | 6 => Some(1.0),
-                3..=5 => Some(2.0),
-                _ => None,
-            })
-        },
-        when: When::Armed,
-        ..BATTERY
-    },
-    Check {
-        name: "rail_5v_low",
-        unit: Unit::of("V"),
-        limits: Limits::below(Some(Param::RailLowWarn), Some(Param::RailLowCrit), 0.05),
-        debounce: [Debounce::secs(1), Debounce::millis(500)],
-        when: When::Armed,
-        stale_s: STALE,
-        instances: 1,
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0)),
-        ..BATTERY
-    },
-    Check {
-        name: "rail_5v_high",
-        unit: Unit::of("V"),
-        limits: Limits::above(Some(Param::RailHighWarn), None, 0.05),
-        debounce: [Debounce::secs(1), Debounce::secs(2)],
-        stale_s: STALE,
-        instances: 1,
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0)),
-        ..BATTERY
-    },
+        read: |inputs, battery| of(inputs, battery, |battery| Some(battery.temperature?.0))),
+    row!("batt_state" BATTERY, above(BatStateWarn BatStateCrit 0.0),
+    role: Role::of(Group::BatteryState, Group::Battery.bit()), unit: Unit::FLAG, when: When::Armed,
+    of: InstanceOf::Battery, read: |inputs, battery| {
+        of(inputs, battery, |battery| match battery.charge {
+            1 | 7 => Some(0.0),
+            2 | 6 => Some(1.0),
+            3..=5 => Some(2.0),
+            _ => None,
+        })
+    }),
+    row!("rail_5v_low" BATTERY, below(RailLowWarn RailLowCrit 0.05), unit: Unit::of("V"),
+        debounce: after(1_000, 500), when: When::Armed, stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0))),
+    row!("rail_5v_high" BATTERY, above(RailHighWarn _ 0.05), unit: Unit::of("V"),
+        debounce: after(1_000, 2_000), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0))),
     Check { name: "battery_due", ..due(Subsystem::Power) },
     alert::<{ Cause::Power as usize }>(
         Subsystem::Power,

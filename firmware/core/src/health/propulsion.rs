@@ -1,7 +1,7 @@
 //! Motors, ESCs and propellers.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE_SLOW, alert, due};
+use super::check::{Check, InstanceOf, Limits, Unit, When};
+use super::common::{PLAIN, STALE_SLOW, after, alert, due, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
@@ -28,7 +28,7 @@ const ESC: Check = Check {
 const RATE: Check = Check {
     unit: Unit::of("deg/s"),
     limits: Limits::above(Some(Param::RateWarn), Some(Param::RateCrit), 5.0),
-    debounce: [Debounce::millis(200); 2],
+    debounce: after(200, 200),
     when: When::InFlight,
     instances: 1,
     of: InstanceOf::Vehicle,
@@ -37,109 +37,44 @@ const RATE: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::EscTelemetry, Group::Reboot.bit()), ..ESC },
-    Check {
-        name: "esc_temperature",
-        unit: Unit::of("degC"),
-        limits: Limits::above(Some(Param::EscTempWarn), Some(Param::EscTempCrit), 3.0),
-        debounce: [Debounce::secs(1), Debounce::millis(500)],
-        when: When::Always,
+    row!("esc_temperature" ESC, above(EscTempWarn EscTempCrit 3.0), unit: Unit::of("degC"),
+        debounce: after(1_000, 500), when: When::Always, stale_s: STALE_SLOW,
+        read: |inputs, motor| state(inputs, motor, |esc| Some(esc.temperature?.0))),
+    row!("esc_failure" ESC, above(EscFailWarn EscFailCrit 0.0), role: Role::of(Group::Drive, 0),
+        unit: Unit::FLAG, when: When::Always, stale_s: STALE_SLOW, alarm_only: true,
+        read: |inputs, motor| state(inputs, motor, |esc| esc.failures.map(failure_rank))),
+    row!("esc_errors" ESC, above(EscErrWarn _ 2.0), unit: Unit::of("1/min"), debounce: after(1_000, 0),
         stale_s: STALE_SLOW,
-        read: |inputs, motor| state(inputs, motor, |esc| Some(esc.temperature?.0)),
-        ..ESC
-    },
-    Check {
-        name: "esc_failure",
-        role: Role::of(Group::Drive, 0),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::EscFailWarn), Some(Param::EscFailCrit), 0.0),
-        stale_s: STALE_SLOW,
-        when: When::Always,
-        alarm_only: true,
-        read: |inputs, motor| state(inputs, motor, |esc| esc.failures.map(failure_rank)),
-        ..ESC
-    },
-    Check {
-        name: "esc_errors",
-        unit: Unit::of("1/min"),
-        limits: Limits::above(Some(Param::EscErrWarn), None, 2.0),
-        debounce: [Debounce::secs(1), Debounce::NONE],
-        stale_s: STALE_SLOW,
-        read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors.errors(motor)),
-        ..ESC
-    },
-    Check {
-        name: "motor_loss",
-        role: Role::of(Group::MotorLoss, 0),
-        unit: Unit::of("%"),
-        limits: Limits::below(None, Some(Param::MotLossCrit), 5.0),
-        debounce: [Debounce::NONE, Debounce::millis(500)],
-        when: When::InFlight,
-        read: |Inputs { now, vehicle, derived, .. }, motor| {
-            derived.motors.share(*now, vehicle, &derived.outputs, motor)
-        },
-        ..ESC
-    },
-    Check {
-        name: "motor_imbalance",
-        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::MotImbalWarn), Some(Param::MotImbalCrit), 2.0),
-        debounce: [Debounce::secs(3), Debounce::secs(1)],
-        when: When::InFlight,
-        // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
-        read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
-            derived.motors.imbalance(*now, vehicle, flight, &derived.outputs, motor)
-        },
-        ..ESC
-    },
-    Check {
-        name: "motor_output",
-        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::MotOutWarn), Some(Param::MotOutCrit), 5.0),
-        debounce: [Debounce::millis(500), Debounce::secs(1)],
-        when: When::InFlight,
-        instances: JUDGED_MAX as u8,
-        of: InstanceOf::Output,
-        read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent),
-        ..ESC
-    },
-    Check {
-        name: "motor_off",
-        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()),
-        unit: Unit::FLAG,
-        limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
-        debounce: [Debounce::millis(500), Debounce::secs(1)],
-        when: When::InFlight,
-        instances: JUDGED_MAX as u8,
-        of: InstanceOf::Output,
-        // A driven motor is not thereby good.
-        alarm_only: true,
-        read: |inputs, motor| verdict(inputs, motor, Verdict::off_rank),
-        ..ESC
-    },
-    Check {
-        name: "thrust_lost",
+        read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors.errors(motor))),
+    row!("motor_loss" ESC, below(_ MotLossCrit 5.0), role: Role::of(Group::MotorLoss, 0), unit: Unit::of("%"),
+    debounce: after(0, 500), when: When::InFlight, read: |Inputs { now, vehicle, derived, .. }, motor| {
+        derived.motors.share(*now, vehicle, &derived.outputs, motor)
+    }),
+    // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
+    row!("motor_imbalance" ESC, above(MotImbalWarn MotImbalCrit 2.0),
+    role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
+    debounce: after(3_000, 1_000), when: When::InFlight,
+    read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
+        derived.motors.imbalance(*now, vehicle, flight, &derived.outputs, motor)
+    }),
+    row!("motor_output" ESC, above(MotOutWarn MotOutCrit 5.0),
+        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
+        debounce: after(500, 1_000), when: When::InFlight, instances: JUDGED_MAX as u8,
+        of: InstanceOf::Output, read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent)),
+    // A driven motor is not thereby good.
+    row!("motor_off" ESC, above(AlertWarn AlertCrit 0.0),
+        role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::FLAG,
+        debounce: after(500, 1_000), when: When::InFlight, instances: JUDGED_MAX as u8,
+        of: InstanceOf::Output, alarm_only: true,
+        read: |inputs, motor| verdict(inputs, motor, Verdict::off_rank)),
+    row!("thrust_lost" ESC, above(ThrustWarn _ 0.0),
         role: Role::of(Group::Other, DRIVE | Group::EscTelemetry.bit() | RATES | Group::EkfClimb.bit()),
-        limits: Limits::above(Some(Param::ThrustWarn), None, 0.0),
-        when: When::InFlight,
-        instances: 1,
-        of: InstanceOf::Vehicle,
-        read: |inputs, _| inputs.derived.crosschecks.thrust.in_vain(),
-        ..ESC
-    },
-    Check {
-        name: "roll_rate",
-        role: Role::of(Group::RollRate, DRIVE | GYROS),
-        read: |inputs, _| rate_off_deg_s(inputs, 0),
-        ..RATE
-    },
-    Check {
-        name: "pitch_rate",
-        role: Role::of(Group::PitchRate, DRIVE | GYROS),
-        read: |inputs, _| rate_off_deg_s(inputs, 1),
-        ..RATE
-    },
+        when: When::InFlight, instances: 1, of: InstanceOf::Vehicle,
+        read: |inputs, _| inputs.derived.crosschecks.thrust.in_vain()),
+    row!("roll_rate" RATE, role: Role::of(Group::RollRate, DRIVE | GYROS),
+        read: |inputs, _| rate_off_deg_s(inputs, 0)),
+    row!("pitch_rate" RATE, role: Role::of(Group::PitchRate, DRIVE | GYROS),
+        read: |inputs, _| rate_off_deg_s(inputs, 1)),
     Check { name: "drive_due", ..due(Subsystem::Propulsion) },
     alert::<{ Cause::Propulsion as usize }>(
         Subsystem::Propulsion,

@@ -1,7 +1,7 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Debounce, Limits, Unit};
-use super::common::{PLAIN, due};
+use super::check::{Check, Limits, Unit};
+use super::common::{PLAIN, after, due, row};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{Group, Role};
@@ -13,55 +13,26 @@ const STATE: Check = Check {
     name: "recording",
     subsystem: Subsystem::Recorder,
     limits: Limits::above(Some(Param::RecStopWarn), Some(Param::RecStopCrit), 0.0),
-    debounce: [Debounce::secs(1); 2],
+    debounce: after(1_000, 1_000),
     read: stopped_rank,
     ..PLAIN
 };
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Recording, 0), unit: Unit::FLAG, ..STATE },
-    Check {
-        name: "record_queue",
-        role: Role::of(Group::Other, Group::Recording.bit()),
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::RecQueueWarn), Some(Param::RecQueueCrit), 10.0),
-        debounce: [Debounce::NONE; 2],
-        read: |inputs, _| inputs.reading(inputs.recorder.queue * 100.0),
-        ..STATE
-    },
-    Check {
-        name: "record_lost",
-        role: Role::of(Group::Other, Group::Recording.bit()),
-        unit: Unit::of("frames"),
-        limits: Limits::above(Some(Param::RecLostWarn), None, 0.0),
-        debounce: [Debounce::NONE, Debounce::secs(1)],
-        read: |inputs, _| inputs.reading(inputs.derived.frames_lost_lately()),
-        ..STATE
-    },
-    Check {
-        name: "card_stall",
-        role: Role::of(Group::Other, Group::Recording.bit()),
-        unit: Unit::of("ms"),
-        limits: Limits::above(Some(Param::RecStallWarn), Some(Param::RecStallCrit), 0.0),
-        debounce: [Debounce::NONE; 2],
-        read: |inputs, _| inputs.reading(inputs.recorder.stall.as_millis() as f32),
-        ..STATE
-    },
-    Check {
-        name: "card_errors",
-        role: Role::of(Group::Other, Group::Recording.bit()),
-        limits: Limits::above(Some(Param::RecErrWarn), None, 0.0),
-        debounce: [Debounce::NONE, Debounce::secs(1)],
-        read: |inputs, _| inputs.reading(inputs.derived.write_errors_lately()),
-        ..STATE
-    },
-    Check {
-        name: "card_room",
-        unit: Unit::of("%"),
-        limits: Limits::below(Some(Param::RecRoomWarn), Some(Param::RecRoomCrit), 1.0),
-        read: |inputs, _| inputs.reading(inputs.recorder.room? * 100.0),
-        ..STATE
-    },
+    row!("record_queue" STATE, above(RecQueueWarn RecQueueCrit 10.0),
+        role: Role::of(Group::Other, Group::Recording.bit()), unit: Unit::of("%"), debounce: after(0, 0),
+        read: |inputs, _| inputs.reading(inputs.recorder.queue * 100.0)),
+    row!("record_lost" STATE, above(RecLostWarn _ 0.0), role: Role::of(Group::Other, Group::Recording.bit()),
+        unit: Unit::of("frames"), debounce: after(0, 1_000),
+        read: |inputs, _| inputs.reading(inputs.derived.frames_lost_lately())),
+    row!("card_stall" STATE, above(RecStallWarn RecStallCrit 0.0),
+        role: Role::of(Group::Other, Group::Recording.bit()), unit: Unit::of("ms"), debounce: after(0, 0),
+        read: |inputs, _| inputs.reading(inputs.recorder.stall.as_millis() as f32)),
+    row!("card_errors" STATE, above(RecErrWarn _ 0.0), role: Role::of(Group::Other, Group::Recording.bit()),
+        debounce: after(0, 1_000), read: |inputs, _| inputs.reading(inputs.derived.write_errors_lately())),
+    row!("card_room" STATE, below(RecRoomWarn RecRoomCrit 1.0), unit: Unit::of("%"),
+        read: |inputs, _| inputs.reading(inputs.recorder.room? * 100.0)),
     Check { name: "card_due", ..due(Subsystem::Recorder) },
 ];
 

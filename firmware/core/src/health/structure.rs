@@ -1,7 +1,7 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Debounce, Limits, Unit, When};
-use super::common::{PLAIN, STALE, alert, due, vibration};
+use super::check::{Check, Limits, Unit, When};
+use super::common::{PLAIN, STALE, after, alert, due, row, vibration};
 use super::finding::Subsystem;
 use super::suppression::{DRIVE, Group, INERTIAL, Role, SHAKING};
 use crate::cause::Cause;
@@ -13,7 +13,7 @@ const VIBRATION: Check = Check {
     subsystem: Subsystem::Structure,
     unit: Unit::of("m/s2"),
     limits: Limits::above(Some(Param::VibeWarn), Some(Param::VibeCrit), 3.0),
-    debounce: [Debounce::secs(1); 2],
+    debounce: after(1_000, 1_000),
     when: When::Armed,
     stale_s: STALE,
     read: |inputs, _| {
@@ -24,49 +24,22 @@ const VIBRATION: Check = Check {
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Vibration, 0), ..VIBRATION },
-    Check {
-        name: "vibration_px4",
-        role: Role::of(Group::Vibration, 0),
-        limits: Limits::above(Some(Param::VibePx4Warn), Some(Param::VibePx4Crit), 0.5),
-        read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[.., accelerometer]| accelerometer),
-        ..VIBRATION
-    },
-    Check {
-        name: "vibration_rise",
+    row!("vibration_px4" VIBRATION, above(VibePx4Warn VibePx4Crit 0.5), role: Role::of(Group::Vibration, 0),
+        read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[.., accelerometer]| accelerometer)),
+    // Two messages at 5 Hz.
+    // Never stale: only flight on rotors can be judged.
+    row!("vibration_rise" VIBRATION, above(VibeRiseWarn _ 0.5),
         role: Role::of(Group::Shaking, DRIVE | Group::EscTelemetry.bit() | Group::Vibration.bit()),
-        unit: Unit::of("times"),
-        limits: Limits::above(Some(Param::VibeRiseWarn), None, 0.5),
-        // Two messages at 5 Hz.
-        debounce: [Debounce::millis(200), Debounce::secs(1)],
-        when: When::InFlight,
-        // Never stale: only flight on rotors can be judged.
-        stale_s: None,
-        read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now, inputs.vehicle),
-        ..VIBRATION
-    },
-    Check {
-        name: "clipping",
-        role: Role::of(Group::Shaking, Group::Vibration.bit()),
-        unit: Unit::of(""),
-        limits: Limits::above(Some(Param::ClipWarn), Some(Param::ClipCrit), 0.0),
-        debounce: [Debounce::NONE; 2],
-        when: When::InFlight,
-        read: |inputs, _| inputs.derived.clips(inputs.vehicle),
-        ..VIBRATION
-    },
-    Check {
-        name: "load_factor",
-        role: Role::of(Group::Other, SHAKING),
-        unit: Unit::of("g"),
-        limits: Limits::above(Some(Param::LoadFacWarn), Some(Param::LoadFacCrit), 0.2),
-        // A manoeuvre lasts; a shock or vibration does not, and an impact is a mishap.
-        debounce: [Debounce::millis(500); 2],
-        when: When::InFlight,
-        // Never stale: a shaking vehicle has no load factor.
-        stale_s: None,
-        read: |inputs, _| inputs.derived.load_factor(),
-        ..VIBRATION
-    },
+        unit: Unit::of("times"), debounce: after(200, 1_000), when: When::InFlight, stale_s: None,
+        read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now, inputs.vehicle)),
+    row!("clipping" VIBRATION, above(ClipWarn ClipCrit 0.0),
+        role: Role::of(Group::Shaking, Group::Vibration.bit()), unit: Unit::of(""), debounce: after(0, 0),
+        when: When::InFlight, read: |inputs, _| inputs.derived.clips(inputs.vehicle)),
+    // A manoeuvre lasts; a shock or vibration does not, and an impact is a mishap.
+    // Never stale: a shaking vehicle has no load factor.
+    row!("load_factor" VIBRATION, above(LoadFacWarn LoadFacCrit 0.2), role: Role::of(Group::Other, SHAKING),
+        unit: Unit::of("g"), debounce: after(500, 500), when: When::InFlight, stale_s: None,
+        read: |inputs, _| inputs.derived.load_factor()),
     Check { name: "airframe_due", ..due(Subsystem::Structure) },
     alert::<{ Cause::Vibration as usize }>(
         Subsystem::Structure,

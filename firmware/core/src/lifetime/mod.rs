@@ -27,7 +27,6 @@ pub use crate::bytes::{Item, Unreadable};
 use crate::component::{COMPONENTS_MAX, Component};
 use crate::exposure::Exposure;
 use crate::health::exceedance::Exceedances;
-use crate::initial::state;
 use crate::usage::{Form, Totals, UsageCounter};
 use crate::vehicle::BATTERIES_MAX;
 

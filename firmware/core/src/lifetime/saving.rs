@@ -11,7 +11,6 @@
 //! hour, 63 in three, 81 in five and a half. The flash sets this limit; `hums_onboard::persist` has the sums.
 
 use super::ItemKey;
-use crate::initial::state;
 use crate::time::{Instant, Span};
 
 /// The first save: late enough for the store to be ready and the vehicle to be heard.

@@ -11,7 +11,6 @@ pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, Phase};
-use crate::initial::state;
 use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;

@@ -1,7 +1,6 @@
 //! Sums, maxima and minima of all counters, of one session or of many.
 
 use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter};
-use crate::initial::state;
 use crate::observation::MOTORS_MAX;
 
 state! {
