@@ -1,10 +1,7 @@
 //! `hums info --verify`: every check there is, each with what it looked at and what failed.
 
-use std::borrow::Cow;
-
 use anyhow::{Result, bail};
 use hums_blackbox::record::Lost;
-use hums_blackbox::{BlockCounts, Cause, Gap};
 use serde::Serialize;
 
 use crate::cli;
@@ -191,90 +188,20 @@ pub fn verdict(log: &Overview) -> Verdict {
     if log.ok { log.verdict } else { Verdict::NotProved }
 }
 
-/// The check of where a log ends.
-const END: &str = "end";
-/// The check of the session that was recorded before a log.
-const SESSION_BEFORE: &str = "session before";
-
-/// What of a session is to be judged: what is missing before or after that was left out on purpose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Extent {
-    /// It begins with the session.
-    pub from_start: bool,
-    /// It goes to the session's end.
-    pub to_end: bool,
-    /// What was recorded just before it is judged too.
-    pub follows: bool,
-}
-
-impl Extent {
-    /// All of it, with what the logs tell of each other, as `hums info --verify` judges.
-    pub const ALL: Self = Self { from_start: true, to_end: true, follows: true };
-}
-
-/// The checks that fail of a log that was read with [`Overview::verified`], with what each says.
-pub fn failed(log: &Overview, extent: Extent) -> Vec<(&'static str, String)> {
-    let log = if extent.from_start { Cow::Borrowed(log) } else { Cow::Owned(without_before(log.clone())) };
-    let judged = LogJson::new(&log);
-    let is_judged = |check: &Check| {
-        check.failed > 0
-            && (extent.follows || check.name != SESSION_BEFORE)
-            && (extent.to_end || check.name != END)
-    };
-    let checks = judged.checks.into_iter().filter(is_judged);
-    let failed: Vec<_> = checks
+/// The failed checks of a log that was read with [`Overview::verified`], and the reason of each.
+pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
+    let judged = LogJson::new(log);
+    let failed = judged.checks.into_iter().filter(|check| check.failed > 0);
+    let mut failed: Vec<_> = failed
         .map(|check| match check.detail.as_str() {
             "" => (check.name, format!("{} failed", check.failed)),
             detail => (check.name, format!("{} failed; {detail}", check.failed)),
         })
         .collect();
-    if failed.is_empty() && extent == Extent::ALL && !judged.ok {
-        return vec![("log", log.faults().join("; "))];
+    if failed.is_empty() && !judged.ok {
+        failed.push(("log", log.faults().join("; ")));
     }
     failed
-}
-
-/// Sectors at the beginning of a log, of which what comes before was not asked for, that are the rest of a group which began there.
-pub fn rest_of_group(log: &Overview, extent: Extent) -> Option<u32> {
-    let summary = &log.ending.summary;
-    let BlockCounts { damaged, misplaced, .. } = summary.blocks;
-    let is_as_written = damaged + misplaced == 0 && others(&summary.blocks) == others(&summary.behind);
-    let first = log.contents.gaps.first().filter(|_| is_as_written && !extent.from_start)?;
-    // None is missing behind them.
-    let is_rest = first.sectors_skipped > 0 && Some(first.sectors_lost) <= summary.first_number;
-    (is_rest && first.from.is_none() && first.cause == Cause::Missing).then_some(first.sectors_skipped)
-}
-
-/// Blocks that are no sectors of the log.
-const fn others(of: &BlockCounts) -> u64 {
-    of.stale + of.unsound + of.foreign + of.empty + of.erased
-}
-
-/// The same log, of which nothing was asked for that comes before it. Where its only file does not begin with a sector of it, what is
-/// missing is missing in that.
-fn without_before(mut log: Overview) -> Overview {
-    let is_rest = rest_of_group(&log, Extent { from_start: false, ..Extent::ALL }).is_some();
-    let ending = &mut log.ending;
-    let summary = &mut ending.summary;
-    summary.files_gone = 0;
-    let (all, behind) = (&summary.blocks, &summary.behind);
-    let is_in_file = ending.files.len() == 1 && others(all) > others(behind);
-    // What was left out on purpose is no gap.
-    let is_before = |gap: &Gap| gap.from.is_none() && gap.sectors_skipped == 0 && gap.cause == Cause::Missing;
-    if is_rest || log.contents.gaps.first().is_some_and(is_before) && !is_in_file {
-        let gap = log.contents.gaps.remove(0);
-        summary.gaps -= 1;
-        summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));
-        summary.gaps_uncounted -= u64::from(gap.frames.is_none());
-    } else if let Some(gap) = log.contents.gaps.first_mut().filter(|gap| gap.from.is_none()) {
-        // Of what is missing before the first sector only that counts which has a place here.
-        gap.sectors_lost = gap.sectors_lost.min(u32::try_from(others(all) + all.damaged).unwrap_or(u32::MAX));
-        if let Some(frames) = gap.frames.take() {
-            summary.frames_missing -= u64::from(frames);
-            summary.gaps_uncounted += 1;
-        }
-    }
-    log
 }
 
 fn print(checks: &[Check]) -> Result<()> {
@@ -301,8 +228,7 @@ struct LogJson {
     left_over: bool,
     /// What is known of its end.
     end: EndJson,
-    /// The number of the session that its file held when the recorder had just begun to write it anew, or of the first one of that
-    /// power-on; 0 where that is not known.
+    /// The number of the session in a file that the recorder had just begun to reuse.
     begun_anew: Option<u32>,
     /// All blocks of its files.
     blocks: BlocksJson,
@@ -392,7 +318,7 @@ impl LogJson {
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
         let (name, closed) = (ending.name.clone(), summary.closed);
-        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of.unwrap_or(0)));
+        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of));
         Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
     }
 }
@@ -463,8 +389,8 @@ fn ends(log: &Overview) -> [Check; 7] {
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("chain", summary.groups, summary.unchained, String::new()),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
-        check(END, 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
-        check(SESSION_BEFORE, before_checked, before_failed, before),
+        check("end", 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
+        check("session before", before_checked, before_failed, before),
     ]
 }
 
