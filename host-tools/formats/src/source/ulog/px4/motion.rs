@@ -9,244 +9,97 @@ use hums_core::units::{
     Radians, RadiansPerSecond, norm,
 };
 
-use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Said, Topic};
+use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Said, Topic, topic};
 
 /// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
 /// forces of nearly all flights.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 
+/// Fields of `vehicle_imu`.
+const VEHICLE_IMU: &str = "delta_velocity delta_velocity_dt delta_angle delta_angle_dt";
+/// Fields of `vehicle_air_data`.
+const VEHICLE_AIR_DATA: &str = "baro_pressure_pa ambient_temperature baro_temp_celcius baro_alt_meter";
+/// Fields of `vehicle_local_position`.
+const VEHICLE_LOCAL_POSITION: &str = "x y z vx vy vz z_valid z_global v_z_valid ref_alt heading yaw";
+/// Fields of `estimator_status`.
+const ESTIMATOR_STATUS: &str = "vel_test_ratio pos_test_ratio hgt_test_ratio hdg_test_ratio mag_test_ratio solution_status_flags \
+    vibe";
+/// Fields of `estimator_innovation_test_ratios`.
+const ESTIMATOR_INNOVATION_TEST_RATIOS: &str = "gps_hvel gps_vvel ev_hvel ev_vvel aux_hvel gps_hpos ev_hpos gps_vpos ev_vpos rng_vpos baro_vpos \
+    mag_field heading";
+/// Fields of `estimator_status_flags`.
+const ESTIMATOR_STATUS_FLAGS: &str =
+    "cs_tilt_align cs_fake_pos cs_constant_pos cs_gnss_fault fs_bad_acc_vertical";
+/// Fields of `vehicle_imu_status`.
+const VEHICLE_IMU_STATUS: &str = "accel_device_id delta_angle_coning_metric gyro_coning_vibration gyro_vibration_metric \
+    accel_vibration_metric accel_clipping";
+
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "sensor_combined",
-        instances: 1,
-        // Thinned by its handler, which looks for shocks in all of them.
-        every_us: 0,
-        fields: &["accelerometer_m_s2", "gyro_rad"],
-        take: imu,
-    },
-    Topic { name: "vehicle_acceleration", instances: 1, every_us: 0, fields: &["xyz"], take: acceleration },
-    Topic {
-        name: "vehicle_angular_velocity",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["xyz"],
-        take: |px4, said| px4.motion.rate = said.fields.vector(0),
-    },
+    // Thinned by its handler, which looks for shocks in all of them.
+    topic("sensor_combined", 1, 0, "accelerometer_m_s2 gyro_rad", imu),
+    topic("vehicle_acceleration", 1, 0, "xyz", acceleration),
+    topic("vehicle_angular_velocity", 1, FAST_US, "xyz", |px4, said| px4.motion.rate = said.fields.vector(0)),
     // Each of several sensors; the one that flies is in the topics above.
-    Topic {
-        name: "vehicle_imu",
-        instances: 3,
-        every_us: MEDIUM_US,
-        fields: &["delta_velocity", "delta_velocity_dt", "delta_angle", "delta_angle_dt"],
-        take: other_imu,
-    },
-    Topic {
-        name: "vehicle_magnetometer",
-        instances: 3,
-        every_us: MEDIUM_US,
-        fields: &["magnetometer_ga"],
-        take: |px4, said| {
-            if let Some(slot) = px4.motion.fields.get_mut(usize::from(said.instance)) {
-                *slot = said.fields.vector(0).map(|field| field.map(Gauss));
+    topic("vehicle_imu", 3, MEDIUM_US, VEHICLE_IMU, other_imu),
+    topic("vehicle_magnetometer", 3, MEDIUM_US, "magnetometer_ga", |px4, said| {
+        if let Some(slot) = px4.motion.fields.get_mut(usize::from(said.instance)) {
+            *slot = said.fields.vector(0).map(|field| field.map(Gauss));
+        }
+    }),
+    topic("sensor_baro", 3, MEDIUM_US, "pressure", other_air),
+    topic("actuator_outputs", 2, MEDIUM_US, "output", outputs),
+    topic("vehicle_air_data", 1, MEDIUM_US, VEHICLE_AIR_DATA, air),
+    topic("vehicle_attitude", 1, FAST_US, "q rollspeed pitchspeed yawspeed", attitude),
+    // Until v1.15 the angles are in it too, and before v1.6 only they.
+    topic("vehicle_attitude_setpoint", 1, FAST_US, "q_d roll_body pitch_body", attitude_setpoint),
+    topic("vehicle_rates_setpoint", 1, FAST_US, "roll pitch yaw", |px4, said| {
+        let rates = [0, 1, 2].map(|axis| said.fields.finite(axis));
+        px4.motion.rates_wanted = match rates {
+            [Some(roll), Some(pitch), Some(yaw)] => {
+                Some((said.recorded_us, [roll, pitch, yaw].map(RadiansPerSecond)))
             }
-        },
-    },
-    Topic { name: "sensor_baro", instances: 3, every_us: MEDIUM_US, fields: &["pressure"], take: other_air },
-    Topic { name: "actuator_outputs", instances: 2, every_us: MEDIUM_US, fields: &["output"], take: outputs },
-    Topic {
-        name: "vehicle_air_data",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["baro_pressure_pa", "ambient_temperature", "baro_temp_celcius", "baro_alt_meter"],
-        take: air,
-    },
-    Topic {
-        name: "vehicle_attitude",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["q", "rollspeed", "pitchspeed", "yawspeed"],
-        take: attitude,
-    },
-    Topic {
-        name: "vehicle_attitude_setpoint",
-        instances: 1,
-        every_us: FAST_US,
-        // Until v1.15 the angles are in it too, and before v1.6 only they.
-        fields: &["q_d", "roll_body", "pitch_body"],
-        take: attitude_setpoint,
-    },
-    Topic {
-        name: "vehicle_rates_setpoint",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["roll", "pitch", "yaw"],
-        take: |px4, said| {
-            let rates = [0, 1, 2].map(|axis| said.fields.finite(axis));
-            px4.motion.rates_wanted = match rates {
-                [Some(roll), Some(pitch), Some(yaw)] => {
-                    Some((said.recorded_us, [roll, pitch, yaw].map(RadiansPerSecond)))
-                }
-                _ => None,
-            };
-        },
-    },
-    Topic {
-        name: "vehicle_local_position",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &[
-            "x",
-            "y",
-            "z",
-            "vx",
-            "vy",
-            "vz",
-            "z_valid",
-            "z_global",
-            "v_z_valid",
-            "ref_alt",
-            "heading",
-            "yaw",
-        ],
-        take: local_position,
-    },
-    Topic {
-        name: "vehicle_local_position_setpoint",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["vz"],
-        take: |px4, said| {
-            if let Some(down) = said.fields.finite(0) {
-                px4.observe(Observation::ClimbWanted(MetresPerSecond(-down)));
-            }
-        },
-    },
-    Topic {
-        name: "vehicle_global_position",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["lat", "lon", "alt"],
-        take: global_position,
-    },
-    Topic {
-        name: "home_position",
-        instances: 1,
-        every_us: 0,
-        fields: &["alt", "z", "valid_alt"],
-        take: home,
-    },
-    Topic {
-        name: "airspeed_validated",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["calibrated_airspeed_m_s", "equivalent_airspeed_m_s"],
-        take: airspeed_validated,
-    },
-    Topic {
-        name: "airspeed",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["indicated_airspeed_m_s"],
-        take: airspeed,
-    },
-    Topic {
-        name: "vehicle_thrust_setpoint",
-        instances: 2,
-        every_us: MEDIUM_US,
-        fields: &["xyz"],
-        take: |px4, said| {
-            let length = said.fields.vector::<3>(0).map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
-            px4.motion.set_thrust(said.instance, length);
-        },
-    },
+            _ => None,
+        };
+    }),
+    topic("vehicle_local_position", 1, MEDIUM_US, VEHICLE_LOCAL_POSITION, local_position),
+    topic("vehicle_local_position_setpoint", 1, MEDIUM_US, "vz", |px4, said| {
+        if let Some(down) = said.fields.finite(0) {
+            px4.observe(Observation::ClimbWanted(MetresPerSecond(-down)));
+        }
+    }),
+    topic("vehicle_global_position", 1, MEDIUM_US, "lat lon alt", global_position),
+    topic("home_position", 1, 0, "alt z valid_alt", home),
+    topic(
+        "airspeed_validated",
+        1,
+        MEDIUM_US,
+        "calibrated_airspeed_m_s equivalent_airspeed_m_s",
+        airspeed_validated,
+    ),
+    topic("airspeed", 1, MEDIUM_US, "indicated_airspeed_m_s", airspeed),
+    topic("vehicle_thrust_setpoint", 2, MEDIUM_US, "xyz", |px4, said| {
+        let length = said.fields.vector::<3>(0).map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
+        px4.motion.set_thrust(said.instance, length);
+    }),
     // Until v1.13 the throttle is the fourth control of a group: of the rotors, and of a VTOL's plane.
-    Topic {
-        name: "actuator_controls_0",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["control"],
-        take: |px4, said| px4.motion.set_thrust(0, said.fields.element(0, 3).map(|thrust| thrust as f32)),
-    },
-    Topic {
-        name: "actuator_controls_1",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["control"],
-        take: |px4, said| px4.motion.set_thrust(1, said.fields.element(0, 3).map(|thrust| thrust as f32)),
-    },
-    Topic {
-        name: "estimator_selector_status",
-        instances: 1,
-        every_us: 0,
-        fields: &["primary_instance"],
-        take: |px4, said| px4.motion.estimator = said.fields.byte(0).unwrap_or(0),
-    },
-    Topic {
-        name: "estimator_status",
-        instances: 9,
-        every_us: MEDIUM_US,
-        fields: &[
-            "vel_test_ratio",
-            "pos_test_ratio",
-            "hgt_test_ratio",
-            "hdg_test_ratio",
-            "mag_test_ratio",
-            "solution_status_flags",
-            "vibe",
-        ],
-        take: estimator_status,
-    },
-    Topic {
-        name: "estimator_innovation_test_ratios",
-        instances: 9,
-        every_us: MEDIUM_US,
-        fields: &[
-            "gps_hvel",
-            "gps_vvel",
-            "ev_hvel",
-            "ev_vvel",
-            "aux_hvel",
-            "gps_hpos",
-            "ev_hpos",
-            "gps_vpos",
-            "ev_vpos",
-            "rng_vpos",
-            "baro_vpos",
-            "mag_field",
-            "heading",
-        ],
-        take: test_ratios,
-    },
-    Topic {
-        name: "estimator_status_flags",
-        instances: 9,
-        every_us: 0,
-        fields: &["cs_tilt_align", "cs_fake_pos", "cs_constant_pos", "cs_gnss_fault", "fs_bad_acc_vertical"],
-        take: estimator_flags,
-    },
+    topic("actuator_controls_0", 1, MEDIUM_US, "control", |px4, said| {
+        px4.motion.set_thrust(0, said.fields.element(0, 3).map(|thrust| thrust as f32));
+    }),
+    topic("actuator_controls_1", 1, MEDIUM_US, "control", |px4, said| {
+        px4.motion.set_thrust(1, said.fields.element(0, 3).map(|thrust| thrust as f32));
+    }),
+    topic("estimator_selector_status", 1, 0, "primary_instance", |px4, said| {
+        px4.motion.estimator = said.fields.byte(0).unwrap_or(0);
+    }),
+    topic("estimator_status", 9, MEDIUM_US, ESTIMATOR_STATUS, estimator_status),
+    topic("estimator_innovation_test_ratios", 9, MEDIUM_US, ESTIMATOR_INNOVATION_TEST_RATIOS, test_ratios),
+    topic("estimator_status_flags", 9, 0, ESTIMATOR_STATUS_FLAGS, estimator_flags),
     // Motors are given this since v1.13.
-    Topic { name: "actuator_motors", instances: 1, every_us: MEDIUM_US, fields: &["control"], take: motors },
-    Topic {
-        name: "sensor_selection",
-        instances: 1,
-        every_us: 0,
-        fields: &["accel_device_id"],
-        take: |px4, said| px4.motion.accelerometer = said.fields.count(0).filter(|&id| id != 0),
-    },
-    Topic {
-        name: "vehicle_imu_status",
-        instances: 3,
-        every_us: 0,
-        fields: &[
-            "accel_device_id",
-            "delta_angle_coning_metric",
-            "gyro_coning_vibration",
-            "gyro_vibration_metric",
-            "accel_vibration_metric",
-            "accel_clipping",
-        ],
-        take: imu_status,
-    },
+    topic("actuator_motors", 1, MEDIUM_US, "control", motors),
+    topic("sensor_selection", 1, 0, "accel_device_id", |px4, said| {
+        px4.motion.accelerometer = said.fields.count(0).filter(|&id| id != 0);
+    }),
+    topic("vehicle_imu_status", 3, 0, VEHICLE_IMU_STATUS, imu_status),
 ];
 
 /// With the field of the compass of the same number, as in MAVLink's messages.

@@ -5,62 +5,31 @@ use hums_core::observation::{
 };
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
-use super::state::{BATTERIES_MAX, MEDIUM_US, Pack, Px4, Said, Topic};
+use super::state::{BATTERIES_MAX, MEDIUM_US, Pack, Px4, Said, Topic, topic};
 
-/// The names of one ESC's fields.
+/// The names of the fields of these ESCs.
 macro_rules! esc_fields {
-    ($($number:literal),*) => {
-        &["esc_count", $(
-            concat!("esc[", $number, "].esc_rpm"),
-            concat!("esc[", $number, "].esc_voltage"),
-            concat!("esc[", $number, "].esc_current"),
-            concat!("esc[", $number, "].esc_temperature"),
-            concat!("esc[", $number, "].esc_errorcount"),
-            concat!("esc[", $number, "].failures"),
-        )*]
+    ($($n:literal),*) => {
+        concat!("esc_count", $(" esc[", $n, "].esc_rpm esc[", $n, "].esc_voltage esc[", $n, "].esc_current esc[", $n,
+            "].esc_temperature esc[", $n, "].esc_errorcount esc[", $n, "].failures",)*)
     };
 }
 
 /// Fields of one ESC above.
 const ESC_FIELDS: usize = 6;
 
+/// Fields of `battery_status`.
+const BATTERY_STATUS: &str = "connected voltage_v voltage_filtered_v current_a current_filtered_a remaining discharged_mah \
+    temperature faults cell_count voltage_cell_v id warning";
+
+/// Fields of `esc_status`.
+const ESC_STATUS: &str = esc_fields!(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11);
+
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "battery_status",
-        instances: BATTERIES_MAX as u8,
-        every_us: MEDIUM_US,
-        fields: &[
-            "connected",
-            "voltage_v",
-            "voltage_filtered_v",
-            "current_a",
-            "current_filtered_a",
-            "remaining",
-            "discharged_mah",
-            "temperature",
-            "faults",
-            "cell_count",
-            "voltage_cell_v",
-            "id",
-            "warning",
-        ],
-        take: battery,
-    },
-    Topic { name: "cpuload", instances: 1, every_us: 0, fields: &["load"], take: load },
-    Topic {
-        name: "system_power",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["voltage5v_v", "voltage5V_v"],
-        take: rails,
-    },
-    Topic {
-        name: "esc_status",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: esc_fields!(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11),
-        take: escs,
-    },
+    topic("battery_status", BATTERIES_MAX as u8, MEDIUM_US, BATTERY_STATUS, battery),
+    topic("cpuload", 1, 0, "load", load),
+    topic("system_power", 1, MEDIUM_US, "voltage5v_v voltage5V_v", rails),
+    topic("esc_status", 1, MEDIUM_US, ESC_STATUS, escs),
 ];
 
 fn battery(px4: &mut Px4, said: &Said<'_>) {

@@ -11,46 +11,20 @@ use hums_core::observation::{Gnss, GnssIntegrity, Observation};
 use hums_core::units::{Metres, MetresPerSecond, Radians};
 
 use super::motion::place;
-use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Said, Told, Topic};
+use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Said, Told, Topic, topic};
 
 /// A receiver silent for longer is gone.
 const SILENCE: Span = Span::from_millis(2_500);
 /// A fix with a position: `FIX_TYPE_2D`.
 const FIX_2D: u8 = 2;
 
-const FIELDS: &[&str] = &[
-    "fix_type",
-    "satellites_used",
-    "hdop",
-    "eph",
-    "latitude_deg",
-    "longitude_deg",
-    "altitude_msl_m",
-    "lat",
-    "lon",
-    "alt",
-    "vel_m_s",
-    "time_utc_usec",
-    "jamming_state",
-    "spoofing_state",
-    "cog_rad",
-];
+/// Fields of both topics.
+const FIELDS: &str = "fix_type satellites_used hdop eph latitude_deg longitude_deg altitude_msl_m lat lon alt vel_m_s \
+    time_utc_usec jamming_state spoofing_state cog_rad";
 
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "sensor_gps",
-        instances: RECEIVERS_MAX as u8,
-        every_us: MEDIUM_US,
-        fields: FIELDS,
-        take: sensor,
-    },
-    Topic {
-        name: "vehicle_gps_position",
-        instances: RECEIVERS_MAX as u8,
-        every_us: MEDIUM_US,
-        fields: FIELDS,
-        take: used,
-    },
+    topic("sensor_gps", RECEIVERS_MAX as u8, MEDIUM_US, FIELDS, sensor),
+    topic("vehicle_gps_position", RECEIVERS_MAX as u8, MEDIUM_US, FIELDS, used),
 ];
 
 /// A silence counts only after a receiver's next message.

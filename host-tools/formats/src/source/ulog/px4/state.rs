@@ -14,9 +14,20 @@ pub(in crate::source::ulog) struct Topic {
     pub(in crate::source::ulog) instances: u8,
     /// The least time between two messages that serve, microseconds.
     pub(in crate::source::ulog) every_us: u64,
-    /// The fields that are needed, of all versions.
-    pub(in crate::source::ulog) fields: &'static [&'static str],
+    /// The fields that are needed, of all versions, with spaces between.
+    pub(in crate::source::ulog) fields: &'static str,
     pub(in crate::source::ulog) take: fn(&mut Px4, &Said<'_>),
+}
+
+/// A row of a table of topics.
+pub(super) const fn topic(
+    name: &'static str,
+    instances: u8,
+    every_us: u64,
+    fields: &'static str,
+    take: fn(&mut Px4, &Said<'_>),
+) -> Topic {
+    Topic { name, instances, every_us, fields, take }
 }
 
 /// A message of a topic.

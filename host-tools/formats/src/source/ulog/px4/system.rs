@@ -6,170 +6,48 @@ use hums_core::observation::{
 };
 use hums_core::units::Rpm;
 
-use super::state::{MEDIUM_US, Px4, Said, Status, System, Told, Topic};
+use super::state::{MEDIUM_US, Px4, Said, Status, System, Told, Topic, topic};
+
+/// Fields of `vehicle_status`.
+const VEHICLE_STATUS: &str = "arming_state nav_state failsafe system_type hil_state takeoff_time onboard_control_sensors_present \
+    onboard_control_sensors_enabled onboard_control_sensors_health calibration_enabled \
+    nav_state_user_intention";
+/// Fields of `actuator_armed`.
+const ACTUATOR_ARMED: &str = "armed lockdown kill termination manual_lockdown force_failsafe";
+/// Fields of `failsafe_flags`.
+const FAILSAFE_FLAGS: &str = "manual_control_signal_lost gcs_connection_lost offboard_control_signal_lost battery_warning \
+    battery_low_remaining_time battery_unhealthy geofence_breached mission_failure navigator_failure \
+    vtol_fixed_wing_system_failure wind_limit_exceeded flight_time_limit_exceeded attitude_invalid \
+    angular_velocity_invalid local_position_invalid global_position_invalid local_position_accuracy_low \
+    position_accuracy_low fd_critical_failure fd_motor_failure fd_esc_arming_failure fd_imbalanced_prop";
 
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "vehicle_status",
-        instances: 1,
-        every_us: 0,
-        fields: &[
-            "arming_state",
-            "nav_state",
-            "failsafe",
-            "system_type",
-            "hil_state",
-            "takeoff_time",
-            "onboard_control_sensors_present",
-            "onboard_control_sensors_enabled",
-            "onboard_control_sensors_health",
-            "calibration_enabled",
-            "nav_state_user_intention",
-        ],
-        take: status,
-    },
-    Topic {
-        name: "actuator_armed",
-        instances: 1,
-        every_us: 0,
-        fields: &["armed", "lockdown", "kill", "termination", "manual_lockdown", "force_failsafe"],
-        take: armed,
-    },
-    Topic {
-        name: "vehicle_control_mode",
-        instances: 1,
-        every_us: 0,
-        fields: &["flag_control_auto_enabled"],
-        take: |px4, said| px4.system.auto = said.fields.flag(0),
-    },
-    Topic {
-        name: "position_setpoint_triplet",
-        instances: 1,
-        every_us: 0,
-        fields: &["current.valid", "current.type"],
-        take: |px4, said| px4.system.setpoint = said.fields.byte(1).filter(|_| said.fields.flag(0)),
-    },
-    Topic {
-        name: "failsafe_flags",
-        instances: 1,
-        every_us: 0,
-        fields: &[
-            "manual_control_signal_lost",
-            "gcs_connection_lost",
-            "offboard_control_signal_lost",
-            "battery_warning",
-            "battery_low_remaining_time",
-            "battery_unhealthy",
-            "geofence_breached",
-            "mission_failure",
-            "navigator_failure",
-            "vtol_fixed_wing_system_failure",
-            "wind_limit_exceeded",
-            "flight_time_limit_exceeded",
-            "attitude_invalid",
-            "angular_velocity_invalid",
-            "local_position_invalid",
-            "global_position_invalid",
-            "local_position_accuracy_low",
-            "position_accuracy_low",
-            "fd_critical_failure",
-            "fd_motor_failure",
-            "fd_esc_arming_failure",
-            "fd_imbalanced_prop",
-        ],
-        take: failsafe_flags,
-    },
-    Topic {
-        name: "vehicle_land_detected",
-        instances: 1,
-        every_us: 0,
-        fields: &["landed"],
-        take: land_detected,
-    },
-    Topic {
-        name: "input_rc",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["rssi", "channel_count"],
-        take: rc,
-    },
-    Topic {
-        name: "radio_status",
-        instances: 1,
-        every_us: 0,
-        fields: &["rssi", "remote_rssi", "noise", "remote_noise", "rxerrors"],
-        take: radio,
-    },
-    Topic {
-        name: "telemetry_status",
-        instances: 4,
-        every_us: 0,
-        fields: &["rssi", "remote_rssi", "noise", "remote_noise", "rxerrors", "type"],
-        take: telemetry,
-    },
-    Topic {
-        name: "mission_result",
-        instances: 1,
-        every_us: 0,
-        fields: &["seq_current", "seq_reached"],
-        take: mission,
-    },
-    Topic {
-        name: "vehicle_command_ack",
-        instances: 4,
-        every_us: 0,
-        fields: &["command", "result"],
-        take: ack,
-    },
-    Topic {
-        name: "event",
-        instances: 1,
-        every_us: 0,
-        fields: &["id", "log_levels", "arguments"],
-        take: event,
-    },
-    Topic {
-        name: "log_message",
-        instances: 1,
-        every_us: 0,
-        fields: &["severity", "text"],
-        take: log_message,
-    },
-    Topic {
-        name: "rpm",
-        instances: 2,
-        every_us: MEDIUM_US,
-        fields: &["rpm_estimate", "indicated_frequency_rpm"],
-        take: rpm,
-    },
+    topic("vehicle_status", 1, 0, VEHICLE_STATUS, status),
+    topic("actuator_armed", 1, 0, ACTUATOR_ARMED, armed),
+    topic("vehicle_control_mode", 1, 0, "flag_control_auto_enabled", |px4, said| {
+        px4.system.auto = said.fields.flag(0);
+    }),
+    topic("position_setpoint_triplet", 1, 0, "current.valid current.type", |px4, said| {
+        px4.system.setpoint = said.fields.byte(1).filter(|_| said.fields.flag(0));
+    }),
+    topic("failsafe_flags", 1, 0, FAILSAFE_FLAGS, failsafe_flags),
+    topic("vehicle_land_detected", 1, 0, "landed", land_detected),
+    topic("input_rc", 1, MEDIUM_US, "rssi channel_count", rc),
+    topic("radio_status", 1, 0, "rssi remote_rssi noise remote_noise rxerrors", radio),
+    topic("telemetry_status", 4, 0, "rssi remote_rssi noise remote_noise rxerrors type", telemetry),
+    topic("mission_result", 1, 0, "seq_current seq_reached", mission),
+    topic("vehicle_command_ack", 4, 0, "command result", ack),
+    topic("event", 1, 0, "id log_levels arguments", event),
+    topic("log_message", 1, 0, "severity text", log_message),
+    topic("rpm", 2, MEDIUM_US, "rpm_estimate indicated_frequency_rpm", rpm),
 ];
 
 /// The conditions of `failsafe_flags`, in the order of its fields above, for people. Flags of unused modes,
 /// and flags that only prevent arming, are left out.
-const FAILSAFES: [&str; 22] = [
-    "manual control",
-    "ground station",
-    "offboard control",
-    "battery",
-    "battery time",
-    "battery health",
-    "fence",
-    "mission",
-    "navigator",
-    "VTOL system",
-    "wind",
-    "flight time",
-    "attitude",
-    "angular velocity",
-    "local position",
-    "global position",
-    "position accuracy",
-    "position accuracy",
-    "attitude failure",
-    "motor failure",
-    "ESC",
-    "propeller",
-];
+const FAILSAFES: &str = "manual control,ground station,offboard control,battery,battery time,battery health,fence,\
+    mission,navigator,VTOL system,wind,flight time,attitude,angular velocity,local position,\
+    global position,position accuracy,position accuracy,attitude failure,motor failure,ESC,\
+    propeller";
 
 /// `ARMING_STATE_ARMED`: the same number in all versions; 1 is standby, later called disarmed.
 const ARMED: u8 = 2;
@@ -343,7 +221,7 @@ fn failsafe_flags(px4: &mut Px4, said: &Said<'_>) {
     const OFFBOARD: &str = "offboard control";
     const CRITICAL: f64 = 2.0;
     let mut names: Vec<&str> = Vec::new();
-    for (field, name) in FAILSAFES.into_iter().enumerate() {
+    for (field, name) in FAILSAFES.split(',').enumerate() {
         let least = if name == BATTERY { CRITICAL } else { 1.0 };
         let is_set = said.fields.get(field).is_some_and(|value| value >= least);
         // It is so on each vehicle that no other computer flies.
