@@ -227,15 +227,7 @@ impl Times {
             "{} without a time that can be one: nothing in the log can be judged",
             count(frames, "frame")
         );
-        (self.records == 0 && frames > 0).then_some(Gap {
-            from: None,
-            to: None,
-            cause: Cause::NoTimes,
-            place: None,
-            bytes: 0,
-            words,
-            own: None,
-        })
+        (self.records == 0 && frames > 0).then(|| Gap::new(None, Cause::NoTimes, words))
     }
 
     /// The damage report if the recorded times are invalid.
@@ -245,6 +237,6 @@ impl Times {
         }
         let words =
             format!("{} have the same time: nothing in the log can be judged", count(self.records, "record"));
-        Some(Gap { from: None, to: None, cause: Cause::NoTimes, place: None, bytes: 0, words, own: None })
+        Some(Gap::new(None, Cause::NoTimes, words))
     }
 }

@@ -506,18 +506,12 @@ impl<'a, 'b> Session<'a, 'b> {
     fn dropout(&mut self, place: u64, milliseconds: u16) -> Result<()> {
         let now = self.clock.now();
         self.px4.dropout();
-        let gap = Gap {
-            from: Some(now),
-            to: Some(now + Span::from_millis(u64::from(milliseconds))),
-            cause: Cause::Lost,
-            place: Some(place),
-            bytes: 0,
-            words: match milliseconds {
-                0 => "a dropout: the card was too slow for the logger".to_owned(),
-                _ => format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
-            },
-            own: None,
+        let words = match milliseconds {
+            0 => "a dropout: the card was too slow for the logger".to_owned(),
+            _ => format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
         };
+        let to = Some(now + Span::from_millis(u64::from(milliseconds)));
+        let gap = Gap { to, ..Gap::new(Some(now), Cause::Lost, words).at(place) };
         self.tell(Item::Gap(&gap))
     }
 
