@@ -51,7 +51,7 @@ impl Folder {
             }
         }
         let context = || cannot_write(path);
-        let target = without_links(path).with_context(context)?;
+        let target = without_links(path);
         let prefix = part_prefix(&target).with_context(context)?;
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(PART);
