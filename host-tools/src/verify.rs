@@ -8,7 +8,7 @@ use crate::cli;
 use crate::colour::level;
 use crate::ending::{
     BlocksJson, EndJson, Ending, SessionBefore, among_words, behind_words, copies_words, made_again_words,
-    not_taken_words, unprotected_words,
+    unprotected_words,
 };
 use crate::followed::EndResolver;
 use crate::logs::sessions::{Sessions, place};
@@ -59,7 +59,6 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         worst = worst.max(log.verdict);
         weakened.made_again += overview.ending.made_again();
         weakened.unprotected += overview.ending.unprotected();
-        weakened.not_taken += overview.ending.not_taken();
         logs += u64::from(overview.ending.is_counted());
         if overview.ending.is_without_earlier() {
             without_earlier.add(&overview.ending.name);
@@ -95,8 +94,6 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
 struct Weakened {
     made_again: u64,
     unprotected: u64,
-    /// Parity that its card may have refused.
-    not_taken: u64,
 }
 
 impl Weakened {
@@ -136,11 +133,7 @@ impl WithoutEarlier {
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
             (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
         };
-        let weakened = [
-            made_again_words(weakened.made_again),
-            unprotected_words(weakened.unprotected),
-            not_taken_words(weakened.not_taken),
-        ];
+        let weakened = [made_again_words(weakened.made_again), unprotected_words(weakened.unprotected)];
         let weakened = weakened.into_iter().flatten().fold(String::new(), |all, words| all + "; " + &words);
         let more = match self.more {
             0 => String::new(),
@@ -350,9 +343,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
     let words = "parity is missing: what the card loses of these files cannot be made again";
     // A log packed on a PC has no parity.
     let written = if summary.marks.has_boot { summary.parity.written } else { 0 };
-    let mut protected = check("sectors protected", written, ending.unprotected(), words);
-    protected.detail.extend(not_taken_words(ending.not_taken()));
-    vec![intact, protected]
+    vec![intact, check("sectors protected", written, ending.unprotected(), words)]
 }
 
 /// The checks of a log's end and place.
@@ -361,11 +352,9 @@ fn ends(log: &Overview) -> [Check; 7] {
     let summary = &ending.summary;
     let blocks = &summary.blocks;
     let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
-    let newer = ending.has_newer();
-    let behind = match (behind_words(&summary.behind), newer) {
-        (words, _) if words.is_empty() => "nothing behind its last sector".to_owned(),
-        (words, false) => format!("behind its last sector: {words}"),
-        (words, true) => format!("behind its last sector: {words}; some are of a session that began later"),
+    let behind = match behind_words(&summary.behind) {
+        words if words.is_empty() => "nothing behind its last sector".to_owned(),
+        words => format!("behind its last sector: {words}"),
     };
     let among = among_words(summary);
     let among = if among.is_empty() { among } else { format!("; before it: {among}") };
@@ -381,7 +370,7 @@ fn ends(log: &Overview) -> [Check; 7] {
         SessionBefore::There | SessionBefore::Gone(_) => gone.unwrap_or_default(),
     };
     let strange = ending.strange();
-    let holds = ending.proof.holds() && !newer && ending.noise().is_none();
+    let holds = ending.proof.holds() && ending.noise().is_none();
     let parity = &summary.parity;
     [
         check("parity", parity.columns, parity.contradicted, ending.contradicted().unwrap_or_default()),

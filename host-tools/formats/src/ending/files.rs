@@ -9,12 +9,8 @@ use crate::logs::naming::is_part;
 use crate::logs::reader::Summary;
 use crate::logs::segment_name;
 use crate::logs::strangers::Strange;
-use crate::plural::{are, count};
+use crate::plural::count;
 
-/// Maximum difference of two power-ons' clocks that does not show their order: microseconds.
-const EPOCH_SLACK_US: u64 = 60_000_000;
-/// No box recorded before 2025, and a clock that says so is wrong: microseconds since 1970.
-const EARLIEST_US: u64 = 1_735_689_600_000_000;
 /// Files of a log that are named one by one.
 const NAMED_MAX: usize = 3;
 
@@ -107,11 +103,10 @@ impl Files<'_> {
                 strange.session
             )
         };
-        let mut all: Vec<_> = told.iter().copied().take(NAMED_MAX).map(|strange| words(&strange)).collect();
+        let mut all: Vec<_> = told.iter().take(NAMED_MAX).map(words).collect();
         if told.len() > NAMED_MAX {
             all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
         }
-        all.extend(self.newer());
         all
     }
 
@@ -139,25 +134,6 @@ impl Files<'_> {
             1 => format!("file {first:02} of this log is not there"),
             _ => format!("files {first:02} to {:02} of this log are not there", end - 1),
         })
-    }
-
-    /// Sectors of a later session, in places where a recycled file may have older ones.
-    pub(super) fn newer(&self) -> Option<String> {
-        let told = self.summary.strange.iter().any(|strange| strange.sectors > 0);
-        (self.has_newer() && !told).then(|| {
-            format!(
-                "{} not of this log, and of a session that began later: only this log is read",
-                are(self.summary.blocks.stale, "sector")
-            )
-        })
-    }
-
-    /// Whether the log's files hold sectors of a later session. Remains are always older: only a newer
-    /// session overwrites a file.
-    pub(super) fn has_newer(&self) -> bool {
-        let both =
-            self.summary.other_epoch_us.zip(self.summary.epoch_us.filter(|epoch| *epoch >= EARLIEST_US));
-        both.is_some_and(|(other, own)| other > own.saturating_add(EPOCH_SLACK_US))
     }
 }
 
@@ -244,17 +220,6 @@ mod tests {
         };
         assert_eq!([strange("00001_01.HUM", false, 0), strange("00001_03.HUM", false, 0)], [0, 1]);
         assert_eq!([strange("00001_03.HUM", true, 0), strange("00001_03.HUM", true, 1)], [0, 1]);
-    }
-
-    #[test]
-    fn a_clock_of_before_any_box_says_nothing_about_which_session_began_later() {
-        let has_newer = |own, other| {
-            let summary = Summary { epoch_us: Some(own), other_epoch_us: Some(other), ..Summary::default() };
-            Files { names: &[], summary: &summary, proof: Proof::None }.has_newer()
-        };
-        let (then, now) = (1_554_595_200_000_000, 1_790_000_000_000_000);
-        assert!(has_newer(now, now + 2 * EPOCH_SLACK_US) && !has_newer(now, now));
-        assert!(!has_newer(then, now), "2019");
     }
 
     #[test]

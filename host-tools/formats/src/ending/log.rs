@@ -1,6 +1,6 @@
 //! The end of a log that was read: the evidence of its completeness.
 
-use super::files::{Files, behind_words};
+use super::files::Files;
 use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
@@ -54,18 +54,8 @@ impl Ending {
             )
         };
         let begun_anew = self.begun_anew.filter(|anew| anew.is_confirmed);
-        let again = self.again.as_deref().map(|of| again_words(of) + &self.behind_copy());
+        let again = self.again.as_deref().map(again_words);
         again.or_else(|| self.left_over.then(left_over)).or_else(|| begun_anew.map(BegunAnew::words))
-    }
-
-    /// Blocks after the last sector of a mere copy that are not sectors: its original may not have them. A
-    /// remark, not a finding.
-    fn behind_copy(&self) -> String {
-        let behind = &self.summary.behind;
-        if behind.foreign + behind.unsound == 0 {
-            return String::new();
-        }
-        format!("; behind its last sector: {}", behind_words(behind))
     }
 
     /// Whether it is to be counted: its session is not there under another name.
@@ -83,12 +73,6 @@ impl Ending {
         self.faults().is_empty()
     }
 
-    /// Missing parity sectors of a log whose recorder reported refused blocks. They may be among those, so
-    /// they are not a fault of the log.
-    pub fn not_taken(&self) -> u64 {
-        if self.has_parity() && self.summary.marks.refused { self.summary.parity.missing } else { 0 }
-    }
-
     /// The faults, as parts of sentences: missing proof, rebuilt sectors, missing parity.
     pub fn faults(&self) -> Vec<String> {
         let weakened = [made_again_words(self.made_again()), unprotected_words(self.unprotected())];
@@ -102,8 +86,7 @@ impl Ending {
     }
 
     /// Number of missing parity sectors: nothing is lost, but further losses of the card cannot be rebuilt. A
-    /// refused block is not written again, so after refused blocks they do not prove a loss
-    /// ([`Self::not_taken`]).
+    /// refused block is not written again, so after refused blocks they do not prove a loss.
     pub fn unprotected(&self) -> u64 {
         if self.has_parity() && !self.summary.marks.refused { self.summary.parity.missing } else { 0 }
     }
@@ -203,11 +186,6 @@ impl Ending {
     pub fn strange(&self) -> Vec<String> {
         self.file().strange()
     }
-
-    /// Whether the log's files hold sectors of a later session.
-    pub fn has_newer(&self) -> bool {
-        self.file().has_newer()
-    }
 }
 
 /// The sentence about this many rebuilt sectors, with advice; `None` without any.
@@ -230,17 +208,6 @@ pub fn unprotected_words(sectors: u64) -> Option<String> {
     })
 }
 
-/// The sentence about this many missing parity sectors after refused blocks; `None` without any.
-pub fn not_taken_words(sectors: u64) -> Option<String> {
-    (sectors > 0).then(|| {
-        format!(
-            "{} not there: the card refused blocks while it recorded (card_errors), and these may be among them; what the card loses of these \
-             files cannot be made again",
-            are(sectors, "parity sector")
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,9 +218,9 @@ mod tests {
             let mut summary = Summary { session: Some(7), closed: true, ..Summary::default() };
             (summary.marks.has_boot, summary.marks.refused, summary.parity.missing) = (true, refused, 3);
             let ending = Ending { proof: Proof::of(&summary, None), summary, ..Ending::default() };
-            (ending.unprotected(), ending.not_taken(), ending.is_sound())
+            (ending.unprotected(), ending.is_sound())
         };
-        assert_eq!([of(false), of(true)], [(3, 0, false), (0, 3, true)]);
+        assert_eq!([of(false), of(true)], [(3, false), (0, true)]);
     }
 
     #[test]

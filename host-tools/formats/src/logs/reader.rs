@@ -106,9 +106,6 @@ pub struct Summary {
     pub behind: BlockCounts,
     /// Number of blocks up to the end of its files that belong to no log.
     pub foreign_at_end: u64,
-    /// The latest power-on of another session with sectors among or after this one's, microseconds since
-    /// 1970.
-    pub other_epoch_us: Option<u64>,
     /// Evidence from its parity.
     pub parity: Evidence,
     /// Strange sectors in its files.
@@ -160,7 +157,6 @@ pub fn read<C: Collect>(
     summary.ends_partial = stitch.cut;
     summary.behind = groups.behind();
     summary.foreign_at_end = groups.foreign_at_end();
-    summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
     summary.parity = groups.evidence();
