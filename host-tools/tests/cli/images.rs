@@ -1,10 +1,9 @@
 //! Images of cards: deleted logs, lost names, cut and damaged images.
 
 use std::fs;
-use std::path::Path;
 
-use crate::copied::{BLOCK, all_say, copied, delete, readers};
-use crate::support::{attempt, end_of, flight, json, px4, run, text};
+use crate::copied::{BLOCK, all_say, copied, readers};
+use crate::support::{json, px4, run, text};
 
 #[test]
 fn a_wiped_card_is_told_with_and_without_salvage() {
