@@ -136,7 +136,7 @@ mod tests {
     use hums_link::text::Severity;
 
     use super::*;
-    use crate::talk::fake::{self, found};
+    use crate::talk::tests::fake::{self, found};
 
     /// The result for this answer of the board to the command.
     fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Said) -> Result<()> {

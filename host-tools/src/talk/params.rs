@@ -265,7 +265,7 @@ mod tests {
     use hums_link::messages::param_value;
 
     use super::*;
-    use crate::talk::fake;
+    use crate::talk::tests::fake;
 
     #[test]
     fn what_another_systems_board_says_is_no_answer() {

@@ -310,7 +310,7 @@ mod tests {
     use hums_link::packet::Packet;
 
     use super::*;
-    use crate::talk::fake;
+    use crate::talk::tests::fake;
 
     #[test]
     fn an_answer_counts_that_the_board_that_was_asked_gives_to_us() {

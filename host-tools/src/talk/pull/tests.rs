@@ -11,7 +11,7 @@ use hums_link::packet::Fields;
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::*;
-use crate::talk::fake;
+use crate::talk::tests::fake;
 
 /// The sectors of a recording of the repository, as `hums decode --format hum` makes them.
 pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {

@@ -10,12 +10,12 @@ use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::{Frame, Framer};
 
-use super::Client;
 use crate::duplex::{Duplex, Port};
 use crate::mavlink::ids::HEARTBEAT;
+use crate::talk::Client;
 
 /// The other end's answers to a frame: sender and packet.
-pub(super) type Said = Vec<(u8, Packet)>;
+pub(in crate::talk) type Said = Vec<(u8, Packet)>;
 
 struct Line {
     framer: Framer,
@@ -25,7 +25,7 @@ struct Line {
 }
 
 /// A client on a line with boards of these systems, which answer each of its heartbeats with their own, and all else so.
-pub(super) fn client(
+pub(in crate::talk) fn client(
     systems: &'static [u8],
     answer: impl FnMut(&Frame<'_>) -> Said + Send + 'static,
 ) -> Client {
@@ -36,7 +36,7 @@ pub(super) fn client(
 }
 
 /// A client that has found the board of system 1 on it.
-pub(super) fn found(
+pub(in crate::talk) fn found(
     systems: &'static [u8],
     answer: impl FnMut(&Frame<'_>) -> Said + Send + 'static,
 ) -> Client {
