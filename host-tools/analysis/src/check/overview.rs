@@ -24,7 +24,7 @@ use crate::outcome::usage;
 use crate::progress;
 use crate::source::item::{Gap, Item, Summary, Want};
 use crate::source::recording::{Format, Place};
-use crate::summary::{Contents, ExceedanceLine, FindingLine, Overview};
+use crate::summary::{Contents, ExceedanceLine, Overview};
 
 /// A log with fewer kinds of messages may have too little in it to be judged, though a recorder that checks wrote it.
 const FEW_KINDS: usize = 16;
@@ -215,7 +215,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
         return;
     }
     contents.findings_count = findings_count;
-    contents.findings = findings.into_iter().map(FindingLine::from).collect();
+    contents.findings = findings;
     contents.usage.extend(counters);
     if let Some((_, last)) = span {
         for exceedance in monitor.exceedances().iter(last.into()) {

@@ -27,7 +27,8 @@ use crate::logs::{Log, Piece};
 use crate::loss;
 use crate::outcome::{Outcome, exists};
 use crate::plural::count;
-use crate::summary::{FindingLine, Overview};
+use crate::source::told::Finding;
+use crate::summary::Overview;
 use crate::utc::{When, date_and_time, moment};
 
 /// Sectors searched backwards from an unreadable one for the beginning of a group.
@@ -44,7 +45,7 @@ pub(super) struct Brought {
     /// The moment.
     pub(super) at: Instant,
     /// The finding, if one was requested.
-    pub(super) found: Option<FindingLine>,
+    pub(super) found: Option<Finding>,
     /// Whether all requested sectors were read. Losses are reported.
     pub(super) outcome: Outcome,
 }
@@ -131,13 +132,11 @@ fn tell_faults(overview: &Overview, to: Option<Instant>) -> Outcome {
 }
 
 /// Whether a change of level matches the request. A return to normal does not.
-fn is_wanted(what: &Around, finding: &FindingLine) -> bool {
-    let level = finding.to_level();
-    let is_bad = matches!(level, Level::Warning | Level::Critical);
+fn is_wanted(what: &Around, finding: &Finding) -> bool {
     match what {
-        Around::Level(Level::Critical) => level == Level::Critical,
-        Around::Level(_) => is_bad,
-        Around::Check(name) => is_bad && finding.check == *name,
+        Around::Level(Level::Critical) => finding.level == Level::Critical,
+        Around::Level(_) => finding.is_bad(),
+        Around::Check(name) => finding.is_bad() && finding.check == *name,
         Around::Time(_) => false,
     }
 }
@@ -290,7 +289,7 @@ impl<'a> RemoteLog<'a> {
     }
 
     /// The latest matching finding, searched from the end group by group, and whether nothing was lost there.
-    fn latest(&mut self, what: &Around) -> Result<(FindingLine, Outcome)> {
+    fn latest(&mut self, what: &Around) -> Result<(Finding, Outcome)> {
         let (count, mut start, mut found) = (self.count(), self.count(), None);
         while start > 0 && found.is_none() {
             let places = self.group_before(start)?;
@@ -307,7 +306,7 @@ impl<'a> RemoteLog<'a> {
             self.tell_unread();
             bail!("no such finding is in this log; for another log name its files");
         };
-        note!("{}: {} at {}", found.check, found.level, moment(found.at));
+        note!("{}: {} at {}", found.check, found.level.name(), moment(found.at));
         Ok((found, outcome))
     }
 

@@ -179,7 +179,7 @@ fn around(
         let around = MomentJson {
             time_s: at.as_secs_f64(),
             instance: found.as_ref().map(|found| found.instance),
-            level: found.as_ref().map(|found| found.level),
+            level: found.as_ref().map(|found| found.level.name()),
             check: found.map(|found| found.check),
         };
         let logs = files.into_iter().map(|(name, path)| LogJson::new(name, path, true)).collect();
