@@ -152,8 +152,10 @@ fn each(
                 outcome = Outcome::Losses;
             }
             Err(error) => {
-                if let Some(before) = failed.replace(error) {
-                    note!("{before:#}");
+                if failed.is_some() {
+                    note!("{error:#}");
+                } else {
+                    failed = Some(error);
                 }
             }
         }
