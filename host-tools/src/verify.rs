@@ -11,7 +11,7 @@ use crate::ending::{
     unprotected_words,
 };
 use crate::followed::EndResolver;
-use crate::logs::sessions::{Sessions, place};
+use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::loss;
@@ -32,9 +32,9 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    // First the files that are no logs, then the logs.
-    let (mut ok, mut worst, mut weakened) = (!found.is_cut(), Verdict::Holds, Weakened::default());
-    let (mut logs, mut without_earlier) = (0_u64, WithoutEarlier::default());
+    let mut ok = !found.is_cut();
+    let mut all =
+        Totals { logs: 0, worst: Verdict::Holds, made_again: 0, unprotected: 0, without_earlier: None };
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
         for words in words {
@@ -56,13 +56,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     }
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
-        worst = worst.max(log.verdict);
-        weakened.made_again += overview.ending.made_again();
-        weakened.unprotected += overview.ending.unprotected();
-        logs += u64::from(overview.ending.is_counted());
-        if overview.ending.is_without_earlier() {
-            without_earlier.add(&overview.ending.name);
-        }
+        all.add(&overview.ending, log.verdict);
         if let Some(list) = &mut list {
             return list.element(&log);
         }
@@ -74,14 +68,15 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         }
         Ok(())
     })?;
-    let worst = if ok && failed == 0 { worst } else { Verdict::NotProved };
-    let ok = worst != Verdict::NotProved && !weakened.is_damage();
+    if !ok || failed > 0 {
+        all.worst = Verdict::NotProved;
+    }
+    let ok = all.worst != Verdict::NotProved && !all.is_damage();
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
-        let logs = count(logs, "session");
-        let verdict = without_earlier.verdict(worst, weakened, found.has_passed_over());
-        output::line(&format!("{logs}: {verdict}"))?;
+        let words = all.words(found.has_passed_over());
+        output::line(&format!("{}: {words}", count(all.logs, "session")))?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));
@@ -89,60 +84,54 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     Ok(Outcome::lossy(!ok))
 }
 
-/// What cards have lost without a loss of frames: sectors that were made again, and parity that is missing.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-struct Weakened {
+/// Totals of all logs.
+struct Totals {
+    /// Number of sessions.
+    logs: u64,
+    worst: Verdict,
+    /// Sectors that were rebuilt, and missing ones with parity: a card is damaged, and no frame is lost.
     made_again: u64,
     unprotected: u64,
+    /// The first log of a card of which the logs before it were not read.
+    without_earlier: Option<String>,
 }
 
-impl Weakened {
-    /// Whether a card has lost any of it.
-    const fn is_damage(self) -> bool {
-        self.made_again + self.unprotected > 0
-    }
-}
-
-/// Logs whose earlier logs on the same card were not read: the name of the first such log, and the number of other
-/// cards with one.
-#[derive(Default)]
-struct WithoutEarlier {
-    first: Option<String>,
-    more: u64,
-    card: Option<String>,
-}
-
-impl WithoutEarlier {
-    fn add(&mut self, log: &str) {
-        let (card, _) = place(log);
-        if self.card.as_deref() != Some(card) {
-            self.more += u64::from(self.first.is_some());
-            self.card = Some(card.to_owned());
-            self.first.get_or_insert_with(|| log.to_owned());
+impl Totals {
+    fn add(&mut self, ending: &Ending, verdict: Verdict) {
+        self.worst = self.worst.max(verdict);
+        self.made_again += ending.made_again();
+        self.unprotected += ending.unprotected();
+        self.logs += u64::from(ending.is_counted());
+        if ending.is_without_earlier() {
+            self.without_earlier.get_or_insert_with(|| ending.name.clone());
         }
     }
 
-    /// The verdict on all logs, limited to those that were read.
-    fn verdict(&self, worst: Verdict, weakened: Weakened, has_passed_over: bool) -> String {
-        let all = self.first.is_none() && !has_passed_over;
-        let words = match (worst, weakened == Weakened::default(), all) {
-            (Verdict::Holds, true, true) => "everything holds",
-            (Verdict::Holds, true, false) => "all that was read holds",
-            (Verdict::Holds, _, true) => "nothing is lost",
-            (Verdict::Holds, _, false) => "nothing is lost of what was read",
+    /// Whether a card has lost any of it.
+    const fn is_damage(&self) -> bool {
+        self.made_again + self.unprotected > 0
+    }
+
+    /// The verdict on all logs that were read.
+    fn words(&self, has_passed_over: bool) -> String {
+        let all = self.without_earlier.is_none() && !has_passed_over;
+        let words = match (self.worst, self.is_damage(), all) {
+            (Verdict::Holds, false, true) => "everything holds",
+            (Verdict::Holds, false, false) => "all that was read holds",
+            (Verdict::Holds, true, true) => "nothing is lost",
+            (Verdict::Holds, true, false) => "nothing is lost of what was read",
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
             (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
         };
-        let weakened = [made_again_words(weakened.made_again), unprotected_words(weakened.unprotected)];
-        let weakened = weakened.into_iter().flatten().fold(String::new(), |all, words| all + "; " + &words);
-        let more = match self.more {
-            0 => String::new(),
-            more => format!(" and before {}", count(more, "more log")),
-        };
-        let first = self.first.as_ref();
-        let earlier = first.map(|first| format!("; the logs before {}{more} were not read", word(first)));
-        let passed_over = if has_passed_over { "; what was passed over was not read" } else { "" };
-        format!("{words}{weakened}{}{passed_over}", earlier.unwrap_or_default())
+        let earlier = self.without_earlier.as_ref();
+        let more = [
+            made_again_words(self.made_again),
+            unprotected_words(self.unprotected),
+            earlier.map(|first| format!("the logs before {} were not read", word(first))),
+            has_passed_over.then(|| "what was passed over was not read".to_owned()),
+        ];
+        let parts = [words.to_owned()].into_iter().chain(more.into_iter().flatten());
+        parts.collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -221,8 +210,6 @@ struct LogJson {
     left_over: bool,
     /// What is known of its end.
     end: EndJson,
-    /// The number of the session in a file that the recorder had just begun to reuse.
-    begun_anew: Option<u32>,
     /// All blocks of its files.
     blocks: BlocksJson,
     checks: Vec<Check>,
@@ -296,8 +283,6 @@ impl LogJson {
         let is_told_only = ending.aside().is_some();
         if is_told_only {
             checks = beside_copy(ending);
-        } else if let Some(anew) = ending.begun_anew {
-            checks = vec![check("files", ending.files.len() as u64, 1, anew.words())];
         }
         let holds = checks.iter().all(|check| check.failed == 0) && ending.unproved().is_empty();
         let verdict = match (holds, ending.proof.is_whole() || is_told_only) {
@@ -311,8 +296,7 @@ impl LogJson {
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
         let (name, closed) = (ending.name.clone(), summary.closed);
-        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of));
-        Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
+        Self { name, ok, closed, copy_of, left_over: ending.left_over, end, blocks, checks, verdict }
     }
 }
 
@@ -336,7 +320,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
     let sectors = summary.blocks.sectors;
     let intact =
         check("sectors intact", sectors, ending.made_again(), "made again from parity, without a loss");
-    if ending.aside().is_some() || ending.begun_anew.is_some() {
+    if ending.aside().is_some() {
         // Of a copy, too, it is told that its card is damaged.
         return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();
     }

@@ -15,7 +15,6 @@ use crate::check::causes::causes;
 use crate::colour::level;
 use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs;
-use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
 use crate::loss;
 use crate::names::{check_kind, check_name, unit_name};
@@ -139,8 +138,7 @@ fn ending(text: &mut String, log: &Overview) {
     if let Some(gone) = ending.before.gone() {
         let _ = writeln!(text, "  before   {gone}");
     }
-    let anew = ending.begun_anew.map(BegunAnew::words);
-    if let Some(words) = ending.aside().or(anew) {
+    if let Some(words) = ending.aside() {
         let _ = writeln!(text, "  place    {words}");
     }
     for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {

@@ -12,7 +12,7 @@ use super::native::{self, Entry, Native};
 use super::told::Told;
 use crate::ending::Ending;
 use crate::endpoint::Endpoint;
-use crate::logs::groups::at_beginning;
+use crate::logs::groups::has_start;
 use crate::outcome::usage;
 use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
@@ -65,7 +65,7 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
         None => endpoint.to_string(),
     };
     // A packed recording has no start of a box, and may be of any link.
-    let is_of_box = place.own().is_some_and(|log| at_beginning(log, |_| Some(())).is_some());
+    let is_of_box = place.own().is_some_and(has_start);
     Ok(Opened { name, recording: Some(recording), native, is_of_box })
 }
 

@@ -17,7 +17,7 @@ use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
 use crate::counters::is_told;
 use crate::ending::Ending;
-use crate::logs::groups::at_beginning;
+use crate::logs::groups::has_start;
 use crate::logs::reader;
 use crate::names::counter_name;
 use crate::outcome::usage;
@@ -69,7 +69,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
         // If a log begins with the record of a start, a monitor ran, and the log is not judged here.
-        let has_start = at_beginning(log, |_| Some(())).is_some();
+        let has_start = has_start(log);
         let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
         let mut overview = match &mut here {
             Some(here) => Overview::told(log, place.system, &mut |at, item| {

@@ -4,7 +4,6 @@ use super::files::Files;
 use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
-use crate::logs::begun_anew::BegunAnew;
 use crate::logs::reader::Summary;
 use crate::logs::sessions::again_words;
 use crate::logs::strangers::Strange;
@@ -23,8 +22,6 @@ pub struct Ending {
     pub proof: Proof,
     /// State of the session just before it on the card.
     pub before: SessionBefore,
-    /// Power failed when the recorder began to rewrite this file, which still holds its old content.
-    pub begun_anew: Option<BegunAnew>,
     /// The name of the original, if it is a mere copy.
     pub again: Option<String>,
     /// It is the rest of a session outside of all files, left by newer ones.
@@ -53,9 +50,8 @@ impl Ending {
                 count(self.summary.frames, "frame")
             )
         };
-        let begun_anew = self.begun_anew.filter(|anew| anew.is_confirmed);
         let again = self.again.as_deref().map(again_words);
-        again.or_else(|| self.left_over.then(left_over)).or_else(|| begun_anew.map(BegunAnew::words))
+        again.or_else(|| self.left_over.then(left_over))
     }
 
     /// Whether it is to be counted: its session is not there under another name.
@@ -82,7 +78,7 @@ impl Ending {
     /// Number of sectors rebuilt from parity. They show a damaged card although nothing is lost. In a file
     /// just begun anew the new session has overwritten some, which do not count.
     pub const fn made_again(&self) -> u64 {
-        if self.begun_anew.is_some() { 0 } else { self.summary.blocks.repaired }
+        self.summary.blocks.repaired
     }
 
     /// Number of missing parity sectors: nothing is lost, but further losses of the card cannot be rebuilt. A
@@ -93,7 +89,7 @@ impl Ending {
 
     /// Whether its parity should be there. It does not matter for copies and rests.
     fn has_parity(&self) -> bool {
-        self.begun_anew.is_none() && self.aside().is_none() && self.summary.marks.has_boot
+        self.aside().is_none() && self.summary.marks.has_boot
     }
 
     /// Reasons why it is not proved to be whole, as parts of sentences: losses, missing proof, foreign data
@@ -104,9 +100,6 @@ impl Ending {
             return self.besides();
         }
         let mut all = Vec::new();
-        if let Some(anew) = self.begun_anew {
-            return vec![anew.words()];
-        }
         let (summary, blocks) = (&self.summary, &self.summary.blocks);
         let lost = summary.marks.lost;
         if summary.gaps > 0 || blocks.damaged > 0 || lost > 0 {

@@ -1,10 +1,9 @@
 //! A log's blocks as groups of sectors. Each group decodes by itself: the unit of parallel work.
 
 use anyhow::Result;
-use hums_blackbox::record::Boot;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 
-use super::board::{HEADING_GROUPS, find_boot};
+use super::board::{HEADING_GROUPS, heading};
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
@@ -18,16 +17,11 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// The wanted value from the record of a start at a log's beginning. `None` without such a record, or if the
-/// log is unreadable.
-pub fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
+/// Whether the record of a start is at a log's beginning.
+pub fn has_start(log: &Log) -> bool {
     let mut groups = Groups::new(log);
-    for _ in 0..HEADING_GROUPS {
-        if let Some(found) = find_boot(&groups.next_group().ok()??, &wanted) {
-            return Some(found);
-        }
-    }
-    None
+    let mut first = (0..HEADING_GROUPS).map_while(|_| groups.next_group().ok()?);
+    first.any(|group| heading(&group).is_some())
 }
 
 /// Streams a log's groups.

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use hums_blackbox::Header;
 
-use super::begun_anew::{self, BegunAnew, Known};
 use super::fingerprint::{Fingerprint, fingerprint};
 use super::places::{Log, Piece};
 
@@ -21,8 +20,6 @@ pub struct Sessions {
     again: BTreeMap<String, String>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
-    /// By card and number.
-    begun_anew: BTreeMap<(String, u32), BegunAnew>,
 }
 
 impl Sessions {
@@ -32,7 +29,6 @@ impl Sessions {
         let mut all: BTreeMap<_, Vec<u32>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-        let mut known: BTreeMap<&str, Vec<Known<'_>>> = BTreeMap::new();
         for &(name, log) in &logs {
             let (card, number) = place(name);
             if let Some(number) = number {
@@ -42,24 +38,10 @@ impl Sessions {
             alike.entry(first.session).or_default().push(Candidate { name, number, log });
             if let Some(number) = number {
                 all.entry((card.to_owned(), first.session)).or_default().push(number);
-                known.entry(card).or_default().push(Known { number, session: first.session, log });
             }
         }
         let again = alike.into_values().flat_map(copies).collect();
-        let mut anew = BTreeMap::new();
-        for (card, mut known) in known {
-            known.sort_by_key(|known| known.number);
-            let numbers = numbers.get(card).map_or_else(BTreeMap::new, |all| begun_anew::find(all, &known));
-            anew.extend(numbers.into_iter().map(|(number, anew)| ((card.to_owned(), number), anew)));
-        }
-        Self { logs: all, again, numbers, begun_anew: anew }
-    }
-
-    /// The old content of a log's file, if the recorder had just begun to rewrite it. A full card's oldest
-    /// file gets the next name before its first sector is written.
-    pub fn begun_anew(&self, name: &str) -> Option<BegunAnew> {
-        let (card, number) = place(name);
-        self.begun_anew.get(&(card.to_owned(), number?)).copied()
+        Self { logs: all, again, numbers }
     }
 
     /// The name of the original if this log is a copy of it or of one of its files, sector by sector. Copies
@@ -149,116 +131,4 @@ fn first_sector(log: &Log) -> Option<Header> {
         }
     }
     None
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use hums_blackbox::record::{Before, Boot, Found};
-    use hums_blackbox::{Record, Sector, SectorSink, Writer};
-    use hums_core::clock::Instant;
-
-    use super::*;
-    use crate::logs::find::find_in;
-
-    fn sealed(mut sector: Sector, session: u32) -> Vec<u8> {
-        sector.seal(session);
-        sector.bytes().to_vec()
-    }
-
-    #[derive(Default)]
-    struct Sink(Vec<Sector>);
-
-    impl SectorSink for Sink {
-        fn room(&self) -> usize {
-            usize::MAX
-        }
-
-        fn put(&mut self, sector: &Sector) {
-            self.0.push(*sector);
-        }
-    }
-
-    /// A log whose start found this session under this number.
-    fn after(number: u32, session: u32) -> Vec<u8> {
-        log(9, number, session)
-    }
-
-    /// The same of a session of this name.
-    fn log(own: u32, number: u32, session: u32) -> Vec<u8> {
-        let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
-        let before = Before { found: Found::Frames, number, session, ..Before::default() };
-        let boot = Record::Boot(Boot { before, ..Boot::default() });
-        writer.record(Instant::ZERO, &boot, &mut sink).expect("room");
-        writer.finish(&mut sink);
-        sink.0.into_iter().flat_map(|sector| sealed(sector, own)).collect()
-    }
-
-    /// Logs in a folder; the recorder had begun to rewrite some files.
-    struct Card(tempfile::TempDir);
-
-    impl Card {
-        fn new() -> Self {
-            Self(tempfile::tempdir().expect("a folder"))
-        }
-
-        fn write(&self, name: u32, bytes: impl AsRef<[u8]>) {
-            fs::write(self.0.path().join(format!("{name:05}_00.HUM")), bytes).expect("room");
-        }
-
-        fn remove(&self, name: u32) {
-            fs::remove_file(self.0.path().join(format!("{name:05}_00.HUM"))).expect("there");
-        }
-
-        /// By number: the old log, and whether the next start found it so.
-        fn anew(&self) -> Vec<(u32, u32, bool)> {
-            let found = find_in(self.0.path(), false).expect("a folder");
-            let sessions = Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
-            let anew = |name: &str| {
-                let BegunAnew { of, is_confirmed } = sessions.begun_anew(name)?;
-                Some((place(name).1?, of, is_confirmed))
-            };
-            found.logs.iter().filter_map(|log| anew(&log.name)).collect()
-        }
-    }
-
-    #[test]
-    fn a_file_that_was_to_be_written_anew_is_known_and_the_next_start_confirms_it() {
-        let card = Card::new();
-        card.write(5, after(4, 4));
-        card.write(6, log(6, 5, 5));
-        // Two sessions fill the card: the oldest one is the content of the newest file.
-        card.write(7, log(4, 3, 3));
-        assert_eq!(card.anew(), [(7, 4, false)]);
-        card.write(8, after(7, 4));
-        assert_eq!(card.anew(), [(7, 4, true)]);
-        // Logs in the order of recording, of which somebody deleted the first ones.
-        card.write(7, log(7, 6, 6));
-        assert_eq!(card.anew(), []);
-    }
-
-    #[test]
-    fn power_that_goes_several_times_at_the_start_renames_nothing() {
-        let card = Card::new();
-        // The card had 10 to 14. Power failed just after 10 and 11 got the next names; then a start overwrote 12.
-        card.write(13, log(13, 12, 12));
-        card.write(14, log(14, 13, 13));
-        card.write(15, log(10, 9, 9));
-        assert_eq!(card.anew(), [(15, 10, false)]);
-        card.write(16, log(11, 10, 10));
-        assert_eq!(card.anew(), [(15, 10, false), (16, 11, false)]);
-        card.write(17, log(17, 16, 11));
-        let both = [(15, 10, true), (16, 11, true)];
-        assert_eq!(card.anew(), both);
-        // The names stay while later starts write over the others, to the last.
-        for number in [13, 14] {
-            card.remove(number);
-            card.write(number + 5, log(number + 5, number + 4, number + 4));
-            assert_eq!(card.anew(), both);
-        }
-        card.remove(15);
-        card.write(20, log(20, 19, 19));
-        assert_eq!(card.anew(), both[1..]);
-    }
 }
