@@ -47,17 +47,18 @@ impl Joints {
         self.0 = Some((system, boot_ms));
     }
 
-    /// How much time an autopilot's clock shows between its last report before a jump of the recorder's clock
-    /// and its first one after it, ms.
-    fn passed_ms<R: Read>(self, after: &Records<R>) -> Option<i64> {
+    /// Time from an autopilot's last report before a jump of the recorder's clock to the jump, by its first
+    /// report after the jump, ms.
+    fn passed_ms<R: Read>(self, time_us: u64, after: &Records<R>) -> Option<i64> {
         let (system, before_ms) = self.0?;
-        let after_ms = after.frames_after(|bytes| match frame::peek(bytes) {
+        let (after_us, after_ms) = after.frames_after(|recorded_us, bytes| match frame::peek(bytes) {
             frame::Peek::Frame(frame) if frame.system == system => {
-                boot_ms_of(frame.id, frame.component, frame.payload)
+                Some((recorded_us, boot_ms_of(frame.id, frame.component, frame.payload)?))
             }
             _ => None,
         })?;
-        Some(i64::from(after_ms) - i64::from(before_ms))
+        let since_jump_ms = i64::try_from(after_us.saturating_sub(time_us) / 1_000).ok()?;
+        Some(i64::from(after_ms) - i64::from(before_ms) - since_jump_ms)
     }
 
     /// The real time passed, microseconds, if the recorder's clock was set while the autopilot's went on. A
@@ -66,7 +67,7 @@ impl Joints {
         if (before_us..before_us.saturating_add(HELD_BACK_US)).contains(&time_us) {
             return None;
         }
-        let passed_ms = self.passed_ms(after).filter(|ms| (-DISORDER_MS..=TOLD_MS).contains(ms))?;
+        let passed_ms = self.passed_ms(time_us, after).filter(|ms| (-DISORDER_MS..=TOLD_MS).contains(ms))?;
         let passed_us = u64::try_from(passed_ms * 1_000).unwrap_or(0);
         let is_set = time_us < before_us || time_us - before_us > passed_us.saturating_add(HELD_BACK_US);
         is_set.then_some(passed_us)
@@ -75,7 +76,9 @@ impl Joints {
     /// Whether another recording begins at this jump of the recorder's clock: the autopilot's clock does not
     /// go on. Without an autopilot's time, a jump by more than an hour counts.
     pub(super) fn is_joint<R: Read>(self, before_us: u64, time_us: u64, after: &Records<R>) -> bool {
-        let Some(boot) = self.passed_ms(after) else { return before_us.abs_diff(time_us) > JOINT_US };
+        let Some(boot) = self.passed_ms(time_us, after) else {
+            return before_us.abs_diff(time_us) > JOINT_US;
+        };
         let recorder = (i128::from(time_us) - i128::from(before_us)) / 1_000;
         let with_it = i128::from(boot).abs_diff(recorder) <= TOLD_MS as u128;
         boot < -DISORDER_MS || (boot > TOLD_MS && !with_it)
