@@ -1,6 +1,5 @@
 //! The end of a log that was read: the evidence of its completeness.
 
-use super::files::Files;
 use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
@@ -145,7 +144,7 @@ impl Ending {
 
     /// Sectors of a mere copy's files that are not of the session which it copies.
     pub fn besides(&self) -> Vec<String> {
-        if self.again.is_some() { self.file().others() } else { Vec::new() }
+        if self.again.is_some() { self.others() } else { Vec::new() }
     }
 
     /// The next start found sectors of this session in the log's last file. Returns whether that file has no
@@ -159,25 +158,6 @@ impl Ending {
         let before = strange.len();
         strange.retain(|strange| !is_it(strange));
         strange.len() < before
-    }
-
-    fn file(&self) -> Files<'_> {
-        Files { names: &self.files, summary: &self.summary, proof: self.proof }
-    }
-
-    /// Blocks after the last sector that are not sectors, if the log's end is not proved before them.
-    pub fn noise(&self) -> Option<String> {
-        self.file().noise()
-    }
-
-    /// That sectors disagree with their parity.
-    pub fn contradicted(&self) -> Option<String> {
-        self.file().contradicted()
-    }
-
-    /// Which sectors of its files are not of the log, and which of its files are not there.
-    pub fn strange(&self) -> Vec<String> {
-        self.file().strange()
     }
 }
 

@@ -5,6 +5,7 @@
 //! 00042. It has the unique id of the board, and the session in its sectors.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hums_recorder::LogName;
@@ -105,6 +106,26 @@ pub fn is_part(path: &Path) -> bool {
     let is_hum = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());
     is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
+}
+
+/// The logs of one of several inputs get its name before theirs: each card has a session 1.
+pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>) {
+    let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
+    for name in names.filter(|name| **name != stem) {
+        *name = format!("{stem}/{name}");
+    }
+}
+
+/// Of equal names the later ones get a number.
+pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
+    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+    for name in names {
+        let count = seen.entry(name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            *name = format!("{name}-{count}");
+        }
+    }
 }
 
 /// Whether the name of a file, without its ending, has an identity at its end, so that it was made from a log:

@@ -92,13 +92,9 @@ pub struct Summary {
     pub last_number: Option<u32>,
     /// Of that there is only a copy that was made while it was in progress.
     pub ends_partial: bool,
-    /// Frames of the session before its first group, modulo 2^32.
-    pub frames_before: Option<u32>,
     /// Frames of the session up to its end, modulo 2^32.
     pub frames_end: Option<u32>,
-    /// The check of the session's entries before its first group.
-    pub check_before: Option<u32>,
-    /// The same up to its end, as its last sector has it.
+    /// The check of the session's entries up to its end, as its last sector has it.
     pub check_end: Option<u32>,
     /// Groups that go on from other entries than the sectors before them end with.
     pub unchained: u64,
@@ -405,7 +401,6 @@ impl Stitch {
                 if let (None, Some(before), Some(begun)) = (&self.open, before, group.check_before) {
                     self.summary.unchained += u64::from(before != begun);
                 }
-                self.summary.check_before = self.summary.check_before.or(group.check_before);
                 if let Some(mut gap) = self.open.take() {
                     (gap.to, gap.frames) = (Some(start), missing);
                     self.close(gap, deliver)?;
@@ -414,7 +409,6 @@ impl Stitch {
                 hand_on(&mut group, new, deliver)?;
                 self.expected = Some(frames_before.wrapping_add(group.frames));
                 self.summary.first = self.summary.first.or(Some(start));
-                self.summary.frames_before.get_or_insert(frames_before);
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);

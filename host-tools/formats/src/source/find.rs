@@ -12,6 +12,7 @@ use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recordi
 use super::recording::{Place, of_one_vehicle};
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
+use crate::logs::naming::{make_unique, name_after};
 use crate::logs::sessions::{Sessions, first_session};
 use crate::logs::{self, Content, segment_name};
 use crate::outcome::usage;
@@ -224,31 +225,12 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         }
         found.drop_repeats(before);
         if inputs.len() > 1 && segment_name(input).is_none() {
-            name_after(input, found.places.iter_mut().skip(before).filter(|place| place.own().is_some()));
+            let own = found.places.iter_mut().skip(before).filter(|place| place.own().is_some());
+            name_after(input, own.map(|place| &mut place.name));
         }
     }
-    make_names_unique(&mut found.places);
+    make_unique(found.places.iter_mut().map(|place| &mut place.name));
     Ok(found)
-}
-
-/// The sessions of one of several inputs get its name before theirs: each card has a session 1.
-fn name_after<'a>(input: &Path, places: impl Iterator<Item = &'a mut Place>) {
-    let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
-    for place in places.filter(|place| place.name != stem) {
-        place.name = format!("{stem}/{}", place.name);
-    }
-}
-
-/// Names are those of files: the later ones of a name get a number.
-fn make_names_unique(places: &mut [Place]) {
-    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
-    for place in places {
-        let count = seen.entry(place.name.clone()).or_default();
-        *count += 1;
-        if *count > 1 {
-            place.name = format!("{}-{count}", place.name);
-        }
-    }
 }
 
 /// Other contents of a folder besides our logs, as sentences, for a command that reads only our logs. Also
