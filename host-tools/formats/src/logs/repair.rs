@@ -68,18 +68,18 @@ impl Repairs {
         if file.bytes() > FILE_BYTES_MAX {
             return Ok(Self::default());
         }
-        let Some(found) = Found::of(&file, session)? else { return Ok(Self::default()) };
-        let last = found.parity.iter().map(|(one, _)| one.last).max();
+        let Some(sectors) = FileSectors::of(&file, session)? else { return Ok(Self::default()) };
+        let last = sectors.parity.iter().map(|(one, _)| one.last).max();
         let mut all = Self { evidence: Evidence { last, ..Evidence::default() }, ..Self::default() };
-        let Some(base) = found.base else { return Ok(all) };
-        (all.evidence.written, all.evidence.missing) = found.written_and_missing(base);
-        let mut columns = found.columns(base);
+        let Some(base) = sectors.base else { return Ok(all) };
+        (all.evidence.written, all.evidence.missing) = sectors.written_and_missing(base);
+        let mut columns = sectors.columns(base);
         let mut blocks = file.blocks();
         let mut at = 0;
         while !columns.is_empty()
             && let Some(block) = blocks.next_block()?
         {
-            if let Some(number) = found.in_place(base, at)
+            if let Some(number) = sectors.in_place(base, at)
                 && let Some((column, _)) = columns.get_mut(&column_of(at))
             {
                 column.sector(number, block);
@@ -115,7 +115,7 @@ const fn column_of(at: u32) -> (u32, u32) {
 }
 
 /// Contents of a file.
-struct Found {
+struct FileSectors {
     session: u32,
     /// The number of the file's first sector; `None` without a sector of the session.
     base: Option<u32>,
@@ -126,7 +126,7 @@ struct Found {
     parity: Vec<(Parity, [u8; BLOCK_BYTES])>,
 }
 
-impl Found {
+impl FileSectors {
     /// `None` without any sector.
     fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
         let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
