@@ -28,7 +28,7 @@ pub mod health;
 mod imu_gnss;
 pub mod inertial;
 mod initial;
-mod latest;
+pub mod latest;
 pub mod lifetime;
 mod mag_heading_residual;
 pub mod mishap;

@@ -12,7 +12,7 @@ use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
-use crate::logs::naming::{identity_at_end, segment_name, session_name};
+use crate::logs::naming::{ends_with_identity, segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
@@ -152,7 +152,7 @@ pub fn is_made(path: &Path) -> bool {
     }
     let endings = [".tlog.gaps.csv", ".jsonl", ".lp", ".html"];
     let mut stems = endings.iter().filter_map(|ending| name.strip_suffix(ending));
-    stems.find_map(identity_at_end).is_some()
+    stems.any(ends_with_identity)
 }
 
 /// Whether the beginning of a page names `hums report`: the table of a folder's pages has no session in its name.

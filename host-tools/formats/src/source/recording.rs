@@ -250,9 +250,7 @@ impl Recording {
             result => result.with_context(|| self.name.clone())?,
         };
         if let Some(words) = self.progress.damage() {
-            let place = Some(self.progress.taken());
-            let gap =
-                Gap { from: Some(last), to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None };
+            let gap = Gap::new(Some(last), Cause::Damaged, words).at(self.progress.taken());
             seen.item(last, &Item::Gap(&gap));
             match take(last, Item::Gap(&gap)) {
                 Err(error) if !error.is::<Stop>() => return Err(error),

@@ -27,8 +27,6 @@ mod px4;
 mod rows;
 mod session;
 #[cfg(test)]
-mod testing;
-#[cfg(test)]
 mod tests;
 mod times;
 mod topics;

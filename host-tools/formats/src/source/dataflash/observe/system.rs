@@ -3,24 +3,16 @@
 use hums_core::clock::Span;
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
 
-use super::handler::{Given, Handler};
+use super::handler::{Given, Handler, handler};
 use super::say::Out;
 use super::state::State;
 use super::words::Craft;
 
-const SYSTEM: Handler =
-    Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
-
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler { names: &[("PM", 0)], columns: &[&["Load"]], take: performance, ..SYSTEM },
-    Handler {
-        names: &[("RAD", 0)],
-        columns: &[&["RSSI"], &["RemRSSI"], &["Noise"], &["RemNoise"], &["RxErrors"]],
-        take: radio,
-        ..SYSTEM
-    },
-    Handler { names: &[("RSSI", 0)], columns: &[&["RXRSSI"]], take: rc, ..SYSTEM },
-    Handler { names: &[("STAT", 0)], columns: &[&["isFlying"], &["Armed"]], take: status, ..SYSTEM },
+    handler("PM", "Load", performance),
+    handler("RAD", "RSSI RemRSSI Noise RemNoise RxErrors", radio),
+    handler("RSSI", "RXRSSI", rc),
+    handler("STAT", "isFlying Armed", status),
 ];
 
 /// Load in thousandths, as in `SYS_STATUS`.

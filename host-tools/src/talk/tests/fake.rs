@@ -10,24 +10,24 @@ use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::{Frame, Framer};
 
-use super::Client;
 use crate::duplex::{Duplex, Port};
 use crate::mavlink::ids::HEARTBEAT;
+use crate::talk::Client;
 
 /// The other end's answers to a frame: sender and packet.
-pub(super) type Said = Vec<(u8, Packet)>;
+pub(in crate::talk) type Answers = Vec<(u8, Packet)>;
 
 struct Line {
     framer: Framer,
     systems: &'static [u8],
-    answer: Box<dyn FnMut(&Frame<'_>) -> Said + Send>,
+    answer: Box<dyn FnMut(&Frame<'_>) -> Answers + Send>,
     coming: VecDeque<u8>,
 }
 
 /// A client on a line with boards of these systems, which answer each of its heartbeats with their own, and all else so.
-pub(super) fn client(
+pub(in crate::talk) fn client(
     systems: &'static [u8],
-    answer: impl FnMut(&Frame<'_>) -> Said + Send + 'static,
+    answer: impl FnMut(&Frame<'_>) -> Answers + Send + 'static,
 ) -> Client {
     let (framer, coming) = (Framer::new(), VecDeque::new());
     let line = Arc::new(Mutex::new(Line { framer, systems, answer: Box::new(answer), coming }));
@@ -36,9 +36,9 @@ pub(super) fn client(
 }
 
 /// A client that has found the board of system 1 on it.
-pub(super) fn found(
+pub(in crate::talk) fn found(
     systems: &'static [u8],
-    answer: impl FnMut(&Frame<'_>) -> Said + Send + 'static,
+    answer: impl FnMut(&Frame<'_>) -> Answers + Send + 'static,
 ) -> Client {
     let mut client = client(systems, answer);
     client.find(Some(1), Duration::ZERO).expect("it is heard");

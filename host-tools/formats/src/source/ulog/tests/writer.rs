@@ -2,25 +2,25 @@
 
 use hums_core::clock::Instant;
 
-use super::Ulog;
 use crate::source::item::{Gap, Item, Reader, Rows, Summary, Value, Want};
+use crate::source::ulog::Ulog;
 
 /// A log in the making.
 #[derive(Clone)]
-pub(super) struct Writer {
-    pub(super) bytes: Vec<u8>,
+pub(in crate::source::ulog) struct Writer {
+    pub(in crate::source::ulog) bytes: Vec<u8>,
 }
 
 impl Writer {
     /// A header, logging began at this time.
-    pub(super) fn new(time_us: u64) -> Self {
-        let mut bytes = super::message::MAGIC.to_vec();
+    pub(in crate::source::ulog) fn new(time_us: u64) -> Self {
+        let mut bytes = crate::source::ulog::message::MAGIC.to_vec();
         bytes.push(1);
         bytes.extend(time_us.to_le_bytes());
         Self { bytes }
     }
 
-    pub(super) fn message(mut self, kind: u8, body: &[&[u8]]) -> Self {
+    pub(in crate::source::ulog) fn message(mut self, kind: u8, body: &[&[u8]]) -> Self {
         let body = body.concat();
         self.bytes.extend(u16::try_from(body.len()).expect("a message of 64 KiB").to_le_bytes());
         self.bytes.push(kind);
@@ -28,12 +28,12 @@ impl Writer {
         self
     }
 
-    pub(super) fn flags(self, incompatible: u8, appended: [u64; 3]) -> Self {
+    pub(in crate::source::ulog) fn flags(self, incompatible: u8, appended: [u64; 3]) -> Self {
         let offsets: Vec<u8> = appended.iter().flat_map(|offset| offset.to_le_bytes()).collect();
         self.message(b'B', &[&[0; 8], &[incompatible, 0, 0, 0, 0, 0, 0, 0], &offsets])
     }
 
-    pub(super) fn format(self, text: &str) -> Self {
+    pub(in crate::source::ulog) fn format(self, text: &str) -> Self {
         self.message(b'F', &[text.as_bytes()])
     }
 
@@ -41,69 +41,69 @@ impl Writer {
         self.message(kind, &[before, &[key.len() as u8], key.as_bytes(), value])
     }
 
-    pub(super) fn information(self, key: &str, value: &[u8]) -> Self {
+    pub(in crate::source::ulog) fn information(self, key: &str, value: &[u8]) -> Self {
         self.keyed(b'I', &[], key, value)
     }
 
-    pub(super) fn parameter(self, name: &str, value: f32) -> Self {
+    pub(in crate::source::ulog) fn parameter(self, name: &str, value: f32) -> Self {
         self.keyed(b'P', &[], &format!("float {name}"), &value.to_le_bytes())
     }
 
-    pub(super) fn integer_parameter(self, name: &str, value: i32) -> Self {
+    pub(in crate::source::ulog) fn integer_parameter(self, name: &str, value: i32) -> Self {
         self.keyed(b'P', &[], &format!("int32_t {name}"), &value.to_le_bytes())
     }
 
-    pub(super) fn default_parameter(self, groups: u8, name: &str, value: f32) -> Self {
+    pub(in crate::source::ulog) fn default_parameter(self, groups: u8, name: &str, value: f32) -> Self {
         self.keyed(b'Q', &[groups], &format!("float {name}"), &value.to_le_bytes())
     }
 
-    pub(super) fn subscribe(self, id: u16, instance: u8, name: &str) -> Self {
+    pub(in crate::source::ulog) fn subscribe(self, id: u16, instance: u8, name: &str) -> Self {
         self.message(b'A', &[&[instance], &id.to_le_bytes(), name.as_bytes()])
     }
 
-    pub(super) fn data(self, id: u16, time_us: u64, data: &[u8]) -> Self {
+    pub(in crate::source::ulog) fn data(self, id: u16, time_us: u64, data: &[u8]) -> Self {
         self.message(b'D', &[&id.to_le_bytes(), &time_us.to_le_bytes(), data])
     }
 
-    pub(super) fn text(self, level: u8, time_us: u64, words: &str) -> Self {
+    pub(in crate::source::ulog) fn text(self, level: u8, time_us: u64, words: &str) -> Self {
         self.message(b'L', &[&[level], &time_us.to_le_bytes(), words.as_bytes()])
     }
 
-    pub(super) fn tagged(self, level: u8, tag: u16, time_us: u64, words: &str) -> Self {
+    pub(in crate::source::ulog) fn tagged(self, level: u8, tag: u16, time_us: u64, words: &str) -> Self {
         self.message(b'C', &[&[level], &tag.to_le_bytes(), &time_us.to_le_bytes(), words.as_bytes()])
     }
 
-    pub(super) fn sync(self) -> Self {
+    pub(in crate::source::ulog) fn sync(self) -> Self {
         self.message(b'S', &[&[0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12]])
     }
 
-    pub(super) fn dropout(self, milliseconds: u16) -> Self {
+    pub(in crate::source::ulog) fn dropout(self, milliseconds: u16) -> Self {
         self.message(b'O', &[&milliseconds.to_le_bytes()])
     }
 }
 
 /// The items of a log as texts: easy to compare, easy to read if they differ.
 #[derive(Debug, Default)]
-pub(super) struct Read {
-    pub(super) items: Vec<(u64, String)>,
-    pub(super) gaps: Vec<Gap>,
-    pub(super) summary: Summary,
+pub(in crate::source::ulog) struct Read {
+    pub(in crate::source::ulog) items: Vec<(u64, String)>,
+    pub(in crate::source::ulog) gaps: Vec<Gap>,
+    pub(in crate::source::ulog) summary: Summary,
 }
 
 impl Read {
     /// The items of this kind.
-    pub(super) fn of(&self, kind: &str) -> Vec<&str> {
+    pub(in crate::source::ulog) fn of(&self, kind: &str) -> Vec<&str> {
         self.items.iter().filter_map(|(_, item)| item.strip_prefix(kind)).map(str::trim_start).collect()
     }
 }
 
 /// Reads a log that is one.
-pub(super) fn read(bytes: &[u8]) -> Read {
+pub(in crate::source::ulog) fn read(bytes: &[u8]) -> Read {
     try_read(bytes).expect("a ULog")
 }
 
 /// Reads bytes that may be a log. Times never fall.
-pub(super) fn try_read(bytes: &[u8]) -> anyhow::Result<Read> {
+pub(in crate::source::ulog) fn try_read(bytes: &[u8]) -> anyhow::Result<Read> {
     let mut read = Read::default();
     let mut last = Instant::ZERO;
     let want = Want { observations: true, rows: Rows::All, ..Want::default() };
