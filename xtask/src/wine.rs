@@ -10,7 +10,7 @@ use crate::setup::{WINDOWS_TARGET, find_wine};
 use crate::shell::Shell;
 
 /// The crates of `hums`, besides itself.
-const PARTS: [&str; 11] = [
+const PARTS: [&str; 12] = [
     "hums-core",
     "hums-blackbox",
     "hums-dialect",
@@ -21,6 +21,7 @@ const PARTS: [&str; 11] = [
     "hums-store",
     "hums-analysis",
     "hums-base",
+    "hums-export",
     "hums-formats",
 ];
 

@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub use check::Check;
 pub use live::Live;
-pub use read::{Decode, Format, Info, Report, Split};
+pub use read::{Decode, Info, Report, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull};

@@ -17,23 +17,34 @@
 //! their tables go on in `ATTITUDE.2.parquet`. That happens in a session of days, and in a log of thousands
 //! of tables.
 
+mod batches;
+mod columns;
+
+#[cfg(test)]
+pub(crate) use columns::TAKEN_FRAMES;
+
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
+use hums_core::clock::Instant;
 use parquet::basic::{Compression, Repetition};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use super::batches::{Batches, TimedRow};
-use super::columns::{Column, TableRows};
-use super::table::Table;
+use crate::context::Context;
 use crate::files::{Folder, FolderFile, cannot_write};
+use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
 use crate::logs::in_order::{in_order, workers};
+use crate::row::Row;
+use crate::story::Story;
+use crate::table::Table;
+use batches::{Batches, TimedRow};
+use columns::{Column, TableRows};
 
 /// Memory limits: some 55 MiB with the reading.
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
@@ -62,7 +73,7 @@ struct Limits {
 }
 
 /// The tables of one session, open.
-pub struct ParquetTables {
+struct ParquetTables {
     folder: Folder,
     limits: Limits,
     properties: Properties,
@@ -96,7 +107,7 @@ struct Open {
 
 impl ParquetTables {
     /// Tables in a folder; `about` goes into each file's metadata.
-    pub fn new(folder: Folder, about: &[(&str, String)]) -> Self {
+    fn new(folder: Folder, about: &[(&str, String)]) -> Self {
         let about =
             about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
         let writer = WriterProperties::builder()
@@ -112,7 +123,7 @@ impl ParquetTables {
     }
 
     /// Takes a group's columns.
-    pub fn put(&mut self, batches: Batches) -> Result<()> {
+    fn put(&mut self, batches: Batches) -> Result<()> {
         let (frames, rows) = batches.parts();
         for (table, columns) in frames {
             let new = || TableFile::new(table, TableRows::of_frames(table));
@@ -174,7 +185,7 @@ impl ParquetTables {
     }
 
     /// Writes the rest, and each file's end: the folder gets its name. Returns it and the number of tables.
-    pub fn finish(mut self) -> Result<(PathBuf, usize)> {
+    fn finish(mut self) -> Result<(PathBuf, usize)> {
         let count = self.tables.len();
         let (folder, properties) = (&self.folder, &self.properties);
         let mut tables = std::mem::take(&mut self.tables).into_values();
@@ -186,6 +197,50 @@ impl ParquetTables {
         let path = self.folder.path().to_owned();
         self.folder.finish()?;
         Ok((path, count))
+    }
+}
+
+impl Part for Batches {
+    fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
+        Self::frame(self, entry.at, entry.utc_us, entry.frame, entry.known);
+    }
+
+    fn row(&mut self, context: &Context, at: Instant, row: &Row) {
+        Self::row(self, at, context.epochs.utc_us(at), row);
+    }
+
+    fn held_bytes(&self) -> usize {
+        Self::held_bytes(self)
+    }
+}
+
+/// The tables of a log.
+pub(super) struct Parquet(ParquetTables);
+
+impl Writer for Parquet {
+    const ABOUT: About = About {
+        needs_identity: true,
+        ..About::new(
+            "parquet",
+            "Typed columns by vehicle, date and session, for DuckDB, Spark, pandas",
+            Files::Partition("parquet"),
+        )
+    };
+    type Part = Batches;
+
+    fn open(context: &Context, path: &Path) -> Result<Self> {
+        let identity = &context.identity;
+        let about = [("hums.vehicle", identity.vehicle.clone()), ("hums.session", identity.session.clone())];
+        Ok(Self(ParquetTables::new(Folder::create(path, &context.inputs, &context.session)?, &about)))
+    }
+
+    fn part(&mut self, _: &Context, part: Batches, _: &Story) -> Result<()> {
+        self.0.put(part)
+    }
+
+    fn finish(self, _: &Context, totals: Totals) -> Result<Finished> {
+        let (dir, tables) = self.0.finish()?;
+        Ok(totals.of_tables(dir, "parquet", tables).into())
     }
 }
 
@@ -298,7 +353,6 @@ impl TableFile {
 mod tests {
     use std::fs::File;
 
-    use hums_core::clock::Instant;
     use parquet::file::reader::SerializedFileReader;
     use parquet::record::RowAccessor as _;
 

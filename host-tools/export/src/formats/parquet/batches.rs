@@ -5,22 +5,22 @@ use std::collections::BTreeMap;
 use hums_core::clock::Instant;
 
 use super::columns::TableRows;
-use super::row::{Cell, Row};
-use super::table::Table;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::Payload;
+use crate::row::{Cell, Row};
+use crate::table::Table;
 
 /// One group's entries: frames as columns; rows unchanged, since the first row of the whole log determines
 /// the columns.
 #[derive(Debug, Default)]
-pub struct Batches {
+pub(crate) struct Batches {
     frames: BTreeMap<Table, TableRows>,
     rows: BTreeMap<&'static str, Vec<TimedRow>>,
     held_bytes: usize,
 }
 
 /// A row with its time since power-on and its UTC.
-pub type TimedRow = (Instant, Option<u64>, Row);
+pub(crate) type TimedRow = (Instant, Option<u64>, Row);
 
 /// Memory of an empty table, and of a row besides the values of its message: its times, its sender.
 const TABLE_BYTES: usize = 4_096;
@@ -42,7 +42,13 @@ fn table_of(frame: &Frame<'_>, known: bool) -> Table {
 
 impl Batches {
     /// Adds a frame.
-    pub fn frame(&mut self, at: Instant, utc_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
+    pub(crate) fn frame(
+        &mut self,
+        at: Instant,
+        utc_us: Option<u64>,
+        frame: &Frame<'_>,
+        known: Option<&Payload>,
+    ) {
         let table = table_of(frame, known.is_some());
         let columns = self.frames.entry(table).or_insert_with(|| {
             self.held_bytes += TABLE_BYTES;
@@ -56,7 +62,7 @@ impl Batches {
     }
 
     /// Adds a row of the monitor's own.
-    pub fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
+    pub(crate) fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
         let texts = row.cells.iter().map(|(_, cell)| match cell {
             Cell::Text(text) | Cell::Words(text, _) => text.len(),
             Cell::Hex(bytes) => bytes.len(),
@@ -67,12 +73,12 @@ impl Batches {
     }
 
     /// Bytes of memory that it holds, roughly.
-    pub fn held_bytes(&self) -> usize {
+    pub(crate) fn held_bytes(&self) -> usize {
         self.held_bytes
     }
 
     /// The frames and the rows of each table.
-    pub fn parts(self) -> (BTreeMap<Table, TableRows>, BTreeMap<&'static str, Vec<TimedRow>>) {
+    pub(crate) fn parts(self) -> (BTreeMap<Table, TableRows>, BTreeMap<&'static str, Vec<TimedRow>>) {
         (self.frames, self.rows)
     }
 }

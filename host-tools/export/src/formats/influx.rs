@@ -15,26 +15,33 @@
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a
 //! message may come twice: the second one's time is a nanosecond later, so that both are kept.
 
+use std::path::Path;
+
+use anyhow::Result;
 use hums_core::clock::Instant;
 use hums_core::health::Level;
 use hums_core::observation::Observation;
 use hums_dialect::{Field, Kind};
 
-use super::field_names::free_name;
-use super::row::{Cell, Row};
-use super::table::Table;
-use super::text::{push_finite, push_integer};
+use crate::context::Context;
+use crate::field_names::free_name;
+use crate::format::{About, Entry, Files, Finished, Part, Single, Totals, Writer, lines_of};
 use crate::hex::push_hex;
+use crate::made::OutputFile;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
 use crate::mavlink::values::{Payload, Scalar, Value};
 use crate::reference::{Quantity, Reference};
+use crate::row::{Cell, Row};
 use crate::source::epochs::Epochs;
+use crate::story::Story;
+use crate::table::Table;
+use crate::text::{push_finite, push_integer};
 
 /// Columns of records that are tags: few values, used for grouping.
 const TAGS: [&str; 3] = ["subsystem", "check", "counter"];
 /// Names that the database or our tags have already: a field called `time` would be dropped.
-pub(super) const TAKEN: [&str; 5] = ["time", "vehicle", "session", "system", "component"];
+pub(crate) const TAKEN: [&str; 5] = ["time", "vehicle", "session", "system", "component"];
 
 /// The tags of every point.
 #[derive(Clone, Debug, Default)]
@@ -361,5 +368,78 @@ impl Clock {
         let close = ns <= self.last_ns && self.last_ns - ns < MILLISECOND_NS;
         self.last_ns = if close { self.last_ns + 1 } else { ns };
         self.last_ns
+    }
+}
+
+/// The open file, and the state of points that are made in order.
+pub(super) struct Influx {
+    file: Single,
+    messages: Clock,
+    quantities: Clock,
+    reference: Reference,
+    text: Vec<u8>,
+    /// Points so far.
+    count: u64,
+}
+
+/// Points of a group.
+#[derive(Default)]
+pub(super) struct Points(Lines);
+
+impl Part for Points {
+    fn frame(&mut self, context: &Context, entry: &Entry<'_>) {
+        self.0.frame(&context.tags, entry.at, entry.frame, entry.known);
+    }
+
+    fn row(&mut self, context: &Context, at: Instant, row: &Row) {
+        self.0.row(&context.tags, at, row);
+    }
+
+    fn held_bytes(&self) -> usize {
+        self.0.held_bytes()
+    }
+}
+
+impl Writer for Influx {
+    const ABOUT: About = About {
+        has_observations: true,
+        needs_identity: true,
+        ..About::new("influx", "Lines for InfluxDB, VictoriaMetrics and QuestDB", Files::One("lp"))
+    };
+    type Part = Points;
+
+    fn open(context: &Context, path: &Path) -> Result<Self> {
+        Ok(Self {
+            file: Single::open(context, path)?,
+            messages: Clock::default(),
+            quantities: Clock::default(),
+            reference: Reference::new(),
+            text: Vec::new(),
+            count: 0,
+        })
+    }
+
+    /// Writes the frames of a group, and their quantities of the reference system.
+    fn part(&mut self, context: &Context, part: Points, story: &Story) -> Result<()> {
+        self.text.clear();
+        self.messages.write(&part.0, &context.epochs, &mut self.text);
+        let mut lines = Lines::default();
+        for observed in &story.observed {
+            let own = self.reference.observe(observed.at, observed.source, &observed.observation);
+            if own && context.selection.has_time(observed.at, &context.epochs) {
+                lines.observed(&context.tags, observed.at, &self.reference, &observed.observation);
+            }
+        }
+        self.quantities.write(&lines, &context.epochs, &mut self.text);
+        self.count += lines_of(&self.text);
+        self.file.write(&self.text)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    fn finish(self, _: &Context, _: Totals) -> Result<Finished> {
+        Ok(OutputFile::of(self.file.finish()?, "influx", &[(self.count, "point")]).into())
     }
 }

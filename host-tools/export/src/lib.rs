@@ -1,51 +1,49 @@
 //! `hums decode`: logs and recordings become files for other tools.
 //!
-//! | format | content | files |
-//! |---|---|---|
-//! | `tlog` | every frame bit for bit, UTC before it | one file a log |
-//! | `csv` | a table for each message type, `HUMS_*` tables for the monitor's own records and for gaps | one
-//! file a table |
-//! | `jsonl` | everything in order, an object a line | one file a log |
-//! | `influx` | line protocol: the reference system's measurement, every frame, every record | one file a log
-//! |
-//! | `hum` | a log as the box writes it, of a tlog or raw recording ([`crate::pack`]) | one file |
-//! | `parquet` | typed columns, the tables of `csv` | one file a table, by vehicle, date and session |
-//! | `thesis` | the reference system's four tables | four files a log |
+//! Each format is a file in [`formats`], where their table is.
 //!
 //! A log is read once (twice if its vehicle must be known first), and an unchecked one is judged in the same
 //! reading. Its groups become text and columns in parallel, and are written in order. Several logs are
 //! decoded in parallel, few enough that memory stays bounded.
 //!
-//! A log's files are named after its session ([`naming`]), and written by the rules of [`crate::files`].
+//! A log's files are named after its session ([`naming`]), and written by the rules of `hums_base::files`.
 //!
-//! Recordings of every kind go the same way ([`crate::source::parts`]); an autopilot's log has its own tables
-//! (`native`).
+//! Recordings of every kind go the same way (`hums_formats::source::parts`); an autopilot's log has its own
+//! tables (`native`).
 //!
 //! `--split flights` cuts a log between its flights, and decodes each as a log of its own.
 //!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with
 //! `thesis`.
 
-pub mod batches;
+#![deny(
+    clippy::print_stderr,
+    reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
+)]
+
+#[macro_use(note)]
+extern crate hums_base;
+
+use hums_analysis::{check, reference, summary};
+use hums_base::{endpoint, files, hex, outcome, output, plural, printable, utc};
+use hums_formats::{ending, followed, logs, loss, mavlink, names, naming, source};
+
 pub mod checked;
 pub mod collect;
-pub mod columns;
 pub mod context;
 pub mod destination;
 pub mod field_names;
+pub mod format;
+pub mod formats;
 pub mod identity;
-pub mod influx;
 pub mod made;
 mod native;
-pub mod parquet;
 pub mod record;
 pub mod row;
 pub mod selection;
+pub mod story;
 pub mod table;
-pub mod tables;
 pub mod text;
-pub mod thesis;
-pub mod unknown;
 mod wear;
 mod works;
 pub mod write;
@@ -57,46 +55,75 @@ use std::sync::Mutex;
 use anyhow::{Result, bail};
 use hums_core::clock::Instant;
 
-use crate::check;
-use crate::check::judge::{Judge, Limits};
-use crate::cli;
-use crate::ending::Ending;
-use crate::files::{Inputs, check_parent, means_standard_output, says_directory};
-use crate::followed::{EndResolver, HasEnding};
-use crate::logs::reader;
-use crate::logs::side_by_side::side_by_side;
-use crate::naming::{self, Named};
-use crate::outcome::{Outcome, usage as usage_error};
-use crate::output::{self, Schema};
-use crate::pack;
-use crate::plural::count;
-use crate::printable;
-use crate::source::epochs::Epochs;
-use crate::source::find::{find, sessions_of};
-use crate::source::item::{Rows, Summary, Want};
-use crate::source::recording::{Format, Place};
-use crate::summary::{Overview, damaged_places};
+use check::judge::{Judge, Limits};
 use checked::Checked;
 use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
+use ending::Ending;
+use files::{Inputs, check_parent, means_standard_output, says_directory};
+use followed::{EndResolver, HasEnding};
+use format::{Files, Finished, Way};
+use formats::FORMATS;
+use formats::influx::Tags;
 use identity::{Identity, identity};
-use influx::Tags;
+use logs::reader;
+use logs::side_by_side::side_by_side;
 use made::{LogJson, MadeJson, OutputFile};
+use naming::Named;
+use outcome::{Outcome, usage as usage_error};
+use output::Schema;
+use plural::count;
 use selection::Selection;
-
+use source::epochs::Epochs;
+use source::find::{find, sessions_of};
+use source::item::{Rows, Summary, Want};
+use source::recording::{Format, Place};
+use story::Said;
+use summary::{Overview, damaged_places};
+use utc::When;
 use works::{NamedLog, check_forms, works};
 use write::Writers;
 
 /// Output of `hums decode --json`.
 pub const SCHEMA: Schema = Schema::first("hums-decode");
 
+/// The request of `hums decode`.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Logs, images, recordings, and folders of them.
+    pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image.
+    pub salvage: bool,
+    /// Only this session.
+    pub session: Option<String>,
+    /// The file or folder to write.
+    pub output: PathBuf,
+    /// The formats to write.
+    pub formats: Vec<&'static format::Format>,
+    /// Entries before it are left out.
+    pub from: Option<When>,
+    /// Entries after it are left out.
+    pub to: Option<When>,
+    /// Each flight has files of its own.
+    pub split: bool,
+    /// Seconds from the log's beginning to the video's, for subtitles.
+    pub offset_s: f64,
+    /// Only messages of these names.
+    pub messages: Vec<String>,
+    /// Replace existing outputs.
+    pub force: bool,
+    /// Print the result as JSON.
+    pub json: bool,
+}
+
 /// Runs `hums decode`.
-pub fn run(args: &cli::Decode) -> Result<Outcome> {
-    if args.format.contains(&cli::Format::Hum) {
-        return pack::run(args);
+pub fn run(args: &Request) -> Result<Outcome> {
+    let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
+    if let Some(run) = args.formats.iter().find_map(alone) {
+        return run(args);
     }
-    let formats = Formats::new(&args.format, args.split.is_some());
+    let formats = Formats::new(&args.formats, args.split);
     let (given, remarks) = naming::without_made(&args.inputs);
     let found = find(&given, args.salvage)?;
     for remark in remarks.iter().chain(&found.remarks) {
@@ -116,12 +143,20 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     inputs.refuse(&args.output)?;
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
-    let standard_output = check_output(args, asked, formats)?;
-    let native = check_forms(&works, formats)?;
+    let standard_output = check_output(args, asked, &formats)?;
+    let native = check_forms(&works, &formats)?;
     let selection = Selection::new(args, native)?;
     let logs = asked;
     let mut followed = EndResolver::new(sessions);
-    let task = Task { formats, selection, inputs, output: &args.output, standard_output, logs };
+    let task = Task {
+        formats,
+        selection,
+        inputs,
+        output: &args.output,
+        standard_output,
+        logs,
+        offset_s: args.offset_s,
+    };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);
@@ -157,21 +192,21 @@ fn beside(work: &NamedLog<'_>) -> Result<Done> {
     Ok(Done { ending, ..Done::of(work.log) })
 }
 
-/// Endings of the files that are made: no folder is made of such a name by mistake.
-const FILE_NAMES: [&str; 5] = ["tlog", "jsonl", "lp", "csv", "parquet"];
-
 /// Whether the output is standard output. An error if the requested formats cannot go there, or into the
 /// given file.
-fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<bool> {
+fn check_output(args: &Request, logs: usize, formats: &Formats) -> Result<bool> {
     let standard_output = means_standard_output(&args.output);
     if standard_output && (logs != 1 || !formats.is_single_file()) {
         let why = match logs {
             1 => "these formats are more than that".to_owned(),
             count => format!("there are {count} logs: --session NAME takes one"),
         };
+        let single = FORMATS.iter().filter(|format| matches!(format.about.files, Files::One(_)));
+        let single: Vec<&str> = single.map(|format| format.about.name).collect();
         return Err(usage_error(format!(
-            "-o -: standard output takes one log in one format of a single file (tlog, jsonl or influx), and {why}; \
-             name a file or a directory"
+            "-o -: standard output takes one log in one format of a single file ({}), and {why}; \
+             name a file or a directory",
+            single.join(", ")
         )));
     }
     let one_file = logs == 1 && formats.is_single_file();
@@ -182,7 +217,9 @@ fn check_output(args: &cli::Decode, logs: usize, formats: Formats) -> Result<boo
         )));
     }
     let extension = args.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    let is_file_name = extension.is_some_and(|extension| FILE_NAMES.contains(&extension.as_str()));
+    // No folder is made of a file's name by mistake.
+    let is_file_name = extension
+        .is_some_and(|extension| FORMATS.iter().any(|format| format.about.extension() == extension.as_str()));
     if !one_file && logs > 0 && is_file_name && !says_directory(&args.output) {
         return Err(usage_error(format!(
             "-o {0}: is the name of a file, but tables, several formats and several logs need a directory; name one log by \
@@ -205,6 +242,7 @@ struct Task<'a> {
     output: &'a Path,
     standard_output: bool,
     logs: usize,
+    offset_s: f64,
 }
 
 /// A log's outcome, reported in the logs' order.
@@ -327,8 +365,8 @@ impl Task<'_> {
         let log = work.log;
         let mut remarks = Vec::new();
         remarks.extend(check_clock(&log.name, &context)?);
-        let mut parquet = None;
-        if self.formats.parquet
+        let mut partitioned = None;
+        if self.formats.about().any(|about| matches!(about.files, Files::Partition(_)))
             && let Ok(mut taken) = taken.lock()
         {
             let first = partition(self.output, &context.identity);
@@ -343,14 +381,14 @@ impl Task<'_> {
                     dir.display()
                 ));
             }
-            parquet = Some(dir);
+            partitioned = Some(dir);
         }
-        let mut read = self.read(log, name, &context, parquet.as_deref());
+        let mut read = self.read(log, name, &context, partitioned.as_deref());
         if let Some(epoch_us) = self.better_epoch(log, &context, &read) {
             // Only its last group knew better: all of it again, with that.
             drop(read);
             context.epochs = Epochs::of(epoch_us);
-            read = self.read(log, name, &context, parquet.as_deref());
+            read = self.read(log, name, &context, partitioned.as_deref());
         }
         let (summary, mut writers, checked) = read?;
         if writers.is_empty() && context.selection.is_part() {
@@ -359,7 +397,8 @@ impl Task<'_> {
         }
         let not_checked = writers.checked(summary.span.map(|(_, last)| last), checked.as_ref())?;
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
-        let written = writers.finish()?;
+        let rows_left_out = writers.rows_left_out();
+        let Finished { made, remarks: left_out } = writers.finish()?;
         let mut outcome = Outcome::Done;
         let ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
         if ending.is_none() && summary.gaps > 0 {
@@ -370,25 +409,26 @@ impl Task<'_> {
             let places = count(summary.losses, "place");
             remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
         }
-        remarks.extend(written.left_out().map(|words| format!("{}: {words}", log.name)));
-        outcome = outcome.and(Outcome::lossy(written.rows_left_out > 0));
-        let made = if self.standard_output { Vec::new() } else { written.made };
+        remarks.extend(left_out.into_iter().map(|words| format!("{}: {words}", log.name)));
+        outcome = outcome.and(Outcome::lossy(rows_left_out > 0));
+        let made = if self.standard_output { Vec::new() } else { made };
         Ok(Done { outcome, ending, written: true, made, remarks, ..Done::of(log) })
     }
 
     /// The context of a log, needed before its first byte is written.
     fn context(&self, work: &NamedLog<'_>) -> Result<Context> {
         let mut context = Context {
-            formats: self.formats,
+            formats: self.formats.clone(),
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
+            offset_s: self.offset_s,
             session: work.traits.identity(work.log),
             ..Context::default()
         };
         // A box's log begins with the record of its start, and its monitor checks.
         let judges = self.formats.has_records() && !work.traits.has_board();
         match work.log.own() {
-            Some(log) if !(self.formats.influx || self.formats.parquet) => {
+            Some(log) if !self.formats.about().any(|about| about.needs_identity) => {
                 let epoch = if self.standard_output { reader::epoch(log) } else { reader::likely_epoch(log) };
                 context.epochs = Epochs::of(epoch?);
                 context.judges = judges;
@@ -422,32 +462,39 @@ impl Task<'_> {
         place: &Place,
         name: &str,
         context: &'a Context,
-        parquet: Option<&Path>,
+        partition: Option<&Path>,
     ) -> Result<Read<'a>> {
         let destination = if self.standard_output {
             Destination::Standard
         } else {
-            Destination::new(self.output, name, self.logs, self.formats)
+            Destination::new(self.output, name, self.logs, &self.formats)
         };
-        let mut writers = Writers::new(context, destination, parquet.map(Path::to_owned))?;
-        let formats = self.formats;
+        let mut writers = Writers::new(context, &destination, partition)?;
+        let formats = &self.formats;
         let rows = match context.selection.names() {
             [] if formats.has_records() => Rows::All,
             [] => Rows::None,
             names => Rows::Named(names),
         };
-        let want =
-            Want { frames: true, observations: formats.influx || formats.thesis, rows, ..Want::default() };
+        let observations = formats.about().any(|about| about.has_observations);
+        let want = Want { frames: true, observations, rows, ..Want::default() };
         let new = || Collected::new(context);
-        let Some(log) = place.own().filter(|_| context.judges) else {
+        let has_words = formats.about().any(|about| about.has_words);
+        let Some(log) = place.own().filter(|_| context.judges || has_words) else {
             return Ok((place.in_parts(want, new, &mut writers)?, writers, None));
         };
-        let mut judge = Judge::new(&Limits::default(), Format::Hums);
+        let mut judge = context.judges.then(|| Judge::new(&Limits::default(), Format::Hums));
+        let said = writers.said();
         let summary = place.in_parts_and_order(log, want, new, &mut writers, &mut |at, item| {
-            judge.item(at, item);
+            if let Some(judge) = &mut judge {
+                judge.item(at, item);
+            }
+            if has_words && context.selection.has_time(at, &context.epochs) {
+                said.borrow_mut().extend(Said::of(at, &item));
+            }
             Ok(())
         })?;
-        Ok((summary, writers, Checked::new(judge.end())))
+        Ok((summary, writers, judge.and_then(|judge| Checked::new(judge.end()))))
     }
 }
 

@@ -12,12 +12,11 @@ use hums_core::clock::Instant;
 use hums_link::{Check, Framer};
 use sha2::{Digest as _, Sha256};
 
-use crate::cli;
-use crate::decode;
-use crate::decode::made::{LogJson, MadeJson, OutputFile};
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write, says_directory};
+use crate::format::{About, Files, Format, Way};
 use crate::logs::marks::PACKED;
+use crate::made::{LogJson, MadeJson, OutputFile};
 use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
@@ -26,12 +25,27 @@ use crate::source::booted::Booted;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
+use crate::{Request, SCHEMA};
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
 
+/// Its line of the table.
+pub(super) const FORMAT: Format = Format {
+    about: About {
+        is_of_frames: true,
+        omits: "an autopilot's own log, findings",
+        ..About::new(
+            "hum",
+            "A log as the box writes it, of one tlog or raw recording; written alone",
+            Files::One("hum"),
+        )
+    },
+    way: Way::Alone(run),
+};
+
 /// Runs `hums decode --format hum`.
-pub fn run(args: &cli::Decode) -> Result<Outcome> {
+fn run(args: &Request) -> Result<Outcome> {
     let (input, path) = (input(args)?, output(args));
     let name = input.to_string();
     let mut inputs = Inputs::none().forcing(args.force);
@@ -92,7 +106,7 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
     let made = OutputFile::of(path, "hum", &[(done.frames, "frame"), (done.log_bytes, "byte")]);
     if args.json {
         let logs = vec![LogJson { name, whole, files: vec![made] }];
-        output::json(decode::SCHEMA, &MadeJson { logs })?;
+        output::json(SCHEMA, &MadeJson { logs })?;
     } else {
         output::line(&printable::word(&made.line()))?;
     }
@@ -100,14 +114,14 @@ pub fn run(args: &cli::Decode) -> Result<Outcome> {
 }
 
 /// The one recording that is read; a usage error if more is asked for than all of it.
-fn input(args: &cli::Decode) -> Result<Endpoint> {
+fn input(args: &Request) -> Result<Endpoint> {
     let is_part = args.session.is_some()
         || args.from.is_some()
         || args.to.is_some()
-        || args.split.is_some()
-        || !args.message.is_empty();
+        || args.split
+        || !args.messages.is_empty();
     match args.inputs.as_slice() {
-        [input] if args.format.len() == 1 && !is_part => {
+        [input] if args.formats.len() == 1 && !is_part => {
             Ok(if input.as_os_str() == "-" { Endpoint::Standard } else { Endpoint::File(input.clone()) })
         }
         _ => Err(usage(
@@ -117,7 +131,7 @@ fn input(args: &cli::Decode) -> Result<Endpoint> {
 }
 
 /// The log's path: in a directory it is named after the recording.
-fn output(args: &cli::Decode) -> PathBuf {
+fn output(args: &Request) -> PathBuf {
     let stem = args.inputs.first().and_then(|input| input.file_stem()).unwrap_or_default();
     if says_directory(&args.output) {
         args.output.join(stem).with_extension("hum")

@@ -11,7 +11,7 @@ pub(super) fn free_name<'a>(name: &'a str, taken: &[&str]) -> Cow<'a, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decode::{columns, influx};
+    use crate::formats::{influx, parquet};
 
     #[test]
     fn only_a_name_that_is_taken_changes() {
@@ -24,7 +24,7 @@ mod tests {
         let messages = hums_dialect::messages();
         let mut renamed = 0;
         for message in messages {
-            for taken in [influx::TAKEN.as_slice(), columns::TAKEN_FRAMES.as_slice()] {
+            for taken in [influx::TAKEN.as_slice(), parquet::TAKEN_FRAMES.as_slice()] {
                 for field in message.fields {
                     let name = free_name(field.name, taken);
                     renamed += u32::from(name != field.name);

@@ -50,9 +50,9 @@ impl Checked {
         (self.by == NOBODY).then_some(why)
     }
 
-    /// Its findings with their times.
-    pub fn findings(&self) -> impl Iterator<Item = (Instant, Row)> {
-        self.findings.iter().map(|finding| (finding.at, finding_row(finding, self.by)))
+    /// Its findings, each with its row.
+    pub fn findings(&self) -> impl Iterator<Item = (&Finding, Row)> {
+        self.findings.iter().map(|finding| (finding, finding_row(finding, self.by)))
     }
 
     /// The row of the log; for a part of it, of the findings in that part.
@@ -142,4 +142,14 @@ pub fn finding_row(finding: &Finding, by: &str) -> Row {
             ("checked_by", text(by)),
         ],
     )
+}
+
+/// A finding in words: `cell_voltage 1 critical: 3.4 V (limit 3.5 V)`.
+pub fn finding_words(finding: &Finding) -> String {
+    let Finding { check, instance, level, value, limit, unit, .. } = finding;
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let number = |number: f32| format!("{}{unit}", (f64::from(number) * 1000.0).round() / 1000.0);
+    let value = if value.is_nan() { String::new() } else { format!(": {}", number(*value)) };
+    let limit = if limit.is_nan() { String::new() } else { format!(" (limit {})", number(*limit)) };
+    format!("{check} {} {}{value}{limit}", u32::from(*instance) + 1, level.name())
 }

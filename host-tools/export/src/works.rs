@@ -35,7 +35,7 @@ pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<Na
 
 /// Whether any of these has messages of its own instead of MAVLink's; an error if one cannot become the
 /// requested format.
-pub(super) fn check_forms(works: &[NamedLog<'_>], formats: Formats) -> Result<bool> {
+pub(super) fn check_forms(works: &[NamedLog<'_>], formats: &Formats) -> Result<bool> {
     let mut native = false;
     for place in works.iter().map(|work| work.log).filter(|place| place.own().is_none()) {
         if place.is_standard() {
@@ -44,11 +44,12 @@ pub(super) fn check_forms(works: &[NamedLog<'_>], formats: Formats) -> Result<bo
         let format = place.open()?.format;
         if !format.is_of_link() {
             native = true;
-            if formats.tlog {
+            if let Some(about) = formats.about().find(|about| about.is_of_frames) {
                 return Err(usage_error(format!(
-                    "{}: is {}, which has no MAVLink frames for a tlog; --format csv, jsonl or parquet has all of it",
+                    "{}: is {}, which has no MAVLink frames for a {}; --format csv, jsonl or parquet has all of it",
                     place.title,
-                    format.with_article()
+                    format.with_article(),
+                    about.name
                 )));
             }
         }

@@ -8,18 +8,19 @@
 //! flight time jumps, and `gaps.csv` names the gaps.
 
 use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use hums_blackbox::Gap;
 use hums_core::clock::{Instant, Span};
-use hums_core::observation::{Observation, Source};
 
-use super::selection::Selection;
+use crate::context::Context;
 use crate::files::{Folder, FolderFile, buffered, settle};
+use crate::format::{About, Files, Finished, Totals, Writer};
+use crate::made::OutputFile;
 use crate::mavlink::values::Scalar;
 use crate::reference::{MOTORS, Quantity, Reference};
-use crate::source::epochs::Epochs;
+use crate::story::{Observed, Story};
 
 /// After a silence of this length, the vehicle's values do not count for the second.
 const SILENCE_MAX: Span = Span::from_secs(10);
@@ -37,12 +38,10 @@ const VFR_HUD: &str =
 const GAPS: &str = "From [s]; To [s]; Cause; Frames missing";
 
 /// The tables of one log, open.
-pub struct Thesis {
+pub(super) struct Thesis {
     folder: Folder,
     tables: [(BufWriter<FolderFile>, PathBuf); 5],
     reference: Reference,
-    selection: Selection,
-    epochs: Epochs,
     /// The next whole second, once the first frame has set it.
     next: Option<u64>,
     /// Rows written to each table.
@@ -50,27 +49,9 @@ pub struct Thesis {
 }
 
 impl Thesis {
-    /// Makes the tables in a folder.
-    pub fn new(folder: Folder, selection: Selection, epochs: Epochs) -> Result<Self> {
-        let table = |name: &str, header: &str| -> Result<(BufWriter<FolderFile>, PathBuf)> {
-            let path = folder.path().join(name);
-            let mut file = buffered(folder.file(name)?);
-            settle(writeln!(file, "{header}"), &path)?;
-            Ok((file, path))
-        };
-        let tables = [
-            table("flightvalues.csv", FLIGHT_VALUES)?,
-            table("esc_status.csv", ESC_STATUS)?,
-            table("esc_info.csv", ESC_INFO)?,
-            table("vfr_hud.csv", VFR_HUD)?,
-            table("gaps.csv", GAPS)?,
-        ];
-        Ok(Self { folder, tables, reference: Reference::new(), selection, epochs, next: None, rows: 0 })
-    }
-
     /// Takes an observation: first come the rows of the seconds that have passed.
-    pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> Result<()> {
-        let at_us = at.as_micros();
+    fn observe(&mut self, context: &Context, observed: &Observed) -> Result<()> {
+        let at_us = observed.at.as_micros();
         let mut next = *self.next.get_or_insert(at_us.next_multiple_of(SECOND_US));
         while next <= at_us {
             let now = Instant::from_micros(next);
@@ -79,25 +60,13 @@ impl Thesis {
                 next = at_us.next_multiple_of(SECOND_US).max(next + SECOND_US);
                 break;
             }
-            if self.selection.has_time(now, &self.epochs) {
+            if context.selection.has_time(now, &context.epochs) {
                 self.rows(now)?;
             }
             next += SECOND_US;
         }
         self.next = Some(next);
-        self.reference.observe(at, source, observation);
-        Ok(())
-    }
-
-    /// Gaps have no rows.
-    pub fn gap(&mut self, gap: &Gap) -> Result<()> {
-        let seconds =
-            |at: Option<Instant>| at.map_or_else(String::new, |at| format!("{:.3}", at.as_secs_f64()));
-        let frames = gap.frames.map_or_else(String::new, |frames| frames.to_string());
-        self.line(4, &[seconds(gap.from), seconds(gap.to), gap.cause.name().to_owned(), frames])?;
-        if let (Some(next), Some(to)) = (self.next, gap.to) {
-            self.next = Some(next.max(to.as_micros().next_multiple_of(SECOND_US)));
-        }
+        self.reference.observe(observed.at, observed.source, &observed.observation);
         Ok(())
     }
 
@@ -131,19 +100,65 @@ impl Thesis {
         let Some((file, path)) = self.tables.get_mut(table) else { return Ok(()) };
         settle(writeln!(file, "{}", cells.join("; ")), path)
     }
+}
 
-    /// Whether no second has a row.
-    pub fn is_empty(&self) -> bool {
+impl Writer for Thesis {
+    const ABOUT: About = About {
+        has_records: false,
+        has_observations: true,
+        omits: "messages besides flight, ESC and speed values, the board's records, findings",
+        ..About::new(
+            "thesis",
+            "Four tables with a row a second, as the thesis has them on which HUMS is built: flight, ESC status, ESC errors, speeds",
+            Files::Tables(Some("thesis"), "csv"),
+        )
+    };
+    type Part = ();
+
+    fn open(context: &Context, path: &Path) -> Result<Self> {
+        let folder = Folder::create(path, &context.inputs, &context.session)?;
+        let table = |name: &str, header: &str| -> Result<(BufWriter<FolderFile>, PathBuf)> {
+            let path = folder.path().join(name);
+            let mut file = buffered(folder.file(name)?);
+            settle(writeln!(file, "{header}"), &path)?;
+            Ok((file, path))
+        };
+        let tables = [
+            table("flightvalues.csv", FLIGHT_VALUES)?,
+            table("esc_status.csv", ESC_STATUS)?,
+            table("esc_info.csv", ESC_INFO)?,
+            table("vfr_hud.csv", VFR_HUD)?,
+            table("gaps.csv", GAPS)?,
+        ];
+        Ok(Self { folder, tables, reference: Reference::new(), next: None, rows: 0 })
+    }
+
+    fn part(&mut self, context: &Context, (): (), story: &Story) -> Result<()> {
+        story.observed.iter().try_for_each(|observed| self.observe(context, observed))
+    }
+
+    /// Gaps have no rows.
+    fn gap(&mut self, _: &Context, gap: &Gap) -> Result<()> {
+        let seconds =
+            |at: Option<Instant>| at.map_or_else(String::new, |at| format!("{:.3}", at.as_secs_f64()));
+        let frames = gap.frames.map_or_else(String::new, |frames| frames.to_string());
+        self.line(4, &[seconds(gap.from), seconds(gap.to), gap.cause.name().to_owned(), frames])?;
+        if let (Some(next), Some(to)) = (self.next, gap.to) {
+            self.next = Some(next.max(to.as_micros().next_multiple_of(SECOND_US)));
+        }
+        Ok(())
+    }
+
+    fn is_empty(&self) -> bool {
         self.rows == 0
     }
 
-    /// All rows are there: the folder gets its name. Returns it and the number of rows.
-    pub fn finish(mut self) -> Result<(PathBuf, u64)> {
+    fn finish(mut self, _: &Context, _: Totals) -> Result<Finished> {
         self.tables.iter_mut().try_for_each(|(file, path)| settle(file.flush(), path))?;
         drop(self.tables);
         let path = self.folder.path().to_owned();
         self.folder.finish()?;
-        Ok((path, self.rows))
+        Ok(OutputFile::of(path, "thesis", &[(self.rows, "second")]).into())
     }
 }
 

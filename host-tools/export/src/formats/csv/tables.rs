@@ -5,19 +5,19 @@ use std::io::{BufWriter, Write as _};
 
 use anyhow::Result;
 
-use super::table::Table;
-use super::text::{columns, push_csv_text};
 use super::unknown::UnknownLines;
 use crate::files::{Folder, FolderFile, buffered, settle};
+use crate::table::Table;
+use crate::text::{columns, push_csv_text};
 
 /// Tables that are open at once at most: there are 16 million ids, and some hundred files for a process.
 const OPEN_MAX: usize = 256;
 
 /// Ids without a definition that have a table of their own at most. The first ones have it; all others share one.
-pub const UNKNOWN_TABLES_MAX: usize = 512;
+pub(crate) const UNKNOWN_TABLES_MAX: usize = 512;
 
 /// The tables, some of them open.
-pub struct Tables {
+pub(crate) struct Tables {
     folder: Folder,
     /// Ids without a definition that have a table of their own.
     unknown: BTreeSet<u32>,
@@ -29,7 +29,7 @@ pub struct Tables {
 
 impl Tables {
     /// Empty; all tables will be in this folder.
-    pub fn new(folder: Folder) -> Self {
+    pub(crate) fn new(folder: Folder) -> Self {
         Self {
             folder,
             unknown: BTreeSet::new(),
@@ -40,14 +40,14 @@ impl Tables {
     }
 
     /// The columns of the monitor's own tables.
-    pub fn headers(&mut self, headers: &BTreeMap<&'static str, Vec<&'static str>>) {
+    pub(crate) fn headers(&mut self, headers: &BTreeMap<&'static str, Vec<&'static str>>) {
         for (name, columns) in headers {
             self.headers.entry(name).or_insert_with(|| columns.clone());
         }
     }
 
     /// Adds lines to a table.
-    pub fn put(&mut self, table: Table, lines: &[u8]) -> Result<()> {
+    pub(crate) fn put(&mut self, table: Table, lines: &[u8]) -> Result<()> {
         let name = format!("{}.csv", table.name());
         let path = self.folder.path().join(&name);
         if let Some(file) = self.open.get_mut(&table) {
@@ -77,7 +77,7 @@ impl Tables {
 
     /// Adds frames of ids without a definition: to the id's own table, or to the one that the ids beyond
     /// [`UNKNOWN_TABLES_MAX`] share.
-    pub fn put_unknown(&mut self, lines: &UnknownLines) -> Result<()> {
+    pub(crate) fn put_unknown(&mut self, lines: &UnknownLines) -> Result<()> {
         let (mut own, mut shared): (BTreeMap<u32, Vec<u8>>, Vec<u8>) = Default::default();
         for line in lines.iter() {
             if self.unknown.len() < UNKNOWN_TABLES_MAX {
@@ -96,17 +96,17 @@ impl Tables {
     }
 
     /// Whether some ids share a table.
-    pub fn has_shared(&self) -> bool {
+    pub(crate) fn has_shared(&self) -> bool {
         self.begun.contains(&Table::Unknowns)
     }
 
     /// Tables so far.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.begun.len()
     }
 
     /// All lines are there: the folder gets its name.
-    pub fn finish(mut self) -> Result<()> {
+    pub(crate) fn finish(mut self) -> Result<()> {
         for (table, mut file) in std::mem::take(&mut self.open) {
             settle(file.flush(), &self.folder.path().join(table.name()))?;
         }

@@ -10,17 +10,17 @@ use parquet::errors::Result;
 use parquet::file::writer::SerializedColumnWriter;
 use parquet::schema::types::Type;
 
-use super::field_names::free_name;
-use super::row::{Cell, CellType, Row};
-use super::table::Table;
+use crate::field_names::free_name;
 use crate::hex::push_hex;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::values::{Payload, Scalar, Value};
+use crate::row::{Cell, CellType, Row, plain_name};
+use crate::table::Table;
 
 /// Names that every table has: its own first columns, and those that its place among the directories adds.
 const TAKEN: [&str; 5] = ["boot_s", "utc", "vehicle", "date", "session"];
 /// Names that tables of frames have: those, and who sent the frame.
-pub(super) const TAKEN_FRAMES: [&str; 7] =
+pub(crate) const TAKEN_FRAMES: [&str; 7] =
     ["boot_s", "utc", "vehicle", "date", "session", "system", "component"];
 /// Texts that are handed to the encoder at once: each takes some 40 bytes there.
 const TEXTS_AT_ONCE: usize = 1024;
@@ -171,15 +171,9 @@ impl Column {
         Self { units, enumeration, length, ..Self::new(name, Kind::of_field(field.kind)) }
     }
 
-    /// `at[s]` as a name would need quoting in every query: it is `at_s` here.
     fn of_cell(name: &'static str, cell: CellType) -> Self {
         let kind = Kind::of_cell(name, cell);
-        let (plain, units) =
-            name.strip_suffix(']').and_then(|name| name.rsplit_once('[')).unwrap_or((name, ""));
-        // An element of an array: `q[0]`.
-        let (plain, units) = if units.parse::<u32>().is_ok() { (name, "") } else { (plain, units) };
-        let plain = if units.is_empty() { plain.to_owned() } else { format!("{plain}_{units}") };
-        let plain = plain.replace('%', "percent");
+        let (plain, units) = plain_name(name);
         Self { units, ..Self::new(free_name(&plain, &TAKEN), kind).optional() }
     }
 
@@ -357,7 +351,7 @@ impl Column {
 
 /// The rows of a table that wait to be written.
 #[derive(Debug)]
-pub struct TableRows {
+pub(crate) struct TableRows {
     columns: Vec<Column>,
     rows: usize,
     /// They are of frames, not of cells.
@@ -372,7 +366,7 @@ impl TableRows {
     }
 
     /// Of the frames of a table.
-    pub fn of_frames(table: Table) -> Self {
+    pub(crate) fn of_frames(table: Table) -> Self {
         let sender = ["system", "component"].map(|name| Column::new(name, Kind::Unsigned(8)));
         let fields = match table {
             Table::Message(id) => {
@@ -410,7 +404,13 @@ impl TableRows {
     }
 
     /// Adds a frame; of a message that is not known its bytes as hexadecimal digits.
-    pub fn frame(&mut self, at: Instant, utc_us: Option<u64>, frame: &Frame<'_>, known: Option<&Payload>) {
+    pub(crate) fn frame(
+        &mut self,
+        at: Instant,
+        utc_us: Option<u64>,
+        frame: &Frame<'_>,
+        known: Option<&Payload>,
+    ) {
         let mut columns = self.begin(at, utc_us);
         let mut push = |value| columns.next().into_iter().for_each(|column| column.push_value(value));
         let number = |number: u32| Value::Scalar(Scalar::Unsigned(number.into()));
@@ -436,7 +436,7 @@ impl TableRows {
     }
 
     /// Adds the rows that come next.
-    pub fn append(&mut self, mut next: Self) {
+    pub(crate) fn append(&mut self, mut next: Self) {
         self.rows += std::mem::take(&mut next.rows);
         for (column, next) in self.columns.iter_mut().zip(&mut next.columns) {
             column.append(next);
@@ -444,7 +444,7 @@ impl TableRows {
     }
 
     /// Takes all rows out, and leaves it empty.
-    pub fn take(&mut self) -> Self {
+    pub(crate) fn take(&mut self) -> Self {
         let (rows, columns) = (std::mem::take(&mut self.rows), &mut self.columns);
         let take = |column: &mut Column| Column {
             name: column.name.clone(),
@@ -460,17 +460,17 @@ impl TableRows {
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
     /// Whether the rows are frames.
-    pub fn has_frames(&self) -> bool {
+    pub(crate) fn has_frames(&self) -> bool {
         self.has_frames
     }
 
     /// Bytes of memory that they take.
-    pub fn held_bytes(&self) -> usize {
+    pub(crate) fn held_bytes(&self) -> usize {
         self.columns.iter().map(Column::held_bytes).sum()
     }
 }
