@@ -36,7 +36,13 @@ pub mod field_names;
 pub mod format;
 pub mod formats;
 pub mod identity;
+mod journey;
 pub mod made;
+<<<<<<< HEAD
+=======
+mod motion;
+pub mod naming;
+>>>>>>> 4eb6f9dd (Decode to MCAP, ULog, KML, GPX and SRT)
 mod native;
 pub mod record;
 pub mod row;
