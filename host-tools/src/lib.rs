@@ -52,6 +52,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Report(args) => report::run(&args.request()),
         Command::Live(args) => live::run(args),
         Command::Decode(args) => decode::run(&args.request()),
+        Command::Share(args) => decode::share::run(&args.request()),
         Command::Info(args) => info::run(args),
         Command::Sim(args) => run::sim::run(args),
         Command::Box(args) => match &args.action {

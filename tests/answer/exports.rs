@@ -14,16 +14,30 @@ fn read(recording: &str, at_least: &[(&str, u64)]) {
     let (input, out) = (root().join("tests").join(recording), dir.path());
     let log = out.join("log.hum");
     let input = if recording.contains(".tlog") {
-        hums(["decode".as_ref(), input.as_os_str(), "-o".as_ref(), log.as_os_str(), "--format".as_ref(), "hum".as_ref()])
-            .expect_code(&[0, 3]);
+        hums([
+            "decode".as_ref(),
+            input.as_os_str(),
+            "-o".as_ref(),
+            log.as_os_str(),
+            "--format".as_ref(),
+            "hum".as_ref(),
+        ])
+        .expect_code(&[0, 3]);
         log
     } else {
         input
     };
     let files = out.join("files");
     let formats = "jsonl,mcap,ulog,kml,gpx,srt";
-    hums(["decode".as_ref(), input.as_os_str(), "-o".as_ref(), files.as_os_str(), "--format".as_ref(), formats.as_ref()])
-        .expect_code(&[0, 3]);
+    hums([
+        "decode".as_ref(),
+        input.as_os_str(),
+        "-o".as_ref(),
+        files.as_os_str(),
+        "--format".as_ref(),
+        formats.as_ref(),
+    ])
+    .expect_code(&[0, 3]);
     let names = fs::read_dir(&files).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let jsonl = names.into_iter().find(|name| name.ends_with(".jsonl")).unwrap();
     let found = oracle::exports(&files, jsonl.strip_suffix(".jsonl").unwrap());
@@ -63,10 +77,21 @@ fn a_vehicle_on_a_link_reads_back_from_each_format() {
 fn an_autopilots_own_log_reads_back_from_each_format() {
     read(
         "labelled/bin/f12_gps_jump.bin.gz",
-        &[("/mcap/messages", 10_000), ("/mcap/~1texts", 2), ("/ulog/vehicle_attitude", 500), ("/ulog/parameters", 500), ("/gpx/places", 100)],
+        &[
+            ("/mcap/messages", 10_000),
+            ("/mcap/~1texts", 2),
+            ("/ulog/vehicle_attitude", 500),
+            ("/ulog/parameters", 500),
+            ("/gpx/places", 100),
+        ],
     );
     read(
         "labelled/px4/p23_motor_dead_quad.cut.ulg.gz",
-        &[("/mcap/messages", 10_000), ("/ulog/vehicle_attitude", 100), ("/ulog/parameters", 800), ("/gpx/places", 20)],
+        &[
+            ("/mcap/messages", 10_000),
+            ("/ulog/vehicle_attitude", 100),
+            ("/ulog/parameters", 800),
+            ("/gpx/places", 20),
+        ],
     );
 }

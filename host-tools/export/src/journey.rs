@@ -139,7 +139,7 @@ pub(crate) fn push_xml(out: &mut String, text: &str) {
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'.. => {
-                out.push(character)
+                out.push(character);
             }
             _ => out.push('\u{fffd}'),
         }

@@ -38,15 +38,12 @@ pub mod formats;
 pub mod identity;
 mod journey;
 pub mod made;
-<<<<<<< HEAD
-=======
 mod motion;
-pub mod naming;
->>>>>>> 4eb6f9dd (Decode to MCAP, ULog, KML, GPX and SRT)
 mod native;
 pub mod record;
 pub mod row;
 pub mod selection;
+pub mod share;
 pub mod story;
 pub mod table;
 pub mod text;
@@ -96,6 +93,7 @@ pub const SCHEMA: Schema = Schema::first("hums-decode");
 
 /// The request of `hums decode`.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Request {
     /// Logs, images, recordings, and folders of them.
     pub inputs: Vec<PathBuf>,

@@ -29,9 +29,9 @@ pub struct LogJson {
 #[derive(Debug, Serialize)]
 pub struct OutputFile {
     path: PathBuf,
-    /// `tlog`, `jsonl`, `influx`, `gaps`, `csv`, `thesis`, `parquet`.
+    /// The name of a format, or `gaps`.
     format: &'static str,
-    /// Counts of its content: `frames`, `records`, `rows`, `tables`, `objects`, `points`, `seconds`.
+    /// Counts of its content: `frames`, `records`, `rows`, `tables`, `objects` and so on.
     counts: BTreeMap<String, u64>,
     #[serde(skip)]
     words: String,

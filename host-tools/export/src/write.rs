@@ -20,7 +20,7 @@ use crate::source::parts::Deliver;
 /// The open files of one log.
 pub struct Writers<'a> {
     context: &'a Context,
-    writers: Vec<Box<dyn AnyWriter>>,
+    files: Vec<Box<dyn AnyWriter>>,
     /// Texts and parameters of a log of ours, whose parts have none.
     said: Rc<RefCell<Vec<Said>>>,
     frames: u64,
@@ -34,15 +34,15 @@ impl<'a> Writers<'a> {
     /// Opens the files that are always written; a table is opened for its first row. `partition` is the folder of this
     /// session.
     pub fn new(context: &'a Context, destination: &Destination, partition: Option<&Path>) -> Result<Self> {
-        let mut writers = Vec::new();
+        let mut files = Vec::new();
         for (about, way) in context.formats.ways() {
             let Way::Parts { open, .. } = way else { continue };
             let path = destination.path(about.files).or_else(|| partition.map(Path::to_owned));
-            writers.push(open(context, &path.unwrap_or_else(|| PathBuf::from("-")))?);
+            files.push(open(context, &path.unwrap_or_else(|| PathBuf::from("-")))?);
         }
         Ok(Self {
             context,
-            writers,
+            files,
             said: Rc::default(),
             frames: 0,
             records: 0,
@@ -90,7 +90,7 @@ impl<'a> Writers<'a> {
         self.on_board.and(collected.on_board);
         self.rows_left_out += collected.rows_left_out;
         collected.story.said.append(&mut self.said.borrow_mut());
-        for (writer, part) in self.writers.iter_mut().zip(collected.parts) {
+        for (writer, part) in self.files.iter_mut().zip(collected.parts) {
             writer.part(self.context, part, &collected.story)?;
         }
         Ok(())
@@ -99,7 +99,7 @@ impl<'a> Writers<'a> {
     /// Whether only the beginnings of files were written.
     pub fn is_empty(&self) -> bool {
         let has_records = self.context.formats.has_records() && self.records > 0;
-        self.frames == 0 && !has_records && self.writers.iter().all(|writer| writer.is_empty())
+        self.frames == 0 && !has_records && self.files.iter().all(|writer| writer.is_empty())
     }
 
     /// Rows that were left out.
@@ -117,7 +117,7 @@ impl<'a> Writers<'a> {
                 "{rows} left out: the names of its tables take more room than any autopilot's"
             ));
         }
-        for writer in self.writers {
+        for writer in self.files {
             let Finished { made, remarks } = writer.finish(self.context, totals)?;
             all.made.extend(made);
             all.remarks.extend(remarks);
@@ -131,7 +131,7 @@ impl<'a> Deliver<Collected<'a>> for Writers<'a> {
         let gap = &gap.to_own();
         let mut collected = Collected::new(self.context);
         collected.gap(gap);
-        for writer in &mut self.writers {
+        for writer in &mut self.files {
             writer.gap(self.context, gap)?;
         }
         self.put(collected)

@@ -208,12 +208,22 @@ mod tests {
 
     #[test]
     fn outputs_are_known_by_their_names_and_recordings_are_not_taken_for_them() {
-        for made in ["00001-box3f-s1a2b3c4d.jsonl", "log-s1a2b3c4d-2.lp", "log-s1a2b3c4d.kml", "a.tlog-r00112233.tlog.gaps.csv"] {
+        for made in [
+            "00001-box3f-s1a2b3c4d.jsonl",
+            "log-s1a2b3c4d-2.lp",
+            "log-s1a2b3c4d.kml",
+            "a.tlog-r00112233.tlog.gaps.csv",
+        ] {
             assert!(is_made(Path::new(made)), "{made}");
         }
-        for other in
-            ["log-s1a2b3c4d.hum", "log-s1a2b3c4d.tlog", "log-s1a2b3c4d.ulg", "log-s1a2b3c4.jsonl", "notes.jsonl", "x.html"]
-        {
+        for other in [
+            "log-s1a2b3c4d.hum",
+            "log-s1a2b3c4d.tlog",
+            "log-s1a2b3c4d.ulg",
+            "log-s1a2b3c4.jsonl",
+            "notes.jsonl",
+            "x.html",
+        ] {
             assert!(!is_made(Path::new(other)), "{other}");
         }
     }

@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub use check::Check;
 pub use live::Live;
-pub use read::{Decode, Info, Report, Split};
+pub use read::{Decode, Info, Report, Share, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull};
@@ -59,8 +59,10 @@ pub enum Command {
     Report(Report),
     /// Show the vehicle as it flies, on a page that this program serves: from a link, a recording or a log
     Live(Live),
-    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, InfluxDB
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, MCAP, ULog, KML and others
     Decode(Decode),
+    /// Copy a log without where and who: places and times moved, names, numbers and secrets removed
+    Share(Share),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
-use crate::decode::Request;
 use crate::decode::format::Format;
 use crate::decode::formats::{FORMATS, find};
+use crate::decode::{Request, share};
 use crate::endpoint::without_slash;
 use crate::report;
 use crate::utc::When;
@@ -114,6 +114,40 @@ impl Decode {
 fn format() -> impl TypedValueParser<Value = &'static Format> {
     let values = FORMATS.iter().map(|format| PossibleValue::new(format.about.name).help(format.about.help));
     PossibleValuesParser::new(values).try_map(|name| find(&name).ok_or("is no format"))
+}
+
+const SHARE_EXAMPLES: &str = "Examples:
+  hums share flight.tlog -o shared.tlog
+  hums share card.img --session 00001 -o shared.tlog
+  hums share flight.ulg -o shared.ulg
+
+A recording of a link becomes a tlog, an autopilot's own log a ULog. The output lists the data that was moved and removed.
+Look at the copy before you publish it: docs/decode.md says what the rest of it still tells.";
+
+/// `hums share`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = SHARE_EXAMPLES)]
+pub struct Share {
+    /// One log, or a card image with --session
+    #[arg(value_name = "LOG|IMAGE", value_parser = input())]
+    pub input: PathBuf,
+    /// Only this session of a card or folder, by the name that `hums info --list` prints
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
+    /// The file to write
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Overwrite a file that exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl Share {
+    /// The request that the arguments make.
+    pub fn request(&self) -> share::Request {
+        let Self { input, session, output, force } = self.clone();
+        share::Request { input, session, output, force }
+    }
 }
 
 const INFO_EXAMPLES: &str = "Examples:

@@ -55,10 +55,14 @@ fn piece(context: &Context, places: &[(Instant, Fix)]) -> String {
     };
     if let Some(times) = times {
         out.push_str("<gx:Track><altitudeMode>absolute</altitudeMode>\n");
-        times.iter().for_each(|time| push_element(&mut out, "when", time));
+        for time in &times {
+            push_element(&mut out, "when", time);
+        }
         let mut all = String::new();
         coordinates(&mut all, ' ', "\n");
-        all.lines().for_each(|place| push_element(&mut out, "gx:coord", place));
+        for place in all.lines() {
+            push_element(&mut out, "gx:coord", place);
+        }
         out.push_str("</gx:Track>");
     } else {
         out.push_str("<LineString><altitudeMode>absolute</altitudeMode><coordinates>\n");

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use hums_core::clock::Instant;
 
-use crate::checked::finding_words;
+use crate::checked::{Checked, finding_words};
 use crate::context::Context;
 use crate::format::{About, Files, Finished, Single, Totals, Writer};
 use crate::journey::{Findings, utc};
@@ -102,7 +102,7 @@ impl Writer for Srt {
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         // Those of this program are known before; those of a board come in order.
-        let findings = context.checked.iter().flat_map(|checked| checked.findings());
+        let findings = context.checked.iter().flat_map(Checked::findings);
         let findings = findings.map(|(finding, _)| finding.clone()).collect();
         let file = Single::open(context, path)?;
         Ok(Self { file, reference: Reference::new(), begin_us: None, next_us: 0, findings, cues: 0 })

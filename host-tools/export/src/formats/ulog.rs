@@ -9,7 +9,10 @@ use std::path::Path;
 use anyhow::Result;
 use hums_blackbox::Gap;
 use hums_core::clock::Instant;
-use hums_core::observation::{Autopilot, Imu, LandedState, Observation, VehicleKind, VtolState};
+use hums_core::observation::{
+    Autopilot, Battery, Gnss, Heartbeat, Imu, LandedState, Observation, VehicleKind, VtolState,
+};
+use hums_core::vehicle::Vehicle;
 
 use crate::checked::finding_words;
 use crate::context::Context;
@@ -80,7 +83,7 @@ enum Topic {
 
 /// The pilot's channels and the findings of a part.
 #[derive(Default)]
-pub(super) struct Words {
+pub(crate) struct Words {
     channels: Vec<(Instant, Vec<u8>)>,
     findings: Vec<Finding>,
 }
@@ -129,10 +132,62 @@ impl Fields {
     fn maybe(&mut self, values: impl IntoIterator<Item = Option<f32>>) {
         self.floats(values.into_iter().map(|value| value.unwrap_or(f32::NAN)));
     }
+
+    fn gnss(&mut self, gnss: &Gnss, utc_us: Option<u64>) {
+        self.bytes(utc_us.unwrap_or(0).to_le_bytes());
+        let place = gnss.position.map(|place| [place.latitude_deg, place.longitude_deg]);
+        for degrees in place.unwrap_or_default() {
+            self.bytes(((degrees * 1e7).round() as i32).to_le_bytes());
+        }
+        let altitude_mm = gnss.altitude.map_or(0.0, |altitude| altitude.0 * 1e3);
+        self.bytes((altitude_mm.round() as i32).to_le_bytes());
+        self.maybe([
+            gnss.hdop,
+            gnss.accuracy.map(|accuracy| accuracy.0),
+            gnss.speed.map(|speed| speed.0),
+            gnss.course.map(|course| course.0),
+        ]);
+        self.bytes([gnss.fix, gnss.satellites.unwrap_or(0)]);
+    }
+
+    fn battery(&mut self, battery: &Battery) {
+        self.maybe([
+            battery.voltage.map(|value| value.0),
+            battery.current.map(|value| value.0),
+            battery.consumed.map(|value| value.0 * 1e3),
+            battery.remaining.map(|value| value.0),
+            battery.temperature.map(|value| value.0),
+        ]);
+        self.floats(battery.cells.map(|cell| cell.map_or(0.0, |cell| cell.volts().0)));
+        self.bytes([battery.cells_reported() as u8, battery.id, 1]);
+    }
+
+    fn status(&mut self, heartbeat: &Heartbeat, vehicle: &Vehicle) {
+        // `ARMING_STATE_ARMED`, `ARMING_STATE_STANDBY`
+        let arming = if heartbeat.armed { 2 } else { 1 };
+        let nav = if heartbeat.autopilot == Autopilot::Px4 { nav_state(heartbeat.mode) } else { None };
+        let kind = match heartbeat.kind {
+            VehicleKind::Rotorcraft => 1,
+            VehicleKind::Plane => 2,
+            VehicleKind::Vtol => {
+                if vehicle.vtol == VtolState::Forward {
+                    2
+                } else {
+                    1
+                }
+            }
+            VehicleKind::Surface => 3,
+            VehicleKind::Other => 0,
+        };
+        let system = vehicle.source.map_or(0, |source| source.system);
+        let flags = [heartbeat.kind == VehicleKind::Vtol, vehicle.vtol == VtolState::Transition];
+        self.bytes([arming, nav.unwrap_or(NO_MODE), kind, heartbeat.type_number, system]);
+        self.bytes(flags.map(u8::from));
+    }
 }
 
 /// The open file. Parameters stand at its beginning, and are known last.
-pub(super) struct Ulog {
+pub(crate) struct Ulog {
     file: Single,
     data: Spool,
     motion: Motion,
@@ -170,16 +225,12 @@ fn parameter(name: &str, value: f64) -> Vec<u8> {
 impl Ulog {
     fn put(&mut self, (topic, instance): (Topic, u8), at: Instant, fields: &Fields) -> Result<()> {
         let next = self.numbers.len() as u16;
-        let number = match self.numbers.get(&(topic, instance)) {
-            Some(known) => *known,
-            None => {
-                self.numbers.insert((topic, instance), next);
-                let name = TOPICS.get(topic as usize).map_or("", |(name, _)| name);
-                let content = [&[instance][..], &next.to_le_bytes(), name.as_bytes()].concat();
-                self.data.write(&message(b'A', &content))?;
-                next
-            }
-        };
+        let number = *self.numbers.entry((topic, instance)).or_insert(next);
+        if number == next {
+            let name = TOPICS.get(topic as usize).map_or("", |(name, _)| name);
+            let content = [&[instance][..], &next.to_le_bytes(), name.as_bytes()].concat();
+            self.data.write(&message(b'A', &content))?;
+        }
         self.first.get_or_insert(at);
         self.messages += 1;
         let content = [&number.to_le_bytes()[..], &at.as_micros().to_le_bytes(), &fields.0].concat();
@@ -214,7 +265,6 @@ impl Ulog {
 
     fn observe(&mut self, at: Instant, utc_us: Option<u64>, observation: &Observation) -> Result<()> {
         let mut fields = Fields::default();
-        let known = |value: Option<f32>| value.unwrap_or(f32::NAN);
         let topic = match observation {
             Observation::Attitude(attitude) => {
                 if let Some(rates) = attitude.rates {
@@ -242,57 +292,15 @@ impl Ulog {
                 (Topic::GlobalPosition, 0)
             }
             Observation::Gnss(gnss) => {
-                fields.bytes(utc_us.unwrap_or(0).to_le_bytes());
-                let place = gnss.position.map(|place| [place.latitude_deg, place.longitude_deg]);
-                for degrees in place.unwrap_or_default() {
-                    fields.bytes(((degrees * 1e7).round() as i32).to_le_bytes());
-                }
-                let altitude_mm = gnss.altitude.map_or(0.0, |altitude| altitude.0 * 1e3);
-                fields.bytes((altitude_mm.round() as i32).to_le_bytes());
-                fields.maybe([
-                    gnss.hdop,
-                    gnss.accuracy.map(|accuracy| accuracy.0),
-                    gnss.speed.map(|speed| speed.0),
-                    gnss.course.map(|course| course.0),
-                ]);
-                fields.bytes([gnss.fix, gnss.satellites.unwrap_or(0)]);
+                fields.gnss(gnss, utc_us);
                 (Topic::Gnss, gnss.instance)
             }
             Observation::Battery(battery) => {
-                fields.floats([
-                    known(battery.voltage.map(|value| value.0)),
-                    known(battery.current.map(|value| value.0)),
-                    known(battery.consumed.map(|value| value.0 * 1e3)),
-                    known(battery.remaining.map(|value| value.0)),
-                    known(battery.temperature.map(|value| value.0)),
-                ]);
-                fields.floats(battery.cells.map(|cell| cell.map_or(0.0, |cell| cell.volts().0)));
-                fields.bytes([battery.cells_reported() as u8, battery.id, 1]);
+                fields.battery(battery);
                 (Topic::Battery, battery.id)
             }
             Observation::Heartbeat(heartbeat) => {
-                // `ARMING_STATE_ARMED`, `ARMING_STATE_STANDBY`
-                let arming = if heartbeat.armed { 2 } else { 1 };
-                let nav =
-                    if heartbeat.autopilot == Autopilot::Px4 { nav_state(heartbeat.mode) } else { None };
-                let vehicle = &self.motion.vehicle();
-                let kind = match heartbeat.kind {
-                    VehicleKind::Rotorcraft => 1,
-                    VehicleKind::Plane => 2,
-                    VehicleKind::Vtol => {
-                        if vehicle.vtol == VtolState::Forward {
-                            2
-                        } else {
-                            1
-                        }
-                    }
-                    VehicleKind::Surface => 3,
-                    VehicleKind::Other => 0,
-                };
-                let system = vehicle.source.map_or(0, |source| source.system);
-                let flags = [heartbeat.kind == VehicleKind::Vtol, vehicle.vtol == VtolState::Transition];
-                fields.bytes([arming, nav.unwrap_or(NO_MODE), kind, heartbeat.type_number, system]);
-                fields.bytes(flags.map(u8::from));
+                fields.status(heartbeat, self.motion.vehicle());
                 (Topic::Status, 0)
             }
             Observation::Imu(imu) | Observation::ImuAndAir(imu, _) => {

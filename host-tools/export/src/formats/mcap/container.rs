@@ -106,9 +106,9 @@ impl Record {
     }
 }
 
-fn span_with(span: Option<(u64, u64)>, time_ns: u64) -> Option<(u64, u64)> {
+fn span_with(span: Option<(u64, u64)>, time_ns: u64) -> (u64, u64) {
     let (first, last) = span.unwrap_or((time_ns, time_ns));
-    Some((first.min(time_ns), last.max(time_ns)))
+    (first.min(time_ns), last.max(time_ns))
 }
 
 impl Container {
@@ -174,8 +174,8 @@ impl Container {
         chunk.records.extend_from_slice(&time_ns.to_le_bytes());
         chunk.records.extend_from_slice(&time_ns.to_le_bytes());
         chunk.records.extend_from_slice(data);
-        chunk.span = span_with(chunk.span, time_ns);
-        self.span = span_with(self.span, time_ns);
+        chunk.span = Some(span_with(chunk.span, time_ns));
+        self.span = Some(span_with(self.span, time_ns));
         if self.chunk.records.len() >= CHUNK_BYTES { self.end_chunk() } else { Ok(()) }
     }
 

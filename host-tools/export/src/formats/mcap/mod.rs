@@ -266,7 +266,7 @@ impl Mcap {
                 known.for_each(|(number, value)| float(out, number, value));
                 let cells = battery.cells.iter().flatten();
                 inside(out, 7, |out| {
-                    cells.for_each(|cell| out.extend_from_slice(&cell.volts().0.to_le_bytes()))
+                    cells.for_each(|cell| out.extend_from_slice(&cell.volts().0.to_le_bytes()));
                 });
             }),
             _ => {}
@@ -278,13 +278,11 @@ impl Mcap {
         rows: &BTreeMap<&'static str, Row>,
         (topic, time_ns, data): (Topic, u64, &[u8]),
     ) -> Result<()> {
-        match self.channel(topic, rows) {
-            Some(channel) => self.file.message(channel, time_ns, data),
-            None => {
-                self.left_out += 1;
-                Ok(())
-            }
+        if let Some(channel) = self.channel(topic, rows) {
+            return self.file.message(channel, time_ns, data);
         }
+        self.left_out += 1;
+        Ok(())
     }
 }
 

@@ -128,7 +128,9 @@ pub(super) fn file(
         for (name, fields, enumeration) in messages {
             inside(out, 4, |out| {
                 bytes(out, 1, name.as_bytes());
-                fields.iter().for_each(|field| inside(out, 2, |out| define(out, field)));
+                for field in fields {
+                    inside(out, 2, |out| define(out, field));
+                }
                 if let Some((name, values)) = enumeration {
                     inside(out, 4, |out| {
                         bytes(out, 1, name.as_bytes());
