@@ -19,7 +19,6 @@ use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::loss;
-use crate::manifest::Manifest;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
@@ -27,6 +26,7 @@ use crate::printable::{path, word};
 use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
 use hums_analysis::log_json::images_json;
+use hums_analysis::manifest::Manifest;
 
 /// What `hums info --verify --json` prints.
 const SCHEMA: Schema = Schema::first("hums-info-verify");
@@ -88,7 +88,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
         let refuse = Inputs::of(read.iter().map(PathBuf::as_path));
-        manifest.write(to, &read, &[], &refuse)?;
+        manifest.write(cli::PROGRAM, to, &read, &[], &refuse)?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));

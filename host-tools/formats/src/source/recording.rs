@@ -165,6 +165,7 @@ impl Place {
                 // Observations of a frame stay with it.
                 Item::Observation(..) => !is_of_link,
                 Item::Frame(_) | Item::Row(_) | Item::Gap(_) => true,
+                Item::Text(_) | Item::Parameter(_) => false,
                 _ => return Ok(()),
             };
             let is_full = items >= PART_ITEMS || part.held_bytes() >= PART_BYTES;

@@ -36,7 +36,7 @@ use std::io::Read;
 
 use anyhow::Result;
 
-pub use self::px4::mode_name;
+pub use self::px4::{mode_name, nav_state};
 use super::input::Input;
 use super::item::{Reader, Summary, Take, Want};
 use window::Window;

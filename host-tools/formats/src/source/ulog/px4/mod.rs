@@ -18,7 +18,7 @@ mod tests;
 
 use hums_core::clock::Instant;
 
-pub use self::system::mode_name;
+pub use self::system::{mode_name, nav_state};
 
 pub(super) use state::{Px4, Report, Sample, Topic};
 

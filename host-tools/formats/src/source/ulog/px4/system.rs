@@ -189,6 +189,12 @@ fn custom_mode(nav: u8) -> u32 {
     mode.map_or(0, |&(_, main, sub, _)| u32::from(main) << 16 | u32::from(sub) << 24)
 }
 
+/// The `nav_state` of a mode in `HEARTBEAT.custom_mode`. `PX4` sends manual flight for a termination too, and a landing for a descent.
+pub fn nav_state(mode: u32) -> Option<u8> {
+    let mut navs = MODES.iter().map(|(nav, ..)| *nav).filter(|nav| !matches!(nav, 8 | 9 | 12 | 13));
+    navs.find(|nav| mode != 0 && custom_mode(*nav) == mode)
+}
+
 fn status(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let bits = |field| Some(fields.count(field)? as u32);
