@@ -13,15 +13,13 @@ pub use hums_base::{
     archive, colour, duplex, endpoint, files, hex, interrupt, outcome, output, plural, printable, progress,
     rng, sink, utc,
 };
+pub use hums_export as decode;
 pub use hums_formats::{card, ending, followed, logs, loss, mavlink, names, naming, source, statustext};
 pub use hums_report::{page, report};
 
 pub mod cli;
-pub mod decode;
 pub mod info;
 pub mod live;
-pub mod manifest;
-pub mod pack;
 pub mod run;
 pub mod shell;
 pub mod talk;
@@ -68,7 +66,8 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Check(args) => check::run(&args.request()),
         Command::Report(args) => report::run(&args.request()),
         Command::Live(args) => live::run(args),
-        Command::Decode(args) => decode::run(args),
+        Command::Decode(args) => decode::run(&args.request()),
+        Command::Share(args) => decode::share::run(&args.request()),
         Command::Info(args) => info::run(args),
         Command::Due(args) => info::due::run(args),
         Command::Sim(args) => run::sim::run(args),

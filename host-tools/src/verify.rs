@@ -1,27 +1,24 @@
 //! `hums info --verify`: every check there is, each with what it looked at and what failed.
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use hums_blackbox::record::Lost;
-use hums_blackbox::{BlockCounts, Cause, Gap};
 use serde::Serialize;
 
 use crate::cli;
 use crate::colour::level;
 use crate::ending::{
     BlocksJson, EndJson, Ending, SessionBefore, among_words, behind_words, copies_words, made_again_words,
-    not_taken_words, unprotected_words,
+    unprotected_words,
 };
 use crate::files::Inputs;
 use crate::followed::EndResolver;
-use crate::logs::sessions::{Sessions, place};
+use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{self, Found, find::Image};
 use crate::loss;
-use crate::manifest::Manifest;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::plural::count;
@@ -29,6 +26,7 @@ use crate::printable::{path, word};
 use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
 use hums_analysis::log_json::images_json;
+use hums_analysis::manifest::Manifest;
 
 /// What `hums info --verify --json` prints.
 const SCHEMA: Schema = Schema::first("hums-info-verify");
@@ -39,9 +37,9 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     for remark in &found.remarks {
         note!("{remark}");
     }
-    // First the files that are no logs, then the logs.
-    let (mut ok, mut worst, mut weakened) = (!found.is_cut(), Verdict::Holds, Weakened::default());
-    let (mut logs, mut without_earlier) = (0_u64, WithoutEarlier::default());
+    let mut ok = !found.is_cut();
+    let mut all =
+        Totals { logs: 0, worst: Verdict::Holds, made_again: 0, unprotected: 0, without_earlier: None };
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
         for words in words {
@@ -65,14 +63,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
         manifest.log(&overview.ending.name, Some(&overview.ending), &[]);
-        worst = worst.max(log.verdict);
-        weakened.made_again += overview.ending.made_again();
-        weakened.unprotected += overview.ending.unprotected();
-        weakened.not_taken += overview.ending.not_taken();
-        logs += u64::from(overview.ending.is_counted());
-        if overview.ending.is_without_earlier() {
-            without_earlier.add(&overview.ending.name);
-        }
+        all.add(&overview.ending, log.verdict);
         if let Some(list) = &mut list {
             return list.element(&log);
         }
@@ -84,19 +75,20 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         }
         Ok(())
     })?;
-    let worst = if ok && failed == 0 { worst } else { Verdict::NotProved };
-    let ok = worst != Verdict::NotProved && !weakened.is_damage();
+    if !ok || failed > 0 {
+        all.worst = Verdict::NotProved;
+    }
+    let ok = all.worst != Verdict::NotProved && !all.is_damage();
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
-        let logs = count(logs, "session");
-        let verdict = without_earlier.verdict(worst, weakened, found.has_passed_over());
-        output::line(&format!("{logs}: {verdict}"))?;
+        let words = all.words(found.has_passed_over());
+        output::line(&format!("{}: {words}", count(all.logs, "session")))?;
     }
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
         let refuse = Inputs::of(read.iter().map(PathBuf::as_path));
-        manifest.write(to, &read, &[], &refuse)?;
+        manifest.write(cli::PROGRAM, to, &read, &[], &refuse)?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));
@@ -104,66 +96,54 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     Ok(Outcome::lossy(!ok))
 }
 
-/// What cards have lost without a loss of frames: sectors that were made again, and parity that is missing.
-#[derive(Clone, Copy, Default, PartialEq, Eq)]
-struct Weakened {
+/// Totals of all logs.
+struct Totals {
+    /// Number of sessions.
+    logs: u64,
+    worst: Verdict,
+    /// Sectors that were rebuilt, and missing ones with parity: a card is damaged, and no frame is lost.
     made_again: u64,
     unprotected: u64,
-    /// Parity that its card may have refused.
-    not_taken: u64,
+    /// The first log of a card of which the logs before it were not read.
+    without_earlier: Option<String>,
 }
 
-impl Weakened {
-    /// Whether a card has lost any of it.
-    const fn is_damage(self) -> bool {
-        self.made_again + self.unprotected > 0
-    }
-}
-
-/// Logs whose earlier logs on the same card were not read: the name of the first such log, and the number of other
-/// cards with one.
-#[derive(Default)]
-struct WithoutEarlier {
-    first: Option<String>,
-    more: u64,
-    card: Option<String>,
-}
-
-impl WithoutEarlier {
-    fn add(&mut self, log: &str) {
-        let (card, _) = place(log);
-        if self.card.as_deref() != Some(card) {
-            self.more += u64::from(self.first.is_some());
-            self.card = Some(card.to_owned());
-            self.first.get_or_insert_with(|| log.to_owned());
+impl Totals {
+    fn add(&mut self, ending: &Ending, verdict: Verdict) {
+        self.worst = self.worst.max(verdict);
+        self.made_again += ending.made_again();
+        self.unprotected += ending.unprotected();
+        self.logs += u64::from(ending.is_counted());
+        if ending.is_without_earlier() {
+            self.without_earlier.get_or_insert_with(|| ending.name.clone());
         }
     }
 
-    /// The verdict on all logs, limited to those that were read.
-    fn verdict(&self, worst: Verdict, weakened: Weakened, has_passed_over: bool) -> String {
-        let all = self.first.is_none() && !has_passed_over;
-        let words = match (worst, weakened == Weakened::default(), all) {
-            (Verdict::Holds, true, true) => "everything holds",
-            (Verdict::Holds, true, false) => "all that was read holds",
-            (Verdict::Holds, _, true) => "nothing is lost",
-            (Verdict::Holds, _, false) => "nothing is lost of what was read",
+    /// Whether a card has lost any of it.
+    const fn is_damage(&self) -> bool {
+        self.made_again + self.unprotected > 0
+    }
+
+    /// The verdict on all logs that were read.
+    fn words(&self, has_passed_over: bool) -> String {
+        let all = self.without_earlier.is_none() && !has_passed_over;
+        let words = match (self.worst, self.is_damage(), all) {
+            (Verdict::Holds, false, true) => "everything holds",
+            (Verdict::Holds, false, false) => "all that was read holds",
+            (Verdict::Holds, true, true) => "nothing is lost",
+            (Verdict::Holds, true, false) => "nothing is lost of what was read",
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
             (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
         };
-        let weakened = [
-            made_again_words(weakened.made_again),
-            unprotected_words(weakened.unprotected),
-            not_taken_words(weakened.not_taken),
+        let earlier = self.without_earlier.as_ref();
+        let more = [
+            made_again_words(self.made_again),
+            unprotected_words(self.unprotected),
+            earlier.map(|first| format!("the logs before {} were not read", word(first))),
+            has_passed_over.then(|| "what was passed over was not read".to_owned()),
         ];
-        let weakened = weakened.into_iter().flatten().fold(String::new(), |all, words| all + "; " + &words);
-        let more = match self.more {
-            0 => String::new(),
-            more => format!(" and before {}", count(more, "more log")),
-        };
-        let first = self.first.as_ref();
-        let earlier = first.map(|first| format!("; the logs before {}{more} were not read", word(first)));
-        let passed_over = if has_passed_over { "; what was passed over was not read" } else { "" };
-        format!("{words}{weakened}{}{passed_over}", earlier.unwrap_or_default())
+        let parts = [words.to_owned()].into_iter().chain(more.into_iter().flatten());
+        parts.collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -204,90 +184,21 @@ pub fn verdict(log: &Overview) -> Verdict {
 
 /// The check of sectors that the card has lost, and that parity has rebuilt.
 const INTACT: &str = "sectors intact";
-/// The check of where a log ends.
-const END: &str = "end";
-/// The check of the session that was recorded before a log.
-const SESSION_BEFORE: &str = "session before";
 
-/// What of a session is to be judged: what is missing before or after that was left out on purpose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Extent {
-    /// It begins with the session.
-    pub from_start: bool,
-    /// It goes to the session's end.
-    pub to_end: bool,
-    /// What was recorded just before it is judged too.
-    pub follows: bool,
-}
-
-impl Extent {
-    /// All of it, with what the logs tell of each other, as `hums info --verify` judges.
-    pub const ALL: Self = Self { from_start: true, to_end: true, follows: true };
-}
-
-/// The checks that fail of a log that was read with [`Overview::verified`], with what each says.
-pub fn failed(log: &Overview, extent: Extent) -> Vec<(&'static str, String)> {
-    let log = if extent.from_start { Cow::Borrowed(log) } else { Cow::Owned(without_before(log.clone())) };
-    let judged = LogJson::new(&log);
-    let is_judged = |check: &Check| {
-        check.failed > 0
-            && (extent.follows || check.name != SESSION_BEFORE)
-            && (extent.to_end || check.name != END)
-    };
-    let checks = judged.checks.into_iter().filter(is_judged);
-    let failed: Vec<_> = checks
+/// The failed checks of a log that was read with [`Overview::verified`], and the reason of each.
+pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
+    let judged = LogJson::new(log);
+    let failed = judged.checks.into_iter().filter(|check| check.failed > 0);
+    let mut failed: Vec<_> = failed
         .map(|check| match check.detail.as_str() {
             "" => (check.name, format!("{} failed", check.failed)),
             detail => (check.name, format!("{} failed; {detail}", check.failed)),
         })
         .collect();
-    if failed.is_empty() && extent == Extent::ALL && !judged.ok {
-        return vec![("log", log.faults().join("; "))];
+    if failed.is_empty() && !judged.ok {
+        failed.push(("log", log.faults().join("; ")));
     }
     failed
-}
-
-/// Sectors at the beginning of a log, of which what comes before was not asked for, that are the rest of a group which began there.
-pub fn rest_of_group(log: &Overview, extent: Extent) -> Option<u32> {
-    let summary = &log.ending.summary;
-    let BlockCounts { damaged, misplaced, .. } = summary.blocks;
-    let is_as_written = damaged + misplaced == 0 && others(&summary.blocks) == others(&summary.behind);
-    let first = log.contents.gaps.first().filter(|_| is_as_written && !extent.from_start)?;
-    // None is missing behind them.
-    let is_rest = first.sectors_skipped > 0 && Some(first.sectors_lost) <= summary.first_number;
-    (is_rest && first.from.is_none() && first.cause == Cause::Missing).then_some(first.sectors_skipped)
-}
-
-/// Blocks that are no sectors of the log.
-const fn others(of: &BlockCounts) -> u64 {
-    of.stale + of.unsound + of.foreign + of.empty + of.erased
-}
-
-/// The same log, of which nothing was asked for that comes before it. Where its only file does not begin with a sector of it, what is
-/// missing is missing in that.
-fn without_before(mut log: Overview) -> Overview {
-    let is_rest = rest_of_group(&log, Extent { from_start: false, ..Extent::ALL }).is_some();
-    let ending = &mut log.ending;
-    let summary = &mut ending.summary;
-    summary.files_gone = 0;
-    let (all, behind) = (&summary.blocks, &summary.behind);
-    let is_in_file = ending.files.len() == 1 && others(all) > others(behind);
-    // What was left out on purpose is no gap.
-    let is_before = |gap: &Gap| gap.from.is_none() && gap.sectors_skipped == 0 && gap.cause == Cause::Missing;
-    if is_rest || log.contents.gaps.first().is_some_and(is_before) && !is_in_file {
-        let gap = log.contents.gaps.remove(0);
-        summary.gaps -= 1;
-        summary.frames_missing -= u64::from(gap.frames.unwrap_or(0));
-        summary.gaps_uncounted -= u64::from(gap.frames.is_none());
-    } else if let Some(gap) = log.contents.gaps.first_mut().filter(|gap| gap.from.is_none()) {
-        // Of what is missing before the first sector only that counts which has a place here.
-        gap.sectors_lost = gap.sectors_lost.min(u32::try_from(others(all) + all.damaged).unwrap_or(u32::MAX));
-        if let Some(frames) = gap.frames.take() {
-            summary.frames_missing -= u64::from(frames);
-            summary.gaps_uncounted += 1;
-        }
-    }
-    log
 }
 
 fn print(checks: &[Check]) -> Result<()> {
@@ -318,9 +229,6 @@ struct LogJson {
     left_over: bool,
     /// What is known of its end.
     end: EndJson,
-    /// The number of the session that its file held when the recorder had just begun to write it anew, or of the first one of that
-    /// power-on; 0 where that is not known.
-    begun_anew: Option<u32>,
     /// All blocks of its files.
     blocks: BlocksJson,
     checks: Vec<Check>,
@@ -394,8 +302,6 @@ impl LogJson {
         let is_told_only = ending.aside().is_some();
         if is_told_only {
             checks = beside_copy(ending);
-        } else if let Some(anew) = ending.begun_anew {
-            checks = vec![check("files", ending.files.len() as u64, 1, anew.words())];
         }
         let holds = checks.iter().all(|check| check.failed == 0) && ending.unproved().is_empty();
         let verdict = match (holds, ending.proof.is_whole() || is_told_only) {
@@ -409,8 +315,7 @@ impl LogJson {
         let end = EndJson::new(ending);
         let blocks = BlocksJson::new(&blocks);
         let (name, closed) = (ending.name.clone(), summary.closed);
-        let (left_over, begun_anew) = (ending.left_over, ending.begun_anew.map(|anew| anew.of.unwrap_or(0)));
-        Self { name, ok, closed, copy_of, left_over, end, begun_anew, blocks, checks, verdict }
+        Self { name, ok, closed, copy_of, left_over: ending.left_over, end, blocks, checks, verdict }
     }
 }
 
@@ -433,16 +338,14 @@ fn weakened(log: &Overview) -> Vec<Check> {
     };
     let sectors = summary.blocks.sectors;
     let intact = check(INTACT, sectors, ending.made_again(), "made again from parity, without a loss");
-    if ending.aside().is_some() || ending.begun_anew.is_some() {
+    if ending.aside().is_some() {
         // Of a copy, too, it is told that its card is damaged.
         return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();
     }
     let words = "parity is missing: what the card loses of these files cannot be made again";
     // A log packed on a PC has no parity.
     let written = if summary.marks.has_boot { summary.parity.written } else { 0 };
-    let mut protected = check("sectors protected", written, ending.unprotected(), words);
-    protected.detail.extend(not_taken_words(ending.not_taken()));
-    vec![intact, protected]
+    vec![intact, check("sectors protected", written, ending.unprotected(), words)]
 }
 
 /// The checks of a log's end and place.
@@ -451,11 +354,9 @@ fn ends(log: &Overview) -> [Check; 7] {
     let summary = &ending.summary;
     let blocks = &summary.blocks;
     let check = |name, checked, failed, detail: String| Check { name, checked, failed, detail };
-    let newer = ending.has_newer();
-    let behind = match (behind_words(&summary.behind), newer) {
-        (words, _) if words.is_empty() => "nothing behind its last sector".to_owned(),
-        (words, false) => format!("behind its last sector: {words}"),
-        (words, true) => format!("behind its last sector: {words}; some are of a session that began later"),
+    let behind = match behind_words(&summary.behind) {
+        words if words.is_empty() => "nothing behind its last sector".to_owned(),
+        words => format!("behind its last sector: {words}"),
     };
     let among = among_words(summary);
     let among = if among.is_empty() { among } else { format!("; before it: {among}") };
@@ -471,7 +372,7 @@ fn ends(log: &Overview) -> [Check; 7] {
         SessionBefore::There | SessionBefore::Gone(_) => gone.unwrap_or_default(),
     };
     let strange = ending.strange();
-    let holds = ending.proof.holds() && !newer && ending.noise().is_none();
+    let holds = ending.proof.holds() && ending.noise().is_none();
     let parity = &summary.parity;
     [
         check("parity", parity.columns, parity.contradicted, ending.contradicted().unwrap_or_default()),
@@ -479,8 +380,8 @@ fn ends(log: &Overview) -> [Check; 7] {
         check("files", ending.files.len() as u64, strange.len() as u64, strange.join("; ")),
         check("chain", summary.groups, summary.unchained, String::new()),
         check("end marks", summary.marks.count, summary.marks.wrong, String::new()),
-        check(END, 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
-        check(SESSION_BEFORE, before_checked, before_failed, before),
+        check("end", 1, u64::from(!holds), format!("{}; {behind}{among}", ending.words())),
+        check("session before", before_checked, before_failed, before),
     ]
 }
 

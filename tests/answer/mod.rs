@@ -5,6 +5,8 @@ mod damaged;
 #[cfg(feature = "oracle")]
 mod dataflash;
 #[cfg(feature = "oracle")]
+mod exports;
+#[cfg(feature = "oracle")]
 mod fleet;
 #[cfg(feature = "oracle")]
 mod readback;

@@ -51,6 +51,11 @@ pub fn readback(recording: &Path, out: &Path) -> Value {
     json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
 }
 
+/// Reads a log's files for other programs: see `tests/oracle/exports.py`.
+pub fn exports(folder: &Path, name: &str) -> Value {
+    json(&run("exports.py", &[folder.to_owned(), PathBuf::from(name)]))
+}
+
 /// Compares our reading of a PX4 log with pyulog's: see `tests/oracle/ulog.py`.
 pub fn ulog(log: &Path, folder: &Path) -> Value {
     json(&run("ulog.py", &[log.to_owned(), folder.to_owned()]))

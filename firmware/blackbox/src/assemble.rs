@@ -112,8 +112,6 @@ pub struct Assembler {
     counts: BlockCounts,
     /// The counts at the last sector.
     at_last: BlockCounts,
-    /// Latest power-on time found in a sector of another session, microseconds since 1970.
-    other_epoch: Option<u64>,
 }
 
 impl Assembler {
@@ -152,13 +150,11 @@ impl Assembler {
             Ok(header) => header,
             Err(error) => return self.count(error, block),
         };
-        let sector = Sector::from_bytes(*block);
         if *self.session.get_or_insert(header.session) != header.session {
             self.counts.stale += 1;
-            let epoch = sector.preamble().and_then(|preamble| preamble.epoch_micros);
-            self.other_epoch = self.other_epoch.max(epoch);
             return;
         }
+        let sector = Sector::from_bytes(*block);
         self.place(Step { header, sector, missing: 0, damaged: 0 });
     }
 
@@ -305,12 +301,6 @@ impl Assembler {
     /// Kinds of the blocks after the last sector.
     pub const fn behind_last(&self) -> BlockCounts {
         self.counts.since(&self.at_last)
-    }
-
-    /// Latest power-on time found in a sector of another session, microseconds since 1970. Old sectors in a file are older than
-    /// the log that replaced it.
-    pub const fn other_epoch_micros(&self) -> Option<u64> {
-        self.other_epoch
     }
 
     /// Blocks since the last sector that were sectors of this session and fail their check. Old contents of a file may follow its

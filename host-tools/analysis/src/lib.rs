@@ -4,10 +4,10 @@
 //!   reason
 //! * [`summary`]: the contents of a recording, counted; [`soundness`]: what it lacks
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
-//! * [`reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON
+//! * [`reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON; [`manifest`]: the files of a reading
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
 //!
-//! It reads recordings through `hums_formats` only, and writes nothing but errors.
+//! It reads recordings through `hums_formats` only, and writes nothing but errors and the manifest.
 
 #![deny(
     clippy::print_stderr,
@@ -17,12 +17,13 @@
 #[macro_use(note)]
 extern crate hums_base;
 
-use hums_base::{colour, files, outcome, output, plural, printable, progress, utc};
+use hums_base::{colour, files, hex, outcome, output, plural, printable, progress, utc};
 use hums_formats::{ending, followed, logs, loss, mavlink, names, source};
 
 pub mod check;
 pub mod counters;
 pub mod log_json;
+pub mod manifest;
 pub mod params;
 pub mod part;
 pub mod reference;

@@ -11,7 +11,7 @@ use crate::names::{autopilot_name, check_name, type_name};
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
 use crate::states;
-use crate::summary::{Contents, FlightLine, Overview};
+use crate::summary::{BootLine, Contents, FlightLine, Overview};
 use crate::utc::iso8601;
 
 /// A card image's file system.
@@ -61,7 +61,7 @@ pub struct LogJson {
     start_s: Option<f64>,
     end_s: Option<f64>,
     duration_s: f64,
-    monitor: Option<MonitorJson>,
+    monitor: Option<BootLine>,
     vehicle: Option<VehicleJson>,
     frames: u64,
     frame_bytes: u64,
@@ -97,15 +97,6 @@ pub struct LogJson {
     sectors_damaged: u64,
     /// All blocks of its files.
     blocks: BlocksJson,
-}
-
-#[derive(Debug, Serialize)]
-struct MonitorJson {
-    version: String,
-    git: String,
-    board: String,
-    reset: String,
-    boots: u32,
 }
 
 /// The vehicle of a recording.
@@ -158,12 +149,6 @@ struct FlightJson {
     from_s: f64,
     /// `null` if its landing is not in the log.
     to_s: Option<f64>,
-}
-
-impl FlightJson {
-    fn of(flight: FlightLine) -> Self {
-        Self { from_s: flight.from.as_secs_f64(), to_s: flight.to.map(Instant::as_secs_f64) }
-    }
 }
 
 #[derive(Debug, Serialize)]
@@ -289,13 +274,7 @@ impl LogJson {
             start_s: summary.first.map(seconds),
             end_s: summary.last.map(seconds),
             duration_s: duration_s(log),
-            monitor: contents.boot.as_ref().map(|boot| MonitorJson {
-                version: boot.version.clone(),
-                git: boot.git.clone(),
-                board: boot.board.clone(),
-                reset: boot.reset.clone(),
-                boots: boot.boots,
-            }),
+            monitor: contents.boot.clone(),
             vehicle: vehicle(log),
             frames: contents.frames(),
             frame_bytes: contents.frame_bytes(),
@@ -311,7 +290,7 @@ impl LogJson {
             checks_judged: contents.judged.map(|checks| checks.judged),
             checks_all: contents.judged.map(|checks| checks.all),
             ends_in_air: contents.ends_in_air.map(|end| end.to_string()),
-            flights: contents.flights().into_iter().map(FlightJson::of).collect(),
+            flights: contents.flights().into_iter().map(flight).collect(),
             findings_count: contents.findings_count,
             findings: findings(log),
             usage: contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect(),
@@ -327,6 +306,10 @@ impl LogJson {
             blocks: BlocksJson::new(&summary.blocks),
         }
     }
+}
+
+fn flight(flight: FlightLine) -> FlightJson {
+    FlightJson { from_s: flight.from.as_secs_f64(), to_s: flight.to.map(Instant::as_secs_f64) }
 }
 
 fn messages(contents: &Contents) -> Vec<MessageJson> {
@@ -363,12 +346,12 @@ fn losses(contents: &Contents) -> Vec<LossJson> {
 }
 
 fn findings(log: &Overview) -> Vec<FindingJson> {
-    let json = |finding: &crate::summary::FindingLine| FindingJson {
-        subsystem: finding.subsystem,
+    let json = |finding: &crate::source::told::Finding| FindingJson {
+        subsystem: finding.subsystem.name(),
         check: finding.check.clone(),
         instance: finding.instance,
-        level: finding.level,
-        previous: finding.previous,
+        level: finding.level.name(),
+        previous: finding.previous.name(),
         time_s: finding.at.as_secs_f64(),
         time_utc: log.utc_us(finding.at).map(iso8601),
         value: finite(finding.value),

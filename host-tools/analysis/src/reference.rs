@@ -121,17 +121,6 @@ impl Quantity {
     }
 }
 
-/// A frame's observation, kept until the frames before it have been taken.
-#[derive(Clone, Copy, Debug)]
-pub struct Observed {
-    /// When it came.
-    pub at: Instant,
-    /// The sender.
-    pub source: Source,
-    /// The observation.
-    pub observation: Observation,
-}
-
 /// The vehicle as the reference system sees it, replayed from its observations.
 #[derive(Clone, Debug)]
 pub struct Reference {

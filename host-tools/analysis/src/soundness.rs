@@ -24,8 +24,7 @@ pub enum Soundness {
 impl Soundness {
     /// Of a log of ours.
     pub fn of(ending: &Ending) -> Self {
-        let (summary, is_counted) =
-            (&ending.summary, ending.aside().is_none() && ending.begun_anew.is_none());
+        let (summary, is_counted) = (&ending.summary, ending.aside().is_none());
         match () {
             () if is_counted && summary.gaps + summary.blocks.damaged > 0 => Self::Damaged,
             () if is_counted && summary.marks.lost > 0 => Self::Lossy,

@@ -8,10 +8,11 @@ use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Gap, Record};
 use hums_core::clock::{Instant, Span};
 use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
+use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
-use hums_core::health::{Level, Subsystem};
 use hums_core::usage::UsageCounter;
 use hums_link as link;
+use serde::Serialize;
 
 use crate::ending::Ending;
 use crate::followed::HasEnding;
@@ -42,84 +43,8 @@ const COUNTED_LATE: Span = Span::from_secs(1);
 /// Checks with exceedances that are kept: four times those that there are, with all their instances.
 const EXCEEDANCES_MAX: usize = 1_000;
 
-/// A check's change of level.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FindingLine {
-    /// When, on the monitor's clock.
-    pub at: Instant,
-    /// The part of the vehicle.
-    pub subsystem: &'static str,
-    /// The check.
-    pub check: String,
-    /// Which one of several.
-    pub instance: u8,
-    /// The new level.
-    pub level: &'static str,
-    /// The one before.
-    pub previous: &'static str,
-    /// The decisive value.
-    pub value: f32,
-    /// The limit that it crossed.
-    pub limit: f32,
-    /// The unit of both.
-    pub unit: String,
-}
-
-/// A level by its name; other names give `ok`.
-fn level_named(name: &str) -> Level {
-    Level::ALL.into_iter().find(|level| level.name() == name).unwrap_or(Level::Ok)
-}
-
-impl FindingLine {
-    /// The new level.
-    pub fn to_level(&self) -> Level {
-        level_named(self.level)
-    }
-
-    /// Text for a check that no longer applies.
-    pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
-
-    /// Whether the check no longer applies (after landing): its value is not known to be good then.
-    pub fn is_unjudged(&self) -> bool {
-        self.level == Level::Ok.name() && self.value.is_nan()
-    }
-}
-
-impl From<Finding> for FindingLine {
-    fn from(finding: Finding) -> Self {
-        Self {
-            at: finding.at,
-            subsystem: finding.subsystem.name(),
-            check: finding.check,
-            instance: finding.instance,
-            level: finding.level.name(),
-            previous: finding.previous.name(),
-            value: finding.value,
-            limit: finding.limit,
-            unit: finding.unit,
-        }
-    }
-}
-
-impl From<&FindingLine> for Finding {
-    fn from(line: &FindingLine) -> Self {
-        let subsystem = Subsystem::ALL.into_iter().find(|subsystem| subsystem.name() == line.subsystem);
-        Self {
-            at: line.at,
-            subsystem: subsystem.unwrap_or(Subsystem::Recorder),
-            check: line.check.clone(),
-            instance: line.instance,
-            level: line.to_level(),
-            previous: level_named(line.previous),
-            value: line.value,
-            limit: line.limit,
-            unit: line.unit.clone(),
-        }
-    }
-}
-
 /// How the monitor started.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BootLine {
     /// The product's version.
     pub version: String,
@@ -259,7 +184,7 @@ pub struct Contents {
     /// UTC at power-on, microseconds since 1970.
     pub epoch_us: Option<u64>,
     /// Changes of level, in order, up to [`LISTED_MAX`].
-    pub findings: Vec<FindingLine>,
+    pub findings: Vec<Finding>,
     /// How many there are.
     pub findings_count: u64,
     /// They were found by this program when it read the log, because its recorder ran no checks.
@@ -364,8 +289,7 @@ impl Contents {
 
     /// Whether little was judged without a finding: that is not good news.
     pub fn is_little(&self) -> bool {
-        let is_worry = |finding: &FindingLine| matches!(finding.level, "warning" | "critical");
-        self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(is_worry)
+        self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(Finding::is_bad)
     }
 
     /// The name of a part, and the limit that it reaches first, by its place from 1.
@@ -381,10 +305,10 @@ impl Contents {
     }
 
     /// The due part of a finding; `None` for another check.
-    pub fn due(&self, finding: &FindingLine) -> Option<(String, Option<String>)> {
+    pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
         let of = |line: &ComponentLine| {
             let kind = Kind::ALL.into_iter().find(|kind| kind.name() == line.kind);
-            kind.and_then(Kind::subsystem).is_some_and(|of| of.name() == finding.subsystem)
+            kind.and_then(Kind::subsystem) == Some(finding.subsystem)
         };
         let mine = self.components.iter().filter(|(_, line)| part::is_due(&finding.check) && of(line));
         let (place, line) =
@@ -395,7 +319,7 @@ impl Contents {
     /// Whether the box reports that it did not record somewhere in a gap.
     pub fn did_not_record(&self, gap: &Gap) -> bool {
         let (from, to) = (gap.from.unwrap_or(Instant::ZERO), gap.to);
-        let is_ok = |finding: &FindingLine| finding.level == Level::Ok.name();
+        let is_ok = |finding: &Finding| finding.level == Level::Ok;
         let mut changes = self.findings.iter().filter(|finding| finding.check == "recording");
         let before = changes.clone().rfind(|change| change.at <= from);
         before.is_some_and(|change| !is_ok(change))
@@ -424,7 +348,7 @@ impl Contents {
             Record::Finding(finding) => {
                 self.findings_count += 1;
                 if self.findings.len() < LISTED_MAX {
-                    self.findings.push(Finding::from(finding).into());
+                    self.findings.push(Finding::from(finding));
                 }
             }
             // The counters at the start are those of the sessions before.

@@ -23,15 +23,15 @@ const BUFFER_BYTES: usize = 65_536;
 /// The other side of the ground station's port.
 pub struct Ground {
     /// Its output.
-    pub writer: Beside,
+    pub writer: SideOutput,
     /// Its input.
-    pub heard: Heard,
+    pub input: GroundInput,
 }
 
 /// Output beside a recording: `--gs`, `--tap`. A failure is reported at once, and the recording continues without it:
 /// writing never fails. A clone writes to the same output.
 #[derive(Clone)]
-pub struct Beside(Arc<Mutex<Inside>>);
+pub struct SideOutput(Arc<Mutex<Inside>>);
 
 struct Inside {
     /// The flag that requested it.
@@ -47,7 +47,7 @@ enum To {
     Stream(Box<dyn Write + Send>),
 }
 
-impl Beside {
+impl SideOutput {
     /// A writer without a reader.
     pub fn nowhere() -> Self {
         Self::new("", To::Nowhere)
@@ -106,7 +106,7 @@ impl Inside {
     }
 }
 
-impl Write for Beside {
+impl Write for SideOutput {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.lock().attempt(|to| to.write_all(bytes));
         Ok(bytes.len())
@@ -119,9 +119,9 @@ impl Write for Beside {
 }
 
 /// The ground station's bytes.
-pub struct Heard(Option<Receiver<Vec<u8>>>);
+pub struct GroundInput(Option<Receiver<Vec<u8>>>);
 
-impl Heard {
+impl GroundInput {
     /// Nobody is there.
     pub const fn nobody() -> Self {
         Self(None)
@@ -145,27 +145,27 @@ const FLAG: &str = "--gs";
 
 /// Opens SINK, which must not be one of the inputs.
 pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
-    let heard = Heard::nobody();
+    let input = GroundInput::nobody();
     match endpoint {
         Endpoint::File(path) => {
             let file = Output::create(path, inputs)?;
-            Ok(Ground { writer: Beside::file(FLAG, file), heard })
+            Ok(Ground { writer: SideOutput::file(FLAG, file), input })
         }
         Endpoint::Standard => {
             let stream = To::Stream(Box::new(BufWriter::new(Stdout::new())));
-            Ok(Ground { writer: Beside::new(FLAG, stream), heard })
+            Ok(Ground { writer: SideOutput::new(FLAG, stream), input })
         }
         _ => {
             let duplex = duplex::open(endpoint, SILENCE)?;
-            let writer = Beside::new(FLAG, To::Stream(duplex.writer));
-            let heard = listen(duplex.reader).context("--gs: no thread")?;
-            Ok(Ground { writer, heard })
+            let writer = SideOutput::new(FLAG, To::Stream(duplex.writer));
+            let input = listen(duplex.reader).context("--gs: no thread")?;
+            Ok(Ground { writer, input })
         }
     }
 }
 
 /// A thread reads, so that the pipeline never waits for a ground station.
-fn listen(mut port: Box<dyn Port>) -> io::Result<Heard> {
+fn listen(mut port: Box<dyn Port>) -> io::Result<GroundInput> {
     let (sender, receiver) = sync_channel(PIECES);
     std::thread::Builder::new().name("ground".to_owned()).spawn(move || {
         let mut buffer = vec![0; BUFFER_BYTES];
@@ -182,7 +182,7 @@ fn listen(mut port: Box<dyn Port>) -> io::Result<Heard> {
             }
         }
     })?;
-    Ok(Heard(Some(receiver)))
+    Ok(GroundInput(Some(receiver)))
 }
 
 /// A writer without a reader.

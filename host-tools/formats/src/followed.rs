@@ -8,9 +8,10 @@ use std::collections::VecDeque;
 use hums_blackbox::record::{Before, Found};
 
 use crate::ending::{Ending, Proof, SessionBefore};
-use crate::logs::begun_anew::LOOKED_AT_MAX;
 use crate::logs::sessions::{Sessions, place};
 
+/// Number of files that a start looks at (`SEGMENTS_MAX` of the recorder).
+const LOOKED_AT_MAX: u32 = 3;
 /// Logs held back at most; this many later ones may record its end.
 pub const HELD_MAX: usize = 4;
 
@@ -39,10 +40,8 @@ impl<T: HasEnding> EndResolver<T> {
         if let Some(ending) = next.ending() {
             has_sectors = ending.summary.session.is_some();
             ending.again = self.sessions.again(&ending.name).map(str::to_owned);
-            ending.begun_anew = self.sessions.begun_anew(&ending.name);
             if let Some(before) = ending.summary.marks.before
                 && ending.is_counted()
-                && ending.begun_anew.is_none()
             {
                 if before.has_end() {
                     self.tell(&before, ending);

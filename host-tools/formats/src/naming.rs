@@ -12,7 +12,7 @@ use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
-use crate::logs::naming::{identity_at_end, segment_name, session_name};
+use crate::logs::naming::{ends_with_identity, segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
@@ -150,10 +150,14 @@ pub fn is_made(path: &Path) -> bool {
     if name.ends_with(".html") && says_report(path) {
         return true;
     }
-    let endings = [".tlog.gaps.csv", ".jsonl", ".lp", ".html"];
-    let mut stems = endings.iter().filter_map(|ending| name.strip_suffix(ending));
-    stems.find_map(identity_at_end).is_some()
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let gaps = name.strip_suffix(".tlog.gaps.csv");
+    let other = || name.rsplit_once('.').filter(|(_, ending)| !RECORDINGS.contains(ending));
+    gaps.or_else(|| Some(other()?.0)).is_some_and(ends_with_identity)
 }
+
+/// Endings of recordings: `decode` makes some of them.
+const RECORDINGS: [&str; 6] = ["hum", "tlog", "raw", "bin", "log", "ulg"];
 
 /// Whether the beginning of a page names `hums report`: the table of a folder's pages has no session in its name.
 fn says_report(path: &Path) -> bool {
@@ -204,12 +208,22 @@ mod tests {
 
     #[test]
     fn outputs_are_known_by_their_names_and_recordings_are_not_taken_for_them() {
-        for made in ["00001-box3f-s1a2b3c4d.jsonl", "log-s1a2b3c4d-2.lp", "a.tlog-r00112233.tlog.gaps.csv"] {
+        for made in [
+            "00001-box3f-s1a2b3c4d.jsonl",
+            "log-s1a2b3c4d-2.lp",
+            "log-s1a2b3c4d.kml",
+            "a.tlog-r00112233.tlog.gaps.csv",
+        ] {
             assert!(is_made(Path::new(made)), "{made}");
         }
-        for other in
-            ["log-s1a2b3c4d.hum", "log-s1a2b3c4d.tlog", "log-s1a2b3c4.jsonl", "notes.jsonl", "x.html"]
-        {
+        for other in [
+            "log-s1a2b3c4d.hum",
+            "log-s1a2b3c4d.tlog",
+            "log-s1a2b3c4d.ulg",
+            "log-s1a2b3c4.jsonl",
+            "notes.jsonl",
+            "x.html",
+        ] {
             assert!(!is_made(Path::new(other)), "{other}");
         }
     }

@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub use check::Check;
 pub use live::Live;
-pub use read::{Decode, Due, Format, Info, Report, Split};
+pub use read::{Decode, Due, Info, Report, Share, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull, Replaced};
@@ -41,6 +41,9 @@ Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage 
 4 done, and `hums check` found something wrong with the vehicle, also in a damaged log.
 Results go to standard output, everything else to standard error. Colours are for terminals only, and NO_COLOR=1 turns them off.";
 
+/// The name of this program, its version and its commit.
+pub(crate) const PROGRAM: &str = concat!("hums ", env!("HUMS_VERSION"));
+
 /// The whole command line.
 #[derive(Debug, Parser)]
 #[command(name = "hums", version = env!("HUMS_VERSION"), about = ABOUT, after_help = AFTER, max_term_width = 110)]
@@ -59,8 +62,10 @@ pub enum Command {
     Report(Report),
     /// Show the vehicle as it flies, on a page that this program serves: from a link, a recording or a log
     Live(Live),
-    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, InfluxDB
+    /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, MCAP, ULog, KML and others
     Decode(Decode),
+    /// Copy a log without where and who: places and times moved, names, numbers and secrets removed
+    Share(Share),
     /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
     /// Say which parts are due: used, limit, left at the present rate; and the hours of each vehicle

@@ -2,9 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
+use crate::decode::format::Format;
+use crate::decode::formats::{FORMATS, find};
+use crate::decode::{Request, share};
 use crate::endpoint::without_slash;
 use crate::report;
 use crate::utc::When;
@@ -20,8 +23,8 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode flight.tlog -o found.tlog --format tlog --findings
   hums decode flight.tlog -o flight.hum --format hum
 
-Where files go: -o names the file where there is one log and one format of a single file (tlog, jsonl, influx), unless
-it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
+Where files go: -o names the file where there is one log and one format of a single file (all but csv, parquet and
+thesis), unless it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
 OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
 An output that exists is overwritten with --force only, once all of the new one is written. An output that is an input,
@@ -36,6 +39,7 @@ pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {
 /// `hums decode`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = DECODE_EXAMPLES)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Decode {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
@@ -50,8 +54,8 @@ pub struct Decode {
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// What to write, several with commas
-    #[arg(long, value_enum, value_delimiter = ',', required = true)]
-    pub format: Vec<Format>,
+    #[arg(long, value_parser = format(), value_delimiter = ',', required = true)]
+    pub format: Vec<&'static Format>,
     /// Leave out what is earlier: seconds as the tables have them (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
     #[arg(long, value_name = "T")]
     pub from: Option<When>,
@@ -67,6 +71,15 @@ pub struct Decode {
     /// Write a manifest of the files read and made, as JSON: SHA-256, repairs, losses (docs/json.md)
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
+    /// For srt: the video begins this long after the log; negative if it begins before
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value = "0",
+        hide_default_value = true,
+        allow_negative_numbers = true
+    )]
+    pub offset: f64,
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
@@ -85,23 +98,67 @@ pub enum Split {
     Flights,
 }
 
-/// What to write.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// A ground station's log: opens in Mission Planner, QGroundControl, MAVProxy, pymavlink
-    Tlog,
-    /// A table for each type of message, units in the header
-    Csv,
-    /// An object a line, in order of time
-    Jsonl,
-    /// Lines for InfluxDB, VictoriaMetrics and QuestDB
-    Influx,
-    /// Typed columns by vehicle, date and session, for DuckDB, Spark, pandas
-    Parquet,
-    /// A log as the box writes it, of one tlog or raw recording; written alone
-    Hum,
-    /// Four tables with a row a second, as the thesis has them on which HUMS is built: flight, ESC status, ESC errors, speeds
-    Thesis,
+impl Decode {
+    /// The request that the arguments make.
+    pub fn request(&self) -> Request {
+        Request {
+            inputs: self.inputs.clone(),
+            salvage: self.salvage,
+            session: self.session.clone(),
+            output: self.output.clone(),
+            formats: self.format.clone(),
+            from: self.from,
+            to: self.to,
+            split: self.split.is_some(),
+            offset_s: self.offset,
+            findings: self.findings,
+            manifest: self.manifest.clone(),
+            program: super::PROGRAM,
+            messages: self.message.clone(),
+            force: self.force,
+            json: self.json,
+        }
+    }
+}
+
+/// The formats of `hums decode`, from their table.
+fn format() -> impl TypedValueParser<Value = &'static Format> {
+    let values = FORMATS.iter().map(|format| PossibleValue::new(format.about.name).help(format.about.help));
+    PossibleValuesParser::new(values).try_map(|name| find(&name).ok_or("is no format"))
+}
+
+const SHARE_EXAMPLES: &str = "Examples:
+  hums share flight.tlog -o shared.tlog
+  hums share card.img --session 00001 -o shared.tlog
+  hums share flight.ulg -o shared.ulg
+
+A recording of a link becomes a tlog, an autopilot's own log a ULog. The output lists the data that was moved and removed.
+Look at the copy before you publish it: docs/decode.md says what the rest of it still tells.";
+
+/// `hums share`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = SHARE_EXAMPLES)]
+pub struct Share {
+    /// One log, or a card image with --session
+    #[arg(value_name = "LOG|IMAGE", value_parser = input())]
+    pub input: PathBuf,
+    /// Only this session of a card or folder, by the name that `hums info --list` prints
+    #[arg(long, value_name = "NAME")]
+    pub session: Option<String>,
+    /// The file to write
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Overwrite a file that exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl Share {
+    /// The request that the arguments make.
+    pub fn request(&self) -> share::Request {
+        let Self { input, session, output, force } = self.clone();
+        share::Request { input, session, output, force }
+    }
 }
 
 const INFO_EXAMPLES: &str = "Examples:

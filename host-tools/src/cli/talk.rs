@@ -149,11 +149,11 @@ pub struct Pull {
     /// Only these, by the names that the board has for them
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
-    /// Only the newest N logs, each with all of its files; what a box keeps before an arming, while it waits for that, is none of them
+    /// Only the newest N logs, each with all of its files
     #[arg(long, value_name = "N", conflicts_with = "around")]
     pub last: Option<usize>,
-    /// First what matters: of the newest session only what was recorded around a time (4:20 after power-on, or UTC), around the
-    /// latest critical finding (`critical`), the latest warning or worse (`warning`), or the latest of one check (`motor_loss`)
+    /// Only the part of the newest log around a time (4:20 after power-on, or UTC), or around the latest finding: `critical`,
+    /// `warning` (or worse), or the name of a check (`motor_loss`)
     #[arg(long, value_name = "TIME|FINDING")]
     pub around: Option<Around>,
     /// With --around: from S seconds before it to S seconds after it

@@ -236,17 +236,19 @@ fn span(seconds: f64) -> Span {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::summary::FindingLine;
+    use hums_core::health::Subsystem;
 
-    fn finding(check: &str, level: &'static str, at_s: u64) -> FindingLine {
-        FindingLine {
+    use super::*;
+    use crate::source::told::Finding;
+
+    fn finding(check: &str, level: &str, at_s: u64) -> Finding {
+        Finding {
             at: Instant::from_millis(at_s * 1000),
-            subsystem: "power",
+            subsystem: Subsystem::Power,
             check: check.to_owned(),
             instance: 0,
-            level,
-            previous: "ok",
+            level: Level::ALL.into_iter().find(|known| known.name() == level).expect("a level"),
+            previous: Level::Ok,
             value: 1.0,
             limit: 2.0,
             unit: String::new(),
@@ -275,7 +277,7 @@ mod tests {
     #[test]
     fn a_mishap_comes_before_what_was_found_earlier_and_a_part_that_is_due_behind_all() {
         let mut log = Overview::default();
-        let mishap = FindingLine { subsystem: "mishap", ..finding("tumbling", "critical", 9) };
+        let mishap = Finding { subsystem: Subsystem::Mishap, ..finding("tumbling", "critical", 9) };
         log.contents.findings = vec![
             finding("airframe_due", "critical", 1),
             finding("cell_voltage", "critical", 2),

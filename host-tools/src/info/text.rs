@@ -13,11 +13,8 @@ use super::number::short;
 use super::{usage, wear};
 use crate::check::causes::causes;
 use crate::colour::level;
-use crate::ending::{
-    among_words, behind_words, copies_words, made_again_words, not_taken_words, unprotected_words,
-};
+use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs;
-use crate::logs::begun_anew::BegunAnew;
 use crate::logs::naming::is_part;
 use crate::loss;
 use crate::names::{check_kind, check_name, unit_name};
@@ -25,8 +22,9 @@ use crate::part;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
+use crate::source::told::Finding;
 use crate::states::{Shown, shown};
-use crate::summary::{FindingLine, LISTED_MAX, Overview};
+use crate::summary::{LISTED_MAX, Overview};
 use crate::utc::{clock, iso8601_ms, moment};
 use hums_analysis::log_json::{duration_s, vehicle};
 
@@ -137,24 +135,16 @@ fn ending(text: &mut String, log: &Overview) {
     if !among.is_empty() {
         let _ = writeln!(text, "  among    {among}");
     }
-    if ending.has_newer() {
-        text.push_str("           some of them are of a session that began later: two logs are mixed here\n");
-    }
     if let Some(gone) = ending.before.gone() {
         let _ = writeln!(text, "  before   {gone}");
     }
-    let anew = ending.begun_anew.map(BegunAnew::words);
-    if let Some(words) = ending.aside().or(anew) {
+    if let Some(words) = ending.aside() {
         let _ = writeln!(text, "  place    {words}");
     }
     for strange in ending.contradicted().into_iter().chain(ending.noise()).chain(ending.strange()) {
         let _ = writeln!(text, "  files    {strange}");
     }
-    let weakened = [
-        made_again_words(ending.made_again()),
-        unprotected_words(ending.unprotected()),
-        not_taken_words(ending.not_taken()),
-    ];
+    let weakened = [made_again_words(ending.made_again()), unprotected_words(ending.unprotected())];
     for words in weakened.into_iter().flatten() {
         let _ = writeln!(text, "  parity   {words}");
     }
@@ -198,7 +188,7 @@ fn findings_text(text: &mut String, log: &Overview) {
                 Some(words) => format!("{} checks {words}", row.len()),
                 None => sentence(finding, contents.due(finding).as_ref(), cause.as_deref()),
             };
-            let level = level(if finding.is_unjudged() { "ended" } else { finding.level });
+            let level = level(if finding.is_unjudged() { "ended" } else { finding.level.name() });
             let _ = writeln!(text, "    {:>11}  {level:<8}  {}", moment(finding.at), word(&words));
             (lines, told) = (lines + 1, told + size);
         }
@@ -210,21 +200,18 @@ fn findings_text(text: &mut String, log: &Overview) {
 const ROW_MIN: usize = 4;
 
 /// The words for a change that only means that data stopped or came again.
-fn silence(finding: &FindingLine) -> Option<&'static str> {
-    let [ok, stale] = [Level::Ok.name(), Level::Stale.name()];
+fn silence(finding: &Finding) -> Option<&'static str> {
     match (finding.previous, finding.level) {
-        (previous, level) if (previous, level) == (ok, stale) => Some("that were ok have no data"),
-        (previous, level) if (previous, level) == (stale, ok) && !finding.is_unjudged() => {
-            Some("have data again, and are ok")
-        }
+        (Level::Ok, Level::Stale) => Some("that were ok have no data"),
+        (Level::Stale, Level::Ok) if !finding.is_unjudged() => Some("have data again, and are ok"),
         _ => None,
     }
 }
 
 /// The finding, its check, the part that is due, and its cause.
-fn sentence(finding: &FindingLine, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
-    let FindingLine { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
-    let mut sentence = format!("{subsystem}: {}", check_name(check, *instance));
+fn sentence(finding: &Finding, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
+    let Finding { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
+    let mut sentence = format!("{}: {}", subsystem.name(), check_name(check, *instance));
     if let Some(due) = due {
         let _ = write!(sentence, ": {}", part::due_words(due));
     }
@@ -243,12 +230,12 @@ fn sentence(finding: &FindingLine, due: Option<&(String, Option<String>)>, cause
         let _ = write!(sentence, " (limit {})", short(limit.into()));
     }
     if finding.is_unjudged() {
-        let _ = write!(sentence, "; {}", FindingLine::UNJUDGED);
+        let _ = write!(sentence, "; {}", Finding::UNJUDGED);
     }
     if let Some(cause) = cause {
         let _ = write!(sentence, "; because of {}", check_kind(cause));
     }
-    let _ = write!(sentence, "; was {previous} [{check}]");
+    let _ = write!(sentence, "; was {} [{check}]", previous.name());
     sentence
 }
 
@@ -370,23 +357,24 @@ fn messages_text(text: &mut String, log: &Overview) {
 #[cfg(test)]
 mod tests {
     use hums_core::clock::Instant;
+    use hums_core::health::Subsystem;
 
     use super::*;
 
     #[test]
     fn a_state_has_its_name_and_a_quantity_its_limit() {
-        let finding = |check: &str, value, limit, unit: &str| FindingLine {
+        let finding = |check: &str, value, limit, unit: &str| Finding {
             at: Instant::ZERO,
-            subsystem: "computer",
+            subsystem: Subsystem::Computer,
             check: check.to_owned(),
             instance: 0,
-            level: "critical",
-            previous: "ok",
+            level: Level::Critical,
+            previous: Level::Ok,
             value,
             limit,
             unit: unit.to_owned(),
         };
-        let sentence = |finding: FindingLine| sentence(&finding, None, None);
+        let sentence = |finding: Finding| sentence(&finding, None, None);
         let state = sentence(finding("autopilot_state", 6.0, 4.5, ""));
         assert_eq!(state, "computer: autopilot failsafe, emergency; was ok [autopilot_state]");
         let charge = sentence(finding("batt_state", 1.0, 0.5, ""));
@@ -397,9 +385,9 @@ mod tests {
 
     #[test]
     fn a_silence_of_many_checks_is_a_line_and_what_was_wrong_then_another_one() {
-        let finding = |at_s: u64, check: &str, previous, level, value| FindingLine {
+        let finding = |at_s: u64, check: &str, previous, level, value| Finding {
             at: Instant::from_millis(at_s * 1_000),
-            subsystem: "structure",
+            subsystem: Subsystem::Structure,
             check: check.to_owned(),
             instance: 0,
             level,
@@ -410,10 +398,10 @@ mod tests {
         };
         let checks = ["vibration", "clipping", "load_factor", "roll", "pitch"];
         let mut log = Overview::default();
-        let silent = checks.map(|check| finding(84, check, "ok", "stale", f32::NAN));
-        let heard = checks.map(|check| finding(95, check, "stale", "ok", 0.5));
+        let silent = checks.map(|check| finding(84, check, Level::Ok, Level::Stale, f32::NAN));
+        let heard = checks.map(|check| finding(95, check, Level::Stale, Level::Ok, 0.5));
         log.contents.findings.extend(silent);
-        log.contents.findings.push(finding(90, "cell_voltage", "critical", "stale", f32::NAN));
+        log.contents.findings.push(finding(90, "cell_voltage", Level::Critical, Level::Stale, f32::NAN));
         log.contents.findings.extend(heard);
         log.contents.findings_count = log.contents.findings.len() as u64;
         let mut text = String::new();
@@ -436,13 +424,13 @@ mod tests {
 
     #[test]
     fn what_no_longer_applies_is_not_called_good() {
-        let finding = |value| FindingLine {
+        let finding = |value| Finding {
             at: Instant::ZERO,
-            subsystem: "power",
+            subsystem: Subsystem::Power,
             check: "cell_voltage".to_owned(),
             instance: 0,
-            level: "ok",
-            previous: "critical",
+            level: Level::Ok,
+            previous: Level::Critical,
             value,
             limit: f32::NAN,
             unit: "V".to_owned(),

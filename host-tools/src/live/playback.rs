@@ -14,7 +14,7 @@ use super::hub::{Command, Hub, Published};
 use super::influx::{Figures, Influx};
 use super::native::Native;
 use super::rate::{PUBLISH, Rate};
-use super::recording::{self, Heard, Opened};
+use super::recording::{self, Content, Opened};
 use super::show::{self, Around, SourceJson};
 use super::spool::{Spool, SpoolWriter, Spooled};
 use super::told::{Limits, Told};
@@ -204,18 +204,18 @@ impl Player {
         let mut shown = Wall::now();
         let Self { hub, source, epoch_us, influx, .. } = self;
         // `Ctrl-C` ends a long reading too.
-        let ending = recording::each(opened, &mut |at, epoch, progress, heard| -> io::Result<bool> {
+        let ending = recording::each(opened, &mut |at, epoch, progress, content| -> io::Result<bool> {
             *epoch_us = epoch.or(*epoch_us);
             source.progress = progress;
             if start.is_none() {
                 start = Some(at);
                 world.begin(at);
             }
-            let native = matches!(heard, Heard::Entry(_));
-            let frame = match heard {
-                Heard::Frame(frame) => Some(frame),
-                Heard::Entry(_) => None,
-                Heard::Told(what) => {
+            let native = matches!(content, Content::Entry(_));
+            let frame = match content {
+                Content::Frame(frame) => Some(frame),
+                Content::Entry(_) => None,
+                Content::Told(what) => {
                     if told.len() < TOLD_MAX {
                         world.told(at, what, Some(&mut hub.histories()));
                         keep(&mut told, &mut copies, at, what);
@@ -240,7 +240,7 @@ impl Player {
             if let Some(frame) = frame {
                 writer.push(Spooled { at, check: frame.check(), bytes: frame.bytes() })?;
                 world.frame(at, frame, Some(&mut hub.histories()));
-            } else if let Heard::Entry(entry) = heard {
+            } else if let Content::Entry(entry) = content {
                 world.entry(at, entry, Some(&mut hub.histories()));
             }
             world.found.clear();

@@ -12,7 +12,7 @@ use super::native::{self, Entry, Native};
 use super::told::Told;
 use crate::ending::Ending;
 use crate::endpoint::Endpoint;
-use crate::logs::groups::at_beginning;
+use crate::logs::groups::has_start;
 use crate::outcome::usage;
 use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
@@ -65,7 +65,7 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
         None => endpoint.to_string(),
     };
     // A packed recording has no start of a box, and may be of any link.
-    let is_of_box = place.own().is_some_and(|log| at_beginning(log, |_| Some(())).is_some());
+    let is_of_box = place.own().is_some_and(has_start);
     Ok(Opened { name, recording: Some(recording), native, is_of_box })
 }
 
@@ -91,7 +91,7 @@ fn listed(names: &[String]) -> String {
 
 /// An item of a recording.
 #[derive(Clone, Copy, Debug)]
-pub enum Heard<'a> {
+pub enum Content<'a> {
     /// A frame.
     Frame(&'a Frame<'a>),
     /// An entry of an autopilot's own log.
@@ -102,7 +102,7 @@ pub enum Heard<'a> {
 
 /// Callback for each item: its time, UTC of time zero if known, the part read so far, 0 to 1, and the item.
 /// `false` ends the reading.
-pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Heard<'_>) -> io::Result<bool> + 'a;
+pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
 
 /// Reads it from its beginning to its end, once; returns the evidence of a log's end.
 pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> {
@@ -119,23 +119,23 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> 
             Item::Gap(gap) if !native => Told::missing(gap),
             _ => None,
         };
-        let heard = match item {
+        let content = match item {
             Item::Epoch(epoch) => {
                 epoch_us = Some(epoch);
                 return Ok(());
             }
-            Item::Frame(frame) => Heard::Frame(frame),
+            Item::Frame(frame) => Content::Frame(frame),
             Item::Record(_) | Item::Gap(_) if !native => match &told {
                 Some(Told::Checked | Told::Peak { .. }) | None => return Ok(()),
-                Some(told) => Heard::Told(told),
+                Some(told) => Content::Told(told),
             },
             // Each that the player counts when it goes to a place.
             _ => match &entry {
-                Some(entry) => Heard::Entry(entry),
+                Some(entry) => Content::Entry(entry),
                 None => return Ok(()),
             },
         };
-        if take(at, epoch_us, progress.part(), heard)? { Ok(()) } else { Err(Stop.into()) }
+        if take(at, epoch_us, progress.part(), content)? { Ok(()) } else { Err(Stop.into()) }
     })?;
     Ok(summary.ending)
 }

@@ -1,8 +1,10 @@
 //! The latest values as the page takes them: each with its age and whether that is too old.
 
 use hums_core::clock::{Instant, Span};
+use hums_core::latest::Latest;
 use hums_core::observation::MOTORS_MAX;
 use hums_core::time;
+use hums_core::vehicle::Vehicle;
 use serde::Serialize;
 use serde::ser::{SerializeMap, SerializeTuple, Serializer};
 
@@ -41,8 +43,69 @@ impl Serialize for Shown {
     }
 }
 
-/// Takes a value by its name: its time, value and maximum age.
-type Put<'a> = dyn FnMut(&'static str, Option<time::Instant>, Option<f32>, Span) + 'a;
+/// When a value came, and the value if it is known.
+type Told = (Option<time::Instant>, Option<f32>);
+
+/// A value of a message.
+fn of<T>(message: &Latest<T>, value: impl FnOnce(&T) -> Option<f32>) -> Told {
+    (message.at(), message.get().and_then(value))
+}
+
+/// Values of the monitor's vehicle: the page's names, maximum ages, and places.
+const OF_VEHICLE: &[(&str, Span, fn(&Vehicle) -> Told)] = &[
+    ("roll", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.roll.0.to_degrees()))),
+    ("pitch", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.pitch.0.to_degrees()))),
+    ("yaw", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.yaw.0.to_degrees()))),
+    ("height", MOTION, |vehicle| of(&vehicle.global, |global| Some(global.relative_altitude.0))),
+    ("fix", SLOW, |vehicle| of(&vehicle.gnss[0], |gnss| Some(gnss.fix.into()))),
+    ("satellites", SLOW, |vehicle| of(&vehicle.gnss[0], |gnss| gnss.satellites.map(f32::from))),
+    ("hdop", SLOW, |vehicle| of(&vehicle.gnss[0], |gnss| gnss.hdop)),
+    ("accuracy", SLOW, |vehicle| of(&vehicle.gnss[0], |gnss| gnss.accuracy.map(|metres| metres.0))),
+    ("vibration_0", SLOW, |vehicle| of(&vehicle.vibration, |vibration| vibration.levels[0])),
+    ("vibration_1", SLOW, |vehicle| of(&vehicle.vibration, |vibration| vibration.levels[1])),
+    ("vibration_2", SLOW, |vehicle| of(&vehicle.vibration, |vibration| vibration.levels[2])),
+    ("clips", SLOW, |vehicle| of(&vehicle.vibration, |vibration| Some(clips(vibration.clips)))),
+    ("ekf_velocity", SLOW, |vehicle| of(&vehicle.estimator, |estimator| estimator.velocity)),
+    ("ekf_horizontal", SLOW, |vehicle| of(&vehicle.estimator, |estimator| estimator.position_horizontal)),
+    ("ekf_vertical", SLOW, |vehicle| of(&vehicle.estimator, |estimator| estimator.position_vertical)),
+    ("ekf_compass", SLOW, |vehicle| of(&vehicle.estimator, |estimator| estimator.compass)),
+    ("battery_amperes", SLOW, amperes),
+    ("battery_consumed", SLOW, |vehicle| {
+        of(&vehicle.batteries[0], |pack| pack.consumed.map(|charge| charge.0))
+    }),
+    ("battery_celsius", SLOW, |vehicle| {
+        of(&vehicle.batteries[0], |pack| pack.temperature.map(|celsius| celsius.0))
+    }),
+    ("load", SLOW, |vehicle| of(&vehicle.system, |system| system.load.map(|load| load.0 * 100.0))),
+    ("rail_5v", SLOW, |vehicle| of(&vehicle.rails, |rails| rails.vcc.map(|volts| volts.0))),
+    ("rail_servo", SLOW, |vehicle| of(&vehicle.rails, |rails| rails.servo.map(|volts| volts.0))),
+    ("processor_celsius", SLOW, |vehicle| {
+        of(&vehicle.processor, |chip| chip.temperature.map(|celsius| celsius.0))
+    }),
+    ("rc_rssi", SLOW, |vehicle| of(&vehicle.rc, |rc| rc.rssi.map(f32::from))),
+    ("radio_rssi", SLOW, |vehicle| of(&vehicle.radio, |radio| radio.rssi.map(f32::from))),
+    ("radio_remote_rssi", SLOW, |vehicle| of(&vehicle.radio, |radio| radio.remote_rssi.map(f32::from))),
+    ("radio_noise", SLOW, |vehicle| of(&vehicle.radio, |radio| radio.noise.map(f32::from))),
+    ("engine_rpm", SLOW, |vehicle| of(&vehicle.engine, |engine| engine.rpm.map(|rpm| rpm.0))),
+    ("engine_load", SLOW, |vehicle| of(&vehicle.engine, |engine| engine.load.map(|load| load.0 * 100.0))),
+    ("engine_fuel_flow", SLOW, |vehicle| of(&vehicle.engine, |engine| engine.fuel_flow)),
+    ("engine_fuel_consumed", SLOW, |vehicle| of(&vehicle.engine, |engine| engine.fuel_consumed)),
+    ("engine_head_celsius", SLOW, |vehicle| {
+        of(&vehicle.engine, |engine| engine.cylinder_head.map(|head| head.0))
+    }),
+];
+
+/// Clipped samples of all accelerometers.
+fn clips(of_each: [u32; 3]) -> f32 {
+    of_each.iter().fold(0_u32, |sum, clips| sum.saturating_add(*clips)) as f32
+}
+
+/// The first battery's current, or else the one in the autopilot's status.
+fn amperes(vehicle: &Vehicle) -> Told {
+    let of_battery = of(&vehicle.batteries[0], |pack| pack.current.map(|amperes| amperes.0));
+    let of_system = || of(&vehicle.system, |system| system.current.map(|amperes| amperes.0));
+    if of_battery.1.is_some() { of_battery } else { of_system() }
+}
 
 /// Everything that is known now, by name.
 #[derive(Debug)]
@@ -59,124 +122,23 @@ impl<'a> Values<'a> {
 
     fn each(&self, mut each: impl FnMut(&'static str, Shown)) {
         let (craft, now) = (self.craft, self.now);
+        let vehicle = craft.monitor.vehicle();
         for (name, quantity, limit) in &QUANTITIES {
-            let is_known = *quantity != Quantity::FlightTime || tells_flight(craft.monitor.vehicle());
+            let is_known = *quantity != Quantity::FlightTime || tells_flight(vehicle);
             if let Some((at, value)) = craft.latest.get(*quantity).filter(|_| is_known) {
                 let is_flown = *quantity == Quantity::FlightTime;
                 let value = if is_flown { Scalar::Double(craft.flown_s()) } else { value };
                 each(name, Shown::new(now, at, value, *limit));
             }
         }
-        let mut put = |name, at: Option<time::Instant>, value: Option<f32>, limit| {
-            if let (Some(at), Some(value)) = (at, value) {
-                each(name, Shown::new(now, Instant::of(at, now), Scalar::Single(value), limit));
-            }
-        };
-        self.motion(&mut put);
-        self.condition(&mut put);
-        self.power(&mut put);
-        self.radio(&mut put);
-        self.engine(&mut put);
-    }
-
-    /// Attitude, height, and the receiver's position.
-    fn motion(&self, put: &mut Put<'_>) {
-        let vehicle = self.craft.monitor.vehicle();
-        let attitude = &vehicle.attitude;
-        if let Some(angles) = attitude.get() {
-            for (name, angle) in [("roll", angles.roll), ("pitch", angles.pitch), ("yaw", angles.yaw)] {
-                put(name, attitude.at(), Some(angle.0.to_degrees()), MOTION);
+        for (name, limit, value) in OF_VEHICLE {
+            if let (Some(at), Some(value)) = value(vehicle) {
+                each(name, Shown::new(now, Instant::of(at, now), Scalar::Single(value), *limit));
             }
         }
-        let height = vehicle.global.get().map(|global| global.relative_altitude.0);
-        put("height", vehicle.global.at(), height, MOTION);
-        let gnss = &vehicle.gnss[0];
-        if let Some(fix) = gnss.get() {
-            put("fix", gnss.at(), Some(f32::from(fix.fix)), SLOW);
-            put("satellites", gnss.at(), fix.satellites.map(f32::from), SLOW);
-            put("hdop", gnss.at(), fix.hdop, SLOW);
-            put("accuracy", gnss.at(), fix.accuracy.map(|metres| metres.0), SLOW);
-        }
-    }
-
-    /// Vibration and estimator.
-    fn condition(&self, put: &mut Put<'_>) {
-        let vehicle = self.craft.monitor.vehicle();
-        if let Some(vibration) = vehicle.vibration.get() {
-            let names = ["vibration_0", "vibration_1", "vibration_2"];
-            for (name, level) in names.into_iter().zip(vibration.levels) {
-                put(name, vehicle.vibration.at(), level, SLOW);
-            }
-            let clips = vibration.clips.iter().fold(0_u32, |sum, clips| sum.saturating_add(*clips));
-            put("clips", vehicle.vibration.at(), Some(clips as f32), SLOW);
-        }
-        if let Some(estimator) = vehicle.estimator.get() {
-            let figures = [
-                ("ekf_velocity", estimator.velocity),
-                ("ekf_horizontal", estimator.position_horizontal),
-                ("ekf_vertical", estimator.position_vertical),
-                ("ekf_compass", estimator.compass),
-            ];
-            for (name, figure) in figures {
-                put(name, vehicle.estimator.at(), figure, SLOW);
-            }
-        }
-    }
-
-    /// Battery, rails, the autopilot's computer.
-    fn power(&self, put: &mut Put<'_>) {
-        let vehicle = self.craft.monitor.vehicle();
-        let (battery, system) = (&vehicle.batteries[0], &vehicle.system);
-        if let Some(amperes) = battery.get().and_then(|battery| battery.current) {
-            put("battery_amperes", battery.at(), Some(amperes.0), SLOW);
-        } else {
-            let amperes = system.get().and_then(|system| system.current).map(|amperes| amperes.0);
-            put("battery_amperes", system.at(), amperes, SLOW);
-        }
-        if let Some(known) = battery.get() {
-            put("battery_consumed", battery.at(), known.consumed.map(|charge| charge.0), SLOW);
-            put("battery_celsius", battery.at(), known.temperature.map(|celsius| celsius.0), SLOW);
-        }
-        let load = system.get().and_then(|system| system.load).map(|load| load.0 * 100.0);
-        put("load", system.at(), load, SLOW);
-        if let Some(rails) = vehicle.rails.get() {
-            put("rail_5v", vehicle.rails.at(), rails.vcc.map(|volts| volts.0), SLOW);
-            put("rail_servo", vehicle.rails.at(), rails.servo.map(|volts| volts.0), SLOW);
-        }
-        let processor = vehicle.processor.get().and_then(|processor| processor.temperature);
-        put("processor_celsius", vehicle.processor.at(), processor.map(|celsius| celsius.0), SLOW);
-    }
-
-    fn radio(&self, put: &mut Put<'_>) {
-        let vehicle = self.craft.monitor.vehicle();
-        let rssi = vehicle.rc.get().and_then(|rc| rc.rssi).map(f32::from);
-        put("rc_rssi", vehicle.rc.at(), rssi, SLOW);
-        if let Some(radio) = vehicle.radio.get() {
-            put("radio_rssi", vehicle.radio.at(), radio.rssi.map(f32::from), SLOW);
-            put("radio_remote_rssi", vehicle.radio.at(), radio.remote_rssi.map(f32::from), SLOW);
-            put("radio_noise", vehicle.radio.at(), radio.noise.map(f32::from), SLOW);
-        }
-    }
-
-    /// A combustion engine, and its speed sensors.
-    fn engine(&self, put: &mut Put<'_>) {
-        let engine = &self.craft.monitor.vehicle().engine;
-        if let Some(known) = engine.get() {
-            let figures = [
-                ("engine_rpm", known.rpm.map(|rpm| rpm.0)),
-                ("engine_load", known.load.map(|load| load.0 * 100.0)),
-                ("engine_fuel_flow", known.fuel_flow),
-                ("engine_fuel_consumed", known.fuel_consumed),
-                ("engine_head_celsius", known.cylinder_head.map(|celsius| celsius.0)),
-            ];
-            for (name, figure) in figures {
-                put(name, engine.at(), figure, SLOW);
-            }
-        }
-        let names = ["speed_sensor_0", "speed_sensor_1"];
-        for (sensor, name) in self.craft.speed_sensors.iter().zip(names) {
+        for (sensor, name) in craft.speed_sensors.iter().zip(["speed_sensor_0", "speed_sensor_1"]) {
             if let Some((at, rpm)) = sensor {
-                put(name, Some((*at).into()), Some(*rpm), SLOW);
+                each(name, Shown::new(now, *at, Scalar::Single(*rpm), SLOW));
             }
         }
     }

@@ -18,7 +18,6 @@ use crate::page::history::History;
 use crate::page::more::More;
 use crate::page::note::Note;
 use crate::source::told::Finding as BoxFinding;
-use crate::summary::FindingLine;
 
 /// Maximum number of vehicles; further ones are counted.
 pub const VEHICLES_MAX: usize = 8;
@@ -259,7 +258,7 @@ impl World {
         let is_new = finding.subsystem == Subsystem::Recorder
             || self.crafts.get_mut(&owner).is_some_and(|craft| craft.found_on_board(finding));
         if let Some(histories) = histories.filter(|_| is_new) {
-            let note = Note::told(&FindingLine::from(finding.clone()));
+            let note = Note::told(finding);
             histories.entry(owner).or_default().note(finding.at, note);
         }
     }

@@ -12,7 +12,7 @@ use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output};
 use crate::outcome::Outcome;
-use crate::sink::{Beside, nowhere};
+use crate::sink::{SideOutput, nowhere};
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
@@ -28,7 +28,7 @@ pub struct Arrivals {
     first: VecDeque<Chunk>,
     name: String,
     waiting: VecDeque<Chunk>,
-    tap: Beside,
+    tap: SideOutput,
     bytes: u64,
     /// The way to the autopilot, if a live one is connected.
     autopilot: Option<Box<dyn Write + Send>>,
@@ -71,7 +71,7 @@ impl Arrivals {
             first,
             name: run.input.to_string(),
             waiting: VecDeque::new(),
-            tap: run.tap.as_deref().map_or_else(|| Ok(Beside::nowhere()), |path| tap_of(path, inputs))?,
+            tap: run.tap.as_deref().map_or_else(|| Ok(SideOutput::nowhere()), |path| tap_of(path, inputs))?,
             bytes: 0,
             autopilot,
             broken_off: false,
@@ -163,6 +163,6 @@ fn until_frame(
 }
 
 /// A file for a copy of the bytes. It must not be one of the inputs.
-fn tap_of(path: &Path, inputs: &Inputs) -> Result<Beside> {
-    Ok(Beside::file("--tap", Output::create(path, inputs)?))
+fn tap_of(path: &Path, inputs: &Inputs) -> Result<SideOutput> {
+    Ok(SideOutput::file("--tap", Output::create(path, inputs)?))
 }

@@ -9,26 +9,26 @@ use super::arrivals::CHUNK_BYTES_MAX;
 use crate::cli::Sim;
 use crate::files::Inputs;
 use crate::outcome::Outcome;
-use crate::sink::{self, Beside, Heard};
+use crate::sink::{self, GroundInput, SideOutput};
 use crate::source::{self, Chunk, Source, Timing};
 
 /// The ground station's messages.
 pub struct Ground {
-    heard: Heard,
+    input: GroundInput,
     stored: Option<Box<dyn Source>>,
     next: Option<Chunk>,
-    got: Beside,
+    got: SideOutput,
 }
 
 /// Opens both directions by the command line. Outputs must differ from the inputs.
 pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
-    let sink::Ground { writer, heard } = match &run.gs {
+    let sink::Ground { writer, input } = match &run.gs {
         Some(endpoint) => sink::open(endpoint, inputs)?,
-        None => sink::Ground { writer: Beside::nowhere(), heard: Heard::nobody() },
+        None => sink::Ground { writer: SideOutput::nowhere(), input: GroundInput::nobody() },
     };
     let timing = Timing { line_rate: None };
     let stored = run.gs_input.as_ref().map(|input| source::open(input, timing)).transpose()?;
-    Ok((Ground { heard, stored, next: None, got: writer.clone() }, Box::new(writer)))
+    Ok((Ground { input, stored, next: None, got: writer.clone() }, Box::new(writer)))
 }
 
 impl Ground {
@@ -55,6 +55,6 @@ impl Ground {
             }
             return Ok(Some(Chunk { at_us, bytes }));
         }
-        Ok(self.heard.take().map(|bytes| Chunk { at_us: now_us, bytes }))
+        Ok(self.input.take().map(|bytes| Chunk { at_us: now_us, bytes }))
     }
 }

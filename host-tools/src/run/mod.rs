@@ -15,21 +15,25 @@ pub mod sim;
 mod store;
 
 use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
 use crate::card::image;
 use crate::card::{Faults, SimCard};
 use crate::cli::{Sim, Speed};
 use crate::endpoint::Endpoint;
-use crate::files::FileId;
 use crate::interrupt;
-use crate::outcome::usage;
+use crate::outcome::{Outcome, usage};
+use crate::params;
 use crate::source::Chunk;
 use arrivals::Arrivals;
+use earlier::EarlierSessions;
 use ground::Ground;
+use report::Report;
+use store::FileFlash;
 
 /// In real time the machine's clock goes on at least this often, also while nothing arrives.
 const STEP: Duration = Duration::from_millis(20);
@@ -131,26 +135,51 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
     Ok(file)
 }
 
-/// The files that a run updates in place, and which ones these were when it began.
-struct InPlace<'a>(Vec<(&'a Path, Option<FileId>)>);
+/// A run before its first byte: everything that it reads and writes is open.
+struct Prepared {
+    speed: Speed,
+    live: bool,
+    arrivals: Arrivals,
+    card: File,
+    flash: FileFlash,
+    earlier: EarlierSessions,
+    ground: Ground,
+    /// What the ground station gets.
+    gs: Box<dyn Write + Send>,
+    entropy: u32,
+}
 
-impl<'a> InPlace<'a> {
-    fn of(run: &'a Sim) -> Self {
-        let paths = std::iter::once(run.sd.as_path()).chain(run.store.as_deref());
-        Self(paths.map(|path| (path, FileId::of(path).ok())).collect())
+/// Opens the files of a run. An input without a length may have `unknown` bytes.
+fn prepare(run: &Sim, unknown: u64) -> Result<Prepared> {
+    let (speed, live) = pace(run)?;
+    let inputs = paths::inputs(run)?;
+    let params = params::read(run.params.as_deref())?;
+    let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
+        run.store.as_deref().map_or(Ok(()), store::check)?;
+        let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
+        Ok((card, store::open(run.store.as_deref(), &params)?))
+    })?;
+    let earlier = EarlierSessions::of(run, unknown)?;
+    let (ground, gs) = ground::open(run, &inputs)?;
+    let entropy = salt::salt(run, &mut arrivals)?;
+    Ok(Prepared { speed, live, arrivals, card, flash, earlier, ground, gs, entropy })
+}
+
+/// The end of a run: remarks, and the report.
+fn finish(run: &Sim, arrivals: &Arrivals, ground: &Ground, report: &Report) -> Result<Outcome> {
+    let beside = ground.finish().and(arrivals.finish());
+    for remark in arrivals.remark().into_iter().chain(report.remark(&run.input)) {
+        note!("{remark}");
     }
+    let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
+    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged())))
+}
 
-    /// Those that somebody has removed or replaced since, which is said: what the run wrote to them is gone.
-    fn gone(&self) -> Vec<&'a Path> {
-        let is_gone = |(path, id): &&(&Path, Option<FileId>)| FileId::of(path).ok() != *id;
-        let gone: Vec<&Path> = self.0.iter().filter(is_gone).map(|(path, _)| *path).collect();
-        for path in &gone {
-            note!(
-                "{}: was removed or replaced during the run; what was written to it is lost",
-                path.display()
-            );
-        }
-        gone
+/// Fails if the store's file could not be written.
+fn check_store(run: &Sim, flash: &FileFlash) -> Result<()> {
+    match (flash.take_error(), &run.store) {
+        (Some(error), Some(store)) => bail!("--store {}: {error}", store.display()),
+        _ => Ok(()),
     }
 }
 

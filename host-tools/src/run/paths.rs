@@ -1,6 +1,6 @@
 //! The files of a run: none may be two things at once.
 
-use std::path::Path;
+use std::path::{self, Path};
 
 use anyhow::Result;
 
@@ -39,7 +39,7 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
         Output::check(output, &inputs)?;
     }
     if let (Some(gs), Some(tap)) = (gs, tap)
-        && FileId::of(gs).ok() == FileId::of(tap).ok()
+        && is_same(gs, tap)
         && !is_device(gs)
     {
         return Err(usage(format!(
@@ -49,6 +49,15 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
         )));
     }
     Ok(inputs)
+}
+
+/// Whether two paths lead to one file, which may not be there yet.
+fn is_same(one: &Path, other: &Path) -> bool {
+    match [one, other].map(|path| FileId::of(path)) {
+        [Ok(one), Ok(other)] => one == other,
+        [Err(_), Err(_)] => path::absolute(one).ok() == path::absolute(other).ok(),
+        _ => false,
+    }
 }
 
 /// Whether something is there that is neither a file nor a folder: `/dev/null` may be written by both.

@@ -16,7 +16,8 @@ use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 use crate::plural::count;
-use crate::summary::{FindingLine, Overview};
+use crate::source::told;
+use crate::summary::Overview;
 use crate::utc::moment;
 
 /// The output of `hums sim --json`.
@@ -145,13 +146,13 @@ impl From<&health::Finding> for Finding {
     }
 }
 
-impl From<&FindingLine> for Finding {
-    fn from(finding: &FindingLine) -> Self {
+impl From<&told::Finding> for Finding {
+    fn from(finding: &told::Finding) -> Self {
         Self {
-            subsystem: finding.subsystem.to_owned(),
+            subsystem: finding.subsystem.name().to_owned(),
             check: finding.check.clone(),
             instance: finding.instance,
-            level: finding.level.to_owned(),
+            level: finding.level.name().to_owned(),
             time_s: finding.at.as_millis() as f64 / 1e3,
             value: known(finding.value),
             unit: finding.unit.clone(),

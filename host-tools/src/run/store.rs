@@ -56,12 +56,10 @@ pub(super) fn check(path: &Path) -> Result<()> {
     if path.exists() {
         let (bytes, _) = read(path)?;
         if found(&bytes) == Some(Found::Damaged) {
-            let lost = if is_emptied(&bytes) {
-                "nothing is stored in it any more, or power went when it was made, and all begins anew"
-            } else {
-                "a stored item was lost, its older value counts or it begins anew"
-            };
-            note!("--store {}: is damaged: {lost}", path.display());
+            let path = path.display();
+            note!(
+                "--store {path}: is damaged: a stored item was lost, its older value counts or it begins anew"
+            );
         }
         return Ok(());
     }
@@ -115,16 +113,9 @@ fn fill(mut file: &File, path: &Path) -> Result<()> {
     file.write_all(&vec![0xFF; BYTES]).with_context(|| cannot_write(path))
 }
 
-/// What a board would find in these bytes; one that has lost all of its items is damaged, which no board can know.
+/// The state of a store with these bytes, as a board would find it.
 fn found(bytes: &[u8]) -> Option<Found> {
-    let (_, found) = Store::mount(SimFlash::<SECTOR>::with(bytes)).ok()?;
-    Some(if found == Found::Kept && is_emptied(bytes) { Found::Damaged } else { found })
-}
-
-/// Whether somebody made a store of these bytes, and no item is in it: each start stores how many there were.
-fn is_emptied(bytes: &[u8]) -> bool {
-    let mounts = || Store::mount(SimFlash::<SECTOR>::with(bytes)).ok()?.0.mounts().ok();
-    bytes.iter().any(|byte| *byte != 0xFF) && mounts() == Some(1)
+    Store::mount(SimFlash::<SECTOR>::with(bytes)).ok().map(|(_, found)| found)
 }
 
 /// Flash whose content is written through to a file. Clones are the same flash.

@@ -52,13 +52,13 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
 }
 
 /// A message of a board about formatting.
-enum Said {
+enum Answer {
     /// To our command: a `MAV_RESULT`.
     Result(u8),
     Card(String),
 }
 
-impl Said {
+impl Answer {
     fn read(frame: &Frame<'_>) -> Option<Self> {
         let fields = Fields(frame.payload());
         match frame.id() {
@@ -79,8 +79,8 @@ impl Said {
 fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
     let (system, component) = client.target();
     let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);
-    let answer = client.ask(&packet, ANSWER, TRIES, |frame| match Said::read(frame) {
-        Some(Said::Result(result)) => Some(result),
+    let answer = client.ask(&packet, ANSWER, TRIES, |frame| match Answer::read(frame) {
+        Some(Answer::Result(result)) => Some(result),
         _ => None,
     })?;
     let mut result = answer.context("no answer; is its firmware as new as this program?")?;
@@ -92,14 +92,14 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
     let end = Instant::now() + limit;
     loop {
         // Any frame from the board proves its presence.
-        match client.until(end.min(Instant::now() + silence), |frame| Some(Said::read(frame)))? {
+        match client.until(end.min(Instant::now() + silence), |frame| Some(Answer::read(frame)))? {
             // A result after the acceptance answers the repeated command.
-            Some(Some(Said::Result(next))) if result == IN_PROGRESS => {
+            Some(Some(Answer::Result(next))) if result == IN_PROGRESS => {
                 check(next)?;
                 result = next;
             }
-            Some(Some(Said::Card(state))) if state == "recording" => return Ok(()),
-            Some(Some(Said::Card(state))) if !state.starts_with("is being") => {
+            Some(Some(Answer::Card(state))) if state == "recording" => return Ok(()),
+            Some(Some(Answer::Card(state))) if !state.starts_with("is being") => {
                 bail!("it did not work, the board says of its card: {state}")
             }
             Some(_) => {}
@@ -136,10 +136,10 @@ mod tests {
     use hums_link::text::Severity;
 
     use super::*;
-    use crate::talk::fake::{self, found};
+    use crate::talk::tests::fake::{self, found};
 
     /// The result for this answer of the board to the command.
-    fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Said) -> Result<()> {
+    fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Answers) -> Result<()> {
         let mut client = found(&[1], move |_| said());
         format(&mut client, Duration::from_millis(silence_ms), Duration::from_millis(limit_ms))
     }

@@ -270,7 +270,7 @@ mod tests {
     use hums_link::messages::param_value;
 
     use super::*;
-    use crate::talk::fake;
+    use crate::talk::tests::fake;
 
     #[test]
     fn what_another_systems_board_says_is_no_answer() {
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn a_list_that_cannot_be_is_told_and_no_name_makes_a_line_of_its_own() {
-        let listed = |said: fn() -> fake::Said| {
+        let listed = |said: fn() -> fake::Answers| {
             let mut client = fake::found(&[1], move |_| said());
             let (values, wrong) = list(&mut client).expect("a list");
             (values.iter().map(|value| shown(&value.name)).collect::<Vec<_>>(), wrong)

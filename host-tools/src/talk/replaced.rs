@@ -189,7 +189,7 @@ mod tests {
 
     use super::*;
     use crate::mavlink::ids::PARAM_VALUE;
-    use crate::talk::fake::found;
+    use crate::talk::tests::fake::found;
 
     #[test]
     fn the_board_is_told_the_place_of_the_part_and_its_serial_number() {

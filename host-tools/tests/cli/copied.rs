@@ -88,21 +88,6 @@ fn copy(dir: &Path, sessions: usize) {
     }
 }
 
-/// Deletes a file like an operating system: its entry and its chain in the FAT.
-pub(crate) fn delete(image: &mut [u8], name: &[u8; 11]) {
-    let at = image.windows(11).position(|bytes| bytes == name).expect("an entry");
-    let word = |image: &[u8], at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
-    let partition = word(image, 446 + 8) as usize * BLOCK;
-    let fat = partition + (word(image, partition + 14) & 0xffff) as usize * BLOCK;
-    image[at] = 0xe5;
-    let mut next = (word(image, at + 26) & 0xffff | word(image, at + 20) << 16) as usize;
-    while next < 0x0fff_fff8 {
-        let entry = fat + 4 * next;
-        next = word(image, entry) as usize & 0x0fff_ffff;
-        image[entry..entry + 4].fill(0);
-    }
-}
-
 /// The only log of a card's image or of a copy, up to the last of its parity, which ends it.
 pub(crate) fn with_parity(file: &Path) -> Vec<u8> {
     let bytes = fs::read(file).expect("a log");

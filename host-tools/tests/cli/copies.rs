@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::copied::{BLOCK, all_say, copied, each_says, without};
-use crate::support::{attempt, end_of, run, text};
+use crate::support::{attempt, run, text};
 
 #[test]
 fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
@@ -116,17 +116,4 @@ fn what_is_wrong_with_a_copy_is_told_by_every_command() {
     damaged[20 * BLOCK..21 * BLOCK].fill(0);
     fs::write(at("Copy of 00001_00.HUM"), damaged).expect("written");
     each_says(dir.path(), "copied", 3, &["1 sector had to be made again from parity"]);
-}
-
-#[test]
-fn what_lies_behind_a_mere_copy_is_said() {
-    let dir = copied(2);
-    let at = |name: &str| dir.path().join("copied").join(name);
-    let copy = fs::read(at("00001_00.HUM")).expect("there");
-    let recording = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("there");
-    fs::write(at("zcopy.hum"), &copy).expect("written");
-    all_say(dir.path(), "copied", 0, &["is the same session as 00001 once more (not counted)"]);
-    fs::write(at("zcopy.hum"), [copy, recording].concat()).expect("written");
-    let words = "is the same session as 00001 once more (not counted); behind its last sector: ";
-    all_say(dir.path(), "copied", 0, &[words]);
 }

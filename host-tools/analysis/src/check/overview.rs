@@ -17,14 +17,14 @@ use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
 use crate::counters::is_told;
 use crate::ending::Ending;
-use crate::logs::groups::at_beginning;
+use crate::logs::groups::has_start;
 use crate::logs::reader;
 use crate::names::counter_name;
 use crate::outcome::usage;
 use crate::progress;
 use crate::source::item::{Gap, Item, Summary, Want};
 use crate::source::recording::{Format, Place};
-use crate::summary::{Contents, ExceedanceLine, FindingLine, Overview};
+use crate::summary::{Contents, ExceedanceLine, Overview};
 
 /// A log with fewer kinds of messages may have too little in it to be judged, though a recorder that checks wrote it.
 const FEW_KINDS: usize = 16;
@@ -69,7 +69,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
         // If a log begins with the record of a start, a monitor ran, and the log is not judged here.
-        let has_start = at_beginning(log, |_| Some(())).is_some();
+        let has_start = has_start(log);
         let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
         let mut overview = match &mut here {
             Some(here) => Overview::told(log, place.system, &mut |at, item| {
@@ -215,7 +215,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
         return;
     }
     contents.findings_count = findings_count;
-    contents.findings = findings.into_iter().map(FindingLine::from).collect();
+    contents.findings = findings;
     contents.usage.extend(counters);
     if let Some((_, last)) = span {
         for exceedance in monitor.exceedances().iter(last.into()) {

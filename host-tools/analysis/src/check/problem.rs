@@ -7,7 +7,6 @@ use hums_core::health::{Alarm, Level, Side, Subsystem, checks, root_cause};
 
 use crate::part;
 use crate::source::told::Finding;
-use crate::summary::FindingLine;
 use crate::utc::moment;
 
 /// Maximum number of listed findings, flights and gaps; further ones are only counted.
@@ -338,10 +337,10 @@ pub(super) fn worst_first(problems: &mut [Problem]) {
 }
 
 /// The problems from a log's findings, worst first. The findings are by a box or by this program.
-pub fn problems(findings: &[FindingLine], of_box: bool) -> Vec<Problem> {
+pub fn problems(findings: &[Finding], of_box: bool) -> Vec<Problem> {
     let mut problems = if of_box { Problems::of_box() } else { Problems::default() };
     for finding in findings {
-        problems.take(&finding.into(), Span::ZERO);
+        problems.take(finding, Span::ZERO);
     }
     problems.worst_first()
 }

@@ -8,7 +8,6 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
@@ -19,9 +18,6 @@ use super::inputs::Inputs;
 use super::paths::{PART, cannot_write, folder_of, make_parent, part_prefix, settle};
 use super::stamp::{STAMP, Stamp};
 use crate::outcome::exists;
-
-/// Files that are synced at once: each waits for the disk, and nearly all of it together.
-const SYNCS_AT_ONCE: usize = 8;
 
 /// A file of the folder.
 pub type FolderFile = File;
@@ -51,7 +47,7 @@ impl Folder {
             }
         }
         let context = || cannot_write(path);
-        let target = without_links(path).with_context(context)?;
+        let target = without_links(path);
         let prefix = part_prefix(&target).with_context(context)?;
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(PART);
@@ -98,10 +94,8 @@ impl Folder {
     pub fn finish(self) -> Result<()> {
         let Self { path, target, part, session, files } = self;
         let stamp = Stamp { session, files: files.into_inner().unwrap_or_else(PoisonError::into_inner) };
-        let placed = File::create(part.path().join(STAMP))
-            .and_then(|file| stamp.write(&file))
-            .and_then(|()| sync_all(part.path()))
-            .and_then(|()| {
+        let placed =
+            File::create(part.path().join(STAMP)).and_then(|file| stamp.write(&file)).and_then(|()| {
                 // `create` has checked the existing files.
                 if let Some(old) = Stamp::of(&target) {
                     old.files.iter().map(String::as_str).chain([STAMP]).try_for_each(|name| {
@@ -150,30 +144,6 @@ fn check(path: &Path, session: &str) -> Result<()> {
         ),
         None => Ok(()),
     }
-}
-
-/// Brings all files of a folder to the disk.
-fn sync_all(folder: &Path) -> io::Result<()> {
-    let paths: Vec<PathBuf> =
-        fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<_>>()?;
-    let next = AtomicUsize::new(0);
-    let sync = || -> io::Result<()> {
-        while let Some(path) = paths.get(next.fetch_add(1, Ordering::Relaxed)) {
-            File::options().append(true).open(path)?.sync_all()?;
-        }
-        Ok(())
-    };
-    std::thread::scope(|scope| {
-        // This thread is one of them: the system may give no other.
-        let others = 1..SYNCS_AT_ONCE.min(paths.len());
-        let thread = |_| std::thread::Builder::new().spawn_scoped(scope, sync).ok();
-        let threads: Vec<_> = others.map_while(thread).collect();
-        let mut synced = sync();
-        for thread in threads {
-            synced = synced.and(thread.join().unwrap_or_else(|_| Err(io::Error::other("a thread failed"))));
-        }
-        synced
-    })
 }
 
 /// A file of a folder with room for a group's lines of a busy message; there may be some hundred of these.

@@ -60,7 +60,7 @@ impl Output {
             return Ok(Self::new(To::File(file), path, Part::None));
         }
         // A link to a file stays a link.
-        let to = without_links(path).with_context(context)?;
+        let to = without_links(path);
         if !folder_of(&to).is_dir() {
             bail!("{}; there is no folder {}", cannot_write(path), folder_of(&to).display());
         }
@@ -107,7 +107,7 @@ impl Output {
     /// Goes on with the bytes that an earlier run has left of a file. Dropped before its end it stays for the next one. In the
     /// end it replaces a file of its name, whose bytes the caller has compared. One run at a time has it.
     pub fn resume(path: &Path) -> Result<Self> {
-        let to = without_links(path).with_context(|| cannot_write(path))?;
+        let to = without_links(path);
         let from = begun_of(&to)?;
         // Windows does not allow cutting a file that is open to append. One run at a time has it, so its end is where
         // this run left it.

@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 
-use super::identity::folded;
-
 /// How the name of a file or a folder ends that is not whole yet.
 pub(super) const PART: &str = ".hums-part";
 /// Why readers of a folder pass over a file of this name, as the end of a sentence.
@@ -66,8 +64,6 @@ pub fn make_directory(dir: &Path) -> Result<()> {
 fn check_directory(dir: &Path) -> Result<()> {
     // Without a slash at its end, with which a file is not found.
     let dir: PathBuf = dir.components().collect();
-    // Nor where it is spelled through a folder that would be made on the way.
-    let dir = folded(&dir).unwrap_or(dir);
     let there = dir.ancestors().find_map(|folder| Some((folder, fs::metadata(folder).ok()?)));
     match there.filter(|(_, about)| !about.is_dir()) {
         Some((file, about)) => {

@@ -4,34 +4,24 @@ use std::path::Path;
 
 use hums_blackbox::{BlockCounts, PAGE_SECTORS};
 
+use super::log::Ending;
 use super::proof::Proof;
 use crate::logs::naming::is_part;
 use crate::logs::reader::Summary;
 use crate::logs::segment_name;
 use crate::logs::strangers::Strange;
-use crate::plural::{are, count};
+use crate::plural::count;
 
-/// Maximum difference of two power-ons' clocks that does not show their order: microseconds.
-const EPOCH_SLACK_US: u64 = 60_000_000;
-/// No box recorded before 2025: an earlier clock is wrong. Microseconds since 1970.
-const EARLIEST_US: u64 = 1_735_689_600_000_000;
 /// Files of a log that are named one by one.
 const NAMED_MAX: usize = 3;
 
-/// A log's files, and the result of reading them.
-pub(super) struct Files<'a> {
-    pub(super) names: &'a [String],
-    pub(super) summary: &'a Summary,
-    pub(super) proof: Proof,
-}
-
-impl Files<'_> {
+impl Ending {
     /// Blocks after the last sector that are neither empty nor sectors of any log, if the log's end is not
     /// proved before them. Damaged sectors of the log look like that. Data from before the card's use in the
     /// box are larger than a card's page, and go on to the end of the last file. A block that begins as a
     /// sector and fails its check may be left over like sectors of another session. So it counts only without
     /// sound ones of those.
-    pub(super) fn noise(&self) -> Option<String> {
+    pub fn noise(&self) -> Option<String> {
         let behind = &self.summary.behind;
         let unsound = if behind.stale == 0 { behind.unsound } else { 0 };
         let is_older = |number: u64| number > PAGE_SECTORS as u64 && self.summary.foreign_at_end > 0;
@@ -46,10 +36,10 @@ impl Files<'_> {
     }
 
     /// That sectors disagree with their parity, which was made of them when they were on the card.
-    pub(super) fn contradicted(&self) -> Option<String> {
+    pub fn contradicted(&self) -> Option<String> {
         let parity = &self.summary.parity;
         let (file, first, last) = parity.first?;
-        let file = self.names.get(file).map_or("a file", String::as_str);
+        let file = self.files.get(file).map_or("a file", String::as_str);
         let more = match parity.contradicted.saturating_sub(1) {
             0 => String::new(),
             more => format!(", and so it is with {more} more of their columns"),
@@ -61,8 +51,8 @@ impl Files<'_> {
     }
 
     /// Which sectors of its files are not of the log, and which of its files are not there.
-    pub(super) fn strange(&self) -> Vec<String> {
-        let parts = self.names.iter().filter(|name| is_part(Path::new(name)));
+    pub fn strange(&self) -> Vec<String> {
+        let parts = self.files.iter().filter(|name| is_part(Path::new(name)));
         let part_words = |name: &String| {
             format!(
                 "{name} is a part of its log, as `hums box pull --around` brings it: what it lacks was not brought, or came damaged; `hums box pull` \
@@ -80,12 +70,12 @@ impl Files<'_> {
     /// The card may have refused one between consecutive sectors, or was missing.
     fn empty(&self) -> Option<String> {
         let is_usual = |strange: &Strange| {
-            let is_between = strange.file + 1 < self.names.len() && self.summary.gaps == 0;
+            let is_between = strange.file + 1 < self.files.len() && self.summary.gaps == 0;
             is_between || matches!(self.proof, Proof::NextStart(None))
         };
         let is_told = |strange: &&Strange| strange.hollow && strange.sectors == 0 && !is_usual(strange);
         let mut told = self.summary.strange.iter().filter(is_told);
-        let name = told.next().and_then(|strange| self.names.get(strange.file))?;
+        let name = told.next().and_then(|strange| self.files.get(strange.file))?;
         let more = match told.count() {
             0 => String::new(),
             more => format!(", and {} more", count(more as u64, "file")),
@@ -101,24 +91,23 @@ impl Files<'_> {
             format!(
                 "{} of {} not of this log (the first at block {}, of session {:08x}): only this log is read",
                 count(strange.sectors, "sector"),
-                self.names.get(strange.file).map_or("a file", String::as_str).to_owned()
+                self.files.get(strange.file).map_or("a file", String::as_str).to_owned()
                     + if strange.sectors == 1 { " is" } else { " are" },
                 strange.first,
                 strange.session
             )
         };
-        let mut all: Vec<_> = told.iter().copied().take(NAMED_MAX).map(|strange| words(&strange)).collect();
+        let mut all: Vec<_> = told.iter().take(NAMED_MAX).map(words).collect();
         if told.len() > NAMED_MAX {
             all.push(format!("so it is with {} more of its files", told.len() - NAMED_MAX));
         }
-        all.extend(self.newer());
         all
     }
 
     /// Whether the last file was to be rewritten when the power failed, and still holds another session from
     /// its beginning on. Its first sector may be torn.
     fn is_begun_anew(&self, strange: &Strange) -> bool {
-        let is_last = strange.file + 1 == self.names.len();
+        let is_last = strange.file + 1 == self.files.len();
         strange.hollow && is_last && strange.first <= 1 && matches!(self.proof, Proof::NextStart(None))
     }
 
@@ -128,7 +117,7 @@ impl Files<'_> {
         // If the card was missing or refused data, an empty file may exist: it is not copied.
         let is_passed = self.summary.gaps == 0 && self.summary.marks.has_card_trouble();
         let between = || {
-            self.names.iter().zip(self.names.iter().skip(1)).find_map(|(before, after)| {
+            self.files.iter().zip(self.files.iter().skip(1)).find_map(|(before, after)| {
                 let (first, end) = (segment(before)?.checked_add(1)?, segment(after)?);
                 (first < end && !is_passed).then_some((first, end))
             })
@@ -139,25 +128,6 @@ impl Files<'_> {
             1 => format!("file {first:02} of this log is not there"),
             _ => format!("files {first:02} to {:02} of this log are not there", end - 1),
         })
-    }
-
-    /// Sectors of a later session, in places where a recycled file may have older ones.
-    pub(super) fn newer(&self) -> Option<String> {
-        let told = self.summary.strange.iter().any(|strange| strange.sectors > 0);
-        (self.has_newer() && !told).then(|| {
-            format!(
-                "{} not of this log, and of a session that began later: only this log is read",
-                are(self.summary.blocks.stale, "sector")
-            )
-        })
-    }
-
-    /// Whether the log's files hold sectors of a later session. Remains are always older: only a newer
-    /// session overwrites a file.
-    pub(super) fn has_newer(&self) -> bool {
-        let both =
-            self.summary.other_epoch_us.zip(self.summary.epoch_us.filter(|epoch| *epoch >= EARLIEST_US));
-        both.is_some_and(|(other, own)| other > own.saturating_add(EPOCH_SLACK_US))
     }
 }
 
@@ -216,7 +186,7 @@ mod tests {
             let strange = vec![Strange { file: 0, hollow, sectors: 300, first: 1, session: 0x1a2b_3c4d }];
             let summary = Summary { session: Some(7), strange, ..Summary::default() };
             let names = ["00001_00.HUM".to_owned()];
-            Files { names: &names, summary: &summary, proof }.strange().join("; ")
+            Ending { files: names.to_vec(), summary, proof, ..Ending::default() }.strange().join("; ")
         };
         let told = "300 sectors of 00001_00.HUM are not of this log (the first at block 1, of session 1a2b3c4d): only this log is read";
         assert_eq!([words(false, Proof::None), words(true, Proof::None)], [told, told]);
@@ -228,7 +198,7 @@ mod tests {
         let words = |names: &[&str], files_gone| {
             let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
             let summary = Summary { session: Some(7), files_gone, ..Summary::default() };
-            Files { names: &names, summary: &summary, proof: Proof::None }.strange().join("; ")
+            Ending { files: names.to_vec(), summary, ..Ending::default() }.strange().join("; ")
         };
         assert_eq!(words(&["00001_03.HUM"], 3), "files 00 to 02 of this log are not there");
         assert_eq!(words(&["00001_00.HUM", "00001_02.HUM"], 0), "file 01 of this log is not there");
@@ -240,21 +210,10 @@ mod tests {
             let mut summary = Summary { session: Some(7), gaps, ..Summary::default() };
             summary.marks.card_out = card_out;
             let names = ["00001_00.HUM", second].map(str::to_owned);
-            Files { names: &names, summary: &summary, proof: Proof::None }.strange().len()
+            Ending { files: names.to_vec(), summary, ..Ending::default() }.strange().len()
         };
         assert_eq!([strange("00001_01.HUM", false, 0), strange("00001_03.HUM", false, 0)], [0, 1]);
         assert_eq!([strange("00001_03.HUM", true, 0), strange("00001_03.HUM", true, 1)], [0, 1]);
-    }
-
-    #[test]
-    fn a_clock_of_before_any_box_says_nothing_about_which_session_began_later() {
-        let has_newer = |own, other| {
-            let summary = Summary { epoch_us: Some(own), other_epoch_us: Some(other), ..Summary::default() };
-            Files { names: &[], summary: &summary, proof: Proof::None }.has_newer()
-        };
-        let (then, now) = (1_554_595_200_000_000, 1_790_000_000_000_000);
-        assert!(has_newer(now, now + 2 * EPOCH_SLACK_US) && !has_newer(now, now));
-        assert!(!has_newer(then, now), "2019");
     }
 
     #[test]
@@ -262,7 +221,7 @@ mod tests {
         let noise = |foreign, unsound, stale, foreign_at_end| {
             let behind = BlockCounts { foreign, unsound, stale, ..BlockCounts::default() };
             let summary = Summary { session: Some(1), behind, foreign_at_end, ..Summary::default() };
-            Files { names: &[], summary: &summary, proof: Proof::None }.noise()
+            Ending { summary, ..Ending::default() }.noise()
         };
         assert!(noise(0, 0, 0, 0).is_none());
         for (foreign, at_end) in [(1, 0), (32, 32), (100, 0), (10_000, 0)] {

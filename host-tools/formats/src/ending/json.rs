@@ -28,8 +28,6 @@ pub struct EndJson {
     frames_missing: Option<u32>,
     /// The blocks after the last sector.
     behind: BlocksJson,
-    /// It holds sectors of a later session.
-    newer_session: bool,
     /// Reasons why the log does not count as whole, and a remark on rebuilt sectors, as sentences; empty
     /// without both.
     not_proved: Vec<String>,
@@ -66,7 +64,6 @@ impl EndJson {
             sectors_missing,
             frames_missing,
             behind: BlocksJson::new(&summary.behind),
-            newer_session: ending.has_newer(),
             not_proved: ending.faults(),
         }
     }

@@ -1,10 +1,8 @@
 //! The end of a log that was read: the evidence of its completeness.
 
-use super::files::{Files, behind_words};
 use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
-use crate::logs::begun_anew::BegunAnew;
 use crate::logs::reader::Summary;
 use crate::logs::sessions::again_words;
 use crate::logs::strangers::Strange;
@@ -23,8 +21,6 @@ pub struct Ending {
     pub proof: Proof,
     /// State of the session just before it on the card.
     pub before: SessionBefore,
-    /// Power failed when the recorder began to rewrite this file, which still holds its old content.
-    pub begun_anew: Option<BegunAnew>,
     /// The name of the original, if it is a mere copy.
     pub again: Option<String>,
     /// It is the rest of a session outside of all files, left by newer ones.
@@ -53,19 +49,8 @@ impl Ending {
                 count(self.summary.frames, "frame")
             )
         };
-        let begun_anew = self.begun_anew.filter(|anew| anew.is_confirmed);
-        let again = self.again.as_deref().map(|of| again_words(of) + &self.behind_copy());
-        again.or_else(|| self.left_over.then(left_over)).or_else(|| begun_anew.map(BegunAnew::words))
-    }
-
-    /// Blocks after the last sector of a mere copy that are not sectors: its original may not have them. A
-    /// remark, not a finding.
-    fn behind_copy(&self) -> String {
-        let behind = &self.summary.behind;
-        if behind.foreign + behind.unsound == 0 {
-            return String::new();
-        }
-        format!("; behind its last sector: {}", behind_words(behind))
+        let again = self.again.as_deref().map(again_words);
+        again.or_else(|| self.left_over.then(left_over))
     }
 
     /// Whether it is to be counted: its session is not there under another name.
@@ -83,12 +68,6 @@ impl Ending {
         self.faults().is_empty()
     }
 
-    /// Missing parity sectors of a log whose recorder reported refused blocks. They may be among those, so
-    /// they are not a fault of the log.
-    pub fn not_taken(&self) -> u64 {
-        if self.has_parity() && self.summary.marks.refused { self.summary.parity.missing } else { 0 }
-    }
-
     /// The faults, as parts of sentences: missing proof, rebuilt sectors, missing parity.
     pub fn faults(&self) -> Vec<String> {
         let weakened = [made_again_words(self.made_again()), unprotected_words(self.unprotected())];
@@ -98,19 +77,18 @@ impl Ending {
     /// Number of sectors rebuilt from parity. They show a damaged card although nothing is lost. In a file
     /// just begun anew the new session has overwritten some, which do not count.
     pub const fn made_again(&self) -> u64 {
-        if self.begun_anew.is_some() { 0 } else { self.summary.blocks.repaired }
+        self.summary.blocks.repaired
     }
 
     /// Number of missing parity sectors: nothing is lost, but further losses of the card cannot be rebuilt. A
-    /// refused block is not written again, so after refused blocks they do not prove a loss
-    /// ([`Self::not_taken`]).
+    /// refused block is not written again, so after refused blocks they do not prove a loss.
     pub fn unprotected(&self) -> u64 {
         if self.has_parity() && !self.summary.marks.refused { self.summary.parity.missing } else { 0 }
     }
 
     /// Whether its parity should be there. It does not matter for copies and rests.
     fn has_parity(&self) -> bool {
-        self.begun_anew.is_none() && self.aside().is_none() && self.summary.marks.has_boot
+        self.aside().is_none() && self.summary.marks.has_boot
     }
 
     /// Reasons why it is not proved to be whole, as parts of sentences: losses, missing proof, foreign data
@@ -121,9 +99,6 @@ impl Ending {
             return self.besides();
         }
         let mut all = Vec::new();
-        if let Some(anew) = self.begun_anew {
-            return vec![anew.words()];
-        }
         let (summary, blocks) = (&self.summary, &self.summary.blocks);
         let lost = summary.marks.lost;
         if summary.gaps > 0 || blocks.damaged > 0 || lost > 0 {
@@ -169,7 +144,7 @@ impl Ending {
 
     /// Sectors of a mere copy's files that are not of the session which it copies.
     pub fn besides(&self) -> Vec<String> {
-        if self.again.is_some() { self.file().others() } else { Vec::new() }
+        if self.again.is_some() { self.others() } else { Vec::new() }
     }
 
     /// The next start found sectors of this session in the log's last file. Returns whether that file has no
@@ -183,30 +158,6 @@ impl Ending {
         let before = strange.len();
         strange.retain(|strange| !is_it(strange));
         strange.len() < before
-    }
-
-    fn file(&self) -> Files<'_> {
-        Files { names: &self.files, summary: &self.summary, proof: self.proof }
-    }
-
-    /// Blocks after the last sector that are not sectors, if the log's end is not proved before them.
-    pub fn noise(&self) -> Option<String> {
-        self.file().noise()
-    }
-
-    /// That sectors disagree with their parity.
-    pub fn contradicted(&self) -> Option<String> {
-        self.file().contradicted()
-    }
-
-    /// Which sectors of its files are not of the log, and which of its files are not there.
-    pub fn strange(&self) -> Vec<String> {
-        self.file().strange()
-    }
-
-    /// Whether the log's files hold sectors of a later session.
-    pub fn has_newer(&self) -> bool {
-        self.file().has_newer()
     }
 }
 
@@ -230,17 +181,6 @@ pub fn unprotected_words(sectors: u64) -> Option<String> {
     })
 }
 
-/// The sentence about this many missing parity sectors after refused blocks; `None` without any.
-pub fn not_taken_words(sectors: u64) -> Option<String> {
-    (sectors > 0).then(|| {
-        format!(
-            "{} not there: the card refused blocks while it recorded (card_errors), and these may be among them; what the card loses of these \
-             files cannot be made again",
-            are(sectors, "parity sector")
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,9 +191,9 @@ mod tests {
             let mut summary = Summary { session: Some(7), closed: true, ..Summary::default() };
             (summary.marks.has_boot, summary.marks.refused, summary.parity.missing) = (true, refused, 3);
             let ending = Ending { proof: Proof::of(&summary, None), summary, ..Ending::default() };
-            (ending.unprotected(), ending.not_taken(), ending.is_sound())
+            (ending.unprotected(), ending.is_sound())
         };
-        assert_eq!([of(false), of(true)], [(3, 0, false), (0, 3, true)]);
+        assert_eq!([of(false), of(true)], [(3, false), (0, true)]);
     }
 
     #[test]

@@ -13,6 +13,6 @@ mod proof;
 
 pub use files::{among_words, behind_words, copies_words};
 pub use json::{BlocksJson, EndJson};
-pub use log::{Ending, made_again_words, not_taken_words, unprotected_words};
+pub use log::{Ending, made_again_words, unprotected_words};
 pub use place::SessionBefore;
 pub use proof::{Proof, Teller};

@@ -1,7 +1,6 @@
 //! The box that recorded a log, from the record of its start. The record is at the beginning of each file of
 //! a log. It is in the first group, or in the second one if the file was opened later.
 
-use hums_blackbox::record::Boot;
 use hums_blackbox::{Entry, GroupDecoder, Record, Step};
 
 /// Number of groups at the beginning of a file, one with the record.
@@ -20,21 +19,14 @@ pub fn known(uid: Board) -> Option<Board> {
     Some(uid).filter(|uid| *uid != [0; 12])
 }
 
-/// The id in the first record of a start; zeros without a board.
+/// The id in the first record of a start in a group or its beginning; zeros without a board.
 pub fn heading(group: &[Step]) -> Option<Board> {
-    find_boot(group, |boot| Some(boot.uid))
-}
-
-/// The wanted value from the first record of a start that has it, in a group or its beginning.
-pub fn find_boot<T>(group: &[Step], wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
     let mut decoder = Box::new(GroupDecoder::new());
     for step in group {
         decoder.push(&step.header, &step.sector).ok()?;
         while let Some(Ok(entry)) = decoder.next_entry() {
-            if let Entry::Record { record: Record::Boot(boot), .. } = entry
-                && let Some(found) = wanted(&boot)
-            {
-                return Some(found);
+            if let Entry::Record { record: Record::Boot(boot), .. } = entry {
+                return Some(boot.uid);
             }
         }
     }

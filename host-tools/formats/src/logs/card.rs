@@ -1,6 +1,6 @@
 //! The logs in a file and on a card: by its file system, or if that is damaged, by searching every block.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::path::Path;
@@ -10,17 +10,11 @@ use hums_blackbox::Header;
 use hums_blackbox::parity::Parity;
 use hums_recorder::layout::{Layout, LayoutError};
 
-use super::begun_anew;
-use super::fat::{CardFile, Deleted, Extent, ReadAt as _, Volume, Walk};
+use super::fat::{CardFile, Extent, ReadAt as _, Volume, Walk};
 use super::found::{Found, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
-use super::reader::likely_epoch;
 use super::scan::{Files, Scan, scan};
-use super::sessions::first_session;
 use crate::card::{ReadOnlyImage, length};
-
-/// The digits of a deleted name wrap at this number.
-const DIGITS: u32 = 10_000;
 
 /// A file that is a log, or a segment of one.
 pub(super) fn whole_file(path: &Path) -> Result<Log> {
@@ -128,56 +122,8 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
             .damage
             .push(format!("{clusters}, with sectors of logs in them: an entry of a directory is lost"));
     }
-    if let Some(number) = newest_deleted(path, &walk.files, &walk.deleted)? {
-        about
-            .damage
-            .push(format!("session {number:05}, which is newer than all that are there, was deleted"));
-    }
     about.deleted_logs = walk.deleted_logs;
     Ok(walk.files)
-}
-
-/// The number of the newest deleted log that was recorded after all others on the card. Older logs are
-/// deleted to make room; the newest one is the reason to read a card.
-fn newest_deleted(path: &Path, files: &[CardFile], deleted: &[Deleted]) -> Result<Option<u32>> {
-    let newest = files.iter().filter_map(|file| Some(file.name?.session)).max();
-    // The first digit of a deleted log's number is lost. Of the possible numbers, the next one after those on
-    // the card counts.
-    let after = |deleted: &Deleted| {
-        let ahead = (deleted.name.session + DIGITS - newest? % DIGITS) % DIGITS;
-        (1..DIGITS / 2).contains(&ahead).then_some((newest? + ahead, *deleted))
-    };
-    let mut deleted: Vec<_> = deleted.iter().filter_map(after).collect();
-    deleted.sort_by_key(|(number, deleted)| (*number, deleted.name));
-    let logs = sessions_of(path, files);
-    let mut sessions: BTreeSet<u32> = logs.iter().filter_map(first_session).collect();
-    let (mut following, mut other) = (None, None);
-    for (number, deleted) in deleted {
-        let Some(first) = first_sector(path, vec![deleted.place])? else { continue };
-        let extent = Extent { length: deleted.bytes, ..deleted.place };
-        let log = Log { session: Some(first.session), ..lost(path, vec![extent]) };
-        // It continues a power-on with a log on the card, or its own beginning names such a log as the one
-        // just before it. Clocks do not count, because they may have been wrong.
-        let is_known = |session: u32| sessions.contains(&session);
-        if is_known(first.session) || begun_anew::before(&log).is_some_and(|before| is_known(before.session))
-        {
-            following = Some(number);
-            sessions.insert(first.session);
-        } else {
-            other = Some((number, log));
-        }
-    }
-    let other = other.filter(|(_, log)| following.is_none() && !is_older_than_all(log, &logs));
-    Ok(following.or(other.map(|(number, _)| number)))
-}
-
-/// Whether a deleted log is older than all logs on the card. The first one of those found an empty card and
-/// is newer by its clock: numbers began again after all logs had been deleted.
-fn is_older_than_all(deleted: &Log, logs: &[Log]) -> bool {
-    let epoch = |log: &Log| likely_epoch(log).ok().flatten();
-    let first = logs.first().filter(|first| begun_anew::found_nothing(first));
-    first
-        .is_some_and(|first| epoch(first).zip(epoch(deleted)).is_some_and(|(first, deleted)| deleted < first))
 }
 
 /// The sessions with sectors outside of the logs in the file system.
@@ -222,29 +168,14 @@ fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> 
 
 /// Whether there is a sector of a log here, or the parity of some.
 fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
-    let is_part = |block: &_| (Header::read(block).is_ok() || Parity::read(block).is_some()).then_some(());
-    Ok(first_block(path, extents, is_part)?.is_some())
-}
-
-/// The first sector of a log here.
-fn first_sector(path: &Path, extents: Vec<Extent>) -> Result<Option<Header>> {
-    first_block(path, extents, |block| Header::read(block).ok())
-}
-
-/// The first result of `look` on the blocks here.
-fn first_block<T>(
-    path: &Path,
-    extents: Vec<Extent>,
-    look: impl Fn(&[u8; BLOCK_BYTES]) -> Option<T>,
-) -> Result<Option<T>> {
     let lost = lost(path, extents);
     let mut blocks = lost.blocks();
     while let Some(block) = blocks.next_block()? {
-        if let Some(made) = look(block) {
-            return Ok(Some(made));
+        if Header::read(block).is_ok() || Parity::read(block).is_some() {
+            return Ok(true);
         }
     }
-    Ok(None)
+    Ok(false)
 }
 
 /// Blocks here that belong to no file, as a log.

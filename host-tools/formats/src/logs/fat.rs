@@ -37,8 +37,6 @@ const ENTRIES_PER_BLOCK: u32 = 128;
 const END_OF_CHAIN: u32 = 0x0fff_fff8;
 const ENTRY_MASK: u32 = 0x0fff_ffff;
 
-/// Deleted segments that are kept.
-const DELETED_MAX: usize = 10_000;
 /// The first byte of an entry whose file was deleted.
 const DELETED: u8 = 0xe5;
 const ATTRIBUTE_VOLUME: u8 = 0x08;
@@ -68,18 +66,6 @@ pub struct CardFile {
     pub extents: Vec<Extent>,
 }
 
-/// A deleted segment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Deleted {
-    /// Its name, with the lost first digit as 0.
-    pub name: LogName,
-    /// Its first cluster.
-    pub place: Extent,
-    /// Its former size. The places after its first cluster are unknown: the recorder's files are mostly
-    /// contiguous.
-    pub bytes: u64,
-}
-
 /// Result of a walk over the volume.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
@@ -94,8 +80,6 @@ pub struct Walk {
     pub lost_clusters: u64,
     /// Their places, as far as there is room.
     pub lost: Vec<Extent>,
-    /// The deleted segments with a free first cluster.
-    pub deleted: Vec<Deleted>,
     /// Deleted segments with a free first cluster that begins with a sector of a log.
     pub deleted_logs: u64,
 }
@@ -294,14 +278,9 @@ impl<'a, I: ReadAt> Volume<'a, I> {
 
     /// The entry of a file that was deleted.
     fn deleted(&mut self, child: &Child) -> io::Result<()> {
-        let Some(name) = child.segment().filter(|_| self.is_cluster(child.first)) else { return Ok(()) };
-        if self.entry(child.first)? != 0 {
-            return Ok(());
-        }
-        self.walk.deleted_logs += u64::from(self.begins_as_log(child)?);
-        if self.walk.deleted.len() < DELETED_MAX {
-            let place = Extent { start: self.place(child.first), length: self.cluster_bytes() };
-            self.walk.deleted.push(Deleted { name, place, bytes: u64::from(child.size) });
+        let is_segment = child.segment().is_some() && self.is_cluster(child.first);
+        if is_segment && self.entry(child.first)? == 0 {
+            self.walk.deleted_logs += u64::from(self.begins_as_log(child)?);
         }
         Ok(())
     }

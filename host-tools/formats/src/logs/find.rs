@@ -10,7 +10,7 @@ use super::card::{image, whole_file};
 use super::folder::directory;
 pub use super::found::{Found, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
-use super::naming::{SegmentName, is_part, segment_or_part};
+use super::naming::{SegmentName, is_part, make_unique, name_after, segment_or_part};
 use super::places::Log;
 use crate::files::{is_seekable, why_unread};
 
@@ -61,17 +61,11 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
             none(input)?;
         }
         if inputs.len() > 1 {
-            let stem =
-                input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
-            for log in found.logs.iter_mut().skip(before) {
-                if log.name != stem {
-                    log.name = format!("{stem}/{}", log.name);
-                }
-            }
+            name_after(input, found.logs.iter_mut().skip(before).map(|log| &mut log.name));
         }
     }
     found.add(as_in_folders(segments));
-    make_names_unique(&mut found.logs);
+    make_unique(found.logs.iter_mut().map(|log| &mut log.name));
     found.finish();
     Ok(found)
 }
@@ -148,18 +142,6 @@ fn as_in_folders(segments: Segments) -> Vec<Log> {
         }
     }
     logs
-}
-
-/// Two cards both have a session 1: the later ones get a number.
-fn make_names_unique(logs: &mut [Log]) {
-    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
-    for log in logs {
-        let count = seen.entry(log.name.clone()).or_default();
-        *count += 1;
-        if *count > 1 {
-            log.name = format!("{}-{count}", log.name);
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,10 +1,9 @@
 //! A log's blocks as groups of sectors. Each group decodes by itself: the unit of parallel work.
 
 use anyhow::Result;
-use hums_blackbox::record::Boot;
-use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Sector, Step};
+use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 
-use super::board::{HEADING_GROUPS, find_boot};
+use super::board::{HEADING_GROUPS, heading};
 use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
@@ -18,16 +17,11 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// The wanted value from the record of a start at a log's beginning. `None` without such a record, or if the
-/// log is unreadable.
-pub fn at_beginning<T>(log: &Log, wanted: impl Fn(&Boot<'_>) -> Option<T>) -> Option<T> {
+/// Whether the record of a start is at a log's beginning.
+pub fn has_start(log: &Log) -> bool {
     let mut groups = Groups::new(log);
-    for _ in 0..HEADING_GROUPS {
-        if let Some(found) = find_boot(&groups.next_group().ok()??, &wanted) {
-            return Some(found);
-        }
-    }
-    None
+    let mut first = (0..HEADING_GROUPS).map_while(|_| groups.next_group().ok()?);
+    first.any(|group| heading(&group).is_some())
 }
 
 /// Streams a log's groups.
@@ -47,8 +41,6 @@ pub struct Groups<'a> {
     strangers: Option<Strangers>,
     /// Rebuilt sectors of the file of the last block, and that file. `None` as for `strangers`.
     repairs: Option<(Option<usize>, Repairs)>,
-    /// The second of two sectors that are read in the place of one block.
-    beside: Option<[u8; BLOCK_BYTES]>,
     /// Number of rebuilt sectors.
     repaired: u64,
     /// Evidence from the parity of the files so far.
@@ -71,7 +63,6 @@ impl<'a> Groups<'a> {
             first: None,
             strangers: log.session.is_none().then(|| Strangers::new(log.pieces.len())),
             repairs: log.session.is_none().then(Default::default),
-            beside: None,
             repaired: 0,
             evidence: Evidence::default(),
         }
@@ -123,12 +114,8 @@ impl<'a> Groups<'a> {
         Ok(())
     }
 
-    /// The next block as it was written, if known. Before or after it comes the block actually there, if that
-    /// is nowhere else.
+    /// The next block as it was written, if known.
     fn read_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
-        if let Some(beside) = self.beside.take() {
-            return Ok(Some(beside));
-        }
         let (Some(block), (file, at)) = (self.blocks.next_block()?.copied(), self.blocks.place()) else {
             return Ok(None);
         };
@@ -139,12 +126,7 @@ impl<'a> Groups<'a> {
         }
         let Some(made) = repairs.at(at).filter(|made| **made != block) else { return Ok(Some(block)) };
         self.repaired += 1;
-        let mut both = [*made, block];
-        if repairs.is_displaced(at) {
-            both.sort_by_key(|sector| Sector::from_bytes(*sector).number());
-            self.beside = Some(both[1]);
-        }
-        Ok(Some(both[0]))
+        Ok(Some(*made))
     }
 
     fn feed(&mut self, block: &[u8; BLOCK_BYTES]) {
@@ -186,11 +168,6 @@ impl<'a> Groups<'a> {
     /// Number of blocks at the end of all files that belong to no log.
     pub const fn foreign_at_end(&self) -> u64 {
         self.foreign_at_end
-    }
-
-    /// The latest power-on in sectors of other sessions, microseconds since 1970.
-    pub const fn other_epoch_us(&self) -> Option<u64> {
-        self.assembler.other_epoch_micros()
     }
 
     /// The session that its sectors name, once one was seen.

@@ -8,7 +8,6 @@
 //!
 //! Here each of them is a list of places to read blocks of 512 bytes from.
 
-pub mod begun_anew;
 pub mod board;
 mod card;
 pub mod fat;

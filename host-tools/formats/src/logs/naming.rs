@@ -5,6 +5,7 @@
 //! 00042. It has the unique id of the board, and the session in its sectors.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use hums_recorder::LogName;
@@ -107,25 +108,39 @@ pub fn is_part(path: &Path) -> bool {
     is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
 }
 
-/// Splits the name of a file made from a log, without its ending, into the rest and the identity at its end.
-/// The identity is a session, `s1a2b3c4d`, or the content of another recording, `r1a2b3c4d`. A further log of
-/// a session has a number after it.
-pub fn identity_at_end(stem: &str) -> Option<(&str, &str)> {
-    let split = |stem: &'_ str| -> Option<usize> {
-        let at = stem.rfind('-')?;
-        let digits = stem.get(at + 1..)?.strip_prefix(['s', 'r'])?;
-        let is_hex = digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
-        (digits.len() == SESSION_DIGITS && is_hex).then_some(at)
-    };
-    let unnumbered = stem.rsplit_once('-').filter(|(_, number)| number.parse::<u32>().is_ok());
-    let stem = unnumbered.map(|(stem, _)| stem).filter(|stem| split(stem).is_some()).unwrap_or(stem);
-    let (base, identity) = stem.split_at_checked(split(stem)?)?;
-    Some((base, identity.get(1..)?))
+/// The logs of one of several inputs get its name before theirs: each card has a session 1.
+pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>) {
+    let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
+    for name in names.filter(|name| **name != stem) {
+        *name = format!("{stem}/{name}");
+    }
 }
 
-/// The session at the end of a name, `s1a2b3c4d`.
-pub fn session_of(identity: &str) -> Option<u32> {
-    u32::from_str_radix(identity.strip_prefix('s')?, 16).ok()
+/// Of equal names the later ones get a number.
+pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
+    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
+    for name in names {
+        let count = seen.entry(name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            *name = format!("{name}-{count}");
+        }
+    }
+}
+
+/// Whether the name of a file, without its ending, has an identity at its end, so that it was made from a log:
+/// a session, `s1a2b3c4d`, or the content of another recording, `r1a2b3c4d`. A further log of a session has a
+/// number after it.
+pub fn ends_with_identity(stem: &str) -> bool {
+    let is_identity = |name: &str| {
+        let digits = name.rsplit_once('-').and_then(|(_, identity)| identity.strip_prefix(['s', 'r']));
+        digits.is_some_and(|digits| {
+            let is_hex = digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+            digits.len() == SESSION_DIGITS && is_hex
+        })
+    };
+    let numbered = stem.rsplit_once('-').filter(|(_, number)| number.parse::<u32>().is_ok());
+    is_identity(stem) || numbered.is_some_and(|(stem, _)| is_identity(stem))
 }
 
 /// Whether a name ends with a session, `s1a2b3c4d`, alone or after a box.
@@ -158,14 +173,14 @@ mod tests {
     #[test]
     fn what_is_made_of_a_log_is_known_by_its_name() {
         for (stem, expected) in [
-            ("00001-box3f-s1a2b3c4d", Some(("00001-box3f", "s1a2b3c4d"))),
-            ("a.tlog-r00112233-2", Some(("a.tlog", "r00112233"))),
-            ("log-s1a2b3c4", None),
-            ("log-s1A2b3c4d", None),
-            ("log-2", None),
-            ("s1a2b3c4d", None),
+            ("00001-box3f-s1a2b3c4d", true),
+            ("a.tlog-r00112233-2", true),
+            ("log-s1a2b3c4", false),
+            ("log-s1A2b3c4d", false),
+            ("log-2", false),
+            ("s1a2b3c4d", false),
         ] {
-            assert_eq!(identity_at_end(stem), expected, "{stem}");
+            assert_eq!(ends_with_identity(stem), expected, "{stem}");
         }
     }
 

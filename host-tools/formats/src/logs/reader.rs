@@ -92,13 +92,9 @@ pub struct Summary {
     pub last_number: Option<u32>,
     /// The last sector is only a copy that was made while it was in progress.
     pub ends_partial: bool,
-    /// Frames of the session before its first group, modulo 2^32.
-    pub frames_before: Option<u32>,
     /// Frames of the session up to its end, modulo 2^32.
     pub frames_end: Option<u32>,
-    /// The check of the session's entries before its first group.
-    pub check_before: Option<u32>,
-    /// The same up to its end, as its last sector has it.
+    /// The check of the session's entries up to its end, as its last sector has it.
     pub check_end: Option<u32>,
     /// Groups that go on from other entries than the sectors before them end with.
     pub unchained: u64,
@@ -106,9 +102,6 @@ pub struct Summary {
     pub behind: BlockCounts,
     /// Number of blocks up to the end of its files that belong to no log.
     pub foreign_at_end: u64,
-    /// The latest power-on of another session with sectors among or after this one's, microseconds since
-    /// 1970.
-    pub other_epoch_us: Option<u64>,
     /// Evidence from its parity.
     pub parity: Evidence,
     /// Strange sectors in its files.
@@ -160,7 +153,6 @@ pub fn read<C: Collect>(
     summary.ends_partial = stitch.cut;
     summary.behind = groups.behind();
     summary.foreign_at_end = groups.foreign_at_end();
-    summary.other_epoch_us = groups.other_epoch_us();
     summary.session = groups.session();
     summary.blocks = groups.counts();
     summary.parity = groups.evidence();
@@ -409,7 +401,6 @@ impl Stitch {
                 if let (None, Some(before), Some(begun)) = (&self.open, before, group.check_before) {
                     self.summary.unchained += u64::from(before != begun);
                 }
-                self.summary.check_before = self.summary.check_before.or(group.check_before);
                 if let Some(mut gap) = self.open.take() {
                     (gap.to, gap.frames) = (Some(start), missing);
                     self.close(gap, deliver)?;
@@ -418,7 +409,6 @@ impl Stitch {
                 hand_on(&mut group, new, deliver)?;
                 self.expected = Some(frames_before.wrapping_add(group.frames));
                 self.summary.first = self.summary.first.or(Some(start));
-                self.summary.frames_before.get_or_insert(frames_before);
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);

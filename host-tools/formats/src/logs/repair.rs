@@ -11,8 +11,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
+use hums_blackbox::Header;
 use hums_blackbox::parity::{COLUMNS, Column, Parity, STRETCH_SECTORS, Sum, parity_block};
-use hums_blackbox::{Header, Sector};
 use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
@@ -57,8 +57,6 @@ impl Evidence {
 #[derive(Debug, Default)]
 pub(super) struct Repairs {
     made: BTreeMap<u64, [u8; BLOCK_BYTES]>,
-    /// Those of the blocks that hold a sector which is nowhere else.
-    displaced: BTreeSet<u64>,
     pub(super) evidence: Evidence,
 }
 
@@ -70,18 +68,18 @@ impl Repairs {
         if file.bytes() > FILE_BYTES_MAX {
             return Ok(Self::default());
         }
-        let Some(found) = Found::of(&file, session)? else { return Ok(Self::default()) };
-        let last = found.parity.iter().map(|(one, _)| one.last).max();
+        let Some(sectors) = FileSectors::of(&file, session)? else { return Ok(Self::default()) };
+        let last = sectors.parity.iter().map(|(one, _)| one.last).max();
         let mut all = Self { evidence: Evidence { last, ..Evidence::default() }, ..Self::default() };
-        let Some(base) = found.base else { return Ok(all) };
-        (all.evidence.written, all.evidence.missing) = found.written_and_missing(base);
-        let mut columns = found.columns(base);
+        let Some(base) = sectors.base else { return Ok(all) };
+        (all.evidence.written, all.evidence.missing) = sectors.written_and_missing(base);
+        let mut columns = sectors.columns(base);
         let mut blocks = file.blocks();
         let mut at = 0;
         while !columns.is_empty()
             && let Some(block) = blocks.next_block()?
         {
-            if let Some(number) = found.in_place(base, at)
+            if let Some(number) = sectors.in_place(base, at)
                 && let Some((column, _)) = columns.get_mut(&column_of(at))
             {
                 column.sector(number, block);
@@ -102,18 +100,12 @@ impl Repairs {
                 all.made.insert(u64::from(sector.number().wrapping_sub(base)), *sector.bytes());
             }
         }
-        all.displaced = found.displaced(base, &all.made);
         Ok(all)
     }
 
     /// The rebuilt sector of this block.
     pub(super) fn at(&self, block: u64) -> Option<&[u8; BLOCK_BYTES]> {
         self.made.get(&block)
-    }
-
-    /// Whether the block at this place is to be read too.
-    pub(super) fn is_displaced(&self, block: u64) -> bool {
-        self.displaced.contains(&block)
     }
 }
 
@@ -123,7 +115,7 @@ const fn column_of(at: u32) -> (u32, u32) {
 }
 
 /// Contents of a file.
-struct Found {
+struct FileSectors {
     session: u32,
     /// The number of the file's first sector; `None` without a sector of the session.
     base: Option<u32>,
@@ -134,7 +126,7 @@ struct Found {
     parity: Vec<(Parity, [u8; BLOCK_BYTES])>,
 }
 
-impl Found {
+impl FileSectors {
     /// `None` without any sector.
     fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
         let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
@@ -206,31 +198,6 @@ impl Found {
     fn in_place(&self, base: u32, at: u32) -> Option<u32> {
         let number = self.numbers.get(at as usize).copied().flatten();
         number.filter(|number| *number == base.wrapping_add(at))
-    }
-
-    /// Blocks whose own sector was rebuilt, and that hold another sector found nowhere else. After an
-    /// insertion into a file all later sectors are displaced, and some columns have lost too many to rebuild.
-    fn displaced(&self, base: u32, made: &BTreeMap<u64, [u8; BLOCK_BYTES]>) -> BTreeSet<u64> {
-        let number =
-            |at: u64| usize::try_from(at).ok().and_then(|at| self.numbers.get(at).copied()).flatten();
-        let mut only: BTreeMap<u32, u64> =
-            made.keys().filter_map(|at| number(*at).map(|number| (number, *at))).collect();
-        if !only.is_empty() {
-            let elsewhere = (0_u64..).zip(&self.numbers).filter(|(at, _)| !made.contains_key(at));
-            // A rebuilt sector helps up to the first one that is neither present nor rebuilt: sectors after
-            // that come in another order.
-            let hole = (0_u32..).zip(&self.numbers).find(|(at, number)| {
-                number.is_none_or(|number| Some(number) != base.checked_add(*at))
-                    && !made.contains_key(&u64::from(*at))
-            });
-            let hole = hole.map_or(u32::MAX, |(at, _)| base.saturating_add(at));
-            let again =
-                made.values().map(|block| Sector::from_bytes(*block).number()).filter(|made| *made < hole);
-            for number in elsewhere.filter_map(|(_, number)| *number).chain(again) {
-                only.remove(&number);
-            }
-        }
-        only.into_values().collect()
     }
 
     /// The columns with parity and with few enough lost sectors to rebuild, with the numbers of those.

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use hums_blackbox::Header;
 
-use super::begun_anew::{self, BegunAnew, Known};
 use super::fingerprint::{Fingerprint, fingerprint};
 use super::places::{Log, Piece};
 
@@ -21,8 +20,6 @@ pub struct Sessions {
     again: BTreeMap<String, String>,
     /// The numbers of all logs of each card, also of those without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
-    /// By card and number.
-    begun_anew: BTreeMap<(String, u32), BegunAnew>,
 }
 
 impl Sessions {
@@ -32,39 +29,19 @@ impl Sessions {
         let mut all: BTreeMap<_, Vec<u32>> = BTreeMap::new();
         let mut alike: BTreeMap<u32, Vec<Candidate<'_>>> = BTreeMap::new();
         let mut numbers: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-        let mut known: BTreeMap<&str, Vec<Known<'_>>> = BTreeMap::new();
         for &(name, log) in &logs {
             let (card, number) = place(name);
             if let Some(number) = number {
                 numbers.entry(card.to_owned()).or_default().insert(number);
             }
-            let Some((at, first)) = first_sector(log) else { continue };
+            let Some(first) = first_sector(log) else { continue };
             alike.entry(first.session).or_default().push(Candidate { name, number, log });
             if let Some(number) = number {
                 all.entry((card.to_owned(), first.session)).or_default().push(number);
-                known.entry(card).or_default().push(Known { number, first, at, log });
             }
         }
         let again = alike.into_values().flat_map(copies).collect();
-        let mut anew = BTreeMap::new();
-        for (card, mut known) in known {
-            known.sort_by_key(|known| known.number);
-            let numbers = numbers.get(card).map_or_else(BTreeMap::new, |all| begun_anew::find(all, &known));
-            anew.extend(numbers.into_iter().map(|(number, anew)| ((card.to_owned(), number), anew)));
-        }
-        Self { logs: all, again, numbers, begun_anew: anew }
-    }
-
-    /// The old content of a log's file, if the recorder had just begun to rewrite it. A full card's oldest
-    /// file gets the next name before its first sector is written.
-    pub fn begun_anew(&self, name: &str) -> Option<BegunAnew> {
-        let (card, number) = place(name);
-        self.begun_anew_number(card, number?)
-    }
-
-    /// The same by card and number.
-    pub fn begun_anew_number(&self, card: &str, number: u32) -> Option<BegunAnew> {
-        self.begun_anew.get(&(card.to_owned(), number)).copied()
+        Self { logs: all, again, numbers }
     }
 
     /// The name of the original if this log is a copy of it or of one of its files, sector by sector. Copies
@@ -142,201 +119,16 @@ pub fn place(name: &str) -> (&str, Option<u32>) {
 
 /// The session of a log's first sector.
 pub fn first_session(log: &Log) -> Option<u32> {
-    first_sector(log).map(|(_, first)| first.session)
+    first_sector(log).map(|first| first.session)
 }
 
-/// A log's first sector, and its block. Reading the log reports errors.
-fn first_sector(log: &Log) -> Option<(usize, Header)> {
+/// A log's first sector. Reading the log reports errors.
+fn first_sector(log: &Log) -> Option<Header> {
     let mut blocks = log.blocks();
-    for at in 0..LOOK_BLOCKS {
+    for _ in 0..LOOK_BLOCKS {
         if let Ok(header) = Header::read(blocks.next_block().ok()??) {
-            return Some((at, header));
+            return Some(header);
         }
     }
     None
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use hums_blackbox::record::{Before, Boot, Clock, Found};
-    use hums_blackbox::{Record, Sector, SectorSink, Writer};
-    use hums_core::clock::Instant;
-
-    use super::*;
-    use crate::logs::find::find_in;
-
-    /// The first sector of a session with this number.
-    fn sector(session: u32, number: u32) -> Vec<u8> {
-        let mut bytes = [0; 512];
-        bytes[..2].copy_from_slice(&[0x48, 0xb3]);
-        bytes[11..15].copy_from_slice(&number.to_le_bytes());
-        sealed(Sector::from_bytes(bytes), session)
-    }
-
-    fn sealed(mut sector: Sector, session: u32) -> Vec<u8> {
-        sector.seal(session);
-        sector.bytes().to_vec()
-    }
-
-    #[derive(Default)]
-    struct Sink(Vec<Sector>);
-
-    impl SectorSink for Sink {
-        fn room(&self) -> usize {
-            usize::MAX
-        }
-
-        fn put(&mut self, sector: &Sector) {
-            self.0.push(*sector);
-        }
-    }
-
-    /// A log whose start found this session under this number.
-    fn after(number: u32, session: u32) -> Vec<u8> {
-        log(9, number, session)
-    }
-
-    /// The same of a session of this name.
-    fn log(own: u32, number: u32, session: u32) -> Vec<u8> {
-        let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
-        let before = Before { found: Found::Frames, number, session, ..Before::default() };
-        let boot = Record::Boot(Boot { before, ..Boot::default() });
-        writer.record(Instant::ZERO, &boot, &mut sink).expect("room");
-        writer.finish(&mut sink);
-        sink.0.into_iter().flat_map(|sector| sealed(sector, own)).collect()
-    }
-
-    /// Logs in a folder; the recorder had begun to rewrite some files.
-    struct Card(tempfile::TempDir);
-
-    impl Card {
-        fn new() -> Self {
-            Self(tempfile::tempdir().expect("a folder"))
-        }
-
-        fn write(&self, name: u32, bytes: impl AsRef<[u8]>) {
-            fs::write(self.0.path().join(format!("{name:05}_00.HUM")), bytes).expect("room");
-        }
-
-        fn remove(&self, name: u32) {
-            fs::remove_file(self.0.path().join(format!("{name:05}_00.HUM"))).expect("there");
-        }
-
-        /// By number: the old log, whether it may be a later one of the power-on, and whether the next start
-        /// found it so.
-        fn anew(&self) -> Vec<(u32, Option<u32>, bool, bool)> {
-            let found = find_in(self.0.path(), false).expect("a folder");
-            let sessions = Sessions::of(found.logs.iter().map(|log| (log.name.as_str(), log)));
-            let anew = |name: &str| {
-                let BegunAnew { of, or_later, is_confirmed, .. } = sessions.begun_anew(name)?;
-                Some((place(name).1?, of, or_later, is_confirmed))
-            };
-            found.logs.iter().filter_map(|log| anew(&log.name)).collect()
-        }
-    }
-
-    #[test]
-    fn a_file_that_was_to_be_written_anew_is_known_and_the_next_start_confirms_it() {
-        let card = Card::new();
-        // The beginning of the power-on whose second log is the oldest on the card; its own record is lost.
-        card.write(5, sector(7, 100));
-        card.write(6, sector(8, 0));
-        card.write(7, sector(7, 0));
-        assert_eq!(card.anew(), [(7, None, false, false)]);
-        card.write(8, after(7, 7));
-        assert_eq!(card.anew(), [(7, None, false, true)]);
-        // No log has the number before it: the name is a user's.
-        card.remove(6);
-        assert_eq!(card.anew(), []);
-        // All of the power-on before the oldest one that is there.
-        card.write(5, after(4, 7));
-        card.write(6, sector(8, 0));
-        assert_eq!(card.anew(), [(7, None, false, true)]);
-    }
-
-    #[test]
-    fn power_that_goes_several_times_at_the_start_renames_nothing() {
-        let card = Card::new();
-        // The ring had 10 to 14. Power failed just after 10 and 11 got the next names; then a start overwrote
-        // 12.
-        card.write(13, log(13, 12, 12));
-        card.write(14, log(14, 13, 13));
-        card.write(15, log(10, 9, 9));
-        assert_eq!(card.anew(), [(15, Some(10), false, false)]);
-        card.write(16, log(11, 10, 10));
-        assert_eq!(card.anew(), [(15, Some(10), false, false), (16, Some(11), false, false)]);
-        card.write(17, log(17, 16, 11));
-        let both = [(15, Some(10), false, true), (16, Some(11), false, true)];
-        assert_eq!(card.anew(), both);
-        // The names stay while later starts write over the others, to the last.
-        for number in [13, 14] {
-            card.remove(number);
-            card.write(number + 5, log(number + 5, number + 4, number + 4));
-            assert_eq!(card.anew(), both);
-        }
-        card.remove(15);
-        card.write(20, log(20, 19, 19));
-        assert_eq!(card.anew(), both[1..]);
-        // Two names were exchanged: their contents are in the wrong order.
-        card.write(15, log(11, 10, 10));
-        card.write(14, log(14, 13, 13));
-        card.write(16, log(10, 9, 9));
-        card.write(17, log(17, 16, 10));
-        assert_eq!(card.anew(), [(15, Some(11), false, false), (16, Some(10), false, true)]);
-    }
-
-    #[test]
-    fn a_torn_first_sector_of_another_session_tells_that_a_file_was_begun_anew_and_a_damaged_one_does_not() {
-        let card = Card::new();
-        let (new, old) = (0x1122_3344, 0x5566_7788);
-        card.write(20, log(20, 19, 19));
-        let write = |first: &[u8]| card.write(21, [first, &sector(old, 1)].concat());
-        let mut torn = sector(new, 0);
-        torn[300..].fill(7);
-        write(&torn);
-        assert_eq!(card.anew(), [(21, None, false, false)]);
-        card.write(22, log(22, 21, old));
-        assert_eq!(card.anew(), [(21, None, false, true)]);
-        // Its clock is later than in the log before: it is not older.
-        let timed = |own: u32, number: u32, utc_micros: u64| {
-            let (mut writer, mut sink) = (Box::new(Writer::new()), Sink::default());
-            let clock = Record::Clock(Clock { boot: Instant::ZERO, utc_micros, source: 3 });
-            writer.record(Instant::ZERO, &clock, &mut sink).expect("room");
-            writer.finish(&mut sink);
-            let numbered = |sector: Sector| {
-                let mut bytes = *sector.bytes();
-                bytes[11..15].copy_from_slice(&number.to_le_bytes());
-                sealed(Sector::from_bytes(bytes), own)
-            };
-            sink.0.into_iter().flat_map(numbered).collect::<Vec<u8>>()
-        };
-        card.write(20, timed(20, 0, 2_000));
-        for (utc, expected) in [(1_000, &[(21, None, false, true)][..]), (3_000, &[])] {
-            card.write(21, [&torn[..], &timed(old, 1, utc)].concat());
-            assert_eq!(card.anew(), expected);
-        }
-        // The next log of that power-on was begun anew too, and the following start found it so.
-        write(&torn);
-        card.write(22, log(old, 9, 9));
-        card.write(23, log(23, 22, old));
-        let two = [(21, None, false, true), (22, Some(10), false, true)];
-        assert_eq!(card.anew(), two);
-        card.remove(23);
-        // The next log goes on with it.
-        write(&torn);
-        card.write(22, sector(old, 9));
-        assert_eq!(card.anew(), []);
-        card.write(22, log(22, 21, old));
-        // A byte of the session is wrong, or the whole head; or the head is of an existing log.
-        let [mut byte, mut zeros, mut other] = [torn.clone(), torn.clone(), torn.clone()];
-        byte[7] = 0x88;
-        zeros[7..15].fill(0);
-        other[7..11].copy_from_slice(&[22, 0, 0, 0]);
-        for damaged in [byte, zeros, other] {
-            write(&damaged);
-            assert_eq!(card.anew(), []);
-        }
-    }
 }

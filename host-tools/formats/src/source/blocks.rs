@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 
-use super::item::{Cause, Gap};
+use super::item::Gap;
 use crate::plural::count;
 
 /// An unwritten block of a file: at least this many bytes 0x00 or 0xff in a row. Frames and lines are shorter
@@ -27,16 +27,7 @@ impl Bytes {
 
     fn gap(self, at: Instant, what: &str) -> Option<Gap> {
         let words = format!("{what}: {}", count(self.count, "byte"));
-        let (from, bytes) = (Some(at), self.count);
-        self.first.map(|place| Gap {
-            from,
-            to: None,
-            cause: Cause::Damaged,
-            place: Some(place),
-            bytes,
-            words,
-            own: None,
-        })
+        self.first.map(|place| Gap { bytes: self.count, ..Gap::damaged(at, place, words) })
     }
 }
 

@@ -10,9 +10,9 @@ use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
 use super::recording::{Place, of_one_vehicle};
-use crate::files::{FileId, content_identity, why_unread};
+use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
-use crate::logs::naming::{identity_at_end, session_of};
+use crate::logs::naming::{make_unique, name_after};
 use crate::logs::sessions::{Sessions, first_session};
 use crate::logs::{self, Content, segment_name};
 use crate::outcome::usage;
@@ -95,35 +95,27 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
-    /// Drops tlogs that `hums decode` made from another recording in the list: a flight counts once.
-    fn drop_made(&mut self, before: usize) {
-        let found = self.places.split_off(before);
-        let original = |place: &Place| -> Option<String> {
-            let stem = place.path()?.file_name()?.to_str()?.strip_suffix(".tlog")?;
-            let (base, identity) = identity_at_end(stem)?;
-            let session = session_of(identity);
-            let is_it = |other: &&Place| match session {
-                Some(_) => other.own().and_then(first_session) == session,
-                None => other.path().is_some_and(|path| {
-                    path.file_name().is_some_and(|name| name == base)
-                        && content_identity(path).is_some_and(|content| content == identity)
-                }),
-            };
-            found.iter().find(is_it).map(|place| place.title.clone())
+    /// Drops the tlogs that `hums decode` made of another recording in the list: a flight counts once.
+    fn drop_made(&mut self) {
+        let made_of = |stem: &str, other: &Place| match other.own() {
+            Some(log) => first_session(log).is_some_and(|session| stem.contains(&format!("-s{session:08x}"))),
+            None => other
+                .path()
+                .and_then(|path| stem.strip_prefix(path.file_name()?.to_str()?))
+                .is_some_and(|rest| rest.starts_with("-r")),
         };
-        let originals: Vec<_> = found.iter().map(original).collect();
-        for (place, original) in found.into_iter().zip(originals) {
-            let Some(of) = original else {
-                self.places.push(place);
-                continue;
-            };
-            if self.remarks.len() < REMARKS_MAX {
-                self.remarks.push(format!(
-                    "{}: has the name of what hums decode makes of {of}, which is read, and is passed over",
-                    place.title
-                ));
-            }
-        }
+        let original = |place: &Place| {
+            let stem = place.path()?.file_name()?.to_str()?.strip_suffix(".tlog")?;
+            let original = self.places.iter().find(|other| made_of(stem, other))?;
+            Some(format!(
+                "{}: hums decode made it of {}, which is read, and it is passed over",
+                place.title, original.title
+            ))
+        };
+        let remarks: Vec<_> = self.places.iter().map(original).collect();
+        let mut made = remarks.iter();
+        self.places.retain(|_| made.next().is_some_and(Option::is_none));
+        self.remarks.extend(remarks.into_iter().flatten().take(REMARKS_MAX));
     }
 
     /// Reads only the vehicle with this system id.
@@ -207,7 +199,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             let mut walk = Walk::of(input, &own)?;
             found.add_own(input, own);
             found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
-            found.drop_made(before);
+            found.drop_made();
             found.is_cut |= walk.left_out > 0;
             found.remarks.extend(walk.left_out_words(input));
             found.is_cut |= walk.unknown > 0;
@@ -233,31 +225,12 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         }
         found.drop_repeats(before);
         if inputs.len() > 1 && segment_name(input).is_none() {
-            name_after(input, found.places.iter_mut().skip(before).filter(|place| place.own().is_some()));
+            let own = found.places.iter_mut().skip(before).filter(|place| place.own().is_some());
+            name_after(input, own.map(|place| &mut place.name));
         }
     }
-    make_names_unique(&mut found.places);
+    make_unique(found.places.iter_mut().map(|place| &mut place.name));
     Ok(found)
-}
-
-/// The sessions of one of several inputs get its name before theirs: each card has a session 1.
-fn name_after<'a>(input: &Path, places: impl Iterator<Item = &'a mut Place>) {
-    let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
-    for place in places.filter(|place| place.name != stem) {
-        place.name = format!("{stem}/{}", place.name);
-    }
-}
-
-/// Names are those of files: the later ones of a name get a number.
-fn make_names_unique(places: &mut [Place]) {
-    let mut seen: BTreeMap<String, u32> = BTreeMap::new();
-    for place in places {
-        let count = seen.entry(place.name.clone()).or_default();
-        *count += 1;
-        if *count > 1 {
-            place.name = format!("{}-{count}", place.name);
-        }
-    }
 }
 
 /// Other contents of a folder besides our logs, as sentences, for a command that reads only our logs. Also

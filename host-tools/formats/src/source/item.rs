@@ -243,6 +243,20 @@ pub enum Value<'a> {
     Bytes(&'a [u8]),
 }
 
+impl Value<'_> {
+    /// As a number, if it is one.
+    pub fn number(self) -> Option<f64> {
+        Some(match self {
+            Self::Unsigned(value) => value as f64,
+            Self::Signed(value) => value as f64,
+            Self::Single(value) => f64::from(value),
+            Self::Double(value) => value,
+            Self::Flag(value) => f64::from(u8::from(value)),
+            Self::Unknown | Self::Text(_) | Self::Bytes(_) => return None,
+        })
+    }
+}
+
 /// Something is missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gap {
@@ -263,10 +277,21 @@ pub struct Gap {
 }
 
 impl Gap {
+    /// A gap after this time, without an end, a place or a size.
+    pub const fn new(from: Option<Instant>, cause: Cause, words: String) -> Self {
+        Self { from, to: None, cause, place: None, bytes: 0, words, own: None }
+    }
+
     /// The data from this time and place on are damaged; no byte of them is passed over.
     pub const fn damaged(at: Instant, place: u64, words: String) -> Self {
-        let (from, place) = (Some(at), Some(place));
-        Self { from, to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None }
+        Self::new(Some(at), Cause::Damaged, words).at(place)
+    }
+
+    /// The same gap at this place.
+    #[must_use]
+    pub const fn at(mut self, place: u64) -> Self {
+        self.place = Some(place);
+        self
     }
 
     /// Whether it is only noise: bytes that are not part of a frame.

@@ -341,14 +341,13 @@ fn of_packed(loss: &Loss) -> Gap {
         Lost::WrongChecksums => (wrong_checksums(loss.count), Some(loss.to)),
         _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
     };
-    Gap { from: Some(loss.from), to, cause: Cause::Lost, place: None, bytes: 0, words, own: None }
+    Gap { to, ..Gap::new(Some(loss.from), Cause::Lost, words) }
 }
 
 /// The recorder's count of lost data.
 fn not_recorded(loss: &Loss) -> Option<Gap> {
-    let (from, to) = (Some(loss.from), Some(loss.to));
-    let words = loss::words(loss)?;
-    Some(Gap { from, to, cause: Cause::Lost, place: None, bytes: 0, words, own: None })
+    let gap = Gap::new(Some(loss.from), Cause::Lost, loss::words(loss)?);
+    Some(Gap { to: Some(loss.to), ..gap })
 }
 
 /// A gap in the stream's words.

@@ -135,16 +135,7 @@ impl Pace {
         let (at, place) = self.stands?;
         let words = "the recorded times stand still, fall again and again, or go on far too slowly, from here on: what is \
                      recorded there cannot be judged";
-        let (from, place) = (Some(at), Some(place));
-        Some(Gap {
-            from,
-            to: None,
-            cause: Cause::NoTimes,
-            place,
-            bytes: 0,
-            words: words.to_owned(),
-            own: None,
-        })
+        Some(Gap::new(Some(at), Cause::NoTimes, words.to_owned()).at(place))
     }
 }
 

@@ -5,8 +5,8 @@
 //! [`Deliver`] that gets the parts in their order. A recording of another format is one row of items: it is
 //! cut into parts of bounded size, on one thread.
 //!
-//! Parts have frames, observations, rows and records. They lack items that need earlier frames (texts, modes,
-//! parameters) and items needed before the first part (clocks): a reading in order has all.
+//! Parts have frames, observations, rows and records. They lack items that need earlier frames (modes; in logs of
+//! ours also texts and parameters) and items needed before the first part (clocks): a reading in order has all.
 
 use anyhow::Result;
 use hums_core::clock::Instant;

@@ -165,6 +165,7 @@ impl Place {
                 // Observations of a frame stay with it.
                 Item::Observation(..) => !is_of_link,
                 Item::Frame(_) | Item::Row(_) | Item::Gap(_) => true,
+                Item::Text(_) | Item::Parameter(_) => false,
                 _ => return Ok(()),
             };
             let is_full = items >= PART_ITEMS || part.held_bytes() >= PART_BYTES;
@@ -250,9 +251,7 @@ impl Recording {
             result => result.with_context(|| self.name.clone())?,
         };
         if let Some(words) = self.progress.damage() {
-            let place = Some(self.progress.taken());
-            let gap =
-                Gap { from: Some(last), to: None, cause: Cause::Damaged, place, bytes: 0, words, own: None };
+            let gap = Gap::new(Some(last), Cause::Damaged, words).at(self.progress.taken());
             seen.item(last, &Item::Gap(&gap));
             match take(last, Item::Gap(&gap)) {
                 Err(error) if !error.is::<Stop>() => return Err(error),

@@ -82,6 +82,19 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// The words for a check that no longer applies.
+    pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
+
+    /// Whether the check no longer applies (after landing): its value is not known to be good then.
+    pub fn is_unjudged(&self) -> bool {
+        self.level == Level::Ok && self.value.is_nan()
+    }
+
+    /// Whether its level is a warning or critical.
+    pub const fn is_bad(&self) -> bool {
+        matches!(self.level, Level::Warning | Level::Critical)
+    }
+
     /// From a finding of the monitor's, found at about `now`.
     pub fn new(now: Instant, finding: &health::Finding) -> Self {
         Self::from(&FindingRecord::new(now, finding))

@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use crate::names::{check_name, unit_name, vocabulary};
 use crate::part;
+use crate::source::told;
 use crate::states::{Shown, meaning, shown};
 use crate::statustext::Text;
-use crate::summary::FindingLine;
 
 /// Prefix of a finding of a HUMS.
 const OURS: &str = "HUMS: ";
@@ -121,13 +121,13 @@ const FEEDS: [Feeds; 3] = [Feeds::Vehicle, Feeds::Avionics, Feeds::Payload];
 
 impl Note {
     /// A finding of a check, and the check that explains it.
-    pub fn found(finding: &FindingLine, because: Option<&str>) -> Self {
+    pub fn found(finding: &told::Finding, because: Option<&str>) -> Self {
         let known = vocabulary(&finding.check);
         let mut words = check_name(&finding.check, finding.instance);
         if finding.is_unjudged() {
-            words = format!("{words}: {}", FindingLine::UNJUDGED);
+            words = format!("{words}: {}", told::Finding::UNJUDGED);
         }
-        let is_worry = matches!(finding.level, "warning" | "critical");
+        let is_worry = finding.is_bad();
         let (state, value, limit) = match shown(&finding.check, finding.value, finding.limit) {
             Shown::State(state) => (state, None, None),
             Shown::Quantity(value, limit) => (None, value, limit),
@@ -135,14 +135,14 @@ impl Note {
         Self {
             at_s: finding.at.as_secs_f64(),
             kind: "finding",
-            level: finding.level,
+            level: finding.level.name(),
             from: "here".to_owned(),
-            subsystem: finding.subsystem,
+            subsystem: finding.subsystem.name(),
             words,
             found: Some(Found {
                 check: finding.check.clone(),
                 instance: finding.instance,
-                previous: finding.previous,
+                previous: finding.previous.name(),
                 ended: finding.is_unjudged(),
                 value,
                 state,
@@ -163,23 +163,13 @@ impl Note {
     }
 
     /// A finding that a box recorded.
-    pub fn told(finding: &FindingLine) -> Self {
+    pub fn told(finding: &told::Finding) -> Self {
         Self { from: "on board".to_owned(), ..Self::found(finding, None) }
     }
 
     /// A finding of the checks here.
     pub fn finding(now: Instant, finding: &Finding) -> Self {
-        let line = FindingLine {
-            at: Instant::of(finding.at, now),
-            subsystem: finding.subsystem.name(),
-            check: finding.check.to_owned(),
-            instance: finding.instance,
-            level: finding.level.name(),
-            previous: finding.previous.name(),
-            value: finding.value,
-            limit: finding.limit,
-            unit: finding.unit.to_owned(),
-        };
+        let line = told::Finding::new(now, finding);
         Self::found(&line, Some(finding.because).filter(|because| !because.is_empty()))
     }
 

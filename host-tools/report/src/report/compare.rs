@@ -116,15 +116,12 @@ impl Recorded<'_> {
         let (from, to) = flight.span();
         let contents = &self.overview.contents;
         let is_of_it = |at| at >= from && at <= to;
-        let worries = contents
-            .findings
-            .iter()
-            .filter(|finding| is_of_it(finding.at) && matches!(finding.level, "warning" | "critical"));
+        let worries = contents.findings.iter().filter(|finding| is_of_it(finding.at) && finding.is_bad());
         let findings: Vec<_> = worries
             .map(|finding| {
                 (
                     finding.at.as_secs_f64() - from.as_secs_f64(),
-                    finding.level,
+                    finding.level.name(),
                     Note::found(finding, None).words,
                 )
             })

@@ -28,7 +28,6 @@ use serde::Serialize;
 use crate::check;
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{EndResolver, HELD_MAX};
-use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
 use crate::naming::{Named, Names, Traits, without_made};
@@ -91,7 +90,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
     let sessions = sessions_of(&found.places);
-    let wanted = wanted(args, output, &found, &sessions)?;
+    let wanted = wanted(args, output, &found)?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
         return Err(usage(format!(
             "-o {}: a page is HTML: give it that name, and print it from a browser",
@@ -197,9 +196,8 @@ impl Making<'_> {
             note!("{}: {why}", overview.ending.name);
         }
         self.outcome = self.outcome.and(Outcome::lossy(!overview.is_sound()));
-        // A session that is there twice counts once, and a file's old content is older than its name.
-        let counts = overview.ending.is_counted() && overview.ending.begun_anew.is_none();
-        self.earlier.push(counts.then_some(this));
+        // A session that is there twice counts once.
+        self.earlier.push(overview.ending.is_counted().then_some(this));
         Ok(())
     }
 
@@ -393,7 +391,7 @@ struct Wanted {
     pages: bool,
 }
 
-fn wanted(args: &Request<'_>, output: &Path, found: &Found, sessions: &Sessions) -> Result<Wanted> {
+fn wanted(args: &Request<'_>, output: &Path, found: &Found) -> Result<Wanted> {
     let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")
@@ -405,12 +403,7 @@ fn wanted(args: &Request<'_>, output: &Path, found: &Found, sessions: &Sessions)
             index..=index
         }
         None if directory => 0..=last,
-        None => {
-            // The old content of a file to be rewritten is not the last session, in spite of its name.
-            let is_own = |log: &Place| sessions.begun_anew(&log.name).is_none();
-            let last = logs.iter().rposition(is_own).unwrap_or(last);
-            last..=last
-        }
+        None => last..=last,
     };
     let pages = directory || !args.compare;
     Ok(Wanted { sessions, output: output.to_owned(), directory, pages })

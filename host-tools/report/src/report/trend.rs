@@ -130,6 +130,5 @@ fn value(log: &Overview, counter: &str, hourly: bool) -> Option<f64> {
 }
 
 fn worrying(log: &Overview) -> f64 {
-    let findings = log.contents.findings.iter();
-    findings.filter(|finding| matches!(finding.level, "warning" | "critical")).count() as f64
+    log.contents.findings.iter().filter(|finding| finding.is_bad()).count() as f64
 }

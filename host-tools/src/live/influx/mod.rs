@@ -26,7 +26,7 @@ use self::names::Names;
 use self::queue::Queue;
 use self::target::Target;
 use super::world::World;
-use crate::decode::influx::{Clock, Lines};
+use crate::decode::formats::influx::{Clock, Lines};
 use crate::decode::record::rows;
 use crate::interrupt;
 use crate::mavlink::frame::{Peek, peek};

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
 use anyhow::{Result, anyhow};
 
 use super::batch::Batch;
-use crate::decode::influx::Tags;
+use crate::decode::formats::influx::Tags;
 use crate::live::world::World;
 
 /// Programs ask an autopilot for its id at once, and again after some seconds.

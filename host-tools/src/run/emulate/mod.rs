@@ -11,17 +11,12 @@ use board::{Board, Traffic};
 use hums_sdcard::Medium;
 use stm32f405_model::image::Image;
 
-use super::earlier::EarlierSessions;
 use super::report::{OnCard, Report};
-use super::{
-    InPlace, arrivals::Arrivals, check_standard_output, drive, ground, pace, paths, prepare_card, salt, store,
-};
+use super::{Prepared, check_standard_output, check_store, drive, finish, prepare};
 use crate::card::image::is_card;
 use crate::cli;
-use crate::endpoint::Endpoint;
 use crate::files::read_short;
 use crate::outcome::Outcome;
-use crate::params;
 use crate::plural::count;
 
 /// The ELF file of a release with all of its symbols has 8 MB.
@@ -30,28 +25,17 @@ const IMAGE_FILE_BYTES_MAX: u64 = 32 << 20;
 /// Runs `hums sim --firmware`.
 pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     check_standard_output(run)?;
-    let (speed, live) = pace(run)?;
-    let inputs = paths::inputs(run)?;
-    let params = params::read(run.params.as_deref())?;
     let (wired, image) = image(firmware)?;
-    // Open, so that no other run uses them.
-    let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
-        run.store.as_deref().map_or(Ok(()), store::check)?;
-        let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-        Ok((card, store::open(run.store.as_deref(), &params)?))
-    })?;
-    let in_place = InPlace::of(run);
+    let Prepared { speed, live, mut arrivals, card, flash, earlier, mut ground, gs, entropy } =
+        prepare(run, u64::MAX)?;
     flash.prepare()?;
-    let earlier = EarlierSessions::of(run, u64::MAX)?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();
-    let (mut ground, gs) = ground::open(run, &inputs)?;
-    let seed = salt::salt(run, &mut arrivals)?;
     let unread = || format!("{}: cannot be read", run.sd.display());
     let (is_card, medium) = (is_card(&card).with_context(unread)?, Medium::load(&card).with_context(unread)?);
     let table = medium.get(0);
     let mut board =
-        Board::new((wired, image), seed, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
+        Board::new((wired, image), entropy, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
     let flown = drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)
         .and_then(|_| board.settle());
     if is_card && medium.get(0) != table {
@@ -60,18 +44,11 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     // Also after an early end of the run: the card keeps its data.
     medium.save(&card).with_context(|| format!("{}: cannot be written", run.sd.display()))?;
     flash.set(board.store());
-    if let Some(error) = flash.take_error() {
-        bail!("--store {}: {error}", run.store.as_deref().unwrap_or(Path::new("")).display());
-    }
+    check_store(run, &flash)?;
     flown?;
-    let beside = ground.finish().and(arrivals.finish());
-    if let Some(remark) = arrivals.remark() {
-        note!("{remark}");
-    }
     if let Some((times, first_s)) = board.resets() {
         note!("the board reset itself {}, first at {first_s:.3} s", count(times, "time"));
     }
-    let gone = in_place.gone();
     let mut report = Report::default();
     let (frames, on_card) = report.read_card(&run.sd, &earlier)?;
     tell(&mut report, &board.traffic(), frames, &on_card);
@@ -81,11 +58,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
         report.stack_by_urgency = Some(board.stack_by_urgency());
         report.busy_percent_max = Some(board.busy_percent_max());
     }
-    if let Some(remark) = report.remark(&run.input) {
-        note!("{remark}");
-    }
-    let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
-    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged() || !gone.is_empty())))
+    finish(run, &arrivals, &ground, &report)
 }
 
 /// Reports the traffic of the ports, and the part of it on the card.

@@ -25,16 +25,14 @@ use pipeline::Pipeline;
 
 use super::arrivals::Arrivals;
 use super::earlier::EarlierSessions;
-use super::ground::{self, Ground};
+use super::ground::Ground;
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
-use super::{InPlace, check_standard_output, drive, emulate, pace, paths, prepare_card, salt};
+use super::{Prepared, check_standard_output, check_store, drive, emulate, finish, prepare};
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
-use crate::endpoint::Endpoint;
 use crate::outcome::{Outcome, usage};
-use crate::params;
 use crate::run::Machine as _;
 use crate::source::Chunk;
 
@@ -44,27 +42,18 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
         return emulate::run(run, image);
     }
     check_standard_output(run)?;
-    let (speed, live) = pace(run)?;
-    let inputs = paths::inputs(run)?;
     if run.costs {
         return Err(usage("--costs measures a firmware image: give one with --firmware"));
     }
-    let params = params::read(run.params.as_deref())?;
-    let (mut arrivals, (image, flash)) = Arrivals::open(run, &inputs, || {
-        run.store.as_deref().map_or(Ok(()), store::check)?;
-        let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-        Ok((card, store::open(run.store.as_deref(), &params)?))
-    })?;
-    let in_place = InPlace::of(run);
+    // The recorder itself keeps earlier sessions, however much comes.
+    let prepared = prepare(run, 0)?;
+    let Prepared { speed, live, mut arrivals, card: image, flash, earlier, mut ground, gs, entropy } =
+        prepared;
     if let Some(step) = run.faults.cut_store_after {
         flash.cut_after(step, run.faults.seed);
     }
-    // The recorder itself keeps them, however much comes.
-    let earlier = EarlierSessions::of(run, 0)?;
     let card = card(image, &run.faults).with_context(|| format!("{}: cannot be used", run.sd.display()))?;
     let card = card.keeping_logs(!run.overwrite_oldest);
-    let (mut ground, gs) = ground::open(run, &inputs)?;
-    let entropy = salt::salt(run, &mut arrivals)?;
     let mut world = World {
         card: &card,
         flash: &flash,
@@ -86,24 +75,9 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
     if let Some(error) = card.take_image_error() {
         bail!("{}: {error}", run.sd.display());
     }
-    if let Some(error) = flash.take_error() {
-        let store = run.store.as_deref().unwrap_or(Path::new(""));
-        bail!("--store {}: {error}", store.display());
-    }
-    let beside = ground.finish().and(arrivals.finish());
-    if let Some(remark) = arrivals.remark() {
-        note!("{remark}");
-    }
-    let mut report = world.settle(&run.sd, &earlier)?;
-    let gone = in_place.gone();
-    if gone.contains(&run.sd.as_path()) {
-        (report.frames_logged, report.frames_lost) = (0, report.frames_in);
-    }
-    if let Some(remark) = report.remark(&run.input) {
-        note!("{remark}");
-    }
-    let outcome = report.print(run.json, run.gs == Some(Endpoint::Standard))?;
-    Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged() || !gone.is_empty())))
+    check_store(run, &flash)?;
+    let report = world.settle(&run.sd, &earlier)?;
+    finish(run, &arrivals, &ground, &report)
 }
 
 fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {

@@ -1,453 +1,459 @@
-//! `hums box pull --around`: over a slow radio the minute of a crash first. Random access finds the moment
-//! ([`super::moment`]), and the sectors around it become a part of the log ([`super::part`]). Unreadable
-//! sectors in the part or in the search are reported.
+//! `hums box pull --around`: over a slow radio the minute of a crash first.
+//!
+//! The files of a log count as one row of sectors. A group begins with its time, so each sector read halves the
+//! search. Whole groups around the moment come into partial files. A partial file is as long as the board's file
+//! and has zeros in place of all other sectors. Its name ends in `.part.HUM`, and every reader reports that.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::slice;
 
 use anyhow::{Context as _, Result, bail};
+use hums_blackbox::{GROUP_SECTORS, Header, SECTOR_BYTES, Sector};
 use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
+use hums_recorder::card::SEGMENT_BYTES_MAX;
+use tempfile::NamedTempFile;
 
+use super::compare::{beginning_of, bytes_of, heading_of};
 use super::ftp::Ftp;
-use super::moment::{Sectors as _, between, first_group, group_before};
-use super::part::Part;
-use super::remote::Remote;
-use super::session::number as number_of;
-use super::stretch::{Reading, Stretch, Unread, by_number};
 use crate::cli::Around;
-use crate::outcome::Outcome;
-use crate::summary::FindingLine;
+use crate::files::{begin, cannot_write};
+use crate::logs::fat::Extent;
+use crate::logs::naming::part_name;
+use crate::logs::{Log, Piece};
+use crate::loss;
+use crate::outcome::{Outcome, exists};
+use crate::plural::count;
+use crate::source::told::Finding;
+use crate::summary::Overview;
 use crate::utc::{When, date_and_time, moment};
+
+/// Sectors searched backwards from an unreadable one for the beginning of a group.
+const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;
+/// Twice the longest file of the recorder: a longer one would fill the disk.
+const FILE_BYTES_MAX: u32 = 2 * SEGMENT_BYTES_MAX;
+const SECTOR: u32 = SECTOR_BYTES as u32;
 
 /// The result of a download.
 #[derive(Debug)]
 pub(super) struct Brought {
-    /// The log's name on the board, and the part.
-    pub(super) parts: Vec<(String, PathBuf)>,
-    /// `None` if the readable sectors hold no such finding.
-    pub(super) at: Option<Instant>,
+    /// Names on the board, and the partial files.
+    pub(super) files: Vec<(String, PathBuf)>,
+    /// The moment.
+    pub(super) at: Instant,
     /// The finding, if one was requested.
-    pub(super) found: Option<FindingLine>,
-    /// Sectors of other sessions that came, and are not kept.
-    pub(super) strange: u64,
-    /// Whether all requested sectors were read. Unread ones are reported.
+    pub(super) found: Option<Finding>,
+    /// Whether all requested sectors were read. Losses are reported.
     pub(super) outcome: Outcome,
 }
 
-/// Downloads this span around a moment from the logs of one session, in their order. Other logs of the board
-/// were left out on purpose.
+/// Downloads this span around a moment from the files of one log, which are in order, with their lengths.
 pub(super) fn pull(
     ftp: &mut Ftp,
-    names: &[String],
-    left_out: &[String],
+    files: &[(String, u32)],
     output: &Path,
     (what, span): (&Around, Span),
 ) -> Result<Brought> {
-    let mut board = Board::new(ftp, names, left_out, output);
-    let (mut outcome, mut found, mut epoch_us) = (Outcome::Done, None, None);
+    let mut log = RemoteLog::new(ftp, files, output)?;
+    let (mut found, mut searched) = (None, Outcome::Done);
     let at = match what {
         Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
         Around::Time(When::Utc(utc_us)) => {
-            let clock = board.clock(*utc_us)?;
-            outcome = clock.tell();
-            epoch_us = Some(clock.epoch_us);
-            let micros = utc_us.checked_sub(clock.epoch_us).with_context(|| {
+            let power_on_us = log.power_on_us()?;
+            let micros = utc_us.checked_sub(power_on_us);
+            Instant::from_micros(micros.with_context(|| {
                 format!(
-                    "the newest session began later, {} UTC; name the logs of another one",
-                    date_and_time(clock.epoch_us)
+                    "the log begins later, {} UTC; name the files of another log",
+                    date_and_time(power_on_us)
                 )
-            })?;
-            Instant::from_micros(micros)
+            })?)
         }
         Around::Level(_) | Around::Check(_) => {
-            let searched = board.latest(what)?;
-            outcome = searched.tell();
-            let Some(latest) = searched.found else {
-                return Ok(Brought {
-                    parts: Vec::new(),
-                    at: None,
-                    found: None,
-                    strange: board.strange.len() as u64,
-                    outcome,
-                });
-            };
+            let latest;
+            (latest, searched) = log.latest(what)?;
             found.insert(latest).at
         }
     };
     let (from, to) = (Instant::from_micros(at.as_micros().saturating_sub(span.as_micros())), at + span);
-    let stretches = board.bring(from, to)?;
-    if stretches.is_empty() {
-        bail!("what the board gives of this session begins after {}", moment(to));
+    let places = log.before(from)?.start..log.before(to)?.end;
+    let overview = log.bring(places.clone())?;
+    let is_to_end = places.end == log.count();
+    if log.unread.is_empty() {
+        check_recorded(at, &overview, is_to_end)?;
     }
-    let readings = by_number(&stretches).map(Reading::of).collect::<Result<Vec<_>>>()?;
-    outcome = outcome.and(check_recorded(at, &readings, &board, epoch_us)?);
-    if let Some(missing) = board.missing {
-        note!("of the moment: {}: no log that the board gives has them", missing.words());
-        outcome = Outcome::Losses;
-    }
-    let mut is_over = false;
-    for reading in &readings {
-        // Logs after one that goes beyond the moment do not count.
-        let is_of_it = |unread: &Unread| !is_over && unread.is_within(from, to);
-        // The board's logs end within the requested span.
-        let to_end = reading.is_to_end(names) && reading.span().is_none_or(|(_, end)| end < to);
-        for fault in reading.faults_of(is_of_it, to_end) {
-            note!("{}: of the moment: {fault}; `hums info --verify` says more", reading.name());
-            outcome = Outcome::Losses;
-        }
-        is_over |= reading.span().is_some_and(|(_, end)| end > to);
-        if let Some(words) = reading.unproved_end().filter(|_| to_end) {
-            note!("{}: {words}", reading.name());
-        }
-    }
-    Ok(Brought {
-        parts: board.finish(&stretches)?,
-        at: Some(at),
-        found,
-        strange: board.strange.len() as u64,
-        outcome,
-    })
+    let outcome = log.tell_unread().and(tell_faults(&overview, is_to_end.then_some(to)));
+    Ok(Brought { files: log.finish(&places)?, at, found, outcome: outcome.and(searched) })
 }
 
-/// Refuses a moment without a recording. If a sector is unreadable, the recording may be there; then this is
-/// reported.
-fn check_recorded(
-    at: Instant,
-    readings: &[Reading],
-    board: &Board<'_>,
-    epoch_us: Option<u64>,
-) -> Result<Outcome> {
-    let Board { names, left_out, missing, next, .. } = board;
-    let spans = || readings.iter().filter_map(|reading| Some((reading, reading.span()?)));
-    if spans().any(|(log, (first, last))| first <= at && (at <= last || log.goes_on(names))) {
-        return Ok(Outcome::Done);
-    }
-    let words = |at: Instant| {
-        let utc = epoch_us
-            .map(|epoch_us| format!(" ({} UTC)", date_and_time(epoch_us.saturating_add(at.as_micros()))));
-        moment(at) + &utc.unwrap_or_default()
+/// Refuses a moment without a recording.
+fn check_recorded(at: Instant, overview: &Overview, is_to_end: bool) -> Result<()> {
+    let summary = &overview.ending.summary;
+    let (Some(first), Some(last)) = (summary.first, summary.last) else {
+        bail!("no sector around {} can be read", moment(at));
     };
-    let before = spans().map(|(log, (_, last))| (last, log.name())).filter(|(last, _)| *last < at).max();
-    let starts = spans().map(|(log, (first, _))| (first, log.first_name()));
-    let starts = starts.chain(next.iter().map(|(name, first)| (*first, name.as_str())));
-    let after = starts.filter(|(first, _)| *first > at).min();
-    let is_read = missing.is_none() && readings.iter().all(|reading| reading.unread().is_none());
-    let why = match (before, after) {
-        (Some((end, earlier)), Some((start, later))) => {
-            let is_between = |name: &String| (earlier..later).contains(&name.as_str());
-            if is_read && !left_out.iter().any(is_between) {
-                bail!(
-                    "nothing was recorded between {}, where {earlier} ends, and {}, where {later} begins",
-                    words(end),
-                    words(start)
-                );
-            }
-            let between = format!("nothing between {} and {}", words(end), words(start));
-            format!("what the board gives of this session, as far as it was asked for, has {between}")
-        }
-        (Some((end, _)), None) => format!("what the board gives of this session ends at {}", words(end)),
-        (None, Some((start, _))) => {
-            format!("what the board gives of this session begins at {}", words(start))
-        }
-        (None, None) => "nothing of the moment can be read".to_owned(),
+    let utc = |at: Instant| {
+        let utc_us = summary.epoch_us.map(|epoch_us| epoch_us.saturating_add(at.as_micros()));
+        moment(at) + &utc_us.map_or_else(String::new, |utc_us| format!(" ({} UTC)", date_and_time(utc_us)))
     };
-    if is_read {
-        bail!("{why}; for another session name its logs");
+    if at < first && summary.first_number != Some(0) {
+        bail!("the board's files of this log begin at {}; for another log name its files", utc(first));
     }
-    note!("nothing that can be read was recorded at {}: {why}", words(at));
-    Ok(Outcome::Losses)
+    if at > last && is_to_end {
+        bail!("the log ends at {}; for another log name its files", utc(last));
+    }
+    Ok(())
 }
 
-/// The result of a search.
-struct Searched {
-    found: Option<FindingLine>,
-    /// Unreadable sectors in the search.
-    unread: Option<Unread>,
-}
-
-impl Searched {
-    /// Prints the finding and the gaps of the search.
-    fn tell(&self) -> Outcome {
-        let unread = self.unread.as_ref().map(Unread::words);
-        if let Some(FindingLine { check, level, at, .. }) = &self.found {
-            note!("{check}: {level} at {}", moment(*at));
-        }
-        if let Some(unread) = &unread {
-            let what = if self.found.is_some() { "that is the latest" } else { "no such finding is" };
-            note!("{what} in what could be read: {unread}, where one may be");
-        }
-        Outcome::lossy(unread.is_some())
+/// Reports losses within the brought sectors. If they reach the end of the log before the time `to`, the proof of that end counts too.
+fn tell_faults(overview: &Overview, to: Option<Instant>) -> Outcome {
+    let ending = &overview.ending;
+    let mut faults: Vec<String> = Vec::new();
+    // Sectors before the first brought one are not lost.
+    let gaps = overview.contents.gaps.iter().filter(|gap| gap.from.is_some() || gap.sectors_skipped > 0);
+    faults.extend(Some(gaps.count() as u64).filter(|gaps| *gaps > 0).map(|gaps| count(gaps, "gap")));
+    if ending.summary.marks.lost > 0 {
+        faults.extend(overview.contents.losses.values().map(loss::told));
     }
-}
-
-/// UTC at power-on, by a log's clock.
-#[derive(Clone, Copy)]
-struct Clock {
-    /// Microseconds since 1970.
-    epoch_us: u64,
-    /// Unreadable sectors after the last clock record: the clock may have been set again there.
-    unread: Option<Unread>,
-}
-
-impl Clock {
-    /// Prints the gaps of the search.
-    fn tell(&self) -> Outcome {
-        if let Some(unread) = &self.unread {
-            note!(
-                "UTC goes by the last clock record that could be read (power-on at {}): {}, where one may be",
-                date_and_time(self.epoch_us),
-                unread.words()
-            );
+    let ends_within = to.is_some_and(|to| ending.summary.last.is_some_and(|last| last < to));
+    if ends_within && !ending.proof.is_whole() {
+        if ending.proof.holds() {
+            note!("{}: {}", ending.name, ending.words());
+        } else {
+            faults.push(ending.words());
         }
-        Outcome::lossy(self.unread.is_some())
     }
-}
-
-/// The logs of a session on a board.
-struct Board<'a> {
-    ftp: &'a mut Ftp,
-    names: &'a [String],
-    left_out: &'a [String],
-    output: &'a Path,
-    /// The parts of logs read so far, by their names.
-    parts: BTreeMap<String, Part>,
-    /// Sectors of other sessions, by their logs and places.
-    strange: BTreeSet<(String, u32)>,
-    /// Data recorded between the searched logs or before them, and in none of them, as the sectors' numbers
-    /// show.
-    missing: Option<Unread>,
-    /// The first log that begins after the requested span, and its start.
-    next: Option<(String, Instant)>,
-}
-
-/// Beginning of a log of the session.
-struct Begin<'a> {
-    name: &'a str,
-    /// The number of its first sector.
-    number: Option<u32>,
-    at: Option<Instant>,
-    /// Its beginning was downloaded. A gap between it and a log of the same number is found when both are
-    /// read.
-    is_read: bool,
-}
-
-impl<'a> Board<'a> {
-    fn new(ftp: &'a mut Ftp, names: &'a [String], left_out: &'a [String], output: &'a Path) -> Self {
-        let (parts, strange) = (BTreeMap::new(), BTreeSet::new());
-        Self { ftp, names, left_out, output, parts, strange, missing: None, next: None }
+    for fault in &faults {
+        note!("{}: of the moment: {fault}; `hums info --verify` says more", ending.name);
     }
-
-    /// Names the parts with these stretches; deletes the others.
-    fn finish(&mut self, stretches: &[Stretch]) -> Result<Vec<(String, PathBuf)>> {
-        let of = |stretch: &Stretch| Some((stretch.name.clone(), self.parts.remove(&stretch.name)?));
-        let parts: Vec<_> = stretches.iter().filter_map(of).collect();
-        parts.into_iter().map(|(name, part)| Ok((name, part.finish()?))).collect()
-    }
-
-    /// Downloads the recording between these times.
-    fn bring(&mut self, from: Instant, to: Instant) -> Result<Vec<Stretch>> {
-        let (mut stretches, mut later) = (Vec::new(), None);
-        // Sectors of a group whose beginning is still to be found, with their logs.
-        let mut tails: Vec<(&String, u32)> = Vec::new();
-        for name in self.names.iter().rev() {
-            let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
-            let first = first_group(&mut log)?;
-            let (at, number) = (first.map(|first| first.at), log.first_number());
-            let is_further =
-                self.names.iter().any(|other| other < name && number_of(other) == number_of(name));
-            // A group may begin in the log before: then the first sectors of this one are its last.
-            let is_later =
-                first.map_or(is_further, |first| first.at > to && (first.place == 0 || is_further));
-            if is_later && stretches.is_empty() {
-                if let Some(first) = first {
-                    tails.clear();
-                    self.next = Some((name.clone(), first.at));
-                }
-                tails.insert(0, (name, first.map_or(log.count(), |first| first.place)));
-                later = Some(Begin { name, number, at, is_read: false });
-                continue;
-            }
-            let places = between(&mut log, from, to)?;
-            let begin = Begin { name, number, at, is_read: places.start == 0 };
-            let stretch = log.bring(places)?;
-            log.add_strange(&mut self.strange);
-            if let Some(later) = &mut later {
-                for (name, end) in std::mem::take(&mut tails) {
-                    if end > 0 && stretch.places.end == stretch.sectors {
-                        let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
-                        stretches.push(log.bring(0..end)?);
-                        log.add_strange(&mut self.strange);
-                        later.is_read = true;
-                    }
-                }
-                self.hold_against(Some(&stretch), number, later, to)?;
-            }
-            stretches.insert(0, stretch);
-            if at.is_some_and(|at| at <= from) {
-                return Ok(stretches);
-            }
-            later = Some(begin);
-        }
-        if let Some(first) = later.filter(|_| !stretches.is_empty()) {
-            self.hold_against(None, None, &first, to)?;
-        }
-        Ok(stretches)
-    }
-
-    /// Notes the gap between the end of a downloaded log and the next log, whose first sector has this
-    /// number. Without a log, it is the gap before the next one. Data after the time `to` do not count.
-    fn hold_against(
-        &mut self,
-        before: Option<&Stretch>,
-        number: Option<u32>,
-        later: &Begin<'_>,
-        to: Instant,
-    ) -> Result<()> {
-        let is_between =
-            |name: &String| before.is_none_or(|before| *name > before.name) && name.as_str() < later.name;
-        if self.left_out.iter().any(is_between) {
-            return Ok(());
-        }
-        let is_one_log = before.is_some_and(|before| number_of(&before.name) == number_of(later.name));
-        let end = match before {
-            Some(before) if before.places.end < before.sectors || is_one_log && later.is_read => {
-                return Ok(());
-            }
-            Some(before) => number.map(|number| number.saturating_add(before.sectors)),
-            None => Some(0),
-        };
-        let Some((end, begins)) = end.zip(later.number).filter(|(end, begins)| begins > end) else {
-            return Ok(());
-        };
-        let last = before.map(|before| Reading::of(slice::from_ref(before))).transpose()?;
-        let last = last.and_then(|last| last.span()).map(|(_, last)| last);
-        if last.is_none_or(|last| last < to) {
-            let sectors = u64::from(begins - end);
-            self.missing = Unread::all(Some(Unread { sectors, from: last, to: later.at }), self.missing);
-        }
-        Ok(())
-    }
-
-    /// The clock of the log that contains a time of day. Every reader dates a log by the last clock record in
-    /// it. The log is the newest one that began before that time by its own clock. A log without a clock uses
-    /// the next log's.
-    fn clock(&mut self, utc_us: u64) -> Result<Clock> {
-        let mut clock = None;
-        for logs in self.names.chunk_by(|one, next| number_of(one) == number_of(next)).rev() {
-            clock = self.last_clock(logs)?.or(clock);
-            let Some(found) = clock else { continue };
-            let mut first = Remote::open(self.ftp, &mut self.parts, &logs[0], self.output)?;
-            let began = first_group(&mut first)?.map(|first| first.at);
-            if began.is_some_and(|began| found.epoch_us.saturating_add(began.as_micros()) <= utc_us) {
-                break;
-            }
-        }
-        clock.context(
-            "nothing that can be read told this session the time of day; say the time since its beginning, as --around 4:20",
-        )
-    }
-
-    /// A log's last clock record, from its last readable group.
-    fn last_clock(&mut self, names: &[String]) -> Result<Option<Clock>> {
-        let mut stretches = Vec::new();
-        for name in names.iter().rev() {
-            let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
-            let count = log.count();
-            let place = group_before(&mut log, count)?;
-            stretches.insert(0, log.bring(place..count)?);
-            log.add_strange(&mut self.strange);
-            let reading = Reading::of(&stretches)?;
-            if let Some(epoch_us) = reading.epoch_us() {
-                return Ok(Some(Clock { epoch_us, unread: reading.unread() }));
-            }
-        }
-        Ok(None)
-    }
-
-    /// The latest matching finding: the logs are read from their end backwards, group by group, until it
-    /// comes.
-    fn latest(&mut self, what: &Around) -> Result<Searched> {
-        let (mut found, mut stretches, mut later) = (None, Vec::new(), None);
-        let never = Instant::from_micros(u64::MAX);
-        for name in self.names.iter().rev() {
-            let mut log = Remote::open(self.ftp, &mut self.parts, name, self.output)?;
-            let count = log.count();
-            let mut end = count;
-            while end > 0 && found.is_none() {
-                let place = group_before(&mut log, end)?;
-                let group = Reading::of(&[log.bring(place..end)?])?;
-                found = wanted(&group, what);
-                end = place;
-                if let (None, Some((first, _))) = (&found, group.span()) {
-                    note!("{name}: none in what can be read from {} on; looking before that", moment(first));
-                }
-            }
-            let stretch = log.stretch(end..count);
-            log.add_strange(&mut self.strange);
-            let (at, number) = (first_group(&mut log)?.map(|first| first.at), log.first_number());
-            if let Some(later) = &later {
-                self.hold_against(Some(&stretch), number, later, never)?;
-            }
-            stretches.insert(0, stretch);
-            if found.is_some() {
-                later = None;
-                break;
-            }
-            later = Some(Begin { name, number, at, is_read: true });
-        }
-        if let Some(first) = &later {
-            self.hold_against(None, None, first, never)?;
-        }
-        // All of it again: a group may begin in one log and end in the next one.
-        let mut unread = None;
-        for stretches in by_number(&stretches) {
-            let reading = Reading::of(stretches)?;
-            unread = Unread::all(unread, reading.unread());
-            found = found.into_iter().chain(wanted(&reading, what)).max_by_key(|found| found.at);
-        }
-        Ok(Searched { found, unread: Unread::all(unread, self.missing.take()) })
-    }
-}
-
-/// The latest matching finding in the data read.
-fn wanted(reading: &Reading, what: &Around) -> Option<FindingLine> {
-    reading.findings().iter().rfind(|finding| is_wanted(what, &finding.check, finding.level)).cloned()
+    Outcome::lossy(!faults.is_empty())
 }
 
 /// Whether a change of level matches the request. A return to normal does not.
-fn is_wanted(what: &Around, check: &str, level: &str) -> bool {
-    let is_bad = [Level::Warning, Level::Critical].map(Level::name).contains(&level);
+fn is_wanted(what: &Around, finding: &Finding) -> bool {
     match what {
-        Around::Level(Level::Critical) => level == Level::Critical.name(),
-        Around::Level(_) => is_bad,
-        Around::Check(name) => is_bad && check == name,
+        Around::Level(Level::Critical) => finding.level == Level::Critical,
+        Around::Level(_) => finding.is_bad(),
+        Around::Check(name) => finding.is_bad() && finding.check == *name,
         Around::Time(_) => false,
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A log on the board with random access to its sectors.
+struct RemoteLog<'a> {
+    ftp: &'a mut Ftp,
+    output: &'a Path,
+    files: Vec<RemoteFile>,
+    /// The file that the board has open.
+    open: Option<usize>,
+    /// Brought places without a readable sector of the log.
+    unread: BTreeSet<u32>,
+    /// Whether a file of the log is empty: then later findings may be lost.
+    empty: Outcome,
+}
 
-    #[test]
-    fn a_finding_that_is_asked_for_is_one_that_is_bad() {
-        let critical: Around = "critical".parse().expect("good");
-        let warning: Around = "warning".parse().expect("good");
-        let check: Around = "motor_loss".parse().expect("good");
-        for (level, wanted) in [
-            (Level::Ok, [false, false, false]),
-            (Level::Advisory, [false, false, false]),
-            (Level::Warning, [false, true, true]),
-            (Level::Critical, [true, true, true]),
-            (Level::Stale, [false, false, false]),
-        ] {
-            assert_eq!(
-                [&critical, &warning, &check].map(|what| is_wanted(what, "motor_loss", level.name())),
-                wanted
+/// A file of the log.
+struct RemoteFile {
+    name: String,
+    /// Place of its first sector in the log, and number of its sectors.
+    first: u32,
+    sectors: u32,
+    partial: Option<PartialFile>,
+}
+
+impl<'a> RemoteLog<'a> {
+    fn new(ftp: &'a mut Ftp, files: &[(String, u32)], output: &'a Path) -> Result<Self> {
+        let mut log = Self {
+            ftp,
+            output,
+            files: Vec::new(),
+            open: None,
+            unread: BTreeSet::new(),
+            empty: Outcome::Done,
+        };
+        for (name, bytes) in files {
+            if *bytes < SECTOR {
+                note!("{name}: has no data, or its first sector cannot be read");
+                log.empty = Outcome::Losses;
+                continue;
+            }
+            if *bytes > FILE_BYTES_MAX {
+                bail!("{name}: no recorder makes a file of {bytes} bytes, as the board's directory says");
+            }
+            let (name, first, sectors) = (name.clone(), log.count(), bytes / SECTOR);
+            log.files.push(RemoteFile { name, first, sectors, partial: None });
+        }
+        if log.files.is_empty() {
+            bail!("the board has no log with data");
+        }
+        Ok(log)
+    }
+
+    /// Number of its sectors.
+    fn count(&self) -> u32 {
+        self.files.last().map_or(0, |last| last.first + last.sectors)
+    }
+
+    /// The file with this place, open on the board, and the place in it.
+    fn file_at(&mut self, place: u32) -> Result<(&mut Ftp, &mut PartialFile, u32)> {
+        let index = self.files.partition_point(|file| file.first <= place).saturating_sub(1);
+        let file = self.files.get_mut(index).context("a place beyond the log")?;
+        if self.open.replace(index) != Some(index) {
+            let length = self.ftp.open(&file.name)?;
+            if length / SECTOR < file.sectors {
+                bail!("{}: is shorter than the board's directory says; call again", file.name);
+            }
+            if file.partial.is_none() {
+                let heading = heading_of(self.ftp, &file.name, length)?;
+                let whole = self.output.join(&heading.name);
+                if whole.exists() {
+                    bail!(
+                        "{} is there already: `hums decode --from --to` shows a moment of it, and `hums box pull` completes it",
+                        whole.display()
+                    );
+                }
+                file.partial = Some(PartialFile::begin(&whole, file.sectors, &heading.sectors)?);
+            }
+        }
+        let partial = file.partial.as_mut().context("a file that is not open")?;
+        Ok((&mut *self.ftp, partial, place - file.first))
+    }
+
+    /// The sector at this place; `None` if it is damaged, or another one is there.
+    fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>> {
+        let (ftp, partial, at) = self.file_at(place)?;
+        if !partial.has(at) {
+            let bytes = bytes_of(ftp, at * SECTOR, SECTOR)?;
+            let sector = bytes.first_chunk().map_or(Sector::zeroed(), |bytes| Sector::from_bytes(*bytes));
+            partial.put(at, &sector)?;
+        }
+        partial.sector(at)
+    }
+
+    /// Place and time of the beginning of the group with this sector. If that is unreadable, of the last
+    /// readable one before it.
+    fn group_of(&mut self, place: u32) -> Result<Option<(u32, Instant)>> {
+        let mut next = Some(place);
+        for _ in 0..STEPS_BACK_MAX {
+            let Some(place) = next else { break };
+            next = match self.sector(place)? {
+                Some((header, sector)) if header.starts_group() => {
+                    let start = |start_ms| (place, Instant::from_millis(start_ms));
+                    return Ok(sector.preamble().map(|preamble| start(preamble.start_ms)));
+                }
+                Some((header, _)) => place.checked_sub(u32::from(header.since_first)),
+                None => place.checked_sub(1),
+            };
+        }
+        Ok(None)
+    }
+
+    /// The whole group that ends before this place, with unreadable sectors in front of the place; to the
+    /// beginning of the log if no earlier one is readable.
+    fn group_before(&mut self, end: u32) -> Result<Range<u32>> {
+        let mut place = end;
+        while let Some(last) = place.checked_sub(1) {
+            if let Some((start, _)) = self.group_of(last)? {
+                return Ok(start..end);
+            }
+            place = place.saturating_sub(STEPS_BACK_MAX);
+        }
+        Ok(0..end)
+    }
+
+    /// Places with the recording of this time: they begin with a group that starts then or before, and end with
+    /// one that starts later, or with the log.
+    fn before(&mut self, time: Instant) -> Result<Range<u32>> {
+        let group = GROUP_SECTORS as u32;
+        let (mut start, mut end) = (0, self.count());
+        while end - start > group {
+            // Never in the group that begins at `start`.
+            let middle = start + ((end - start) / 2).max(group);
+            match self.group_of(middle)? {
+                Some((place, at)) if place > start && at <= time => start = place,
+                Some((place, _)) if place > start => end = place,
+                // The times before it are unknown: all of it is taken.
+                _ => break,
+            }
+        }
+        Ok(start..end)
+    }
+
+    /// UTC at power-on by the last clock record, microseconds since 1970.
+    fn power_on_us(&mut self) -> Result<u64> {
+        let last = self.group_before(self.count())?;
+        let epoch_us = self.bring(last)?.ending.summary.epoch_us;
+        epoch_us.context("the log has no time of day; give the time since power-on, as --around 4:20")
+    }
+
+    /// The latest matching finding, searched from the end group by group, and whether nothing was lost there.
+    fn latest(&mut self, what: &Around) -> Result<(Finding, Outcome)> {
+        let (count, mut start, mut found) = (self.count(), self.count(), None);
+        while start > 0 && found.is_none() {
+            let places = self.group_before(start)?;
+            start = places.start;
+            let overview = self.bring(places)?;
+            found = overview.contents.findings.into_iter().rfind(|finding| is_wanted(what, finding));
+            if let (None, Some(first)) = (&found, overview.ending.summary.first) {
+                note!("no such finding from {} on; searching before that", moment(first));
+            }
+        }
+        // All of it together: the sectors' numbers show a missing file.
+        let outcome = tell_faults(&self.bring(start..count)?, None).and(self.empty);
+        let Some(found) = found else {
+            self.tell_unread();
+            bail!("no such finding is in this log; for another log name its files");
+        };
+        note!("{}: {} at {}", found.check, found.level.name(), moment(found.at));
+        Ok((found, outcome))
+    }
+
+    /// Reports unreadable sectors.
+    fn tell_unread(&self) -> Outcome {
+        if !self.unread.is_empty() {
+            let sectors = count(self.unread.len() as u64, "sector");
+            note!(
+                "{sectors} around the moment, or in the search for it, cannot be read: data of it may be lost"
             );
         }
-        assert!(!is_wanted(&check, "cell_voltage", Level::Critical.name()));
+        Outcome::lossy(!self.unread.is_empty())
+    }
+
+    /// Downloads these places as far as they are missing, and reads them.
+    fn bring(&mut self, places: Range<u32>) -> Result<Overview> {
+        let mut place = places.start;
+        while place < places.end {
+            let (ftp, partial, at) = self.file_at(place)?;
+            let end = partial.end_of_missing(at, places.end - place + at);
+            let (mut next, mut waiting) = (at, Vec::new());
+            ftp.bring(at * SECTOR, end * SECTOR, |bytes| {
+                waiting.extend_from_slice(bytes);
+                let (sectors, rest) = waiting.as_chunks::<SECTOR_BYTES>();
+                for sector in sectors {
+                    partial.put(next, &Sector::from_bytes(*sector))?;
+                    next += 1;
+                }
+                waiting = rest.to_vec();
+                Ok(())
+            })?;
+            place += (end - at).max(1);
+            if end > at {
+                note!("{} of {} sectors came", place - places.start, places.len());
+            }
+        }
+        for place in places.clone() {
+            if self.sector(place)?.is_none() {
+                self.unread.insert(place);
+            }
+        }
+        Overview::verified(&self.read_as_log(&places))
+    }
+
+    /// These places of the partial files.
+    fn read_as_log(&self, places: &Range<u32>) -> Log {
+        let piece = |file: &RemoteFile| {
+            let start = places.start.clamp(file.first, file.first + file.sectors) - file.first;
+            let end = places.end.clamp(file.first, file.first + file.sectors) - file.first;
+            let partial = file.partial.as_ref().filter(|_| start < end)?;
+            let [start, length] = [start, end - start].map(|sectors| u64::from(sectors * SECTOR));
+            Some(Piece { path: partial.file.path().to_owned(), extents: vec![Extent { start, length }] })
+        };
+        let name = self.files.first().map_or_else(String::new, |file| file.name.clone());
+        let pieces = self.files.iter().filter_map(piece).collect();
+        Log { name, files: Vec::new(), pieces, session: None, left_over: false }
+    }
+
+    /// Names the partial files with these places; deletes the others.
+    fn finish(self, places: &Range<u32>) -> Result<Vec<(String, PathBuf)>> {
+        let is_in = |file: &RemoteFile| file.first < places.end && places.start < file.first + file.sectors;
+        let files = self.files.into_iter().filter(is_in);
+        let named = files.filter_map(|file| Some((file.name, file.partial?)));
+        named.map(|(name, partial)| Ok((name, partial.finish()?))).collect()
+    }
+}
+
+/// A file with each downloaded sector at its place, and zeros for the others.
+#[derive(Debug)]
+struct PartialFile {
+    file: NamedTempFile<File>,
+    /// Its name, once complete.
+    target: PathBuf,
+    /// Whether each sector was downloaded.
+    has: Vec<bool>,
+    /// Session of the file, and number of its first sector, by its first sectors.
+    session: Option<u32>,
+    base: Option<u32>,
+}
+
+impl PartialFile {
+    /// Begins the partial file beside the path of the whole one, with these first sectors.
+    fn begin(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Self> {
+        let target = part_name(whole);
+        if target.symlink_metadata().is_ok() {
+            return Err(exists(&target, false));
+        }
+        let (session, base) = beginning_of(head);
+        let open = |path: &Path| File::options().read(true).write(true).create_new(true).open(path);
+        let bytes = u64::from(sectors) * SECTOR_BYTES as u64;
+        let file = begin(&target, open).and_then(|file| file.as_file().set_len(bytes).map(|()| file));
+        let file = file.with_context(|| cannot_write(&target))?;
+        let mut partial = Self { file, target, has: vec![false; sectors as usize], session, base };
+        (0..).zip(head).try_for_each(|(at, sector)| partial.put(at, sector))?;
+        Ok(partial)
+    }
+
+    fn has(&self, at: u32) -> bool {
+        self.has.get(at as usize).is_some_and(|has| *has)
+    }
+
+    /// The end of the sectors from `at` on that are missing, at most `end`; `at` if that one is there.
+    fn end_of_missing(&self, at: u32, end: u32) -> u32 {
+        let end = end.min(self.has.len() as u32);
+        (at..end).find(|at| self.has(*at)).unwrap_or(end)
+    }
+
+    /// The header of a sector that belongs at this place. A copy of a sector in progress may be one place
+    /// further.
+    fn header(&self, at: u32, sector: &Sector) -> Option<Header> {
+        let header =
+            Header::read(sector.bytes()).ok().filter(|header| self.session == Some(header.session))?;
+        let number = self.base.map_or(header.number, |base| base.wrapping_add(at));
+        let is_here = header.number == number || header.partial && header.number.wrapping_add(1) == number;
+        is_here.then_some(header)
+    }
+
+    /// Puts a sector at its place; zeros in place of a sector of another session, whose log has come in its place.
+    fn put(&mut self, at: u32, sector: &Sector) -> Result<()> {
+        let header = Header::read(sector.bytes()).ok();
+        self.session = self.session.or(header.map(|header| header.session));
+        let is_other = header.is_some_and(|header| Some(header.session) != self.session);
+        let zeros = Sector::zeroed();
+        let sector = if is_other { &zeros } else { sector };
+        self.seek(at)
+            .and_then(|()| self.file.write_all(sector.bytes()))
+            .with_context(|| cannot_write(&self.target))?;
+        self.has.get_mut(at as usize).into_iter().for_each(|has| *has = true);
+        Ok(())
+    }
+
+    /// A downloaded sector, if it belongs at this place.
+    fn sector(&mut self, at: u32) -> Result<Option<(Header, Sector)>> {
+        let mut bytes = [0; SECTOR_BYTES];
+        self.seek(at)
+            .and_then(|()| self.file.read_exact(&mut bytes))
+            .with_context(|| cannot_write(&self.target))?;
+        let sector = Sector::from_bytes(bytes);
+        Ok(self.header(at, &sector).map(|header| (header, sector)))
+    }
+
+    fn seek(&mut self, at: u32) -> std::io::Result<()> {
+        self.file.seek(SeekFrom::Start(u64::from(at) * SECTOR_BYTES as u64)).map(|_| ())
+    }
+
+    fn finish(self) -> Result<PathBuf> {
+        self.file.persist_noclobber(&self.target).with_context(|| cannot_write(&self.target))?;
+        Ok(self.target)
     }
 }

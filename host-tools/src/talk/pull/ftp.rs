@@ -94,12 +94,24 @@ fn silence(words: &'static str) -> Error {
     io::Error::new(io::ErrorKind::TimedOut, words).into()
 }
 
-/// The text of a refusal.
+/// The board has deleted a log since it listed it.
+#[derive(Debug)]
+pub(super) struct NoSuchLog;
+
+impl std::fmt::Display for NoSuchLog {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(
+            "the board no longer has this log: its card made room for later flights, or is another one",
+        )
+    }
+}
+
+impl std::error::Error for NoSuchLog {}
+
+/// The error of a refusal.
 fn refused(answer: &Answer, what: &str) -> Error {
     if answer.is_nak(FILE_NOT_FOUND) {
-        return anyhow!(
-            "the board no longer has this log: its card made room for later flights, or is another one"
-        );
+        return NoSuchLog.into();
     }
     let why = answer.data.first().map_or_else(String::new, |error| format!(" (MAVLink FTP error {error})"));
     anyhow!("the board refuses {what} of this log{why}; call again")
@@ -182,8 +194,7 @@ impl Ftp {
     pub(super) fn open(&mut self, name: &str) -> Result<u32> {
         let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes(), TRIES)?;
         if opened.opcode != ACK {
-            let why = if opened.is_nak(FILE_NOT_FOUND) { ": it no longer has this log" } else { "" };
-            bail!("the board cannot open it{why}");
+            return Err(refused(&opened, "the opening"));
         }
         Ok(opened.word())
     }
@@ -299,7 +310,7 @@ mod tests {
     use hums_link::packet::Packet;
 
     use super::*;
-    use crate::talk::fake;
+    use crate::talk::tests::fake;
 
     #[test]
     fn an_answer_counts_that_the_board_that_was_asked_gives_to_us() {

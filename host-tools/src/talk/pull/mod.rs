@@ -9,40 +9,28 @@ mod around;
 mod compare;
 mod ftp;
 mod judge;
-mod moment;
-mod part;
-mod remote;
-mod session;
-mod stretch;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use hums_blackbox::SECTOR_BYTES;
-use hums_core::clock::Instant;
 use serde::Serialize;
 
-use self::compare::{Heading, Likeness, beginning_of, compare, heading_here, heading_of};
+use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
-use self::judge::{Asked, LogJson, judge};
-use self::session::{Place, place};
-use self::stretch::{Reading, Stretch};
+use self::judge::{LogJson, judge};
 use super::Client;
 use crate::cli;
 use crate::files::{Output, make_directory, settle};
-use crate::outcome::Outcome;
+use crate::logs::segment_name;
+use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
-use crate::plural::{are, count};
+use crate::plural::count;
 use crate::printable::word;
-use crate::summary::FindingLine;
 
 /// Bytes between two progress messages.
 const TOLD_BYTES: u32 = 8 * 1024;
-
-/// Message for an empty log. A board does not list a log whose first sector is lost.
-const NOTHING: &str = "nothing is recorded in it yet, or its first sector cannot be read";
 
 /// Output of `hums box pull --json`.
 const SCHEMA: Schema = Schema::first("hums-pull");
@@ -62,17 +50,6 @@ struct MomentJson {
     check: Option<String>,
     instance: Option<u8>,
     level: Option<&'static str>,
-}
-
-impl MomentJson {
-    fn of(at: Instant, found: Option<FindingLine>) -> Self {
-        let (check, instance, level) = found
-            .map(|found| (found.check, found.instance, found.level))
-            .map_or((None, None, None), |(check, instance, level)| {
-                (Some(check), Some(instance), Some(level))
-            });
-        Self { time_s: at.as_secs_f64(), check, instance, level }
-    }
 }
 
 /// Runs `hums box pull`.
@@ -96,270 +73,121 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     }
     if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
         let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
-        let such = if skipped > 0 { "lists no such log now" } else { "has no such log" };
-        bail!("{missing}: the board {such}; it has {}", names.join(", "));
+        bail!("{missing}: the board lists no such log now; it has {}", names.join(", "));
     }
     // With named logs, others are not missing.
     let listed = Outcome::lossy(skipped > 0 && args.names.is_empty());
-    let mut all: Vec<String> =
-        logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
-    let begun = logs.last().map(|(log, _)| log.clone());
-    logs.retain(|(log, _)| args.names.is_empty() || args.names.contains(log));
+    let newest = logs.last().map(|(log, _)| log.clone());
+    let oldest = args.last.map(|most| first_of_newest(&logs, most));
+    let is_requested = |log: &str| {
+        (args.names.is_empty() || args.names.iter().any(|name| name == log))
+            && oldest.is_none_or(|oldest| number(log).is_none_or(|number| number >= oldest))
+    };
+    let (logs, left_out): (Vec<_>, Vec<_>) = logs.into_iter().partition(|(log, _)| is_requested(log));
     if let Some(moment) = &args.around {
-        let left_out: Vec<String> =
-            all.into_iter().filter(|log| !args.names.is_empty() && !args.names.contains(log)).collect();
-        return Ok(around(&mut ftp, logs, &left_out, args, moment)?.and(listed));
+        return Ok(around(&mut ftp, logs, args, moment)?.and(listed));
     }
     // A log begun just now may be empty.
-    let begun = begun.filter(|_| args.names.is_empty());
-    let asked = if args.names.is_empty() { newest(&mut logs, args.last) } else { Asked::named(&args.names) };
-    let mut bringing = Bringing { begun, args, pulled: Vec::new(), gone: Vec::new() };
-    let came = bringing.all(&mut ftp, logs, &mut all, &asked);
-    let Bringing { mut pulled, gone, .. } = bringing;
+    let begun = newest.filter(|_| args.names.is_empty());
+    let left_out: Vec<String> =
+        left_out.into_iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log).collect();
+    let mut pulled = Vec::new();
+    let came = each(&mut ftp, logs, begun.as_deref(), args, &mut pulled);
     // Also the logs before an error.
-    let judged = judge(&all, &asked, &mut pulled);
-    let outcome = came?
-        .and(judged?)
-        .and(tell_gone(&gone))
-        .and(hold_against_next(&mut ftp, &all, &asked, &mut pulled)?)
-        .and(listed);
+    let judged = judge(&left_out, &mut pulled);
+    let outcome = came?.and(judged?).and(listed);
     if args.json {
         output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around: None })?;
     }
     Ok(outcome)
 }
 
-/// Keeps this many of the newest logs, or all, each with all of its files.
-fn newest(logs: &mut Vec<(String, u32)>, most: Option<usize>) -> Asked {
-    let Some(most) = most else { return Asked::between(Place::default(), Place::MAX) };
-    // A log begun just now that is still empty is not counted, and comes with the others.
-    let mut numbers: Vec<u32> =
-        logs.iter().filter(|(_, bytes)| *bytes > 0).filter_map(|(log, _)| session::number(log)).collect();
+/// The number of a board's log.
+fn number(log: &str) -> Option<u32> {
+    segment_name(Path::new(log)).map(|name| name.session)
+}
+
+/// The number of the first of this many newest logs. A log begun just now that is still empty is not counted.
+fn first_of_newest(logs: &[(String, u32)], most: usize) -> u32 {
+    let filled = logs.iter().filter(|(_, bytes)| *bytes > 0);
+    let mut numbers: Vec<u32> = filled.filter_map(|(log, _)| number(log)).collect();
     numbers.dedup();
-    if most == 0 {
-        logs.clear();
-        return Asked::named(&[]);
-    }
-    let first = numbers.len().checked_sub(most).and_then(|at| numbers.get(at));
-    let first = Place { session: first.copied().unwrap_or(0), segment: 0 };
-    logs.retain(|(log, _)| place(log).is_none_or(|place| place >= first));
-    Asked::between(first, Place::MAX)
-}
-
-/// Reports files in the board's list that it deleted before their download as lost.
-fn tell_gone(gone: &[String]) -> Outcome {
-    let Some(first) = gone.first() else { return Outcome::Done };
-    note!(
-        "the board no longer has {} that it had in its list, from {first} on: its card made room for later ones",
-        count(gone.len() as u64, "file")
-    );
-    Outcome::Losses
-}
-
-/// How often the board's list is requested again if files disappeared during the download.
-const LISTS_MAX: usize = 8;
-
-/// A download.
-struct Bringing<'a> {
-    /// This log may be empty without a loss.
-    begun: Option<String>,
-    args: &'a cli::Pull,
-    pulled: Vec<LogJson>,
-    /// Files in the board's list that it deleted before their download.
-    gone: Vec<String>,
-}
-
-impl Bringing<'_> {
-    /// Downloads these logs. If the board deleted some meanwhile, its list is requested again, and the new
-    /// logs come too; `board` are its logs that are not empty.
-    fn all(
-        &mut self,
-        ftp: &mut Ftp,
-        mut logs: Vec<(String, u32)>,
-        board: &mut Vec<String>,
-        asked: &Asked,
-    ) -> Result<Outcome> {
-        let mut outcome = Outcome::Done;
-        for nth in 1.. {
-            let (brought, mut failed) = self.each(ftp, logs)?;
-            outcome = outcome.and(brought);
-            let is_again = !failed.is_empty() && self.args.names.is_empty() && nth < LISTS_MAX;
-            let now = if is_again { ftp.list()?.0 } else { Vec::new() };
-            let is_gone = |name: &String| is_again && now.iter().all(|(log, _)| log != name);
-            self.gone.extend(failed.iter().map(|(name, _)| name.clone()).filter(is_gone));
-            failed.retain(|(name, _)| !is_gone(name));
-            let mut failed = failed.into_iter().map(|(_, error)| error);
-            if let Some(first) = failed.next() {
-                failed.for_each(|error| note!("{error:#}"));
-                return Err(first);
-            }
-            if !is_again {
-                break;
-            }
-            *board = now.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
-            board.sort();
-            self.begun = now.iter().map(|(log, _)| log).max().cloned();
-            let wanted = |(name, bytes): &(String, u32)| {
-                let came = self.pulled.iter().find(|log| log.name == *name);
-                let has = came.and_then(|log| log.path.metadata().ok()).map_or(0, |about| about.len());
-                place(name).is_some_and(|place| asked.has(place))
-                    && (came.is_none() || has != u64::from(*bytes))
-            };
-            logs = now.into_iter().filter(wanted).collect();
-            logs.sort();
-        }
-        Ok(outcome)
-    }
-
-    /// Downloads these logs one after the other. A fault of one does not stop the others. Returns the names
-    /// that failed.
-    fn each(
-        &mut self,
-        ftp: &mut Ftp,
-        logs: Vec<(String, u32)>,
-    ) -> Result<(Outcome, Vec<(String, anyhow::Error)>)> {
-        let (mut outcome, mut failed) = (Outcome::Done, Vec::new());
-        let filled: Vec<_> =
-            logs.iter().filter(|(_, bytes)| *bytes > 0).map(|(log, _)| log.clone()).collect();
-        for (name, bytes) in logs {
-            let brought = match pull(ftp, &name, &self.args.output).with_context(|| name.clone()) {
-                Ok(brought) => brought,
-                // An error of the link or of the disk would also stop the others.
-                Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
-                Err(error) => {
-                    failed.push((name, error));
-                    continue;
-                }
-            };
-            // Later files of the same log show whether it had data.
-            let is_followed = || {
-                filled.iter().any(|other| *other > name && session::number(other) == session::number(&name))
-            };
-            match brought {
-                Some((path, is_new)) => {
-                    if !is_new {
-                        note!("{name}: is there already as {}: the same by its checksum", path.display());
-                    } else if !self.args.json {
-                        output::line(&word(&path.display().to_string()))?;
-                    }
-                    self.pulled.retain(|log| log.name != name);
-                    self.pulled.push(LogJson::new(name, path, is_new));
-                }
-                None if bytes > 0 => {
-                    note!(
-                        "{name}: has {} by the board's directory, and none when it is opened; call again",
-                        count(bytes, "byte")
-                    );
-                    outcome = Outcome::Losses;
-                }
-                None if self.begun.as_deref() == Some(name.as_str()) => {}
-                None if self.args.names.is_empty() && is_followed() => {}
-                None => {
-                    note!(
-                        "{name}: nothing of it came, and it may have a flight in it: read the card itself, or an image of it"
-                    );
-                    outcome = Outcome::Losses;
-                }
-            }
-        }
-        Ok((outcome, failed))
+    match most.checked_sub(1) {
+        Some(more) => numbers.iter().rev().nth(more).copied().unwrap_or(0),
+        None => u32::MAX,
     }
 }
 
-/// Whether each log is complete up to the next file of its session, if that was not requested. The first
-/// number of the next file shows it.
-fn hold_against_next(
-    ftp: &mut Ftp,
-    board: &[String],
-    asked: &Asked,
-    pulled: &mut [LogJson],
-) -> Result<Outcome> {
-    let mut outcome = Outcome::Done;
-    for log in pulled {
-        let Some(own) = place(&log.name) else { continue };
-        let next = board.iter().find_map(|name| Some((name, place(name).filter(|next| *next > own)?)));
-        let Some((next, _)) = next.filter(|(_, next)| next.session == own.session && !asked.has(*next))
-        else {
-            continue;
-        };
-        let bytes = log.path.metadata().map_or(0, |about| about.len());
-        let sectors = u32::try_from(bytes / SECTOR_BYTES as u64).unwrap_or(u32::MAX);
-        let length = ftp.open(next)?;
-        let here = heading_here(&log.path, &log.name, sectors.saturating_mul(SECTOR_BYTES as u32))?;
-        let begins = [here, heading_of(ftp, next, length)?].map(|heading| beginning_of(&heading.sectors).1);
-        if let [Some(first), Some(next_first)] = begins
-            && let missing @ 1.. = next_first.saturating_sub(first.saturating_add(sectors))
-        {
-            note!(
-                "{}: {} missing at its end: {next} begins after them",
-                log.name,
-                are(missing.into(), "sector")
-            );
-            log.whole = false;
-            outcome = Outcome::Losses;
-        }
-    }
-    Ok(outcome)
-}
-
-/// Downloads a moment of the newest session of these logs.
-fn around(
+/// Downloads these logs one after the other. A fault of one does not stop the others.
+fn each(
     ftp: &mut Ftp,
     logs: Vec<(String, u32)>,
-    left_out: &[String],
+    begun: Option<&str>,
+    args: &cli::Pull,
+    pulled: &mut Vec<LogJson>,
+) -> Result<Outcome> {
+    let (mut outcome, mut failed) = (Outcome::Done, None);
+    for (name, bytes) in logs {
+        match pull(ftp, &name, &args.output).with_context(|| name.clone()) {
+            Ok(Some((path, is_new))) => {
+                if !is_new {
+                    note!("{name}: is there already as {}: the same by its checksum", path.display());
+                } else if !args.json {
+                    output::line(&word(&path.display().to_string()))?;
+                }
+                pulled.push(LogJson::new(name, path, is_new));
+            }
+            Ok(None) if bytes == 0 && begun == Some(name.as_str()) => {}
+            Ok(None) => {
+                note!(
+                    "{name}: has no data, or its first sector cannot be read: read the card itself, or an image of it"
+                );
+                outcome = Outcome::Losses;
+            }
+            // An error of the link or of the disk would also stop the others.
+            Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
+            // The card has made room for later logs.
+            Err(error) if error.root_cause().is::<ftp::NoSuchLog>() => {
+                note!("{error:#}");
+                outcome = Outcome::Losses;
+            }
+            Err(error) => {
+                if failed.is_some() {
+                    note!("{error:#}");
+                } else {
+                    failed = Some(error);
+                }
+            }
+        }
+    }
+    failed.map_or(Ok(outcome), Err)
+}
+
+/// Downloads a moment of the newest of these logs.
+fn around(
+    ftp: &mut Ftp,
+    mut logs: Vec<(String, u32)>,
     args: &cli::Pull,
     moment: &cli::Around,
 ) -> Result<Outcome> {
-    let (mut names, mut empty) = (Vec::new(), Vec::new());
-    for (name, bytes) in logs {
-        if bytes < SECTOR_BYTES as u32 && ftp.open(&name)? < SECTOR_BYTES as u32 {
-            note!("{name}: {NOTHING}");
-            empty.push(name);
-        } else {
-            names.push(name);
-        }
+    let newest = logs.iter().rev().find(|(_, bytes)| *bytes > 0).and_then(|(log, _)| number(log));
+    if !args.names.is_empty() && logs.iter().any(|(log, _)| number(log) != newest) {
+        return Err(usage("a moment is of one log: name only files of one number"));
     }
-    let session = session::newest(ftp, &names, !args.names.is_empty())?;
-    // The sectors' numbers show a gap between two logs. A search must report unread further files of the last
-    // one.
-    let last = session.logs.last().and_then(|log| place(log));
-    let is_further =
-        |log: &&String| place(log) > last && place(log).map(|log| log.session) == last.map(|log| log.session);
-    let further = empty.iter().find(is_further).filter(|_| !matches!(moment, cli::Around::Time(_)));
-    let mut outcome = Outcome::lossy(further.is_some() || !args.names.is_empty() && !empty.is_empty());
-    if let Some(name) = further {
-        note!("{name}: is a further file of this session, and may have what is looked for, and later");
-    }
-    for name in &session.unknown {
-        note!(
-            "{name}: its beginning cannot be read, so that nothing tells whether it is of this session; it is not looked at: \
-             `hums box pull {name}` brings it"
-        );
-        outcome = Outcome::Losses;
-    }
-    let brought = around::pull(ftp, &session.logs, left_out, &args.output, (moment, args.span))?;
-    if brought.strange > 0 {
-        note!(
-            "{} of another session came and are not in the part: another log has come in its place while it was read, or the \
-             card has lost some of it",
-            count(brought.strange, "sector")
-        );
-        outcome = Outcome::Losses;
-    }
-    outcome = outcome.and(brought.outcome);
-    if brought.at.is_none() && outcome == Outcome::Done {
-        bail!("no such finding is in what the board gives of this session");
-    }
-    let mut pulled = Vec::new();
-    for (name, path) in brought.parts {
-        if !args.json {
-            output::line(&word(&path.display().to_string()))?;
-        }
-        pulled.push(LogJson::new(name, path, true));
-    }
+    logs.retain(|(log, _)| number(log) == newest);
+    let around::Brought { files, at, found, outcome } =
+        around::pull(ftp, &logs, &args.output, (moment, args.span))?;
     if args.json {
-        let around = brought.at.map(|at| MomentJson::of(at, brought.found));
-        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs: pulled, around })?;
+        let around = MomentJson {
+            time_s: at.as_secs_f64(),
+            instance: found.as_ref().map(|found| found.instance),
+            level: found.as_ref().map(|found| found.level.name()),
+            check: found.map(|found| found.check),
+        };
+        let logs = files.into_iter().map(|(name, path)| LogJson::new(name, path, true)).collect();
+        output::json(SCHEMA, &PulledJson { system: ftp.system(), logs, around: Some(around) })?;
+    } else {
+        files.iter().try_for_each(|(_, path)| output::line(&word(&path.display().to_string())))?;
     }
     Ok(outcome)
 }
@@ -368,7 +196,6 @@ fn around(
 fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, bool)>> {
     let length = ftp.open(name)?;
     if length == 0 {
-        note!("{name}: {NOTHING}");
         return Ok(None);
     }
     let heading = heading_of(ftp, name, length)?;
@@ -389,17 +216,12 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     }
     if have > 0 {
         let who = match likeness {
-            Likeness::SameEnds => "of which the first and the last 512 agree with the board's log",
+            Likeness::SameEnds => "whose first and last 512 agree with the board's log",
             Likeness::Same | Likeness::Other => "which the board confirms by their checksum",
         };
         note!("{name}: goes on after {have} bytes, {who}");
     }
-    let brought = complete(ftp, name, &mut file, (have, length), &heading);
-    if let Err(why) = brought {
-        // Before any message about it.
-        tell_begun(name, file.part())?;
-        return Err(why);
-    }
+    complete(ftp, name, &mut file, (have, length), &heading)?;
     file.finish()?;
     Ok(Some((path, true)))
 }
@@ -432,30 +254,6 @@ fn complete(
     }
     same
 }
-
-/// Prints the quality of an incomplete log.
-fn tell_begun(name: &str, begun: &Path) -> Result<()> {
-    let bytes = begun.metadata().map_or(0, |about| about.len());
-    if bytes < SECTOR_BYTES as u64 {
-        return Ok(());
-    }
-    let kept =
-        format!("{name}: what came of it so far, {}, is kept as {}", count(bytes, "byte"), begun.display());
-    match faults_of(name, begun)?.join("; ").as_str() {
-        "" => note!("{kept}; its sectors are sound and follow each other"),
-        faults => note!("{kept}, and is damaged: {faults}"),
-    }
-    Ok(())
-}
-
-/// Faults of the beginning of a log.
-fn faults_of(name: &str, begun: &Path) -> Result<Vec<String>> {
-    let bytes = begun.metadata().map_or(0, |about| about.len());
-    let sectors = u32::try_from(bytes / SECTOR_BYTES as u64).unwrap_or(u32::MAX);
-    let stretch = Stretch { name: name.to_owned(), path: begun.to_owned(), places: 0..sectors, sectors };
-    Ok(Reading::of(&[stretch])?.faults(false))
-}
-
 /// Data of one session never get the name of another.
 fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     match (first.session, now.session) {

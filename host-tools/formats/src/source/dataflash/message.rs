@@ -101,9 +101,6 @@ impl<'a> Message<'a> {
             Body::Bytes(payload) => {
                 let bytes = payload.get(field.offset..)?;
                 match field.kind {
-                    FieldKind::U8 | FieldKind::Mode => Some(u64::from(*bytes.first()?)),
-                    FieldKind::U16 => Some(u64::from(u16::from_le_bytes(*bytes.first_chunk()?))),
-                    FieldKind::U32 => Some(u64::from(u32::from_le_bytes(*bytes.first_chunk()?))),
                     FieldKind::U64 => Some(u64::from_le_bytes(*bytes.first_chunk()?)),
                     FieldKind::I64 => u64::try_from(i64::from_le_bytes(*bytes.first_chunk()?)).ok(),
                     _ => whole(self.number(column)?).and_then(|number| u64::try_from(number).ok()),

@@ -414,8 +414,8 @@ impl<'w> Session<'w> {
             } else {
                 (Cause::NotKept, "nothing was written")
             };
-            let (from, to, words) = (Some(from), Some(when.at), words.to_owned());
-            take(when.at, Item::Gap(&Gap { from, to, cause, place: None, bytes: 0, words, own: None }))?;
+            let gap = Gap::new(Some(from), cause, words.to_owned());
+            take(when.at, Item::Gap(&Gap { to: Some(when.at), ..gap }))?;
         }
         if let Some(standing) = later.take_if(|_| when.own == Own::Sound) {
             state.stand(standing);
@@ -584,15 +584,7 @@ impl Said<'_, '_> {
             Say::Lost(messages) => {
                 let messages = count(messages, "message");
                 let words = format!("{messages} that the autopilot's logger had no room for");
-                let gap = Gap {
-                    from: Some(self.at),
-                    to: None,
-                    cause: Cause::Lost,
-                    place: None,
-                    bytes: 0,
-                    words,
-                    own: None,
-                };
+                let gap = Gap::new(Some(self.at), Cause::Lost, words);
                 return (self.take)(self.at, Item::Gap(&gap));
             }
         };

@@ -73,10 +73,13 @@ impl<R: Read> Records<R> {
     }
 
     /// The first result of `told` among the next frames, as far as they are here.
-    pub(in crate::source) fn frames_after<T>(&self, mut told: impl FnMut(&[u8]) -> Option<T>) -> Option<T> {
+    pub(in crate::source) fn frames_after<T>(
+        &self,
+        mut told: impl FnMut(u64, &[u8]) -> Option<T>,
+    ) -> Option<T> {
         let mut found = None;
-        self.each_after(&mut |_, bytes| {
-            found = told(bytes);
+        self.each_after(&mut |time_us, bytes| {
+            found = told(time_us, bytes);
             found.is_none()
         });
         found

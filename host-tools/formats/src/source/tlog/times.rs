@@ -134,11 +134,10 @@ pub struct Times {
 
 impl Default for Times {
     fn default() -> Self {
-        let (joints, wrong) = (Joints::default(), Wrong::default());
         Self {
             clock: Clock::new(RULES),
-            joints,
-            wrong,
+            joints: Joints::default(),
+            wrong: Wrong::default(),
             now: Instant::ZERO,
             records: 0,
             beside: Beside::default(),
@@ -155,12 +154,12 @@ impl Times {
 
     /// Takes the time of a record with this frame, at this byte.
     pub fn take<R: Read>(&mut self, time_us: u64, bytes: &[u8], place: u64, after: &Records<R>) -> Told {
-        let (told, is_wrong) = self.time(time_us, place, after);
+        let told = self.time(time_us, place, after);
         if let Peek::Frame(frame) = peek(bytes)
             && let Some(boot_ms) = boot_ms_of(frame.id, frame.component, frame.payload)
             && frame.check() == Check::Good
         {
-            self.joints.told(Some(time_us).filter(|_| !is_wrong), frame.system, boot_ms);
+            self.joints.told(frame.system, boot_ms);
             let early_us = self.beside.told(frame.system, boot_ms, self.now, place);
             if early_us > 0 {
                 self.clock.pass(early_us);
@@ -171,36 +170,31 @@ impl Times {
         told
     }
 
-    /// Meaning of a time, and whether it is wrong.
-    fn time<R: Read>(&mut self, time_us: u64, place: u64, after: &Records<R>) -> (Told, bool) {
+    /// Meaning of a time.
+    fn time<R: Read>(&mut self, time_us: u64, place: u64, after: &Records<R>) -> Told {
         self.records += 1;
-        let (before, reached) = (self.clock.recorded_us(), self.now);
+        let before = self.clock.recorded_us();
         let stamp = |us| Stamp { us, series: 0 };
         let ahead = |_: &dyn Fn(Stamp) -> bool| {
             let (times, is_end) = after.times_after();
             Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
         };
-        let (joints, stands) = (&self.joints, self.beside.stands);
+        let (joints, stands) = (self.joints, self.beside.stands);
         // While the clock stood still, the time passed has been counted.
         let passed = || if stands { Some(1) } else { joints.elapsed_us(before?, time_us, after) };
         let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
             self.wrong.add(self.now, place);
-            return (Told::default(), true);
+            return Told::default();
         };
         self.now = moment.at;
         let is_joint = before.is_some_and(|before| {
             let is_far = moment.restarted || time_us > before.saturating_add(JOINT_US);
             is_far && self.joints.is_joint(before, time_us, after)
         });
-        let passed_us = moment.at.since(reached).as_micros();
-        match before.filter(|_| moment.restarted) {
-            _ if is_joint => {
-                self.joints.forget();
-                self.pace.begin_another();
-                self.beside = Beside { last: None, stands: false, ..self.beside };
-            }
-            Some(before) => self.joints.set(before, time_us, passed_us),
-            None => {}
+        if is_joint {
+            self.joints = Joints::default();
+            self.pace.begin_another();
+            self.beside = Beside { last: None, stands: false, ..self.beside };
         }
         if moment.restarted && !is_joint {
             self.pace.fell(moment.at);
@@ -213,7 +207,7 @@ impl Times {
         let is_new = begins.is_some() || before.is_none();
         let epoch_us = time_us.checked_sub(self.now.as_micros());
         let epoch_us = epoch_us.filter(|_| is_new && time_us >= UTC_US_MIN);
-        (Told { begins, epoch_us }, false)
+        Told { begins, epoch_us }
     }
 
     /// Faults of the times, once all were taken: damage.
@@ -231,15 +225,7 @@ impl Times {
             "{} without a time that can be one: nothing in the log can be judged",
             count(frames, "frame")
         );
-        (self.records == 0 && frames > 0).then_some(Gap {
-            from: None,
-            to: None,
-            cause: Cause::NoTimes,
-            place: None,
-            bytes: 0,
-            words,
-            own: None,
-        })
+        (self.records == 0 && frames > 0).then(|| Gap::new(None, Cause::NoTimes, words))
     }
 
     /// The damage report if the recorded times are invalid.
@@ -249,6 +235,6 @@ impl Times {
         }
         let words =
             format!("{} have the same time: nothing in the log can be judged", count(self.records, "record"));
-        Some(Gap { from: None, to: None, cause: Cause::NoTimes, place: None, bytes: 0, words, own: None })
+        Some(Gap::new(None, Cause::NoTimes, words))
     }
 }

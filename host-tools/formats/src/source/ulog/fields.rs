@@ -11,13 +11,13 @@ pub(super) struct Slot {
     count: u32,
 }
 
-/// Places of these fields.
-pub(super) fn slots(layout: &Layout, fields: &[&str]) -> Vec<Option<Slot>> {
-    let slot = |name: &&str| {
-        let field = layout.fields.iter().find(|field| field.name == **name)?;
+/// Places of these fields, whose names have spaces between.
+pub(super) fn slots(layout: &Layout, fields: &str) -> Vec<Option<Slot>> {
+    let slot = |name: &str| {
+        let field = layout.fields.iter().find(|field| field.name == name)?;
         Some(Slot { number: field.number, offset: field.offset, count: field.array.unwrap_or(1) })
     };
-    fields.iter().map(slot).collect()
+    fields.split(' ').map(slot).collect()
 }
 
 /// The fields of a message that the mapping needs, by their places in `Topic::fields`.
@@ -41,18 +41,7 @@ impl<'a> Fields<'a> {
         let bytes = slot.number.bytes();
         let at = slot.offset as usize + element * bytes;
         let bytes = self.data.get(at..at + bytes)?;
-        Some(match slot.number {
-            Number::I8 => f64::from(i8::from_le_bytes(bytes.try_into().ok()?)),
-            Number::U8 | Number::Bool | Number::Char => f64::from(*bytes.first()?),
-            Number::I16 => f64::from(i16::from_le_bytes(bytes.try_into().ok()?)),
-            Number::U16 => f64::from(u16::from_le_bytes(bytes.try_into().ok()?)),
-            Number::I32 => f64::from(i32::from_le_bytes(bytes.try_into().ok()?)),
-            Number::U32 => f64::from(u32::from_le_bytes(bytes.try_into().ok()?)),
-            Number::I64 => i64::from_le_bytes(bytes.try_into().ok()?) as f64,
-            Number::U64 => u64::from_le_bytes(bytes.try_into().ok()?) as f64,
-            Number::F32 => f64::from(f32::from_le_bytes(bytes.try_into().ok()?)),
-            Number::F64 => f64::from_le_bytes(bytes.try_into().ok()?),
-        })
+        slot.number.value(bytes)?.number()
     }
 
     pub(super) fn get(&self, field: usize) -> Option<f64> {

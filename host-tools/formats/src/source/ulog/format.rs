@@ -9,6 +9,8 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
+use crate::source::item::Value;
+
 /// Definitions in one log at most. PX4 has some 250.
 const FORMATS_MAX: usize = 1_024;
 /// Bytes of all definitions at most: PX4's are some 60 KiB.
@@ -63,6 +65,23 @@ impl Number {
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
+    }
+
+    /// The value in these bytes, which are as many as the type has; the code of a character.
+    pub(super) fn value(self, bytes: &[u8]) -> Option<Value<'static>> {
+        Some(match self {
+            Self::U8 | Self::Char => Value::Unsigned(u64::from(*bytes.first()?)),
+            Self::I8 => Value::Signed(i64::from(i8::from_le_bytes(*bytes.first_chunk()?))),
+            Self::U16 => Value::Unsigned(u64::from(u16::from_le_bytes(*bytes.first_chunk()?))),
+            Self::I16 => Value::Signed(i64::from(i16::from_le_bytes(*bytes.first_chunk()?))),
+            Self::U32 => Value::Unsigned(u64::from(u32::from_le_bytes(*bytes.first_chunk()?))),
+            Self::I32 => Value::Signed(i64::from(i32::from_le_bytes(*bytes.first_chunk()?))),
+            Self::U64 => Value::Unsigned(u64::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I64 => Value::Signed(i64::from_le_bytes(*bytes.first_chunk()?)),
+            Self::F32 => Value::Single(f32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::F64 => Value::Double(f64::from_le_bytes(*bytes.first_chunk()?)),
+            Self::Bool => Value::Flag(*bytes.first()? != 0),
+        })
     }
 }
 

@@ -81,22 +81,9 @@ impl<'a> Keyed<'a> {
 
     /// A single number.
     pub(super) fn number(&self) -> Option<f64> {
-        if self.array.is_some() {
-            return None;
-        }
-        let value = self.value;
-        Some(match self.number? {
-            Number::I8 => f64::from(i8::from_le_bytes(value.try_into().ok()?)),
-            Number::U8 | Number::Bool | Number::Char => f64::from(u8::from_le_bytes(value.try_into().ok()?)),
-            Number::I16 => f64::from(i16::from_le_bytes(value.try_into().ok()?)),
-            Number::U16 => f64::from(u16::from_le_bytes(value.try_into().ok()?)),
-            Number::I32 => f64::from(i32::from_le_bytes(value.try_into().ok()?)),
-            Number::U32 => f64::from(u32::from_le_bytes(value.try_into().ok()?)),
-            Number::I64 => i64::from_le_bytes(value.try_into().ok()?) as f64,
-            Number::U64 => u64::from_le_bytes(value.try_into().ok()?) as f64,
-            Number::F32 => f64::from(f32::from_le_bytes(value.try_into().ok()?)),
-            Number::F64 => f64::from_le_bytes(value.try_into().ok()?),
-        })
+        let number =
+            self.number.filter(|number| self.array.is_none() && number.bytes() == self.value.len())?;
+        number.value(self.value)?.number()
     }
 
     /// Words.

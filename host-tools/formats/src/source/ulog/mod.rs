@@ -27,8 +27,6 @@ mod px4;
 mod rows;
 mod session;
 #[cfg(test)]
-mod testing;
-#[cfg(test)]
 mod tests;
 mod times;
 mod topics;
@@ -38,7 +36,7 @@ use std::io::Read;
 
 use anyhow::Result;
 
-pub use self::px4::mode_name;
+pub use self::px4::{mode_name, nav_state};
 use super::input::Input;
 use super::item::{Reader, Summary, Take, Want};
 use window::Window;

@@ -61,7 +61,7 @@ pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<V
         for element in 0..field.array.unwrap_or(1) as usize {
             let at = at + element * bytes;
             let number = data.get(at..at + bytes);
-            values.push(number.and_then(|bytes| value(field.number, bytes)).unwrap_or(Value::Unknown));
+            values.push(number.and_then(|bytes| field.number.value(bytes)).unwrap_or(Value::Unknown));
         }
     }
     values
@@ -83,81 +83,22 @@ fn kind(number: Number) -> Kind {
     }
 }
 
-fn value(number: Number, bytes: &[u8]) -> Option<Value<'static>> {
-    Some(match number {
-        Number::U8 => Value::Unsigned(u64::from(*bytes.first()?)),
-        Number::I8 => Value::Signed(i64::from(i8::from_le_bytes(bytes.try_into().ok()?))),
-        Number::U16 => Value::Unsigned(u64::from(u16::from_le_bytes(bytes.try_into().ok()?))),
-        Number::I16 => Value::Signed(i64::from(i16::from_le_bytes(bytes.try_into().ok()?))),
-        Number::U32 => Value::Unsigned(u64::from(u32::from_le_bytes(bytes.try_into().ok()?))),
-        Number::I32 => Value::Signed(i64::from(i32::from_le_bytes(bytes.try_into().ok()?))),
-        Number::U64 => Value::Unsigned(u64::from_le_bytes(bytes.try_into().ok()?)),
-        Number::I64 => Value::Signed(i64::from_le_bytes(bytes.try_into().ok()?)),
-        Number::F32 => Value::Single(f32::from_le_bytes(bytes.try_into().ok()?)),
-        Number::F64 => Value::Double(f64::from_le_bytes(bytes.try_into().ok()?)),
-        Number::Bool => Value::Flag(*bytes.first()? != 0),
-        Number::Char => return None,
-    })
-}
-
 /// Ends of names and their units, the longest first. From the message definitions of PX4 v1.8 to v1.16.
-const UNITS: [(&str, &str); 31] = [
-    ("_m_s_s", "m/s2"),
-    ("_m_s2", "m/s2"),
-    ("_m_s", "m/s"),
-    ("_rad_s", "rad/s"),
-    ("_deg_s", "deg/s"),
-    ("_rad", "rad"),
-    ("_deg", "deg"),
-    ("_msl_m", "m"),
-    ("_alt_meter", "m"),
-    ("_ellipsoid_m", "m"),
-    ("_celcius", "degC"),
-    ("_celsius", "degC"),
-    ("_usec", "us"),
-    ("_us", "us"),
-    ("_ms", "ms"),
-    ("_hz", "Hz"),
-    ("_pa", "Pa"),
-    ("_mah", "mAh"),
-    ("_wh", "Wh"),
-    ("_ga", "G"),
-    ("_gs", "G"),
-    ("_rpm", "rpm"),
-    ("_percent", "%"),
-    ("_cell_v", "V"),
-    ("_filtered_v", "V"),
-    ("voltage_v", "V"),
-    ("5v_v", "V"),
-    ("3v3_v", "V"),
-    ("current_a", "A"),
-    ("_average_a", "A"),
-    ("_filtered_a", "A"),
-];
+const UNITS: &str = "_m_s_s=m/s2 _m_s2=m/s2 _m_s=m/s _rad_s=rad/s _deg_s=deg/s _rad=rad _deg=deg _msl_m=m _alt_meter=m \
+    _ellipsoid_m=m _celcius=degC _celsius=degC _usec=us _us=us _ms=ms _hz=Hz _pa=Pa _mah=mAh _wh=Wh \
+    _ga=G _gs=G _rpm=rpm _percent=% _cell_v=V _filtered_v=V voltage_v=V 5v_v=V 3v3_v=V current_a=A \
+    _average_a=A _filtered_a=A";
 
 /// Names without their unit at the end.
-const NAMED: [(&str, &str); 14] = [
-    ("timestamp", "us"),
-    ("timestamp_sample", "us"),
-    ("esc_voltage", "V"),
-    ("esc_current", "A"),
-    ("esc_temperature", "degC"),
-    ("vx", "m/s"),
-    ("vy", "m/s"),
-    ("vz", "m/s"),
-    ("ref_alt", "m"),
-    ("dist_bottom", "m"),
-    ("eph", "m"),
-    ("epv", "m"),
-    ("time_remaining_s", "s"),
-    ("voltage5V_v", "V"),
-];
+const NAMED: &str = "timestamp=us timestamp_sample=us esc_voltage=V esc_current=A esc_temperature=degC vx=m/s vy=m/s \
+    vz=m/s ref_alt=m dist_bottom=m eph=m epv=m time_remaining_s=s voltage5V_v=V";
 
 /// The unit of a field; empty if unknown.
 pub(super) fn unit(name: &str) -> &'static str {
     let name = name.rsplit_once('.').map_or(name, |(_, last)| last);
-    let named = NAMED.iter().find(|(known, _)| *known == name);
-    let ending = || UNITS.iter().find(|(ending, _)| name.ends_with(ending));
+    let pairs = |table: &'static str| table.split(' ').filter_map(|pair| pair.split_once('='));
+    let named = pairs(NAMED).find(|(known, _)| *known == name);
+    let ending = || pairs(UNITS).find(|(ending, _)| name.ends_with(ending));
     named.or_else(ending).map_or("", |(_, unit)| unit)
 }
 

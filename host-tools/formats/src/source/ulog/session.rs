@@ -14,7 +14,7 @@ use super::message::{
     FILE_HEADER_BYTES, Found, Keyed, MESSAGE_BYTES_MAX, Message, Parser, VERSION_AT, VERSION_MAX, beginning,
     words as text_of,
 };
-use super::px4::{Px4, Said, Told};
+use super::px4::{Px4, Report, Sample};
 use super::rows;
 use super::times;
 use super::topics::Subscriptions;
@@ -397,7 +397,7 @@ impl<'a, 'b> Session<'a, 'b> {
             let fields = Fields::new(slots, data);
             self.px4.take(
                 topic,
-                &Said {
+                &Sample {
                     at: now,
                     recorded_us: recorded,
                     is_old: latest.saturating_sub(recorded) > OLD_US,
@@ -449,32 +449,34 @@ impl<'a, 'b> Session<'a, 'b> {
 
     /// Hands on the outputs of the mapping.
     fn hand_on(&mut self) -> Result<()> {
-        if self.px4.told.is_empty() {
+        if self.px4.reports.is_empty() {
             return Ok(());
         }
-        let mut told = std::mem::take(&mut self.px4.told);
-        for one in told.drain(..) {
-            self.told(one)?;
+        let mut reports = std::mem::take(&mut self.px4.reports);
+        for report in reports.drain(..) {
+            self.report(report)?;
         }
-        // Its room serves again.
-        self.px4.told = told;
+        // The list is used again.
+        self.px4.reports = reports;
         Ok(())
     }
 
-    fn told(&mut self, told: Told) -> Result<()> {
+    fn report(&mut self, report: Report) -> Result<()> {
         let source = self.px4.source();
-        match told {
-            Told::Observation(_) if !self.want.observations => Ok(()),
-            Told::Observation(observation) => self.tell(Item::Observation(source, &observation)),
-            Told::Text { severity, words } => self.say(severity, &words),
-            Told::Event { number, severity, arguments, is_old } => {
+        match report {
+            Report::Observation(_) if !self.want.observations => Ok(()),
+            Report::Observation(observation) => self.tell(Item::Observation(source, &observation)),
+            Report::Text { severity, words } => self.say(severity, &words),
+            Report::Event { number, severity, arguments, is_old } => {
                 let words = event_name(number).unwrap_or_default();
                 let alert = alert::of_event(number, severity, &arguments).filter(|_| !is_old);
                 self.tell_said(Item::Event(Event { source, number, severity, words, alert }))
             }
-            Told::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
-            Told::Failsafes(words) => self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words })),
-            Told::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
+            Report::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
+            Report::Failsafes(words) => {
+                self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words }))
+            }
+            Report::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
         }
     }
 
@@ -516,18 +518,12 @@ impl<'a, 'b> Session<'a, 'b> {
     fn dropout(&mut self, place: u64, milliseconds: u16) -> Result<()> {
         let now = self.clock.now();
         self.px4.dropout();
-        let gap = Gap {
-            from: Some(now),
-            to: Some(now + Span::from_millis(u64::from(milliseconds))),
-            cause: Cause::Lost,
-            place: Some(place),
-            bytes: 0,
-            words: match milliseconds {
-                0 => "a dropout: the card was too slow for the logger".to_owned(),
-                _ => format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
-            },
-            own: None,
+        let words = match milliseconds {
+            0 => "a dropout: the card was too slow for the logger".to_owned(),
+            _ => format!("a dropout of {milliseconds} ms: the card was too slow for the logger"),
         };
+        let to = Some(now + Span::from_millis(u64::from(milliseconds)));
+        let gap = Gap { to, ..Gap::new(Some(now), Cause::Lost, words).at(place) };
         self.tell(Item::Gap(&gap))
     }
 

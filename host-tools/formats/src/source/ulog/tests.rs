@@ -1,7 +1,10 @@
 //! Logs as they should be, and as they should not.
 
+pub(super) mod writer;
+
+use writer::{Writer, read, try_read};
+
 use super::message::MESSAGE_BYTES_MAX;
-use super::testing::{Writer, read, try_read};
 use super::times;
 use super::topics::Subscriptions;
 use crate::source::item::Cause;

@@ -15,16 +15,25 @@ pub(in crate::source::dataflash) type Slots = [Option<u8>; SLOTS_MAX];
 
 /// The handler of a message.
 pub(in crate::source::dataflash) struct Handler {
-    /// The names of the message, each with the number of the sensor that it is of: `IMU2` is the second.
-    pub(super) names: &'static [(&'static str, u8)],
-    /// The columns: for each slot the labels that it has had.
-    pub(super) columns: &'static [&'static [&'static str]],
+    /// The names of the message with spaces between, each with the number of its sensor if that is not 0: `IMU IMU2:1`.
+    names: &'static str,
+    /// The columns with spaces between: for each slot the labels that it has had, as in `T|Temp`.
+    columns: &'static str,
     /// Whether it reports a fact about the whole log: the first part of a file is searched for these.
     pub(in crate::source::dataflash) is_fact: bool,
     /// Whether it is needed also without observations.
     pub(in crate::source::dataflash) is_said: bool,
     /// Does it.
     pub(super) take: fn(&mut State, &Given<'_>, &mut Out<'_>),
+}
+
+/// A row of a table of handlers.
+pub(super) const fn handler(
+    names: &'static str,
+    columns: &'static str,
+    take: fn(&mut State, &Given<'_>, &mut Out<'_>),
+) -> Handler {
+    Handler { names, columns, is_fact: false, is_said: false, take }
 }
 
 impl std::fmt::Debug for Handler {
@@ -34,12 +43,28 @@ impl std::fmt::Debug for Handler {
 }
 
 impl Handler {
+    /// The same for a fact about the whole log.
+    pub(super) const fn fact(self) -> Self {
+        Self { is_fact: true, ..self }
+    }
+
+    /// The same for texts and numbers, which are needed without observations too.
+    pub(super) const fn said(self) -> Self {
+        Self { is_said: true, ..self }
+    }
+
+    /// The number of the sensor of a message of this name; `None` for messages of other handlers.
+    pub(super) fn sensor(&self, name: &str) -> Option<u8> {
+        let names = self.names.split(' ').map(|name| name.split_once(':').unwrap_or((name, "0")));
+        names.into_iter().find(|(known, _)| *known == name).and_then(|(_, number)| number.parse().ok())
+    }
+
     /// Which columns of a message are which slot.
     pub(in crate::source::dataflash) fn resolve(&self, fields: &[Field]) -> Slots {
         let mut slots = [None; SLOTS_MAX];
-        for (slot, labels) in slots.iter_mut().zip(self.columns) {
-            let known = |label: &&str| fields.iter().position(|field| field.name == *label);
-            *slot = labels.iter().find_map(known).and_then(|column| u8::try_from(column).ok());
+        for (slot, labels) in slots.iter_mut().zip(self.columns.split(' ')) {
+            let known = |label: &str| fields.iter().position(|field| field.name == label);
+            *slot = labels.split('|').find_map(known).and_then(|column| u8::try_from(column).ok());
         }
         slots
     }

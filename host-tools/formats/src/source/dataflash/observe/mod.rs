@@ -27,11 +27,10 @@ pub use self::words::mode_name;
 use super::format::Format;
 use super::message::Message;
 
-/// The handler of a message of this name.
-fn handler(name: &str) -> Option<&'static Handler> {
+/// The handler of a message of this name, and the number of the sensor in the name.
+fn handler(name: &str) -> Option<(&'static Handler, u8)> {
     let lists = [motion::HANDLERS, power::HANDLERS, system::HANDLERS, said::HANDLERS];
-    let named = |handler: &&Handler| handler.names.iter().any(|(known, _)| *known == name);
-    lists.into_iter().flatten().find(named)
+    lists.into_iter().flatten().find_map(|handler| Some((handler, handler.sensor(name)?)))
 }
 
 /// Whether observations or other items are made of the messages of this name.
@@ -77,9 +76,7 @@ impl Handlers {
     pub(super) fn of(&mut self, format: &Format) -> Option<&Resolved> {
         let slot = self.by_kind.get_mut(usize::from(format.kind))?;
         if matches!(slot, Looked::NotYet) {
-            *slot = handler(&format.name).map_or(Looked::Nothing, |handler| {
-                let base = handler.names.iter().find(|(known, _)| *known == format.name);
-                let base = base.map_or(0, |(_, base)| *base);
+            *slot = handler(&format.name).map_or(Looked::Nothing, |(handler, base)| {
                 Looked::Found(Resolved { handler, slots: handler.resolve(&format.fields), base })
             });
         }

@@ -12,7 +12,7 @@ use hums_core::units::{
     Radians, RadiansPerSecond, norm,
 };
 
-use super::handler::{Given, Handler};
+use super::handler::{Given, Handler, handler};
 use super::say::{Out, Say};
 use super::state::{Rates, State};
 use super::words::Craft;
@@ -41,149 +41,29 @@ const TURN_DEG: f32 = 360.0;
 /// Rates go with an attitude within this.
 const RATES_AGE: Span = Span::from_millis(500);
 
-const MOTION: Handler =
-    Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
+/// Columns of GPS.
+const GPS: &str = "I Status NSats HDop Lat Lng Alt Spd GCrs VZ GWk|Week GMS|TimeMS RelAlt|RAlt";
+/// Columns of RCOU.
+const RCOU: &str = "C1|Ch1|Chan1 C2|Ch2|Chan2 C3|Ch3|Chan3 C4|Ch4|Chan4 C5|Ch5|Chan5 C6|Ch6|Chan6 C7|Ch7|Chan7 \
+    C8|Ch8|Chan8 C9|Ch9 C10|Ch10 C11|Ch11 C12|Ch12";
 
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler {
-        names: &[("ATT", 0)],
-        columns: &[&["Roll"], &["Pitch"], &["Yaw"], &["DesRoll"], &["DesPitch"]],
-        take: attitude,
-        ..MOTION
-    },
-    Handler {
-        names: &[("AHR2", 0)],
-        columns: &[&["Roll"], &["Pitch"], &["Yaw"], &["Alt"], &["Lat"], &["Lng"]],
-        take: second_estimate,
-        ..MOTION
-    },
-    Handler {
-        names: &[("RATE", 0)],
-        columns: &[&["RDes"], &["PDes"], &["YDes"], &["R"], &["P"], &["Y"]],
-        take: rates,
-        ..MOTION
-    },
-    Handler {
-        names: &[("IMU", 0), ("IMU2", 1), ("IMU3", 2)],
-        columns: &[
-            &["I"],
-            &["GyrX"],
-            &["GyrY"],
-            &["GyrZ"],
-            &["AccX"],
-            &["AccY"],
-            &["AccZ"],
-            &["T", "Temp"],
-            &["GH", "GyHlt"],
-            &["AH", "AcHlt"],
-        ],
-        take: imu,
-        ..MOTION
-    },
-    Handler {
-        names: &[("GPS", 0), ("GPS2", 1), ("GPSB", 2)],
-        columns: &[
-            &["I"],
-            &["Status"],
-            &["NSats"],
-            &["HDop"],
-            &["Lat"],
-            &["Lng"],
-            &["Alt"],
-            &["Spd"],
-            &["GCrs"],
-            &["VZ"],
-            &["GWk", "Week"],
-            &["GMS", "TimeMS"],
-            &["RelAlt", "RAlt"],
-        ],
-        take: gnss,
-        ..MOTION
-    },
-    Handler {
-        names: &[("GPA", 0), ("GPA2", 1), ("GPAB", 2)],
-        columns: &[&["I"], &["HAcc"]],
-        take: accuracy,
-        ..MOTION
-    },
-    Handler {
-        names: &[("BARO", 0), ("BAR2", 1), ("BAR3", 2)],
-        columns: &[&["I"], &["Press"], &["Temp"], &["Health", "H"], &["CRt"], &["Alt"]],
-        take: air,
-        ..MOTION
-    },
-    Handler {
-        names: &[("MAG", 0), ("MAG2", 1), ("MAG3", 2)],
-        columns: &[&["I"], &["Health"], &["MagX"], &["MagY"], &["MagZ"]],
-        take: compass,
-        ..MOTION
-    },
-    Handler {
-        names: &[("RCOU", 0)],
-        columns: &[
-            &["C1", "Ch1", "Chan1"],
-            &["C2", "Ch2", "Chan2"],
-            &["C3", "Ch3", "Chan3"],
-            &["C4", "Ch4", "Chan4"],
-            &["C5", "Ch5", "Chan5"],
-            &["C6", "Ch6", "Chan6"],
-            &["C7", "Ch7", "Chan7"],
-            &["C8", "Ch8", "Chan8"],
-            &["C9", "Ch9"],
-            &["C10", "Ch10"],
-            &["C11", "Ch11"],
-            &["C12", "Ch12"],
-        ],
-        take: outputs,
-        ..MOTION
-    },
-    Handler {
-        names: &[("POS", 0)],
-        columns: &[&["Lat"], &["Lng"], &["Alt"], &["RelHomeAlt", "RelAlt"]],
-        is_fact: true,
-        take: position,
-        ..MOTION
-    },
-    Handler { names: &[("ORGN", 0)], columns: &[&["Type"], &["Alt"]], take: origin, ..MOTION },
-    Handler {
-        names: &[("XKF1", 0), ("XKF6", 1), ("NKF1", 0), ("NKF6", 1), ("EKF1", 0)],
-        columns: &[&["C"], &["VN"], &["VE"], &["VD"], &["PN"], &["PE"], &["PD"]],
-        take: local,
-        ..MOTION
-    },
-    Handler {
-        names: &[("XKF4", 0), ("XKF9", 1), ("NKF4", 0), ("NKF9", 1), ("EKF4", 0)],
-        columns: &[&["C"], &["SV"], &["SP"], &["SH"], &["SM"], &["SS"], &["PI"]],
-        take: estimator,
-        ..MOTION
-    },
-    Handler {
-        names: &[("VIBE", 0)],
-        columns: &[
-            &["IMU"],
-            &["VibeX"],
-            &["VibeY"],
-            &["VibeZ"],
-            &["Clip"],
-            &["Clip0"],
-            &["Clip1"],
-            &["Clip2"],
-        ],
-        take: vibration,
-        ..MOTION
-    },
-    Handler {
-        names: &[("CTUN", 0), ("THR", 0)],
-        columns: &[&["ThO", "ThrOut"], &["CRt", "CRate"], &["As", "Aspd"], &["DCRt", "DCRate"]],
-        take: hud,
-        ..MOTION
-    },
-    Handler {
-        names: &[("ARSP", 0), ("ASP2", 1)],
-        columns: &[&["I"], &["Airspeed"]],
-        take: airspeed,
-        ..MOTION
-    },
+    handler("ATT", "Roll Pitch Yaw DesRoll DesPitch", attitude),
+    handler("AHR2", "Roll Pitch Yaw Alt Lat Lng", second_estimate),
+    handler("RATE", "RDes PDes YDes R P Y", rates),
+    handler("IMU IMU2:1 IMU3:2", "I GyrX GyrY GyrZ AccX AccY AccZ T|Temp GH|GyHlt AH|AcHlt", imu),
+    handler("GPS GPS2:1 GPSB:2", GPS, gnss),
+    handler("GPA GPA2:1 GPAB:2", "I HAcc", accuracy),
+    handler("BARO BAR2:1 BAR3:2", "I Press Temp Health|H CRt Alt", air),
+    handler("MAG MAG2:1 MAG3:2", "I Health MagX MagY MagZ", compass),
+    handler("RCOU", RCOU, outputs),
+    handler("POS", "Lat Lng Alt RelHomeAlt|RelAlt", position).fact(),
+    handler("ORGN", "Type Alt", origin),
+    handler("XKF1 XKF6:1 NKF1 NKF6:1 EKF1", "C VN VE VD PN PE PD", local),
+    handler("XKF4 XKF9:1 NKF4 NKF9:1 EKF4", "C SV SP SH SM SS PI", estimator),
+    handler("VIBE", "IMU VibeX VibeY VibeZ Clip Clip0 Clip1 Clip2", vibration),
+    handler("CTUN THR", "ThO|ThrOut CRt|CRate As|Aspd DCRt|DCRate", hud),
+    handler("ARSP ASP2:1", "I Airspeed", airspeed),
 ];
 
 fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {

@@ -5,77 +5,22 @@ use hums_core::observation::{
 };
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts, WattHours};
 
-use super::handler::{Given, Handler};
+use super::handler::{Given, Handler, handler};
 use super::say::Out;
 use super::state::State;
 
-const POWER: Handler =
-    Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
-
-const BATTERY_COLUMNS: &[&[&str]] = &[
-    &["Inst", "Instance", "I"],
-    &["Volt"],
-    &["Curr"],
-    &["CurrTot"],
-    &["EnrgTot"],
-    &["Temp"],
-    &["RemPct"],
-    &["Vcc"],
-];
+/// Columns of BAT.
+const BAT: &str = "Inst|Instance|I Volt Curr CurrTot EnrgTot Temp RemPct Vcc";
+/// Columns of ESC.
+const ESC: &str = "Instance|I RPM Volt Curr Temp";
 
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler {
-        names: &[("BAT", 0), ("BAT2", 1), ("BAT3", 2), ("BAT4", 3), ("CURR", 0), ("CUR2", 1)],
-        columns: BATTERY_COLUMNS,
-        take: battery,
-        ..POWER
-    },
-    Handler {
-        names: &[("BCL", 0), ("BCL2", 1)],
-        columns: &[
-            &["Inst", "Instance", "I"],
-            &["V1"],
-            &["V2"],
-            &["V3"],
-            &["V4"],
-            &["V5"],
-            &["V6"],
-            &["V7"],
-            &["V8"],
-            &["V9"],
-            &["V10"],
-            &["V11"],
-            &["V12"],
-            &["V13"],
-            &["V14"],
-        ],
-        take: cells,
-        ..POWER
-    },
-    Handler {
-        names: &[("POWR", 0)],
-        columns: &[&["Vcc", "VCC"], &["VServo"], &["MTemp"], &["MVolt"]],
-        take: rails,
-        ..POWER
-    },
-    Handler { names: &[("MCU", 0)], columns: &[&["MTemp"], &["MVolt"]], take: processor, ..POWER },
-    Handler {
-        names: &[
-            ("ESC", 0),
-            ("ESC1", 0),
-            ("ESC2", 1),
-            ("ESC3", 2),
-            ("ESC4", 3),
-            ("ESC5", 4),
-            ("ESC6", 5),
-            ("ESC7", 6),
-            ("ESC8", 7),
-        ],
-        columns: &[&["Instance", "I"], &["RPM"], &["Volt"], &["Curr"], &["Temp"]],
-        take: esc,
-        ..POWER
-    },
-    Handler { names: &[("RPM", 0)], columns: &[&["I"], &["RPM", "rpm1"], &["rpm2"]], take: rpm, ..POWER },
+    handler("BAT BAT2:1 BAT3:2 BAT4:3 CURR CUR2:1", BAT, battery),
+    handler("BCL BCL2:1", "Inst|Instance|I V1 V2 V3 V4 V5 V6 V7 V8 V9 V10 V11 V12 V13 V14", cells),
+    handler("POWR", "Vcc|VCC VServo MTemp MVolt", rails),
+    handler("MCU", "MTemp MVolt", processor),
+    handler("ESC ESC1 ESC2:1 ESC3:2 ESC4:3 ESC5:4 ESC6:5 ESC7:6 ESC8:7", ESC, esc),
+    handler("RPM", "I RPM|rpm1 rpm2", rpm),
 ];
 
 /// Older versions logged whole hundredths of volts and amperes.

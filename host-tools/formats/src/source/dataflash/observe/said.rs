@@ -2,7 +2,7 @@
 
 use hums_core::alert;
 
-use super::handler::{Given, Handler};
+use super::handler::{Given, Handler, handler};
 use super::say::{Out, Say};
 use super::state::{State, version_of};
 use super::words::{self, CRASH_CHECK, Craft};
@@ -16,41 +16,16 @@ const NOTICE: u8 = 5;
 /// `MAV_SEVERITY_ERROR`
 const ERROR: u8 = 3;
 
-const SAID: Handler = Handler { names: &[], columns: &[], is_fact: false, is_said: true, take: |_, _, _| () };
-
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler {
-        names: &[("PARM", 0)],
-        columns: &[&["Name"], &["Value"]],
-        is_fact: true,
-        take: parameter,
-        ..SAID
-    },
-    Handler {
-        names: &[("MSG", 0)],
-        columns: &[&["Message", "Msg"], &["ID", "Id"], &["Seq"]],
-        is_fact: true,
-        take: message,
-        ..SAID
-    },
-    Handler {
-        names: &[("VER", 0)],
-        columns: &[&["FWS"], &["Maj"], &["Min"], &["Pat"], &["FWT"], &["BU"]],
-        is_fact: true,
-        take: version,
-        ..SAID
-    },
-    Handler { names: &[("MODE", 0)], columns: &[&["ModeNum"], &["Mode"]], take: mode, ..SAID },
-    Handler { names: &[("ARM", 0)], columns: &[&["ArmState"]], is_fact: true, take: arm, ..SAID },
-    Handler { names: &[("EV", 0)], columns: &[&["Id"]], is_fact: true, take: event, ..SAID },
-    Handler { names: &[("ERR", 0)], columns: &[&["Subsys"], &["ECode"]], take: error, ..SAID },
-    Handler {
-        names: &[("WDOG", 0)],
-        columns: &[&["FT", "FaultType"], &["SmLn"], &["FL"]],
-        take: watchdog,
-        ..SAID
-    },
-    Handler { names: &[("DSF", 0)], columns: &[&["Dp"]], take: dropped, ..SAID },
+    handler("PARM", "Name Value", parameter).said().fact(),
+    handler("MSG", "Message|Msg ID|Id Seq", message).said().fact(),
+    handler("VER", "FWS Maj Min Pat FWT BU", version).said().fact(),
+    handler("MODE", "ModeNum Mode", mode).said(),
+    handler("ARM", "ArmState", arm).said().fact(),
+    handler("EV", "Id", event).said().fact(),
+    handler("ERR", "Subsys ECode", error).said(),
+    handler("WDOG", "FT|FaultType", watchdog).said(),
+    handler("DSF", "Dp", dropped).said(),
 ];
 
 fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {

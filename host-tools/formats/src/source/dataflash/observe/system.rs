@@ -4,7 +4,7 @@ use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::clock::Span;
 use hums_core::observation::{LandedState, Observation, RadioControl, TelemetryRadio};
 
-use super::handler::{Given, Handler};
+use super::handler::{Given, Handler, handler};
 use super::say::{Out, Say};
 use super::state::State;
 use super::words::Craft;
@@ -12,25 +12,11 @@ use super::words::Craft;
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
 
-const SYSTEM: Handler =
-    Handler { names: &[], columns: &[], is_fact: false, is_said: false, take: |_, _, _| () };
-
 pub(super) const HANDLERS: &[Handler] = &[
-    Handler {
-        names: &[("PM", 0)],
-        columns: &[&["Load"], &["IntE"]],
-        is_said: true,
-        take: performance,
-        ..SYSTEM
-    },
-    Handler {
-        names: &[("RAD", 0)],
-        columns: &[&["RSSI"], &["RemRSSI"], &["Noise"], &["RemNoise"], &["RxErrors"]],
-        take: radio,
-        ..SYSTEM
-    },
-    Handler { names: &[("RSSI", 0)], columns: &[&["RXRSSI"]], take: rc, ..SYSTEM },
-    Handler { names: &[("STAT", 0)], columns: &[&["isFlying"], &["Armed"]], take: status, ..SYSTEM },
+    handler("PM", "Load IntE", performance).said(),
+    handler("RAD", "RSSI RemRSSI Noise RemNoise RxErrors", radio),
+    handler("RSSI", "RXRSSI", rc),
+    handler("STAT", "isFlying Armed", status),
 ];
 
 /// Load in thousandths, as in `SYS_STATUS`; internal errors since power-on as bits (`AP_InternalError`).

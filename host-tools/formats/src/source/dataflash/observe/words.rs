@@ -76,27 +76,28 @@ impl Craft {
         matches!(self, Self::Sub)
     }
 
-    /// The names of its modes.
-    const fn modes(self) -> &'static [(u32, &'static str)] {
-        match self {
-            Self::Copter | Self::Heli => COPTER_MODES,
-            Self::Plane => PLANE_MODES,
-            Self::Rover => ROVER_MODES,
-            Self::Sub => SUB_MODES,
-            _ => &[],
-        }
+    /// Numbers and names of its modes.
+    fn modes(self) -> impl Iterator<Item = (u32, &'static str)> {
+        let firmware = match self {
+            Self::Copter | Self::Heli => "copter ",
+            Self::Plane => "plane ",
+            Self::Rover => "rover ",
+            Self::Sub => "sub ",
+            _ => "no firmware ",
+        };
+        MODES.lines().filter_map(move |line| numbered(line.strip_prefix(firmware)?))
     }
 
     /// A mode's name.
     pub(in crate::source::dataflash) fn mode_name(self, number: u32) -> Option<&'static str> {
-        self.modes().iter().find(|(known, _)| *known == number).map(|(_, name)| *name)
+        self.modes().find(|(known, _)| *known == number).map(|(_, name)| name)
     }
 
     /// A mode's number by the name that text logs have.
     pub(super) fn mode_number(self, name: &str) -> Option<u32> {
         let plain = |name: &str| name.chars().filter(char::is_ascii_alphanumeric).collect::<String>();
         let name = plain(name).to_ascii_uppercase();
-        self.modes().iter().find(|(_, known)| plain(known) == name).map(|(number, _)| *number)
+        self.modes().find(|(_, known)| plain(known) == name).map(|(number, _)| number)
     }
 }
 
@@ -126,171 +127,26 @@ pub(super) fn name_and_version(words: &str) -> Option<(&str, &str)> {
     Some((name, version.strip_prefix(['V', 'v'])?))
 }
 
-const COPTER_MODES: &[(u32, &str)] = &[
-    (0, "STABILIZE"),
-    (1, "ACRO"),
-    (2, "ALT_HOLD"),
-    (3, "AUTO"),
-    (4, "GUIDED"),
-    (5, "LOITER"),
-    (6, "RTL"),
-    (7, "CIRCLE"),
-    (8, "POSITION"),
-    (9, "LAND"),
-    (10, "OF_LOITER"),
-    (11, "DRIFT"),
-    (13, "SPORT"),
-    (14, "FLIP"),
-    (15, "AUTOTUNE"),
-    (16, "POSHOLD"),
-    (17, "BRAKE"),
-    (18, "THROW"),
-    (19, "AVOID_ADSB"),
-    (20, "GUIDED_NOGPS"),
-    (21, "SMART_RTL"),
-    (22, "FLOWHOLD"),
-    (23, "FOLLOW"),
-    (24, "ZIGZAG"),
-    (25, "SYSTEMID"),
-    (26, "AUTOROTATE"),
-    (27, "AUTO_RTL"),
-    (28, "TURTLE"),
-];
+/// Flight modes and events, a line each.
+const MODES: &str = include_str!("modes.txt");
+const EVENTS: &str = include_str!("events.txt");
 
-const PLANE_MODES: &[(u32, &str)] = &[
-    (0, "MANUAL"),
-    (1, "CIRCLE"),
-    (2, "STABILIZE"),
-    (3, "TRAINING"),
-    (4, "ACRO"),
-    (5, "FBWA"),
-    (6, "FBWB"),
-    (7, "CRUISE"),
-    (8, "AUTOTUNE"),
-    (10, "AUTO"),
-    (11, "RTL"),
-    (12, "LOITER"),
-    (13, "TAKEOFF"),
-    (14, "AVOID_ADSB"),
-    (15, "GUIDED"),
-    (16, "INITIALISING"),
-    (17, "QSTABILIZE"),
-    (18, "QHOVER"),
-    (19, "QLOITER"),
-    (20, "QLAND"),
-    (21, "QRTL"),
-    (22, "QAUTOTUNE"),
-    (23, "QACRO"),
-    (24, "THERMAL"),
-    (25, "LOITER_ALT_QLAND"),
-    (26, "AUTOLAND"),
-];
-
-const ROVER_MODES: &[(u32, &str)] = &[
-    (0, "MANUAL"),
-    (1, "ACRO"),
-    (2, "LEARNING"),
-    (3, "STEERING"),
-    (4, "HOLD"),
-    (5, "LOITER"),
-    (6, "FOLLOW"),
-    (7, "SIMPLE"),
-    (8, "DOCK"),
-    (9, "CIRCLE"),
-    (10, "AUTO"),
-    (11, "RTL"),
-    (12, "SMART_RTL"),
-    (15, "GUIDED"),
-    (16, "INITIALISING"),
-];
-
-const SUB_MODES: &[(u32, &str)] = &[
-    (0, "STABILIZE"),
-    (1, "ACRO"),
-    (2, "ALT_HOLD"),
-    (3, "AUTO"),
-    (4, "GUIDED"),
-    (7, "CIRCLE"),
-    (9, "SURFACE"),
-    (16, "POSHOLD"),
-    (19, "MANUAL"),
-    (20, "MOTOR_DETECT"),
-    (21, "SURFTRAK"),
-];
+/// A line of a table: a number, and its words.
+fn numbered(line: &'static str) -> Option<(u32, &'static str)> {
+    let (number, words) = line.split_once(' ')?;
+    Some((number.parse().ok()?, words))
+}
 
 /// The text of an EV; empty for an unknown number.
 pub(super) fn event(number: u8) -> &'static str {
-    EVENTS.iter().find(|(known, _)| *known == number).map_or("", |(_, words)| words)
+    let event = EVENTS.lines().filter_map(numbered).find(|(known, _)| *known == u32::from(number));
+    event.map_or("", |(_, words)| words)
 }
-
-const EVENTS: &[(u8, &str)] = &[
-    (7, "state of the autopilot"),
-    (10, "armed"),
-    (11, "disarmed"),
-    (15, "automatic take-off allowed"),
-    (16, "take-off"),
-    (17, "landing is likely complete"),
-    (18, "landed"),
-    (19, "GPS lost"),
-    (21, "flip begins"),
-    (22, "flip ends"),
-    (25, "home set"),
-    (26, "simple mode on"),
-    (27, "simple mode off"),
-    (28, "left the ground"),
-    (29, "super simple mode on"),
-    (30, "autotune begins"),
-    (31, "autotune off"),
-    (32, "autotune begins again"),
-    (33, "autotune succeeded"),
-    (34, "autotune failed"),
-    (35, "autotune reached its limit"),
-    (36, "pilot tests the gains of autotune"),
-    (37, "gains of autotune saved"),
-    (38, "trim saved"),
-    (39, "waypoint added"),
-    (41, "fence on"),
-    (42, "fence off"),
-    (43, "acro trainer off"),
-    (44, "acro trainer levels"),
-    (45, "acro trainer limits"),
-    (46, "gripper grabs"),
-    (47, "gripper releases"),
-    (49, "parachute off"),
-    (50, "parachute on"),
-    (51, "parachute released"),
-    (52, "landing gear down"),
-    (53, "landing gear up"),
-    (54, "motors stopped in emergency"),
-    (55, "emergency stop of the motors ended"),
-    (56, "motor interlock off"),
-    (57, "motor interlock on"),
-    (58, "rotor at speed"),
-    (59, "rotor below its critical speed"),
-    (60, "EKF altitude reset"),
-    (61, "landing cancelled by the pilot"),
-    (62, "EKF yaw reset"),
-    (63, "ADS-B avoidance on"),
-    (64, "ADS-B avoidance off"),
-    (65, "proximity avoidance on"),
-    (66, "proximity avoidance off"),
-    (67, "another GPS is the first"),
-    (71, "zigzag: A stored"),
-    (72, "zigzag: B stored"),
-    (73, "landing place moved by the pilot"),
-    (74, "standby on"),
-    (75, "standby off"),
-    (80, "fence: altitude on"),
-    (163, "surfaced"),
-    (164, "dived"),
-    (165, "on the bottom"),
-    (166, "off the bottom"),
-];
 
 /// The subsystem of an ERR, and the meaning of its code; the code 0 is always the end of it.
 pub(super) fn error(subsystem: u8, code: u8) -> String {
-    let name = SUBSYSTEMS.iter().find(|(known, _)| *known == subsystem).map(|(_, name)| *name);
-    let name = name.map_or_else(|| format!("subsystem {subsystem}"), str::to_owned);
+    let name =
+        row(subsystem).map_or_else(|| format!("subsystem {subsystem}"), |(_, name, ..)| (*name).to_owned());
     let words = match (subsystem, code) {
         (_, 0) => "resolved",
         (2, 2) => "late frame",
@@ -313,81 +169,75 @@ pub(super) fn error(subsystem: u8, code: u8) -> String {
 
 /// The alert of an ERR, or its end (code 0).
 pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
-    let (cause, urgency) = match subsystem {
-        3 => (Cause::Compass, Urgency::Warning),
-        4 => (Cause::Ranging, Urgency::Warning),
-        5 => (Cause::RemoteControl, Urgency::Warning),
-        6 => (Cause::Power, Urgency::Warning),
-        7 | 11 => (Cause::Gnss, Urgency::Warning),
-        8 => (Cause::GroundStation, Urgency::Warning),
-        9 => (Cause::Fence, Urgency::Warning),
-        CRASH_CHECK => (Cause::Crash, Urgency::Critical),
-        16 | 24 | 31 => (Cause::Estimator, Urgency::Warning),
-        17 => (Cause::Estimator, Urgency::Critical),
-        18 => (Cause::Barometer, Urgency::Warning),
-        19 | 30 => (Cause::Processor, Urgency::Warning),
-        23 => (Cause::Terrain, Urgency::Warning),
-        25 => (Cause::Propulsion, Urgency::Warning),
-        26 | 27 => (Cause::Other, Urgency::Warning),
-        29 => (Cause::Vibration, Urgency::Warning),
-        _ => return None,
+    let cause = row(subsystem)?.2?;
+    let urgency = match (subsystem, code) {
+        (_, 0) => Urgency::Over,
+        (CRASH_CHECK | EKF_FAILSAFE, _) => Urgency::Critical,
+        _ => Urgency::Warning,
     };
-    Some(Alert { cause, urgency: if code == 0 { Urgency::Over } else { urgency } })
+    Some(Alert { cause, urgency })
 }
 
-const SUBSYSTEMS: &[(u8, &str)] = &[
-    (1, "main"),
-    (2, "radio"),
-    (3, "compass"),
-    (4, "optical flow"),
-    (5, "radio failsafe"),
-    (6, "battery failsafe"),
-    (7, "GPS failsafe"),
-    (8, "ground station failsafe"),
-    (9, "fence failsafe"),
-    (10, "flight mode"),
-    (11, "GPS"),
-    (12, "crash check"),
-    (13, "flip"),
-    (14, "autotune"),
-    (15, "parachute"),
-    (16, "EKF check"),
-    (17, "EKF failsafe"),
-    (18, "barometer"),
-    (19, "CPU watchdog"),
-    (20, "ADS-B failsafe"),
-    (21, "terrain"),
-    (22, "navigation"),
-    (23, "terrain failsafe"),
-    (24, "EKF primary"),
-    (25, "thrust loss"),
-    (26, "sensor failsafe"),
-    (27, "leak failsafe"),
-    (28, "pilot input"),
-    (29, "vibration failsafe"),
-    (30, "internal error"),
-    (31, "dead reckoning failsafe"),
+/// The row of a subsystem.
+fn row(subsystem: u8) -> Option<&'static (u8, &'static str, Option<Cause>, bool)> {
+    SUBSYSTEMS.iter().find(|(known, ..)| *known == subsystem)
+}
+
+/// The subsystems of ERR: number, name, cause of their alerts, and whether an error is a failsafe or an emergency. A failsafe lasts
+/// until it is resolved or the vehicle is disarmed. For 5, 6, 8, 17, 20, 23 and 31 the autopilot also reports a critical state in
+/// its heartbeat (`Copter::any_failsafe_triggered`), for the others not.
+const SUBSYSTEMS: &[(u8, &str, Option<Cause>, bool)] = &[
+    (1, "main", None, false),
+    (2, "radio", None, false),
+    (3, "compass", Some(Cause::Compass), false),
+    (4, "optical flow", Some(Cause::Ranging), false),
+    (5, "radio failsafe", Some(Cause::RemoteControl), true),
+    (6, "battery failsafe", Some(Cause::Power), true),
+    (7, "GPS failsafe", Some(Cause::Gnss), true),
+    (8, "ground station failsafe", Some(Cause::GroundStation), true),
+    (9, "fence failsafe", Some(Cause::Fence), true),
+    (10, "flight mode", None, false),
+    (11, "GPS", Some(Cause::Gnss), false),
+    (12, "crash check", Some(Cause::Crash), false),
+    (13, "flip", None, false),
+    (14, "autotune", None, false),
+    (15, "parachute", None, false),
+    (16, "EKF check", Some(Cause::Estimator), false),
+    (17, "EKF failsafe", Some(Cause::Estimator), true),
+    (18, "barometer", Some(Cause::Barometer), false),
+    (19, "CPU watchdog", Some(Cause::Processor), true),
+    (20, "ADS-B failsafe", None, true),
+    (21, "terrain", None, false),
+    (22, "navigation", None, false),
+    (23, "terrain failsafe", Some(Cause::Terrain), true),
+    (24, "EKF primary", Some(Cause::Estimator), false),
+    (25, "thrust loss", Some(Cause::Propulsion), true),
+    (26, "sensor failsafe", Some(Cause::Other), true),
+    (27, "leak failsafe", Some(Cause::Other), true),
+    (28, "pilot input", None, false),
+    (29, "vibration failsafe", Some(Cause::Vibration), true),
+    (30, "internal error", Some(Cause::Processor), true),
+    (31, "dead reckoning failsafe", Some(Cause::Estimator), true),
 ];
 
 /// The subsystem of ERR that stops the motors at once, and so is not a lasting state.
 pub(super) const CRASH_CHECK: u8 = 12;
 
-/// Whether a subsystem of ERR is a failsafe or an emergency, which lasts until it is resolved or the vehicle
-/// is disarmed. For 5, 6, 8, 17, 20, 23 and 31 the autopilot also reports a critical state in its heartbeat
-/// (`Copter::any_failsafe_triggered`). The heartbeat does not show the others (GPS failsafe of before 3.3,
-/// fence, CPU, thrust loss, sensors and leak of `ArduSub`, vibration, internal error).
-pub(super) const fn is_failsafe(subsystem: u8) -> bool {
-    matches!(subsystem, 5..=9 | 17 | 19 | 20 | 23 | 25..=27 | 29..=31)
+/// The subsystem of ERR for a failure of the estimator in flight.
+const EKF_FAILSAFE: u8 = 17;
+
+/// Whether a subsystem of ERR is a failsafe or an emergency.
+pub(super) fn is_failsafe(subsystem: u8) -> bool {
+    row(subsystem).is_some_and(|(.., is_failsafe)| *is_failsafe)
 }
 
 /// A subsystem's name; empty if unknown.
 pub(super) fn subsystem(number: u8) -> &'static str {
-    SUBSYSTEMS.iter().find(|(known, _)| *known == number).map_or("", |(_, name)| name)
+    row(number).map_or("", |(_, name, ..)| name)
 }
 
 /// The failsafes of these bits, by their names.
 pub(super) fn failsafes(bits: u64) -> String {
-    let is_set = |subsystem: u8| bits & (1 << subsystem) != 0;
-    let named = SUBSYSTEMS.iter().filter(|(subsystem, _)| is_set(*subsystem));
-    named.map(|(_, name)| *name).collect::<Vec<_>>().join(", ")
+    let named = SUBSYSTEMS.iter().filter(|(subsystem, ..)| bits & (1 << subsystem) != 0);
+    named.map(|(_, name, ..)| *name).collect::<Vec<_>>().join(", ")
 }

@@ -18,9 +18,9 @@ mod tests;
 
 use hums_core::clock::Instant;
 
-pub use self::system::mode_name;
+pub use self::system::{mode_name, nav_state};
 
-pub(super) use state::{Px4, Said, Told, Topic};
+pub(super) use state::{Px4, Report, Sample, Topic};
 
 /// Period of the repeated messages.
 const REPEAT_US: u64 = 1_000_000;
@@ -48,8 +48,8 @@ impl Px4 {
         receivers::dropout(&mut self.receivers);
     }
 
-    pub(super) fn take(&mut self, topic: &Topic, said: &Said<'_>) {
-        (topic.take)(self, said);
+    pub(super) fn take(&mut self, topic: &Topic, sample: &Sample<'_>) {
+        (topic.take)(self, sample);
     }
 
     /// Time goes on.
@@ -58,8 +58,10 @@ impl Px4 {
         if due && self.system.status.is_some() {
             self.repeated_us = Some(recorded_us);
             self.repeat(recorded_us);
-            let Self { receivers, told, .. } = self;
-            receivers::silence(receivers, now, &mut |observation| told.push(Told::Observation(observation)));
+            let Self { receivers, reports, .. } = self;
+            receivers::silence(receivers, now, &mut |observation| {
+                reports.push(Report::Observation(observation))
+            });
         }
     }
 }

@@ -9,244 +9,99 @@ use hums_core::units::{
     Radians, RadiansPerSecond, norm,
 };
 
-use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Said, Topic};
+use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Sample, Topic, topic};
 
 /// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
 /// forces of nearly all flights.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 
+/// Fields of `vehicle_imu`.
+const VEHICLE_IMU: &str = "delta_velocity delta_velocity_dt delta_angle delta_angle_dt";
+/// Fields of `vehicle_air_data`.
+const VEHICLE_AIR_DATA: &str = "baro_pressure_pa ambient_temperature baro_temp_celcius baro_alt_meter";
+/// Fields of `vehicle_local_position`.
+const VEHICLE_LOCAL_POSITION: &str = "x y z vx vy vz z_valid z_global v_z_valid ref_alt heading yaw";
+/// Fields of `estimator_status`.
+const ESTIMATOR_STATUS: &str = "vel_test_ratio pos_test_ratio hgt_test_ratio hdg_test_ratio mag_test_ratio solution_status_flags \
+    vibe";
+/// Fields of `estimator_innovation_test_ratios`.
+const ESTIMATOR_INNOVATION_TEST_RATIOS: &str = "gps_hvel gps_vvel ev_hvel ev_vvel aux_hvel gps_hpos ev_hpos gps_vpos ev_vpos rng_vpos baro_vpos \
+    mag_field heading";
+/// Fields of `estimator_status_flags`.
+const ESTIMATOR_STATUS_FLAGS: &str =
+    "cs_tilt_align cs_fake_pos cs_constant_pos cs_gnss_fault fs_bad_acc_vertical";
+/// Fields of `vehicle_imu_status`.
+const VEHICLE_IMU_STATUS: &str = "accel_device_id delta_angle_coning_metric gyro_coning_vibration gyro_vibration_metric \
+    accel_vibration_metric accel_clipping";
+
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "sensor_combined",
-        instances: 1,
-        // Thinned by its handler, which looks for shocks in all of them.
-        every_us: 0,
-        fields: &["accelerometer_m_s2", "gyro_rad"],
-        take: imu,
-    },
-    Topic { name: "vehicle_acceleration", instances: 1, every_us: 0, fields: &["xyz"], take: acceleration },
-    Topic {
-        name: "vehicle_angular_velocity",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["xyz"],
-        take: |px4, said| px4.motion.rate = said.fields.vector(0),
-    },
+    // Thinned by its handler, which looks for shocks in all of them.
+    topic("sensor_combined", 1, 0, "accelerometer_m_s2 gyro_rad", imu),
+    topic("vehicle_acceleration", 1, 0, "xyz", acceleration),
+    topic("vehicle_angular_velocity", 1, FAST_US, "xyz", |px4, sample| {
+        px4.motion.rate = sample.fields.vector(0)
+    }),
     // Each of several sensors; the one that flies is in the topics above.
-    Topic {
-        name: "vehicle_imu",
-        instances: 3,
-        every_us: MEDIUM_US,
-        fields: &["delta_velocity", "delta_velocity_dt", "delta_angle", "delta_angle_dt"],
-        take: other_imu,
-    },
-    Topic {
-        name: "vehicle_magnetometer",
-        instances: 3,
-        every_us: MEDIUM_US,
-        fields: &["magnetometer_ga"],
-        take: |px4, said| {
-            if let Some(slot) = px4.motion.fields.get_mut(usize::from(said.instance)) {
-                *slot = said.fields.vector(0).map(|field| field.map(Gauss));
+    topic("vehicle_imu", 3, MEDIUM_US, VEHICLE_IMU, other_imu),
+    topic("vehicle_magnetometer", 3, MEDIUM_US, "magnetometer_ga", |px4, sample| {
+        if let Some(slot) = px4.motion.fields.get_mut(usize::from(sample.instance)) {
+            *slot = sample.fields.vector(0).map(|field| field.map(Gauss));
+        }
+    }),
+    topic("sensor_baro", 3, MEDIUM_US, "pressure", other_air),
+    topic("actuator_outputs", 2, MEDIUM_US, "output", outputs),
+    topic("vehicle_air_data", 1, MEDIUM_US, VEHICLE_AIR_DATA, air),
+    topic("vehicle_attitude", 1, FAST_US, "q rollspeed pitchspeed yawspeed", attitude),
+    // Until v1.15 the angles are in it too, and before v1.6 only they.
+    topic("vehicle_attitude_setpoint", 1, FAST_US, "q_d roll_body pitch_body", attitude_setpoint),
+    topic("vehicle_rates_setpoint", 1, FAST_US, "roll pitch yaw", |px4, sample| {
+        let rates = [0, 1, 2].map(|axis| sample.fields.finite(axis));
+        px4.motion.rates_wanted = match rates {
+            [Some(roll), Some(pitch), Some(yaw)] => {
+                Some((sample.recorded_us, [roll, pitch, yaw].map(RadiansPerSecond)))
             }
-        },
-    },
-    Topic { name: "sensor_baro", instances: 3, every_us: MEDIUM_US, fields: &["pressure"], take: other_air },
-    Topic { name: "actuator_outputs", instances: 2, every_us: MEDIUM_US, fields: &["output"], take: outputs },
-    Topic {
-        name: "vehicle_air_data",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["baro_pressure_pa", "ambient_temperature", "baro_temp_celcius", "baro_alt_meter"],
-        take: air,
-    },
-    Topic {
-        name: "vehicle_attitude",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["q", "rollspeed", "pitchspeed", "yawspeed"],
-        take: attitude,
-    },
-    Topic {
-        name: "vehicle_attitude_setpoint",
-        instances: 1,
-        every_us: FAST_US,
-        // Until v1.15 the angles are in it too, and before v1.6 only they.
-        fields: &["q_d", "roll_body", "pitch_body"],
-        take: attitude_setpoint,
-    },
-    Topic {
-        name: "vehicle_rates_setpoint",
-        instances: 1,
-        every_us: FAST_US,
-        fields: &["roll", "pitch", "yaw"],
-        take: |px4, said| {
-            let rates = [0, 1, 2].map(|axis| said.fields.finite(axis));
-            px4.motion.rates_wanted = match rates {
-                [Some(roll), Some(pitch), Some(yaw)] => {
-                    Some((said.recorded_us, [roll, pitch, yaw].map(RadiansPerSecond)))
-                }
-                _ => None,
-            };
-        },
-    },
-    Topic {
-        name: "vehicle_local_position",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &[
-            "x",
-            "y",
-            "z",
-            "vx",
-            "vy",
-            "vz",
-            "z_valid",
-            "z_global",
-            "v_z_valid",
-            "ref_alt",
-            "heading",
-            "yaw",
-        ],
-        take: local_position,
-    },
-    Topic {
-        name: "vehicle_local_position_setpoint",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["vz"],
-        take: |px4, said| {
-            if let Some(down) = said.fields.finite(0) {
-                px4.observe(Observation::ClimbWanted(MetresPerSecond(-down)));
-            }
-        },
-    },
-    Topic {
-        name: "vehicle_global_position",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["lat", "lon", "alt"],
-        take: global_position,
-    },
-    Topic {
-        name: "home_position",
-        instances: 1,
-        every_us: 0,
-        fields: &["alt", "z", "valid_alt"],
-        take: home,
-    },
-    Topic {
-        name: "airspeed_validated",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["calibrated_airspeed_m_s", "equivalent_airspeed_m_s"],
-        take: airspeed_validated,
-    },
-    Topic {
-        name: "airspeed",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["indicated_airspeed_m_s"],
-        take: airspeed,
-    },
-    Topic {
-        name: "vehicle_thrust_setpoint",
-        instances: 2,
-        every_us: MEDIUM_US,
-        fields: &["xyz"],
-        take: |px4, said| {
-            let length = said.fields.vector::<3>(0).map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
-            px4.motion.set_thrust(said.instance, length);
-        },
-    },
+            _ => None,
+        };
+    }),
+    topic("vehicle_local_position", 1, MEDIUM_US, VEHICLE_LOCAL_POSITION, local_position),
+    topic("vehicle_local_position_setpoint", 1, MEDIUM_US, "vz", |px4, sample| {
+        if let Some(down) = sample.fields.finite(0) {
+            px4.observe(Observation::ClimbWanted(MetresPerSecond(-down)));
+        }
+    }),
+    topic("vehicle_global_position", 1, MEDIUM_US, "lat lon alt", global_position),
+    topic("home_position", 1, 0, "alt z valid_alt", home),
+    topic(
+        "airspeed_validated",
+        1,
+        MEDIUM_US,
+        "calibrated_airspeed_m_s equivalent_airspeed_m_s",
+        airspeed_validated,
+    ),
+    topic("airspeed", 1, MEDIUM_US, "indicated_airspeed_m_s", airspeed),
+    topic("vehicle_thrust_setpoint", 2, MEDIUM_US, "xyz", |px4, sample| {
+        let length = sample.fields.vector::<3>(0).map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
+        px4.motion.set_thrust(sample.instance, length);
+    }),
     // Until v1.13 the throttle is the fourth control of a group: of the rotors, and of a VTOL's plane.
-    Topic {
-        name: "actuator_controls_0",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["control"],
-        take: |px4, said| px4.motion.set_thrust(0, said.fields.element(0, 3).map(|thrust| thrust as f32)),
-    },
-    Topic {
-        name: "actuator_controls_1",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["control"],
-        take: |px4, said| px4.motion.set_thrust(1, said.fields.element(0, 3).map(|thrust| thrust as f32)),
-    },
-    Topic {
-        name: "estimator_selector_status",
-        instances: 1,
-        every_us: 0,
-        fields: &["primary_instance"],
-        take: |px4, said| px4.motion.estimator = said.fields.byte(0).unwrap_or(0),
-    },
-    Topic {
-        name: "estimator_status",
-        instances: 9,
-        every_us: MEDIUM_US,
-        fields: &[
-            "vel_test_ratio",
-            "pos_test_ratio",
-            "hgt_test_ratio",
-            "hdg_test_ratio",
-            "mag_test_ratio",
-            "solution_status_flags",
-            "vibe",
-        ],
-        take: estimator_status,
-    },
-    Topic {
-        name: "estimator_innovation_test_ratios",
-        instances: 9,
-        every_us: MEDIUM_US,
-        fields: &[
-            "gps_hvel",
-            "gps_vvel",
-            "ev_hvel",
-            "ev_vvel",
-            "aux_hvel",
-            "gps_hpos",
-            "ev_hpos",
-            "gps_vpos",
-            "ev_vpos",
-            "rng_vpos",
-            "baro_vpos",
-            "mag_field",
-            "heading",
-        ],
-        take: test_ratios,
-    },
-    Topic {
-        name: "estimator_status_flags",
-        instances: 9,
-        every_us: 0,
-        fields: &["cs_tilt_align", "cs_fake_pos", "cs_constant_pos", "cs_gnss_fault", "fs_bad_acc_vertical"],
-        take: estimator_flags,
-    },
+    topic("actuator_controls_0", 1, MEDIUM_US, "control", |px4, sample| {
+        px4.motion.set_thrust(0, sample.fields.element(0, 3).map(|thrust| thrust as f32));
+    }),
+    topic("actuator_controls_1", 1, MEDIUM_US, "control", |px4, sample| {
+        px4.motion.set_thrust(1, sample.fields.element(0, 3).map(|thrust| thrust as f32));
+    }),
+    topic("estimator_selector_status", 1, 0, "primary_instance", |px4, sample| {
+        px4.motion.estimator = sample.fields.byte(0).unwrap_or(0);
+    }),
+    topic("estimator_status", 9, MEDIUM_US, ESTIMATOR_STATUS, estimator_status),
+    topic("estimator_innovation_test_ratios", 9, MEDIUM_US, ESTIMATOR_INNOVATION_TEST_RATIOS, test_ratios),
+    topic("estimator_status_flags", 9, 0, ESTIMATOR_STATUS_FLAGS, estimator_flags),
     // Motors are given this since v1.13.
-    Topic { name: "actuator_motors", instances: 1, every_us: MEDIUM_US, fields: &["control"], take: motors },
-    Topic {
-        name: "sensor_selection",
-        instances: 1,
-        every_us: 0,
-        fields: &["accel_device_id"],
-        take: |px4, said| px4.motion.accelerometer = said.fields.count(0).filter(|&id| id != 0),
-    },
-    Topic {
-        name: "vehicle_imu_status",
-        instances: 3,
-        every_us: 0,
-        fields: &[
-            "accel_device_id",
-            "delta_angle_coning_metric",
-            "gyro_coning_vibration",
-            "gyro_vibration_metric",
-            "accel_vibration_metric",
-            "accel_clipping",
-        ],
-        take: imu_status,
-    },
+    topic("actuator_motors", 1, MEDIUM_US, "control", motors),
+    topic("sensor_selection", 1, 0, "accel_device_id", |px4, sample| {
+        px4.motion.accelerometer = sample.fields.count(0).filter(|&id| id != 0);
+    }),
+    topic("vehicle_imu_status", 3, 0, VEHICLE_IMU_STATUS, imu_status),
 ];
 
 /// With the field of the compass of the same number, as in MAVLink's messages.
@@ -261,65 +116,65 @@ fn inertial(px4: &mut Px4, instance: u8, acceleration: Option<[f32; 3]>, rate: O
     }));
 }
 
-fn imu(px4: &mut Px4, said: &Said<'_>) {
+fn imu(px4: &mut Px4, sample: &Sample<'_>) {
     px4.motion.combined = true;
-    if is_due(px4, said) {
-        inertial(px4, 0, said.fields.vector(0), said.fields.vector(1));
+    if is_due(px4, sample) {
+        inertial(px4, 0, sample.fields.vector(0), sample.fields.vector(1));
     }
 }
 
 /// Whether the specific force of a message is handed on. Between two of them only a shock is, as such:
 /// impacts are short.
-fn is_due(px4: &mut Px4, said: &Said<'_>) -> bool {
-    let now_us = said.recorded_us;
+fn is_due(px4: &mut Px4, sample: &Sample<'_>) -> bool {
+    let now_us = sample.recorded_us;
     let long_ago = |last: u64| now_us < last || now_us - last >= FAST_US;
     if px4.motion.force_us.is_none_or(long_ago) {
         px4.motion.force_us = Some(now_us);
         return true;
     }
-    if let Some(force) = said.fields.vector(0).map(norm).filter(|force| *force > SHOCK_MIN) {
+    if let Some(force) = sample.fields.vector(0).map(norm).filter(|force| *force > SHOCK_MIN) {
         px4.observe(Observation::Shock(MetresPerSecond2(force)));
     }
     false
 }
 
 /// Velocity and angle over a time, which is in microseconds.
-fn other_imu(px4: &mut Px4, said: &Said<'_>) {
+fn other_imu(px4: &mut Px4, sample: &Sample<'_>) {
     let over = |delta: usize, dt: usize| {
-        let dt_s = said.fields.finite(dt).map(|us| us / 1e6).filter(|dt_s| *dt_s > 0.0)?;
-        Some(said.fields.vector::<3>(delta)?.map(|axis| axis / dt_s))
+        let dt_s = sample.fields.finite(dt).map(|us| us / 1e6).filter(|dt_s| *dt_s > 0.0)?;
+        Some(sample.fields.vector::<3>(delta)?.map(|axis| axis / dt_s))
     };
-    if said.instance > 0 {
-        inertial(px4, said.instance, over(0, 1), over(2, 3));
+    if sample.instance > 0 {
+        inertial(px4, sample.instance, over(0, 1), over(2, 3));
     }
 }
 
 /// In hPa until v1.13, in Pa since.
-fn other_air(px4: &mut Px4, said: &Said<'_>) {
+fn other_air(px4: &mut Px4, sample: &Sample<'_>) {
     const HPA_MAX: f32 = 2_000.0;
-    let pressure = said.fields.finite(0).filter(|pressure| *pressure > 0.0);
+    let pressure = sample.fields.finite(0).filter(|pressure| *pressure > 0.0);
     let pressure = pressure.map(|it| Hectopascals(if it > HPA_MAX { it / 100.0 } else { it }));
-    if said.instance > 0 {
-        px4.observe(Observation::Air(Air { instance: said.instance, pressure, temperature: None }));
+    if sample.instance > 0 {
+        px4.observe(Observation::Air(Air { instance: sample.instance, pressure, temperature: None }));
     }
 }
 
 /// The source of `SERVO_OUTPUT_RAW`.
-fn outputs(px4: &mut Px4, said: &Said<'_>) {
-    let pulse = |output: usize| said.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
+fn outputs(px4: &mut Px4, sample: &Sample<'_>) {
+    let pulse = |output: usize| sample.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
     let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);
-    px4.observe(Observation::Outputs(Outputs { port: said.instance, pulses }));
+    px4.observe(Observation::Outputs(Outputs { port: sample.instance, pulses }));
 }
 
 /// For a log without `sensor_combined`.
-fn acceleration(px4: &mut Px4, said: &Said<'_>) {
-    if !px4.motion.combined && is_due(px4, said) {
-        inertial(px4, 0, said.fields.vector(0), px4.motion.rate);
+fn acceleration(px4: &mut Px4, sample: &Sample<'_>) {
+    if !px4.motion.combined && is_due(px4, sample) {
+        inertial(px4, 0, sample.fields.vector(0), px4.motion.rate);
     }
 }
 
-fn air(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn air(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     px4.motion.pressure_altitude = fields.finite(3);
     px4.observe(Observation::Air(Air {
         instance: 0,
@@ -332,13 +187,13 @@ fn air(px4: &mut Px4, said: &Said<'_>) {
 }
 
 /// Quaternion of the rotation from north, east, down to the body; the first element is its real part.
-fn attitude(px4: &mut Px4, said: &Said<'_>) {
-    let Some([w, x, y, z]) = said.fields.vector::<4>(0) else { return };
+fn attitude(px4: &mut Px4, sample: &Sample<'_>) {
+    let Some([w, x, y, z]) = sample.fields.vector::<4>(0) else { return };
     let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
     let pitch = (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin();
     let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
     // Until v1.9 the rates are in it, later in vehicle_angular_velocity. PX4 makes its ATTITUDE from the same.
-    let rates = match [1, 2, 3].map(|field| said.fields.finite(field)) {
+    let rates = match [1, 2, 3].map(|field| sample.fields.finite(field)) {
         [Some(x), Some(y), Some(z)] => Some([x, y, z]),
         _ => px4.motion.rate,
     };
@@ -347,7 +202,7 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
         pitch: Radians(pitch),
         yaw: Radians(yaw),
         rates: rates.map(|rates| rates.map(RadiansPerSecond)),
-        boot_ms: Some((said.recorded_us / 1_000) as u32),
+        boot_ms: Some((sample.recorded_us / 1_000) as u32),
     }));
 }
 
@@ -355,22 +210,22 @@ fn attitude(px4: &mut Px4, said: &Said<'_>) {
 /// rate setpoints.
 const RATES_AGE_US: u64 = 500_000;
 
-fn attitude_setpoint(px4: &mut Px4, said: &Said<'_>) {
+fn attitude_setpoint(px4: &mut Px4, sample: &Sample<'_>) {
     let angles = || {
-        let [roll, pitch] = [said.fields.finite(1)?, said.fields.finite(2)?].map(Radians);
+        let [roll, pitch] = [sample.fields.finite(1)?, sample.fields.finite(2)?].map(Radians);
         Some(Wanted { roll, pitch, rates: None })
     };
-    let wanted = said.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
+    let wanted = sample.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
     if let Some(wanted) = wanted {
-        let fresh = |(us, _): &(u64, _)| said.recorded_us.abs_diff(*us) <= RATES_AGE_US;
+        let fresh = |(us, _): &(u64, _)| sample.recorded_us.abs_diff(*us) <= RATES_AGE_US;
         let rates = px4.motion.rates_wanted.filter(fresh);
         let rates = rates.map(|(_, about)| WantedRates { about, of: None });
         px4.observe(Observation::Wanted(Wanted { rates, ..wanted }));
     }
 }
 
-fn local_position(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn local_position(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let [x, y, z, vx, vy, vz] = [0, 1, 2, 3, 4, 5].map(|field| fields.finite(field));
     let altitude = match (fields.flag(6) && fields.flag(7), z, fields.finite(9)) {
         (true, Some(z), Some(reference)) => Some(reference - z),
@@ -403,8 +258,8 @@ fn local_position(px4: &mut Px4, said: &Said<'_>) {
 }
 
 /// `GLOBAL_POSITION_INT`, as in PX4's stream: heights are the local position's, if it has any.
-fn global_position(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn global_position(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let Some(altitude) = fields.finite(2) else { return };
     let local = px4.motion.local.unwrap_or(Local { z: None, velocity: [0.0; 3], altitude: None });
     let altitude = local.altitude.unwrap_or(altitude);
@@ -432,29 +287,29 @@ pub(super) fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Pos
 }
 
 /// Versions before the flag have a home as soon as there is one.
-fn home(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn home(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let valid = fields.get(2).is_none_or(|flag| flag != 0.0);
     px4.motion.home = valid.then(|| Home { altitude: fields.finite(0), z: fields.finite(1) });
 }
 
-fn airspeed_validated(px4: &mut Px4, said: &Said<'_>) {
+fn airspeed_validated(px4: &mut Px4, sample: &Sample<'_>) {
     px4.motion.airspeed_validated = true;
-    px4.motion.airspeed = said.fields.finite(0).or_else(|| said.fields.finite(1));
+    px4.motion.airspeed = sample.fields.finite(0).or_else(|| sample.fields.finite(1));
 }
 
 /// Before v1.10.
-fn airspeed(px4: &mut Px4, said: &Said<'_>) {
+fn airspeed(px4: &mut Px4, sample: &Sample<'_>) {
     if !px4.motion.airspeed_validated {
-        px4.motion.airspeed = said.fields.finite(0);
+        px4.motion.airspeed = sample.fields.finite(0);
     }
 }
 
 /// `ESTIMATOR_STATUS` of the estimator that flies. The compass has the test ratio of the heading since it has no own
 /// (v1.16).
-fn estimator_status(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
-    if said.instance != px4.motion.estimator {
+fn estimator_status(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
+    if sample.instance != px4.motion.estimator {
         return;
     }
     px4.motion.estimator_status = true;
@@ -477,13 +332,13 @@ fn estimator_status(px4: &mut Px4, said: &Said<'_>) {
 
 /// The same figures of a log without `estimator_status`, sensor by sensor: the largest counts, as PX4's estimator has it
 /// there. These are squares (innovation squared by its limit squared), and there they are not.
-fn test_ratios(px4: &mut Px4, said: &Said<'_>) {
-    if said.instance != px4.motion.estimator || px4.motion.estimator_status {
+fn test_ratios(px4: &mut Px4, sample: &Sample<'_>) {
+    if sample.instance != px4.motion.estimator || px4.motion.estimator_status {
         return;
     }
     let largest = |fields: std::ops::Range<usize>| {
         let elements =
-            fields.flat_map(|field| (0..3).filter_map(move |element| said.fields.element(field, element)));
+            fields.flat_map(|field| (0..3).filter_map(move |element| sample.fields.element(field, element)));
         let squares = elements.filter(|square| square.is_finite() && *square >= 0.0);
         squares.reduce(f64::max).map(|square| square.sqrt() as f32)
     };
@@ -498,21 +353,21 @@ fn test_ratios(px4: &mut Px4, said: &Said<'_>) {
 }
 
 /// `ESTIMATOR_STATUS_FLAGS` of a log without `estimator_status`, as far as known.
-fn estimator_flags(px4: &mut Px4, said: &Said<'_>) {
+fn estimator_flags(px4: &mut Px4, sample: &Sample<'_>) {
     const ATTITUDE: u16 = 1;
     const CONST_POS_MODE: u16 = 1 << 7;
     const GPS_GLITCH: u16 = 1 << 10;
     const ACCEL_ERROR: u16 = 1 << 11;
-    if said.instance == px4.motion.estimator {
+    if sample.instance == px4.motion.estimator {
         let bits = [ATTITUDE, CONST_POS_MODE, CONST_POS_MODE, GPS_GLITCH, ACCEL_ERROR];
-        let set = bits.into_iter().enumerate().filter(|(field, _)| said.fields.flag(*field));
+        let set = bits.into_iter().enumerate().filter(|(field, _)| sample.fields.flag(*field));
         px4.motion.estimator_flags = set.fold(0, |all, (_, bit)| all | bit);
     }
 }
 
 /// A missing or stopped motor has NaN or zero.
-fn motors(px4: &mut Px4, said: &Said<'_>) {
-    let given = (0..12).filter_map(|motor| said.fields.element(0, motor)).filter(|part| part.is_finite());
+fn motors(px4: &mut Px4, sample: &Sample<'_>) {
+    let given = (0..12).filter_map(|motor| sample.fields.element(0, motor)).filter(|part| part.is_finite());
     let running: Vec<f64> = given.filter(|part| *part > 0.0).collect();
     let sum: f64 = running.iter().sum();
     px4.motion.motors = Some((sum / running.len().max(1) as f64) as f32);
@@ -523,17 +378,17 @@ fn vibration(levels: [Option<f32>; 3], clips: [u32; 3]) -> Observation {
 }
 
 /// `VIBRATION`: the metrics of the accelerometer that flies, and the clipped samples of each.
-fn imu_status(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn imu_status(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     px4.motion.imu_status = true;
-    if let Some(clips) = px4.motion.clips.get_mut(usize::from(said.instance)) {
+    if let Some(clips) = px4.motion.clips.get_mut(usize::from(sample.instance)) {
         let sum: f64 = (0..3).filter_map(|axis| fields.element(5, axis)).sum();
         *clips = sum as u32;
     }
     let id = fields.count(0);
     // A log without the id of the one in use has one, or the first one is in use.
     let flies =
-        px4.motion.accelerometer.map_or(said.instance == 0, |accelerometer| id == Some(accelerometer));
+        px4.motion.accelerometer.map_or(sample.instance == 0, |accelerometer| id == Some(accelerometer));
     if flies {
         let level = |field| fields.finite(field).filter(|level| *level >= 0.0);
         let levels = [level(1).or_else(|| level(2)), level(3), level(4)];

@@ -5,66 +5,35 @@ use hums_core::observation::{
 };
 use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
-use super::state::{BATTERIES_MAX, MEDIUM_US, Pack, Px4, Said, Topic};
+use super::state::{BATTERIES_MAX, MEDIUM_US, Pack, Px4, Sample, Topic, topic};
 
-/// The names of one ESC's fields.
+/// The names of the fields of these ESCs.
 macro_rules! esc_fields {
-    ($($number:literal),*) => {
-        &["esc_count", $(
-            concat!("esc[", $number, "].esc_rpm"),
-            concat!("esc[", $number, "].esc_voltage"),
-            concat!("esc[", $number, "].esc_current"),
-            concat!("esc[", $number, "].esc_temperature"),
-            concat!("esc[", $number, "].esc_errorcount"),
-            concat!("esc[", $number, "].failures"),
-        )*]
+    ($($n:literal),*) => {
+        concat!("esc_count", $(" esc[", $n, "].esc_rpm esc[", $n, "].esc_voltage esc[", $n, "].esc_current esc[", $n,
+            "].esc_temperature esc[", $n, "].esc_errorcount esc[", $n, "].failures",)*)
     };
 }
 
 /// Fields of one ESC above.
 const ESC_FIELDS: usize = 6;
 
+/// Fields of `battery_status`.
+const BATTERY_STATUS: &str = "connected voltage_v voltage_filtered_v current_a current_filtered_a remaining discharged_mah \
+    temperature faults cell_count voltage_cell_v id warning";
+
+/// Fields of `esc_status`.
+const ESC_STATUS: &str = esc_fields!(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11);
+
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "battery_status",
-        instances: BATTERIES_MAX as u8,
-        every_us: MEDIUM_US,
-        fields: &[
-            "connected",
-            "voltage_v",
-            "voltage_filtered_v",
-            "current_a",
-            "current_filtered_a",
-            "remaining",
-            "discharged_mah",
-            "temperature",
-            "faults",
-            "cell_count",
-            "voltage_cell_v",
-            "id",
-            "warning",
-        ],
-        take: battery,
-    },
-    Topic { name: "cpuload", instances: 1, every_us: 0, fields: &["load"], take: load },
-    Topic {
-        name: "system_power",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["voltage5v_v", "voltage5V_v"],
-        take: rails,
-    },
-    Topic {
-        name: "esc_status",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: esc_fields!(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11),
-        take: escs,
-    },
+    topic("battery_status", BATTERIES_MAX as u8, MEDIUM_US, BATTERY_STATUS, battery),
+    topic("cpuload", 1, 0, "load", load),
+    topic("system_power", 1, MEDIUM_US, "voltage5v_v voltage5V_v", rails),
+    topic("esc_status", 1, MEDIUM_US, ESC_STATUS, escs),
 ];
 
-fn battery(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn battery(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     // Logs from before this field have a battery if its voltage is plausible.
     let connected = fields.get(0).map_or(fields.finite(1) > Some(0.1), |flag| flag != 0.0);
     let when = |value: Option<f32>| value.filter(|_| connected);
@@ -73,11 +42,11 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
         when(fields.finite(4).or_else(|| fields.finite(3))).filter(|amperes| (*amperes + 1.0).abs() > 1e-6);
     let remaining = when(fields.finite(5)).filter(|part| (0.0..=1.0).contains(part));
     let whole = when(fields.finite(1).or_else(|| fields.finite(2))).filter(|volts| *volts > 0.0);
-    let cells = cells(said).filter(|_| connected);
+    let cells = cells(sample).filter(|_| connected);
     let voltage = cells.map_or(whole, |cells| Some(cells.iter().flatten().map(|cell| cell.0).sum()));
     let battery = Battery {
         // PX4 counts from 1; versions without a number, and those that leave it at 0, have instances.
-        id: fields.byte(11).and_then(|id| id.checked_sub(1)).unwrap_or(said.instance),
+        id: fields.byte(11).and_then(|id| id.checked_sub(1)).unwrap_or(sample.instance),
         cells: cells
             .unwrap_or([None; CELLS_MAX])
             .map(|cell| cell.and_then(|volts| CellVoltage::from_millivolts((volts.0 * 1e3).round() as u16))),
@@ -93,7 +62,7 @@ fn battery(px4: &mut Px4, said: &Said<'_>) {
         ..Battery::default()
     };
     let voltage = when(fields.finite(2).or_else(|| fields.finite(1))).filter(|volts| *volts > 0.0).map(Volts);
-    if let Some(pack) = px4.power.batteries.get_mut(usize::from(said.instance)) {
+    if let Some(pack) = px4.power.batteries.get_mut(usize::from(sample.instance)) {
         let (current, remaining) =
             (battery.current, remaining.map(|part| Fraction((part * 100.0).ceil() / 100.0)));
         *pack = connected.then_some(Pack { voltage, current, remaining });
@@ -116,8 +85,8 @@ const fn charge(warning: Option<u8>) -> u8 {
 }
 
 /// The cells' voltages, if the battery measures them.
-fn cells(said: &Said<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
-    let fields = &said.fields;
+fn cells(sample: &Sample<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
+    let fields = &sample.fields;
     let count = fields.count(9).filter(|&count| count > 0)?;
     fields.element(10, 0).filter(|volts| *volts >= 0.0001)?;
     let mut cells = [None; CELLS_MAX];
@@ -127,9 +96,9 @@ fn cells(said: &Said<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
     Some(cells)
 }
 
-fn load(px4: &mut Px4, said: &Said<'_>) {
+fn load(px4: &mut Px4, sample: &Sample<'_>) {
     px4.power.has_load = true;
-    px4.power.load = said.fields.finite(0).filter(|load| (0.0..=1.0).contains(load));
+    px4.power.load = sample.fields.finite(0).filter(|load| (0.0..=1.0).contains(load));
     system_status(px4);
 }
 
@@ -148,20 +117,20 @@ fn system_status(px4: &mut Px4) {
 }
 
 /// The name of the rail has a capital letter before v1.12.
-fn rails(px4: &mut Px4, said: &Said<'_>) {
-    let vcc = said.fields.finite(0).or_else(|| said.fields.finite(1)).filter(|volts| *volts > 0.0);
+fn rails(px4: &mut Px4, sample: &Sample<'_>) {
+    let vcc = sample.fields.finite(0).or_else(|| sample.fields.finite(1)).filter(|volts| *volts > 0.0);
     // MAVLink has a servo rail; PX4's topic does not.
     px4.observe(Observation::Rails(Rails { vcc: vcc.map(Volts), servo: None }));
 }
 
 /// `ESC_STATUS` and `ESC_INFO` at once, in groups of four.
-fn escs(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn escs(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let count = (fields.count(0).unwrap_or(0) as usize).min(MOTORS_MAX);
     for first in (0..count).step_by(ESC_GROUP) {
         let mut group = EscGroup { first: first as u8, escs: [None; ESC_GROUP] };
         for (place, esc) in group.escs.iter_mut().enumerate().take(count - first) {
-            *esc = Some(one_esc(said, 1 + (first + place) * ESC_FIELDS));
+            *esc = Some(one_esc(sample, 1 + (first + place) * ESC_FIELDS));
         }
         px4.observe(Observation::Escs(group));
     }
@@ -175,8 +144,8 @@ fn celsius(temperature: f32) -> Celsius {
 }
 
 /// A place with zeros or NaN for speed, voltage and current has no ESC, or one without power.
-fn one_esc(said: &Said<'_>, at: usize) -> Esc {
-    let fields = &said.fields;
+fn one_esc(sample: &Sample<'_>, at: usize) -> Esc {
+    let fields = &sample.fields;
     let nothing = |value: Option<f32>| value.is_none_or(|value| value == 0.0);
     let (rpm, volts, amperes) = (fields.finite(at), fields.finite(at + 1), fields.finite(at + 2));
     let silent = nothing(rpm) && nothing(volts) && nothing(amperes);

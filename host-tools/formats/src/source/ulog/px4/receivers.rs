@@ -11,46 +11,20 @@ use hums_core::observation::{Gnss, GnssIntegrity, Observation};
 use hums_core::units::{Metres, MetresPerSecond, Radians};
 
 use super::motion::place;
-use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Said, Told, Topic};
+use super::state::{MEDIUM_US, Px4, RECEIVERS_MAX, Receivers, Report, Sample, Topic, topic};
 
 /// A receiver silent for longer is gone.
 const SILENCE: Span = Span::from_millis(2_500);
 /// A fix with a position: `FIX_TYPE_2D`.
 const FIX_2D: u8 = 2;
 
-const FIELDS: &[&str] = &[
-    "fix_type",
-    "satellites_used",
-    "hdop",
-    "eph",
-    "latitude_deg",
-    "longitude_deg",
-    "altitude_msl_m",
-    "lat",
-    "lon",
-    "alt",
-    "vel_m_s",
-    "time_utc_usec",
-    "jamming_state",
-    "spoofing_state",
-    "cog_rad",
-];
+/// Fields of both topics.
+const FIELDS: &str = "fix_type satellites_used hdop eph latitude_deg longitude_deg altitude_msl_m lat lon alt vel_m_s \
+    time_utc_usec jamming_state spoofing_state cog_rad";
 
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "sensor_gps",
-        instances: RECEIVERS_MAX as u8,
-        every_us: MEDIUM_US,
-        fields: FIELDS,
-        take: sensor,
-    },
-    Topic {
-        name: "vehicle_gps_position",
-        instances: RECEIVERS_MAX as u8,
-        every_us: MEDIUM_US,
-        fields: FIELDS,
-        take: used,
-    },
+    topic("sensor_gps", RECEIVERS_MAX as u8, MEDIUM_US, FIELDS, sensor),
+    topic("vehicle_gps_position", RECEIVERS_MAX as u8, MEDIUM_US, FIELDS, used),
 ];
 
 /// A silence counts only after a receiver's next message.
@@ -67,22 +41,22 @@ pub(super) fn silence(receivers: &Receivers, now: Instant, observe: &mut dyn FnM
     }
 }
 
-fn sensor(px4: &mut Px4, said: &Said<'_>) {
+fn sensor(px4: &mut Px4, sample: &Sample<'_>) {
     px4.receivers.sensors = true;
-    receiver(px4, said);
+    receiver(px4, sample);
 }
 
 /// The estimator's input: a receiver of its own before v1.12, and since then a sign of life of the first one.
-fn used(px4: &mut Px4, said: &Said<'_>) {
+fn used(px4: &mut Px4, sample: &Sample<'_>) {
     if !px4.receivers.sensors {
-        receiver(px4, said);
-    } else if said.instance == 0 && px4.receivers.heard[1].is_none() {
-        px4.receivers.heard[0] = Some(said.at);
+        receiver(px4, sample);
+    } else if sample.instance == 0 && px4.receivers.heard[1].is_none() {
+        px4.receivers.heard[0] = Some(sample.at);
     }
 }
 
-fn receiver(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn receiver(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let fix = fields.byte(0).unwrap_or(0);
     let has_position = fix >= FIX_2D;
     // Until v1.14 degrees times 1e7 and millimetres.
@@ -90,7 +64,7 @@ fn receiver(px4: &mut Px4, said: &Said<'_>) {
     let position = place(degrees(4, 7), degrees(5, 8));
     let altitude = fields.finite(6).or_else(|| fields.get(9).map(|millimetres| (millimetres / 1e3) as f32));
     px4.observe(Observation::Gnss(Gnss {
-        instance: said.instance,
+        instance: sample.instance,
         fix,
         satellites: fields.byte(1).filter(|&count| count < u8::MAX),
         // As MAVLink holds them: hundredths in 16 bits, millimetres; 0 is unknown.
@@ -104,27 +78,31 @@ fn receiver(px4: &mut Px4, said: &Said<'_>) {
         // The receiver's UTC: 0 if unknown.
         measured_ms: fields.count(11).and_then(|us| NonZeroU32::new((us / 1_000) as u32)),
     }));
-    if let Some(heard) = px4.receivers.heard.get_mut(usize::from(said.instance)) {
-        *heard = Some(said.at);
+    if let Some(heard) = px4.receivers.heard.get_mut(usize::from(sample.instance)) {
+        *heard = Some(sample.at);
     }
     // A state that is newer than our list is unknown.
     let state = |field| fields.byte(field).filter(|&state| state <= 3).unwrap_or(0);
     if fields.get(12).is_some() {
         let (jamming, spoofing) = (state(12), state(13));
-        px4.observe(Observation::GnssIntegrity(GnssIntegrity { instance: said.instance, jamming, spoofing }));
+        px4.observe(Observation::GnssIntegrity(GnssIntegrity {
+            instance: sample.instance,
+            jamming,
+            spoofing,
+        }));
     }
-    utc(px4, said);
+    utc(px4, sample);
 }
 
 /// UTC of the first receiver that has a fix, once.
-fn utc(px4: &mut Px4, said: &Said<'_>) {
+fn utc(px4: &mut Px4, sample: &Sample<'_>) {
     /// 2000 and 2200.
     const UTC_US: std::ops::Range<u64> = 946_684_800_000_000..7_258_118_400_000_000;
-    let (fix, utc_us) = (said.fields.byte(0).unwrap_or(0), said.fields.count(11).unwrap_or(0));
+    let (fix, utc_us) = (sample.fields.byte(0).unwrap_or(0), sample.fields.count(11).unwrap_or(0));
     if px4.receivers.told_utc || fix <= FIX_2D || !UTC_US.contains(&utc_us) {
         return;
     }
     px4.receivers.told_utc = true;
-    px4.system.utc(utc_us, said.recorded_us);
-    px4.told.push(Told::Utc { utc_us, recorded_us: said.recorded_us });
+    px4.system.utc(utc_us, sample.recorded_us);
+    px4.reports.push(Report::Utc { utc_us, recorded_us: sample.recorded_us });
 }

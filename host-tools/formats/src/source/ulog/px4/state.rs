@@ -14,14 +14,25 @@ pub(in crate::source::ulog) struct Topic {
     pub(in crate::source::ulog) instances: u8,
     /// The least time between two messages that serve, microseconds.
     pub(in crate::source::ulog) every_us: u64,
-    /// The fields that are needed, of all versions.
-    pub(in crate::source::ulog) fields: &'static [&'static str],
-    pub(in crate::source::ulog) take: fn(&mut Px4, &Said<'_>),
+    /// The fields that are needed, of all versions, with spaces between.
+    pub(in crate::source::ulog) fields: &'static str,
+    pub(in crate::source::ulog) take: fn(&mut Px4, &Sample<'_>),
+}
+
+/// A row of a table of topics.
+pub(super) const fn topic(
+    name: &'static str,
+    instances: u8,
+    every_us: u64,
+    fields: &'static str,
+    take: fn(&mut Px4, &Sample<'_>),
+) -> Topic {
+    Topic { name, instances, every_us, fields, take }
 }
 
 /// A message of a topic.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::source::ulog) struct Said<'a> {
+pub(in crate::source::ulog) struct Sample<'a> {
     pub(in crate::source::ulog) at: Instant,
     /// Microseconds since the autopilot's boot.
     pub(in crate::source::ulog) recorded_us: u64,
@@ -36,7 +47,7 @@ pub(in crate::source::ulog) const ARGUMENTS: usize = 8;
 
 /// An output of the mapping.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::source::ulog) enum Told {
+pub(in crate::source::ulog) enum Report {
     Observation(Observation),
     Text {
         severity: u8,
@@ -70,7 +81,7 @@ pub(super) const MEDIUM_US: u64 = 100_000;
 #[derive(Debug, Default)]
 pub(in crate::source::ulog) struct Px4 {
     /// Outputs of the last messages, to be handed on.
-    pub(in crate::source::ulog) told: Vec<Told>,
+    pub(in crate::source::ulog) reports: Vec<Report>,
     pub(super) system: System,
     pub(super) motion: Motion,
     pub(super) power: Power,
@@ -85,7 +96,7 @@ impl Px4 {
     }
 
     pub(super) fn observe(&mut self, observation: Observation) {
-        self.told.push(Told::Observation(observation));
+        self.reports.push(Report::Observation(observation));
     }
 }
 

@@ -6,170 +6,48 @@ use hums_core::observation::{
 };
 use hums_core::units::Rpm;
 
-use super::state::{MEDIUM_US, Px4, Said, Status, System, Told, Topic};
+use super::state::{MEDIUM_US, Px4, Report, Sample, Status, System, Topic, topic};
+
+/// Fields of `vehicle_status`.
+const VEHICLE_STATUS: &str = "arming_state nav_state failsafe system_type hil_state takeoff_time onboard_control_sensors_present \
+    onboard_control_sensors_enabled onboard_control_sensors_health calibration_enabled \
+    nav_state_user_intention";
+/// Fields of `actuator_armed`.
+const ACTUATOR_ARMED: &str = "armed lockdown kill termination manual_lockdown force_failsafe";
+/// Fields of `failsafe_flags`.
+const FAILSAFE_FLAGS: &str = "manual_control_signal_lost gcs_connection_lost offboard_control_signal_lost battery_warning \
+    battery_low_remaining_time battery_unhealthy geofence_breached mission_failure navigator_failure \
+    vtol_fixed_wing_system_failure wind_limit_exceeded flight_time_limit_exceeded attitude_invalid \
+    angular_velocity_invalid local_position_invalid global_position_invalid local_position_accuracy_low \
+    position_accuracy_low fd_critical_failure fd_motor_failure fd_esc_arming_failure fd_imbalanced_prop";
 
 pub(super) const TOPICS: &[Topic] = &[
-    Topic {
-        name: "vehicle_status",
-        instances: 1,
-        every_us: 0,
-        fields: &[
-            "arming_state",
-            "nav_state",
-            "failsafe",
-            "system_type",
-            "hil_state",
-            "takeoff_time",
-            "onboard_control_sensors_present",
-            "onboard_control_sensors_enabled",
-            "onboard_control_sensors_health",
-            "calibration_enabled",
-            "nav_state_user_intention",
-        ],
-        take: status,
-    },
-    Topic {
-        name: "actuator_armed",
-        instances: 1,
-        every_us: 0,
-        fields: &["armed", "lockdown", "kill", "termination", "manual_lockdown", "force_failsafe"],
-        take: armed,
-    },
-    Topic {
-        name: "vehicle_control_mode",
-        instances: 1,
-        every_us: 0,
-        fields: &["flag_control_auto_enabled"],
-        take: |px4, said| px4.system.auto = said.fields.flag(0),
-    },
-    Topic {
-        name: "position_setpoint_triplet",
-        instances: 1,
-        every_us: 0,
-        fields: &["current.valid", "current.type"],
-        take: |px4, said| px4.system.setpoint = said.fields.byte(1).filter(|_| said.fields.flag(0)),
-    },
-    Topic {
-        name: "failsafe_flags",
-        instances: 1,
-        every_us: 0,
-        fields: &[
-            "manual_control_signal_lost",
-            "gcs_connection_lost",
-            "offboard_control_signal_lost",
-            "battery_warning",
-            "battery_low_remaining_time",
-            "battery_unhealthy",
-            "geofence_breached",
-            "mission_failure",
-            "navigator_failure",
-            "vtol_fixed_wing_system_failure",
-            "wind_limit_exceeded",
-            "flight_time_limit_exceeded",
-            "attitude_invalid",
-            "angular_velocity_invalid",
-            "local_position_invalid",
-            "global_position_invalid",
-            "local_position_accuracy_low",
-            "position_accuracy_low",
-            "fd_critical_failure",
-            "fd_motor_failure",
-            "fd_esc_arming_failure",
-            "fd_imbalanced_prop",
-        ],
-        take: failsafe_flags,
-    },
-    Topic {
-        name: "vehicle_land_detected",
-        instances: 1,
-        every_us: 0,
-        fields: &["landed"],
-        take: land_detected,
-    },
-    Topic {
-        name: "input_rc",
-        instances: 1,
-        every_us: MEDIUM_US,
-        fields: &["rssi", "channel_count"],
-        take: rc,
-    },
-    Topic {
-        name: "radio_status",
-        instances: 1,
-        every_us: 0,
-        fields: &["rssi", "remote_rssi", "noise", "remote_noise", "rxerrors"],
-        take: radio,
-    },
-    Topic {
-        name: "telemetry_status",
-        instances: 4,
-        every_us: 0,
-        fields: &["rssi", "remote_rssi", "noise", "remote_noise", "rxerrors", "type"],
-        take: telemetry,
-    },
-    Topic {
-        name: "mission_result",
-        instances: 1,
-        every_us: 0,
-        fields: &["seq_current", "seq_reached"],
-        take: mission,
-    },
-    Topic {
-        name: "vehicle_command_ack",
-        instances: 4,
-        every_us: 0,
-        fields: &["command", "result"],
-        take: ack,
-    },
-    Topic {
-        name: "event",
-        instances: 1,
-        every_us: 0,
-        fields: &["id", "log_levels", "arguments"],
-        take: event,
-    },
-    Topic {
-        name: "log_message",
-        instances: 1,
-        every_us: 0,
-        fields: &["severity", "text"],
-        take: log_message,
-    },
-    Topic {
-        name: "rpm",
-        instances: 2,
-        every_us: MEDIUM_US,
-        fields: &["rpm_estimate", "indicated_frequency_rpm"],
-        take: rpm,
-    },
+    topic("vehicle_status", 1, 0, VEHICLE_STATUS, status),
+    topic("actuator_armed", 1, 0, ACTUATOR_ARMED, armed),
+    topic("vehicle_control_mode", 1, 0, "flag_control_auto_enabled", |px4, sample| {
+        px4.system.auto = sample.fields.flag(0);
+    }),
+    topic("position_setpoint_triplet", 1, 0, "current.valid current.type", |px4, sample| {
+        px4.system.setpoint = sample.fields.byte(1).filter(|_| sample.fields.flag(0));
+    }),
+    topic("failsafe_flags", 1, 0, FAILSAFE_FLAGS, failsafe_flags),
+    topic("vehicle_land_detected", 1, 0, "landed", land_detected),
+    topic("input_rc", 1, MEDIUM_US, "rssi channel_count", rc),
+    topic("radio_status", 1, 0, "rssi remote_rssi noise remote_noise rxerrors", radio),
+    topic("telemetry_status", 4, 0, "rssi remote_rssi noise remote_noise rxerrors type", telemetry),
+    topic("mission_result", 1, 0, "seq_current seq_reached", mission),
+    topic("vehicle_command_ack", 4, 0, "command result", ack),
+    topic("event", 1, 0, "id log_levels arguments", event),
+    topic("log_message", 1, 0, "severity text", log_message),
+    topic("rpm", 2, MEDIUM_US, "rpm_estimate indicated_frequency_rpm", rpm),
 ];
 
 /// The conditions of `failsafe_flags`, in the order of its fields above, for people. Flags of unused modes,
 /// and flags that only prevent arming, are left out.
-const FAILSAFES: [&str; 22] = [
-    "manual control",
-    "ground station",
-    "offboard control",
-    "battery",
-    "battery time",
-    "battery health",
-    "fence",
-    "mission",
-    "navigator",
-    "VTOL system",
-    "wind",
-    "flight time",
-    "attitude",
-    "angular velocity",
-    "local position",
-    "global position",
-    "position accuracy",
-    "position accuracy",
-    "attitude failure",
-    "motor failure",
-    "ESC",
-    "propeller",
-];
+const FAILSAFES: &str = "manual control,ground station,offboard control,battery,battery time,battery health,fence,\
+    mission,navigator,VTOL system,wind,flight time,attitude,angular velocity,local position,\
+    global position,position accuracy,position accuracy,attitude failure,motor failure,ESC,\
+    propeller";
 
 /// `ARMING_STATE_ARMED`: the same number in all versions; 1 is standby, later called disarmed.
 const ARMED: u8 = 2;
@@ -311,8 +189,14 @@ fn custom_mode(nav: u8) -> u32 {
     mode.map_or(0, |&(_, main, sub, _)| u32::from(main) << 16 | u32::from(sub) << 24)
 }
 
-fn status(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+/// The `nav_state` of a mode in `HEARTBEAT.custom_mode`. `PX4` sends manual flight for a termination too, and a landing for a descent.
+pub fn nav_state(mode: u32) -> Option<u8> {
+    let mut navs = MODES.iter().map(|(nav, ..)| *nav).filter(|nav| !matches!(nav, 8 | 9 | 12 | 13));
+    navs.find(|nav| mode != 0 && custom_mode(*nav) == mode)
+}
+
+fn status(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let bits = |field| Some(fields.count(field)? as u32);
     let sensors = || Some(Sensors::of(bits(6)?, bits(7)?, bits(8)?));
     let before = px4.system.status;
@@ -337,15 +221,15 @@ fn status(px4: &mut Px4, said: &Said<'_>) {
 }
 
 /// Since v1.14. These conditions also hold without an active failsafe, so they are reported only in failsafe.
-fn failsafe_flags(px4: &mut Px4, said: &Said<'_>) {
+fn failsafe_flags(px4: &mut Px4, sample: &Sample<'_>) {
     // `BATTERY_WARNING_CRITICAL`: a low battery alone is a warning.
     const BATTERY: &str = "battery";
     const OFFBOARD: &str = "offboard control";
     const CRITICAL: f64 = 2.0;
     let mut names: Vec<&str> = Vec::new();
-    for (field, name) in FAILSAFES.into_iter().enumerate() {
+    for (field, name) in FAILSAFES.split(',').enumerate() {
         let least = if name == BATTERY { CRITICAL } else { 1.0 };
-        let is_set = said.fields.get(field).is_some_and(|value| value >= least);
+        let is_set = sample.fields.get(field).is_some_and(|value| value >= least);
         // It is so on each vehicle that no other computer flies.
         let is_meant = name != OFFBOARD || px4.system.is_offboard();
         if is_set && is_meant && !names.contains(&name) {
@@ -356,30 +240,30 @@ fn failsafe_flags(px4: &mut Px4, said: &Said<'_>) {
     px4.failsafes();
 }
 
-fn armed(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn armed(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     // Lockdown is also how a simulation with hardware keeps its motors off.
     px4.system.stopped = fields.flag(1);
     px4.system.terminated = (2..=5).any(|field| fields.flag(field));
 }
 
-fn land_detected(px4: &mut Px4, said: &Said<'_>) {
+fn land_detected(px4: &mut Px4, sample: &Sample<'_>) {
     let before = px4.system.landed;
-    px4.system.landed = Some(said.fields.flag(0));
+    px4.system.landed = Some(sample.fields.flag(0));
     if before != px4.system.landed {
         px4.landed();
     }
 }
 
-fn rc(px4: &mut Px4, said: &Said<'_>) {
-    let none = said.fields.count(1) == Some(0);
-    let rssi = if none { Some(0) } else { said.fields.byte(0).filter(|&rssi| rssi < u8::MAX) };
+fn rc(px4: &mut Px4, sample: &Sample<'_>) {
+    let none = sample.fields.count(1) == Some(0);
+    let rssi = if none { Some(0) } else { sample.fields.byte(0).filter(|&rssi| rssi < u8::MAX) };
     px4.observe(Observation::RadioControl(RadioControl { rssi }));
 }
 
 /// A telemetry radio, from v1.9 on.
-fn radio(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn radio(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     let byte = |field| fields.byte(field).filter(|&value| value < u8::MAX);
     px4.observe(Observation::TelemetryRadio(TelemetryRadio {
         rssi: byte(0),
@@ -391,14 +275,14 @@ fn radio(px4: &mut Px4, said: &Said<'_>) {
 }
 
 /// Until v1.8 the radio is in `telemetry_status`, which every link has, also such without a radio.
-fn telemetry(px4: &mut Px4, said: &Said<'_>) {
-    if said.fields.byte(0).is_some_and(|rssi| rssi > 0) {
-        radio(px4, said);
+fn telemetry(px4: &mut Px4, sample: &Sample<'_>) {
+    if sample.fields.byte(0).is_some_and(|rssi| rssi > 0) {
+        radio(px4, sample);
     }
 }
 
-fn mission(px4: &mut Px4, said: &Said<'_>) {
-    let fields = &said.fields;
+fn mission(px4: &mut Px4, sample: &Sample<'_>) {
+    let fields = &sample.fields;
     if let Some(current) = fields.count(0) {
         px4.observe(Observation::MissionCurrent(current as u16));
     }
@@ -411,27 +295,27 @@ fn mission(px4: &mut Px4, said: &Said<'_>) {
     }
 }
 
-fn ack(px4: &mut Px4, said: &Said<'_>) {
-    let (command, result) = (said.fields.count(0).unwrap_or(0) as u16, said.fields.byte(1).unwrap_or(0));
+fn ack(px4: &mut Px4, sample: &Sample<'_>) {
+    let (command, result) = (sample.fields.count(0).unwrap_or(0) as u16, sample.fields.byte(1).unwrap_or(0));
     px4.observe(Observation::CommandAck(CommandAck { command, result, target: None }));
 }
 
 /// The lower half of the levels is for those outside, as `MAV_SEVERITY`; 8 and more are not for people.
-fn event(px4: &mut Px4, said: &Said<'_>) {
-    let severity = said.fields.byte(1).unwrap_or(0) & 0x0f;
-    if let Some(number) = said.fields.count(0)
+fn event(px4: &mut Px4, sample: &Sample<'_>) {
+    let severity = sample.fields.byte(1).unwrap_or(0) & 0x0f;
+    if let Some(number) = sample.fields.count(0)
         && severity < 8
     {
-        let argument = |at| said.fields.element(2, at).unwrap_or(0.0) as u8;
+        let argument = |at| sample.fields.element(2, at).unwrap_or(0.0) as u8;
         let arguments = std::array::from_fn(argument);
-        px4.told.push(Told::Event { number: number as u32, severity, arguments, is_old: said.is_old });
+        px4.reports.push(Report::Event { number: number as u32, severity, arguments, is_old: sample.is_old });
     }
 }
 
-fn log_message(px4: &mut Px4, said: &Said<'_>) {
-    if let Some(words) = said.fields.words(1) {
-        let severity = said.fields.byte(0).unwrap_or(6).min(7);
-        px4.told.push(Told::Text { severity, words: words.trim_end().to_owned() });
+fn log_message(px4: &mut Px4, sample: &Sample<'_>) {
+    if let Some(words) = sample.fields.words(1) {
+        let severity = sample.fields.byte(0).unwrap_or(6).min(7);
+        px4.reports.push(Report::Text { severity, words: words.trim_end().to_owned() });
     }
 }
 
@@ -444,9 +328,9 @@ pub fn mode_name(mode: u32) -> Option<&'static str> {
     flown.rev().find(|(_, of, part, _)| (*of, *part) == (main, sub)).map(|&(.., name)| name)
 }
 
-fn rpm(px4: &mut Px4, said: &Said<'_>) {
-    let Some(rpm) = said.fields.finite(0).or_else(|| said.fields.finite(1)) else { return };
-    let sensor = SpeedSensor { index: said.instance, rpm: Rpm(rpm) };
+fn rpm(px4: &mut Px4, sample: &Sample<'_>) {
+    let Some(rpm) = sample.fields.finite(0).or_else(|| sample.fields.finite(1)) else { return };
+    let sensor = SpeedSensor { index: sample.instance, rpm: Rpm(rpm) };
     px4.observe(Observation::SpeedSensors([Some(sensor), None]));
 }
 
@@ -458,7 +342,7 @@ impl Px4 {
             self.system.told_mode = Some(heartbeat.mode);
             let nav = self.system.status.map(|status| status.nav);
             let name = MODES.iter().find(|(number, ..)| Some(*number) == nav).map(|&(.., name)| name);
-            self.told.push(Told::Mode { number: heartbeat.mode, name });
+            self.reports.push(Report::Mode { number: heartbeat.mode, name });
         }
         if !self.system.told_identity && self.system.release != 0 {
             self.system.told_identity = true;
@@ -474,7 +358,7 @@ impl Px4 {
         let words = if in_failsafe { self.system.failsafes.as_str() } else { "" };
         if words != self.system.told_failsafes {
             words.clone_into(&mut self.system.told_failsafes);
-            self.told.push(Told::Failsafes(self.system.told_failsafes.clone()));
+            self.reports.push(Report::Failsafes(self.system.told_failsafes.clone()));
         }
     }
 

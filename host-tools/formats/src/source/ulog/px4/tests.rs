@@ -1,6 +1,6 @@
 //! Observations from topics of several versions.
 
-use crate::source::ulog::testing::{Read, Writer, read};
+use crate::source::ulog::tests::writer::{Read, Writer, read};
 
 const SECOND: u64 = 1_000_000;
 

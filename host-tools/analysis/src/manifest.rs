@@ -1,0 +1,137 @@
+//! The manifest of a reading: which files were read and made, by their SHA-256, and what was repaired or lost. One JSON file,
+//! so that others can prove later that they have the same files, with `sha256sum` or any other program.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context as _, Result};
+use serde::Serialize;
+
+use crate::ending::Ending;
+use crate::files::{Inputs, Output, digest, settle};
+use crate::hex::hex;
+use crate::output::{self, Schema};
+use crate::plural::count;
+use crate::printable::path as shown;
+use crate::soundness::Soundness;
+use crate::utc::iso8601;
+
+/// The object of a manifest.
+const SCHEMA: Schema = Schema::first("hums-manifest");
+
+/// A manifest in the making.
+#[derive(Debug, Default, Serialize)]
+pub struct Manifest {
+    /// This program and its commit.
+    program: &'static str,
+    made_utc: String,
+    inputs: Vec<FileJson>,
+    outputs: Vec<FileJson>,
+    logs: Vec<LogJson>,
+}
+
+/// A file and its content.
+#[derive(Debug, Serialize)]
+struct FileJson {
+    /// Its name, without this computer's folders above the folder that was named.
+    file: String,
+    bytes: u64,
+    sha256: String,
+}
+
+/// A log, and what it lacks.
+#[derive(Debug, Serialize)]
+struct LogJson {
+    name: String,
+    /// As its sectors name it, hexadecimal; `null` for other recordings.
+    session: Option<String>,
+    /// These are `null` for other recordings.
+    frames: Option<u64>,
+    gaps: Option<u64>,
+    frames_missing: Option<u64>,
+    sectors_rebuilt: Option<u64>,
+    /// In a word; empty if it is whole.
+    lacks: &'static str,
+    /// Why, and remarks, as sentences.
+    faults: Vec<String>,
+}
+
+impl Manifest {
+    /// Adds a log that was read, with the remarks on it. Recordings of other programs have no ending.
+    pub fn log(&mut self, name: &str, ending: Option<&Ending>, remarks: &[String]) {
+        let summary = ending.map(|ending| &ending.summary);
+        let faults = ending.map_or_else(Vec::new, Ending::faults);
+        self.logs.push(LogJson {
+            name: name.to_owned(),
+            session: summary.and_then(|summary| summary.session).map(|session| format!("{session:08x}")),
+            frames: summary.map(|summary| summary.frames),
+            gaps: summary.map(|summary| summary.gaps),
+            frames_missing: summary.map(|summary| summary.frames_missing),
+            sectors_rebuilt: ending.map(Ending::made_again),
+            lacks: ending.map_or("", |ending| Soundness::of(ending).words()),
+            faults: faults.into_iter().chain(remarks.iter().cloned()).collect(),
+        });
+    }
+
+    /// Hashes all files, tells people of them, and writes the manifest. Outputs may be folders.
+    ///
+    /// # Errors
+    /// A file cannot be read, or the manifest not be written.
+    pub fn write(
+        mut self,
+        program: &'static str,
+        to: &Path,
+        inputs: &BTreeSet<PathBuf>,
+        outputs: &[PathBuf],
+        refuse: &Inputs,
+    ) -> Result<()> {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        (self.program, self.made_utc) = (program, iso8601(since_1970.as_micros() as u64));
+        self.inputs = inputs.iter().map(|path| hashed(path, path.parent())).collect::<Result<_>>()?;
+        for output in outputs {
+            self.outputs.extend(below(output)?);
+        }
+        refuse.refuse(to)?;
+        let mut file = Output::create(to, refuse)?;
+        let text = output::json_text(SCHEMA, &self)?;
+        settle(file.write_all(text.as_bytes()), to)?;
+        file.finish()?;
+        output::aside(&format!(
+            "{}: SHA-256 of {} read and {} made",
+            shown(to),
+            count(self.inputs.len() as u64, "file"),
+            count(self.outputs.len() as u64, "file")
+        ));
+        Ok(())
+    }
+}
+
+/// All files below a folder, or the file itself, in the order of their names.
+fn below(output: &Path) -> Result<Vec<FileJson>> {
+    let mut files = Vec::new();
+    let mut waiting = vec![output.to_owned()];
+    while let Some(path) = waiting.pop() {
+        if path.is_dir() {
+            let context = || format!("{}: cannot be read", path.display());
+            for entry in path.read_dir().with_context(context)? {
+                waiting.push(entry.with_context(context)?.path());
+            }
+        } else {
+            files.push(hashed(&path, output.parent())?);
+        }
+    }
+    files.sort_by(|one, other| one.file.cmp(&other.file));
+    Ok(files)
+}
+
+/// A file's content, named from this folder on.
+fn hashed(path: &Path, from: Option<&Path>) -> Result<FileJson> {
+    let context = || format!("{}: cannot be read", path.display());
+    let bytes = fs::metadata(path).with_context(context)?.len();
+    let digest = digest(path).with_context(context)?;
+    let name = from.and_then(|from| path.strip_prefix(from).ok()).unwrap_or(path);
+    Ok(FileJson { file: name.display().to_string(), bytes, sha256: hex(&digest) })
+}

@@ -1,0 +1,155 @@
+//! The checker of the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log. If the recorder ran
+//! no checks, also `HUMS_FINDING` with the findings of this program. So an empty table of findings means a
+//! checked log.
+
+use hums_core::clock::Instant;
+use hums_core::health::Level;
+
+use super::row::{Cell, CellType, Row};
+use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
+use crate::source::told::Finding;
+
+/// Word for the monitor on board, as `checked_by` in `hums info --json`.
+pub const BOARD: &str = "board";
+/// Word for this program.
+const HUMS: &str = "hums";
+/// Word if nothing could be judged.
+const NOBODY: &str = "nobody";
+
+/// This program's findings in a recording whose recorder ran no checks.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    by: &'static str,
+    verdict: &'static str,
+    findings: Vec<Finding>,
+    count: u64,
+    judged: u64,
+    not_judged: u64,
+    is_timeless: bool,
+}
+
+impl Checked {
+    /// From a judged recording; `None` if the monitor on board checked it.
+    pub fn new(judged: Judged) -> Option<Self> {
+        if judged.by == JudgedBy::Board {
+            return None;
+        }
+        let (by, verdict) = (if judged.worst().is_some() { HUMS } else { NOBODY }, judged.verdict());
+        let Judged { findings, findings_count: count, judged, not_judged, is_timeless, .. } = judged;
+        let (judged, not_judged) = (judged.len() as u64, not_judged.len() as u64);
+        Some(Self { by, verdict, findings, count, judged, not_judged, is_timeless })
+    }
+
+    /// The reason for missing findings, as a part of a sentence; `None` if it was checked.
+    pub fn not_checked(&self) -> Option<&'static str> {
+        let why = if self.is_timeless {
+            "not checked: it has no times"
+        } else {
+            "not checked: no autopilot was heard in it"
+        };
+        (self.by == NOBODY).then_some(why)
+    }
+
+    /// Its findings, each with its row.
+    pub fn findings(&self) -> impl Iterator<Item = (&Finding, Row)> {
+        self.findings.iter().map(|finding| (finding, finding_row(finding, self.by)))
+    }
+
+    /// The row of the log; for a part of it, of the findings in that part.
+    pub fn row(&self, part: Option<&dyn Fn(Instant) -> bool>) -> Row {
+        let (verdict, findings) = match part.filter(|_| self.by == HUMS) {
+            None => (self.verdict, self.count),
+            Some(is_wanted) => {
+                let mut part = OnBoard::default();
+                let wanted = self.findings.iter().filter(|finding| is_wanted(finding.at));
+                wanted.for_each(|finding| part.add(finding.level));
+                // That too little was judged is so of every part.
+                let is_judged = part.verdict() != Level::Ok.name() || self.verdict != TOO_LITTLE;
+                (if is_judged { part.verdict() } else { TOO_LITTLE }, part.count)
+            }
+        };
+        let number = |count| Cell::Count(count);
+        row(self.by, verdict, findings, number(self.judged), number(self.not_judged))
+    }
+}
+
+/// The findings of a log's own monitor, or of a part of a log, counted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OnBoard {
+    count: u64,
+    /// The worst level, by its number; a stopped input does not count.
+    worst: u8,
+}
+
+impl OnBoard {
+    /// One more.
+    pub fn add(&mut self, level: Level) {
+        self.count += 1;
+        if level != Level::Stale {
+            self.worst = self.worst.max(level as u8);
+        }
+    }
+
+    /// Those of the next group.
+    pub fn and(&mut self, next: Self) {
+        self.count += next.count;
+        self.worst = self.worst.max(next.worst);
+    }
+
+    /// The worst level, as in `hums check`: advisories are not problems.
+    fn verdict(self) -> &'static str {
+        match Level::ALL.get(usize::from(self.worst)) {
+            Some(level @ (Level::Warning | Level::Critical)) => level.name(),
+            _ => Level::Ok.name(),
+        }
+    }
+
+    /// The row of the log. The record does not name the checks that its monitor could not judge.
+    pub fn row(&self) -> Row {
+        let unknown = || Cell::Unknown(CellType::Count);
+        row(BOARD, self.verdict(), self.count, unknown(), unknown())
+    }
+}
+
+fn row(by: &str, verdict: &str, findings: u64, judged: Cell, not_judged: Cell) -> Row {
+    Row::new(
+        "HUMS_CHECKED",
+        vec![
+            ("checked_by", Cell::Text(by.to_owned())),
+            ("verdict", Cell::Text(verdict.to_owned())),
+            ("findings", Cell::Count(findings)),
+            ("judged", judged),
+            ("not_judged", not_judged),
+        ],
+    )
+}
+
+/// A finding, and who found it.
+pub fn finding_row(finding: &Finding, by: &str) -> Row {
+    let text = |text: &str| Cell::Text(text.to_owned());
+    Row::new(
+        "HUMS_FINDING",
+        vec![
+            ("at[s]", Cell::Time(finding.at)),
+            ("subsystem", text(finding.subsystem.name())),
+            ("check", text(&finding.check)),
+            ("instance", Cell::Count(finding.instance.into())),
+            ("level", text(finding.level.name())),
+            ("previous", text(finding.previous.name())),
+            ("value", Cell::Single(finding.value)),
+            ("limit", Cell::Single(finding.limit)),
+            ("unit", text(&finding.unit)),
+            ("checked_by", text(by)),
+        ],
+    )
+}
+
+/// A finding in words: `cell_voltage 1 critical: 3.4 V (limit 3.5 V)`.
+pub fn finding_words(finding: &Finding) -> String {
+    let Finding { check, instance, level, value, limit, unit, .. } = finding;
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let number = |number: f32| format!("{}{unit}", (f64::from(number) * 1000.0).round() / 1000.0);
+    let value = if value.is_nan() { String::new() } else { format!(": {}", number(*value)) };
+    let limit = if limit.is_nan() { String::new() } else { format!(" (limit {})", number(*limit)) };
+    format!("{check} {} {}{value}{limit}", u32::from(*instance) + 1, level.name())
+}

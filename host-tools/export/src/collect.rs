@@ -1,0 +1,116 @@
+//! A group's entries, encoded in each requested format by many threads at once.
+
+use hums_blackbox::{Gap, Record};
+use hums_core::clock::Instant;
+use hums_link as link;
+
+use super::checked::OnBoard;
+use super::context::Context;
+use super::format::{Entry, Part};
+use super::record::{gap_row, rows};
+use super::row::Row;
+use super::story::{Observed, Said, Story};
+use crate::mavlink::frame::{Peek, peek};
+use crate::mavlink::values::Payload;
+use crate::source::item::Item;
+use crate::source::parts::Collect;
+use crate::source::told::Finding;
+
+/// One group in each format.
+pub struct Collected<'a> {
+    context: &'a Context,
+    /// By format.
+    pub parts: Vec<Box<dyn Part>>,
+    /// For outputs that are made in order.
+    pub story: Story,
+    /// Frames written.
+    pub frames: u64,
+    /// Records written.
+    pub records: u64,
+    /// Findings of the log's own monitor, wanted or not.
+    pub on_board: OnBoard,
+    /// Rows of tables without room for their names.
+    pub rows_left_out: u64,
+}
+
+impl<'a> Collected<'a> {
+    /// Empty.
+    pub fn new(context: &'a Context) -> Self {
+        Self {
+            context,
+            parts: context.formats.parts(),
+            story: Story::default(),
+            frames: 0,
+            records: 0,
+            on_board: OnBoard::default(),
+            rows_left_out: 0,
+        }
+    }
+
+    fn frame(&mut self, at: Instant, frame: &link::Frame<'_>) {
+        let (bytes, verified) = (frame.bytes(), frame.check() == link::Check::Verified);
+        let Peek::Frame(frame) = peek(bytes) else { return };
+        if !self.context.selection.has_id(frame.id) {
+            return;
+        }
+        self.frames += 1;
+        let known =
+            if verified { frame.message().map(|message| Payload::new(message, frame.payload)) } else { None };
+        let utc_us = self.context.epochs.utc_us(at);
+        let entry = Entry { at, utc_us, frame: &frame, known: known.as_ref() };
+        self.parts.iter_mut().for_each(|part| part.frame(self.context, &entry));
+    }
+
+    /// Adds rows of the monitor's own.
+    pub fn rows(&mut self, at: Instant, rows: &[Row]) {
+        for row in rows {
+            self.records += 1;
+            self.parts.iter_mut().for_each(|part| part.row(self.context, at, row));
+        }
+    }
+
+    /// Adds a finding, besides its row.
+    pub fn finding(&mut self, finding: &Finding) {
+        self.parts.iter_mut().for_each(|part| part.finding(self.context, finding));
+    }
+
+    /// Adds a gap.
+    pub fn gap(&mut self, gap: &Gap) {
+        let from = gap.from.unwrap_or(Instant::ZERO);
+        if self.context.selection.overlaps(gap, &self.context.epochs) {
+            self.rows(from, &[gap_row(gap)]);
+        }
+    }
+}
+
+impl Collect for Collected<'_> {
+    fn item(&mut self, at: Instant, item: Item<'_>) {
+        // Always: later items depend on the vehicle's earlier state.
+        if let Item::Observation(source, observation) = item {
+            self.story.observed.push(Observed { at, source, observation: *observation });
+        }
+        if !self.context.selection.has_time(at, &self.context.epochs) {
+            return;
+        }
+        match item {
+            Item::Frame(frame) => self.frame(at, frame),
+            Item::Row(row) => match self.context.tables.row(row) {
+                Some(row) => self.rows(at, &[row]),
+                None => self.rows_left_out += 1,
+            },
+            Item::Record(record) => {
+                if let Record::Finding(finding) = record {
+                    self.on_board.add(finding.level);
+                    self.finding(&Finding::from(finding));
+                }
+                self.rows(at, &rows(record));
+            }
+            item => self.story.said.extend(Said::of(at, &item)),
+        }
+    }
+
+    fn held_bytes(&self) -> usize {
+        let parts = self.parts.iter().map(|part| part.held_bytes()).sum::<usize>();
+        parts + self.story.held_bytes()
+    }
+}

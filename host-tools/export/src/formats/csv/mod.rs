@@ -1,0 +1,151 @@
+//! A table for each message type and each record, and for gaps: one file a table.
+
+mod tables;
+mod unknown;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use hums_core::clock::Instant;
+
+use crate::context::Context;
+use crate::files::Folder;
+use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
+use crate::hex::push_hex;
+use crate::made::OutputFile;
+use crate::row::Row;
+use crate::story::Story;
+use crate::table::Table;
+use crate::text::{push_csv_cells, push_integer};
+use crate::utc::{push_iso8601, push_seconds};
+use tables::{Tables, UNKNOWN_TABLES_MAX};
+use unknown::UnknownLines;
+
+/// The open tables.
+pub(super) struct Csv {
+    dir: PathBuf,
+    tables: Tables,
+}
+
+/// Lines of each table.
+#[derive(Default)]
+pub(super) struct Lines {
+    tables: BTreeMap<Table, Vec<u8>>,
+    /// Lines of frames that we have no definition of.
+    unknown: UnknownLines,
+    /// A header for each table of the monitor's own.
+    headers: BTreeMap<&'static str, Vec<&'static str>>,
+    /// Bytes in `tables`, with the tables' own memory.
+    tables_bytes: usize,
+}
+
+/// A table with its first buffer, in a tree.
+const TABLE_BYTES: usize = 256;
+
+impl Lines {
+    /// Adds a line to a table.
+    fn line(&mut self, table: Table, write: impl FnOnce(&mut Vec<u8>)) {
+        let out = self.tables.entry(table).or_default();
+        let before = table_bytes(out);
+        write(out);
+        out.push(b'\n');
+        self.tables_bytes += table_bytes(out) - before;
+    }
+}
+
+impl Part for Lines {
+    fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
+        let Entry { frame, known, .. } = entry;
+        let head = |out: &mut Vec<u8>| {
+            push_times(out, entry.at, entry.utc_us);
+            for number in [frame.system, frame.component] {
+                out.push(b',');
+                push_integer(out, u64::from(number));
+            }
+        };
+        let opaque = |out: &mut Vec<u8>| {
+            out.push(b',');
+            push_integer(out, u64::from(frame.sequence));
+            out.push(b',');
+            push_hex(out, frame.payload);
+        };
+        let table = Table::of(frame, known.is_some());
+        if matches!(table, Table::Unknown(_)) {
+            self.unknown.push(frame.id, head, opaque);
+            return;
+        }
+        self.line(table, |out| {
+            head(out);
+            match known {
+                Some(payload) => push_csv_cells(out, payload),
+                None => opaque(out),
+            }
+        });
+    }
+
+    fn row(&mut self, context: &Context, at: Instant, row: &Row) {
+        self.headers.entry(row.table).or_insert_with(|| row.cells.iter().map(|(name, _)| *name).collect());
+        self.line(Table::Hums(row.table), |out| {
+            push_times(out, at, context.epochs.utc_us(at));
+            for (_, cell) in &row.cells {
+                out.push(b',');
+                cell.push_csv(out);
+            }
+        });
+    }
+
+    fn held_bytes(&self) -> usize {
+        // Twice, because it is also split by tables.
+        self.tables_bytes + 2 * self.unknown.held_bytes()
+    }
+}
+
+impl Writer for Csv {
+    const ABOUT: About = About::new(
+        "csv",
+        "A table for each type of message, units in the header, for spreadsheets and scripts",
+        Files::Tables(None, "csv"),
+    );
+    type Part = Lines;
+
+    fn open(context: &Context, path: &Path) -> Result<Self> {
+        let folder = Folder::create(path, &context.inputs, &context.session)?;
+        Ok(Self { dir: path.to_owned(), tables: Tables::new(folder) })
+    }
+
+    fn part(&mut self, _: &Context, part: Lines, _: &Story) -> Result<()> {
+        self.tables.headers(&part.headers);
+        for (table, lines) in &part.tables {
+            self.tables.put(*table, lines)?;
+        }
+        self.tables.put_unknown(&part.unknown)
+    }
+
+    fn finish(self, _: &Context, totals: Totals) -> Result<Finished> {
+        let (tables, shared) = (self.tables.count(), self.tables.has_shared());
+        self.tables.finish()?;
+        let mut made = vec![totals.of_tables(self.dir.clone(), "csv", tables)];
+        if shared {
+            let words = format!(
+                "the messages without a definition beyond the first {UNKNOWN_TABLES_MAX}, with their ids in a column"
+            );
+            made.push(OutputFile::with_words(self.dir.join("UNKNOWN.csv"), "csv", words));
+        }
+        Ok(Finished { made, remarks: Vec::new() })
+    }
+}
+
+/// Memory of a table's lines; 0 before the first one.
+fn table_bytes(lines: &[u8]) -> usize {
+    if lines.is_empty() { 0 } else { TABLE_BYTES + lines.len() }
+}
+
+/// The first two cells of every row.
+fn push_times(out: &mut Vec<u8>, at: Instant, utc_us: Option<u64>) {
+    push_seconds(out, at.as_micros());
+    out.push(b',');
+    if let Some(utc_us) = utc_us {
+        push_iso8601(out, utc_us);
+    }
+}

@@ -1,0 +1,411 @@
+//! Typed columns for the tools that read a whole fleet as one table: `DuckDB`, Spark, `DataFusion`, pandas.
+//!
+//! ```text
+//! OUT/vehicle=uid-0031002a3035510a/date=2026-11-21/session=s1a2b3c4d/ATTITUDE.parquet
+//! ```
+//!
+//! One file for each message type and for each table of the monitor's own, in a path that identifies the
+//! session. These tools read `vehicle`, `date` and `session` as columns. Columns keep the sent type (arrays
+//! are lists, `char` arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table
+//! begins with `boot_s`, seconds since the monitor's power-on, and `utc`, null if unknown. Tables of frames
+//! go on with `system` and `component`.
+//!
+//! Memory is bounded. Rows wait as plain columns, 12 MiB in all; then the largest tables become row groups
+//! and are written. So an encoder, which costs far more than its rows, is open only for one row group. An
+//! open file takes memory for each of its columns, and for the description of its row groups, which is
+//! written at its end. The memory of open files is limited too: beyond the limit the largest are closed, and
+//! their tables go on in `ATTITUDE.2.parquet`. That happens in a session of days, and in a log of thousands
+//! of tables.
+
+mod batches;
+mod columns;
+
+#[cfg(test)]
+pub(crate) use columns::TAKEN_FRAMES;
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use hums_core::clock::Instant;
+use parquet::basic::{Compression, Repetition};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+
+use crate::context::Context;
+use crate::files::{Folder, FolderFile, cannot_write};
+use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
+use crate::logs::in_order::{in_order, workers};
+use crate::row::Row;
+use crate::story::Story;
+use crate::table::Table;
+use batches::{Batches, TimedRow};
+use columns::{Column, TableRows};
+
+/// Memory limits: some 55 MiB with the reading.
+const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
+/// Number of rows in a row group: a good size for one read of an engine.
+const GROUP_ROWS: usize = 128 * 1024;
+/// Bytes of a page and of a column's dictionary at most.
+const PAGE_BYTES: usize = 32 * 1024;
+/// Columns of texts of a table at most that have a dictionary: it takes 73 kB of each.
+const DICTIONARIES_MAX: usize = 32;
+/// Memory of an open file: its buffer, and its writer.
+const OPEN_FILE_BYTES: usize = 10 << 10;
+/// Memory of each of its columns in its schema.
+const OPEN_COLUMN_BYTES: usize = 1_000;
+/// Memory of each column of a written row group.
+const CHUNK_BYTES: usize = 800;
+/// Tables that are written before it is looked at how many are open.
+const AT_ONCE: usize = 16;
+
+/// Memory limits for all tables of one session.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Bytes of columns that wait to be encoded.
+    pending_bytes: usize,
+    /// Bytes of files that are open.
+    open_bytes: usize,
+}
+
+/// The tables of one session, open.
+struct ParquetTables {
+    folder: Folder,
+    limits: Limits,
+    properties: Properties,
+    tables: BTreeMap<Table, TableFile>,
+}
+
+/// Properties of the writer, and the session's metadata for each file.
+struct Properties {
+    writer: WriterPropertiesBuilder,
+    about: Vec<KeyValue>,
+}
+
+/// A table: the rows that wait, and its file while that is open.
+struct TableFile {
+    table: Table,
+    columns: TableRows,
+    /// Memory of its waiting rows.
+    pending_bytes: usize,
+    open: Option<Open>,
+    /// Files of it so far.
+    parts: u32,
+}
+
+/// A file that is written.
+struct Open {
+    path: PathBuf,
+    writer: SerializedFileWriter<FolderFile>,
+    /// Its memory.
+    bytes: usize,
+}
+
+impl ParquetTables {
+    /// Tables in a folder; `about` goes into each file's metadata.
+    fn new(folder: Folder, about: &[(&str, String)]) -> Self {
+        let about =
+            about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
+        let writer = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_data_page_size_limit(PAGE_BYTES)
+            .set_dictionary_page_size_limit(PAGE_BYTES)
+            .set_dictionary_enabled(false)
+            // Metadata of each page would be kept until the file's end.
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true)
+            .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned());
+        Self { folder, limits: LIMITS, properties: Properties { writer, about }, tables: BTreeMap::new() }
+    }
+
+    /// Takes a group's columns.
+    fn put(&mut self, batches: Batches) -> Result<()> {
+        let (frames, rows) = batches.parts();
+        for (table, columns) in frames {
+            let new = || TableFile::new(table, TableRows::of_frames(table));
+            self.tables.entry(table).or_insert_with(new).frames(columns)?;
+        }
+        for (name, rows) in rows {
+            let Some((_, _, first)) = rows.first() else { continue };
+            let table = Table::Hums(name);
+            let new = || TableFile::new(table, TableRows::of_rows(first));
+            self.tables.entry(table).or_insert_with(new).rows(&rows)?;
+        }
+        let Self { folder, properties, tables, .. } = self;
+        for file in tables.values_mut().filter(|file| file.columns.rows() >= GROUP_ROWS) {
+            file.write_group(folder, properties)?;
+        }
+        let pending_bytes: usize = self.tables.values().map(|table| table.pending_bytes).sum();
+        if pending_bytes > self.limits.pending_bytes {
+            self.write_largest(pending_bytes / 2)?;
+        }
+        Ok(())
+    }
+
+    /// Makes room: writes this many waiting bytes, in as few row groups as possible.
+    fn write_largest(&mut self, bytes: usize) -> Result<()> {
+        let mut sizes: Vec<_> =
+            self.tables.iter().map(|(table, file)| (Reverse(file.pending_bytes), *table)).collect();
+        sizes.sort_unstable();
+        let mut written = 0;
+        let enough = sizes.iter().position(|(Reverse(size), _)| {
+            written += size;
+            written >= bytes
+        });
+        sizes.truncate(enough.map_or(sizes.len(), |last| last + 1));
+        for few in sizes.chunks(AT_ONCE) {
+            let Self { folder, properties, tables, .. } = self;
+            let is_one = |table: &Table| few.iter().any(|(_, few)| few == table);
+            let mut few = tables.iter_mut().filter(|(table, _)| is_one(table));
+            let write = |(_, file): (&Table, &mut TableFile)| file.write_group(folder, properties);
+            in_order(workers(), AT_ONCE, || Ok(few.next()), write, |written| written)?;
+            self.close_largest()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the files that take the most, if all together take too much: their tables go on in further ones.
+    fn close_largest(&mut self) -> Result<()> {
+        let mut open: Vec<&mut TableFile> =
+            self.tables.values_mut().filter(|table| table.open.is_some()).collect();
+        let mut bytes: usize = open.iter().map(|table| table.open_bytes()).sum();
+        open.sort_unstable_by_key(|table| Reverse(table.open_bytes()));
+        for table in open {
+            if bytes <= self.limits.open_bytes {
+                break;
+            }
+            bytes -= table.open_bytes();
+            table.end_file()?;
+        }
+        Ok(())
+    }
+
+    /// Writes the rest, and each file's end: the folder gets its name. Returns it and the number of tables.
+    fn finish(mut self) -> Result<(PathBuf, usize)> {
+        let count = self.tables.len();
+        let (folder, properties) = (&self.folder, &self.properties);
+        let mut tables = std::mem::take(&mut self.tables).into_values();
+        let write = |mut table: TableFile| {
+            table.write_group(folder, properties)?;
+            table.end_file()
+        };
+        in_order(workers(), AT_ONCE, || Ok(tables.next()), write, |written| written)?;
+        let path = self.folder.path().to_owned();
+        self.folder.finish()?;
+        Ok((path, count))
+    }
+}
+
+impl Part for Batches {
+    fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
+        Self::frame(self, entry.at, entry.utc_us, entry.frame, entry.known);
+    }
+
+    fn row(&mut self, context: &Context, at: Instant, row: &Row) {
+        Self::row(self, at, context.epochs.utc_us(at), row);
+    }
+
+    fn held_bytes(&self) -> usize {
+        Self::held_bytes(self)
+    }
+}
+
+/// The tables of a log.
+pub(super) struct Parquet(ParquetTables);
+
+impl Writer for Parquet {
+    const ABOUT: About = About {
+        needs_identity: true,
+        ..About::new(
+            "parquet",
+            "Typed columns by vehicle, date and session, for DuckDB, Spark, pandas",
+            Files::Partition("parquet"),
+        )
+    };
+    type Part = Batches;
+
+    fn open(context: &Context, path: &Path) -> Result<Self> {
+        let identity = &context.identity;
+        let about = [("hums.vehicle", identity.vehicle.clone()), ("hums.session", identity.session.clone())];
+        Ok(Self(ParquetTables::new(Folder::create(path, &context.inputs, &context.session)?, &about)))
+    }
+
+    fn part(&mut self, _: &Context, part: Batches, _: &Story) -> Result<()> {
+        self.0.put(part)
+    }
+
+    fn finish(self, _: &Context, totals: Totals) -> Result<Finished> {
+        let (dir, tables) = self.0.finish()?;
+        Ok(totals.of_tables(dir, "parquet", tables).into())
+    }
+}
+
+/// The name of a table's `part`th file, from 1: `ATTITUDE.*parquet` is all of them.
+fn file_name(table: Table, part: u32) -> String {
+    match part {
+        ..=1 => format!("{}.parquet", table.name()),
+        part => format!("{}.{part}.parquet", table.name()),
+    }
+}
+
+impl Open {
+    fn new(folder: &Folder, name: &str, columns: &[Column], properties: &Properties) -> Result<Self> {
+        let path = folder.path().join(name);
+        // Files of numbers are a sixth smaller without a dictionary; texts gain by it.
+        let texts = columns.iter().filter_map(Column::text_name).take(DICTIONARIES_MAX);
+        let writer = texts.fold(properties.writer.clone(), |writer, name| {
+            writer.set_column_dictionary_enabled(vec![name.to_owned()].into(), true)
+        });
+        let about = columns.iter().flat_map(Column::about);
+        let about = about.map(|(name, value)| KeyValue::new(name, value.to_owned()));
+        let writer =
+            writer.set_key_value_metadata(Some(properties.about.iter().cloned().chain(about).collect()));
+        let types: parquet::errors::Result<Vec<_>> =
+            columns.iter().map(|column| column.parquet_type().map(Arc::new)).collect();
+        let schema = types.and_then(|types| {
+            Type::group_type_builder("hums").with_repetition(Repetition::REQUIRED).with_fields(types).build()
+        });
+        let file = folder.file(name)?;
+        let writer = schema
+            .and_then(|schema| SerializedFileWriter::new(file, Arc::new(schema), Arc::new(writer.build())))
+            .with_context(|| cannot_write(&path))?;
+        let bytes = OPEN_FILE_BYTES + OPEN_COLUMN_BYTES * columns.len();
+        Ok(Self { path, writer, bytes })
+    }
+
+    fn write(&mut self, columns: &[Column]) -> parquet::errors::Result<()> {
+        let mut group = self.writer.next_row_group()?;
+        for column in columns {
+            if let Some(mut writer) = group.next_column()? {
+                column.write(&mut writer)?;
+                writer.close()?;
+            }
+        }
+        group.close()?;
+        self.bytes += CHUNK_BYTES * columns.len();
+        Ok(())
+    }
+}
+
+impl TableFile {
+    fn new(table: Table, columns: TableRows) -> Self {
+        Self { table, columns, pending_bytes: 0, open: None, parts: 0 }
+    }
+
+    fn frames(&mut self, columns: TableRows) -> Result<()> {
+        self.check(true)?;
+        self.columns.append(columns);
+        self.pending_bytes = self.columns.held_bytes();
+        Ok(())
+    }
+
+    fn rows(&mut self, rows: &[TimedRow]) -> Result<()> {
+        self.check(false)?;
+        for (at, utc_us, row) in rows {
+            self.columns.row(*at, *utc_us, row);
+        }
+        self.pending_bytes = self.columns.held_bytes();
+        Ok(())
+    }
+
+    fn check(&self, has_frames: bool) -> Result<()> {
+        if self.columns.has_frames() != has_frames {
+            bail!("{}: is the name of two tables of different columns", self.table.name())
+        }
+        Ok(())
+    }
+
+    /// Memory of its open file.
+    fn open_bytes(&self) -> usize {
+        self.open.as_ref().map_or(0, |open| open.bytes)
+    }
+
+    /// Writes the waiting rows as a row group.
+    fn write_group(&mut self, folder: &Folder, properties: &Properties) -> Result<()> {
+        if self.columns.rows() == 0 {
+            return Ok(());
+        }
+        let rows = self.columns.take();
+        self.pending_bytes = 0;
+        let open = match &mut self.open {
+            Some(open) => open,
+            none => {
+                self.parts += 1;
+                let name = file_name(self.table, self.parts);
+                none.insert(Open::new(folder, &name, rows.columns(), properties)?)
+            }
+        };
+        open.write(rows.columns()).with_context(|| cannot_write(&open.path))
+    }
+
+    /// Ends its file; later rows go into a further one.
+    fn end_file(&mut self) -> Result<()> {
+        let Some(Open { path, writer, .. }) = self.open.take() else { return Ok(()) };
+        writer.close().map(|_| ()).with_context(|| cannot_write(&path))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use parquet::file::reader::SerializedFileReader;
+    use parquet::record::RowAccessor as _;
+
+    use super::*;
+    use crate::files::Inputs;
+    use crate::mavlink::frame::Frame;
+    use crate::mavlink::values::Payload;
+
+    fn frame(id: u32) -> Frame<'static> {
+        Frame { bytes: &[], id, sequence: 0, system: 1, component: 1, payload: &[0x5a; 255] }
+    }
+
+    #[test]
+    fn a_session_of_many_row_groups_goes_on_in_further_files_and_no_row_is_lost() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let decode = |limits| {
+            let path = dir.path().join("session=s1");
+            let inputs = Inputs::none().forcing(true);
+            let folder = Folder::create(&path, &inputs, "a session").expect("a folder");
+            let mut tables = ParquetTables::new(folder, &[]);
+            tables.limits = limits;
+            for second in 0..2000_u32 {
+                let mut batches = Batches::default();
+                for id in [0, 30] {
+                    let frame = frame(id);
+                    let payload = frame.message().map(|message| Payload::new(message, frame.payload));
+                    batches.frame(
+                        Instant::from_millis(u64::from(second) * 1000),
+                        None,
+                        &frame,
+                        payload.as_ref(),
+                    );
+                }
+                tables.put(batches).expect("put");
+            }
+            assert_eq!(tables.finish().expect("finish").1, 2);
+            let mut seconds = Vec::new();
+            let files = (1..).map(|part| path.join(file_name(Table::Message(30), part)));
+            let files: Vec<PathBuf> = files.take_while(|path| path.exists()).collect();
+            for path in &files {
+                let file = File::open(path).expect("a file");
+                let reader = SerializedFileReader::new(file).expect("a Parquet file");
+                seconds.extend(reader.into_iter().map(|row| {
+                    let row = row.expect("a row");
+                    row.get_double(0).expect("seconds")
+                }));
+            }
+            assert!(seconds.iter().copied().eq((0..2000_u32).map(f64::from)), "{seconds:?}");
+            files.len()
+        };
+        // The whole in fewer row groups has fewer bytes: it is written first.
+        assert_eq!(decode(LIMITS), 1);
+        let few = decode(Limits { pending_bytes: 20_000, open_bytes: 80_000 });
+        assert!(few > 3, "{few}");
+    }
+}

@@ -1,0 +1,599 @@
+//! `hums decode`: logs and recordings become files for other tools.
+//!
+//! Each format is a file in [`formats`], where their table is.
+//!
+//! A log is read once (twice if its vehicle must be known first), and an unchecked one is judged in the same
+//! reading. Its groups become text and columns in parallel, and are written in order. Several logs are
+//! decoded in parallel, few enough that memory stays bounded.
+//!
+//! A log's files are named after its session ([`naming`]), and written by the rules of `hums_base::files`.
+//!
+//! Recordings of every kind go the same way (`hums_formats::source::parts`); an autopilot's log has its own
+//! tables (`native`).
+//!
+//! `--split flights` cuts a log between its flights, and decodes each as a log of its own.
+//!
+//! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with
+//! `thesis`.
+
+#![deny(
+    clippy::print_stderr,
+    reason = "`eprintln!` panics where standard error lies on a full disk: `output::note`, `output::aside`"
+)]
+
+#[macro_use(note)]
+extern crate hums_base;
+
+use hums_analysis::{check, manifest, reference, summary};
+use hums_base::{endpoint, files, hex, outcome, output, plural, printable, utc};
+use hums_formats::{ending, followed, logs, loss, mavlink, names, naming, source};
+
+pub mod checked;
+pub mod collect;
+pub mod context;
+pub mod destination;
+pub mod field_names;
+pub mod findings;
+pub mod format;
+pub mod formats;
+pub mod identity;
+mod journey;
+pub mod made;
+mod motion;
+mod native;
+pub mod record;
+pub mod row;
+pub mod selection;
+pub mod share;
+pub mod story;
+pub mod table;
+pub mod text;
+mod wear;
+mod works;
+pub mod write;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use anyhow::{Result, bail};
+use hums_core::clock::Instant;
+
+use check::judge::{Judge, Limits};
+use checked::Checked;
+use collect::Collected;
+use context::{Context, Formats};
+use destination::Destination;
+use ending::Ending;
+use files::{Inputs, check_parent, means_standard_output, says_directory};
+use findings::Findings;
+use followed::{EndResolver, HasEnding};
+use format::{Files, Finished, Way};
+use formats::FORMATS;
+use formats::influx::Tags;
+use identity::{Identity, identity};
+use logs::reader;
+use logs::side_by_side::side_by_side;
+use made::{LogJson, MadeJson, OutputFile};
+use manifest::Manifest;
+use naming::Named;
+use outcome::{Outcome, usage as usage_error};
+use output::Schema;
+use plural::count;
+use selection::Selection;
+use source::epochs::Epochs;
+use source::find::{find, sessions_of};
+use source::item::{Rows, Summary, Want};
+use source::recording::{Format, Place};
+use story::Said;
+use summary::{Overview, damaged_places};
+use utc::When;
+use works::{NamedLog, check_forms, works};
+use write::Writers;
+
+/// Output of `hums decode --json`.
+pub const SCHEMA: Schema = Schema::first("hums-decode");
+
+/// The request of `hums decode`.
+#[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub struct Request {
+    /// Logs, images, recordings, and folders of them.
+    pub inputs: Vec<PathBuf>,
+    /// Look at every block of an image.
+    pub salvage: bool,
+    /// Only this session.
+    pub session: Option<String>,
+    /// The file or folder to write.
+    pub output: PathBuf,
+    /// The formats to write.
+    pub formats: Vec<&'static format::Format>,
+    /// Entries before it are left out.
+    pub from: Option<When>,
+    /// Entries after it are left out.
+    pub to: Option<When>,
+    /// Each flight has files of its own.
+    pub split: bool,
+    /// Seconds from the log's beginning to the video's, for subtitles.
+    pub offset_s: f64,
+    /// A tlog has the findings as texts.
+    pub findings: bool,
+    /// The file for a manifest of the files read and made.
+    pub manifest: Option<PathBuf>,
+    /// The name and version of this program, for the manifest.
+    pub program: &'static str,
+    /// Only messages of these names.
+    pub messages: Vec<String>,
+    /// Replace existing outputs.
+    pub force: bool,
+    /// Print the result as JSON.
+    pub json: bool,
+}
+
+/// Runs `hums decode`.
+pub fn run(args: &Request) -> Result<Outcome> {
+    if args.findings && !args.formats.iter().any(|format| format.about.name == "tlog") {
+        return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
+    }
+    let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
+    if let Some(run) = args.formats.iter().find_map(alone) {
+        if args.manifest.is_some() {
+            return Err(usage_error(
+                "--manifest: a log of one recording has none; hums info --verify makes it",
+            ));
+        }
+        return run(args);
+    }
+    let formats = Formats::new(&args.formats, args.split);
+    let (given, remarks) = naming::without_made(&args.inputs);
+    let found = find(&given, args.salvage)?;
+    for remark in remarks.iter().chain(&found.remarks) {
+        note!("{remark}");
+    }
+    let mut outcome = Outcome::lossy(found.is_lossy());
+    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
+        note!("{}: {}", image.path.display(), image.damage.join("; "));
+    }
+    if found.places.is_empty() {
+        note!("no log is in there, so nothing was written");
+    }
+    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
+    let sessions = sessions_of(&found.places);
+    let wanted = found.name_of(args.session.as_deref())?;
+    let works = works(&found.places, &sessions)?;
+    inputs.refuse(&args.output)?;
+    let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
+    let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
+    let standard_output = check_output(args, asked, &formats)?;
+    let native = check_forms(&works, &formats)?;
+    let selection = Selection::new(args, native)?;
+    let logs = asked;
+    let mut followed = EndResolver::new(sessions);
+    let manifest_inputs = inputs.clone();
+    let task = Task {
+        formats,
+        selection,
+        inputs,
+        output: &args.output,
+        standard_output,
+        logs,
+        has_findings: args.findings,
+        offset_s: args.offset_s,
+    };
+    let taken = Mutex::new(BTreeSet::new());
+    let mut written = works.is_empty();
+    let mut json = args.json.then(MadeJson::default);
+    let (mut manifest, mut made) = (Manifest::default(), Vec::new());
+    let mut tell = |done: Done| {
+        if !is_wanted(&done.name) {
+            return Ok(());
+        }
+        outcome = outcome.and(done.outcome());
+        written |= done.written;
+        manifest.log(&done.name, done.ending.as_ref(), &done.remarks);
+        made.extend(done.made.iter().map(|made| made.path().to_owned()));
+        done.tell(json.as_mut())
+    };
+    side_by_side(
+        &works,
+        |work| {
+            if is_wanted(&work.log.name) { task.decode(work, &works, &taken) } else { beside(work) }
+        },
+        |done| followed.push(done?).into_iter().try_for_each(&mut tell),
+    )?;
+    followed.finish().try_for_each(&mut tell)?;
+    json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
+    if let Some(to) = &args.manifest {
+        let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
+        manifest.write(args.program, to, &read, &made, &manifest_inputs)?;
+    }
+    if !written {
+        bail!("nothing of what was asked for is there, so nothing was written");
+    }
+    Ok(outcome)
+}
+
+/// A log beside the requested one, which may show how that one ends.
+fn beside(work: &NamedLog<'_>) -> Result<Done> {
+    let ending = match work.log.own() {
+        Some(_) => Some(check::overview(work.log)?.ending),
+        None => None,
+    };
+    Ok(Done { ending, ..Done::of(work.log) })
+}
+
+/// Whether the output is standard output. An error if the requested formats cannot go there, or into the
+/// given file.
+fn check_output(args: &Request, logs: usize, formats: &Formats) -> Result<bool> {
+    let standard_output = means_standard_output(&args.output);
+    if standard_output && (logs != 1 || !formats.is_single_file()) {
+        let why = match logs {
+            1 => "these formats are more than that".to_owned(),
+            count => format!("there are {count} logs: --session NAME takes one"),
+        };
+        let single = FORMATS.iter().filter(|format| matches!(format.about.files, Files::One(_)));
+        let single: Vec<&str> = single.map(|format| format.about.name).collect();
+        return Err(usage_error(format!(
+            "-o -: standard output takes one log in one format of a single file ({}), and {why}; \
+             name a file or a directory",
+            single.join(", ")
+        )));
+    }
+    let one_file = logs == 1 && formats.is_single_file();
+    if args.output.is_file() && !one_file {
+        return Err(usage_error(format!(
+            "-o {}: is a file, but tables, several formats and several logs need a directory; name one, or a new name, or one log by --session NAME",
+            args.output.display()
+        )));
+    }
+    let extension = args.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    // No folder is made of a file's name by mistake.
+    let is_file_name = extension
+        .is_some_and(|extension| FORMATS.iter().any(|format| format.about.extension() == extension.as_str()));
+    if !one_file && logs > 0 && is_file_name && !says_directory(&args.output) {
+        return Err(usage_error(format!(
+            "-o {0}: is the name of a file, but tables, several formats and several logs need a directory; name one log by \
+             --session NAME, or say {0}/",
+            args.output.display()
+        )));
+    }
+    Ok(standard_output)
+}
+
+/// A log that was read into its still incomplete files, with this program's findings if it was judged in the
+/// same reading.
+type Read<'a> = (Summary, Writers<'a>, Option<Checked>);
+
+/// The work for each log.
+struct Task<'a> {
+    formats: Formats,
+    selection: Selection,
+    inputs: Inputs,
+    output: &'a Path,
+    standard_output: bool,
+    logs: usize,
+    /// A tlog has the findings as texts.
+    has_findings: bool,
+    offset_s: f64,
+}
+
+/// A log's outcome, reported in the logs' order.
+struct Done {
+    name: String,
+    outcome: Outcome,
+    /// The evidence of its end, for a HUMS log.
+    ending: Option<Ending>,
+    /// Whether there was anything to write.
+    written: bool,
+    /// The files written.
+    made: Vec<OutputFile>,
+    /// Remarks on it.
+    remarks: Vec<String>,
+}
+
+impl Done {
+    /// Without files and remarks.
+    fn of(log: &Place) -> Self {
+        let (made, remarks) = (Vec::new(), Vec::new());
+        Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, made, remarks }
+    }
+
+    /// Adds further files of the same log.
+    fn add(&mut self, next: Self) {
+        self.outcome = self.outcome.and(next.outcome);
+        self.ending = next.ending.or_else(|| self.ending.take());
+        self.written |= next.written;
+        self.made.extend(next.made);
+        let new = next.remarks.into_iter().filter(|remark| !self.remarks.contains(remark));
+        self.remarks.extend(new.collect::<Vec<_>>());
+    }
+
+    fn outcome(&self) -> Outcome {
+        let is_sound = self.ending.as_ref().is_none_or(Ending::is_sound);
+        self.outcome.and(Outcome::lossy(!is_sound))
+    }
+
+    /// Prints the remarks and the files written, or adds them to the JSON.
+    fn tell(self, json: Option<&mut MadeJson>) -> Result<()> {
+        for remark in &self.remarks {
+            note!("{remark}");
+        }
+        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.faults()).collect::<Vec<_>>();
+        for why in self.ending.iter().flat_map(said) {
+            note!("{}: {why}", self.name);
+        }
+        let Some(json) = json else {
+            return self.made.iter().try_for_each(|made| output::line(&printable::word(&made.line())));
+        };
+        let whole = self.outcome() == Outcome::Done;
+        json.logs.push(LogJson { name: self.name, whole, files: self.made });
+        Ok(())
+    }
+}
+
+impl HasEnding for Done {
+    fn ending(&mut self) -> Option<&mut Ending> {
+        self.ending.as_mut()
+    }
+}
+
+/// A remark on the parts of a log without a time of day. A usage error if the request has a time of day and
+/// no part has one.
+fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
+    let what = match context.epochs.untold() {
+        (0, _) => return Ok(None),
+        (untold, all) if untold == all => {
+            context.selection.check_without_utc(name)?;
+            "no frame told the time of day: UTC columns are empty, and tlog times count from power-on as 1970"
+                .to_owned()
+        }
+        (untold, all) => format!(
+            "in {untold} of its {all} parts (its clock began anew between them) nothing told the time of day: UTC columns are \
+             empty there, and tlog times count from power-on as 1970"
+        ),
+    };
+    Ok(Some(format!("{name}: {what}")))
+}
+
+impl Task<'_> {
+    /// `taken` are the directories of Parquet tables that other logs of this command have.
+    fn decode(
+        &self,
+        work: &NamedLog<'_>,
+        all: &[NamedLog<'_>],
+        taken: &Mutex<BTreeSet<PathBuf>>,
+    ) -> Result<Done> {
+        let log = work.log;
+        let (name, nth) = match &work.named {
+            Named::As(name, nth) => (name, *nth),
+            Named::Copy(of) => {
+                return copy(log, all.get(*of).map_or("another log", |work| &work.log.name));
+            }
+        };
+        let flights = if self.formats.split { flights(log)? } else { Vec::new() };
+        if flights.is_empty() {
+            return self.decode_part(work, (name, nth), self.context(work)?, taken);
+        }
+        let mut done = Done::of(log);
+        for (number, span) in (1..).zip(flights) {
+            let mut context = self.context(work)?;
+            context.selection = context.selection.within(span);
+            context.identity.session = format!("{}-flight{number}", context.identity.session);
+            context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+            let name = format!("{name}-flight{number}");
+            done.add(self.decode_part(work, (&name, nth), context, taken)?);
+        }
+        Ok(done)
+    }
+
+    /// Decodes the selected part of a log into files of this name.
+    fn decode_part(
+        &self,
+        work: &NamedLog<'_>,
+        (name, nth): (&str, u32),
+        mut context: Context,
+        taken: &Mutex<BTreeSet<PathBuf>>,
+    ) -> Result<Done> {
+        let log = work.log;
+        let mut remarks = Vec::new();
+        remarks.extend(check_clock(&log.name, &context)?);
+        let mut partitioned = None;
+        if self.formats.about().any(|about| matches!(about.files, Files::Partition(_)))
+            && let Ok(mut taken) = taken.lock()
+        {
+            let first = partition(self.output, &context.identity);
+            check_parent(&first)?;
+            let dir = claim(&mut taken, &first, nth);
+            if dir != first {
+                remarks.push(format!(
+                    "{}: {} has other tables of a session of this number; these go to {}: a query over both counts \
+                     twice what both have",
+                    log.name,
+                    first.display(),
+                    dir.display()
+                ));
+            }
+            partitioned = Some(dir);
+        }
+        let mut read = self.read(log, name, &context, partitioned.as_deref());
+        if let Some(epoch_us) = self.better_epoch(log, &context, &read) {
+            // Only its last group knew better: all of it again, with that.
+            drop(read);
+            context.epochs = Epochs::of(epoch_us);
+            read = self.read(log, name, &context, partitioned.as_deref());
+        }
+        let (summary, mut writers, checked) = read?;
+        if writers.is_empty() && context.selection.is_part() {
+            remarks.push(nothing_of(log, &summary, &context.selection));
+            return Ok(Done { remarks, ..Done::of(log) });
+        }
+        let not_checked = writers.checked(summary.span.map(|(_, last)| last), checked.as_ref())?;
+        remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
+        let rows_left_out = writers.rows_left_out();
+        let Finished { made, remarks: left_out } = writers.finish()?;
+        let mut outcome = Outcome::Done;
+        let ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
+        if ending.is_none() && summary.gaps > 0 {
+            outcome = Outcome::Losses;
+            remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
+        }
+        if ending.is_none() && summary.losses > 0 {
+            let places = count(summary.losses, "place");
+            remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
+        }
+        remarks.extend(left_out.into_iter().map(|words| format!("{}: {words}", log.name)));
+        outcome = outcome.and(Outcome::lossy(rows_left_out > 0));
+        let made = if self.standard_output { Vec::new() } else { made };
+        Ok(Done { outcome, ending, written: true, made, remarks, ..Done::of(log) })
+    }
+
+    /// The context of a log, needed before its first byte is written.
+    fn context(&self, work: &NamedLog<'_>) -> Result<Context> {
+        let mut context = Context {
+            formats: self.formats.clone(),
+            selection: self.selection.clone(),
+            inputs: self.inputs.clone(),
+            offset_s: self.offset_s,
+            session: work.traits.identity(work.log),
+            ..Context::default()
+        };
+        if self.has_findings {
+            context.findings = Some(Findings::of(work.log)?);
+        }
+        // A box's log begins with the record of its start, and its monitor checks.
+        let judges = self.formats.has_records() && !work.traits.has_board();
+        match work.log.own() {
+            Some(log) if !self.formats.about().any(|about| about.needs_identity) => {
+                let epoch = if self.standard_output { reader::epoch(log) } else { reader::likely_epoch(log) };
+                context.epochs = Epochs::of(epoch?);
+                context.judges = judges;
+            }
+            _ => {
+                (context.identity, context.checked) =
+                    identity(work.log, work.traits.identity(work.log), judges)?;
+                context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
+                context.epochs = context.identity.epochs.clone();
+            }
+        }
+        Ok(context)
+    }
+
+    /// UTC at power-on from a reading, if the log's files were begun with another one. A reading that failed
+    /// because the existing files differ may have failed for that reason.
+    #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
+    fn better_epoch(&self, place: &Place, context: &Context, read: &Result<Read<'_>>) -> Option<Option<u64>> {
+        let epoch_us = match (read, place.own()) {
+            (_, None) => return None,
+            _ if self.standard_output => return None,
+            (Ok((summary, ..)), _) => summary.ending.as_ref().and_then(|ending| ending.summary.epoch_us),
+            _ => return None,
+        };
+        Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole())
+    }
+
+    /// Reads a log into its files, which are not whole yet.
+    fn read<'a>(
+        &self,
+        place: &Place,
+        name: &str,
+        context: &'a Context,
+        partition: Option<&Path>,
+    ) -> Result<Read<'a>> {
+        let destination = if self.standard_output {
+            Destination::Standard
+        } else {
+            Destination::new(self.output, name, self.logs, &self.formats)
+        };
+        let mut writers = Writers::new(context, &destination, partition)?;
+        let formats = &self.formats;
+        let rows = match context.selection.names() {
+            [] if formats.has_records() => Rows::All,
+            [] => Rows::None,
+            names => Rows::Named(names),
+        };
+        let observations = formats.about().any(|about| about.has_observations);
+        let want = Want { frames: true, observations, rows, ..Want::default() };
+        let new = || Collected::new(context);
+        let has_words = formats.about().any(|about| about.has_words);
+        let Some(log) = place.own().filter(|_| context.judges || has_words) else {
+            return Ok((place.in_parts(want, new, &mut writers)?, writers, None));
+        };
+        let mut judge = context.judges.then(|| Judge::new(&Limits::default(), Format::Hums));
+        let said = writers.said();
+        let summary = place.in_parts_and_order(log, want, new, &mut writers, &mut |at, item| {
+            if let Some(judge) = &mut judge {
+                judge.item(at, item);
+            }
+            if has_words && context.selection.has_time(at, &context.epochs) {
+                said.borrow_mut().extend(Said::of(at, &item));
+            }
+            Ok(())
+        })?;
+        Ok((summary, writers, judge.and_then(|judge| Checked::new(judge.end()))))
+    }
+}
+
+/// The parts of a log, each with one flight: it is cut in the middle between a landing and the next take-off.
+fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
+    let flights = check::overview(log)?.contents.flights();
+    let middle = |landing: Instant, take_off: Instant| {
+        Instant::from_micros(landing.as_micros() + take_off.since(landing).as_micros() / 2)
+    };
+    let cuts = flights.iter().zip(flights.iter().skip(1));
+    let cuts: Vec<Instant> =
+        cuts.map(|(flight, next)| middle(flight.to.unwrap_or(next.from), next.from)).collect();
+    let after = |cut: &Instant| Instant::from_micros(cut.as_micros() + 1);
+    let begins = std::iter::once(Instant::ZERO).chain(cuts.iter().map(after));
+    let ends = cuts.iter().copied().chain([Instant::from_micros(u64::MAX)]);
+    Ok(if flights.is_empty() { Vec::new() } else { begins.zip(ends).collect() })
+}
+
+/// A copy of another log: it is read for remarks only, and no files are written.
+fn copy(log: &Place, of: &str) -> Result<Done> {
+    let remarks = vec![format!("{}: is a copy of {of}, which is written once", log.name)];
+    let ending = log.own().map(Overview::verified).transpose()?.map(|overview| overview.ending);
+    let ending = ending.map(|ending| Ending { name: log.name.clone(), ..ending });
+    Ok(Done { written: true, ending, remarks, ..Done::of(log) })
+}
+
+/// The message for a log without the requested data, with the log's own times.
+fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
+    let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
+    let names = selection.names().join(", ");
+    if !selection.has_limits() {
+        return format!("{}: no {names} is in it", log.name);
+    }
+    let what = if names.is_empty() { "nothing of it".to_owned() } else { format!("no {names} of it") };
+    format!(
+        "{}: {what} is within --from and --to: its times go from {:.3} s to {:.3} s",
+        log.name,
+        seconds(summary.span.map(|(first, _)| first)),
+        seconds(summary.span.map(|(_, last)| last))
+    )
+}
+
+/// A directory for a session's tables. A further log with the same session in one command (a shortened copy,
+/// a board without a source of randomness) gets a number.
+fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32) -> PathBuf {
+    let numbered = |number: u32| {
+        let mut name = dir.to_owned().into_os_string();
+        if number > 1 {
+            name.push(format!("-{number}"));
+        }
+        PathBuf::from(name)
+    };
+    let claimed = (nth..u32::MAX).map(numbered).find(|path| !taken.contains(path));
+    let claimed = claimed.unwrap_or_else(|| dir.to_owned());
+    taken.insert(claimed.clone());
+    claimed
+}
+
+/// The directory of a session's Parquet tables, named as the tools that read them expect.
+fn partition(output: &Path, identity: &Identity) -> PathBuf {
+    // Hive's word for "null", known to every reader of this layout.
+    let date = identity.date.as_deref().unwrap_or("__HIVE_DEFAULT_PARTITION__");
+    output
+        .join(format!("vehicle={}", identity.vehicle))
+        .join(format!("date={date}"))
+        .join(format!("session={}", identity.session))
+}

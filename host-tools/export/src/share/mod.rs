@@ -1,0 +1,247 @@
+//! `hums share`: a copy of a log without where and who, for a bug report or a question in public.
+//!
+//! * Frames of a link become a tlog with the fields in `fields.txt`, the parameters in `parameters.txt`, and texts made of the words in `words.txt`.
+//! * An autopilot's own log becomes a ULog of its observations, by [`moved::Moved::observation`].
+//! * Places move so that the first one is in the middle of the Atlantic at sea level, pressure so that the first is standard pressure, and times so
+//!   that the first is the beginning of 2020. Relative motion, heights and durations stay.
+
+mod moved;
+mod rules;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use hums_core::clock::Instant;
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Packet;
+use hums_link::{Check, Frame};
+
+use crate::context::Context;
+use crate::files::{Inputs, says_directory};
+use crate::format::{Single, Totals, Writer as _};
+use crate::formats::ulog::{Ulog, Words};
+use crate::names::message_name;
+use crate::outcome::{Outcome, usage};
+use crate::output;
+use crate::plural::count;
+use crate::printable;
+use crate::source::find::find;
+use crate::source::item::{Item, Want};
+use crate::source::recording::Place;
+use crate::story::{Observed, Said, Story};
+use moved::{Moved, SHARED_UTC_US};
+use rules::{Rule, Rules};
+
+/// Items of a part of an autopilot's own log.
+const PART_ITEMS: usize = 4_096;
+/// Names in the list of removed data.
+const REMOVED_MAX: usize = 2_000;
+const STATUSTEXT: u32 = 253;
+const PARAM_VALUE: u32 = 22;
+
+/// The request of `hums share`.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// A log, an image, or a recording.
+    pub input: PathBuf,
+    /// Only this session.
+    pub session: Option<String>,
+    /// The file to write.
+    pub output: PathBuf,
+    /// Replace an existing file.
+    pub force: bool,
+}
+
+/// Runs `hums share`.
+pub fn run(args: &Request) -> Result<Outcome> {
+    let found = find(&[&args.input], false)?;
+    found.remarks.iter().for_each(|remark| note!("{remark}"));
+    let wanted = found.name_of(args.session.as_deref())?;
+    let mut places =
+        found.places.iter().filter(|place| wanted.as_ref().is_none_or(|name| *name == place.name));
+    let (Some(place), None) = (places.next(), places.next()) else {
+        return Err(usage(format!(
+            "{}: has {}; name one by --session NAME",
+            args.input.display(),
+            count(found.places.len(), "log")
+        )));
+    };
+    if place.is_standard() || says_directory(&args.output) {
+        return Err(usage("share reads a file and writes a file; name both"));
+    }
+    let inputs = Inputs::of([args.input.as_path()].into_iter().chain(found.paths())).forcing(args.force);
+    let context = Context { inputs, ..Context::default() };
+    let mut share = Share::new();
+    let lossy = if place.open()?.format.is_of_link() || place.own().is_some() {
+        share.link(place, &context, args)?
+    } else {
+        share.own(place, &context, args)?
+    };
+    share.tell(args)?;
+    Ok(Outcome::lossy(lossy))
+}
+
+/// A copy in work.
+struct Share {
+    rules: Rules,
+    moved: Moved,
+    /// Removed messages, fields, parameters and texts, with their numbers.
+    removed: BTreeMap<String, u64>,
+    removed_others: u64,
+    kept: u64,
+    /// New system ids, by their first frame.
+    systems: BTreeMap<u8, u8>,
+}
+
+impl Share {
+    fn new() -> Self {
+        Self {
+            rules: Rules::new(),
+            moved: Moved::default(),
+            removed: BTreeMap::new(),
+            removed_others: 0,
+            kept: 0,
+            systems: BTreeMap::new(),
+        }
+    }
+
+    fn remove(&mut self, what: &str) {
+        if let Some(number) = self.removed.get_mut(what) {
+            *number += 1;
+        } else if self.removed.len() < REMOVED_MAX {
+            self.removed.insert(what.to_owned(), 1);
+        } else {
+            self.removed_others += 1;
+        }
+    }
+
+    /// Copies frames. Returns whether the recording has damage.
+    fn link(&mut self, place: &Place, context: &Context, args: &Request) -> Result<bool> {
+        let mut file = Single::open(context, &args.output)?;
+        let want = Want { frames: true, ..Want::default() };
+        let (mut bytes, mut lossy) = (Vec::new(), false);
+        let summary = place.open()?.read(want, &mut |at, item| {
+            match item {
+                Item::Frame(frame) => {
+                    if let Some(frame) = self.frame(at, frame, &mut bytes) {
+                        let utc_us = SHARED_UTC_US.saturating_add(at.as_micros());
+                        file.write(&utc_us.to_be_bytes())?;
+                        file.write(frame)?;
+                        self.kept += 1;
+                    }
+                }
+                Item::Record(_) => self.remove("records of the board"),
+                Item::Gap(gap) => lossy |= gap.cause.is_damage(),
+                _ => {}
+            }
+            Ok(())
+        })?;
+        file.finish()?;
+        Ok(lossy || summary.ending.is_some_and(|ending| !ending.is_sound()))
+    }
+
+    /// The frame with the fields that stay; `None` if nothing of it does.
+    fn frame<'a>(&mut self, at: Instant, frame: &Frame<'_>, out: &'a mut Vec<u8>) -> Option<&'a [u8]> {
+        let name = message_name(frame.id());
+        let known = frame.check() == Check::Verified;
+        let Some(fields) = self.rules.fields(frame.id()).filter(|_| known) else {
+            self.remove(&name);
+            return None;
+        };
+        let fields = fields.to_vec();
+        let mut payload = frame.payload().to_vec();
+        payload.resize(usize::from(u8::MAX) + 1, 0);
+        let text = |field: &str| {
+            let place = fields.iter().find(|place| place.name == field)?;
+            let bytes = payload.get(place.at..place.at + place.size)?;
+            let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+            Some(String::from_utf8_lossy(text).into_owned())
+        };
+        let is_secret = match frame.id() {
+            STATUSTEXT => !self.rules.keeps_text(&text("text").unwrap_or_default()),
+            PARAM_VALUE => !self.rules.keeps_parameter(&text("param_id").unwrap_or_default()),
+            _ => false,
+        };
+        if is_secret {
+            self.remove(&name);
+            return None;
+        }
+        let value = |place: &rules::Place| payload.get(place.at..place.at + place.size).unwrap_or_default();
+        let degrees = |rule| {
+            let place = fields.iter().find(|place| place.rule == Some(rule))?;
+            Some(i32::from_le_bytes(*value(place).first_chunk()?))
+        };
+        if let (Some(latitude), Some(longitude)) = (degrees(Rule::Latitude), degrees(Rule::Longitude)) {
+            self.moved.begin(f64::from(latitude) / 1e7, f64::from(longitude) / 1e7);
+        }
+        let mut packet = Packet::new(frame.id());
+        for place in &fields {
+            let bytes = value(place);
+            match place.rule {
+                Some(rule) => packet = packet.bytes(place.at, &self.moved.field(at, rule, place.kind, bytes)),
+                None if bytes.iter().any(|byte| *byte != 0) => self.remove(&format!("{name}.{}", place.name)),
+                None => {}
+            }
+        }
+        let next = self.systems.len() as u8 + 1;
+        let system = *self.systems.entry(frame.system()).or_insert(next);
+        let mut encoder = Encoder::of(system, frame.component());
+        encoder.set_sequence(frame.sequence());
+        let mut buffer = [0; FRAME_BYTES_MAX];
+        out.clear();
+        out.extend_from_slice(encoder.frame(&mut buffer, &packet));
+        Some(out)
+    }
+
+    /// Copies observations, texts and parameters. Returns whether the recording has damage.
+    fn own(&mut self, place: &Place, context: &Context, args: &Request) -> Result<bool> {
+        let mut file = Ulog::open(context, &args.output)?;
+        let (mut story, mut lossy) = (Story::default(), false);
+        let want = Want { observations: true, ..Want::default() };
+        place.open()?.read(want, &mut |at, item| {
+            match item {
+                Item::Observation(source, observation) => match self.moved.observation(observation) {
+                    Some(observation) => {
+                        self.kept += 1;
+                        story.observed.push(Observed { at, source, observation });
+                    }
+                    None => self.remove("observations with places, identities or texts"),
+                },
+                Item::Text(text) if !self.rules.keeps_text(text.words) => self.remove("texts"),
+                Item::Parameter(told) if !self.rules.keeps_parameter(told.name) => self.remove("parameters"),
+                Item::Gap(gap) => lossy |= gap.cause.is_damage(),
+                item => story.said.extend(Said::of(at, &item)),
+            }
+            if story.observed.len() >= PART_ITEMS {
+                file.part(context, Words::default(), &std::mem::take(&mut story))?;
+            }
+            Ok(())
+        })?;
+        file.part(context, Words::default(), &story)?;
+        file.finish(context, Totals { frames: 0, records: 0 })?;
+        self.remove("all messages of the log that are not in the copy's topics (docs/decode.md#ulog)");
+        Ok(lossy)
+    }
+
+    /// Prints the list of what was removed and moved.
+    fn tell(self, args: &Request) -> Result<()> {
+        let line = |words: &str| output::line(&printable::word(words));
+        line(&format!("{}: {} kept", args.output.display(), count(self.kept, "message")))?;
+        line(
+            "moved: places to the Atlantic, altitudes to sea level, pressure to 1013.25 hPa, times to 2020",
+        )?;
+        for (what, number) in &self.removed {
+            line(&format!("removed: {what} ({number} times)"))?;
+        }
+        if self.removed_others > 0 {
+            line(&format!("removed: {} of further names", count(self.removed_others, "message")))?;
+        }
+        line(
+            "stays: the magnetic field, wind, temperature and the shape of the track; docs/decode.md says what they tell",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! The fields, parameters and words that a shared copy keeps. Anything else is removed, so that a message that nobody knows
+//! gives nothing away.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use hums_dialect::{Kind, Message};
+
+const FIELDS: &str = include_str!("fields.txt");
+const PARAMETERS: &str = include_str!("parameters.txt");
+const WORDS: &str = include_str!("words.txt");
+/// Digits of a number in a text at most.
+const DIGITS_MAX: usize = 3;
+
+/// The treatment of a field that stays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rule {
+    Keep,
+    Time,
+    Latitude,
+    Longitude,
+    Altitude,
+    Pressure,
+}
+
+impl Rule {
+    fn of(word: &str) -> Option<Self> {
+        Some(match word {
+            "time" => Self::Time,
+            "latitude" => Self::Latitude,
+            "longitude" => Self::Longitude,
+            "altitude" => Self::Altitude,
+            "pressure" => Self::Pressure,
+            _ => return None,
+        })
+    }
+}
+
+/// A field of a message: its name, type, place in the payload and size, and its treatment; `None` if it is removed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) name: &'static str,
+    pub(super) kind: Kind,
+    pub(super) at: usize,
+    pub(super) size: usize,
+    pub(super) rule: Option<Rule>,
+}
+
+/// All rules.
+pub(super) struct Rules {
+    messages: BTreeMap<u32, Vec<Place>>,
+    keep: Vec<&'static str>,
+    drop: Vec<&'static str>,
+    words: BTreeSet<&'static str>,
+}
+
+fn lines(text: &'static str) -> impl Iterator<Item = std::str::SplitWhitespace<'static>> {
+    text.lines().filter(|line| !line.starts_with('#')).map(str::split_whitespace)
+}
+
+pub(super) fn places(message: &'static Message, kept: &BTreeMap<&str, Rule>) -> Vec<Place> {
+    let mut at = 0;
+    let place = |field: &'static hums_dialect::Field| {
+        let begin = at;
+        at += field.size();
+        Place {
+            name: field.name,
+            kind: field.kind,
+            at: begin,
+            size: field.size(),
+            rule: kept.get(field.name).copied(),
+        }
+    };
+    message.fields.iter().map(place).collect()
+}
+
+impl Rules {
+    pub(super) fn new() -> Self {
+        let mut messages = BTreeMap::new();
+        for mut words in lines(FIELDS) {
+            let name = words.next().unwrap_or_default();
+            let Some(message) = hums_dialect::messages().iter().find(|message| message.name == name) else {
+                continue;
+            };
+            let rule = |word: &'static str| {
+                let (field, rule) = word.split_once(':').unwrap_or((word, ""));
+                // A word that is no rule removes the field.
+                if rule.is_empty() { Some((field, Rule::Keep)) } else { Some((field, Rule::of(rule)?)) }
+            };
+            messages.insert(message.id, places(message, &words.filter_map(rule).collect()));
+        }
+        let parts = |list: &str| {
+            let mut lists = lines(PARAMETERS).filter(|words| words.clone().next() == Some(list));
+            lists.next().into_iter().flatten().skip(1).collect()
+        };
+        Self { messages, keep: parts("keep"), drop: parts("drop"), words: lines(WORDS).flatten().collect() }
+    }
+
+    /// The fields of a message; `None` if the message is removed.
+    pub(super) fn fields(&self, id: u32) -> Option<&[Place]> {
+        self.messages.get(&id).map(Vec::as_slice)
+    }
+
+    /// Whether a parameter stays.
+    pub(super) fn keeps_parameter(&self, name: &str) -> bool {
+        self.keep.iter().any(|begin| name.starts_with(begin))
+            && !self.drop.iter().any(|part| name.contains(part))
+    }
+
+    /// Whether a text stays.
+    pub(super) fn keeps_text(&self, text: &str) -> bool {
+        let mut parts =
+            text.split(|character: char| !character.is_alphanumeric()).filter(|part| !part.is_empty());
+        parts.all(|part| {
+            let digits = part.len() <= DIGITS_MAX && part.bytes().all(|byte| byte.is_ascii_digit());
+            // `EKF3`, `PX4`
+            let word = part.trim_end_matches(|character: char| character.is_ascii_digit());
+            let is_numbered = part.len() - word.len() <= 1;
+            digits || (is_numbered && self.words.contains(word.to_ascii_lowercase().as_str()))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_rule_names_a_field_of_a_message_and_none_that_says_who_or_where() {
+        for mut words in lines(FIELDS) {
+            let name = words.next().expect("a name");
+            let message = hums_dialect::messages().iter().find(|message| message.name == name).expect(name);
+            for word in words {
+                let (field, rule) = word.split_once(':').unwrap_or((word, ""));
+                assert!(message.fields.iter().any(|known| known.name == field), "{name}.{field}");
+                assert_eq!(Rule::of(rule).is_some(), !rule.is_empty(), "{word}");
+                let tells = ["lat", "lon", "lng", "uid", "serial", "home", "custom_version", "unix", "usec"];
+                let tells = tells.iter().any(|part| field.contains(part)) && field != "relative_alt";
+                assert!(
+                    !tells || !rule.is_empty() || field.contains("latency"),
+                    "{name}.{field} has no rule"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn parameters_and_texts_are_kept_by_their_words() {
+        let rules = Rules::new();
+        for (name, kept) in [
+            ("ATC_RAT_RLL_P", true),
+            ("BATT_LOW_VOLT", true),
+            ("BATT_SERIAL_NUM", false),
+            ("INS_ACC_ID", false),
+            ("COMPASS_DEC", false),
+            ("EKF2_MAG_DECL", false),
+            ("MAV_SYS_ID", false),
+            ("WIFI_PASSWORD", false),
+            ("SOMETHING_NEW", false),
+        ] {
+            assert_eq!(rules.keeps_parameter(name), kept, "{name}");
+        }
+        for (text, kept) in [
+            ("Battery 1 low voltage failsafe", true),
+            ("EKF3 lane switch 1", true),
+            ("Potential Thrust Loss (3)", true),
+            ("ArduCopter V4.6.0 (3fc7011a)", false),
+            ("Field Elevation Set: 516m at Zurich", false),
+            ("home 47.3979 8.5455", false),
+            ("Land at Smith", false),
+        ] {
+            assert_eq!(rules.keeps_text(text), kept, "{text}");
+        }
+    }
+}

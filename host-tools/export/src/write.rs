@@ -1,0 +1,143 @@
+//! The open files of a log, in all requested formats.
+
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use anyhow::Result;
+use hums_core::clock::Instant;
+
+use super::checked::{Checked, OnBoard};
+use super::collect::Collected;
+use super::context::Context;
+use super::destination::Destination;
+use super::format::{AnyWriter, Finished, Totals, Way};
+use super::story::Said;
+use crate::plural::count;
+use crate::source::item;
+use crate::source::parts::Deliver;
+
+/// The open files of one log.
+pub struct Writers<'a> {
+    context: &'a Context,
+    files: Vec<Box<dyn AnyWriter>>,
+    /// Texts and parameters of a log of ours, whose parts have none.
+    said: Rc<RefCell<Vec<Said>>>,
+    frames: u64,
+    records: u64,
+    on_board: OnBoard,
+    /// Rows of tables without room for their names.
+    rows_left_out: u64,
+}
+
+impl<'a> Writers<'a> {
+    /// Opens the files that are always written; a table is opened for its first row. `partition` is the folder of this
+    /// session.
+    pub fn new(context: &'a Context, destination: &Destination, partition: Option<&Path>) -> Result<Self> {
+        let mut files = Vec::new();
+        for (about, way) in context.formats.ways() {
+            let Way::Parts { open, .. } = way else { continue };
+            let path = destination.path(about.files).or_else(|| partition.map(Path::to_owned));
+            files.push(open(context, &path.unwrap_or_else(|| PathBuf::from("-")))?);
+        }
+        Ok(Self {
+            context,
+            files,
+            said: Rc::default(),
+            frames: 0,
+            records: 0,
+            on_board: OnBoard::default(),
+            rows_left_out: 0,
+        })
+    }
+
+    /// The place for texts and parameters that are read in order, beside the parts.
+    pub fn said(&self) -> Rc<RefCell<Vec<Said>>> {
+        self.said.clone()
+    }
+
+    /// The log was read up to this time. Writes its checker, and this program's findings, from an earlier
+    /// reading or this one. Returns the reason if it was not checked, as a part of a sentence.
+    pub fn checked(
+        &mut self,
+        last: Option<Instant>,
+        checked: Option<&Checked>,
+    ) -> Result<Option<&'static str>> {
+        let context = self.context;
+        let checked = context.checked.as_ref().or(checked);
+        if !context.formats.has_records() {
+            return Ok(None);
+        }
+        let mut collected = Collected::new(context);
+        for (finding, row) in checked.iter().flat_map(|checked| checked.findings()) {
+            if context.selection.has_time(finding.at, &context.epochs) {
+                collected.rows(finding.at, &[row]);
+                collected.finding(finding);
+            }
+        }
+        let is_wanted = |at| context.selection.has_time(at, &context.epochs);
+        let part: Option<&dyn Fn(Instant) -> bool> =
+            if context.selection.has_limits() { Some(&is_wanted) } else { None };
+        let row = checked.map_or_else(|| self.on_board.row(), |checked| checked.row(part));
+        collected.rows(last.unwrap_or(Instant::ZERO), &[row]);
+        self.put(collected)?;
+        Ok(checked.and_then(Checked::not_checked))
+    }
+
+    fn put(&mut self, mut collected: Collected<'_>) -> Result<()> {
+        self.frames += collected.frames;
+        self.records += collected.records;
+        self.on_board.and(collected.on_board);
+        self.rows_left_out += collected.rows_left_out;
+        collected.story.said.append(&mut self.said.borrow_mut());
+        for (writer, part) in self.files.iter_mut().zip(collected.parts) {
+            writer.part(self.context, part, &collected.story)?;
+        }
+        Ok(())
+    }
+
+    /// Whether only the beginnings of files were written.
+    pub fn is_empty(&self) -> bool {
+        let has_records = self.context.formats.has_records() && self.records > 0;
+        self.frames == 0 && !has_records && self.files.iter().all(|writer| writer.is_empty())
+    }
+
+    /// Rows that were left out.
+    pub fn rows_left_out(&self) -> u64 {
+        self.rows_left_out
+    }
+
+    /// The log is complete: the files get their names. Returns the outputs.
+    pub fn finish(self) -> Result<Finished> {
+        let totals = Totals { frames: self.frames, records: self.records };
+        let mut all = Finished::default();
+        if self.rows_left_out > 0 {
+            let rows = count(self.rows_left_out, "row");
+            all.remarks.push(format!(
+                "{rows} left out: the names of its tables take more room than any autopilot's"
+            ));
+        }
+        for writer in self.files {
+            let Finished { made, remarks } = writer.finish(self.context, totals)?;
+            all.made.extend(made);
+            all.remarks.extend(remarks);
+        }
+        Ok(all)
+    }
+}
+
+impl<'a> Deliver<Collected<'a>> for Writers<'a> {
+    fn gap(&mut self, gap: &item::Gap) -> Result<()> {
+        let gap = &gap.to_own();
+        let mut collected = Collected::new(self.context);
+        collected.gap(gap);
+        for writer in &mut self.files {
+            writer.gap(self.context, gap)?;
+        }
+        self.put(collected)
+    }
+
+    fn part(&mut self, collected: Collected<'a>) -> Result<()> {
+        self.put(collected)
+    }
+}
