@@ -32,7 +32,6 @@ pub mod happening;
 pub mod health;
 mod imu_gnss;
 pub mod inertial;
-mod initial;
 mod latest;
 pub mod lifetime;
 mod mag_heading_residual;
