@@ -10,8 +10,9 @@ const HEAD: &str = "\
 For the builder of a box. Afterwards you know which pads of your board to connect. [wiring.md](wiring.md) has the autopilot's side and its
 settings. The wiring tables here are made from the files in [`boards/`](../boards) by `cargo xtask boards`.
 
-**No board of this page was tried on hardware.** Each image has run on the [model of the chip](chip.md) with its board's pins. Pins, crystals and
-levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If you have tried one, please report it.
+**No board of this page was tried on hardware.** `cargo xtask test` runs the image of one board for each SPI on the [model of the chip](chip.md),
+`cargo xtask prove boards` that of every board. Pins, crystals and levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If
+you have tried a board, please report it.
 
 * A flight controller is used here as a recorder only. Its own sensors, OSD and motor outputs stay unused. Do not connect motors.
 * The USB plug loads the firmware. The box does not talk over USB.

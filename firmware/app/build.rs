@@ -1,6 +1,7 @@
 //! Gives the linker the memory map and its scripts, and the program its board and its commit. The board is the one that
 //! `HUMS_BOARD` names, from its file in `boards/`. Only for the bare-metal target: a host build of the workspace must not see them.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
@@ -10,7 +11,7 @@ use hums_boards::{Board, Level, Pin, Port, Stream};
 /// Input of the chip's PLL (RM0090, 7.3.2): the crystal is divided down to it.
 const PLL_INPUT_HZ: u32 = 2_000_000;
 
-fn main() {
+fn main() -> Result<(), String> {
     println!("cargo::rustc-env=HUMS_GIT={}", commit());
     println!("cargo::rerun-if-env-changed=DEFMT_LOG");
     println!("cargo::rerun-if-env-changed=HUMS_BOARD");
@@ -19,18 +20,19 @@ fn main() {
         println!("cargo::rustc-env=DEFMT_LOG=info");
     }
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
-        return;
+        return Ok(());
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     copy("../../memory.x", &out.join("memory.x"));
     let name = env::var("HUMS_BOARD").unwrap_or_else(|_| hums_boards::DEFAULT.to_owned());
-    let board = hums_boards::find(&name).unwrap_or_else(|why| panic!("HUMS_BOARD: {why}"));
+    let board = hums_boards::find(&name).map_err(|why| format!("HUMS_BOARD: {why}"))?;
     fs::write(out.join("board.rs"), code(board)).expect("OUT_DIR can be written");
     println!("cargo::rustc-link-search={}", out.display());
     let logs = env::var_os("CARGO_FEATURE_LOG").is_some();
     for argument in ["--nmagic", "-Tlink.x"].into_iter().chain(logs.then_some("-Tdefmt.x")) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
+    Ok(())
 }
 
 /// The board as a call of the macro in `src/boards/board.rs`, by the names of `embassy_stm32`.
@@ -45,11 +47,11 @@ fn code(board: &Board) -> String {
         || format!("pins {{ {pins} }}"),
         |bus| format!("SPI{} {{ {pins} }} {{ {} {} }}", bus.spi, channel(bus.tx), channel(bus.rx)),
     );
-    let held = |pins: Vec<&Pin>| pins.into_iter().map(|pin| format!("{pin} ")).collect::<String>();
+    let held = |pins: &BTreeMap<Pin, String>| pins.keys().map(Pin::to_string).collect::<Vec<_>>().join(" ");
     let streams = board
         .streams()
         .into_iter()
-        .map(|stream| format!("DMA{}_STREAM{} {} ", stream.controller, stream.number, channel(stream)));
+        .map(|stream| format!("DMA{}_STREAM{} {}", stream.controller, stream.number, channel(stream)));
     format!(
         "board! {{\n tag {tag:?} {skip} {end};\n crystal {crystal_hz} DIV{divider};\n autopilot {autopilot};\n gs {gs};\n card {{ {card} }};\n \
          led {led} {lit} {wait};\n high {{ {high} }} low {{ {low} }} pull {{ {pull} }}\n streams {{ {streams} }}\n}}\n",
@@ -62,10 +64,10 @@ fn code(board: &Board) -> String {
         led = led.pin,
         lit = if led.lit == Level::High { "High" } else { "Low" },
         wait = led.pin.is_debug(),
-        high = held(hold.high.keys().collect()),
-        low = held(hold.low.keys().collect()),
-        pull = held(hold.pull_up.keys().collect()),
-        streams = streams.collect::<String>(),
+        high = held(&hold.high),
+        low = held(&hold.low),
+        pull = held(&hold.pull_up),
+        streams = streams.collect::<Vec<_>>().join(" "),
     )
 }
 

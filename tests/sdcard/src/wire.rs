@@ -13,13 +13,11 @@ use crate::{Event, SimPort, Slot};
 pub fn connect(machine: &mut Machine, board: &Board, slot: &Slot) {
     let pin = |pin: hums_boards::Pin| Pin(pin.port, pin.number);
     let (wires, card) = (&board.card, Box::new(Card::new(slot)));
-    match &wires.bus {
-        Some(bus) => machine.connect(usize::from(bus.spi).saturating_sub(1), pin(wires.cs), card),
-        None => {
-            let [clock, to_device, from_device, select] =
-                [wires.sck, wires.mosi, wires.miso, wires.cs].map(pin);
-            machine.connect_pins(Pins { clock, to_device, from_device, select }, card);
-        }
+    if let Some(bus) = &wires.bus {
+        machine.connect(usize::from(bus.spi).saturating_sub(1), pin(wires.cs), card);
+    } else {
+        let [clock, to_device, from_device, select] = [wires.sck, wires.mosi, wires.miso, wires.cs].map(pin);
+        machine.connect_pins(Pins { clock, to_device, from_device, select }, card);
     }
 }
 
