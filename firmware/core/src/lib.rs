@@ -32,7 +32,7 @@ pub mod happening;
 pub mod health;
 mod imu_gnss;
 pub mod inertial;
-mod latest;
+pub mod latest;
 pub mod lifetime;
 mod mag_heading_residual;
 pub mod mishap;
