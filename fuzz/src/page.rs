@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use hums::endpoint::Endpoint;
-use hums::live::recording::{self, Heard};
+use hums::live::recording::{self, Content};
 use hums::live::show::{self, Around, SourceJson};
 use hums::live::told::Limits;
 use hums::live::world::{Histories, World};
@@ -109,9 +109,9 @@ fn live(path: &Path) {
         }
         last = Some(at);
         match heard {
-            Heard::Frame(frame) => world.frame(at, frame, Some(&mut histories)),
-            Heard::Entry(entry) => world.entry(at, entry, Some(&mut histories)),
-            Heard::Told(told) => world.told(at, told, Some(&mut histories)),
+            Content::Frame(frame) => world.frame(at, frame, Some(&mut histories)),
+            Content::Entry(entry) => world.entry(at, entry, Some(&mut histories)),
+            Content::Told(told) => world.told(at, told, Some(&mut histories)),
         }
         world.found.clear();
         Ok(true)
