@@ -8,8 +8,9 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use clap::{CommandFactory as _, ValueEnum as _};
-use hums::cli::{Cli, Format};
+use clap::CommandFactory as _;
+use hums::cli::Cli;
+use hums::decode::formats::FORMATS;
 use hums_tests::child::{self, Outcome};
 use hums_tests::hostile;
 use hums_tests::live::Live;
@@ -59,10 +60,9 @@ fn tried(command: &str) -> Tried {
         "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
             // At once they take more than each alone. Those of frames alone, which some logs have not, are tried by themselves.
-            let name = |format: &Format| format.to_possible_value().unwrap().get_name().to_owned();
-            let formats: Vec<String> = Format::value_variants().iter().map(name).collect();
+            let formats = FORMATS.iter().map(|format| format.about.name);
             let (alone, together): (Vec<_>, Vec<_>) =
-                formats.into_iter().partition(|name| ["hum", "tlog", "thesis"].contains(&name.as_str()));
+                formats.partition(|name| ["hum", "tlog", "thesis"].contains(name));
             let lines = alone.into_iter().chain([together.join(",")]);
             Tried::Lines(lines.map(|names| format!("decode IN -o OUT/{names}/ --format {names}")).collect())
         }

@@ -34,8 +34,14 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     let unread = || format!("{}: cannot be read", run.sd.display());
     let (is_card, medium) = (is_card(&card).with_context(unread)?, Medium::load(&card).with_context(unread)?);
     let table = medium.get(0);
-    let mut board =
-        Board::new((wired, image), entropy, &medium, &flash.bytes(), (gs, arrivals.take_autopilot()), reboots);
+    let mut board = Board::new(
+        (wired, image),
+        entropy,
+        &medium,
+        &flash.bytes(),
+        (gs, arrivals.take_autopilot()),
+        reboots,
+    );
     let flown = drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)
         .and_then(|_| board.settle());
     if is_card && medium.get(0) != table {
