@@ -63,7 +63,7 @@ fn tried(command: &str) -> Tried {
             let formats = FORMATS.iter().map(|format| format.about.name);
             let (alone, together): (Vec<_>, Vec<_>) =
                 formats.partition(|name| ["hum", "tlog", "thesis"].contains(name));
-            let lines = alone.into_iter().chain([together.join(",")]);
+            let lines = alone.into_iter().map(str::to_owned).chain([together.join(",")]);
             Tried::Lines(lines.map(|names| format!("decode IN -o OUT/{names}/ --format {names}")).collect())
         }
         "sim" => lines(&["sim --json IN --sd OUT/card.img --gs OUT/gs --tap OUT/tap"]),
