@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use hums::endpoint::Endpoint;
-use hums::live::recording::{self, Heard};
+use hums::live::recording::{self, Content};
 use hums::live::show::{self, Around, SourceJson};
 use hums::live::told::Limits;
 use hums::live::world::{Histories, World};
@@ -102,16 +102,16 @@ fn live(path: &Path) {
     let mut opened = recording::open(&Endpoint::File(path.to_owned()), None).expect("it is a log");
     let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
     let mut last = None;
-    recording::each(&mut opened, &mut |at, _, progress, heard| {
+    recording::each(&mut opened, &mut |at, _, progress, content| {
         assert!((0.0..=1.0).contains(&progress));
         if last.is_none() {
             world.begin(at);
         }
         last = Some(at);
-        match heard {
-            Heard::Frame(frame) => world.frame(at, frame, Some(&mut histories)),
-            Heard::Entry(entry) => world.entry(at, entry, Some(&mut histories)),
-            Heard::Told(told) => world.told(at, told, Some(&mut histories)),
+        match content {
+            Content::Frame(frame) => world.frame(at, frame, Some(&mut histories)),
+            Content::Entry(entry) => world.entry(at, entry, Some(&mut histories)),
+            Content::Told(told) => world.told(at, told, Some(&mut histories)),
         }
         world.found.clear();
         Ok(true)

@@ -8,8 +8,9 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use clap::{CommandFactory as _, ValueEnum as _};
-use hums::cli::{Cli, Format};
+use clap::CommandFactory as _;
+use hums::cli::Cli;
+use hums::decode::formats::FORMATS;
 use hums_tests::child::{self, Outcome};
 use hums_tests::hostile;
 use hums_tests::live::Live;
@@ -61,10 +62,11 @@ fn tried(command: &str) -> Tried {
             "info --verify --json IN",
         ]),
         "check" => lines(&["check IN", "check --json IN"]),
+        "due" => lines(&["due IN", "due --json IN"]),
+        "share" => lines(&["share IN -o OUT/shared"]),
         "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
-            let name = |format: &Format| format.to_possible_value().unwrap().get_name().to_owned();
-            let formats = Format::value_variants().iter().map(name);
+            let formats = FORMATS.iter().map(|format| format.about.name);
             Tried::Lines(
                 formats.map(|format| format!("decode IN -o OUT/{format}/ --format {format}")).collect(),
             )

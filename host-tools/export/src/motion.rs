@@ -23,17 +23,11 @@ pub(crate) struct Fix {
 }
 
 /// The vehicle, replayed from its observations.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
     vehicle: Vehicle,
     /// The first place.
     origin: Option<Fix>,
-}
-
-impl Default for Motion {
-    fn default() -> Self {
-        Self { vehicle: Vehicle::unknown(), origin: None }
-    }
 }
 
 impl Motion {

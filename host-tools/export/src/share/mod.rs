@@ -55,7 +55,7 @@ pub struct Request {
 
 /// Runs `hums share`.
 pub fn run(args: &Request) -> Result<Outcome> {
-    let found = find(&[&args.input], false)?;
+    let found = find(std::slice::from_ref(&args.input), false)?;
     found.remarks.iter().for_each(|remark| note!("{remark}"));
     let wanted = found.name_of(args.session.as_deref())?;
     let mut places =

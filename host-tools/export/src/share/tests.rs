@@ -74,7 +74,7 @@ fn assert_silent(copy: &[u8], secrets: &[Vec<u8>]) {
 }
 
 fn observations(path: &Path) -> Vec<Observation> {
-    let found = find(&[path], false).expect("a log");
+    let found = find(&[path.to_owned()], false).expect("a log");
     let mut observations = Vec::new();
     let want = Want { observations: true, ..Want::default() };
     let read = found.places[0].open().expect("open").read(want, &mut |_, item| {
