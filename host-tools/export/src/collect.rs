@@ -105,7 +105,9 @@ impl Collect for Collected<'_> {
                 }
                 self.rows(at, &rows(record));
             }
-            item => self.story.said.extend(Said::of(at, &item)),
+            // Without need they would only make the parts smaller.
+            item if self.context.formats.has_words() => self.story.said.extend(Said::of(at, &item)),
+            _ => {}
         }
     }
 

@@ -46,6 +46,11 @@ impl Formats {
         self.about().any(|about| about.has_records)
     }
 
+    /// Whether any of them has texts and parameters of any recording.
+    pub fn has_words(&self) -> bool {
+        self.about().any(|about| about.has_words)
+    }
+
     /// Whether a log becomes exactly one file.
     pub fn is_single_file(&self) -> bool {
         let mut about = self.about();

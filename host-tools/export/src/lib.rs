@@ -514,7 +514,7 @@ impl Task<'_> {
         let observations = formats.about().any(|about| about.has_observations);
         let want = Want { frames: true, observations, rows, ..Want::default() };
         let new = || Collected::new(context);
-        let has_words = formats.about().any(|about| about.has_words);
+        let has_words = formats.has_words();
         let Some(log) = place.own().filter(|_| context.judges || has_words) else {
             return Ok((place.in_parts(want, new, &mut writers)?, writers, None));
         };
