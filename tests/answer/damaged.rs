@@ -7,7 +7,7 @@ use hums_tests::child;
 use hums_tests::flights::own;
 use hums_tests::program::{LIMIT, command, hums};
 
-const FORMATS: &str = "tlog,csv,jsonl,influx,parquet,thesis";
+const FORMATS: &str = "tlog,csv,jsonl,influx,parquet,thesis,mcap,ulog,kml,gpx,srt";
 
 #[test]
 fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {

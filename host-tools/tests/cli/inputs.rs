@@ -195,7 +195,7 @@ fn a_cards_image_is_written_over_by_no_format() {
     let dir = recorded();
     let at = dir.path();
     let (before, whole) = (stamps(at), contents(at));
-    for format in ["tlog", "csv", "jsonl", "influx", "parquet", "thesis", "tlog,csv"] {
+    for format in ["tlog", "csv", "jsonl", "parquet", "thesis", "mcap", "ulog", "kml,srt", "gpx"] {
         for output in ["card.img", "./card.img"] {
             for flag in ["", "--force", "--salvage"] {
                 refused(
