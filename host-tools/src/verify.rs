@@ -34,6 +34,9 @@ const SCHEMA: Schema = Schema::first("hums-info-verify");
 /// Runs `hums info --verify`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
     let found = logs::find(&args.inputs, args.salvage).map_err(|error| not_ours(&args.inputs, error))?;
+    let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
+    let inputs = Inputs::of(&read);
+    args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
     for remark in &found.remarks {
         note!("{remark}");
     }
@@ -86,9 +89,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         output::line(&format!("{}: {words}", count(all.logs, "session")))?;
     }
     if let Some(to) = &args.manifest {
-        let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
-        let refuse = Inputs::of(read.iter().map(PathBuf::as_path));
-        manifest.write(cli::PROGRAM, to, &read, &[], &refuse)?;
+        manifest.write(cli::PROGRAM, to, &read, &[], &inputs)?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));

@@ -189,8 +189,8 @@ pub struct Info {
     /// Check all that can be checked about HUMS logs and cards, and print each check
     #[arg(long, conflicts_with_all = ["list", "session", "system"])]
     pub verify: bool,
-    /// With --verify: write a manifest of the files read, as JSON: SHA-256, repairs, losses (docs/json.md)
-    #[arg(long, value_name = "FILE", requires = "verify")]
+    /// As --verify, and write a manifest of the files read, as JSON: SHA-256, repairs, losses (docs/json.md)
+    #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
     /// Only this session, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]

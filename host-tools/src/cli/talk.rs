@@ -214,7 +214,7 @@ pub struct Replaced {
     /// The kind of part: airframe, battery, motor, propeller, esc, card, engine, other
     #[arg(value_name = "PART", value_parser = kind)]
     pub part: Kind,
-    /// Which one of its kind, from 1, as CMPn_NUMBER has it
+    /// Which one of its kind, from 1, as `CMPn_NUMBER` has it
     #[arg(value_name = "N", default_value_t = 0)]
     pub number: u8,
     /// The serial number of the new part

@@ -12,7 +12,8 @@ mod wear;
 use anyhow::Result;
 
 use crate::cli;
-use crate::outcome::Outcome;
+use crate::files::Inputs;
+use crate::outcome::{Outcome, usage};
 use crate::output::{self, JsonList, Schema};
 use crate::source::find::find;
 use crate::verify;
@@ -25,7 +26,13 @@ const SCHEMA: Schema = Schema::first("hums-info");
 
 /// Runs `hums info`.
 pub fn run(args: &cli::Info) -> Result<Outcome> {
-    if args.verify {
+    if let Some(to) = &args.manifest {
+        Inputs::of(&args.inputs).refuse(to)?;
+        if args.list || args.session.is_some() || args.system.is_some() {
+            return Err(usage("--manifest is for --verify, which reads all sessions and prints no list"));
+        }
+    }
+    if args.verify || args.manifest.is_some() {
         return verify::run(args);
     }
     if args.list {

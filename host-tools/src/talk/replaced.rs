@@ -174,7 +174,7 @@ fn write(card: &Path, place: usize, serial: &str) -> Result<PathBuf> {
     let (path, name) = (card.join(SETTINGS), format!("CMP{place}_SERIAL"));
     let before = if path.exists() { settle(fs::read_to_string(&path), &path)? } else { String::new() };
     let is_other = |line: &&str| !line.trim_start().starts_with(&name);
-    let mut text: String = before.lines().filter(is_other).map(|line| format!("{line}\n")).collect();
+    let mut text: String = before.lines().filter(is_other).flat_map(|line| [line, "\n"]).collect();
     let _ = writeln!(text, "{name} {serial}");
     let mut file = Output::create(&path, &Inputs::none().forcing(true))?;
     settle(file.write_all(text.as_bytes()), &path)?;
@@ -199,8 +199,8 @@ mod tests {
             let fields = Fields(frame.payload());
             if frame.id() == 76 {
                 // Component 3; "A-4" and "711" as numbers of 24 bits.
-                let is_it = [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
-                    == [3.0, 4271412.0, 3617073.0, 0.0];
+                let told = [0, 4, 8, 12].map(|at| fields.f32(at) as u32);
+                let is_it = told == [3, 4_271_412, 3_617_073, 0];
                 return vec![(1, command_ack(REPLACED, if is_it { 0 } else { 3 }, 255, 190))];
             }
             let Some(name) = fields.text(4, 16) else { return Vec::new() };

@@ -13,7 +13,7 @@ fn a_manifest_names_each_file_with_its_hash() {
     let made = fs::read(dir.path().join("made.json")).expect("a manifest");
     let made: serde_json::Value = serde_json::from_slice(&made).expect("JSON");
     let image = fs::read(dir.path().join("card.img")).expect("an image");
-    let hash: String = sha2::Sha256::digest(&image).iter().map(|byte| format!("{byte:02x}")).collect();
+    let hash = hums::hex::hex(&sha2::Sha256::digest(&image));
     let [input] = made["inputs"].as_array().expect("a list").as_slice() else { panic!("{made}") };
     assert_eq!((&input["file"], &input["sha256"]), (&"card.img".into(), &hash.into()));
     assert_eq!((&made["logs"][0]["frames"], &made["logs"][0]["lacks"]), (&16_645.into(), &"".into()));

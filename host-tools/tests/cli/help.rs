@@ -125,8 +125,19 @@ fn every_example_that_needs_nobody_works_as_it_is_typed() {
             }
         }
     }
-    let commands =
-        ["check", "completions", "decode", "due", "flight.tlog", "info", "live", "man", "report", "sim"];
+    let commands = [
+        "check",
+        "completions",
+        "decode",
+        "due",
+        "flight.tlog",
+        "info",
+        "live",
+        "man",
+        "report",
+        "share",
+        "sim",
+    ];
     let commands = commands.map(String::from);
     assert_eq!(ran, BTreeSet::from(commands), "each of these ran");
     assert_eq!(elsewhere, BTreeSet::from(ELSEWHERE), "each of these has an example");

@@ -46,12 +46,13 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
 )];
 
 /// Commands without a pair of input and output to try, with the reason.
-const NO_PAIRS: [(&str, &str); 10] = [
+const NO_PAIRS: [(&str, &str); 11] = [
     ("check", "prints"),
     ("live", "shows and sends"),
     ("completions", "prints"),
     ("man", "prints"),
-    ("info", "prints"),
+    ("due", "prints"),
+    ("box replaced", "talks with a board"),
     ("box format-card", "talks with a board"),
     ("box params list", "talks with a board"),
     ("box params get", "talks with a board"),
