@@ -77,6 +77,7 @@ fn furnished() -> TempDir {
     fs::create_dir(path("cards")).expect("a directory");
     copy(&path("card.img"), &path("cards/card.img"));
     run(dir.path(), "decode --format hum flight.tlog -o 00001_00.HUM", 0);
+    run(dir.path(), "decode --format ulog flight.tlog -o flight.ulg", 0);
     fs::create_dir_all(path("flights/may")).expect("a directory");
     for copy in ["flights/may/flight.tlog", "flights/june.bin", "before.tlog", "after.tlog"] {
         fs::copy(px4(), path(copy)).expect("a copy");
