@@ -102,7 +102,7 @@ fn live(path: &Path) {
     let mut opened = recording::open(&Endpoint::File(path.to_owned()), None).expect("it is a log");
     let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
     let mut last = None;
-    recording::each(&mut opened, &mut |at, _, progress, heard| {
+    recording::each(&mut opened, &mut |at, _, progress, content| {
         assert!((0.0..=1.0).contains(&progress));
         if last.is_none() {
             world.begin(at);

@@ -57,6 +57,8 @@ fn tried(command: &str) -> Tried {
             lines(&["info --json IN", "info --salvage IN", "info --list IN", "info --verify --json IN"])
         }
         "check" => lines(&["check IN"]),
+        "due" => lines(&["due IN"]),
+        "share" => lines(&["share IN -o OUT/shared"]),
         "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
             // At once they take more than each alone. Those of frames alone, which some logs have not, are tried by themselves.

@@ -132,16 +132,9 @@ pub struct Request {
 
 /// Runs `hums decode`.
 pub fn run(args: &Request) -> Result<Outcome> {
-    if args.findings && !args.formats.iter().any(|format| format.about.name == "tlog") {
-        return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
-    }
+    check_request(args)?;
     let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
     if let Some(run) = args.formats.iter().find_map(alone) {
-        if args.manifest.is_some() {
-            return Err(usage_error(
-                "--manifest: a log of one recording has none; hums info --verify makes it",
-            ));
-        }
         return run(args);
     }
     let formats = Formats::new(&args.formats, args.split);
@@ -162,6 +155,7 @@ pub fn run(args: &Request) -> Result<Outcome> {
     let wanted = found.name_of(args.session.as_deref())?;
     let works = works(&found.places, &sessions)?;
     inputs.refuse(&args.output)?;
+    args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
     let standard_output = check_output(args, asked, &formats)?;
@@ -169,7 +163,6 @@ pub fn run(args: &Request) -> Result<Outcome> {
     let selection = Selection::new(args, native)?;
     let logs = asked;
     let mut followed = EndResolver::new(sessions);
-    let manifest_inputs = inputs.clone();
     let task = Task {
         formats,
         selection,
@@ -205,12 +198,23 @@ pub fn run(args: &Request) -> Result<Outcome> {
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
-        manifest.write(args.program, to, &read, &made, &manifest_inputs)?;
+        manifest.write(args.program, to, &read, &made, &task.inputs)?;
     }
     if !written {
         bail!("nothing of what was asked for is there, so nothing was written");
     }
     Ok(outcome)
+}
+
+/// Refuses what no format of the request can have.
+fn check_request(args: &Request) -> Result<()> {
+    if args.findings && !args.formats.iter().any(|format| format.about.name == "tlog") {
+        return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
+    }
+    if args.manifest.is_some() && args.formats.iter().any(|format| matches!(format.way, Way::Alone(_))) {
+        return Err(usage_error("--manifest: a log of one recording has none; hums info --verify makes it"));
+    }
+    Ok(())
 }
 
 /// A log beside the requested one, which may show how that one ends.

@@ -77,6 +77,7 @@ fn furnished() -> TempDir {
     fs::create_dir(path("cards")).expect("a directory");
     copy(&path("card.img"), &path("cards/card.img"));
     run(dir.path(), "decode --format hum flight.tlog -o 00001_00.HUM", 0);
+    run(dir.path(), "decode --format ulog flight.tlog -o flight.ulg", 0);
     fs::create_dir_all(path("flights/may")).expect("a directory");
     for copy in ["flights/may/flight.tlog", "flights/june.bin", "before.tlog", "after.tlog"] {
         fs::copy(px4(), path(copy)).expect("a copy");
@@ -125,8 +126,19 @@ fn every_example_that_needs_nobody_works_as_it_is_typed() {
             }
         }
     }
-    let commands =
-        ["check", "completions", "decode", "due", "flight.tlog", "info", "live", "man", "report", "sim"];
+    let commands = [
+        "check",
+        "completions",
+        "decode",
+        "due",
+        "flight.tlog",
+        "info",
+        "live",
+        "man",
+        "report",
+        "share",
+        "sim",
+    ];
     let commands = commands.map(String::from);
     assert_eq!(ran, BTreeSet::from(commands), "each of these ran");
     assert_eq!(elsewhere, BTreeSet::from(ELSEWHERE), "each of these has an example");

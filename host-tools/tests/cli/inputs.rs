@@ -27,8 +27,8 @@ fn role(arg: &Arg) -> Role {
         "around" | "bucket" | "number" | "part" | "serial" | "card" | "card_out" | "command"
         | "card_size" | "cut_after_writes" | "cut_store_after" | "format" | "from" | "influx" | "last"
         | "line_rate" | "link" | "listen" | "listen_token" | "message" | "name" | "names" | "noise"
-        | "org" | "provoke" | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed" | "split"
-        | "stall" | "system" | "to" | "token" | "value" | "vehicle" | "write_error" => Role::Other,
+        | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed"
+        | "split" | "stall" | "system" | "to" | "token" | "value" | "vehicle" | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
