@@ -108,7 +108,7 @@ fn live(path: &Path) {
             world.begin(at);
         }
         last = Some(at);
-        match heard {
+        match content {
             Content::Frame(frame) => world.frame(at, frame, Some(&mut histories)),
             Content::Entry(entry) => world.entry(at, entry, Some(&mut histories)),
             Content::Told(told) => world.told(at, told, Some(&mut histories)),

@@ -1,4 +1,4 @@
-"""Controls `hums live` in Chromium, step by step.
+"""Controls `hums live` or the check in Chromium, step by step.
 
 usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard input is answered by one on standard output
 
@@ -9,6 +9,8 @@ usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard inp
   {"do": "wait", "script": JS, "limit_s": S}  until the script returns something true; answers its result
   {"do": "run", "script": JS}               answers its result
   {"do": "press", "keys": [...]}            key presses, by name or as the character
+  {"do": "files", "selector": CSS, "paths": [...]}    chooses files, or a folder, in an input
+  {"do": "downloads", "path": P}            saved files go to this folder
   {"do": "frames", "seconds": S}            milliseconds of each frame, from its beginning until it is painted
   {"do": "shot", "path": P, "whole": BOOL}  a screenshot, of the window or of the whole page
   {"do": "console"}                         the browser's complaints since the last time
@@ -116,6 +118,12 @@ def step(driver, asked):
     if do == "press":
         for key in asked["keys"]:
             ActionChains(driver).send_keys(getattr(Keys, key, key)).perform()
+        return None
+    if do == "files":
+        driver.find_element("css selector", asked["selector"]).send_keys("\n".join(asked["paths"]))
+        return None
+    if do == "downloads":
+        driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": asked["path"]})
         return None
     if do == "frames":
         return driver.execute_async_script(FRAMES, asked["seconds"])

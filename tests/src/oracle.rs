@@ -171,6 +171,18 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "press", "keys": keys }));
     }
 
+    /// Chooses files, or a folder, in the input that the selector means.
+    #[track_caller]
+    pub fn files(&mut self, selector: &str, paths: &[PathBuf]) {
+        self.ask(&serde_json::json!({ "do": "files", "selector": selector, "paths": paths }));
+    }
+
+    /// Saved files go to this folder.
+    #[track_caller]
+    pub fn downloads(&mut self, folder: &Path) {
+        self.ask(&serde_json::json!({ "do": "downloads", "path": folder }));
+    }
+
     /// Times of the browser's frames until they are painted, in milliseconds, over this span.
     #[track_caller]
     pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {

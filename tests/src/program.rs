@@ -51,6 +51,18 @@ pub fn firmware() -> PathBuf {
     path
 }
 
+/// The program of the check in a browser: from `HUMS_BROWSER`, otherwise from its own build.
+///
+/// # Panics
+///
+/// If it is not there.
+pub fn browser() -> PathBuf {
+    let built = || root().join("target/wasm32-wasip1/browser/hums-browser.wasm");
+    let path = std::env::var_os("HUMS_BROWSER").map_or_else(built, PathBuf::from);
+    assert!(path.is_file(), "{} is missing: `cargo xtask test --only wasm`", path.display());
+    path
+}
+
 /// `hums` with these arguments, not yet run.
 pub fn command<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(path());

@@ -13,6 +13,7 @@ use std::{env, fs};
 use anyhow::{Context as _, Result, bail};
 use sha2::{Digest as _, Sha256};
 
+use crate::browser;
 use crate::budgets;
 use crate::firmware;
 use crate::repo::{self, FIRMWARE_TARGET};
@@ -23,6 +24,7 @@ use crate::wine::{self, Wine};
 /// Makes a release of the commit that is checked out, in `target/dist`; with `check` a second one elsewhere, and compares.
 pub(crate) fn run(check: bool) -> Result<()> {
     let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
+    needs.push(Need::BrowserTarget);
     needs.extend([Need::WindowsTarget, Need::Mingw, Need::MacTarget]);
     needs.extend(check.then_some(Need::Wine));
     setup::require(&needs)?;
@@ -110,6 +112,7 @@ impl Release {
         self.build(&["--release", "--package=hums", "--target", WINDOWS_TARGET])?;
         files.push(read("hums.exe", &self.target().join(WINDOWS_TARGET).join("release/hums.exe"))?);
         files.push(self.sbom("hums.exe", "host-tools", &["--target", WINDOWS_TARGET])?);
+        files.push(self.check_page()?);
         for name in ["mavproxy_hums.py", "hums_texts.lua", "ParameterMetaData.xml"] {
             files.push(read(name, &self.tree.join("docs/stations").join(name))?);
         }
@@ -119,6 +122,19 @@ impl Release {
         files.push(("BUILD".to_owned(), self.provenance()?.into_bytes()));
         files.push(("SHA256SUMS".to_owned(), sums(&files).into_bytes()));
         Ok(files)
+    }
+
+    /// The check in a browser.
+    fn check_page(&self) -> Result<File> {
+        let [command, arguments @ ..] = browser::BUILD;
+        self.cargo(command, &arguments)?;
+        let page = self.target().join("hums-check.html");
+        let run = ["--release", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];
+        let paths = [browser::program(&self.target()), page.clone()];
+        let paths: Vec<OsString> = paths.into_iter().map(PathBuf::into_os_string).collect();
+        self.cargo("run", &[&run.map(Into::into)[..], &paths].concat())?;
+        browser::check_size(&page)?;
+        read("hums-check.html", &page)
     }
 
     fn target(&self) -> PathBuf {

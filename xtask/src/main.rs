@@ -4,6 +4,7 @@
 //! commands to type, and does the rest of its work. Nothing here is needed to use `hums` itself.
 
 mod bench;
+mod browser;
 mod budgets;
 mod costs;
 mod demo;

@@ -8,6 +8,7 @@ use anyhow::{Context as _, Result, bail};
 use cargo_metadata::diagnostic::DiagnosticLevel;
 use cargo_metadata::{Artifact, Message, Metadata, MetadataCommand, TargetKind};
 
+use crate::browser;
 use crate::firmware;
 use crate::hums;
 use crate::oracle;
@@ -138,6 +139,7 @@ fn run(program: &TestProgram, options: &[&str]) -> Result<()> {
         .env("HUMS_DIALECT", oracle::dialect())
         .env("HUMS_PYTHON", oracle::python())
         .env("HUMS_BIN", hums::program())
+        .env("HUMS_BROWSER", browser::program(&repo::target()))
         .env("CARGO_MANIFEST_DIR", &program.folder)
         .within(&program.folder)
         .args(options)

@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 /// The triple of the firmware: a Cortex-M4 with its FPU.
 pub(crate) const FIRMWARE_TARGET: &str = "thumbv7em-none-eabihf";
 
+/// The triple of the check in a browser: WebAssembly with files.
+pub(crate) const BROWSER_TARGET: &str = "wasm32-wasip1";
+
 /// The root of the repository.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask is one folder below the root")

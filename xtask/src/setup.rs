@@ -11,7 +11,7 @@ use anyhow::{Result, bail};
 
 use Source::{Component, Packages, Target};
 
-use crate::repo::FIRMWARE_TARGET;
+use crate::repo::{BROWSER_TARGET, FIRMWARE_TARGET};
 use crate::shell::{Shell, is_root};
 
 /// The target of a `hums` that needs no library of the machine it runs on.
@@ -29,6 +29,7 @@ pub(crate) const MAC_TARGET: &str = "aarch64-apple-darwin";
 pub(crate) enum Need {
     Linker,
     FirmwareTarget,
+    BrowserTarget,
     StaticTarget,
     WindowsTarget,
     Mingw,
@@ -55,9 +56,10 @@ enum Source {
 }
 
 /// Each need with its purpose.
-const TABLE: [(Need, &str, Source); 15] = [
+const TABLE: [(Need, &str, Source); 16] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
+    (Need::BrowserTarget, "Rust's target of the check in a browser", Target(BROWSER_TARGET)),
     (Need::StaticTarget, "Rust's musl target, for the hums of a release", Target(STATIC_TARGET)),
     (Need::WindowsTarget, "Rust's target for hums.exe", Target(WINDOWS_TARGET)),
     (Need::Mingw, "MinGW, which links hums.exe", Packages(FIND_MINGW, "gcc-mingw-w64-x86-64")),

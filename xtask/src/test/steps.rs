@@ -6,6 +6,7 @@ use anyhow::{Context as _, Result};
 
 use Stage::{Build, Lint, Test};
 
+use crate::browser;
 use crate::budgets;
 use crate::costs;
 use crate::demo;
@@ -18,7 +19,8 @@ use crate::pc;
 use crate::prove;
 use crate::repo;
 use crate::setup::Need::{
-    self, Chromium, Clippy, Dosfstools, FirmwareTarget, Influx, Mtools, PythonVenv, Rustfmt, Victoria,
+    self, BrowserTarget, Chromium, Clippy, Dosfstools, FirmwareTarget, Influx, Mtools, PythonVenv, Rustfmt,
+    Victoria,
 };
 use crate::shell::Shell;
 
@@ -42,11 +44,12 @@ impl Step {
         Self { stage, name, about, needs, run }
     }
 
-    /// Whether it uses results of the step `build`, or of `oracle`.
+    /// Whether it uses results of the step `build`, `oracle` or `wasm`.
     pub(super) fn follows(&self, other: &str) -> bool {
         match other {
             "build" => self.stage != Build || self.name == "budgets",
             "oracle" => self.name != "oracle" && self.needs.contains(&PythonVenv),
+            "wasm" => self.name == "browser",
             _ => false,
         }
     }
@@ -64,12 +67,13 @@ pub(super) enum Stage {
 }
 
 /// Each after those that it needs. `--list` and the table of seconds have this order.
-pub(super) const STEPS: [Step; 18] = [
+pub(super) const STEPS: [Step; 19] = [
     Step::new(Build, "fmt", "the formatting", &[Rustfmt], pc::check_format),
     Step::new(Build, "lines", "lines of code by folder, within budgets.toml", &[], lines::check),
     Step::new(Build, "oracle", "pymavlink and other readers, installed", &[PythonVenv], oracle::prepare),
     Step::new(Build, "page", "formatting and lints of the page, by Biome", &[PythonVenv], page),
     Step::new(Build, "build", "hums, all tests and the firmware compile", &[FirmwareTarget], build),
+    Step::new(Build, "wasm", "the check in a browser compiles", &[BrowserTarget], browser::build),
     Step::new(Build, "budgets", "the size of the firmware, within budgets.toml", &[FirmwareTarget], size),
     Step::new(
         Lint,
@@ -89,7 +93,7 @@ pub(super) const STEPS: [Step; 18] = [
         &[Mtools, Dosfstools, PythonVenv],
         sim,
     ),
-    Step::new(Test, "browser", "the report and the live page in Chromium", &[PythonVenv, Chromium], browser),
+    Step::new(Test, "browser", "all pages in Chromium", &[PythonVenv, Chromium, BrowserTarget], browser),
     Step::new(Test, "prove", "the campaigns in their short form", prove::NEEDS, pc::short_campaigns),
     Step::new(Test, "answer", "every format against other readers", &[PythonVenv, Influx], answer),
     Step::new(Test, "live", "databases and Grafana dashboards", &[PythonVenv, Influx, Victoria], live),

@@ -70,6 +70,11 @@ pub struct Request<'a> {
 
 /// Runs `hums check`.
 pub fn run(args: &Request<'_>) -> Result<Outcome> {
+    run_showing(args, |_| Ok(()))
+}
+
+/// Runs `hums check`, and shows each log to `show` before it is printed.
+pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<()>) -> Result<Outcome> {
     let past = Past::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
     let (found, mut failed) = logs(args)?;
     let found = found.of_system(args.system)?;
@@ -86,6 +91,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
         _ if is_beside(&of) => Ok(()),
         Ok(checked) => {
             outcome = outcome.and(checked.outcome());
+            show(&checked)?;
             let text = if args.json {
                 json::line(&checked)?
             } else if many {

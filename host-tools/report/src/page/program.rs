@@ -2,7 +2,7 @@
 //!
 //! The files in `assets/` are ECMAScript modules, with two habits that make joining them simple. An `import`
 //! is one line, and an export is a `const` at its definition. Each becomes a function that is called once and
-//! returns its exports; an import takes from that. `live`, `report`, `index` and `compare` are imported by no
+//! returns its exports; an import takes from that. `live`, `report`, `index`, `compare`, `check` and `worker` are imported by no
 //! other module: each with its imports is one program.
 
 use std::fmt::Write as _;
@@ -20,6 +20,8 @@ modules! {
     "data" "recorder" "report" "summary" "trend" "usage"
     // The table of a folder's pages, and the comparison of flights.
     "index" "compare"
+    // The check in a browser, and its worker.
+    "check" "worker"
     // The one that grows.
     "bar" "compass" "condition" "esc" "gauge" "general" "health" "horizon" "keys" "link" "live" "movement" "player" "sound" "spark"
 }
@@ -129,7 +131,7 @@ mod tests {
     #[test]
     fn every_module_is_needed_and_what_it_exports_too() {
         let used: BTreeSet<&str> =
-            ["live", "report", "index", "compare"].into_iter().flat_map(needed).collect();
+            ["live", "report", "index", "compare", "check", "worker"].into_iter().flat_map(needed).collect();
         for (name, text) in MODULES {
             assert!(used.contains(name), "nobody needs {name}");
             for line in text.lines().filter(|line| line.starts_with("export")) {
@@ -152,7 +154,7 @@ mod tests {
 
     #[test]
     fn the_style_sheet_has_no_class_that_nothing_has_and_lacks_no_colour() {
-        let pages = [include_str!("assets/live.html"), include_str!("assets/report.html")];
+        let pages = [LIVE, include_str!("assets/report.html"), include_str!("assets/check.html")];
         let texts = MODULES.iter().map(|(_, text)| *text).chain(pages);
         let code: BTreeSet<&str> = texts.flat_map(words).collect();
         let style = STYLE[1];
@@ -186,7 +188,7 @@ mod tests {
 
     #[test]
     fn nothing_that_a_vehicle_sent_becomes_markup_and_nothing_is_loaded() {
-        for program in ["live", "report", "index", "compare"].map(program) {
+        for program in ["live", "report", "index", "compare", "check"].map(program) {
             for markup in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("] {
                 assert!(!program.contains(markup), "{markup}");
             }

@@ -75,8 +75,16 @@ pub struct Request<'a> {
     pub json: bool,
 }
 
+/// Takes a page: its path, its kind, its text. The inputs are not to be overwritten.
+pub type Put<'a> = dyn FnMut(&Path, &What<'_>, &str, &Inputs) -> Result<()> + 'a;
+
 /// Runs `hums report`.
 pub fn run(args: &Request<'_>) -> Result<Outcome> {
+    run_into(args, &mut |path, _, html, inputs| write(path, html, inputs))
+}
+
+/// Runs `hums report`, and hands the pages to `put` instead of writing files.
+pub fn run_into(args: &Request<'_>, put: &mut Put<'_>) -> Result<Outcome> {
     let output = &args.output.map_or_else(|| beside(args.inputs), |output| Ok(output.to_owned()))?;
     let (given, remarks) = without_made(args.inputs);
     let found = find(&given, false)?.of_system(args.system)?;
@@ -118,6 +126,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
         parameters: None,
         json: args.json,
         made: PagesJson::default(),
+        put,
     };
     side_by_side(found.places.get(..end).unwrap_or_default(), check::overview, |overview| {
         followed.push(overview?).into_iter().try_for_each(|overview| making.session(&overview))
@@ -168,6 +177,7 @@ struct Making<'a> {
     /// Whether the outputs are reported as JSON, at the end.
     json: bool,
     made: PagesJson,
+    put: &'a mut Put<'a>,
 }
 
 impl Making<'_> {
@@ -222,7 +232,7 @@ impl Making<'_> {
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        self.write(&path, &html, &What::Session(&place.name), self.inputs)?;
+        self.write(&path, &html, &What::Session(place), self.inputs)?;
         self.rows.push(index::Row::new(file.clone(), overview, &replay));
         self.pages.insert(index, file);
         Ok(())
@@ -252,7 +262,7 @@ impl Making<'_> {
 
     /// Writes a page, and says so.
     fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<()> {
-        write(path, html, inputs)?;
+        (self.put)(path, what, html, inputs)?;
         let made = PageJson { path: path.to_owned(), session: what.session(), bytes: html.len() as u64 };
         if !self.json {
             output::line(&format!("{}: {what}, {}", shown(path), count(made.bytes, "byte")))?;
@@ -339,23 +349,26 @@ fn without_folders(overview: &Overview) -> Overview {
 }
 
 /// The kind of a page.
-enum What<'a> {
-    Session(&'a str),
+#[derive(Clone, Copy, Debug)]
+pub enum What<'a> {
+    /// Of this recording.
+    Session(&'a Place),
     /// The table of this many pages.
     Table(usize),
+    /// Of flights side by side.
     Comparison,
 }
 
 impl What<'_> {
     fn session(&self) -> Option<String> {
-        if let Self::Session(name) = self { Some((*name).to_owned()) } else { None }
+        if let Self::Session(place) = self { Some(place.name.clone()) } else { None }
     }
 }
 
 impl Display for What<'_> {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Session(name) => write!(formatter, "session {}", word(name)),
+            Self::Session(place) => write!(formatter, "session {}", word(&place.name)),
             Self::Table(pages) => write!(formatter, "table of {}", count(*pages as u64, "page")),
             Self::Comparison => formatter.write_str("flights side by side"),
         }

@@ -135,23 +135,31 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
 pub fn whole(entry: &str, data: &impl Serialize) -> String {
     let program = program(entry);
     let programs = [UPLOT, program.as_str()];
-    // Only these two programs may run, whatever else may ever get onto the page.
+    fill(
+        TEMPLATE,
+        &[
+            ("{{scripts}}", &policy(&programs)),
+            ("{{style}}", &STYLE.concat()),
+            ("{{uplot}}", UPLOT),
+            ("{{program}}", &program),
+            // Last, so that nothing in it looks like a mark.
+            ("{{data}}", &embedded(data)),
+        ],
+    )
+}
+
+/// The programs that may run, for a page's policy: no others, whatever else may get onto the page.
+pub(crate) fn policy(programs: &[&str]) -> String {
     let hashes: Vec<String> = programs
         .iter()
         .map(|program| format!("'sha256-{}'", BASE64.encode(Sha256::digest(program))))
         .collect();
-    let mut page = TEMPLATE.to_owned();
-    for (mark, text) in [
-        ("{{scripts}}", hashes.join(" ").as_str()),
-        ("{{style}}", STYLE.concat().as_str()),
-        ("{{uplot}}", UPLOT),
-        ("{{program}}", program.as_str()),
-        // Last, so that nothing in it looks like a mark.
-        ("{{data}}", embedded(data).as_str()),
-    ] {
-        page = page.replacen(mark, text, 1);
-    }
-    page
+    hashes.join(" ")
+}
+
+/// A template with the text of each mark, in this order.
+pub(crate) fn fill(template: &str, texts: &[(&str, &str)]) -> String {
+    texts.iter().fold(template.to_owned(), |page, (mark, text)| page.replacen(mark, text, 1))
 }
 
 #[cfg(test)]
