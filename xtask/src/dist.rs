@@ -127,12 +127,12 @@ impl Release {
     /// The check in a browser.
     fn check_page(&self) -> Result<File> {
         let [command, arguments @ ..] = browser::BUILD;
-        self.cargo(command, &arguments)?;
+        self.cargo(command, &arguments, hums_boards::DEFAULT)?;
         let page = self.target().join("hums-check.html");
         let run = ["--release", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];
         let paths = [browser::program(&self.target()), page.clone()];
         let paths: Vec<OsString> = paths.into_iter().map(PathBuf::into_os_string).collect();
-        self.cargo("run", &[&run.map(Into::into)[..], &paths].concat())?;
+        self.cargo("run", &[&run.map(Into::into)[..], &paths].concat(), hums_boards::DEFAULT)?;
         browser::check_size(&page)?;
         read("hums-check.html", &page)
     }
