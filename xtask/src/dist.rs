@@ -132,7 +132,7 @@ impl Release {
         let run = ["--release", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];
         let paths = [browser::program(&self.target()), page.clone()];
         let paths: Vec<OsString> = paths.into_iter().map(PathBuf::into_os_string).collect();
-        self.cargo("run", &[&run.map(Into::into)[..], &paths].concat(), hums_boards::DEFAULT)?;
+        self.cargo("run", &[&run.map(Into::into)[..], &paths[..]].concat(), hums_boards::DEFAULT)?;
         browser::check_size(&page)?;
         read("hums-check.html", &page)
     }
