@@ -478,7 +478,7 @@ fn nothing_of_a_vehicle_is_no_good_news() {
     let gap = Gap {
         from: None,
         to: None,
-        cause: Why::Cut,
+        cause: Why::Damaged,
         place: Some(7),
         bytes: 3,
         words: "cut".to_owned(),
