@@ -80,7 +80,8 @@ fn the_documentation_shows_the_findings_and_the_usage_of_the_recordings() {
 #[cfg(feature = "oracle")]
 #[test]
 fn usage_is_what_pymavlink_says_within_one_percent_on_every_recording() {
-    let flights: Vec<std::path::PathBuf> = OWN.map(own).into_iter().chain(hums_tests::flights::more()).collect();
+    let flights: Vec<std::path::PathBuf> =
+        OWN.map(own).into_iter().chain(hums_tests::flights::more()).collect();
     let expected = hums_tests::oracle::usage(&flights);
     let mut wrong = Vec::new();
     for flight in &flights {
