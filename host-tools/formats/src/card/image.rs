@@ -1,6 +1,6 @@
 //! An image file: made when it is missing, and read without ever writing to it.
 
-use std::cell::RefCell;
+use std::borrow::Borrow;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -76,7 +76,7 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
             path.display()
         );
     }
-    let why = match Layout::read(&ReadOnlyImage::new(file.try_clone()?)?) {
+    let why = match Layout::read(&ReadOnlyImage::new(file)?) {
         Ok(_) => return Ok(None),
         Err(LayoutError::Device(error)) => return Err(error).with_context(context),
         Err(why) => why,
@@ -98,7 +98,7 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
 
 /// Whether an image has a partition table and a FAT32 volume: that table is never rewritten.
 pub fn is_card(file: &File) -> io::Result<bool> {
-    Ok(Layout::read(&ReadOnlyImage::new(file.try_clone()?)?).is_ok())
+    Ok(Layout::read(&ReadOnlyImage::new(file)?).is_ok())
 }
 
 /// Whether a file has only zeros from here on. Holes of a sparse file are not read.
@@ -143,26 +143,26 @@ pub fn length(mut file: &File) -> io::Result<u64> {
     file.seek(SeekFrom::End(0))
 }
 
-/// An image file as a card with its write protection on.
+/// An image file, owned or borrowed, as a card with its write protection on.
 #[derive(Debug)]
-pub struct ReadOnlyImage {
-    file: RefCell<File>,
+pub struct ReadOnlyImage<F> {
+    file: F,
     blocks: u32,
 }
 
-impl ReadOnlyImage {
+impl<F: Borrow<File>> ReadOnlyImage<F> {
     /// The whole blocks of `file`.
-    pub fn new(file: File) -> io::Result<Self> {
-        let blocks = length(&file)? / BLOCK_BYTES as u64;
-        Ok(Self { file: RefCell::new(file), blocks: u32::try_from(blocks).unwrap_or(u32::MAX) })
+    pub fn new(file: F) -> io::Result<Self> {
+        let blocks = length(file.borrow())? / BLOCK_BYTES as u64;
+        Ok(Self { file, blocks: u32::try_from(blocks).unwrap_or(u32::MAX) })
     }
 }
 
-impl CardDevice for ReadOnlyImage {
+impl<F: Borrow<File>> CardDevice for ReadOnlyImage<F> {
     type Error = io::Error;
 
     fn read(&self, blocks: &mut [Block], start: u32) -> io::Result<()> {
-        let mut file = self.file.borrow_mut();
+        let mut file: &File = self.file.borrow();
         file.seek(SeekFrom::Start(u64::from(start) * BLOCK_BYTES as u64))?;
         blocks.iter_mut().try_for_each(|block| file.read_exact(block))
     }

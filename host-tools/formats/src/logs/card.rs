@@ -1,5 +1,6 @@
 //! The logs in a file and on a card: by its file system, or if that is damaged, by searching every block.
 
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
@@ -32,7 +33,7 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
 }
 
 /// The layout of a card, or of its partition alone (`/dev/sdX1`).
-fn layout(device: &ReadOnlyImage) -> Result<Layout, LayoutError<io::Error>> {
+fn layout(device: &ReadOnlyImage<impl Borrow<File>>) -> Result<Layout, LayoutError<io::Error>> {
     Layout::read(device).or_else(|error| Layout::volume(device).map_err(|_| error))
 }
 
@@ -63,7 +64,7 @@ impl Card {
     /// `None` if unreadable.
     pub fn of(path: &Path) -> Option<Self> {
         let file = File::open(path).ok()?;
-        let layout = layout(&ReadOnlyImage::new(file.try_clone().ok()?).ok()?).ok()?;
+        let layout = layout(&ReadOnlyImage::new(&file).ok()?).ok()?;
         let walk = Volume::new(&file, layout).and_then(Volume::walk).ok()?;
         let (all, clusters) = (layout.data_bytes(), u64::from(layout.clusters));
         Some(Self {
@@ -79,7 +80,7 @@ impl Card {
 pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;
-    let device = ReadOnlyImage::new(file.try_clone().with_context(context)?).with_context(context)?;
+    let device = ReadOnlyImage::new(&file).with_context(context)?;
     let mut about = Image { path: path.to_owned(), ..Image::default() };
     let mut files = Vec::new();
     match layout(&device) {
@@ -152,7 +153,7 @@ fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Resu
 
 /// The message for an image that ends before its first partition does. Such an image is cut short; its volume
 /// is not damaged.
-fn cut_short(file: &File, device: &ReadOnlyImage) -> io::Result<Option<String>> {
+fn cut_short(file: &File, device: &ReadOnlyImage<&File>) -> io::Result<Option<String>> {
     let mut entry = [0; BLOCK_BYTES];
     let has = length(file)?;
     // The partition table's first entry: type, first block and blocks, behind the code.
