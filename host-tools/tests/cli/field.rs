@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::support::{json, run};
+use super::support::{json, run, text};
 
 fn check(name: &str, code: i32) -> Value {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/field");
@@ -35,6 +35,27 @@ fn an_autopilot_s_own_report_of_a_fault_is_a_finding() {
             check == check_name && of == level && (at - at_s).abs() < 0.5 && words.contains(detail)
         };
         assert!(problems.iter().any(is_it), "{name}: {problems:#?}");
+    }
+}
+
+#[test]
+fn each_vehicle_of_a_recording_has_findings_and_flights_of_its_own() {
+    for (name, code, expected) in [
+        ("sysid_changed.tlog", 0, [(1, 1, ""), (5, 1, "")]),
+        ("other_vehicle_after_crash.tlog", 4, [(1, 1, "crash_alert"), (2, 1, "")]),
+    ] {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/field");
+        let lines = text(&run(folder.as_ref(), &format!("check --json {name}.gz"), code));
+        let objects: Vec<Value> =
+            lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        assert_eq!(objects.len(), 2, "{name}");
+        for (object, (system, flights, finding)) in objects.iter().zip(expected) {
+            assert_eq!(object["vehicle"]["system"].as_u64(), Some(system), "{name}");
+            assert_eq!(object["flights"].as_array().map(Vec::len), Some(flights), "{name}, system {system}");
+            let problems = problems(object);
+            let is_expected = problems.iter().any(|(check, ..)| check == finding) || problems.is_empty();
+            assert!(is_expected && problems.is_empty() == finding.is_empty(), "{name}: {problems:#?}");
+        }
     }
 }
 

@@ -172,6 +172,12 @@ impl Details {
         }
     }
 
+    /// The systems whose autopilot sent heartbeats, each once.
+    pub(super) fn systems(&self) -> Vec<u8> {
+        let systems: BTreeSet<u8> = self.autopilots.iter().map(|heard| heard.system).collect();
+        systems.into_iter().collect()
+    }
+
     /// The remark on a recording of several vehicles: joined files, or a ground station of several.
     fn vehicles(&self, judged: Option<u8>) -> Option<String> {
         let first = self.autopilots.first()?;

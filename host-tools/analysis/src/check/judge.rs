@@ -744,6 +744,7 @@ impl Judge {
             judged,
             not_judged,
             episodes: self.episodes,
+            systems: self.details.systems(),
             remarks,
             cells_unknown: self.cells.unknown_since(by),
             gaps: self.gaps,

@@ -95,6 +95,8 @@ pub struct Judged {
     pub not_judged: Vec<(&'static str, String)>,
     /// Its flights and changes of parts, for trends over flights.
     pub episodes: Vec<Episode>,
+    /// The systems whose autopilot sent heartbeats, in order of their ids.
+    pub systems: Vec<u8>,
     /// Further limits of the judgement, as sentences.
     pub remarks: Vec<String>,
     /// Start of the time in the air with an unknown cell count, so that no voltage raised an alarm.

@@ -120,17 +120,17 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     };
     side_by_side(
         &found.places,
-        |place| Told {
-            name: place.title.clone(),
-            of: place.name.clone(),
-            checked: past.judge(place, Heard::Somewhere, !many).and_then(|read| {
-                overview::is_heard(place, read.judged.vehicle().source.is_some())?;
-                Ok(checked(place, read))
-            }),
+        |place| {
+            let told = told(&past, place, !many);
+            let vehicles = vehicles(place, &told);
+            if vehicles.is_empty() {
+                return vec![told];
+            }
+            vehicles.iter().map(|place| self::told(&past, place, !many)).collect()
         },
-        |told| {
+        |all| {
             bar.inc(1);
-            followed.push(told).into_iter().try_for_each(&mut done)
+            all.into_iter().flat_map(|told| followed.push(told)).try_for_each(&mut done)
         },
     )?;
     followed.finish().try_for_each(&mut done)?;
@@ -145,6 +145,24 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
             bail!("{failed} of {} logs could not be read", inputs.len().max(found.places.len()))
         }
     }
+}
+
+fn told(past: &Past, place: &Place, shows: bool) -> Told {
+    let read = past.judge(place, Heard::Somewhere, shows).and_then(|read| {
+        overview::is_heard(place, read.judged.vehicle().source.is_some())?;
+        Ok(checked(place, read))
+    });
+    Told { name: place.title.clone(), of: place.name.clone(), checked: read }
+}
+
+/// The recording of a link with several vehicles, once for each of them; empty otherwise. Each vehicle has findings and flights
+/// of its own. Standard input is read once, so one of its vehicles is judged.
+fn vehicles(place: &Place, told: &Told) -> Vec<Place> {
+    let Ok(checked) = &told.checked else { return Vec::new() };
+    let systems = &checked.judged.systems;
+    let is_of_several = place.system.is_none() && checked.format.is_of_link() && systems.len() > 1;
+    let is_apart = is_of_several && place.path().is_some();
+    if is_apart { systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
 }
 
 /// The given logs, and the number of inputs without a log. With `--json` such an input has an object too, and

@@ -45,6 +45,11 @@ enum From {
 }
 
 impl Place {
+    /// The same place, of which only the vehicle with this system id is read.
+    pub fn of_system(&self, system: u8) -> Self {
+        Self { system: Some(system), ..self.clone() }
+    }
+
     /// Standard input.
     pub fn standard() -> Self {
         Self {
