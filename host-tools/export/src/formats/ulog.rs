@@ -121,6 +121,12 @@ impl Part for Words {
 struct Fields(Vec<u8>);
 
 impl Fields {
+    fn of(values: [f32; 3]) -> Self {
+        let mut fields = Self::default();
+        fields.floats(values);
+        fields
+    }
+
     fn bytes<const N: usize>(&mut self, bytes: [u8; N]) {
         self.0.extend_from_slice(&bytes);
     }
@@ -268,9 +274,7 @@ impl Ulog {
         let topic = match observation {
             Observation::Attitude(attitude) => {
                 if let Some(rates) = attitude.rates {
-                    let mut fields = Fields::default();
-                    fields.floats(rates.map(|rate| rate.0));
-                    self.put((Topic::AngularVelocity, 0), at, &fields)?;
+                    self.put((Topic::AngularVelocity, 0), at, &Fields::of(rates.map(|rate| rate.0)))?;
                 }
                 fields.floats(quaternion(attitude).map(|part| part as f32));
                 (Topic::Attitude, 0)
@@ -313,8 +317,8 @@ impl Ulog {
                 (Topic::Imu, imu.instance)
             }
             Observation::Air(air) => {
-                fields
-                    .maybe([air.pressure.map(|value| value.0 * 100.0), air.temperature.map(|value| value.0)]);
+                let pascals = air.pressure.map(|value| value.0 * 100.0);
+                fields.maybe([pascals, air.temperature.map(|value| value.0)]);
                 (Topic::Air, air.instance)
             }
             Observation::Outputs(outputs) => {
@@ -348,9 +352,7 @@ impl Ulog {
 
     fn magnetometer(&mut self, at: Instant, imu: &Imu) -> Result<()> {
         let Some(field) = imu.field else { return Ok(()) };
-        let mut fields = Fields::default();
-        fields.floats(field.map(|part| part.0));
-        self.put((Topic::Magnetometer, imu.instance), at, &fields)
+        self.put((Topic::Magnetometer, imu.instance), at, &Fields::of(field.map(|part| part.0)))
     }
 
     /// All that stands before the data.

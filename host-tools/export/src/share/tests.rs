@@ -105,7 +105,7 @@ fn no_fact_of_any_message_is_in_the_copy_of_a_recording() {
     tlog.extend(record(100, &global(0, 0)));
     tlog.extend(record(200, &global(10_000, 20_000)));
     for (at, message) in (1..).zip(hums_dialect::messages()) {
-        let all = rules::places(message, &Default::default());
+        let all = rules::places(message, &BTreeMap::default());
         let fields = rules.fields(message.id).unwrap_or(&all);
         let packet = fields
             .iter()
@@ -162,7 +162,7 @@ fn an_autopilots_own_log_gives_nothing_away_either() {
                 secrets.push(global.altitude.0.to_le_bytes().to_vec());
             }
             Observation::Identity(identity) if identity.uid != 0 => {
-                secrets.push(format!("{:016x}", identity.uid).into_bytes())
+                secrets.push(format!("{:016x}", identity.uid).into_bytes());
             }
             _ => {}
         }
