@@ -335,7 +335,7 @@ pub(super) mod tests {
             Ok(())
         });
         assert!(summary.is_ok());
-        assert_eq!(gaps, [(Cause::Cut, Some(0))]);
+        assert_eq!(gaps, [(Cause::Damaged, Some(0))]);
         // A port over which such a log is downloaded is a port.
         assert_eq!(format_of(&[&HEARTBEAT[..], &[0xa3, 0x95, 1]].concat().repeat(50)), Some(Format::Raw));
     }

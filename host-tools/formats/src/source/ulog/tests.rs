@@ -244,7 +244,7 @@ fn a_log_that_is_cut_near_any_multiple_of_64_kib_says_so_unless_it_is_cut_betwee
 #[test]
 fn offsets_of_appended_data_behind_the_end_or_backwards_are_said_and_do_no_harm() {
     for (offsets, words) in [
-        ([u64::MAX, 0, 0], "Cut no appended data at 18446744073709551615"),
+        ([u64::MAX, 0, 0], "Damaged no appended data at 18446744073709551615"),
         ([3, 0, 0], "Damaged an offset of appended data that leads back, to 3"),
     ] {
         let mut log = small().bytes;
