@@ -8,7 +8,7 @@ use stm32f405_model::machine::Board as Parts;
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, SECOND, US};
 
-use crate::bench_of;
+use super::bench_of;
 
 /// Frames in memory at full rate: a quarter of a second of them, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;

@@ -228,7 +228,7 @@ fn mavproxy_shows_what_the_box_says_with_the_module_and_nothing_without_it() {
     let dir = tempfile::tempdir().unwrap();
     let (card, stream) = (dir.path().join("card.img"), dir.path().join("stream.raw"));
     let flight = root().join("tests/labelled/f40_baro_off.tlog.gz");
-    let arguments: [&OsStr; 7] = [
+    let arguments: [&OsStr; 6] = [
         "sim".as_ref(),
         flight.as_os_str(),
         "--sd".as_ref(),

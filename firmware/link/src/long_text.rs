@@ -2,8 +2,9 @@
 
 use hums_core::alert;
 use hums_core::cause::Alert;
-use hums_core::clock::{Instant, Span};
+use hums_core::clock::Instant;
 use hums_core::observation::Source;
+use hums_core::time::{self, Span};
 
 use crate::frame::{Check, Frame};
 use crate::packet::Fields;
@@ -53,7 +54,7 @@ pub(crate) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
 /// The text of which parts have come.
 #[derive(Clone, Debug)]
 struct Open {
-    at: Instant,
+    at: time::Instant,
     source: Source,
     id: u16,
     severity: u8,
@@ -73,6 +74,7 @@ impl LongTexts {
 
     /// Takes each frame; gives the alerts of texts that are complete now.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, give: &mut impl FnMut(Source, Alert)) {
+        let at = time::Instant::from(at);
         for open in &mut self.0 {
             complete(open, give, |open| at.since(open.at) > COMPLETE_AFTER);
         }

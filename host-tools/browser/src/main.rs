@@ -46,12 +46,13 @@ fn check(inputs: &[PathBuf]) -> Result<Outcome> {
         past: &[],
         session: None,
         system: None,
+        verbose: false,
         salvage: false,
         json: true,
     };
     check::run_showing(&request, |checked| {
         output::json_line(
-            &json!({ "screen": shown(&printable::lines(&text::screen(checked)), false) }).to_string(),
+            &json!({ "screen": shown(&printable::lines(&text::screen(checked, false)), false) }).to_string(),
         )
     })
 }

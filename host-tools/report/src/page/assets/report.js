@@ -61,7 +61,11 @@ document
     ),
     el("p", { class: `verdict ${little ? "stale" : worst}`, id: "verdict" }, verdict),
     data.judged && data.judged[0] < data.judged[1]
-      ? el("p", { class: "dim", id: "unjudged" }, `Not judged: ${data.judged[1] - data.judged[0]} of ${data.judged[1]} checks, which lack data; hums check -v lists them.`)
+      ? el(
+          "p",
+          { class: "dim", id: "unjudged" },
+          `Not judged: ${data.judged[1] - data.judged[0]} of ${data.judged[1]} checks, which lack data; hums check -v lists them.`,
+        )
       : "",
     data.missing.length
       ? el(
