@@ -8,6 +8,12 @@ use crate::time::{Instant, Span, Stamp};
 pub(crate) trait Initial: Sized {
     /// It.
     const NEW: Self;
+
+    /// The same, written field by field: a constant of a large structure would be a copy in flash.
+    #[inline(always)]
+    fn initial() -> Self {
+        Self::NEW
+    }
 }
 
 macro_rules! initial {
@@ -33,17 +39,28 @@ impl<T> Initial for Latest<T> {
 
 impl<T: Initial, const N: usize> Initial for [T; N] {
     const NEW: Self = [const { T::NEW }; N];
+
+    #[inline(always)]
+    fn initial() -> Self {
+        core::array::from_fn(|_| T::initial())
+    }
 }
 
 impl<T: Initial, U: Initial> Initial for (T, U) {
     const NEW: Self = (T::NEW, U::NEW);
+
+    #[inline(always)]
+    fn initial() -> Self {
+        (T::initial(), U::initial())
+    }
 }
 
-/// A structure whose fields begin with [`Initial::NEW`] of their types, or with the value behind them. Its `Default` writes field by
-/// field: a constant of a large one would be a copy in flash.
+/// A structure whose fields begin with the initial state of their types, or with the value behind them.
 macro_rules! state {
     (@new $type:ty) => { <$type as $crate::initial::Initial>::NEW };
     (@new $type:ty, $value:expr) => { $value };
+    (@initial $type:ty) => { <$type as $crate::initial::Initial>::initial() };
+    (@initial $type:ty, $value:expr) => { $value };
     ($(#[$meta:meta])* $vis:vis struct $name:ident {
         $($(#[$doc:meta])* $field_vis:vis $field:ident: $type:ty $(= $value:expr)?,)*
     }) => {
@@ -54,12 +71,17 @@ macro_rules! state {
 
         impl $crate::initial::Initial for $name {
             const NEW: Self = Self { $($field: state!(@new $type $(, $value)?),)* };
+
+            #[inline(always)]
+            fn initial() -> Self {
+                Self { $($field: state!(@initial $type $(, $value)?),)* }
+            }
         }
 
         impl Default for $name {
             #[inline(always)]
             fn default() -> Self {
-                Self { $($field: state!(@new $type $(, $value)?),)* }
+                <Self as $crate::initial::Initial>::initial()
             }
         }
     };
