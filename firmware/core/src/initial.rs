@@ -1,4 +1,8 @@
 //! The state before the first input, described with the fields that it is of.
+#![expect(
+    clippy::inline_always,
+    reason = "a call that is not inlined returns a large structure over the stack"
+)]
 
 use crate::cause::Causes;
 use crate::latest::Latest;
