@@ -74,8 +74,16 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
         },
         21 => (target(0), Request::ParamList),
         23 => (target(4), Request::ParamSet(fields.text(6, 16)?, fields.f32(0))),
-        75 | 76 => {
-            (target(30), Request::Command(fields.u16(28), [0, 4, 8, 12, 16, 20, 24].map(|at| fields.f32(at))))
+        // COMMAND_INT has whole numbers in its parameters 5 and 6.
+        id @ (75 | 76) => {
+            let number = |at| {
+                if id == 75 && matches!(at, 16 | 20) {
+                    fields.u32(at).cast_signed() as f32
+                } else {
+                    fields.f32(at)
+                }
+            };
+            (target(30), Request::Command(fields.u16(28), [0, 4, 8, 12, 16, 20, 24].map(number)))
         }
         110 => (target(1), Request::File(frame.payload().get(3..).unwrap_or_default())),
         117 => (target(4), Request::LogList(fields.u16(0), fields.u16(2))),

@@ -156,6 +156,9 @@ pub fn run(args: &Request) -> Result<Outcome> {
     let works = works(&found.places, &sessions)?;
     inputs.refuse(&args.output)?;
     args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
+    if args.manifest.as_ref() == Some(&args.output) {
+        return Err(usage_error("--manifest and -o are one file: the manifest would replace the output"));
+    }
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
     let standard_output = check_output(args, asked, &formats)?;

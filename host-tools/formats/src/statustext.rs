@@ -10,6 +10,8 @@ use crate::mavlink::values::{Payload, Value};
 
 /// A text of several parts that lacks the next one for so long is as long as it is.
 const PATIENCE: Span = Span::from_secs(1);
+/// Senders whose texts are put together at a time. One more completes all.
+const SENDERS_MAX: usize = 64;
 /// The longest text that is put together, bytes.
 const BYTES_MAX: usize = 1_000;
 /// A part with less than this is the last one: it has a NUL.
@@ -80,7 +82,8 @@ impl Texts {
     pub fn take(&mut self, next: Text, whole: &mut impl FnMut(Text)) {
         self.pass(next.at, whole);
         let (source, id, ends) = (next.source, next.id, next.ends);
-        self.complete(whole, |open| open.source == source && (open.id != id || id == 0));
+        let is_full = self.0.len() >= SENDERS_MAX;
+        self.complete(whole, |open| is_full || open.source == source && (open.id != id || id == 0));
         match self.0.iter_mut().find(|open| open.source == source) {
             Some(open) if open.words.len() < BYTES_MAX => open.words.push_str(&next.words),
             Some(_) => {}

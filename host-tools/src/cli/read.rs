@@ -36,6 +36,13 @@ pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(without_slash)
 }
 
+/// An offset in seconds, of at most a week.
+fn offset(text: &str) -> Result<f64, String> {
+    const WEEK_S: f64 = 604_800.0;
+    let offset = text.parse::<f64>().map_err(|error| error.to_string())?;
+    if offset.abs() <= WEEK_S { Ok(offset) } else { Err("an offset is at most a week, 604800 s".to_owned()) }
+}
+
 /// `hums decode`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = DECODE_EXAMPLES)]
@@ -77,7 +84,8 @@ pub struct Decode {
         value_name = "SECONDS",
         default_value = "0",
         hide_default_value = true,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = offset
     )]
     pub offset: f64,
     /// Only these messages, by name; HUMS records and gaps stay

@@ -210,6 +210,7 @@ card's PARAMS.TXT does it at the next start of the box, once: the box compares t
 /// `hums box replaced`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = REPLACED_EXAMPLES)]
+#[command(group = clap::ArgGroup::new("where").args(["link", "card"]).required(true))]
 pub struct Replaced {
     /// The kind of part: airframe, battery, motor, propeller, esc, card, engine, other
     #[arg(value_name = "PART", value_parser = kind)]
@@ -221,7 +222,7 @@ pub struct Replaced {
     #[arg(long, value_name = "S")]
     pub serial: Option<String>,
     /// Where the board is: udpin:, udpout:, tcp: or serial:
-    #[arg(long, value_name = "SRC", required_unless_present = "card")]
+    #[arg(long, value_name = "SRC")]
     pub link: Option<Endpoint>,
     /// Sign what is sent with the key in this file
     #[arg(long, value_name = "FILE")]
@@ -230,7 +231,7 @@ pub struct Replaced {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub system: Option<u8>,
     /// The root of the box's card, in place of a link
-    #[arg(long, value_name = "DIR", conflicts_with = "link")]
+    #[arg(long, value_name = "DIR")]
     pub card: Option<PathBuf>,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]

@@ -13,7 +13,7 @@ use super::list::{flight_s, start_utc_us};
 use super::number::short;
 use crate::cli;
 use crate::colour::level;
-use crate::names::type_name;
+use crate::names::{autopilot_name, type_name};
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 use crate::part::Limit;
@@ -60,7 +60,7 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
     Ok(outcome.and(if is_due { Outcome::Findings } else { Outcome::Done }))
 }
 
-/// The vehicle of a log: by its unique id, else by the name that the user gave, else by the folder and the kind.
+/// The vehicle of a log: by its unique id, else by the name that the user gave, else by the folder, the kind and the autopilot.
 fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
     let known = log.contents.vehicle;
     if let Some(vehicle) = known.filter(|vehicle| vehicle.uid != 0) {
@@ -73,7 +73,10 @@ fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
     let file = place.and_then(|place| place.path().or_else(|| own_file(place)));
     let folder = file.and_then(|file| file.canonicalize().ok()?.parent().map(Path::to_owned));
     let folder = folder.map_or_else(|| "no folder".to_owned(), |folder| folder.display().to_string());
-    let kind = known.map_or_else(|| "unknown vehicle".to_owned(), |vehicle| type_name(vehicle.vehicle_type));
+    let kind = known.map_or_else(
+        || "unknown vehicle".to_owned(),
+        |vehicle| format!("{}, {}", type_name(vehicle.vehicle_type), autopilot_name(vehicle.autopilot)),
+    );
     format!("folder {folder}, {kind}")
 }
 

@@ -153,6 +153,9 @@ struct Prepared {
 fn prepare(run: &Sim, unknown: u64) -> Result<Prepared> {
     let (speed, live) = pace(run)?;
     let inputs = paths::inputs(run)?;
+    if run.costs && run.firmware.is_none() {
+        return Err(usage("--costs measures a firmware image: give one with --firmware"));
+    }
     let params = params::read(run.params.as_deref())?;
     let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;

@@ -1,6 +1,5 @@
 //! `hums box replaced`: a part was replaced; the box counts what the new one runs. Over a link, or by a file on the card.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -10,6 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use hums_core::component::{COMPONENTS_MAX, Kind, LABEL_BYTES};
 use hums_link::messages;
 use hums_link::packet::Fields;
+use hums_link::param_line::{self, Line};
 use serde::Serialize;
 
 use super::{Client, is_for_us, params};
@@ -25,7 +25,7 @@ use crate::source::find::find;
 /// `MAV_CMD_USER_1`
 const REPLACED: u16 = 31_010;
 const ANSWER: Duration = Duration::from_secs(2);
-/// A command that is repeated because its answer was lost is recorded twice, and changes nothing more.
+/// A command with a serial number may be repeated because its answer was lost: the box replaces the part once.
 const TRIES: usize = 3;
 /// The file of settings in a card's root, which the box reads at each power-on.
 const SETTINGS: &str = "PARAMS.TXT";
@@ -48,17 +48,17 @@ struct ReplacedJson {
 /// Runs `hums box replaced`.
 pub fn run(args: &cli::Replaced) -> Result<Outcome> {
     let serial = args.serial.as_deref().unwrap_or_default();
-    let is_plain = |c: char| c.is_ascii_graphic() && !matches!(c, '#' | ',');
+    let is_plain = |c: char| c.is_ascii_graphic() && !matches!(c, '#' | ',' | '<');
     if serial.len() > LABEL_BYTES || !serial.chars().all(is_plain) {
         return Err(usage(format!(
-            "--serial {serial}: a serial number has at most {LABEL_BYTES} letters, digits and signs, without spaces, `#` and `,`"
+            "--serial {serial}: a serial number has at most {LABEL_BYTES} letters, digits and signs, without spaces, `#`, `,` and `<`"
         )));
     }
     let part = part::name(args.part.name(), args.number, "");
     let (place, file) = match (&args.card, &args.link) {
         (Some(card), _) => {
-            let place = on_card(card, args.part, args.number)?;
-            (place, Some(write(card, place, serial)?))
+            let (place, old) = on_card(card, args.part, args.number)?;
+            (place, Some(write(card, place, serial, &old)?))
         }
         (None, Some(link)) => {
             let at = Link { link: link.clone(), key: args.key.clone(), system: args.system };
@@ -144,8 +144,8 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     }
 }
 
-/// The place of a part by the newest log of a card that has components.
-fn on_card(card: &Path, part: Kind, number: u8) -> Result<usize> {
+/// The place of a part, and its serial number, by the newest log of a card that has components.
+fn on_card(card: &Path, part: Kind, number: u8) -> Result<(usize, String)> {
     if !card.is_dir() {
         return Err(usage(format!(
             "--card {}: is no folder; mount the card, and name its root",
@@ -160,22 +160,24 @@ fn on_card(card: &Path, part: Kind, number: u8) -> Result<usize> {
                 |name: &str| Kind::ALL.into_iter().find(|kind| kind.name() == name).unwrap_or_default();
             let known =
                 components.iter().map(|(place, line)| (usize::from(*place), kind(line.kind), line.number));
-            return place_of(known, part, number);
+            let place = place_of(known, part, number)?;
+            let line = components.get(&(place as u8));
+            return Ok((place, line.map_or_else(String::new, |line| line.serial.clone())));
         }
     }
     bail!("{}: no log on it has components; set CMPn_KIND first (docs/usage.md)", card.display())
 }
 
-/// Writes the new serial number into the card's settings; their other lines stay.
-fn write(card: &Path, place: usize, serial: &str) -> Result<PathBuf> {
+/// Writes the new and the old serial number into the card's settings, as their first line; their other lines stay.
+fn write(card: &Path, place: usize, serial: &str, old: &str) -> Result<PathBuf> {
     if serial.is_empty() {
         return Err(usage("--serial is missing: on a card, the box knows a new part by its serial number"));
     }
     let (path, name) = (card.join(SETTINGS), format!("CMP{place}_SERIAL"));
     let before = if path.exists() { settle(fs::read_to_string(&path), &path)? } else { String::new() };
-    let is_other = |line: &&str| !line.trim_start().starts_with(&name);
-    let mut text: String = before.lines().filter(is_other).flat_map(|line| [line, "\n"]).collect();
-    let _ = writeln!(text, "{name} {serial}");
+    let is_other = |line: &&str| !matches!(param_line::read(line), Line::Set(of, _) if of == name);
+    let mut text = format!("{name} {serial}<{old}\n");
+    before.lines().filter(is_other).for_each(|line| text.extend([line, "\n"]));
     let mut file = Output::create(&path, &Inputs::none().forcing(true))?;
     settle(file.write_all(text.as_bytes()), &path)?;
     file.finish()?;
@@ -223,7 +225,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join(SETTINGS);
         fs::write(&path, "GS_BUDGET 1000\nCMP2_SERIAL old\n").expect("written");
-        write(dir.path(), 2, "new-7").expect("written");
-        assert_eq!(fs::read_to_string(&path).expect("there"), "GS_BUDGET 1000\nCMP2_SERIAL new-7\n");
+        write(dir.path(), 2, "new-7", "old").expect("written");
+        assert_eq!(fs::read_to_string(&path).expect("there"), "CMP2_SERIAL new-7<old\nGS_BUDGET 1000\n");
     }
 }

@@ -138,7 +138,7 @@ fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_n
     };
     let by_folder = vehicles("due . --json");
     let [(blue, 1, blue_s), (red, 2, red_s)] = by_folder.as_slice() else { panic!("{by_folder:?}") };
-    assert_eq!([blue.as_str(), red], ["blue, quadrotor", "red, quadrotor"]);
+    assert!(blue.starts_with("blue, quadrotor, ") && red.starts_with("red, quadrotor, "), "{by_folder:?}");
     assert!((210.0..225.0).contains(blue_s) && (515.0..535.0).contains(red_s), "{by_folder:?}");
     let named = vehicles("due . --json --vehicle mine");
     let [(name, 3, all_s)] = named.as_slice() else { panic!("{named:?}") };

@@ -149,7 +149,7 @@ fn every_command_with_the_flag_makes_the_same_again_with_it() {
         assert!(contents(&out) == made, "{line}");
         tried.push(path[0]);
     }
-    assert_eq!(tried, ["report", "decode"]);
+    assert_eq!(tried, ["report", "decode", "share"]);
 }
 
 #[test]

@@ -13,6 +13,7 @@
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
+use hums_core::component::Label;
 use hums_core::health::{self, Level};
 use hums_core::observation::Feeds;
 use hums_core::params::TABLE;
@@ -112,7 +113,7 @@ impl Commands {
             // The storage number and a confirmation: a command sent by mistake has neither.
             (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
             // Likewise: the ground station's button without numbers must not reset the baselines.
-            (REPLACED, 0) if params[0].abs() > 0.0 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
+            (REPLACED, 0) if params[0].to_bits() != 0 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
             (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
                 if !self.allows(now, asker.port) {
                     return TEMPORARILY_REJECTED;
@@ -149,7 +150,10 @@ impl Commands {
                 // The component's record names the sender.
                 let serial = characters(params);
                 let serial = core::str::from_utf8(&serial).unwrap_or_default();
-                if records::replace_component(now, place, serial, by, book, sectors) {
+                // A station that lost our answer asks again.
+                let known = book.monitor.components().get(place).map(|part| part.serial);
+                let is_done = !serial.is_empty() && known == Some(Label::new(serial));
+                if is_done || records::replace_component(now, place, serial, by, book, sectors) {
                     ACCEPTED
                 } else {
                     DENIED

@@ -163,7 +163,7 @@ impl Settings {
             _ if is_cut => false,
             Ok(Line::Nothing) => true,
             Ok(Line::Set(name, value)) => match place_of_serial(name) {
-                Some(place) => replace_unless_known(place, value, now, book, sectors),
+                Some(place) => replace_old(place, value, now, book, sectors),
                 None => param_line::value(value)
                     .is_some_and(|value| book.set_parameter(now, name, value, (0, 0), sectors)),
             },
@@ -178,21 +178,24 @@ impl Settings {
 
 /// The place of a component, from 0, of which a name is that of the serial number: of `CMP1_SERIAL` 0.
 fn place_of_serial(name: &str) -> Option<usize> {
-    name.strip_prefix("CMP")?.strip_suffix("_SERIAL")?.parse::<usize>().ok()?.checked_sub(1)
+    let place = name.strip_prefix("CMP")?.strip_suffix("_SERIAL")?;
+    place.parse::<usize>().ok()?.checked_sub(1).filter(|_| place.len() == 1)
 }
 
-/// Another serial number than the known one is another part. The file is read at each power-on, and replaces a part once.
-fn replace_unless_known(
+/// `NEW<OLD` replaces the part with the serial number OLD, which may be empty, by the part NEW. The file is read at each power-on:
+/// if the place has another part by then, the line is over.
+fn replace_old(
     place: usize,
-    serial: &str,
+    value: &str,
     now: Instant,
     book: &mut Logbook<'_>,
     sectors: &mut SectorsIn,
 ) -> bool {
+    let Some((new, old)) = value.split_once('<').filter(|(new, _)| !new.is_empty()) else { return false };
     // Its kind may stand in a line before.
     book.monitor.describe_component(place);
     let known = book.monitor.components().get(place).map(|part| part.serial);
-    known == Some(Label::new(serial)) || records::replace_component(now, place, serial, (0, 0), book, sectors)
+    known != Some(Label::new(old)) || records::replace_component(now, place, new, (0, 0), book, sectors)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use hums_core::clock::Instant;
+use hums_core::observation::Source;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 use hums_link::{Check, Frame};
@@ -38,6 +39,8 @@ const PART_ITEMS: usize = 4_096;
 /// Names in the list of removed data.
 const REMOVED_MAX: usize = 2_000;
 const STATUSTEXT: u32 = 253;
+/// `GLOBAL_POSITION_INT`, which an autopilot sends once it knows where it is.
+const GLOBAL_POSITION_INT: u32 = 33;
 const PARAM_VALUE: u32 = 22;
 
 /// The request of `hums share`.
@@ -172,7 +175,10 @@ impl Share {
             let place = fields.iter().find(|place| place.rule == Some(rule))?;
             Some(i32::from_le_bytes(*value(place).first_chunk()?))
         };
-        if let (Some(latitude), Some(longitude)) = (degrees(Rule::Latitude), degrees(Rule::Longitude)) {
+        // A receiver without a fix reports a default place.
+        if frame.id() == GLOBAL_POSITION_INT
+            && let (Some(latitude), Some(longitude)) = (degrees(Rule::Latitude), degrees(Rule::Longitude))
+        {
             self.moved.begin(f64::from(latitude) / 1e7, f64::from(longitude) / 1e7);
         }
         let mut packet = Packet::new(frame.id());
@@ -184,14 +190,19 @@ impl Share {
                 None => {}
             }
         }
-        let next = self.systems.len() as u8 + 1;
-        let system = *self.systems.entry(frame.system()).or_insert(next);
+        let system = self.system(frame.system());
         let mut encoder = Encoder::of(system, frame.component());
         encoder.set_sequence(frame.sequence());
         let mut buffer = [0; FRAME_BYTES_MAX];
         out.clear();
         out.extend_from_slice(encoder.frame(&mut buffer, &packet));
         Some(out)
+    }
+
+    /// The number of a system in the copy: they are counted from 1 in the order of their first frames.
+    fn system(&mut self, system: u8) -> u8 {
+        let next = (self.systems.len() as u8).wrapping_add(1);
+        *self.systems.entry(system).or_insert(next)
     }
 
     /// Copies observations, texts and parameters. Returns whether the recording has damage.
@@ -204,6 +215,7 @@ impl Share {
                 Item::Observation(source, observation) => match self.moved.observation(observation) {
                     Some(observation) => {
                         self.kept += 1;
+                        let source = Source { system: self.system(source.system), ..source };
                         story.observed.push(Observed { at, source, observation });
                     }
                     None => self.remove("observations with places, identities or texts"),

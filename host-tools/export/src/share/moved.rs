@@ -13,6 +13,8 @@ pub(super) const SHARED_UTC_US: u64 = 1_577_836_800_000_000;
 const SHARED: (f64, f64) = (45.0, -30.0);
 /// Standard pressure, hPa: the first one of each copy.
 const SHARED_HPA: f64 = 1013.25;
+/// A step of UTC of at least this long is a clock that was set: an hour.
+const SET_US: u64 = 3_600_000_000;
 /// A time from here on is UTC in microseconds: 1973. An earlier one counts from power-on.
 const UTC_MIN_US: u64 = 100_000_000_000_000;
 
@@ -50,9 +52,9 @@ impl Moved {
         })
     }
 
-    /// An altitude above sea level counts from the first one; zero is none.
+    /// An altitude above sea level counts from that of the first place; before it there is none. Zero is none.
     fn altitude(&mut self, metres: f64) -> f64 {
-        if metres == 0.0 || !metres.is_finite() {
+        if self.place.is_none() || metres == 0.0 || !metres.is_finite() {
             0.0
         } else {
             metres - *self.altitude_m.get_or_insert(metres)
@@ -67,7 +69,10 @@ impl Moved {
         if us < UTC_MIN_US {
             return us;
         }
-        let zero = *self.utc_us.get_or_insert(us.saturating_sub(at.as_micros()));
+        let begin_us = us.saturating_sub(at.as_micros());
+        // A clock that is set begins the copy's time anew: the step would tell the date.
+        let known = self.utc_us.filter(|known| known.abs_diff(begin_us) < SET_US);
+        let zero = *self.utc_us.insert(known.unwrap_or(begin_us));
         SHARED_UTC_US.saturating_add(us).saturating_sub(zero)
     }
 
@@ -77,6 +82,13 @@ impl Moved {
         let whole = || bytes.first_chunk().map_or(0, |bytes| i32::from_le_bytes(*bytes));
         let single = || bytes.first_chunk().map_or(0.0, |bytes| f64::from(f32::from_le_bytes(*bytes)));
         match (rule, kind) {
+            // What lies behind the end of a text is no text.
+            (Rule::Keep, Kind::Char) => {
+                let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+                let mut text = bytes[..end].to_vec();
+                text.resize(bytes.len(), 0);
+                text
+            }
             (Rule::Keep, _) => bytes.to_vec(),
             (Rule::Latitude | Rule::Longitude, Kind::I32) if whole() == 0 => bytes.to_vec(),
             (Rule::Latitude, Kind::I32) => degrees(self.latitude(f64::from(whole()) / 1e7)),

@@ -10,6 +10,8 @@ const PARAMETERS: &str = include_str!("parameters.txt");
 const WORDS: &str = include_str!("words.txt");
 /// Digits of a number in a text at most.
 const DIGITS_MAX: usize = 3;
+/// Numbers in a text that stays, at most.
+const NUMBERS_MAX: usize = 2;
 
 /// The treatment of a field that stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,8 +108,17 @@ impl Rules {
             && !self.drop.iter().any(|part| name.contains(part))
     }
 
-    /// Whether a text stays.
+    /// Whether a text stays. Decimals and more than two numbers may be a place.
     pub(super) fn keeps_text(&self, text: &str) -> bool {
+        let has_decimals = text
+            .as_bytes()
+            .windows(3)
+            .any(|three| three[1] == b'.' && three[0].is_ascii_digit() && three[2].is_ascii_digit());
+        let numbers =
+            text.split(|character: char| !character.is_ascii_digit()).filter(|part| !part.is_empty());
+        if !text.is_ascii() || has_decimals || numbers.count() > NUMBERS_MAX {
+            return false;
+        }
         let mut parts =
             text.split(|character: char| !character.is_alphanumeric()).filter(|part| !part.is_empty());
         parts.all(|part| {

@@ -42,6 +42,7 @@ impl Said {
         if frame.check() != Check::Verified {
             return Ok(());
         }
+        hand_texts(take, |hand| self.texts.pass(at, &mut |text| hand(text)))?;
         let mut result = Ok(());
         self.long_texts.frame(at, frame, &mut |source, alert| {
             if want.observations && result.is_ok() {

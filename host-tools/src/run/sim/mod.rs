@@ -42,9 +42,6 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
         return emulate::run(run, image);
     }
     check_standard_output(run)?;
-    if run.costs {
-        return Err(usage("--costs measures a firmware image: give one with --firmware"));
-    }
     // The recorder itself keeps earlier sessions, however much comes.
     let prepared = prepare(run, 0)?;
     let Prepared { speed, live, mut arrivals, card: image, flash, earlier, mut ground, gs, entropy } =

@@ -91,6 +91,8 @@ fn crystal_starts(hz: u32) -> bool {
 fn has_frequency(hz: u32) -> bool {
     RCC.cfgr().modify(|w| w.set_rtcpre(PRESCALER));
     RCC.apb2enr().modify(|w| w.set_tim11en(true));
+    // The timer takes no write in the first cycles after its clock begins (ES0182).
+    cortex_m::asm::dsb();
     TIM11.or().write_value(INPUT_IS_CRYSTAL);
     TIM11.ccmr_input(0).write(|w| {
         w.set_ccs(0, CcmrInputCcs::TI4);

@@ -64,6 +64,9 @@ impl PinPort {
     fn byte(&self, sent: u8) -> u8 {
         (0..8).rev().fold(0, |received, bit| {
             self.to_card.set(sent >> bit & 1 == 1);
+            // A card wants its bit 5 ns before the clock (SD specification, 6.6.6): a cycle is 6 ns.
+            cortex_m::asm::nop();
+            cortex_m::asm::nop();
             self.wait();
             self.clock.set(true);
             self.wait();

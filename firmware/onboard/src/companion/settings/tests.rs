@@ -173,8 +173,8 @@ fn without_a_heartbeat_no_parameters_are_read_nor_long_after_the_last_one() {
 }
 
 #[test]
-fn another_serial_number_in_the_file_is_another_part_once() {
-    let text = "CMP2_KIND 3\nCMP2_NUMBER 3\nCMP2_SERIAL A-4711\nCMP9_SERIAL 1\n";
+fn a_line_replaces_the_part_that_it_names_once() {
+    let text = "CMP2_KIND 3\nCMP2_NUMBER 3\nCMP2_SERIAL A-4711<\nCMP2_SERIAL B<other\nCMP9_SERIAL 1<\nCMP2_SERIAL C\n";
     let once = [(0, Card), (1, DISARMED), (2, DISARMED)];
     let twice = [&once[..], &[(4, NoCard), (6, OtherCard), (7, DISARMED), (8, DISARMED)]].concat();
     for comes in [&once[..], &twice[..]] {
