@@ -11,8 +11,7 @@ fn facts() -> BTreeSet<Fact> {
     assert_eq!(lines.next(), Some("board,function,pin,source,commit"));
     let fact = |line: &str| {
         let [board, function, pin, source, commit] =
-            <[&str; 5]>::try_from(line.split(',').collect::<Vec<_>>())
-                .unwrap_or_else(|fields| panic!("{} fields: {line}", fields.len()));
+            <[&str; 5]>::try_from(line.split(',').collect::<Vec<_>>()).expect("five fields");
         assert!(!source.is_empty() && !commit.is_empty(), "no source: {line}");
         (board.to_owned(), function.to_owned(), pin.to_owned())
     };

@@ -1,6 +1,7 @@
 //! MCAP, ULog, KML, GPX and SRT of each kind of recording, read by readers that are not ours.
 
 use std::fs;
+use std::path::Path;
 
 use hums_tests::flights::root;
 use hums_tests::oracle;
@@ -39,7 +40,8 @@ fn read(recording: &str, at_least: &[(&str, u64)]) {
     ])
     .expect_code(&[0, 3]);
     let names = fs::read_dir(&files).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let jsonl = names.into_iter().find(|name| name.ends_with(".jsonl")).unwrap();
+    let jsonl =
+        names.into_iter().find(|name| Path::new(name).extension().is_some_and(|end| end == "jsonl")).unwrap();
     let found = oracle::exports(&files, jsonl.strip_suffix(".jsonl").unwrap());
     eprintln!("{recording}: {found}");
     assert_eq!(found["wrong"], json!([]), "{recording}");

@@ -208,7 +208,7 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
         ("logs.zip", b"PK\x03\x04 stored".to_vec(), "ZIP"),
         ("cut.tlog.gz", [&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3][..], &[0xff; 40]].concat(), "gz"),
         ("bad.ulg", ulog, ""),
-        ("half.tlog", flight[..flight.len() / 2 + 7].to_vec(), "verdict"),
+        ("half.tlog", flight[..flight.len() / 2 + 7].to_vec(), "1 warning"),
     ] {
         let path = page.file(name, &bytes);
         page.check("#files", &[path]);

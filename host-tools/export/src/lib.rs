@@ -82,7 +82,7 @@ use output::Schema;
 use plural::count;
 use selection::Selection;
 use source::epochs::Epochs;
-use source::find::{find, sessions_of};
+use source::find::{Found, find, sessions_of};
 use source::item::{Rows, Summary, Want};
 use source::recording::{Format, Place};
 use story::Said;
@@ -140,25 +140,14 @@ pub fn run(args: &Request) -> Result<Outcome> {
     let formats = Formats::new(&args.formats, args.split);
     let (given, remarks) = naming::without_made(&args.inputs);
     let found = find(&given, args.salvage)?;
-    for remark in remarks.iter().chain(&found.remarks) {
-        note!("{remark}");
-    }
+    remark(&found, &remarks);
     let mut outcome = Outcome::lossy(found.is_lossy());
-    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-        note!("{}: {}", image.path.display(), image.damage.join("; "));
-    }
-    if found.places.is_empty() {
-        note!("no log is in there, so nothing was written");
-    }
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
     let sessions = sessions_of(&found.places);
     let wanted = found.name_of(args.session.as_deref())?;
     let works = works(&found.places, &sessions)?;
     inputs.refuse(&args.output)?;
     args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
-    if args.manifest.as_ref() == Some(&args.output) {
-        return Err(usage_error("--manifest and -o are one file: the manifest would replace the output"));
-    }
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
     let standard_output = check_output(args, asked, &formats)?;
@@ -217,7 +206,23 @@ fn check_request(args: &Request) -> Result<()> {
     if args.manifest.is_some() && args.formats.iter().any(|format| matches!(format.way, Way::Alone(_))) {
         return Err(usage_error("--manifest: a log of one recording has none; hums info --verify makes it"));
     }
+    if args.manifest.as_ref() == Some(&args.output) {
+        return Err(usage_error("--manifest and -o are one file: the manifest would replace the output"));
+    }
     Ok(())
+}
+
+/// Prints the remarks on what was found.
+fn remark(found: &Found, remarks: &[String]) {
+    for remark in remarks.iter().chain(&found.remarks) {
+        note!("{remark}");
+    }
+    for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
+        note!("{}: {}", image.path.display(), image.damage.join("; "));
+    }
+    if found.places.is_empty() {
+        note!("no log is in there, so nothing was written");
+    }
 }
 
 /// A log beside the requested one, which may show how that one ends.

@@ -51,8 +51,11 @@ fn of<T>(message: &Latest<T>, value: impl FnOnce(&T) -> Option<f32>) -> Told {
     (message.at(), message.get().and_then(value))
 }
 
+/// A value's name, the age up to which it is shown, and its reader.
+type OfVehicle = (&'static str, Span, fn(&Vehicle) -> Told);
+
 /// Values of the monitor's vehicle: the page's names, maximum ages, and places.
-const OF_VEHICLE: &[(&str, Span, fn(&Vehicle) -> Told)] = &[
+const OF_VEHICLE: &[OfVehicle] = &[
     ("roll", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.roll.0.to_degrees()))),
     ("pitch", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.pitch.0.to_degrees()))),
     ("yaw", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.yaw.0.to_degrees()))),

@@ -20,6 +20,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use hums_core::params::ParamSpec;
 
 use crate::card::image;
 use crate::card::{Faults, SimCard};
@@ -27,7 +28,6 @@ use crate::cli::{Sim, Speed};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
-use crate::params;
 use crate::source::Chunk;
 use arrivals::Arrivals;
 use earlier::EarlierSessions;
@@ -150,17 +150,16 @@ struct Prepared {
 }
 
 /// Opens the files of a run. An input without a length may have `unknown` bytes.
-fn prepare(run: &Sim, unknown: u64) -> Result<Prepared> {
+fn prepare(run: &Sim, params: &[(&ParamSpec, f32)], unknown: u64) -> Result<Prepared> {
     let (speed, live) = pace(run)?;
     let inputs = paths::inputs(run)?;
     if run.costs && run.firmware.is_none() {
         return Err(usage("--costs measures a firmware image: give one with --firmware"));
     }
-    let params = params::read(run.params.as_deref())?;
     let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
-        Ok((card, store::open(run.store.as_deref(), &params)?))
+        Ok((card, store::open(run.store.as_deref(), params)?))
     })?;
     let earlier = EarlierSessions::of(run, unknown)?;
     let (ground, gs) = ground::open(run, &inputs)?;

@@ -53,7 +53,7 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
 
 /// Whether two paths lead to one file, which may not be there yet.
 fn is_same(one: &Path, other: &Path) -> bool {
-    match [one, other].map(|path| FileId::of(path)) {
+    match [one, other].map(FileId::of) {
         [Ok(one), Ok(other)] => one == other,
         [Err(_), Err(_)] => path::absolute(one).ok() == path::absolute(other).ok(),
         _ => false,

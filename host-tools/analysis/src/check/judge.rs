@@ -246,11 +246,8 @@ impl Judge {
                 self.details.failsafes(words);
                 self.tell(details::FAILSAFE);
             }
-            Item::Fact(Fact { about: About::Emergency, words }) => {
-                self.reported(at, details::EMERGENCY, words);
-            }
-            Item::Fact(Fact { about: About::ProcessorFault, words }) => {
-                self.reported(at, details::PROCESSOR_FAULT, words);
+            Item::Fact(Fact { about: about @ (About::Emergency | About::ProcessorFault), words }) => {
+                self.reported(at, about, words);
             }
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
@@ -478,7 +475,9 @@ impl Judge {
     }
 
     /// Something is over at the moment of its report: the autopilot stops its motors, or its processor restarts.
-    fn reported(&mut self, at: Instant, what: (&str, f32), words: &str) {
+    fn reported(&mut self, at: Instant, about: About, words: &str) {
+        let is_emergency = about == About::Emergency;
+        let what = if is_emergency { details::EMERGENCY } else { details::PROCESSOR_FAULT };
         self.advance(at);
         if self.here.is_open(what.0) {
             self.here.detail(what.0, words);
@@ -707,14 +706,13 @@ impl Judge {
             }
         }
         let remarks = self.remarks(by, &flights);
-        let last = self.last;
         let (mut problems, end, behind) = match by {
-            JudgedBy::Board => (self.board, last.max(self.recorded_to), Span::ZERO),
-            JudgedBy::Here => (self.here, last, self.clock.behind()),
+            JudgedBy::Board => (self.board, self.last.max(self.recorded_to), Span::ZERO),
+            JudgedBy::Here => (self.here, self.last, self.clock.behind()),
         };
         problems.end(end, behind);
-        let (mut findings, findings_count) =
-            (std::mem::take(&mut problems.findings), problems.findings_count);
+        let findings_count = problems.findings_count;
+        let mut findings = std::mem::take(&mut problems.findings);
         // An impact is reported after the vehicle lies still.
         findings.sort_by_key(|finding| finding.at);
         let worst_first = problems.worst_first();
@@ -734,7 +732,7 @@ impl Judge {
             monitor: self.monitor,
             facts: self.facts,
             epochs: self.epochs,
-            span: self.first.map(|first| (first, last)),
+            span: self.first.map(|first| (first, self.last)),
             armed,
             flights,
             ends_in_air,

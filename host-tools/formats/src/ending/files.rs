@@ -198,7 +198,7 @@ mod tests {
         let words = |names: &[&str], files_gone| {
             let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
             let summary = Summary { session: Some(7), files_gone, ..Summary::default() };
-            Ending { files: names.to_vec(), summary, ..Ending::default() }.strange().join("; ")
+            Ending { files: names.clone(), summary, ..Ending::default() }.strange().join("; ")
         };
         assert_eq!(words(&["00001_03.HUM"], 3), "files 00 to 02 of this log are not there");
         assert_eq!(words(&["00001_00.HUM", "00001_02.HUM"], 0), "file 01 of this log is not there");

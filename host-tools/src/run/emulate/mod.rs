@@ -17,6 +17,7 @@ use crate::card::image::is_card;
 use crate::cli;
 use crate::files::read_short;
 use crate::outcome::Outcome;
+use crate::params;
 use crate::plural::count;
 
 /// The ELF file of a release with all of its symbols has 8 MB.
@@ -25,9 +26,10 @@ const IMAGE_FILE_BYTES_MAX: u64 = 32 << 20;
 /// Runs `hums sim --firmware`.
 pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     check_standard_output(run)?;
+    let params = params::read(run.params.as_deref())?;
     let (wired, image) = image(firmware)?;
     let Prepared { speed, live, mut arrivals, card, flash, earlier, mut ground, gs, entropy } =
-        prepare(run, u64::MAX)?;
+        prepare(run, &params, u64::MAX)?;
     flash.prepare()?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();

@@ -32,7 +32,8 @@ use super::{Prepared, check_standard_output, check_store, drive, emulate, finish
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
-use crate::outcome::{Outcome, usage};
+use crate::outcome::Outcome;
+use crate::params;
 use crate::run::Machine as _;
 use crate::source::Chunk;
 
@@ -43,7 +44,7 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
     }
     check_standard_output(run)?;
     // The recorder itself keeps earlier sessions, however much comes.
-    let prepared = prepare(run, 0)?;
+    let prepared = prepare(run, &params::read(run.params.as_deref())?, 0)?;
     let Prepared { speed, live, mut arrivals, card: image, flash, earlier, mut ground, gs, entropy } =
         prepared;
     if let Some(step) = run.faults.cut_store_after {

@@ -82,7 +82,9 @@ fn tell(overview: &Overview, left_out: &[String], pulled: &mut [LogJson]) -> Out
     let mut faults = failed(overview);
     faults.retain(|(check, _)| is_judged(check));
     let is_proved = !has_all_files || ending.proof.is_whole() || ending.aside().is_some();
-    files.iter_mut().for_each(|log| log.whole = faults.is_empty());
+    for log in &mut files {
+        log.whole = faults.is_empty();
+    }
     if has_log_before && ending.is_without_earlier() {
         note!("{}: the logs that were recorded before it on this card did not come", ending.name);
     }

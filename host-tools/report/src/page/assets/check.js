@@ -78,7 +78,8 @@ const pageButtons = (host, words, { page, html, title }) =>
 
 // ---- A log's verdict.
 const LEVELS = { ok: "ok", advisory: "advisory", warning: "warning", critical: "critical" };
-let logs = new Map();
+// What was said of each log, and of each vehicle of a log of several.
+let logs = [];
 const addLog = (line, told, screen) => {
   const mark = badge();
   const level = LEVELS[told.verdict] ?? "stale";
@@ -95,7 +96,7 @@ const addLog = (line, told, screen) => {
     buttons.append(
       button("Save findings (JSON)", () => save(`${told.log.replace(/[^\w.-]+/g, "_")}.json`, `${line}\n`, "application/json")),
     );
-  logs.set(told.log, { line, told, buttons });
+  logs.push({ line, told, buttons });
   list.append(node);
 };
 
@@ -145,7 +146,7 @@ const start = async (given) => {
   const mine = turn;
   const isOld = () => mine !== turn;
   root.dataset.state = "busy";
-  logs = new Map();
+  logs = [];
   for (const node of [list, beside, remarks, shown]) node.replaceChildren();
   shown.hidden = true;
   const inputs = [...new Set(given.map(({ path }) => path.split("/")[0]))];
@@ -156,18 +157,18 @@ const start = async (given) => {
     else addLog(line, told, screen);
   });
   if (isOld()) return;
-  const read = [...logs.values()].filter(({ told }) => !told.error);
+  const read = logs.filter(({ told }) => !told.error);
   if (read.length > 1)
     beside.append(
       button("Save all findings (JSON lines)", () =>
-        save("findings.jsonl", [...logs.values()].map(({ line }) => `${line}\n`).join(""), "application/json"),
+        save("findings.jsonl", logs.map(({ line }) => `${line}\n`).join(""), "application/json"),
       ),
     );
   if (checked) return idle(`The check ended early: ${checked}.`);
-  if (read.length === 0) return idle(`No log could be read${logs.size ? "" : " in what was given"}.`);
+  if (read.length === 0) return idle(`No log could be read${logs.length ? "" : " in what was given"}.`);
   // A report for each, and one of the flights side by side.
   const flights = read.reduce((sum, { told }) => sum + told.flights.length, 0);
-  const failed = new Set([...logs.values()].filter(({ told }) => told.error).map(({ told }) => told.log));
+  const failed = new Set(logs.filter(({ told }) => told.error).map(({ told }) => told.log));
   const good = inputs.filter((input) => !failed.has(input));
   const files = given.filter(({ path }) => good.includes(path.split("/")[0]));
   root.dataset.state = "checked";
@@ -175,12 +176,12 @@ const start = async (given) => {
     if (!line.startsWith("{")) return;
     const { page, log, html } = JSON.parse(line);
     if (log != null) {
-      const of = logs.get(log);
+      const of = logs.find(({ told }) => told.log === log);
       if (of) pageButtons(of.buttons, "Report", { page, html, title: log });
     } else if (page !== "index.html") pageButtons(beside, "Flights side by side", { page, html, title: "Flights side by side" });
   });
   if (isOld()) return;
-  idle(reported ? `The reports ended early: ${reported}.` : `${plural(logs.size, "log")} checked.`);
+  idle(reported ? `The reports ended early: ${reported}.` : `${plural(new Set(logs.map(({ told }) => told.log)).size, "log")} checked.`);
 };
 
 // ---- Dropping: files, and folders with all that is in them.

@@ -60,7 +60,7 @@ impl Px4 {
             self.repeat(recorded_us);
             let Self { receivers, reports, .. } = self;
             receivers::silence(receivers, now, &mut |observation| {
-                reports.push(Report::Observation(observation))
+                reports.push(Report::Observation(observation));
             });
         }
     }

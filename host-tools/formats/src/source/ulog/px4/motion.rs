@@ -39,7 +39,7 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("sensor_combined", 1, 0, "accelerometer_m_s2 gyro_rad", imu),
     topic("vehicle_acceleration", 1, 0, "xyz", acceleration),
     topic("vehicle_angular_velocity", 1, FAST_US, "xyz", |px4, sample| {
-        px4.motion.rate = sample.fields.vector(0)
+        px4.motion.rate = sample.fields.vector(0);
     }),
     // Each of several sensors; the one that flies is in the topics above.
     topic("vehicle_imu", 3, MEDIUM_US, VEHICLE_IMU, other_imu),
