@@ -1,7 +1,7 @@
 //! `hums share`: a copy of a log without where and who, for a bug report or a question in public.
 //!
 //! * Frames of a link become a tlog with the fields in `fields.txt`, the parameters in `parameters.txt`, and texts made of the words in `words.txt`.
-//! * An autopilot's own log becomes a ULog of its observations, by [`moved::Moved::observation`].
+//! * An autopilot's own log becomes a ULog of its observations, by the rules of `moved.rs`.
 //! * Places move so that the first one is in the middle of the Atlantic at sea level, pressure so that the first is standard pressure, and times so
 //!   that the first is the beginning of 2020. Relative motion, heights and durations stay.
 
