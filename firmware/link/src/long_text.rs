@@ -61,7 +61,7 @@ struct Open {
     words: heapless::Vec<u8, BYTES_MAX>,
 }
 
-/// Puts long texts together: one of each sender, of at most [`SENDERS_MAX`] senders at a time. A part of another text of its
+/// Puts long texts together: one of each sender, of at most two senders at a time. A part of another text of its
 /// sender, or of one sender more, completes the text before.
 #[derive(Clone, Debug, Default)]
 pub struct LongTexts([Option<Open>; SENDERS_MAX]);
