@@ -26,8 +26,10 @@ use crate::card::image;
 use crate::card::{Faults, SimCard};
 use crate::cli::{Sim, Speed};
 use crate::endpoint::Endpoint;
+use crate::files::Inputs;
 use crate::interrupt;
 use crate::outcome::{Outcome, usage};
+use crate::params;
 use crate::source::Chunk;
 use arrivals::Arrivals;
 use earlier::EarlierSessions;
@@ -149,20 +151,27 @@ struct Prepared {
     entropy: u32,
 }
 
-/// Opens the files of a run. An input without a length may have `unknown` bytes.
-fn prepare(run: &Sim, params: &[(&ParamSpec, f32)], unknown: u64) -> Result<Prepared> {
-    let (speed, live) = pace(run)?;
+/// The inputs of a run, and its parameters: refused before anything is opened.
+type Request = (Inputs, Vec<(&'static ParamSpec, f32)>);
+
+fn check_request(run: &Sim) -> Result<Request> {
     let inputs = paths::inputs(run)?;
     if run.costs && run.firmware.is_none() {
         return Err(usage("--costs measures a firmware image: give one with --firmware"));
     }
-    let (mut arrivals, (card, flash)) = Arrivals::open(run, &inputs, || {
+    Ok((inputs, params::read(run.params.as_deref())?))
+}
+
+/// Opens the files of a run. An input without a length may have `unknown` bytes.
+fn prepare(run: &Sim, (inputs, params): &Request, unknown: u64) -> Result<Prepared> {
+    let (speed, live) = pace(run)?;
+    let (mut arrivals, (card, flash)) = Arrivals::open(run, inputs, || {
         run.store.as_deref().map_or(Ok(()), store::check)?;
         let card = prepare_card(&run.sd, run.faults.card_size, run.faults.seed)?;
         Ok((card, store::open(run.store.as_deref(), params)?))
     })?;
     let earlier = EarlierSessions::of(run, unknown)?;
-    let (ground, gs) = ground::open(run, &inputs)?;
+    let (ground, gs) = ground::open(run, inputs)?;
     let entropy = salt::salt(run, &mut arrivals)?;
     Ok(Prepared { speed, live, arrivals, card, flash, earlier, ground, gs, entropy })
 }

@@ -12,12 +12,11 @@ use hums_sdcard::Medium;
 use stm32f405_model::image::Image;
 
 use super::report::{OnCard, Report};
-use super::{Prepared, check_standard_output, check_store, drive, finish, prepare};
+use super::{Prepared, check_request, check_standard_output, check_store, drive, finish, prepare};
 use crate::card::image::is_card;
 use crate::cli;
 use crate::files::read_short;
 use crate::outcome::Outcome;
-use crate::params;
 use crate::plural::count;
 
 /// The ELF file of a release with all of its symbols has 8 MB.
@@ -26,10 +25,10 @@ const IMAGE_FILE_BYTES_MAX: u64 = 32 << 20;
 /// Runs `hums sim --firmware`.
 pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     check_standard_output(run)?;
-    let params = params::read(run.params.as_deref())?;
+    let request = check_request(run)?;
     let (wired, image) = image(firmware)?;
     let Prepared { speed, live, mut arrivals, card, flash, earlier, mut ground, gs, entropy } =
-        prepare(run, &params, u64::MAX)?;
+        prepare(run, &request, u64::MAX)?;
     flash.prepare()?;
     let mut reboots = VecDeque::from(run.faults.reboot_at_us.clone());
     reboots.make_contiguous().sort_unstable();

@@ -28,12 +28,11 @@ use super::earlier::EarlierSessions;
 use super::ground::Ground;
 use super::report::{FINDINGS_MAX, Report};
 use super::store::{self, FileFlash};
-use super::{Prepared, check_standard_output, check_store, drive, emulate, finish, prepare};
+use super::{Prepared, check_request, check_standard_output, check_store, drive, emulate, finish, prepare};
 use crate::card::image::is_card;
 use crate::card::{Faults, SimCard};
 use crate::cli;
 use crate::outcome::Outcome;
-use crate::params;
 use crate::run::Machine as _;
 use crate::source::Chunk;
 
@@ -44,7 +43,7 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
     }
     check_standard_output(run)?;
     // The recorder itself keeps earlier sessions, however much comes.
-    let prepared = prepare(run, &params::read(run.params.as_deref())?, 0)?;
+    let prepared = prepare(run, &check_request(run)?, 0)?;
     let Prepared { speed, live, mut arrivals, card: image, flash, earlier, mut ground, gs, entropy } =
         prepared;
     if let Some(step) = run.faults.cut_store_after {
