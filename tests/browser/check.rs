@@ -126,7 +126,8 @@ fn every_recording_of_the_repository_is_judged_to_the_byte_as_on_the_command_lin
     let saved = page.save("Save all findings (JSON lines)", 1);
     let expected = hums_in(&folder, &["check", "--json"], &names);
     let (shown, expected) = (fs::read_to_string(&saved[0]).unwrap(), expected.text());
-    assert_eq!(shown.lines().count(), names.len());
+    // A recording of two vehicles has a line for each.
+    assert!(expected.lines().count() >= names.len() && shown.lines().count() == expected.lines().count());
     for (shown, expected) in shown.lines().zip(expected.lines()) {
         assert_eq!(shown, expected);
     }

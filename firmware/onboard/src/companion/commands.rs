@@ -151,8 +151,9 @@ impl Commands {
                 let serial = characters(params);
                 let serial = core::str::from_utf8(&serial).unwrap_or_default();
                 // A station that lost our answer asks again.
-                let known = book.monitor.components().get(place).map(|part| part.serial);
-                let is_done = !serial.is_empty() && known == Some(Label::new(serial));
+                let (new, known) =
+                    (Label::new(serial), book.monitor.components().get(place).map(|part| part.serial));
+                let is_done = new != Label::default() && known == Some(new);
                 if is_done || records::replace_component(now, place, serial, by, book, sectors) {
                     ACCEPTED
                 } else {
