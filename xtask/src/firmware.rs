@@ -89,8 +89,7 @@ pub(crate) fn build(board: &Board) -> Result<PathBuf> {
     Ok(image)
 }
 
-/// [`build`] for these boards, one after the other, and, at the same time, what is built for this PC: the last part of each is one
-/// core's work.
+/// [`build`] for these boards, one after the other, beside the build for this PC. The last part of each is one core's work.
 pub(crate) fn build_beside(
     boards: impl IntoIterator<Item = &'static Board> + Send,
     pc: impl FnOnce() -> Result<()>,

@@ -134,10 +134,10 @@ impl Stamp {
 /// Longest gap between samples of one course, and largest age of a current sample: two messages of a stream at 1 Hz.
 pub(crate) const PAUSE: Span = Span::from_secs(2);
 
-/// What is younger is of now, of streams at 2 Hz and more.
+/// Age up to which a message of a stream at 2 Hz or more counts as current.
 pub(crate) const FRESH: Span = Span::from_secs(1);
 
-/// What is older is of no use, of streams at 0.5 Hz and more: they have stopped.
+/// Age from which a stream at 0.5 Hz or more counts as stopped.
 pub(crate) const SILENT: Span = Span::from_secs(5);
 
 /// A length of time in milliseconds, up to 49.7 days.

@@ -51,7 +51,7 @@ pub(crate) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
     if is_whole { alert::of_text(Some(part.severity), part.words) } else { None }
 }
 
-/// The text of which parts have come.
+/// A text that still lacks its last part.
 #[derive(Clone, Debug)]
 struct Open {
     at: time::Instant,

@@ -30,9 +30,9 @@ pub fn name(kind: &str, number: u8, given: &str) -> String {
 /// The limit that a part reaches first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// What the part has run.
+    /// Use of the part so far, in the unit of the limit.
     pub run: f64,
-    /// What it may run.
+    /// The limit.
     pub limit: f64,
     /// Of both: `h`, `flights`, `cycles`.
     pub unit: &'static str,

@@ -548,7 +548,7 @@ impl Overview {
         self.faults().is_empty()
     }
 
-    /// What it lacks.
+    /// Its losses, damage and missing proof.
     pub fn soundness(&self) -> Soundness {
         match self.format {
             None => Soundness::of(&self.ending),

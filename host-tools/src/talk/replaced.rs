@@ -29,7 +29,7 @@ const ANSWER: Duration = Duration::from_secs(2);
 const TRIES: usize = 3;
 /// The file of settings in a card's root, which the box reads at each power-on.
 const SETTINGS: &str = "PARAMS.TXT";
-/// Characters in a parameter of the command: what a number of single precision holds exactly.
+/// Characters in a parameter of the command: single precision holds 24 bits exactly.
 const CHARACTERS: usize = 3;
 
 /// Output of `hums box replaced --json`.

@@ -20,7 +20,7 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// What the log lacks.
+    /// Losses, damage and missing proof of the log.
     pub fn soundness(&self) -> Soundness {
         let judged = &self.judged;
         let read = match () {

@@ -104,6 +104,19 @@ enum Values {
     Texts(Texts),
 }
 
+impl Values {
+    fn count(&self) -> usize {
+        match self {
+            Self::Flags(values) => values.len(),
+            Self::Integers(values) => values.len(),
+            Self::Longs(values) => values.len(),
+            Self::Singles(values) => values.len(),
+            Self::Doubles(values) => values.len(),
+            Self::Texts(values) => values.ends.len(),
+        }
+    }
+}
+
 /// Texts in a row, and the end of each.
 #[derive(Debug, Default)]
 struct Texts {
@@ -309,14 +322,7 @@ impl Column {
     }
 
     pub(super) fn write(&self, writer: &mut SerializedColumnWriter<'_>) -> Result<()> {
-        let values = match &self.values {
-            Values::Flags(values) => values.len(),
-            Values::Integers(values) => values.len(),
-            Values::Longs(values) => values.len(),
-            Values::Singles(values) => values.len(),
-            Values::Doubles(values) => values.len(),
-            Values::Texts(values) => values.ends.len(),
-        };
+        let values = self.values.count();
         // The first element of a list begins a row; lists have no gaps.
         let begins: Vec<i16> = match self.length {
             0 => Vec::new(),
@@ -479,17 +485,6 @@ impl TableRows {
 mod tests {
     use super::*;
 
-    fn values(column: &Column) -> usize {
-        match &column.values {
-            Values::Flags(values) => values.len(),
-            Values::Integers(values) => values.len(),
-            Values::Longs(values) => values.len(),
-            Values::Singles(values) => values.len(),
-            Values::Doubles(values) => values.len(),
-            Values::Texts(values) => values.ends.len(),
-        }
-    }
-
     #[test]
     fn every_message_fills_its_columns_which_have_different_names() {
         for message in hums_dialect::messages() {
@@ -510,7 +505,7 @@ mod tests {
             assert_eq!((all.rows, all.columns.len()), (2, 4 + message.fields.len()), "{}", message.name);
             for (index, column) in all.columns.iter().enumerate() {
                 let expected = if index == 1 { 1 } else { 2 * column.length.max(1) };
-                assert_eq!(values(column), expected, "{} {}", message.name, column.name);
+                assert_eq!(column.values.count(), expected, "{} {}", message.name, column.name);
                 column.parquet_type().expect("a type");
             }
             let mut names: Vec<&str> = all.columns.iter().map(|column| column.name.as_str()).collect();
@@ -548,6 +543,6 @@ mod tests {
         assert_eq!(taken.columns[3].levels, [1, 0, 1, 1]);
         let Values::Texts(texts) = &taken.columns[3].values else { panic!("texts") };
         assert_eq!(texts.some(1, 2), [ByteArray::from(""), ByteArray::from("d\u{e9}")]);
-        assert!(columns.rows() == 0 && values(&columns.columns[0]) == 0, "nothing is left");
+        assert!(columns.rows() == 0 && columns.columns[0].values.count() == 0, "nothing is left");
     }
 }

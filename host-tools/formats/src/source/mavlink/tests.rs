@@ -381,7 +381,7 @@ fn where_the_recorded_times_stand_still_the_autopilots_count_and_it_is_damage() 
     // They stand still for half a minute and then go on rightly.
     let stretch = of(&|passed_s| sound(if (50.0..80.0).contains(&passed_s) { 50.0 } else { passed_s }));
     assert!(is_mended(stretch.clone()), "{stretch:?}");
-    // What a ground station held back while it started comes at once.
+    // A ground station hands on the frames of its start at once.
     let burst = of(&|passed_s| sound((passed_s - 8.0).max(0.0)));
     assert!(burst.0.is_empty() && (1_960..=2_010).contains(&burst.2), "{burst:?}");
     // A link that holds back five seconds again and again is sound.

@@ -193,7 +193,7 @@ pub(in crate::source::dataflash) struct State {
     pub(super) messages_lost: Option<u64>,
     /// Bits of the internal errors so far.
     pub(super) internal_errors: u64,
-    /// The text of which parts have come, with its number.
+    /// A text that still lacks its last part, with its number.
     pub(in crate::source::dataflash) open_text: Option<(u64, String)>,
     /// Time of the last report of UTC.
     pub(super) utc_said: Option<Instant>,
