@@ -1,5 +1,5 @@
-//! The `hums` command and the image that is flashed, from outside; each module is one step of `cargo xtask test`. One program:
-//! compiling and linking five took longer than most of them run.
+//! The `hums` command and the image, from outside; each module is one step of `cargo xtask test`. One program: five took longer
+//! to link than to run.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 mod answer;

@@ -68,8 +68,7 @@ fn what_is_left_of_a_damaged_log_is_in_every_format_and_in_its_report() {
     beside_a_tlog(&dir.path().join("zeroed.hum"), dir.path());
 }
 
-/// A tlog's table of gaps: reported if no second output is possible; no tlog is written without it if a file is in
-/// its way.
+/// Reported if no second output is possible; no tlog is written without it if a file is in its way.
 fn beside_a_tlog(damaged: &Path, dir: &Path) {
     let (tlog, gaps) = (dir.join("one.tlog"), dir.join("one.tlog.gaps.csv"));
     let decode = |output: &Path| {

@@ -7,7 +7,6 @@ use hums::source::recording::Place;
 use hums_tests::{flights, oracle};
 use serde_json::Value as Json;
 
-/// Whether a value equals pymavlink's.
 fn same(ours: &Value<'_>, theirs: &Json) -> bool {
     match ours {
         Value::Unknown => theirs.is_null(),
@@ -35,7 +34,7 @@ fn same(ours: &Value<'_>, theirs: &Json) -> bool {
 fn every_field_of_every_message_of_an_autopilots_own_log_is_read_as_pymavlink_reads_it() {
     let compressed = flights::root().join("tests/labelled/bin/f12_gps_jump.bin.gz");
     let recording = Place::file(&compressed).open().unwrap();
-    // Pymavlink maps the file into its memory, and so needs it without compression.
+    // Pymavlink maps the file into memory: no compression.
     let mut plain = tempfile::Builder::new().suffix(".bin").tempfile().unwrap();
     let mut input = hums::source::input::Input::open(&compressed).unwrap();
     std::io::copy(&mut input, &mut plain).unwrap();

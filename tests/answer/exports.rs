@@ -8,7 +8,7 @@ use hums_tests::oracle;
 use hums_tests::program::hums;
 use serde_json::json;
 
-/// Decodes a recording, lets the script read the files, and compares counts: at least these.
+/// `at_least`: the least counts.
 #[track_caller]
 fn read(recording: &str, at_least: &[(&str, u64)]) {
     let dir = tempfile::tempdir().unwrap();

@@ -10,11 +10,9 @@ use hums_tests::oracle;
 use hums_tests::program::{LIMIT, command, hums};
 use serde_json::Value;
 
-/// Two cards, one with two flights.
 fn cards(dir: &Path) {
     fs::create_dir(dir.join("cards")).unwrap();
-    // A board has a source of randomness that distinguishes sessions of equal number on two cards; here it is the
-    // seed.
+    // Boards have a source of randomness that distinguishes sessions of equal number; here it is the seed.
     for (card, seed, flight) in [
         ("first", "1", "px4_hil_quad_low.tlog"),
         ("second", "2", "ap_quad_guided.tlog"),
@@ -51,7 +49,6 @@ fn cards(dir: &Path) {
     .expect_code(&[0]);
 }
 
-/// The rows of the query under a heading, as objects.
 fn rows(results: &Value, heading: &str) -> Vec<Value> {
     let result =
         results.as_array().unwrap().iter().find(|result| result["heading"] == heading).expect(heading);
@@ -76,7 +73,6 @@ fn the_documents_queries_answer_what_the_cards_say() {
         child::run(decode.args(["--force", "--format", format]), LIMIT).expect_code(&[0]);
     };
     decode("parquet", &fleet);
-    // Again, over it: no row is there twice.
     decode("parquet", &fleet);
     let info = hums(["info".as_ref(), "--json".as_ref(), cards.as_os_str()]).expect_code(&[0]).text();
     let info: Value = serde_json::from_str(&info).unwrap();
@@ -140,7 +136,6 @@ fn the_documents_queries_answer_what_the_cards_say() {
     assert_eq!(frames, expected);
 }
 
-/// No session is skipped silently.
 #[track_caller]
 fn assert_all_are_told(results: &Value, logs: &[Value]) {
     let mut checked: Vec<(String, String, u64)> = rows(results, "Who was checked").iter().map(told).collect();

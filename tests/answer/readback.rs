@@ -6,7 +6,6 @@ use hums_tests::flights::{OWN, further, own};
 use hums_tests::program::hums;
 use hums_tests::{child, oracle};
 
-/// Packs a recording, decodes it to every format, and lets the oracle compare.
 #[track_caller]
 fn compare(recording: &Path) {
     let dir = tempfile::tempdir().unwrap();

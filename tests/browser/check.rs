@@ -36,14 +36,13 @@ impl Page {
         Self { dir, shown }
     }
 
-    /// A file beside the page.
     fn file(&self, name: &str, bytes: &[u8]) -> PathBuf {
         let path = self.dir.path().join(name);
         fs::write(&path, bytes).unwrap();
         path
     }
 
-    /// Chooses files, or a folder, and waits for all results.
+    /// Waits for all results.
     #[track_caller]
     fn check(&mut self, selector: &str, paths: &[PathBuf]) {
         self.shown.run("document.documentElement.dataset.state = ''; return null");
@@ -58,7 +57,7 @@ impl Page {
         self.shown.run(&script).as_str().unwrap().to_owned()
     }
 
-    /// Presses the buttons with these words, one after the other, and returns the saved file of each.
+    /// Returns the saved file of each.
     #[track_caller]
     fn save(&mut self, words: &str, count: usize) -> Vec<PathBuf> {
         let saved = self.dir.path().join("saved");
@@ -79,14 +78,13 @@ impl Page {
     }
 }
 
-/// Runs `hums` in a folder: its names of files are those of the page.
 #[track_caller]
 fn hums_in(folder: &Path, arguments: &[&str], names: &[String]) -> child::Outcome {
     let mut hums = command(arguments.iter().map(ToString::to_string).chain(names.iter().cloned()));
     child::run(hums.current_dir(folder), LIMIT)
 }
 
-/// All recordings of the repository, under names that differ, in `folder`.
+/// All recordings of the repository, under names that differ.
 fn recordings(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     for from in [
@@ -163,7 +161,7 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
             name.display()
         );
     }
-    // The screen is that of the command line, and a report runs inside the page.
+    // A report runs inside the page.
     let screen = hums_in(&folder, &["check"], &names[..1]).text();
     assert!(
         page.text("[data-log='a.tlog'] .screen") == screen.trim_end(),
@@ -215,7 +213,6 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
         page.check("#files", &[path]);
         let shown = page.text("#logs .screen, [role=status], #remarks");
         assert!(shown.contains(words) && !shown.contains("panicked"), "{name}: {shown}");
-        // The command line says the same.
         let expected = hums_in(page.dir.path(), &["check", "--json"], &[name.to_owned()]).text();
         let error =
             serde_json::from_str::<serde_json::Value>(expected.lines().next().unwrap_or("{}")).unwrap();

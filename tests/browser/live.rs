@@ -14,7 +14,6 @@ use hums_tests::oracle::LivePage;
 use hums_tests::program::{command, hums};
 use serde_json::{Value, json};
 
-/// A number as the page prints it.
 fn number(text: &str) -> f64 {
     let plain: String =
         text.chars().filter(|c| *c != '\u{202f}').map(|c| if c == '\u{2212}' { '-' } else { c }).collect();
@@ -25,7 +24,7 @@ fn shown(page: &Value, name: &str) -> f64 {
     number(page["values"][name].as_str().unwrap_or_else(|| panic!("the page has no {name}")))
 }
 
-/// Every frame of a recording with the fields of an independent reader, through a packed log.
+/// The frames with the fields of an independent reader, through a packed log.
 fn frames(recording: &Path) -> Vec<Value> {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("flight.hum"), dir.path().join("flight.jsonl"));
@@ -56,7 +55,6 @@ fn cut(recording: &Path, from_s: f64, to: &Path) -> PathBuf {
     to.to_owned()
 }
 
-/// The vehicle's last message of a name by a time.
 fn last<'a>(frames: &'a [Value], message: &str, by_s: f64) -> &'a Value {
     let of_vehicle = |frame: &&Value| frame["message"] == message && frame["component"] == 1;
     let by = |frame: &&Value| frame["time_boot"].as_f64().unwrap() <= by_s;
@@ -64,7 +62,7 @@ fn last<'a>(frames: &'a [Value], message: &str, by_s: f64) -> &'a Value {
     &found.unwrap_or_else(|| panic!("no {message} by {by_s} s"))["fields"]
 }
 
-/// A panel, its message, its resolution, and its value from the message's fields.
+/// Its message, its resolution, and its value from the message's fields.
 type Panel = (&'static str, &'static str, f64, fn(&Value) -> f64);
 
 fn of(fields: &Value, name: &str) -> f64 {
@@ -111,7 +109,7 @@ fn assert_shows(page: &Value, frames: &[Value]) {
     }
 }
 
-/// Moves to a time of a recording, like a hand on the slider.
+/// Like a hand on the slider.
 fn seek(page: &mut LivePage, to_s: f64) -> Value {
     page.run(&format!(
         "const s = document.querySelector('input[type=range]'); s.value = {to_s}; \
@@ -131,7 +129,6 @@ fn assert_sound(page: &mut LivePage) {
     assert!(width[1].as_f64() <= window, "something sticks out: {width} in a window of {window:?}");
 }
 
-/// The folder for screenshots, if they are wanted.
 fn shots() -> Option<PathBuf> {
     let folder = PathBuf::from(std::env::var_os("HUMS_SHOTS")?);
     std::fs::create_dir_all(&folder).unwrap();
@@ -157,13 +154,12 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     page.press(&[" "]);
     page.wait("return document.getElementById('source').textContent === 'paused'", 10);
 
-    // The help is shown by a key, and Esc closes it.
     page.press(&["?"]);
     page.wait("return document.querySelector('dialog').open", 10);
     page.press(&["ESCAPE"]);
     page.wait("return !document.querySelector('dialog').open", 10);
 
-    // On, back, and on again; each time the whole page shows that moment.
+    // Each time the whole page shows that moment.
     for to_s in [60.0, 90.0, 45.0, 75.0] {
         assert_shows(&seek(&mut page, to_s), &frames);
     }
@@ -171,7 +167,6 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     page.press(&["ARROW_LEFT"]);
     page.wait(&format!("return document.documentElement.dataset.now < {there} - 4"), 10);
 
-    // A finding shows from its time on, and not before.
     let found = |page: &Value| {
         let notes = page["notes"].as_array().unwrap();
         notes.iter().filter(|note| ["warning", "critical"].contains(&note[1].as_str().unwrap())).count()
@@ -194,7 +189,7 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     }
 }
 
-/// The page's entry for a part that wears: its level, and the used part of its life, percent.
+/// Its level, and the used part of its life, percent.
 fn part(page: &mut LivePage) -> (String, f64) {
     page.wait("return document.querySelector('.due li') !== null", 20);
     let level = page.run("return document.querySelector('.due .badge').textContent");
@@ -339,7 +334,6 @@ fn a_page_that_has_lost_hums_says_at_once_that_the_vehicles_state_is_not_known()
     assert_ne!(before, "not known");
     live.program.signal("KILL");
     page.wait("return document.getElementById('source').textContent === 'no connection'", 10);
-    // With the same look as the source's badge, and not seconds later.
     page.wait(&format!("return {overall}.textContent === 'not known'"), 1);
     assert_eq!(page.run(&format!("return {overall}.classList.contains('stale')")), true);
     shoot(&mut page, "no-connection");

@@ -25,7 +25,6 @@ fn report(source: &Path, codes: &[i32]) -> (tempfile::TempDir, PathBuf) {
     (dir, page)
 }
 
-/// Conditions on every page.
 #[track_caller]
 fn assert_sound(shown: &Value) {
     assert_eq!(shown["console"], serde_json::json!([]), "the browser complains");
@@ -39,7 +38,6 @@ fn assert_sound(shown: &Value) {
     }
 }
 
-/// A number as the page prints it: its groups apart, its unit after it.
 fn number(text: &str) -> f64 {
     let plain: String =
         text.chars().filter(|c| *c != '\u{202f}').map(|c| if c == '\u{2212}' { '-' } else { c }).collect();
@@ -47,7 +45,7 @@ fn number(text: &str) -> f64 {
     plain[..end].parse().unwrap_or_else(|_| panic!("no number: {text:?}"))
 }
 
-/// The values of one field around a time, from the JSON lines: lowest and highest within `around_s`.
+/// Lowest and highest within `around_s`, from the JSON lines.
 fn around(jsonl: &str, message: &str, at_s: f64, around_s: f64, value: impl Fn(&Value) -> f64) -> (f64, f64) {
     let wanted = format!("\"message\":\"{message}\"");
     let values = jsonl.lines().filter(|line| line.contains(&wanted)).map(json).filter_map(|entry| {
@@ -117,7 +115,6 @@ const AROUND_S: f64 = 1.6;
 /// A plot, one of its lines, its message, its resolution, and its value from the message's fields.
 type Line = (&'static str, &'static str, &'static str, f64, fn(&Value) -> f64);
 
-/// The modes are those of the heartbeats, in order.
 fn assert_modes(jsonl: &str, shown: &Value) {
     let beats = jsonl.lines().filter(|line| line.contains("\"message\":\"HEARTBEAT\"")).map(json);
     let of_autopilot = beats.filter(|entry| entry["component"] == 1);
@@ -245,7 +242,7 @@ fn labelled(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("labelled").join(name)
 }
 
-/// Frames of one standing vehicle: heartbeats and the given messages, each once a second.
+/// Heartbeats and the given messages, each once a second.
 fn standing(seconds: u8, more: impl Fn(u8) -> Vec<(u32, Vec<u8>)>) -> Vec<u8> {
     let seeds = &Manifest::own().seeds;
     let (mut data, mut sequence, start_us) = (Vec::new(), 0_u8, 1_700_000_000_000_000_u64);
@@ -344,7 +341,6 @@ fn a_finding_stands_with_its_cause_and_with_its_consequences() {
     assert!(says("consequences", "Consequences: "), "{}", shown["consequences"]);
 }
 
-/// The cells of a table's rows.
 fn table(page: &mut LivePage, selector: &str) -> Vec<Vec<String>> {
     let rows = page.run(&format!(
         "return [...document.querySelectorAll('{selector} tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))"
@@ -358,7 +354,7 @@ fn data_of(path: &Path) -> Value {
     json(data.split_once("</script>").unwrap().0)
 }
 
-/// The parameters on a link, by an independent reader: the last values, or the first ones.
+/// By an independent reader: the last values, or the first ones.
 fn parameters(recording: &Path) -> BTreeMap<String, u32> {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
@@ -412,7 +408,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     assert_eq!(table(&mut page, "#pages").len(), 1);
     assert_eq!(page.console(), serde_json::json!([]));
     shoot(&mut page, "index");
-    // Each row leads to its page, which lists the changes since the previous flight.
+    // Lists the changes since the previous flight.
     page.run("document.querySelector('#pages a').click()");
     page.wait("return document.title.includes('ap_quad_faults') && document.documentElement.dataset.ready === 'true'", 20);
     assert_times(&mut page, &flights[1]);
@@ -453,7 +449,7 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     assert_compared(&mut page, &pages, &now, &before);
 }
 
-/// Findings have the times of `hums check` and `hums info`.
+/// As in `hums check` and `hums info`.
 #[track_caller]
 fn assert_times(page: &mut LivePage, recording: &Path) {
     let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.as_os_str()]).text());
@@ -473,7 +469,7 @@ fn page_of(pages: &Path, begins: &str) -> String {
     format!("file://{}", file.display())
 }
 
-/// The newest flight comes first: in the figures, in each plot, and in the parameters that differ.
+/// The newest flight comes first everywhere.
 fn assert_compared(
     page: &mut LivePage,
     pages: &Path,
@@ -504,7 +500,7 @@ fn assert_compared(
     );
     let names = "return [...document.querySelectorAll('#plot-PackVolts-0 .keys button')].map((key) => key.textContent)";
     assert_eq!(page.run(names).as_array().unwrap().len(), 2, "both in one plot, on one scale");
-    // Without the second one only the first is drawn, everywhere.
+    // Without the second one only the first is drawn.
     page.run("document.querySelectorAll('#figures input')[1].click()");
     let off = page.run("return [...document.querySelectorAll('.plot')].filter((plot) => plot.querySelectorAll('.keys .off').length !== 1).length");
     let whole = page.run("return [...document.querySelectorAll('.plot')].filter((plot) => plot.querySelectorAll('.keys button').length === 2).length");
@@ -523,11 +519,11 @@ fn assert_compared(
     shoot(page, "compare");
 }
 
-/// Each flight has its track, all in one scale, and the same distance as on its own page.
+/// All in one scale, and the same distance as on its own page.
 #[track_caller]
 fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
     for (data, far_m) in pages.iter().zip(far_m) {
-        // Of several flights in a log the last comes first.
+        // The last of several flights comes first.
         let last = data["flights"].as_array().unwrap().last().unwrap();
         let within =
             |at: &Value| at.as_f64() >= last["from_s"].as_f64() && at.as_f64() <= last["to_s"].as_f64();
@@ -546,7 +542,7 @@ fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
         "return [...document.querySelectorAll('#tracks canvas')].map((map) => Number(map.dataset.scale))";
     let both = page.run(scales);
     assert!(both[0].as_f64() > Some(0.0) && both[0] == both[1] && both[2].is_null(), "{both}");
-    // Without one of them the other may be drawn larger, and never smaller.
+    // Without one, the other is never drawn smaller.
     let hide = |number: usize| format!("document.querySelectorAll('#figures input')[{number}].click()");
     for number in 0..2 {
         page.run(&hide(number));
@@ -575,13 +571,12 @@ fn parameters_that_are_not_at_their_default_are_those_of_which_the_log_says_so()
     let mut input = hums::source::input::Input::open(&labelled("bin/n03_wind9_gusty.bin.gz")).unwrap();
     std::io::copy(&mut input, &mut fs::File::create(&log).unwrap()).unwrap();
     let (_dir, path) = report(&log, &[0]);
-    // By pymavlink: the last value of each.
+    // By pymavlink.
     let lines = oracle::dataflash(&log);
     let rows = lines.lines().map(json).filter(|row| row[0] == "PARM");
     let (mut other, mut defaults) = (BTreeMap::new(), BTreeMap::new());
     for row in rows {
         let name = row[1][1].as_str().unwrap().to_owned();
-        // A change in flight comes without it.
         if let Some(default) = row[1][3].as_f64() {
             defaults.insert(name.clone(), default);
         }
@@ -599,8 +594,7 @@ fn parameters_that_are_not_at_their_default_are_those_of_which_the_log_says_so()
     assert_eq!(shown.iter().collect::<Vec<_>>(), wanted);
 }
 
-/// The contrast of each text with its background, by WCAG 2.2: the lowest, with its text. Small print is judged by
-/// its own limit.
+/// The contrast of each text with its background, by WCAG 2.2: the lowest, with its text.
 const CONTRAST: &str = "
 const channel = (c) => (c /= 255) <= .04045 ? c / 12.92 : ((c + .055) / 1.055) ** 2.4;
 const light = ([r, g, b]) => .2126 * channel(r) + .7152 * channel(g) + .0722 * channel(b);
@@ -627,8 +621,7 @@ for (let text = walk.nextNode(); text; text = walk.nextNode()) {
 return worst;
 ";
 
-/// From a wide window too, all plots are drawn for paper, as wide as A4 within its margins, before the layout on
-/// paper.
+/// From a wide window too: drawn as wide as A4 within its margins, before the layout on paper.
 #[track_caller]
 fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
     page.open(address, "light", 1920, 1000);
@@ -672,7 +665,6 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     let framed = page.run("return getComputedStyle(document.querySelector('.badge')).borderTopStyle");
     assert_eq!(framed, "solid", "a level without its colour");
     page.media("", &serde_json::json!({}));
-    // The keyboard: a step of the timeline moves the cursor in all plots, Enter zooms in, Escape goes back.
     page.run("document.getElementById('timeline').focus()");
     page.press(&["HOME", "ARROW_RIGHT", "ARROW_RIGHT"]);
     let cursor = page.run("return document.querySelector('.cursor-time').textContent");
@@ -686,7 +678,6 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     shoot(&mut page, "report-keyboard");
     page.press(&["ESCAPE"]);
     page.wait("return document.querySelector('.back').hidden", 5);
-    // The keyboard reaches all clickable elements.
     let mute = page.run("return [...document.querySelectorAll('[onclick], tr.go, .notes .when, canvas[role=slider]')].filter((node) => node.tabIndex < 0).length");
     assert_eq!(mute, 0);
     assert_fits_on_paper(&mut page, &address);

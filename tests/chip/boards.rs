@@ -10,10 +10,9 @@ use stm32f405_model::time::{MS, SECOND, US};
 
 use super::bench_of;
 
-/// Frames in memory at full rate: a quarter of a second of them, and a sector in progress.
+/// A quarter of a second at full rate, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;
 
-/// A new rig with the board's own image.
 fn rig(board: &Board) -> Rig {
     let image = program::firmware().with_file_name(format!("hums-{}.elf", board.name));
     bench_of(&image).rig(Parts { hse_hz: board.crystal_hz, ..Parts::default() })
@@ -31,7 +30,7 @@ fn assert_held(rig: &Rig) {
     }
 }
 
-/// Boots, records at full rate, loses its card and its power, and records again.
+/// Records at full rate, loses its card and its power, and records again.
 fn fly(board: &Board) {
     println!("{}", board.name);
     let mut rig = rig(board);
@@ -64,7 +63,7 @@ fn fly(board: &Board) {
     let compared = rig.compared();
     let rate = rig.sent.len() / 6;
     println!("{compared:?} of {}", rig.sent.len());
-    // All but the frames without a card, which the queue held in part, and those in memory when power went.
+    // Frames without a card, which the queue held in part, and those in memory when power went.
     assert!(
         compared.wrong == 0 && compared.missing < 2 * rate + 2 * IN_MEMORY_MAX,
         "{}: {compared:?}",
@@ -84,7 +83,6 @@ fn each_board_records_and_survives_the_loss_of_card_and_power() {
     hums_boards::all().iter().for_each(fly);
 }
 
-/// The image of a board with another crystal or chip was loaded by mistake.
 #[test]
 fn a_wrong_crystal_or_chip_is_told_and_the_board_records() {
     const STM32F446: u32 = 0x1000_6421;

@@ -5,7 +5,7 @@ use std::fs;
 use hums_tests::hostile;
 use hums_tests::program::{Machine, Recording};
 
-/// Limit of a command's memory beyond an empty run, KiB.
+/// KiB beyond an empty run.
 const ABOVE_KIB_MAX: u64 = 64 << 10;
 
 #[test]

@@ -14,7 +14,6 @@ use super::bench;
 /// The low-speed oscillator at its fastest (DS8626, table 36).
 const LSI_FASTEST: u32 = 47_000;
 
-/// All sent frames are recorded, in order, and nothing else.
 #[track_caller]
 fn assert_whole(rig: &Rig) {
     let compared = rig.compared();
@@ -23,7 +22,6 @@ fn assert_whole(rig: &Rig) {
     assert!(rig.sent.len() > 500, "{} frames", rig.sent.len());
 }
 
-/// No reset but those of power.
 #[track_caller]
 fn assert_no_reset(rig: &Rig) {
     assert!(rig.machine.resets.iter().all(|(_, cause)| *cause == Cause::Power), "{:?}", rig.machine.resets);
@@ -61,8 +59,7 @@ fn the_slowest_erases_leave_the_clock_right_and_the_fastest_watchdog_quiet() {
     }
 }
 
-/// 2 and 3: the store is full, and is erased in a calm time, as slowly as possible; in the middle of it the autopilot
-/// resumes.
+/// The erase is as slow as possible; in the middle of it the autopilot resumes.
 #[test]
 fn what_comes_in_an_erase_is_told_and_the_watchdog_does_not_bite() {
     let mut rig = bench().settled(Board { lsi_hz: LSI_FASTEST, ..Board::default() }).unwrap();
@@ -155,15 +152,13 @@ fn transmitters_that_stand_still_are_told_and_cost_nothing() {
     assert_no_reset(&rig);
 }
 
-/// 8: the flash refuses a word, and the item is saved at another place; it refuses one there too, and the ground is told. Later
-/// settings are saved.
+/// 8: the flash refuses a word, and one at the other place too.
 #[test]
 fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     const FAILED: &str = "HUMS: saving failed, have the board replaced";
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
     rig.run(begin, false).unwrap();
-    // A new value, from the ground station, on the ground.
     let set = |rig: &mut Rig, value: f32| {
         let now = rig.machine.now();
         let end = rig.machine.send(0, &heartbeat(1), now, BAUD);
@@ -190,7 +185,6 @@ fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     assert!(String::from_utf8_lossy(&heard).contains("HUMS: saving failed"), "the ground was not told");
 }
 
-/// The rate of the ground station's port changes while frames go out one after the other.
 #[test]
 fn a_change_of_a_ports_rate_cuts_no_byte() {
     let mut rig = bench().settled(Board::default()).unwrap();
@@ -209,8 +203,8 @@ fn a_change_of_a_ports_rate_cuts_no_byte() {
     assert_no_reset(&rig);
 }
 
-/// A line with beginnings of frames only, at full rate, costs the framer most. A reception that immediately looked
-/// for the next byte would always find one, and no other task would run.
+/// A line of frames' beginnings costs the framer most: a reception that looked for the next byte at once would starve other
+/// tasks.
 #[test]
 fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
     let mut rig = bench().settled(Board::default()).unwrap();
@@ -229,7 +223,7 @@ fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
     assert_no_reset(&rig);
 }
 
-/// The flash is made so slow that the processor cannot take the smallest frames as fast as they come.
+/// The flash is made so slow that the smallest frames are too fast.
 #[test]
 fn more_frames_than_the_processor_can_take_are_lost_and_counted() {
     const ESC_STATUS: (u32, u8) = (291, 10);

@@ -21,16 +21,15 @@ use stm32f405_model::time::SECOND;
 
 use super::bench;
 
-/// The flight of the demo.
 const FLIGHT: &str = "ap_quad_faults.tlog";
-/// Limit of the load in the worst second, of 168 MHz, at 921,600 baud back to back.
+/// Percent of 168 MHz in the worst second, at 921,600 baud back to back.
 const BUSY_PERCENT_MAX: f64 = 40.0;
 /// Prefetch, both caches, five wait states.
 const ACR: u32 = 0x705;
 /// The watchdog stops in a debugger's halt.
 const FREEZES_IWDG: u32 = 1 << 12;
 
-/// All that `hums info --verify` checks holds; only the end of a record that power cut in the air cannot be proved (exit code 3).
+/// Exit code 3: the end of a record that power cut in the air cannot be proved.
 #[track_caller]
 pub(crate) fn assert_verifies(card: &Path) {
     let said = hums(["info".as_ref(), "--verify".as_ref(), card.as_os_str()]).expect_code(&[0, 3]).text();
@@ -43,10 +42,8 @@ pub(crate) fn assert_verifies(card: &Path) {
 
 /// A card of usual size: on a small one the first segment alone takes 0.6 s, which is a finding.
 const CARD_MIB: [&str; 2] = ["--card-size", "4096"];
-/// Every step of the checks, on both machines.
 const TICK_US: u64 = 50_000;
 
-/// The part that is compared with this PC.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Against {
     /// The records, by kind and texts.
@@ -55,15 +52,13 @@ enum Against {
     Numbers,
 }
 
-/// Records one flight by the image. Compares it with the recording, and with this PC's record of the same frames at
-/// the same times.
+/// Compares the image's record with the recording, and with this PC's record of the same frames at the same times.
 #[track_caller]
 fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest, against: Against) {
     let data = fs::read(path).unwrap();
     let input = manifest.frames_of(path, &data);
     let found = manifest.found(path);
     let chip = Recording::make(Machine::Chip, path, &CARD_MIB);
-    // If the record ends in the air by a power cut, decoding reports it.
     let log = chip.decode(&[0, 3]);
     let recorded = log.frames(&manifest.seeds);
     frames::assert_same(&input, &recorded, &stream(found.is_tlog, &data, &input));
@@ -89,7 +84,6 @@ fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest, against: A
     assert!(heartbeats.keys().any(|key| key.contains("/191/")), "our heartbeat: {ground}");
 }
 
-/// Frames of one time wait for each other on the line.
 #[track_caller]
 fn assert_times(input: &[Frame<'_>], recorded: &[Frame<'_>]) {
     let since =
@@ -103,20 +97,19 @@ fn assert_times(input: &[Frame<'_>], recorded: &[Frame<'_>]) {
     assert!(off < 20_000, "{off} us");
 }
 
-/// Offset of the chip's steps in each 50 ms: its records have that time, cut off to a millisecond.
+/// Offset of the chip's steps in each 50 ms: records have that time, cut off to a millisecond.
 #[track_caller]
 fn phase_us(records: &[Value]) -> u64 {
     let stats = records.iter().find(|record| record["record"] == "HUMS_STATS").expect("figures");
     (stats["time_boot"].as_f64().unwrap() * 1e3).round() as u64 * 1_000 % TICK_US
 }
 
-/// This PC's records of the frames on a card, at their times there, and its output to the ground station. Its checks
-/// are stepped at whole 50 ms: the chip's are `phase_us` later.
+/// Steps at whole 50 ms: the chip's are `phase_us` later.
 fn on_this_pc(image: &Path, phase_us: u64, to: &Path) -> (Vec<Value>, Vec<u8>) {
     const MIB: u64 = 1 << 20;
     let medium = Medium::load(&File::open(image).unwrap()).unwrap();
     let session = record::read(&medium).pop().unwrap();
-    // Times on the card are cut off to a millisecond: a frame in a step's millisecond came after it.
+    // Cut off to a millisecond: a frame in a step's millisecond came after it.
     let chunks = session
         .frames
         .into_iter()
@@ -131,9 +124,9 @@ fn on_this_pc(image: &Path, phase_us: u64, to: &Path) -> (Vec<Value>, Vec<u8>) {
     (records(to, &[0, 3]), gs)
 }
 
-/// Records about the machine itself, and their fields of that kind: identity, load, and progress of the card.
+/// Records about the machine itself, and their fields of that kind.
 const OF_THE_MACHINE: [(&str, &[&str]); 4] = [
-    // The number of bytes of HUMS_STATS in the log differs, and with it the end of a sector.
+    // HUMS_STATS has another number of bytes in the log, which moves the ends of sectors.
     ("HUMS_MARK", &["sector"]),
     ("HUMS_BOOT", &["board", "uid", "reset", "reset_name", "git"]),
     ("HUMS_CHECKED", &["git"]),
@@ -155,18 +148,16 @@ const OF_THE_MACHINE: [(&str, &[&str]); 4] = [
         ],
     ),
 ];
-/// A step of the checks may be the one before or the next where a frame comes within a millisecond of it.
+/// A frame within a millisecond of a step falls into this one or the next.
 const TIME_MAX_S: f64 = 0.101;
-/// Tolerance of a number, relative to itself or to one: the effect of a frame within a millisecond of a step.
+/// Relative to the number or to one: the effect of a frame within a millisecond of a step.
 const PART_MAX: f64 = 0.02;
-/// This part of all records may differ by more: momentary values at such a step.
+/// This part of all records may differ by more.
 const ODD_PART_MAX: f64 = 0.02;
 
-/// This PC's store is empty, which is reported.
 const STORE_IS_NEW: &str = "HUMS: the store is new, all counters begin";
 
-/// The same records in the same order of their kinds, at the same times within a step. Their fields are the same,
-/// except for those of the machine.
+/// The same kinds in order, at the same times within a step; fields of the machine may differ.
 #[track_caller]
 fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     assert!(of_chip.len() > 50, "{} records", of_chip.len());
@@ -178,7 +169,7 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
         let texts: Vec<_> = texts.map(|(name, value)| format!("{name}={value}")).collect();
         format!("{} {}", record["record"], texts.join(" "))
     };
-    // Records at the end of the power: this PC is shut down in order.
+    // This PC is shut down in order.
     let last_s = quiet_before_the_end_s(of_chip);
     let by_key = |records: &[Value]| {
         let mut rows = BTreeMap::<String, Vec<Value>>::new();
@@ -213,8 +204,7 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     assert!(odd.len() as f64 <= ODD_PART_MAX * f64::from(all), "{} of {all} differ", odd.len());
 }
 
-/// The middle of the longest pause between records in the 1.5 s before the last 1.5 s. So no record is before it on
-/// one machine and after it on the other.
+/// In the 1.5 s before the last 1.5 s: no record is before it on one machine and after it on the other.
 #[track_caller]
 fn quiet_before_the_end_s(records: &[Value]) -> f64 {
     let mut times: Vec<_> = records.iter().filter_map(|record| record["time_boot"].as_f64()).collect();
@@ -232,7 +222,6 @@ fn of_the_machine(record: &Value) -> &'static [&'static str] {
     OF_THE_MACHINE.iter().find(|(name, _)| record["record"] == *name).map_or(&[], |(_, fields)| fields)
 }
 
-/// Differences beyond the tolerance.
 fn difference(a: &Value, b: &Value) -> Option<String> {
     let far = |a: &Value, b: &Value, most: f64| match (a.as_f64(), b.as_f64()) {
         (Some(a), Some(b)) => (a - b).abs() > most.max(PART_MAX * a.abs().max(b.abs()).max(1.0)),
@@ -251,7 +240,7 @@ fn difference(a: &Value, b: &Value) -> Option<String> {
     None
 }
 
-/// Frames to the ground station: the same texts in the same order, and nearly the same number of each message.
+/// The same texts in order, and nearly the same number of each message.
 #[track_caller]
 fn assert_same_stream(of_chip: &[u8], of_pc: &[u8], seeds: &Seeds) {
     const STATUSTEXT: u32 = 253;
@@ -293,7 +282,7 @@ fn a_signed_flight_is_recorded_bit_for_bit() {
     fs::write(&part, &data[..BYTES]).unwrap();
     let manifest = Manifest::own();
     let input = manifest.frames_of(&flight, &data);
-    // In a first start one frame may be damaged, which is reported: the record counts it as lost.
+    // In a first start one frame may be damaged, and counts as lost.
     let chip = Recording::attempt(Machine::Chip, &part, &CARD_MIB).expect_code(&[0, 3]);
     let lost = chip.number("frames_lost");
     assert!(lost <= 1, "{lost}");

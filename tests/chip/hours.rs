@@ -17,13 +17,11 @@ use stm32f405_model::time::{MS, Ps, SECOND, US};
 use super::bench;
 use super::flights::assert_verifies;
 
-/// Highest difference between the record's time of a frame and the sender's.
+/// Milliseconds.
 const OFF_MS_MAX: u64 = 2;
-/// From power to the vehicle's first frame.
 const START: Ps = 2 * SECOND;
 
-/// Highest difference between recorded times and the ends of frames on the line, in milliseconds. The clock begins a
-/// moment after power-on, and the record cuts off to a millisecond.
+/// Milliseconds: the clock begins a moment after power-on, and the record cuts off to a millisecond.
 fn off_ms(ended: &[Ps], recorded: &[(u64, Vec<u8>)]) -> u64 {
     let late = |(end, (ms, _)): (&Ps, &(u64, Vec<u8>))| (end / MS).cast_signed() - ms.cast_signed();
     let mut lates = ended.iter().zip(recorded).map(late);
@@ -31,7 +29,7 @@ fn off_ms(ended: &[Ps], recorded: &[(u64, Vec<u8>)]) -> u64 {
     lates.map(|late| late.abs_diff(first)).max().unwrap_or(0)
 }
 
-/// The flight, again and again: a recording's frames at their own times, and three seconds of silence.
+/// A recording's frames again and again, with three seconds of silence between.
 struct Flight {
     frames: Vec<(u64, Vec<u8>)>,
     lap: Ps,
@@ -42,20 +40,18 @@ impl Flight {
         let tlog = fs::read(own(name)).unwrap();
         let frames = chip::frames(&tlog);
         let first = frames[0].0;
-        // The recordings' clocks never run backwards.
+        // Recordings' clocks never run backwards.
         let frames: Vec<_> = frames.into_iter().map(|(us, frame)| (us - first, frame.to_vec())).collect();
         let lap = frames.last().unwrap().0 * US + 3 * SECOND;
         Self { frames, lap }
     }
 
-    /// The frame of this number, and its start.
     fn frame(&self, number: usize) -> (Ps, &[u8]) {
         let (us, frame) = &self.frames[number % self.frames.len()];
         ((number / self.frames.len()) as u64 * self.lap + us * US, frame)
     }
 }
 
-/// The board's state without power, as files.
 struct Shelf(PathBuf);
 
 impl Shelf {
@@ -63,7 +59,7 @@ impl Shelf {
         self.0.join("card.img")
     }
 
-    /// The shelf, and its number of power-ons of this length with this image; a shelf of another image is emptied.
+    /// Also its number of power-ons of this length; a shelf of another image is emptied.
     fn look(image: &str, minutes: u64) -> (Self, u64) {
         let shelf = Self(Path::new(env!("CARGO_TARGET_TMPDIR")).join("hours"));
         let done = fs::read_to_string(shelf.0.join("done.txt")).unwrap_or_default();
@@ -92,7 +88,7 @@ fn number(name: &str, otherwise: u64) -> u64 {
 }
 
 /// `HUMS_CHIP_HOURS` of flight (3) in power-ons of `HUMS_CHIP_MINUTES` (180), on one board with one card. An
-/// interrupted run continues with the power-on that was stopped: with 24 hours it is a day.
+/// interrupted run continues.
 #[test]
 #[ignore = "three hours and more in the model's time (cargo xtask prove chip)"]
 fn hours_of_flight_are_recorded_whole_and_at_their_times() {
@@ -125,7 +121,7 @@ fn hours_of_flight_are_recorded_whole_and_at_their_times() {
     }
 }
 
-/// Flies until this moment, and switches off; returns the end of each frame on the line.
+/// Returns the end of each frame on the line.
 #[track_caller]
 fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
     let (mut ended, mut free) = (Vec::new(), 0);
@@ -141,7 +137,6 @@ fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
             ended.push(free);
         }
         machine.run_until(to).unwrap();
-        // Its own messages are not kept.
         machine.take_sent(0);
         machine.take_sent(1);
         if to % (600 * SECOND) < 100 * MS {
@@ -154,7 +149,7 @@ fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
     ended
 }
 
-/// All frames, in their order, each at its time, and no reported loss.
+/// All frames in order, each at its time, without a reported loss.
 #[track_caller]
 fn assert_recorded(session: &Session, flight: &Flight, ended: &[Ps]) {
     let Session { frames, losses, gaps, .. } = session;
@@ -167,15 +162,14 @@ fn assert_recorded(session: &Session, flight: &Flight, ended: &[Ps]) {
     assert!(off <= OFF_MS_MAX, "{off} ms");
 }
 
-/// The store is filled by settings ten times in an hour, on the ground. In the silence after that a sector is erased,
-/// and the processor stops. Then the vehicle sends again, ten times a second.
+/// Settings fill the store ten times in an hour, on the ground. In the silence after that an erase stops the
+/// processor.
 #[test]
 #[ignore = "an hour in the model's time (cargo xtask prove chip)"]
 fn the_records_time_is_the_senders_for_an_hour_with_ten_erases() {
     const ROUND: Ps = 360 * SECOND;
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
-    // Frames before the port is open do not count.
     rig.run(begin, false).unwrap();
     for round in 1..=10 {
         while rig.machine.chip.flash.erases.len() < round {

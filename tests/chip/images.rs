@@ -14,7 +14,6 @@ const TO_NOWHERE: [u16; 4] = [0x2003, 0x0700, 0x3001, 0x4700];
 /// `movw r0, #0xED0C; movt r0, #0xE000; movs r1, #4; movt r1, #0x05FA; str r1, [r0]; b .`: AIRCR.SYSRESETREQ.
 const RESET: [u16; 9] = [0xF64E, 0x500C, 0xF2CE, 0x0000, 0x2104, 0xF2C0, 0x51FA, 0x6001, 0xE7FE];
 
-/// The files of a release: ELF, DFU, raw image.
 fn files() -> [Vec<u8>; 3] {
     ["elf", "dfu", "bin"].map(|kind| fs::read(program::firmware().with_extension(kind)).unwrap())
 }
@@ -58,7 +57,7 @@ fn what_is_no_image_of_this_chip_is_refused() {
     assert!(matches!(Image::parse(&other), Err(Refused::Vectors(..))));
 }
 
-/// The release's ELF file with other instructions at the beginning of `main`, and where that is.
+/// Also the place of `main`.
 fn with_main(code: &[u16]) -> (Vec<u8>, u32) {
     let [mut elf, ..] = files();
     let machine = Machine::new(Image::parse(&elf).unwrap(), Board::default());
@@ -71,7 +70,6 @@ fn with_main(code: &[u16]) -> (Vec<u8>, u32) {
     (elf, main)
 }
 
-/// The output of `hums sim --firmware` for this image.
 fn emulated(elf: &[u8], code: i32) -> String {
     let dir = tempfile::tempdir().unwrap();
     let (image, card) = (dir.path().join("hums.elf"), dir.path().join("card.img"));
@@ -84,7 +82,7 @@ fn emulated(elf: &[u8], code: i32) -> String {
 #[test]
 fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
     let (elf, main) = with_main(&TO_NOWHERE);
-    // The image's own handler of faults would reset it, again and again.
+    // The image's own handler of faults would reset it again and again.
     let said = emulated(&elf, 1);
     assert!(said.contains("an instruction is wanted from 0x30000000, where none may be"), "{said}");
     assert!(said.contains(" us, in no function, come from main+0x6\n  r0  30000001"), "{said}");

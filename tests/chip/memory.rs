@@ -17,7 +17,6 @@ use stm32f405_model::time::{MS, Ps, SECOND};
 
 use super::bench;
 
-/// Results of all flips.
 #[derive(Debug, Default)]
 struct Read {
     frames: Vec<Vec<u8>>,
@@ -69,12 +68,11 @@ struct Outcome {
     resets: usize,
     /// Number of flips.
     flips: u64,
-    /// A flip led the program to an instruction that is not modelled: the chip's behaviour is unknown. No flip came
-    /// after that.
+    /// The flipped program reached an instruction that is not modelled; no flip came after that.
     stopped: Option<Box<Report>>,
 }
 
-/// Flips `most` bits, one at a time, in the memory of this name, at full line rate, and reads the record.
+/// One bit at a time, at full line rate.
 fn flipped(part: &str, most: u64, apart: Ps, seed: u64) -> Outcome {
     let mut rig = bench().settled(Board { seed, ..Board::default() }).unwrap();
     let begin = rig.machine.now() + SECOND;
@@ -127,7 +125,6 @@ fn flips_in_the_codecs_memory_give_no_wrong_frame() {
     assert!(compared.right > 3_000, "{compared:?}");
 }
 
-/// 5,000 in each part, in runs of 100.
 fn five_thousand_in(part: &str, first: u64) {
     let (mut made, mut right, mut gaps, mut resets, mut stops) = (0, 0, 0, 0, 0);
     for seed in (first..).step_by(10) {

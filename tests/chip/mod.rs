@@ -1,7 +1,5 @@
-//! The image that is flashed, byte for byte, on the model of its chip (`docs/chip.md`). It records, and continues
-//! when devices around it fail. Times and loads are modelled, not measured.
-//!
-//! Without the feature `chip` none of this is built: `cargo xtask test` turns it on, and builds the image.
+//! The image that is flashed, byte for byte, on the model of its chip (`docs/chip.md`). Times and loads are modelled,
+//! not measured. The feature `chip` enables these tests: `cargo xtask test` turns it on, and builds the image.
 
 #[cfg(feature = "chip")]
 mod boards;
@@ -32,13 +30,11 @@ mod recompute;
 #[ignore = "the image on the model of its chip: `cargo xtask test` runs it"]
 fn the_image_on_the_model_of_its_chip() {}
 
-/// The default board's image, and a PX4 flight's frames to send.
 #[cfg(feature = "chip")]
 fn bench() -> hums_tests::chip::rig::Bench {
     bench_of(&hums_tests::program::firmware())
 }
 
-/// The same with this image.
 #[cfg(feature = "chip")]
 fn bench_of(image: &std::path::Path) -> hums_tests::chip::rig::Bench {
     use hums_tests::{chip, flights};

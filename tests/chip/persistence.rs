@@ -8,7 +8,7 @@ use hums_tests::flights::own;
 use hums_tests::program::{Machine, Recording};
 use hums_tests::store::Stored;
 
-/// The beginning of a flight: half a minute of it.
+/// Half a minute.
 fn short(dir: &Path) -> PathBuf {
     const BYTES: usize = 150_000;
     let path = dir.join("short.tlog");

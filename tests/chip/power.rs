@@ -10,10 +10,10 @@ use stm32f405_model::time::{MS, SECOND, US};
 
 use super::bench;
 
-/// Frames in memory at full rate: a quarter of a second of them, and a sector in progress.
+/// A quarter of a second at full rate, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;
 
-/// Limit of the load in the first second, which clears memory, mounts the card and makes the log.
+/// The first second clears memory, mounts the card and makes the log.
 const FIRST_BUSY_PERCENT_MAX: f64 = 47.0;
 
 #[test]
@@ -76,7 +76,6 @@ fn a_card_that_stands_still_for_two_and_a_half_seconds_costs_nothing() {
     assert!(session.losses.is_empty(), "{:?}", session.losses);
 }
 
-/// The radio's power amplifier pulls the supply down for a second.
 #[test]
 fn a_supply_that_sags_is_survived_recorded_and_told() {
     let mut rig = bench().settled(Board::default()).unwrap();
@@ -101,7 +100,7 @@ fn a_supply_that_sags_is_survived_recorded_and_told() {
     assert!(compared.wrong == 0 && compared.missing < 1_950 + IN_MEMORY_MAX, "{compared:?}");
 }
 
-/// Each tenth frame has a damaged bit, a false start bit, or a low stop bit; noise fills the pauses.
+/// Each tenth frame has a flaw; noise fills the pauses.
 #[test]
 fn a_noisy_line_costs_the_frames_that_it_damaged() {
     let mut rig = bench().settled(Board::default()).unwrap();
@@ -115,7 +114,7 @@ fn a_noisy_line_costs_the_frames_that_it_damaged() {
         match number % 40 {
             5 => line[middle].byte ^= 0x10,
             15 => line[middle].flaw = Flaw::Noise,
-            // The byte is still right: nothing is lost.
+            // The byte is still right.
             25 => line[middle].flaw = Flaw::Framing,
             35 => line.push(Char { start: end, byte: 0xFD, ..line[0] }),
             _ => {}

@@ -1,5 +1,4 @@
-//! Faults of the program itself, provoked from outside: each leaves a note with its place. The next start records it,
-//! tells the ground station, and goes on recording.
+//! Faults of the program itself, provoked from outside: each leaves a note with its place.
 
 use hums_tests::chip::rig::Rig;
 use stm32f405_model::machine::Board;
@@ -22,24 +21,22 @@ const BUS_FAULT: [u8; 6] = [0x4F, 0xF0, 0x40, 0x50, 0x00, 0x68];
 /// `push {r0-r7, lr}`, again and again.
 const OVERFLOW: [u8; 4] = [0xFF, 0xB5, 0xFD, 0xE7];
 
-/// From the moment that a task hangs: the watchdog's second and the rest of a tick.
+/// The watchdog's second and the rest of a tick.
 const NOTICED_MS: u64 = 1_100;
-/// Storage may wait for its card: it has to report in each 10 s only (`hums_onboard::supervisor`).
+/// Storage may wait for its card: it reports in each 10 s only (`hums_onboard::supervisor`).
 const STORAGE_NOTICED_MS: u64 = 11_100;
-/// Limit of a reset's loss, in frames of full rate: memory, a quarter of a second, and the start.
+/// Frames of full rate: memory, a quarter of a second, and the start.
 const LOST_MAX: usize = 700;
 
 /// The expected result of a fault.
 struct Expected<'a> {
     cause: Cause,
-    /// Its text in the record.
     fault: &'a str,
-    /// Text for the ground station.
     told: &'a str,
     within_ms: u64,
 }
 
-/// Half a second of full rate on a board that has made its store.
+/// Half a second at full rate; the store exists.
 fn flying() -> Rig {
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
@@ -48,7 +45,7 @@ fn flying() -> Rig {
     rig
 }
 
-/// Continues after a reset, and reads the note; `since` is the time of the fault.
+/// `since` is the time of the fault.
 #[track_caller]
 fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
     let (at, cause) = *rig.machine.resets.last().unwrap();
@@ -118,12 +115,12 @@ fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
 }
 
-/// The handler reads an item beyond a slice's end, like code of a file of this name.
+/// Like code of a file of this name.
 #[test]
 fn a_panic_is_survived_recorded_and_told() {
     const FILE: &[u8] = b"firmware/provoked.rs";
     let mut rig = flying();
-    // At the unused lower end of the stack: the address of the place, and its text behind.
+    // At the unused lower end of the stack.
     let place = CCM.0 + 64;
     let words = [place + 16, FILE.len() as u32, 7, 1];
     let bytes = words.iter().flat_map(|word| word.to_le_bytes()).chain(FILE.iter().copied());
@@ -131,7 +128,7 @@ fn a_panic_is_survived_recorded_and_told() {
         rig.machine.poke(at, |_| byte);
     }
     let panics = rig.machine.image().find("panic_bounds_check").unwrap().address | 1;
-    // The index, the length and the place; `movw` and `movt` of each and of the function, `bx r3`
+    // `movw` and `movt` of each and of the function, `bx r3`
     let code = [load(0, 8), load(1, 8), load(2, place), load(3, panics)].concat();
     let since = rig.machine.now();
     rig.replace(DOWNLINK, &[&code[..], &[0x18, 0x47]].concat(), true).unwrap();
@@ -140,7 +137,6 @@ fn a_panic_is_survived_recorded_and_told() {
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
 }
 
-/// `movw` and `movt` of a word into this register.
 fn load(register: u16, word: u32) -> Vec<u8> {
     let half = |first: u16, value: u16| {
         let (imm4, i, imm3, imm8) = (value >> 12, value >> 11 & 1, value >> 8 & 7, value & 0xFF);

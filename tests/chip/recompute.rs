@@ -1,5 +1,4 @@
-//! The codec's computed floats are the same on every machine. The image's function, called on the model of the chip,
-//! is compared with `docs/log-format.md` ("Links") on this PC.
+//! The codec's computed floats on the model of the chip equal those of `docs/log-format.md` ("Links") on this PC.
 
 use std::f32::consts::PI;
 use std::time::Instant;
@@ -12,23 +11,22 @@ use stm32f405_model::time::{SECOND, US};
 
 use super::bench;
 
-/// Addresses of the registers, behind an instruction to return to, and of the stack.
+/// Behind an instruction to return to.
 const REGISTERS: u32 = SRAM.0 + 0x100;
 const STACK: u32 = SRAM.0 + 0x1000;
 /// `bkpt`
 const BREAKPOINT: [u8; 2] = [0x00, 0xBE];
-/// The registers of the angles, of the quaternion and of the last received one, and their number.
+/// The angles, the quaternion, the last received one, and their number.
 const ANGLES: u32 = 0;
 const MADE: u32 = 23;
 const TOLD: u32 = 27;
 const ALL: u32 = 45;
 
-/// The image with its floating-point unit on, about to begin.
 fn begun() -> Machine {
     let mut machine = Machine::new(bench().image, Board::default());
     let begun = |machine: &Machine| {
         let symbol = machine.image().symbol(machine.core.register(15));
-        // Not within an IT block, which would continue in the called function.
+        // An IT block would continue in the called function.
         symbol.is_some_and(|(name, _)| name.contains("hums_firmware"))
             && machine.core.xpsr() & 0x0600_FC00 == 0
     };
@@ -42,13 +40,11 @@ fn begun() -> Machine {
     machine
 }
 
-/// Four words of the registers from this one on.
 fn words(machine: &mut Machine, register: u32) -> &mut [[u8; 4]] {
     let at = (REGISTERS - SRAM.0 + 4 * register) as usize;
     machine.chip.sram.all_mut()[at..at + 16].as_chunks_mut().0
 }
 
-/// Calls the function on these registers.
 fn call(machine: &mut Machine, function: u32, angles: [f32; 3], told: [f32; 4]) -> [f32; 4] {
     for (first, numbers) in [(ANGLES, &angles[..]), (TOLD, &told[..])] {
         for (word, number) in words(machine, first).iter_mut().zip(numbers) {
@@ -65,7 +61,6 @@ fn call(machine: &mut Machine, function: u32, angles: [f32; 3], told: [f32; 4]) 
     [0, 1, 2, 3].map(|part| f32::from_le_bytes(made[part]))
 }
 
-/// The computation of the document.
 fn documented(angles: [f32; 3], told: [f32; 4]) -> [f32; 4] {
     let series = |terms: [f32; 6], z: f32| terms.iter().fold(0.0_f32, |sum, term| (sum + term) * z);
     let [(sr, cr), (sp, cp), (sy, cy)] = angles.map(|angle| {
@@ -89,8 +84,8 @@ fn documented(angles: [f32; 3], told: [f32; 4]) -> [f32; 4] {
     if (a + b) + (c + d) < 0.0 { made.map(|part| -part) } else { made }
 }
 
-/// Three of four times angles of all sizes up to half a turn and parts of a quaternion, else any bits. All are equal
-/// to the bit. NaN differs between machines, and does not count.
+/// Three of four times plausible angles and parts of a quaternion, else any bits. NaN differs between machines, and
+/// does not count.
 fn compare(count: u64, seed: u64) {
     let mut machine = begun();
     let function = machine.image().find("Registers10quaternion").expect("the codec's function").address;

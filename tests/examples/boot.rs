@@ -1,5 +1,3 @@
-//! Boots an image, feeds a recorded flight to its first port, and prints the result.
-//!
 //! `boot IMAGE SECONDS [FLIGHT.tlog|BYTES [CARD.img]]`: a tlog's frames come at their own times, other bytes back to
 //! back at 921,600 baud, both from 1.5 s on. Run it with `cargo run --release -p hums-tests --example boot -- ...`.
 
@@ -37,7 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Flies it second by second; returns the highest load of the processor in a second, after the first two.
+/// Returns the highest load in a second, after the first two.
 fn fly(
     machine: &mut Machine,
     mut feed: chip::Feed,

@@ -1,5 +1,5 @@
 //! Results of faults that take too long for `cargo xtask test`, and the load of the processor: `faults IMAGE
-//! FLIGHT.tlog [NAME...]`. Each prints its observations.
+//! FLIGHT.tlog [NAME...]`.
 
 use std::error::Error;
 
@@ -42,7 +42,6 @@ fn main() -> Outcome {
     Ok(())
 }
 
-/// Saves the card's image in the file of `CARD`.
 fn keep(rig: &Rig) -> Outcome {
     if let Some(path) = std::env::var_os("CARD") {
         chip::save(&rig.medium, path.as_ref())?;
@@ -71,7 +70,7 @@ fn told(rig: &Rig) -> Outcome {
     keep(rig)
 }
 
-/// 5: the processor's load at full rate, with the flash's caches as set and as possible.
+/// 5: the flash's caches as set and as possible.
 fn caches(bench: &Bench) -> Outcome {
     for what in ["as the image sets it", "prefetch alone", "nothing", "no wait states"] {
         let mut rig = bench.settled(Board::default())?;
@@ -109,7 +108,7 @@ fn caches(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Load at full rate: samples of a second and a half, by the exception's number, and by the function.
+/// Samples of a second and a half, by exception and by function.
 fn shares(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 4 * SECOND;
@@ -117,7 +116,7 @@ fn shares(bench: &Bench) -> Outcome {
     sample(&mut rig, 1_500)
 }
 
-/// The same in the first second and a half after power-on, when the card is mounted and the log made.
+/// The first second and a half: the card is mounted and the log made.
 fn first(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     for part in 1..=6 {
@@ -130,7 +129,6 @@ fn first(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Load in this many milliseconds.
 fn sample(rig: &mut Rig, ms: u64) -> Outcome {
     let begin = rig.machine.now();
     let samples = ms * 10;
@@ -166,7 +164,7 @@ fn sample(rig: &mut Rig, ms: u64) -> Outcome {
     Ok(())
 }
 
-/// 8: the flash refuses words, from the first one on or later.
+/// 8: from the first word on or later.
 fn refused(bench: &Bench) -> Outcome {
     for (refuses, after) in [(0, 1), (3, 1), (3, 20), (30, 1)] {
         let mut rig = bench.settled(Board::default())?;
@@ -196,7 +194,7 @@ fn supply(bench: &Bench) -> Outcome {
     told(&rig)
 }
 
-/// Power cuts at moments of full rate, and in the erase of a calm time: the content of card and store afterwards.
+/// At full rate, and in the erase of a calm time.
 fn cuts(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 2 * SECOND;
@@ -230,7 +228,7 @@ fn cuts(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// A card that stalls, is silent or out for a while, at full rate; all times count from power-on.
+/// Stalled, silent or out at full rate; times count from power-on.
 fn cards(bench: &Bench) -> Outcome {
     let ms = |ms: u64| ms * 1_000_000;
     let silent = |long: u64| Plan::always(Fault::Silent).from(ms(6_000)).until(ms(6_000 + long));
@@ -261,7 +259,6 @@ fn cards(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// A sender whose clock is slow or fast.
 fn senders(bench: &Bench) -> Outcome {
     for percent in [-5, -4, -2, 2, 4, 5] {
         let mut rig = bench.settled(Board::default())?;
@@ -275,7 +272,7 @@ fn senders(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// 10: flipping memory, ten times 30 bits.
+/// Ten times 30 bits.
 fn flips(bench: &Bench) -> Outcome {
     for seed in
         (1..=10_u64).filter(|seed| std::env::var("SEED").map_or(true, |only| only == seed.to_string()))

@@ -1,5 +1,3 @@
-//! The cost of `hums live` while a vehicle sends many messages a second, and the smoothness of the page.
-//!
 //! ```text
 //! live_load HUMS SECONDS MESSAGES_PER_SECOND RECORDING.tlog
 //! ```
@@ -18,7 +16,6 @@ use hums_tests::frames::of_tlog;
 use hums_tests::live::{Live, free_port, send};
 use hums_tests::oracle::LivePage;
 
-/// Duration of each measurement of the page's frames.
 const LOOK_S: u32 = 20;
 
 fn main() -> ExitCode {

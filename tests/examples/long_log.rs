@@ -1,7 +1,6 @@
 //! Memory and time for a long log: `long_log HUMS MIB RECORDING.tlog [WHAT...]`.
 //!
-//! The log has so many MiB, made of one recording over and over. All that can be made of it is made, or only `WHAT`
-//! (`info`, `csv`, …). Output files take up to 30 times the log's size meanwhile.
+//! The log repeats one recording. Output files take up to 30 times the log's size meanwhile.
 //!
 //! For instance: `cargo run --release -p hums-tests --example long_log -- target/release/hums 128
 //! tests/flights/ap_quad_faults.tlog`.
@@ -22,7 +21,7 @@ const LIMIT: Duration = Duration::from_hours(2);
 const START_AT: usize = 15 + 4;
 const FRAMES_AT: usize = 15 + 10;
 const NUMBER_AT: usize = 11;
-/// Delay of each round, ms. The codec's prediction depends on the lower 32 bits of the time.
+/// The codec's prediction depends on the lower 32 bits of the time.
 const ROUND_MS: u64 = 1 << 32;
 
 fn main() -> ExitCode {
@@ -55,7 +54,7 @@ const MADE: [(&str, &[&str]); 9] = [
     ("thesis", &["decode", "-o", "OUT", "--format", "thesis"]),
 ];
 
-/// A long log as a recorder would have made it: groups of one recording over and over, later each time.
+/// Groups of one recording over and over, later each time.
 fn long(hums: &Path, mib: &str, recording: &Path, what: &[&str]) -> Result<()> {
     let bytes = mib.parse::<u64>().context("MIB is a number")? << 20;
     if let Some(unknown) = what.iter().find(|word| MADE.iter().all(|(name, _)| name != *word)) {
@@ -87,7 +86,6 @@ fn long(hums: &Path, mib: &str, recording: &Path, what: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Writes the whole groups of `short` again and again, with their numbers, times and frame counts going on.
 fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
     let data = fs::read(short)?;
     let sectors: Vec<[u8; SECTOR_BYTES]> =

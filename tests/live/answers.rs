@@ -18,7 +18,6 @@ fn lately() -> Span {
     [now_s - 300.0, now_s]
 }
 
-/// A query with its variables filled in as by Grafana.
 fn filled(query: &str, [vehicle, session]: [&str; 2], [from_s, to_s]: Span) -> String {
     let between = format!("time >= {} AND time <= {}", (from_s * 1e9) as u64, (to_s * 1e9) as u64);
     let replaced = query.replace("$timeFilter", &between).replace("$__interval", "1s");
@@ -26,7 +25,7 @@ fn filled(query: &str, [vehicle, session]: [&str; 2], [from_s, to_s]: Span) -> S
     replaced.replace("$vehicle", vehicle).replace("$session", session)
 }
 
-/// Sends the queries of a kind's dashboards, variables first: each panel has data. Returns the number of queries.
+/// Variables come first; each panel has data.
 fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String) -> Vec<Value>) -> usize {
     let mut asked = 0;
     for (name, dashboard) in dashboards(kind) {
@@ -63,7 +62,6 @@ pub(crate) fn assert_answered_by_influx(database: &Database) {
     assert!(asked > 40, "{asked}");
 }
 
-/// As [`assert_answered_by_influx`], for `VictoriaMetrics`.
 pub(crate) fn assert_answered_by_victoria(database: &Database) {
     let span = lately();
     let asked = ask_all(VICTORIA, span, |query, fill| {

@@ -10,17 +10,15 @@ use std::time::{Duration, Instant};
 use hums_tests::live::{Running, free_port};
 use serde_json::{Value, json};
 
-/// A database may read its own files for a while before it answers.
+/// It may read its own files for a while.
 const START: Duration = Duration::from_mins(1);
 
-/// The kind of database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Influx,
     Victoria,
 }
 
-/// A database that can be ended and started again with its data.
 pub(crate) struct Database {
     kind: Kind,
     folder: tempfile::TempDir,
@@ -29,7 +27,7 @@ pub(crate) struct Database {
 }
 
 impl Database {
-    /// Starts one. Its port changes if a program took the first one before the start.
+    /// The port changes if a program took the first one.
     pub(crate) fn start(kind: Kind) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut database = Self { kind, folder, port: free_port(), running: None };
@@ -55,7 +53,7 @@ impl Database {
         )
     }
 
-    /// Starts it with its data, at its previous port.
+    /// With its data, at its previous port.
     pub(crate) fn again(&mut self) {
         let start = Instant::now();
         while !self.runs() {
@@ -63,7 +61,6 @@ impl Database {
         }
     }
 
-    /// Starts the program and waits for its first answer; false if the program ends before.
     fn runs(&mut self) -> bool {
         let mut command = match self.kind {
             Kind::Influx => Command::new(program("HUMS_INFLUXD", "/usr/bin/influxd")),
@@ -95,8 +92,8 @@ impl Database {
         false
     }
 
-    /// Ends it: `InfluxDB` at once, like a power cut; `VictoriaMetrics` in order, because by design it holds accepted
-    /// data in memory for some seconds.
+    /// `InfluxDB` ends at once, like a power cut; `VictoriaMetrics` in order, because it holds accepted data in memory for
+    /// seconds.
     pub(crate) fn end(&mut self) {
         let mut running = self.running.take().unwrap();
         running.signal(if self.kind == Kind::Influx { "KILL" } else { "TERM" });
@@ -115,7 +112,7 @@ impl Database {
         Ok((code, body.to_owned()))
     }
 
-    /// `InfluxDB`: writes a line into the database `hums`, which is created.
+    /// Creates the database `hums` if needed.
     pub(crate) fn write(&self, line: &str) {
         for (path, body) in [("/query?q=CREATE%20DATABASE%20hums", ""), ("/write?db=hums&precision=ns", line)]
         {
@@ -138,14 +135,13 @@ impl Database {
         serde_json::from_str(&body).unwrap()
     }
 
-    /// `InfluxDB`: the answer to a query.
     pub(crate) fn ask(&self, question: &str) -> Vec<Value> {
         let answer = self.json(&format!("/query?db=hums&epoch=ns&q={}", escaped(question)));
         assert!(answer["results"][0]["error"].is_null(), "{question}: {answer}");
         answer["results"][0]["series"].as_array().cloned().unwrap_or_default()
     }
 
-    /// `VictoriaMetrics`: the values of an expression, at the end of a span or in each second of it (seconds since 1970).
+    /// At the end of a span or in each second of it (seconds since 1970).
     pub(crate) fn query(&self, expression: &str, [from_s, to_s]: [f64; 2], instant: bool) -> Vec<Value> {
         self.get("/internal/force_flush").unwrap();
         let (kind, span) = if instant {
@@ -164,13 +160,11 @@ impl Database {
         pairs.map(|pair| number(&pair)).collect()
     }
 
-    /// `VictoriaMetrics`: the values of a label, of all series or of those that match.
     pub(crate) fn labels(&self, label: &str, of: &str) -> Vec<Value> {
         let of = if of.is_empty() { String::new() } else { format!("?match[]={}", escaped(of)) };
         self.json(&format!("/api/v1/label/{label}/values{of}"))["data"].as_array().unwrap().clone()
     }
 
-    /// `InfluxDB`: the number of points of a measurement.
     pub(crate) fn points(&self, measurement: &str) -> u64 {
         let series = self.ask(&format!("SELECT * FROM \"{measurement}\""));
         series.iter().map(|one| one["values"].as_array().map_or(0, Vec::len) as u64).sum()
@@ -183,7 +177,6 @@ impl Database {
         values.map(|value| value[0].as_str().unwrap().to_owned()).collect()
     }
 
-    /// `VictoriaMetrics`: the number of samples of a metric.
     pub(crate) fn samples(&self, metric: &str) -> u64 {
         self.get("/internal/force_flush").unwrap();
         let (code, body) = self.get(&format!("/api/v1/export?match[]={metric}")).unwrap();
@@ -196,7 +189,6 @@ impl Database {
     }
 }
 
-/// A text escaped for an address.
 fn escaped(text: &str) -> String {
     text.bytes().fold(String::new(), |text, byte| text + &format!("%{byte:02X}"))
 }

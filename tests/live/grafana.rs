@@ -1,5 +1,5 @@
-//! The dashboards of `host-tools/grafana`, for each kind of database. They are valid by Grafana's own schema and
-//! beyond it, and query existing fields. Available databases answer each query (`writes`).
+//! The dashboards of `host-tools/grafana` are valid by Grafana's schema, and query existing fields. `writes` asks
+//! real databases.
 #![cfg(feature = "oracle")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 #[path = "../../host-tools/grafana/resolve.rs"]
 mod resolve;
 
-/// A folder of dashboards: the type of their data source, the member with the query, and the members of each query.
+/// The type of the data source, the member with the query, and the members of each query.
 pub(crate) type Kind = (&'static str, &'static str, &'static str, &'static [&'static str]);
 const FLUX: Kind =
     ("flux", "influxdb", "query", &["v.defaultBucket", "v.timeRangeStart", "${vehicle}", "${session}"]);
@@ -23,7 +23,7 @@ pub(crate) const VICTORIA: Kind =
     ("victoriametrics", "prometheus", "expr", &["[$__ra", "vehicle=\"$vehicle\"", "session=\"$session\""]);
 const KINDS: [Kind; 3] = [FLUX, INFLUXQL, VICTORIA];
 
-/// Units of Grafana that the dashboards use; a slip in one shows as plain text on the panel.
+/// A slip in a unit shows as plain text on the panel.
 const UNITS: [&str; 14] = [
     "none",
     "s",
@@ -102,7 +102,7 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
     let count: usize = all.iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
     assert_eq!(said["panels"], count);
 
-    // Silence is a proof: each slip is reported.
+    // Each slip is reported.
     let (_, whole) = dashboards(FLUX).swap_remove(0);
     let place = panels(&whole).iter().position(|panel| panel["type"] == "stat").unwrap();
     let slips: [(&str, Value); 6] = [
@@ -124,7 +124,7 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
         fs::write(&path, slip.to_string()).unwrap();
         assert_ne!(oracle::grafana(&[path])["told"], json!([]), "{member}");
     }
-    // The model's release is the one in the compose file.
+    // The release in the compose file.
     let model = fs::read_to_string(root().join("tests/oracle/requirements.txt")).unwrap();
     let release = model.lines().find_map(|line| line.strip_prefix("grafana-foundation-sdk==")).unwrap();
     let release = release.split('!').next_back().unwrap();
@@ -205,14 +205,12 @@ fn every_panel_of_the_reference_system_is_there_in_its_row() {
     assert!(flight["timepicker"]["refresh_intervals"].as_array().unwrap().contains(&"100ms".into()));
 }
 
-/// The contents of the flights' points: fields by measurement, and counters.
 #[derive(Default)]
 struct Points {
     fields: BTreeMap<String, BTreeSet<String>>,
     counters: BTreeSet<String>,
 }
 
-/// Splits at a character outside of quotes and without a backslash.
 fn split(text: &str, at: char) -> Vec<String> {
     let (mut parts, mut quoted, mut escaped) = (vec![String::new()], false, false);
     for c in text.chars() {
@@ -250,7 +248,7 @@ impl Points {
     }
 }
 
-/// The texts in quotes after each of these.
+/// In quotes after each `before`.
 fn quoted<'a>(query: &'a str, before: &str) -> Vec<&'a str> {
     query.match_indices(before).map(|(at, _)| query[at + before.len()..].split('"').next().unwrap()).collect()
 }

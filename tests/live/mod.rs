@@ -1,5 +1,4 @@
-//! `hums live --influx` with real databases: every point arrives despite failures of the database, and the dashboards
-//! query existing data.
+//! `hums live --influx` with real databases.
 
 #[cfg(feature = "databases")]
 mod answers;

@@ -15,19 +15,17 @@ use hums_tests::{child, program};
 use super::answers;
 use super::database::{Database, Kind};
 
-/// Messages a second of a fast link.
 const RATE: f64 = 2_000.0;
-/// Twelve seconds of them.
+/// Twelve seconds.
 const FRAMES: usize = 24_000;
 /// Frames until the database goes away, and until it is back.
 const GOES_AT: u64 = 8_000;
 const BACK_AT: u64 = 16_000;
 
-/// The first frames of a flight, and the number of each message.
 fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
     let data = fs::read(own("ap_quad_faults.tlog")).unwrap();
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
-    // From the middle of the flight on, with all messages; its battery becomes low after 17,284 of them.
+    // All messages; the battery becomes low after 17,284.
     let frames: Vec<_> = frames.into_iter().skip(40_000).take(FRAMES).collect();
     let mut counts = BTreeMap::new();
     for frame in frames.iter().filter(|frame| frame.verified) {
@@ -36,11 +34,11 @@ fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
     (frames.into_iter().map(|frame| frame.bytes.to_vec()).collect(), counts)
 }
 
-/// Sends it past the database; returns the number of written points by hums.
+/// Returns the number of points that hums wrote.
 #[track_caller]
 fn fly(database: &mut Database, flags: &[&str]) -> (u64, BTreeMap<u32, u64>) {
     let (frames, counts) = flight();
-    // By TCP, so that nothing is lost before its arrival.
+    // TCP: nothing is lost before its arrival.
     let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
     let (input, url) =
         (format!("tcp:{}", vehicle.local_addr().unwrap()), format!("http://127.0.0.1:{}", database.port));
@@ -72,7 +70,6 @@ fn influxdb_is_killed_in_flight_and_has_every_point_in_the_end() {
     for (id, count) in counts {
         assert_eq!(database.points(&names[&id]), count, "{}", names[&id]);
     }
-    // Names and tags as in `hums decode`.
     let tags: Vec<_> = database.ask("SHOW TAG KEYS FROM \"HUMS\"");
     let keys = tags[0]["values"].as_array().unwrap().iter().map(|key| key[0].as_str().unwrap().to_owned());
     assert_eq!(keys.collect::<Vec<_>>(), ["motor", "session", "vehicle"]);
@@ -82,7 +79,7 @@ fn influxdb_is_killed_in_flight_and_has_every_point_in_the_end() {
     write_as_documented(&database);
 }
 
-/// Runs the commands of docs/decode.md that write a log's lines into `InfluxDB`, in smaller pieces. Each point must be there.
+/// The commands of docs/decode.md, in smaller pieces.
 fn write_as_documented(database: &Database) {
     let docs = fs::read_to_string(root().join("docs/decode.md")).unwrap();
     let is_command = |line: &&str| {
@@ -150,7 +147,7 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
     };
     let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
-    // One field of ATTITUDE is text there that week: the points of that message are refused, and no others.
+    // ATTITUDE's field was text that week: only that message's points are refused.
     let at_us = frames[0].time_us.expect("a tlog's frames have times");
     database.write(&format!("ATTITUDE,vehicle=x,session=x roll=\"text\" {at_us}000"));
     let (code, words) = flight(&database);
@@ -167,7 +164,6 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
     assert_eq!(points, written + 1, "and the one that was there before");
 }
 
-/// The names of messages by id, from `hums decode`'s own tables.
 fn hums_names() -> BTreeMap<u32, String> {
     let definitions = hums_dialect::messages().iter();
     definitions.map(|message| (message.id, message.name.to_owned())).collect()

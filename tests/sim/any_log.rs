@@ -1,5 +1,4 @@
-//! The logs of both autopilots through every command that reads recordings: all agree with `hums check` on the same
-//! log.
+//! All commands that read recordings agree with `hums check` on logs of both autopilots.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -11,15 +10,12 @@ use hums_tests::live::Live;
 use hums_tests::program::hums;
 use serde_json::Value;
 
-/// A log of an autopilot, and the results of its makers' own tools.
+/// Results of its makers' own tools.
 struct Known {
     path: &'static str,
     format: &'static str,
-    /// The flight modes, in order.
     modes: &'static [&'static str],
-    /// A table with its rows.
     table: (&'static str, usize),
-    /// A finding that its fault has.
     fault: &'static str,
 }
 
@@ -44,7 +40,6 @@ impl Known {
         root().join(self.path)
     }
 
-    /// The result of `hums check`.
     fn checked(&self) -> Value {
         let path = self.path();
         let text = hums(["check".as_ref(), "--json".as_ref(), path.as_os_str()]).expect_code(&[4]).text();
@@ -54,7 +49,6 @@ impl Known {
     }
 }
 
-/// Each finding in a line: time, check, instance, level.
 fn findings(object: &Value) -> Vec<String> {
     let findings = object["findings"].as_array().unwrap();
     assert!(!findings.is_empty(), "a comparison of nothing");
@@ -69,7 +63,6 @@ fn line(time_s: &Value, check: &Value, instance: &Value, level: &Value) -> Strin
     format!("{:.3} {} {instance} {}", time_s.as_f64().unwrap(), text(check), text(level))
 }
 
-/// `hums info --json`, or a page, agrees with `hums check`.
 fn agrees(log: &Value, known: &Known, checked: &Value) {
     assert_eq!((log["format"].as_str(), log["checked_by"].as_str()), (Some(known.format), Some("hums")));
     assert_eq!(findings(log), findings(checked));
@@ -94,7 +87,6 @@ fn info(known: &Known) {
     agrees(&json["logs"][0], known, &checked);
 }
 
-/// The data of a page, as for its script.
 fn data(page: &str) -> Value {
     let (_, data) = page.split_once("<script type=\"application/json\" id=\"data\">").unwrap();
     serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()
@@ -128,12 +120,10 @@ fn report(known: &Known) {
     assert!(flight["parameters"].as_array().unwrap().len() > 500, "its parameters");
 }
 
-/// The lines of a table, without the first.
 fn rows(table: &Path) -> Vec<String> {
     fs::read_to_string(table).unwrap().lines().skip(1).map(str::to_owned).collect()
 }
 
-/// All files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
@@ -190,7 +180,6 @@ fn decode(known: &Known) {
     assert_eq!(count, found.len());
 }
 
-/// The time line of `hums live` has the findings of the whole log, from its beginning on.
 fn live(known: &Known) {
     let (path, checked) = (known.path(), known.checked());
     let live = Live::start(&[path.to_str().unwrap()]);

@@ -12,7 +12,6 @@ use hums_tests::live::free_port;
 use hums_tests::program::{self, hums};
 use tempfile::TempDir;
 
-/// `hums sim` in real time, with a ground station's port.
 pub(crate) struct Board {
     dir: Option<TempDir>,
     child: Child,
@@ -24,7 +23,7 @@ impl Board {
         Self::start_in(tempfile::tempdir().unwrap(), flags)
     }
 
-    /// On the card in `dir`, if there is one.
+    /// With the card in `dir`, if there is one.
     pub(crate) fn start_in(dir: TempDir, flags: &[&str]) -> Self {
         Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
     }
@@ -39,7 +38,7 @@ impl Board {
         Self { dir: Some(dir), child, port }
     }
 
-    /// Ends it in order, as Ctrl-C does, and returns the content of its log, a line each.
+    /// In order, as by Ctrl-C; returns the lines of its log.
     pub(crate) fn end(self) -> String {
         let dir = self.switch_off();
         let image = dir.path().join("card.img");
@@ -47,7 +46,7 @@ impl Board {
         hums(command.into_iter().chain(["--format".as_ref(), "jsonl".as_ref()])).expect_code(&[0]).text()
     }
 
-    /// Ends it, and keeps the folder with its card and its store.
+    /// Keeps the folder with card and store.
     pub(crate) fn switch_off(mut self) -> TempDir {
         let kill = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
         assert!(kill.success());
@@ -62,13 +61,12 @@ impl Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        // Only needed after a failure, while it still runs.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// The downloaded log is on the card, whole and in one row.
+/// Whole and in one row.
 #[track_caller]
 pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     let log = fs::read(log).unwrap();
@@ -77,14 +75,14 @@ pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     assert!(card[first * 512..].starts_with(&log), "the download differs from the card");
 }
 
-/// The first segment of this number that `hums box pull` downloaded into a folder: its name has the session.
+/// `hums box pull` adds the session to the segment's name.
 pub(crate) fn pulled_log(folder: &Path, number: &str) -> PathBuf {
     let all: Vec<PathBuf> = pulled_logs(folder, number);
     assert_eq!(all.len(), 1, "{all:?}");
     all[0].clone()
 }
 
-/// All of them, of several boxes and cards.
+/// Of several boxes and cards.
 pub(crate) fn pulled_logs(folder: &Path, number: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().file_name());
     let names = entries.map(|name| name.into_string().unwrap());

@@ -1,5 +1,5 @@
-//! The ground station's port is never overrun. Limits on every recording: bytes in every window of a second, no
-//! starving message, a critical finding soon after its time on a busy port.
+//! The ground station's port on every recording: bytes in each window of a second, no starving message, critical
+//! findings in time.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -15,11 +15,10 @@ use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own};
 
 const BUDGETS: [u32; 3] = [100, 1_000, 5_000];
-/// The port's default rate.
 const BAUD: u64 = 57_600;
 const SECOND: u64 = 1_000_000;
 
-/// A frame at the port: the time of its first byte, in microseconds, to a millisecond.
+/// The first byte's time, microseconds, to a millisecond.
 struct Sent {
     at_us: u64,
     bytes: Vec<u8>,
@@ -30,13 +29,12 @@ impl Sent {
         Frame::again(&self.bytes, Check::Verified).expect("a frame")
     }
 
-    /// The time of its last byte.
     fn end_us(&self) -> u64 {
         self.at_us + self.bytes.len() as u64 * 10 * SECOND / BAUD
     }
 }
 
-/// The input, with a look each millisecond; `ask` returns the ground station's bytes for each 100 ms.
+/// `ask` returns the ground station's bytes for each 100 ms.
 fn chunks(recording: &Path, mut ask: impl FnMut(u64) -> Vec<u8>) -> Vec<(Side, Chunk)> {
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
@@ -73,7 +71,6 @@ fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (
     (outcome.unwrap(), sent)
 }
 
-/// The most bytes of any second.
 fn fullest_second(sent: &[Sent]) -> usize {
     let (mut first, mut bytes, mut most) = (0, 0, 0);
     for (index, frame) in sent.iter().enumerate() {
@@ -87,7 +84,7 @@ fn fullest_second(sent: &[Sent]) -> usize {
     most
 }
 
-/// A recording of each autopilot: the others differ in what comes, which is more than any budget in all of them.
+/// One recording of each autopilot: all exceed any budget.
 #[test]
 fn no_second_holds_more_than_the_budget_and_nothing_starves() {
     for recording in ["px4_hil_quad_low.tlog", "ap_quad_signed.raw"].map(own) {
@@ -103,8 +100,7 @@ fn no_second_holds_more_than_the_budget_and_nothing_starves() {
     }
 }
 
-/// Repeated messages go on to the end: the gap between two of a kind is limited. The last minute is excluded, since a
-/// message may stop there.
+/// The gap between two of a kind is limited. A message may stop in the last minute.
 fn assert_nothing_starves(name: &str, budget: u32, sent: &[Sent]) {
     let longest_s = match budget {
         100 => 150,
@@ -125,7 +121,7 @@ fn assert_nothing_starves(name: &str, budget: u32, sent: &[Sent]) {
     }
 }
 
-/// A client that requests everything, all the time: the list of parameters, logs, files, commands.
+/// Requests parameters, logs, files and commands all the time.
 fn greedy(now_us: u64) -> Vec<u8> {
     let mut encoder = Encoder::of(255, 190);
     encoder.set_sequence((now_us / 100_000) as u8);

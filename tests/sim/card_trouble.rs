@@ -6,8 +6,7 @@ use hums_tests::program::{Decoded, Machine, Recording};
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
 
-/// Records with these flags. Each frame must be in the log or counted as lost, and the log must have the flight's
-/// frames in order.
+/// Each frame is in the log, in order, or counted as lost.
 #[track_caller]
 fn assert_accounted(flags: &[&str]) -> (Recording, u64) {
     let recording = Recording::attempt(Machine::Sim, &own(FLIGHT), flags).expect_code(&[0, 3]);
@@ -82,7 +81,7 @@ fn a_card_that_is_out_for_half_a_minute_misses_nothing() {
 fn a_stall_of_a_second_loses_nothing() {
     let (recording, lost) = assert_accounted(&["--stall", "1000@50", "--stall", "1000@120"]);
     assert_eq!(lost, 0);
-    // The box notices a stalled card from its own next write on: it writes every 200 ms at least.
+    // The box writes every 200 ms at least: it notices a stall then.
     assert!(recording.number("sd_stall_ms_max") >= 800);
     assert!(recording.number("queue_bytes_max") <= recording.number("queue_bytes_capacity"));
 }
@@ -108,7 +107,7 @@ fn a_card_that_fails_every_write_loses_everything_and_says_so() {
     }
 }
 
-/// The smallest card of FAT32 has some 33 MiB, and a flight's log is far smaller: flight after flight fills it.
+/// The smallest card of FAT32 has some 33 MiB: many flights fill it.
 #[test]
 fn a_small_card_takes_the_newest_data_and_stays_a_good_file_system() {
     let recording = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &["--card-size", "34"]);

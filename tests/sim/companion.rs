@@ -49,7 +49,7 @@ fn a_ground_station_lists_reads_sets_and_commands() {
     assert_eq!(said["protocol"], 200);
     assert_eq!(said["for_the_autopilot"], Value::Null, "that is not ours to answer");
 
-    // Each change, with its author; no refused ones.
+    // Each change with its author.
     let changes: Vec<Value> = log
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).unwrap())
@@ -94,22 +94,21 @@ fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_af
         assert_eq!(sealed["good"], sealed["signed"], "{said}");
         assert_eq!([&sealed["unsigned"], &sealed["wrong"], &sealed["bad"]], [0, 0, 0], "{said}");
         assert_eq!((&sealed["rises"], &said["unsigned_list"]), (&true.into(), &true.into()), "{said}");
-        // MAV_RESULT 2 is denied.
+        // MAV_RESULT 2: denied.
         assert_eq!((&said["unsigned_set"], &said["unsigned_command"]), (&stays.into(), &2.into()), "{said}");
         assert_eq!((&said["signed_set"], &said["signed_command"]), (&21.0.into(), &true.into()), "{said}");
         assert_eq!(said["wrong_key"], serde_json::json!([23.0]), "{said}");
         assert_eq!(said["replayed"], serde_json::json!([23.0, 23.0]), "{said}");
         assert_eq!(said["after"], 24.0, "{said}");
     }
-    // The two that were not signed, at least, in each session.
+    // At least the two unsigned ones, in each session.
     assert!(statistic(&dir, "requests_refused").into_iter().all(|refused| refused >= 2), "not recorded");
-    // The key is not on the card in any form.
+    // In any form.
     let card = fs::read(dir.path().join("card.img")).unwrap();
     let key: Vec<u8> = (1..33).collect();
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
 }
 
-/// The last statistics of each session on the card.
 fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
     let (image, out) = (dir.path().join("card.img"), dir.path().join("decoded"));
     let command = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), out.as_os_str()];
@@ -123,7 +122,6 @@ fn statistic(dir: &TempDir, name: &str) -> Vec<u64> {
     .collect()
 }
 
-/// Pymavlink at both ports: a simulated autopilot and a ground station.
 fn between_autopilot_and_ground_station(kind: &str) -> (Value, TempDir) {
     let (dir, _) = card_with_a_log();
     let params = dir.path().join("params.txt");
@@ -141,13 +139,13 @@ fn assert_what_passes(said: &Value, dir: &TempDir) {
             assert_eq!(passed, &Value::from(expected), "{passes} {name}: {said}");
         }
     }
-    // The bytes of the key that passed at both ports.
+    // The key's bytes that passed both ports.
     let key: Vec<u8> = (0..32).collect();
     let card = fs::read(dir.path().join("card.img")).unwrap();
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");
     let (before, after) = (said["logs_before"].as_array().unwrap(), said["logs_after"].as_array().unwrap());
     assert_eq!((before.len(), after.len()), (2, 1), "erased but for the one in work: {said}");
-    // The log is still on the card, but not offered any more.
+    // The log is on the card, but not offered.
     let image = dir.path().join("card.img");
     let info = hums(["info".as_ref(), image.as_os_str()]).expect_code(&[0, 3]).text();
     assert!(info.contains("00001_00.HUM"), "{info}");
@@ -164,7 +162,7 @@ fn a_px4_is_asked_for_what_is_missing_and_its_radio_is_shared() {
     assert!(said["version_asked"].as_u64() >= Some(1), "{said}");
     assert!(said["asked_again"].as_u64() >= Some(10), "after a reboot: {said}");
     assert_what_passes(&said, &dir);
-    // Announced, cancelled, accepted, and the requests to the autopilot until then: system, component, confirmation.
+    // With the requests to the autopilot until then: system, component, confirmation.
     assert_eq!(said["cancelled"], serde_json::json!([true, true, false, []]), "{said}");
     assert_eq!(said["asked_for"], serde_json::json!([true, false, true, [[1, 1, 0]]]), "{said}");
 }
@@ -199,7 +197,7 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     assert_eq!(crc, Some(hums_link::ftp::checksum(0, &whole)), "{said}");
     assert_eq!((&said["key"], &said["signed"]), (&"HUMS: signing key set".into(), &"34.0".into()), "{said}");
 
-    // Unsigned requests get no answer any more; with the passphrase our own tool gets one.
+    // With the passphrase our own tool gets an answer.
     let address = format!("udpout:127.0.0.1:{}", board.port);
     let unsigned =
         hums(["box", "params", "get", "BAT_REM_WARN", "--system", "1", "--link", &address]).expect_code(&[1]);
@@ -259,7 +257,6 @@ fn put_parameters(image: &Path, lines: &str) {
     assert!(copied.success());
 }
 
-/// The ground before a flight, the flight, and the ground after it: only the first start may read the file.
 #[test]
 fn a_box_that_restarts_in_the_air_reads_no_parameters() {
     let dir = tempfile::tempdir().unwrap();
@@ -323,7 +320,7 @@ fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
     assert!(!log.contains("line 1 is refused") && !log.contains("line 4 is refused"));
 }
 
-/// A UDP link that loses every tenth datagram, each way.
+/// Loses every tenth datagram, each way.
 struct Lossy {
     port: u16,
     lost: Arc<AtomicU32>,
@@ -378,7 +375,6 @@ impl Drop for Lossy {
     }
 }
 
-/// A card with one finished session of some seconds.
 fn card_with_a_log() -> (TempDir, Vec<u8>) {
     let dir = tempfile::tempdir().unwrap();
     let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
@@ -386,7 +382,6 @@ fn card_with_a_log() -> (TempDir, Vec<u8>) {
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
     let (input, image) = (dir.path().join("short.raw"), dir.path().join("card.img"));
     hums(["sim".as_ref(), input.as_os_str(), "--sd".as_ref(), image.as_os_str()]).expect_code(&[0]);
-    // A download has the recorded part of the file.
     let card = fs::read(&image).unwrap();
     (dir, card)
 }
@@ -404,7 +399,6 @@ fn a_log_pulled_over_a_link_that_loses_a_tenth_is_the_one_on_the_card() {
     hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
     assert!(link.lost.load(Ordering::Relaxed) > 5, "nothing was lost: {:?}", link.lost);
     assert_on_card(&pulled_log(&pulled, "00001"), &card);
-    // Again: existing files stay.
     let again =
         hums(["box", "pull", "--link", &address, "--system", "1", "-o", output, log]).expect_code(&[0]);
     assert!(again.stderr.contains("00001_00.HUM: is there already as "), "{}", again.stderr);
@@ -420,7 +414,6 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     let board = Board::start(&[]);
     let link = Lossy::to(board.port);
     let address = format!("udpout:127.0.0.1:{}", link.port);
-    // Without a system id: it is the only board.
     let listed = hums(["box", "params", "list", "--link", &address]).expect_code(&[0]);
     assert!(listed.stderr.contains("system 1: its board is heard"), "{}", listed.stderr);
     let list = listed.text();

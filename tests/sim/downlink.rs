@@ -17,7 +17,7 @@ fn the_stream_of_each_flight_parses_without_one_bad_frame() {
         let of = |wanted: fn(&str) -> bool| -> u64 {
             heartbeats.iter().filter(|(key, _)| wanted(key)).filter_map(|(_, count)| count.as_u64()).sum()
         };
-        // A flight is minutes long and a heartbeat comes each second.
+        // A flight lasts minutes, a heartbeat comes each second.
         assert!(of(|key| key.contains(OURS)) > 100, "{name}: our heartbeats: {stream}");
         // Autopilot 3 is ArduPilot, 12 is PX4.
         let vehicle = |key: &str| key.contains("/1/3/") || key.contains("/1/12/");
@@ -43,7 +43,7 @@ fn the_box_tells_how_it_is_doing_as_an_onboard_computer() {
     assert!((240..256).contains(&total) && used <= total, "a card of 256 MiB: {told}");
     assert_eq!((&told["link_type"][0], &told["link_type"][1]), (&0.into(), &1.into()), "{told}");
     let rate = |name: &str, link: usize| told[name][link].as_u64().unwrap();
-    // 921,600 and 57,600 baud; the budget is 2,000 bytes a second.
+    // 921,600 and 57,600 baud; 2,000 bytes a second.
     assert_eq!((rate("link_rx_max", 0), rate("link_tx_max", 1)), (90, 6), "{told}");
     assert!(
         (1..=90).contains(&rate("link_rx_rate", 0)) && (1..=2).contains(&rate("link_tx_rate", 1)),

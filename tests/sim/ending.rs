@@ -1,7 +1,5 @@
-//! Reports about a log's end, in three cases.
-//! - Power failed after the last landing or disarming: the log is whole up to that.
-//! - Power failed in flight: it is not proved.
-//! - The next start found more data on the card: the end is missing.
+//! Reports about a log's end after a power cut. After the last landing or disarming: whole up to that. In
+//! flight: not proved. More data on the card: the end is missing.
 
 use std::fs;
 use std::path::Path;
@@ -19,12 +17,11 @@ const BLOCK: usize = 512;
 /// An orderly end is one sector and the parity of the last stretch.
 const CLOSING_WRITES: u64 = 1 + 2 * COLUMNS as u64;
 
-/// Records the flight onto a card, with a power cut at this block write. Returns the number of writes.
+/// Records with a power cut at this block write; returns the number of writes.
 fn record(image: &Path, cut: Option<u64>) -> u64 {
     record_of(&own(FLIGHT), image, cut)["blocks_written"].as_u64().unwrap()
 }
 
-/// Records a flight likewise: the output of `hums sim --json`.
 fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
     let mut arguments = vec!["sim".into(), "--json".into(), "--card-size".into(), "64".into()];
     arguments.extend([flight.display().to_string()]);
@@ -33,7 +30,6 @@ fn record_of(flight: &Path, image: &Path, cut: Option<u64>) -> Value {
     serde_json::from_str(&hums(arguments).expect_code(&[0, 3]).text()).unwrap()
 }
 
-/// The logs in `verify --json`; the exit code must be this one.
 fn verify(image: &Path, code: i32) -> Vec<Value> {
     let text = hums(["info".as_ref(), "--verify".as_ref(), "--json".as_ref(), image.as_os_str()])
         .expect_code(&[code])
@@ -83,7 +79,7 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
     record(&image, None);
     let logs = verify(&image, 0);
     assert_eq!(logs[0]["end"]["proof"], "next_start", "{}", logs[0]);
-    // The last 80 sectors of the first log are erased: more than parity can rebuild, at any end of a stretch.
+    // The last 80 sectors: more than parity can rebuild.
     let mut bytes = fs::read(&image).unwrap();
     let blocks = bytes.as_chunks_mut::<BLOCK>().0;
     let first = blocks.iter().find_map(|block| Header::read(block).ok()).unwrap().session;
@@ -103,7 +99,7 @@ fn the_next_log_on_the_card_tells_that_the_end_of_the_one_before_is_gone() {
     assert_eq!(logs[1]["end"]["proof"], "closed");
 }
 
-/// A vehicle that is armed at 5 s, in the air from 8 s on, lands at 38 s and stays armed. 56 frames a second.
+/// Armed at 5 s, in the air from 8 s on, lands at 38 s and stays armed; 56 frames a second.
 fn landing(path: &Path) {
     let (mut log, mut encoder) = (Vec::new(), Encoder::of(1, 1));
     for tick in 0..60 * 50_u64 {
@@ -138,7 +134,7 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
             .text();
         (report, serde_json::from_str::<Value>(&text).unwrap()["logs"][0]["end"].clone())
     };
-    // The first write with the mark on the card.
+    // The first write with the mark.
     let (mut without, mut with) = (1, cut(None).0["blocks_written"].as_u64().unwrap());
     while with - without > 1 {
         let middle = without.midpoint(with);
@@ -149,7 +145,7 @@ fn power_that_goes_after_a_landing_while_armed_leaves_a_log_that_is_whole_to_it_
     assert_eq!(end["proof"], "mark", "{end}");
     assert!(end["words"].as_str().unwrap().contains("whole to the landing at "), "{end}");
     hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0]);
-    // The input between the mark and that write.
+    // The input between mark and write.
     let decode = [
         "decode".as_ref(),
         image.as_os_str(),

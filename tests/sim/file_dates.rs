@@ -1,4 +1,4 @@
-//! The files on the card have the date of the flight, for other programs.
+//! Files on the card have the flight's date.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::process::Command;
 use hums_tests::flights::own;
 use hums_tests::program::hums;
 
-/// The output of `mdir` for the logs on a card: name and date.
+/// `mdir`: name and date.
 fn dates(image: &Path) -> Vec<(String, String)> {
     let card = fs::read(image).unwrap();
     let start = u32::from_le_bytes(card[454..458].try_into().unwrap()) * 512;
@@ -29,7 +29,7 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
         hums(arguments).expect_code(codes);
     };
     record(&own("ap_quad_guided.tlog"), &[0]);
-    // The beginning of the same flight, before the autopilot knew the time.
+    // Before the autopilot knew the time.
     let whole = fs::read(own("ap_quad_guided.tlog")).unwrap();
     let early = dir.path().join("early.tlog");
     fs::write(&early, &whole[..600]).unwrap();
@@ -45,7 +45,6 @@ fn a_log_has_the_date_of_its_flight_and_none_before_it_is_known() {
     hums(["info".as_ref(), "--verify".as_ref(), image.as_os_str()]).expect_code(&[0, 3]);
 }
 
-/// The day of a session in `hums info`.
 fn utc_day(image: &Path, session: u32) -> String {
     let session = format!("{session:05}");
     let text =
@@ -57,7 +56,6 @@ fn utc_day(image: &Path, session: u32) -> String {
     utc[..10].to_owned()
 }
 
-/// The first value with the name `utc` and a time of day.
 fn find_utc(json: &serde_json::Value) -> Option<String> {
     match json {
         serde_json::Value::Object(map) => map.iter().find_map(|(key, value)| match value.as_str() {

@@ -75,7 +75,7 @@ fn devices_in_a_folder_are_passed_over_and_said() {
         assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
         return;
     }
-    // Without permission to make a device, one in this folder serves, which has no log.
+    // Without permission to make one, this folder's device serves.
     if Path::new("/dev/pts/ptmx").exists() {
         let outcome = info(Path::new("/dev/pts")).expect_code(&[1]);
         assert!(outcome.stderr.contains("ptmx: is a pipe, a socket or a device"), "{}", outcome.stderr);
@@ -84,7 +84,7 @@ fn devices_in_a_folder_are_passed_over_and_said() {
     not_tested("a device in a folder (none can be made here, and /dev/pts has none)");
 }
 
-/// Each command that reads recordings, with this path as its input.
+/// The commands that read recordings.
 fn readers(path: &Path, out: &Path) -> Vec<Vec<OsString>> {
     let words = |words: &[&str]| words.iter().map(OsString::from).collect::<Vec<_>>();
     let (page, tables) = (out.join("page.html").into_os_string(), out.join("csv").into_os_string());
@@ -94,7 +94,7 @@ fn readers(path: &Path, out: &Path) -> Vec<Vec<OsString>> {
         [words(&["check"]), vec![input.clone()]].concat(),
         [words(&["report", "-o"]), vec![page, input.clone()]].concat(),
         [words(&["decode", "--format", "csv", "-o"]), vec![tables, input.clone()]].concat(),
-        // Any free port: the default one may be another program's.
+        // The default one may be another program's.
         [words(&["live", "--listen", "127.0.0.1:0"]), vec![input]].concat(),
     ]
 }

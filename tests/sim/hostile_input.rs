@@ -9,12 +9,11 @@ use hums_tests::damage::Random;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording, hums};
 
-/// Memory limit for any input, in KiB.
+/// KiB, for any input.
 const MEMORY_KIB_MAX: u64 = 120 << 10;
-/// Bytes of a recording that is nearly all hole: more than that.
+/// Nearly all of it is a hole.
 const ENORMOUS: u64 = 140 << 20;
 
-/// The commands that read a log or an image.
 fn readers(file: &Path, out: &Path) -> [Vec<String>; 3] {
     let (file, out) = (file.display().to_string(), out.display().to_string());
     [
@@ -24,7 +23,7 @@ fn readers(file: &Path, out: &Path) -> [Vec<String>; 3] {
     ]
 }
 
-/// Each reader refuses this file with code 1 and a message.
+/// Code 1 and a message.
 #[track_caller]
 fn assert_refused(file: &Path) {
     let dir = tempfile::tempdir().unwrap();
@@ -34,7 +33,7 @@ fn assert_refused(file: &Path) {
     }
 }
 
-/// Each reader ends by itself with an exit code of the contract, without a panic.
+/// An exit code of the contract, without a panic.
 #[track_caller]
 fn assert_survived(file: &Path) {
     let dir = tempfile::tempdir().unwrap();
@@ -113,7 +112,7 @@ fn an_image_that_is_no_fat_costs_counted_frames_and_is_left_as_it_was() {
     fs::write(&image, &somebodys).unwrap();
     sim().expect_code(&[1]);
     assert!(fs::read(&image).unwrap() == somebodys, "somebody else's data was overwritten");
-    // It is empty. Like a box without a usable card: all frames count as lost.
+    // Like a box without a usable card: all frames count as lost.
     let before = vec![0; 40 << 20];
     fs::write(&image, &before).unwrap();
     let outcome = sim().expect_code(&[3]);
@@ -161,7 +160,6 @@ fn truncated_images_are_read_as_far_as_they_go() {
         File::options().write(true).open(&file).unwrap().set_len(random.below(4 << 20)).unwrap();
         assert_survived(&file);
     }
-    // Cut in the middle of its data: a prefix of the flight.
     let data = fs::read(recording.image()).unwrap();
     let end = 512 * data.chunks(512).rposition(|block| block.starts_with(&[0x48, 0xb3])).unwrap();
     let file = dir.path().join("half.img");
@@ -212,7 +210,7 @@ fn damaged_images_are_survived_and_give_no_wrong_frame() {
 fn enormous_files_take_little_memory_and_an_end() {
     let dir = tempfile::tempdir().unwrap();
     assert_refused(&sparse(dir.path().join("enormous.img"), 4 << 30));
-    // A frame, without which it is not a recording, and a hole.
+    // Without a frame it is not a recording.
     let raw = sparse(dir.path().join("enormous.raw"), ENORMOUS);
     let flight = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
     let frame = Manifest::own().frames_of(&own("px4_hil_quad_low.tlog"), &flight)[0].bytes;
@@ -234,7 +232,7 @@ fn a_read_only_image_is_read_and_not_recorded_to() {
     let before = fs::read(&image).unwrap();
     let flight = own("px4_hil_quad_low.tlog");
     let arguments = ["sim".as_ref(), flight.as_os_str(), "--sd".as_ref(), image.as_os_str()];
-    // Also for root, who has permission to write to it.
+    // Also for root, who may write to it.
     hums(arguments).expect_clear_failure();
     assert!(fs::read(&image).unwrap() == before, "the image changed");
 }
@@ -247,7 +245,6 @@ fn a_folder_that_cannot_be_made_is_a_clear_failure() {
     let image = recording.image();
     let arguments = ["decode".as_ref(), image.as_os_str(), "-o".as_ref(), blocked.as_os_str()];
     hums(arguments.into_iter().chain(["--format".as_ref(), "tlog".as_ref()])).expect_clear_failure();
-    // A folder that does not exist, for the image.
     let nowhere = recording.image().with_file_name("nowhere").join("card.img");
     let flight = own("px4_hil_quad_low.tlog");
     let arguments = ["sim".as_ref(), flight.as_os_str(), "--sd".as_ref(), nowhere.as_os_str()];

@@ -1,4 +1,4 @@
-//! `hums live` as a server and as a service: broken connections, addresses, and its end.
+//! `hums live` as a server and as a service.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -10,7 +10,6 @@ use hums_tests::live::{Live, Running, free_port, handshake};
 use hums_tests::program::{self, command};
 use rustix::net::sockopt::set_socket_linger;
 
-/// The first line of the answer.
 fn answer(stream: TcpStream) -> String {
     stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
     let mut line = String::new();
@@ -25,7 +24,7 @@ fn two_hundred_broken_off_handshakes_take_no_pages_place() {
     let host = live.address.trim_start_matches("http://").trim_end_matches('/');
     for number in 0..200_u64 {
         let stream = handshake(host);
-        // Like a tablet on a bad radio: the connection is reset, at once or a moment later.
+        // Like a tablet on a bad radio: reset at once or a moment later.
         set_socket_linger(&stream, Some(Duration::ZERO)).unwrap();
         std::thread::sleep(Duration::from_micros(number % 5 * 250));
     }
@@ -35,19 +34,18 @@ fn two_hundred_broken_off_handshakes_take_no_pages_place() {
         if line.contains("101") {
             break;
         }
-        // The last ones may still be in transfer.
         assert!(Instant::now() < end, "no page opens any longer: {line}");
         std::thread::sleep(Duration::from_millis(50));
     }
 }
 
-/// A vehicle by TCP that goes out of range: the connection ends, and later ones get no answer.
+/// The connection ends, and later ones get no answer.
 #[test]
 fn a_link_that_is_gone_keeps_neither_the_page_nor_the_end_waiting() {
     let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = vehicle.local_addr().unwrap();
     let mut live = Live::start(&[&format!("tcp:{address}")]);
-    // A queue of one that is full: the system drops further connections' first packets.
+    // With a full queue of one, the system drops further first packets.
     rustix::net::listen(&vehicle, 0).unwrap();
     drop(vehicle.accept().unwrap());
     let fill = || TcpStream::connect_timeout(&address, Duration::from_millis(300));
@@ -73,7 +71,7 @@ fn a_phone_is_given_an_address_and_the_token() {
     let port: u16 = here.trim_start_matches("http://localhost:").split('/').next().unwrap().parse().unwrap();
     live.signal("TERM");
     assert_eq!(live.end(Duration::from_secs(20)), Some(0), "SIGTERM is Ctrl-C");
-    // As many as this PC has; a PC without a network has none.
+    // A PC without a network has none.
     for line in lines {
         let (address, rest) = line.trim_start_matches("http://").split_once('/').unwrap();
         let address: std::net::SocketAddr = address.parse().unwrap();
@@ -128,7 +126,6 @@ fn a_recording_that_is_broken_off_is_not_called_whole() {
 fn a_server_that_takes_no_point_refuses_none() {
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}", server.local_addr().unwrap());
-    // It answers everything like a database with a bad point.
     std::thread::spawn(move || {
         for stream in server.incoming().flatten() {
             let mut reader = BufReader::new(stream);
@@ -169,7 +166,7 @@ fn sigterm_and_ctrl_c_alike_say_what_is_not_in_the_database_and_a_second_one_end
     let live = Live::start(&input);
     let (code, words) = live.terminate(Duration::from_secs(40));
     assert_eq!(code, Some(3), "{words}");
-    // The number depends on the time of the end: one, or some.
+    // One or some, by the time of the end.
     assert!(words.contains("not in the database"), "{words}");
 }
 
@@ -195,12 +192,12 @@ fn two_signals_at_once_are_one_wish_and_end_nothing_without_a_word() {
     let url = format!("http://127.0.0.1:{}", free_port());
     let recording = own("px4_hil_quad_low.tlog");
     let live = Live::start(&[recording.to_str().unwrap(), "--influx", &url]);
-    // Like `timeout -s INT`: to the program and to its group.
+    // Like `timeout -s INT`: program and group.
     let interrupt = || live.program.signal("INT");
     interrupt();
     interrupt();
     std::thread::sleep(Duration::from_millis(300));
-    // The second signal ends the wait for the database.
+    // Ends the wait for the database.
     let (code, words) = live.interrupt(Duration::from_secs(5));
     assert_eq!(code, Some(3), "{words}");
     assert!(words.contains("not in the database"), "{words}");

@@ -1,7 +1,6 @@
-//! Memory: no input makes a command take more than 64 MiB above an empty run. The commands come from the command
-//! line's definition, the formats from `decode`: a new one is tested, or fails the tests.
-//!
-//! One worker; `docs/decode.md` has the figure for each further one. The inputs are larger than the limit.
+//! No input makes a command take more than 64 MiB above an empty run. Commands and formats come from their definitions: a new
+//! one is tested, or fails the tests. One worker; `docs/decode.md` has the figure for more. The inputs are larger than the
+//! limit.
 
 use std::fs;
 use std::path::Path;
@@ -16,7 +15,7 @@ use hums_tests::hostile;
 use hums_tests::live::Live;
 use hums_tests::program::{LIMIT, command};
 
-/// Limit of a command's memory above an empty run, KiB.
+/// KiB above an empty run.
 const ABOVE_KIB_MAX: u64 = 64 << 10;
 
 fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
@@ -25,10 +24,10 @@ fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
     child::run(&mut command, LIMIT).expect_code(&[0, 1, 2, 3, 4])
 }
 
-/// Memory of a run with nearly no input, KiB.
+/// With nearly no input, KiB.
 fn empty_run(dir: &Path) -> u64 {
     let log = hostile::heartbeats(dir, 10);
-    // A run that ended before it was measured seems to take nothing.
+    // It ended before it was measured.
     let of_one = |_| run(&["info", log.to_str().unwrap()]).memory_kib_max;
     (0..500).map(of_one).find(|kib| *kib > 4 << 10).expect("a look at an empty run")
 }
@@ -38,21 +37,19 @@ fn assert_bounded(what: &str, kib: u64, empty: u64) {
     assert!(kib <= empty + ABOVE_KIB_MAX, "{what} took {kib} KiB, an empty run {empty} KiB");
 }
 
-/// The tested use of a command.
 enum Tried {
-    /// These command lines, in which `IN` is the input and `OUT/` a folder.
+    /// `IN` is the input, `OUT/` a folder.
     Lines(Vec<String>),
-    /// It runs until it is ended.
     Live,
-    /// It reads no file of unlimited size; the reason.
+    /// The reason why its input is limited.
     Nothing(#[allow(dead_code, reason = "for the reader")] &'static str),
 }
 
-/// A command that is not listed fails the test: enter its use, and it is tested with every input.
+/// Unlisted commands fail the test.
 fn tried(command: &str) -> Tried {
     let lines = |lines: &[&str]| Tried::Lines(lines.iter().map(|line| (*line).to_owned()).collect());
     match command {
-        // Text and JSON are printed of the same, so each kind of answer is tried in one of them.
+        // Text and JSON share their data: one of them is enough.
         "info" => {
             lines(&["info --json IN", "info --salvage IN", "info --list IN", "info --verify --json IN"])
         }
@@ -61,7 +58,7 @@ fn tried(command: &str) -> Tried {
         "share" => lines(&["share IN -o OUT/shared"]),
         "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
-            // At once they take more than each alone. Those of frames alone, which some logs have not, are tried by themselves.
+            // Together they take most; formats of frames alone, which some logs lack, are tried apart.
             let formats = FORMATS.iter().map(|format| format.about.name);
             let (alone, together): (Vec<_>, Vec<_>) =
                 formats.partition(|name| ["hum", "tlog", "thesis"].contains(name));
@@ -78,12 +75,12 @@ fn tried(command: &str) -> Tried {
     }
 }
 
-/// Each reading command of the definition, and each format, with this input. A command that refuses it is tested too.
+/// Each reading command and format, also if it refuses the input.
 fn assert_all_bounded(input: &Path, empty: u64) {
     assert_bounded_but(input, empty, |_| false);
 }
 
-/// The same without command lines with this beginning.
+/// Leaves out command lines with this beginning.
 fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bool) {
     let shown = input.to_str().unwrap();
     for command in Cli::command().get_subcommands() {
@@ -103,7 +100,6 @@ fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bo
     }
 }
 
-/// `hums live`, until it has read all, or refuses the input.
 fn assert_live_bounded(log: &Path, empty: u64) {
     let Some(live) = Live::attempt(&[log.to_str().unwrap()]) else { return };
     let (mut before, mut quiet) = (0.0, 0);
@@ -253,7 +249,7 @@ fn files_of_parameters_keys_and_images_without_an_end_are_refused_and_take_littl
     }
 }
 
-/// Ten million (5 GB) take longer than a test may: `HUMS_SESSIONS=10000000`.
+/// Longer than a test may take: `HUMS_SESSIONS=10000000` (5 GB).
 #[test]
 fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
     let dir = tempfile::tempdir().unwrap();
@@ -262,7 +258,7 @@ fn a_log_of_very_many_sessions_takes_little_memory_with_any_command() {
     assert_all_bounded(&hostile::starts(dir.path(), count), empty);
 }
 
-/// The longest file in which lost sectors are rebuilt, 16 MiB, and a longer one.
+/// 16 MiB, the longest file whose lost sectors are rebuilt, and a longer one.
 #[test]
 fn a_file_of_nothing_but_parity_takes_little_memory() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,8 +1,5 @@
-//! The component information. Ground stations read the box's parameters with the words of the table, in files that
-//! follow MAVLink's schemas, and get them whole over the link.
-//!
-//! `HUMS_WRITE_DOCS=1 cargo test -p hums-tests --features oracle metadata` writes
-//! `firmware/onboard/metadata` anew.
+//! Component information: the words of the table of parameters, in files by MAVLink's schemas, over the link.
+//! `HUMS_WRITE_DOCS=1 cargo test -p hums-tests --features oracle metadata` writes `firmware/onboard/metadata`.
 #![cfg(feature = "oracle")]
 
 use std::fs;
@@ -17,8 +14,7 @@ use serde_json::{Value, json};
 
 use super::board::Board;
 
-/// The version of both files that `QGroundControl` reads. The schema of the parameters has 3 as its minimum
-/// (mavlink/mavlink f368676f).
+/// `QGroundControl` reads this version; the schema of parameters has 3 as its minimum (mavlink/mavlink f368676f).
 const VERSION: u32 = 1;
 /// `COMP_METADATA_TYPE_PARAMETER`
 const PARAMETER: u32 = 1;
@@ -28,12 +24,11 @@ fn folder() -> PathBuf {
     root().join("firmware/onboard/metadata")
 }
 
-/// A number in common form: not 0.30000001 for 0.3.
+/// Not 0.30000001 for 0.3.
 fn number(value: f32) -> Value {
     serde_json::from_str(&value.to_string()).unwrap()
 }
 
-/// All parameters, in the order of the table.
 fn parameters() -> String {
     let rows = Param::ALL.map(|param| {
         let (spec, words) = (param.spec(), param.words());
@@ -62,7 +57,6 @@ fn parameters() -> String {
     json!({ "version": VERSION, "parameters": &rows[..] }).to_string()
 }
 
-/// The file that names the file of the parameters.
 fn general(packed: &[u8]) -> String {
     let uri = format!("mftp://[;comp=191]/{PACKED}");
     let types = json!([{ "type": PARAMETER, "uri": uri, "fileCrc": ftp::checksum(0, packed) }]);
@@ -88,7 +82,7 @@ fn what_the_firmware_holds_is_what_the_table_says() {
     assert_eq!(fs::read(&packed).unwrap()[..8], [0xFD, b'7', b'z', b'X', b'Z', 0, 0, 1]);
 }
 
-/// The rules of `parameter.schema.json` and `general.schema.json` (mavlink/mavlink f368676f), beyond those of JSON.
+/// `parameter.schema.json` and `general.schema.json` (mavlink/mavlink f368676f), beyond the rules of JSON.
 #[test]
 fn both_files_are_as_the_public_schemas_want_them() {
     let general: Value = serde_json::from_slice(&fs::read(folder().join("general.json")).unwrap()).unwrap();
@@ -123,7 +117,7 @@ fn both_files_are_as_the_public_schemas_want_them() {
     }
 }
 
-/// An object has all of these, some of those, and no others.
+/// All `required`, some optional ones, no others.
 #[track_caller]
 fn assert_members(object: &Value, required: &[&str], optional: &[&str]) {
     let object = object.as_object().expect("an object");

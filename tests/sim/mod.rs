@@ -1,7 +1,4 @@
-//! End to end on this PC: the `hums` command as for a user, with recorded flights at the UART.
-//!
-//! Each module is one promise: the output of the card, the output to the ground station, the effects of noise,
-//! hostile files, failing cards and power cuts.
+//! The `hums` command as for a user, with recorded flights at the UART; each module is one promise.
 
 mod any_log;
 mod board;

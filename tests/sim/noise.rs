@@ -7,10 +7,9 @@ use hums_tests::damage::{self, Random};
 use hums_tests::flights::{Manifest, OWN, own, stream};
 use hums_tests::program::{Machine, Recording};
 
-/// The frames of a flight, and their stream.
 struct Clean {
     stream: Vec<u8>,
-    /// The place of each frame in the stream.
+    /// Places in the stream.
     frames: Vec<Range<usize>>,
 }
 
@@ -32,8 +31,7 @@ impl Clean {
         Self { stream, frames }
     }
 
-    /// The record of `noisy`, this stream with damage: each whole frame, next to nothing else, and every other byte
-    /// counted.
+    /// Keeps each whole frame and next to nothing else; every other byte is counted.
     #[track_caller]
     fn assert_whole_frames_survive(&self, noisy: &[u8], recording: &Recording) {
         assert_eq!(noisy.len(), self.stream.len());
@@ -78,14 +76,14 @@ impl Clean {
     }
 }
 
-/// Bytes of a frame that its checksum covers, itself included. Damage to a signature behind it can be found only with
-/// the key, and such a frame counts as a frame.
+/// The checksum covers these bytes, itself included. Damage to a signature shows only with the key: such a frame
+/// counts.
 fn covered(frame: &[u8]) -> usize {
     let signed = frame[0] == 0xFD && frame[2] & 1 == 1;
     if signed { frame.len() - 13 } else { frame.len() }
 }
 
-/// The bytes are damaged here, so nothing depends on the program's own noise.
+/// Damaged here, independent of the program's own noise.
 #[test]
 fn each_frame_that_is_not_itself_damaged_survives() {
     for (seed, name) in OWN.into_iter().enumerate() {
@@ -109,7 +107,7 @@ fn each_frame_that_the_programs_own_noise_leaves_whole_survives() {
     Clean::read(FLIGHT).assert_whole_frames_survive(&fs::read(&tap).unwrap(), &recording);
 }
 
-/// The number of frames that survive the program's own noise follows chance, within five standard deviations.
+/// By chance, within five standard deviations.
 #[test]
 fn the_noise_flag_damages_as_much_as_it_says_and_all_of_it_is_counted() {
     let path = own("px4_hil_quad_low.tlog");
@@ -135,7 +133,6 @@ fn the_noise_flag_damages_as_much_as_it_says_and_all_of_it_is_counted() {
         assert_eq!(recording.number("frames_logged"), output.len() as u64);
         assert!(recording.number("bytes_not_frames") > 0);
 
-        // Survivors are frames of the flight, in its order.
         let mut originals = input.iter();
         let strange = output.iter().filter(|frame| {
             let before = originals.clone();
@@ -162,6 +159,6 @@ fn noise_behind_a_frame_is_counted_and_is_no_flight() {
     assert_eq!(recording.number("bytes_in"), noise.len() as u64);
     let decoded = recording.decode(&[0]);
     let verified = decoded.frames(&Manifest::own().seeds).iter().filter(|frame| frame.verified).count();
-    // By chance alone one start byte in some 65,536 passes.
+    // One start byte in some 65,536 passes by chance.
     assert!(verified < 20, "{verified} frames in noise");
 }

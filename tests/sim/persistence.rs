@@ -1,5 +1,4 @@
-//! Persistence: counters and parameters continue from flight to flight, after a power cut at any word of the store
-//! and with any card.
+//! Counters and parameters outlive a power cut at any word of the store.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +18,6 @@ fn fly(store: &Path, flags: &[&str]) -> Recording {
     Recording::attempt(Machine::Sim, &own(FLIGHT), &flags)
 }
 
-/// A whole flight, in order.
 fn flown(store: &Path) {
     let _ = fly(store, &[]).expect_code(&[0]);
 }
@@ -29,7 +27,6 @@ fn two_flights_add_up_in_the_store_whatever_card_is_in_the_slot() {
     let dir = tempfile::tempdir().unwrap();
     let store = dir.path().join("store.bin");
     let once = {
-        // Each recording has a card of its own.
         flown(&store);
         *Stored::read(&store).lifetime()
     };
@@ -62,7 +59,7 @@ fn whatever_word_of_the_store_power_goes_at_the_counters_are_the_old_or_the_new_
     let mut cuts = 0;
     for cut in 0..16 {
         let before = *Stored::read(&store).lifetime();
-        // A flight writes some 400 words; a cut behind those is never met, and the flight counts.
+        // A flight writes some 400 words; a later cut is never met.
         let at = (1 + random.below(500)).to_string();
         let flags = ["--cut-store-after", &at, "--seed", &cut.to_string()];
         let recording = fly(&store, &flags).expect_code(&[0, 3]);
@@ -81,7 +78,6 @@ fn whatever_word_of_the_store_power_goes_at_the_counters_are_the_old_or_the_new_
     assert!(cuts >= 8, "{cuts} of 16 cuts were met");
 }
 
-/// Seconds of a line of the decoded record.
 fn time_s(line: &str) -> f64 {
     let entry: serde_json::Value = serde_json::from_str(line).unwrap();
     entry["time_boot"].as_f64().unwrap_or_default()
@@ -109,7 +105,7 @@ fn power_that_goes_at_any_moment_of_a_flight_costs_two_minutes_of_it_at_most() {
             let lifetime = kept.lifetime.unwrap_or_default();
             let kept_s = lifetime.totals.raw(UsageCounter::Flight);
             let flown_s = end_s - take_off_s;
-            // The record may be a second behind, and a take-off is found half a second late.
+            // The record may be a second behind, a take-off half a second late.
             assert!(
                 (flown_s - 121.0..flown_s + 2.0).contains(&kept_s),
                 "{flight}, cut at {at}: {kept_s} s of {flown_s} s are kept"
@@ -123,7 +119,7 @@ fn power_that_goes_at_any_moment_of_a_flight_costs_two_minutes_of_it_at_most() {
 fn components_wear_from_flight_to_flight_until_they_are_due_and_info_says_so() {
     let dir = tempfile::tempdir().unwrap();
     let (store, file) = (dir.path().join("store.bin"), dir.path().join("hums.param"));
-    // The airframe is due after 504 s; a flight takes 232. Motor 2 has hours to spare.
+    // The airframe is due after 504 s, a flight takes 232 s; motor 2 has hours to spare.
     let text = "CMP1_KIND 1\nCMP1_HOURS 0.14\nCMP2_KIND 3\nCMP2_NUMBER 2\nCMP2_MOT_HOURS 100\n";
     fs::write(&file, text).unwrap();
     let mut seen = Vec::new();
@@ -150,7 +146,7 @@ fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded(
     fs::write(path("hums.param"), "CMP1_KIND 1\nCMP1_FLIGHTS 10\n").unwrap();
     let params = ["--params".to_owned(), path("hums.param").display().to_string()];
     let flags = |more: [String; 2]| -> Vec<String> { params.iter().cloned().chain(more).collect() };
-    // USER_1, component 1, to the box of vehicle 1: once in flight, and once after the disarming at 248.7 s.
+    // USER_1, component 1: once in flight, once after the disarming at 248.7 s.
     let mut command = [1.0_f32.to_le_bytes(), [0; 4]].concat();
     command.resize(28, 0);
     command.extend([0x22, 0x79, 1, 191, 0]);
@@ -198,7 +194,6 @@ fn a_component_that_a_command_says_is_replaced_begins_anew_and_that_is_recorded(
     );
 }
 
-/// The status of a component in `hums info --json`.
 fn component_status(info: &serde_json::Value, place: u64) -> Option<String> {
     match info {
         serde_json::Value::Object(fields) => {
@@ -253,7 +248,7 @@ fn a_file_that_is_no_store_or_cannot_be_read_is_refused_and_stays() {
     let dir = tempfile::tempdir().unwrap();
     let store = dir.path().join("store.bin");
     let mut spoiled = vec![0x5A; 32_768];
-    // Another file of that length is refused, and stays unchanged.
+    // Refused and left unchanged.
     fs::write(&store, &spoiled).unwrap();
     let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
     assert!(outcome.stderr.contains("is no store, though it has the length of one"), "{}", outcome.stderr);
@@ -270,7 +265,6 @@ fn a_file_that_is_no_store_or_cannot_be_read_is_refused_and_stays() {
     assert_eq!(fs::read(&store).unwrap(), b"too short");
 }
 
-/// All records of a card, as text.
 fn records(image: &Path) -> String {
     let jsonl = ["-o", "-", "--format", "jsonl"].map(AsRef::as_ref);
     hums(["decode".as_ref(), image.as_os_str()].into_iter().chain(jsonl)).expect_code(&[0, 3]).text()

@@ -1,14 +1,14 @@
-//! A power cut at any block write: the card is valid and holds the flight up to there.
+//! The card is valid and holds the flight up to the cut.
 
 use hums_tests::damage::Random;
 use hums_tests::fat;
 use hums_tests::flights::{Manifest, own};
 use hums_tests::program::{Decoded, Machine, Recording};
 
-/// A sample by the program itself; each kind of write (data, FAT, directory), whole and torn, is the campaign's.
+/// A sample; the campaign cuts each kind of write (data, FAT, directory), whole and torn.
 const CUTS: usize = 12;
 
-/// Frames of the second in which a log begins, or that wait in memory for their sector.
+/// A log's first second, or frames in memory.
 const LOST_MAX: u64 = 100;
 
 const FLIGHT: &str = "px4_hil_quad_low.tlog";
@@ -31,7 +31,7 @@ fn after_a_cut_at_any_write_the_card_is_in_order_and_gives_the_flight_up_to_ther
         let flags = ["--card-size", "40", "--cut-after-writes", &at];
         let recording = Recording::attempt(Machine::Sim, &path, &flags).expect_code(&[0, 3]);
         fat::assert_clean(&recording.image());
-        // A cut before the log's first sector leaves no log, with exit code 1.
+        // Exit code 1: no log before its first sector.
         let decoded = Decoded::of(&recording.image(), &[0, 1, 3]);
         let output = decoded.frames(&manifest.seeds);
         let prefix =
@@ -41,7 +41,7 @@ fn after_a_cut_at_any_write_the_card_is_in_order_and_gives_the_flight_up_to_ther
         assert!(recording.number("frames_lost") < LOST_MAX, "cut at {at}: more than what was in memory");
         frames_of_cuts.push(output.len());
     }
-    // Cuts late in the flight keep most of it: the test would otherwise pass with empty cards.
+    // Empty cards would pass otherwise.
     let most = frames_of_cuts.iter().max().copied().unwrap_or(0);
     assert!(most > input.len() / 2, "the most that any cut left is {most} of {}", input.len());
 }

@@ -1,5 +1,4 @@
-//! The protective action end to end. Pymavlink simulates an autopilot in the air with an emptying battery at the
-//! autopilot's port, and its pilot at the ground station's.
+//! Pymavlink plays an airborne autopilot with an emptying battery, and its pilot.
 #![cfg(feature = "oracle")]
 
 use std::fs;
@@ -10,22 +9,21 @@ use hums_tests::oracle;
 use hums_tests::program::{self, hums};
 use serde_json::Value;
 
-/// The debounce of an empty battery, and the delay that the tests set.
+/// The empty battery's debounce, and the tests' delay.
 const FOUND_S: f64 = 2.0;
 const DELAY_S: f64 = 3.0;
 
-/// The outcome: observations of the peers, and the steps in the record.
+/// The peers' observations, and the recorded steps.
 struct Outcome {
     said: Value,
     steps: Vec<(String, u64)>,
 }
 
-/// A port that was free a moment ago: the next caller gets another.
 fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// The box, which ends in order, as by Ctrl-C, when dropped.
+/// Ends in order, as by Ctrl-C, when dropped.
 struct Board(Child);
 
 impl Drop for Board {
@@ -60,7 +58,7 @@ fn fly(params: &str, pilot: &str) -> Outcome {
 }
 
 impl Outcome {
-    /// Texts about the action: seconds, severity, text.
+    /// Seconds, severity, text.
     fn texts(&self, action: &str) -> Vec<(f64, u64, String)> {
         let texts = self.said["texts"].as_array().unwrap().iter().map(|entry| {
             let text = entry[2].as_str().unwrap().to_owned();
@@ -83,7 +81,7 @@ fn an_empty_battery_is_announced_counted_down_and_the_autopilot_told_once_and_it
         assert_eq!(asked["command"], command, "{said}");
         assert_eq!(asked["target"], serde_json::json!([1, 1]), "{said}");
         assert_eq!((&asked["confirmation"], &asked["params"][0]), (&0.into(), &0.0.into()), "{said}");
-        // Tolerances: the board's ticks, this PC's scheduler, and its clock.
+        // The board's ticks, this PC's scheduler and clock.
         let asked_s = asked["s"].as_f64().unwrap() - FOUND_S - DELAY_S;
         assert!((-0.1..1.0).contains(&asked_s), "{said}");
         let texts = outcome.texts(action);

@@ -1,4 +1,4 @@
-//! `hums box pull`: interrupted, continued, and never mixed from two logs.
+//! Interrupted, continued, never mixed from two logs.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -19,7 +19,7 @@ use super::board::{Board, assert_on_card, pulled_log, pulled_logs};
 const LOG: &str = "00001_00.HUM";
 const NUMBER: &str = "00001";
 
-/// A card with one finished session on it: this part of a recording. All such cards have logs of the same names.
+/// One finished session: this part of a recording. All such cards have logs of the same names.
 fn card(part: std::ops::Range<usize>, seed: &str) -> (TempDir, Vec<u8>) {
     let dir = tempfile::tempdir().unwrap();
     let recording = fs::read(own("ap_quad_signed.raw")).unwrap();
@@ -44,7 +44,7 @@ fn pull(board: &Board, output: &Path, names: &[&str]) -> hums_tests::child::Outc
     hums(flags.into_iter().chain(names.iter().copied()))
 }
 
-/// Begins a download and is killed after the first data.
+/// Killed after the first data.
 fn begin(board: &Board, output: &Path) -> PathBuf {
     let address = format!("udpout:127.0.0.1:{}", board.port);
     let mut pull = command(["box", "pull", "--link", &address, LOG, "-o"]);
@@ -59,7 +59,6 @@ fn begin(board: &Board, output: &Path) -> PathBuf {
     part
 }
 
-/// The unfinished download in a folder.
 fn only_part(output: &Path) -> PathBuf {
     let names = fs::read_dir(output).unwrap().map(|entry| entry.unwrap().path());
     let is_part = |path: &PathBuf| path.to_string_lossy().ends_with("_00.HUM.pull.hums-part");
@@ -74,7 +73,7 @@ fn two_cards_are_never_made_into_one_log() {
     let home = tempfile::tempdir().unwrap();
     let output = home.path().join("logs");
 
-    // Interrupted; then the box has another card, whose log has the same name.
+    // Another card, whose log has the same name.
     let first = board(one);
     let part = begin(&first, &output);
     let kept = fs::read(&part).unwrap();
@@ -85,7 +84,7 @@ fn two_cards_are_never_made_into_one_log() {
     assert_on_card(&others, &other_card);
     assert_eq!(fs::read(&part).unwrap(), kept);
 
-    // With the first card again, it continues from there, unless another run is using it.
+    // Unless another run is using it.
     second.switch_off();
     let first = board(one);
     let lock = fs::File::options().append(true).open(&part).unwrap();
@@ -103,7 +102,6 @@ fn two_cards_are_never_made_into_one_log() {
     let said = pull(&first, &output, &[LOG]).expect_code(&[0]);
     assert!(said.stderr.contains("is there already") && said.stdout.is_empty(), "{}", said.stderr);
 
-    // Each is a log of its own in the folder, with the name of its outputs.
     let folder = output.to_str().unwrap();
     let read = hums(["info", "--json", folder]).expect_code(&[0]);
     let read: serde_json::Value = serde_json::from_slice(&read.stdout).unwrap();
@@ -115,7 +113,7 @@ fn two_cards_are_never_made_into_one_log() {
         assert!(made.join(format!("{name}.tlog")).exists(), "{name}");
     }
 
-    // One changed bit, or bytes added behind or in the middle: the file may be evidence.
+    // A changed bit, added bytes: the file may be evidence.
     let whole = fs::read(&log).unwrap();
     let flipped = |at: usize| {
         let mut spoiled = whole.clone();
@@ -135,7 +133,7 @@ fn two_cards_are_never_made_into_one_log() {
     }
 }
 
-/// A board's card may be damaged: that is reported each time, even if its log exists already.
+/// Damage is reported each time, even if the log exists already.
 #[test]
 fn what_is_there_already_is_checked_as_what_comes_is() {
     let (dir, mut card) = card(0..30_000, "1");
@@ -153,7 +151,7 @@ fn what_is_there_already_is_checked_as_what_comes_is() {
 #[test]
 fn a_log_in_work_that_has_grown_is_completed() {
     let (dir, _) = card(0..80_000, "1");
-    // The end of a flight, and a vehicle's messages on the ground: the log has an end mark after 5 s.
+    // The log has an end mark after 5 s.
     let flight = fs::read(own("ap_quad_guided.tlog")).unwrap();
     let input = dir.path().join("landed.tlog");
     fs::write(&input, [cut(&flight, 262, 270), cut(&flight, 0, 40)].concat()).unwrap();
@@ -167,7 +165,7 @@ fn a_log_in_work_that_has_grown_is_completed() {
         if pulled.code == Some(0) && !pulled_logs(home.path(), "00002").is_empty() {
             break;
         }
-        // Its end is not proved until then; a log without records is not a log.
+        // Not proved until then; a log without records is not a log.
         let told = pulled.expect_code(&[0, 3]).stderr;
         let words = ["not proved to its end", "has no data, or its first sector cannot be read"];
         assert!(words.iter().any(|words| told.contains(words)), "{told}");
@@ -185,12 +183,11 @@ fn a_log_in_work_that_has_grown_is_completed() {
     assert_on_card(&log, &fs::read(dir.path().join("card.img")).unwrap());
 }
 
-/// The records of a tlog between two times, seconds after its first one.
+/// Seconds after its first record.
 fn cut(tlog: &[u8], from_s: u64, to_s: u64) -> Vec<u8> {
     let (mut at, mut first, mut out) = (0, None, Vec::new());
     while let Some(record) = tlog.get(at..).filter(|record| record.len() > 11) {
         let time = u64::from_be_bytes(record[..8].try_into().unwrap());
-        // MAVLink 2 (with a signature where its flag says so) and 1.
         let frame = if record[8] == 0xfd { 12 + 13 * usize::from(record[10] & 1) } else { 8 };
         let bytes = 8 + frame + usize::from(record[9]);
         let after = time - *first.get_or_insert(time);
@@ -202,13 +199,11 @@ fn cut(tlog: &[u8], from_s: u64, to_s: u64) -> Vec<u8> {
     out
 }
 
-/// The parts of logs in a folder.
 fn parts(output: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(output).unwrap().map(|entry| entry.unwrap().path());
     entries.filter(|path| path.to_string_lossy().ends_with(".part.HUM")).collect()
 }
 
-/// The places of sectors of zeros.
 fn zeros(bytes: &[u8]) -> Vec<usize> {
     let is_zero = |(_, sector): &(usize, &[u8])| sector.iter().all(|byte| *byte == 0);
     bytes.chunks(512).enumerate().filter(is_zero).map(|(place, _)| place).collect()
@@ -219,7 +214,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     const GROUP: usize = 64;
     let dir = tempfile::tempdir().unwrap();
     let (input, image) = (dir.path().join("short.tlog"), dir.path().join("card.img"));
-    // The autopilot declares a failsafe 35 s after its start, in the second group of the log.
+    // The autopilot's failsafe at 35 s is in the log's second group.
     fs::write(&input, cut(&fs::read(own("ap_quad_faults.tlog")).unwrap(), 232, 272)).unwrap();
     fs::write(dir.path().join("params.txt"), "GS_BUDGET 5000\n").unwrap();
     let mut sim = command(["sim"]);
@@ -241,7 +236,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     assert!(bytes.len() / 512 > GROUP + 20 && missing.len() > GROUP / 2, "{missing:?} of {}", bytes.len());
     assert!(missing.iter().all(|place| *place < GROUP), "the second group is there: {missing:?}");
 
-    // Every reader accepts it, and reports that it is a part.
+    // Every reader accepts and reports the part.
     let name = part.to_str().unwrap();
     for words in [&["info", name][..], &["info", "--verify", name]] {
         let told = hums(words).expect_code(&[3]).text();
@@ -249,12 +244,12 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     }
     let made = home.path().join("part.tlog");
     hums(["decode", name, "-o", made.to_str().unwrap(), "--format", "tlog"]).expect_code(&[3]);
-    // Its last record is the flight's last one: time, then the frame.
+    // The flight's last record.
     let (decoded, whole) = (fs::read(&made).unwrap(), fs::read(&input).unwrap());
     let end = |tlog: &[u8]| tlog[tlog.len() - 12..].to_vec();
     assert!(decoded.len() > 10_000 && end(&decoded) == end(&whole), "{} bytes", decoded.len());
 
-    // A part is never extended: another moment needs another folder, and the whole log is stored beside it.
+    // Another moment needs another folder.
     let told = pull(&board, output, &[LOG, "--around", "0:00.5", "--span", "0.5"]).expect_code(&[1]).stderr;
     assert!(told.contains("exists, and was not overwritten"), "{told}");
     assert_eq!(fs::read(&part).unwrap(), bytes);
@@ -267,8 +262,7 @@ fn a_finding_comes_first_as_a_part_that_says_so() {
     assert!(told.contains("is no time (4:20, 260.8, 2026-11-21T10:13:42Z) and no finding"), "{told}");
 }
 
-/// A proxy that makes the board look as if it lacked `CalcFileCRC32`. The client's opcode 14 reaches the board as an
-/// unknown one, and its refusal comes back as one of opcode 14. Returns the proxy's port.
+/// A proxy without `CalcFileCRC32`: opcode 14 reaches the board as an unknown one. Returns its port.
 fn without_checksums(board: u16) -> u16 {
     const OPCODE: usize = 10 + 3 + 3;
     const OF: usize = OPCODE + 2;
@@ -279,7 +273,6 @@ fn without_checksums(board: u16) -> u16 {
     let (to_client, to_board) = (client.try_clone().unwrap(), board_side.try_clone().unwrap());
     let asks = Arc::new(Mutex::new(None));
     let answers = Arc::clone(&asks);
-    // Both end with the test's program.
     std::thread::spawn(move || {
         let mut buffer = [0; 2048];
         while let Ok((length, from)) = client.recv_from(&mut buffer) {
@@ -290,7 +283,6 @@ fn without_checksums(board: u16) -> u16 {
     });
     std::thread::spawn(move || {
         let mut buffer = [0; 2048];
-        // An error means a board that is not there yet.
         loop {
             let Ok(length) = board_side.recv(&mut buffer) else { continue };
             exchange(&mut buffer[..length], OF, 200, 14);
@@ -302,7 +294,7 @@ fn without_checksums(board: u16) -> u16 {
     port
 }
 
-/// In each `FILE_TRANSFER_PROTOCOL` of a datagram, replaces this byte, if it has this value.
+/// Only if it has this value.
 fn exchange(datagram: &mut [u8], place: usize, from: u8, to: u8) {
     const ID: [u8; 3] = [110, 0, 0];
     const SEED: u8 = 84;
@@ -335,7 +327,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
     let log = pulled_log(&output, NUMBER);
     assert_on_card(&log, &card);
     let part = log.with_file_name(format!(".{}.pull.hums-part", log.file_name().unwrap().to_str().unwrap()));
-    // An empty part of a killed run is not a change.
+    // An empty part of a killed run.
     let whole = fs::read(&log).unwrap();
     fs::remove_file(&log).unwrap();
     fs::write(&part, "").unwrap();
@@ -343,7 +335,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
     assert!(!told.contains("was changed"), "{told}");
     assert_eq!(fs::read(&log).unwrap(), whole);
 
-    // A file with the same ends is continued; its sectors show the changed middle.
+    // Its ends agree: it is continued, and its sectors show the changed middle.
     fs::remove_file(&log).unwrap();
     let mut begun = whole[..whole.len() - 1024].to_vec();
     let middle = begun.len() / 2 + 100;

@@ -1,4 +1,4 @@
-//! A card in a reader is a block device, which has the length 0 in its metadata.
+//! A block device has the length 0 in its metadata.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,11 +9,10 @@ use hums_tests::not_tested;
 use hums_tests::program::{Machine, Recording, hums};
 use serde_json::Value;
 
-/// A loop device over an image; gone when dropped.
+/// Gone when dropped.
 struct Loop(PathBuf);
 
 impl Loop {
-    /// None if this machine does not allow it.
     fn over(image: &Path) -> Option<Self> {
         let made =
             Command::new("losetup").args(["--find", "--show", "--read-only"]).arg(image).output().ok()?;

@@ -1,4 +1,4 @@
-//! Every valid frame of a recording comes out of the card bit for bit, in order, with its arrival time.
+//! Every valid frame leaves the card bit for bit, in order, with its arrival time.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -8,7 +8,6 @@ use hums_tests::frames::{self, Frame, build_v2};
 use hums_tests::program::{self, Decoded, LIMIT, Machine, Recording};
 use hums_tests::{child, fat};
 
-/// Records and decodes one flight and compares all of it.
 #[track_caller]
 fn round_trip(path: &Path, manifest: &Manifest) {
     let data = fs::read(path).unwrap();
@@ -26,7 +25,7 @@ fn round_trip(path: &Path, manifest: &Manifest) {
     assert_eq!(recording.number("frames_lost"), 0);
     assert_eq!(recording.number("frames_logged"), output.len() as u64, "logged, and found in the log");
     assert_eq!(recording.number("frames_in"), output.len() as u64);
-    // Bytes of a damaged tlog outside its records arrive as well, and count as bytes outside frames.
+    // A damaged tlog's bytes outside its records count too.
     assert!(recording.number("bytes_in") >= bytes.len() as u64, "every byte arrives");
     let framed: u64 = output.iter().map(|frame| frame.bytes.len() as u64).sum();
     assert_eq!(
@@ -38,8 +37,7 @@ fn round_trip(path: &Path, manifest: &Manifest) {
     assert_times_kept(&input, &output);
 }
 
-/// The times between frames are those of the recording, to 1 ms (and 1 ms for rounding at either end). A recording
-/// whose clock was set back has no such times: from there on only the order is compared.
+/// To 1 ms, and 1 ms for rounding at either end. A clock that was set back leaves only the order.
 #[track_caller]
 fn assert_times_kept(input: &[Frame<'_>], output: &[Frame<'_>]) {
     let times = |frames: &[Frame<'_>]| -> Option<Vec<u64>> {
@@ -88,7 +86,7 @@ fn every_further_recording_comes_out_bit_for_bit() {
     }
 }
 
-/// The checked-in manifest equals pymavlink's results of today. `HUMS_WRITE_DOCS=1 cargo xtask test --only sim` writes it.
+/// `HUMS_WRITE_DOCS=1 cargo xtask test --only sim` writes the manifest.
 #[cfg(feature = "oracle")]
 #[test]
 fn the_manifest_is_what_pymavlink_finds() {
@@ -116,7 +114,7 @@ fn two_runs_are_the_same_to_the_byte_and_their_counters_add_up() {
     assert_eq!(first.number("frames_in"), first.number("frames_logged") + first.number("frames_lost"));
     assert_eq!(first.number("gs_bytes"), gs.len() as u64);
     assert!(first.number("bytes_not_frames") > 0);
-    // A write begins at the latest 200 ms after the card stands still.
+    // A write begins at the latest 200 ms after the stall's start.
     assert!((500..=750).contains(&first.number("sd_stall_ms_max")), "{}", first.number("sd_stall_ms_max"));
     assert!(first.number("queue_bytes_max") <= first.number("queue_bytes_capacity"));
 }

@@ -1,5 +1,4 @@
-//! Logs on cards without a file system, deleted files, and partly overwritten logs: the remaining data comes out, and
-//! missing data is reported with its times.
+//! Cards without a file system, deleted files, partly overwritten logs.
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt as _;
@@ -13,7 +12,7 @@ use serde_json::Value;
 
 const BLOCK: u64 = 512;
 
-/// Offsets on the card, in bytes: the partition, its FAT, its clusters. The first cluster is the directory.
+/// Bytes on the card; the first cluster is the directory.
 struct Places {
     partition: u64,
     fat: u64,
@@ -39,17 +38,14 @@ fn zero(image: &Path, from: u64, to: u64) {
     file.write_all_at(&vec![0; (to - from) as usize], from).unwrap();
 }
 
-/// The JSON of this command, which must end with this code.
 fn json(command: &str, image: &Path, flags: &[&str], code: i32) -> Value {
     let words = command.split(' ').chain(["--json"]).chain(flags.iter().copied()).map(AsRef::as_ref);
     let outcome = hums(words.chain([image.as_os_str()])).expect_code(&[code]);
     serde_json::from_str(&outcome.text()).unwrap()
 }
 
-/// Destroys an image's file system.
 type Wreck = fn(&Path);
 
-/// The ways to destroy the file system, by name.
 const WRECKS: [(&str, Wreck); 4] = [
     ("the FAT is zeros", |image| {
         let Places { fat, data, .. } = places(image);
@@ -69,7 +65,7 @@ const WRECKS: [(&str, Wreck); 4] = [
 #[test]
 fn a_card_without_a_file_system_gives_all_that_is_on_it() {
     let manifest = Manifest::own();
-    // A flight for each: what is wrecked knows nothing of the flight.
+    // A flight for each.
     for (name, (what, wreck)) in OWN.into_iter().zip(WRECKS) {
         let recording = Recording::make(Machine::Sim, &own(name), &["--card-size", "64"]);
         let data = fs::read(own(name)).unwrap();
@@ -78,7 +74,7 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
         let image = recording.image();
         wreck(&image);
         eprintln!("{name}: {what}");
-        // An empty directory tells that the card is empty; the FAT, and what lies there, tell otherwise.
+        // An empty directory alone means an empty card; the FAT contradicts.
         let info = json("info", &image, &[], 3);
         assert_ne!(info["images"][0]["damage"], serde_json::json!([]), "{what}");
         assert_eq!(info["logs"].as_array().unwrap().len(), 1, "{what}: {info}");
@@ -91,7 +87,7 @@ fn a_card_without_a_file_system_gives_all_that_is_on_it() {
     }
 }
 
-/// No output about a card with evidence advises a change of it.
+/// Evidence: no output advises a change.
 #[track_caller]
 fn changes_nothing(command: &str, image: &Path, what: &str) {
     let words = command.split(' ').map(AsRef::as_ref).chain([image.as_os_str()]);
@@ -103,7 +99,7 @@ fn changes_nothing(command: &str, image: &Path, what: &str) {
     }
 }
 
-/// The entry of a log is lost, but its clusters are not free: it was not deleted.
+/// Its clusters are not free: it was not deleted.
 #[test]
 fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
@@ -118,7 +114,7 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     assert!(info["images"][0]["damage"][0].as_str().unwrap().contains("belong to no file"), "{info}");
     assert_eq!(json("info --verify", &image, &[], 3)["logs"].as_array().unwrap().len(), 2);
 
-    // The FAT of its sectors is lost as well, and only its parity remains in clusters without a file.
+    // Only parity remains, in clusters without a file.
     let Places { fat, data, cluster_bytes, .. } = places(&image);
     let first = entry_word(&content, entry + 26);
     let start = data as usize + (first - 2) * cluster_bytes as usize;
@@ -127,7 +123,7 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     let clusters = (sectors * BLOCK as usize).div_ceil(cluster_bytes as usize);
     content[entry..entry + 32].fill(0);
     content[fat as usize + 4 * first..][..4 * clusters].fill(0);
-    // An entry of zeros ends the directory: the other log's entry takes its place.
+    // An entry of zeros ends the directory.
     content.copy_within(entry + 32..entry + 64, entry);
     content[entry + 32..entry + 64].fill(0);
     fs::write(&image, &content).unwrap();
@@ -137,19 +133,18 @@ fn a_log_whose_directory_entry_is_lost_is_found_and_told_beside_others() {
     json("info --verify", &image, &[], 3);
 }
 
-/// Two bytes of a directory entry.
 fn entry_word(image: &[u8], at: usize) -> usize {
     usize::from(u16::from_le_bytes([image[at], image[at + 1]]))
 }
 
-/// The card was formatted on a PC: its file system is valid and empty, and may have had more data than remains.
+/// Valid and empty, and may have had more data than remains.
 #[test]
 fn a_card_that_was_formatted_gives_its_logs_and_says_so() {
     let recording = Recording::make(Machine::Sim, &own("px4_hil_quad_low.tlog"), &["--card-size", "64"]);
     let image = recording.image();
     let Places { fat, data, cluster_bytes, .. } = places(&image);
     zero(&image, fat, data + cluster_bytes);
-    // The media, the flags and the root directory.
+    // Media, flags, root directory.
     let head = [0x0fff_fff8_u32, 0x0fff_ffff, 0x0fff_ffff].map(u32::to_le_bytes).concat();
     File::options().write(true).open(&image).unwrap().write_all_at(&head, fat).unwrap();
     let info = json("info", &image, &[], 3);
@@ -190,7 +185,6 @@ fn a_deleted_log_is_found_again() {
     }
 }
 
-/// Records one more session on a card.
 fn record_more(image: &Path, flight: &Path) {
     let flags = ["--json", "--overwrite-oldest"].map(std::ffi::OsStr::new);
     let sim = ["sim".as_ref(), flags[0], flags[1], flight.as_os_str(), "--sd".as_ref()];
@@ -205,7 +199,7 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     let data = fs::read(&old).unwrap();
     let input = manifest.frames_of(&old, &data);
     fs::write(&short, stream(true, &data, &input[..400])).unwrap();
-    // The smallest card holds sixteen segments: the last session overwrites the first one.
+    // The last session overwrites the first one.
     let recording = Recording::make(Machine::Sim, &old, &["--card-size", "34"]);
     let image = recording.image();
     for _ in 0..40 {
@@ -222,8 +216,7 @@ fn an_older_log_that_a_newer_one_overwrites_gives_what_is_left_of_it_and_never_m
     assert_eq!(newest.len(), 400);
     assert!(newest.iter().zip(&input).all(|(a, b)| a.bytes == b.bytes));
 
-    // The rest of the oldest one, after the newest one overwrote it, is found from the next group on. It does not
-    // count as damage of the card.
+    // From the next group on; no damage of the card.
     let found = json("info", &image, &["--salvage"], 0);
     let verify = hums(["info".as_ref(), "--verify".as_ref(), "--salvage".as_ref(), image.as_os_str()])
         .expect_code(&[0])
@@ -263,7 +256,7 @@ fn a_file_that_held_something_else_before_is_no_damage() {
     let path = own("px4_hil_quad_low.tlog");
     let recording = Recording::make(Machine::Sim, &path, &["--card-size", "64"]);
     let image = recording.image();
-    // The same session on a card whose free clusters are full of a photograph.
+    // Free clusters are full of a photograph.
     let Places { data, .. } = places(&image);
     let mut content = fs::read(&image).unwrap();
     let noise = hums_tests::damage::Random::new(3).bytes(1 << 20);

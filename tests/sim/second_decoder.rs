@@ -1,5 +1,5 @@
-//! The format document is sufficient for a decoder: `tests/oracle/hums_log` is one, in Python, that shares no line
-//! with `hums`. Both give the same frames with the same times, and the same records.
+//! The format document is sufficient for a decoder: `tests/oracle/hums_log`, in Python, shares no line with `hums`,
+//! and gives the same frames, times and records.
 #![cfg(feature = "oracle")]
 
 use std::fs;
@@ -11,10 +11,9 @@ use hums_tests::program::{Decoded, LIMIT, Machine, Recording, command};
 use hums_tests::{fat, oracle};
 use serde_json::{Value, json};
 
-/// Bytes of each recording: some thousands of frames over several groups, in seconds of Python.
+/// Some thousands of frames over several groups, seconds of Python.
 const RECORDING_BYTES: usize = 250_000;
 
-/// Tables that the second decoder reads completely.
 const TABLES: [&str; 11] = [
     "HUMS_BOOT",
     "HUMS_VEHICLE",
@@ -29,7 +28,7 @@ const TABLES: [&str; 11] = [
     "HUMS_KEEP",
 ];
 
-/// Both decoders agree on a log, ours with this exit code; returns the number of frames and records.
+/// Returns the number of frames and records.
 #[track_caller]
 fn compare(log: &Path, code: i32) -> (usize, usize) {
     let ours = Decoded::of(log, &[code]);
@@ -54,7 +53,7 @@ fn rows(text: &[u8]) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Time, table and fields of the records, numbers in single precision, in which most are stored.
+/// Numbers in single precision, in which most are stored.
 fn records(rows: &[Value]) -> Vec<Value> {
     let mut found = Vec::new();
     for row in rows {
@@ -64,9 +63,9 @@ fn records(rows: &[Value]) -> Vec<Value> {
         else {
             continue;
         };
-        // Counters are stored by number; their names are in another document.
+        // Another document has the counters' names.
         fields.remove("counter");
-        // A record of the board needs no such field.
+        // A board's record lacks this field.
         fields.remove("checked_by");
         for value in fields.values_mut() {
             if let Some(number) = value.as_f64().filter(|_| value.is_f64()) {
@@ -92,11 +91,10 @@ fn recordings_of_each_kind_read_the_same() {
         let short = dir.path().join(&*flight);
         let data = fs::read(&path).unwrap();
         fs::write(&short, &data[..RECORDING_BYTES.min(data.len())]).unwrap();
-        // A parameter that is not at its default, so that the record has one.
+        // The record has one parameter.
         let params = dir.path().join("params.txt");
         fs::write(&params, "BAT_REM_WARN 25\n").unwrap();
         let flags = ["--params", params.to_str().unwrap()];
-        // A tlog may be cut in the middle of a record.
         let recording = Recording::attempt(Machine::Sim, &short, &flags).expect_code(&[0, 3]);
         let files = dir.path().join("card");
         fs::create_dir(&files).unwrap();
@@ -107,7 +105,7 @@ fn recordings_of_each_kind_read_the_same() {
         assert_eq!(frames as u64, recording.number("frames_logged"), "{flight}");
         assert!(frames > 2_000 && records > 20, "{flight}: {frames} frames, {records} records");
         if path == own(OWN[0]) {
-            // Both rebuild any two pages from parity. Ours reports it.
+            // Ours reports it.
             let mut bytes = fs::read(log).unwrap();
             for sector in [12, 65] {
                 bytes[512 * sector..][..8 * 512].fill(0xff);

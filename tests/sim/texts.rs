@@ -1,5 +1,4 @@
-//! A pilot gets at most three texts about one event, on every labelled flight and recording, and critical ones at
-//! once.
+//! A pilot gets at most three texts about one event, critical ones at once.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,19 +14,16 @@ use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own, root};
 use rayon::prelude::*;
 
-/// Texts of one event begin within this time of its first one.
+/// Within this time of its first one.
 const EVENT_S: f64 = 10.0;
 const TEXTS_MAX: usize = 3;
-/// Texts in any ten seconds: three that are not critical, and the critical ones. In the worst of these flights
-/// vibration and the autopilot's own failsafe are critical at the same time.
+/// Three that are not critical, and the critical ones: in the worst flight vibration and the autopilot's failsafe.
 const AT_A_TIME_MAX: usize = 5;
 
-/// A critical text waits only for the line: a text of 80 bytes after one of 250 takes 60 ms at 57,600 baud. The time
-/// of a text is known to [`LOOK_US`].
+/// Waits only for the line: 80 bytes after 250 take 60 ms at 57,600 baud. The time of a text is known to [`LOOK_US`].
 const LATE_MAX_S: f64 = 0.25;
 const LOOK_US: u64 = 100_000;
 
-/// A text of the box.
 #[derive(Debug)]
 struct Said {
     at_s: f64,
@@ -35,7 +31,7 @@ struct Said {
     text: String,
 }
 
-/// The box's texts on a recording, and the times of critical checks.
+/// Also the times of critical checks.
 fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let dir = tempfile::tempdir().unwrap();
     let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();
@@ -45,7 +41,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let board = Board { card: &card, params: &params, key: None };
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
-    // Times of texts are known without input too.
+    // Without input too.
     let (mut chunks, mut now_us) = (Vec::new(), 0);
     while let Some(chunk) = source.next().unwrap() {
         while now_us < chunk.at_us {
@@ -67,7 +63,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     (said, critical.map(|finding| finding.time_s).collect())
 }
 
-/// The subject of a text: attitude belongs to the motors.
+/// Attitude belongs to the motors.
 fn family(text: &str) -> Subsystem {
     let words = text.strip_prefix("HUMS: ").unwrap_or(text);
     let words = words.strip_prefix("over: ").unwrap_or(words);
@@ -92,14 +88,13 @@ fn family(text: &str) -> Subsystem {
     }
 }
 
-/// The texts of each event.
 fn events(said: &[Said]) -> Vec<Vec<&Said>> {
     let mut running: BTreeMap<u8, Vec<&Said>> = BTreeMap::new();
     let mut over = Vec::new();
     for one in said {
         let family = family(&one.text);
         let event = running.entry(family as u8).or_default();
-        // A mishap lasts until its end, or until the vehicle is down.
+        // Until its end, or until the vehicle is down.
         let ends = |one: &&Said| one.text.contains("mishap over") || one.text.starts_with("HUMS: down at");
         let goes_on = event.first().is_some_and(|first| {
             family == Subsystem::Mishap && !event.iter().any(ends) || one.at_s - first.at_s < EVENT_S
@@ -140,7 +135,7 @@ fn one_event_is_three_texts_at_most_and_what_is_critical_is_told_at_once() {
             let together: Vec<_> = said.iter().filter(|other| span.contains(&other.at_s)).collect();
             assert!(together.len() <= AT_A_TIME_MAX, "{name}: {together:#?}");
         }
-        // These two texts about a vehicle that is down, or flies again, come from no check.
+        // No check sends these two.
         let is_checks = |text: &str| {
             !["HUMS: down at", "HUMS: it flies again"].iter().any(|begin| text.starts_with(begin))
         };

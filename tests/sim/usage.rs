@@ -1,7 +1,5 @@
-//! Findings and usage of each recording, against pymavlink's own computation and the documentation.
-//!
-//! `cargo xtask test --only sim` prints none of it; the tables of all recordings: `HUMS_FLIGHTS=... cargo test -p
-//! hums-tests --features oracle usage -- --nocapture`.
+//! Findings and usage against pymavlink's own computation. All recordings: `HUMS_FLIGHTS=... cargo test -p hums-tests
+//! --features oracle usage -- --nocapture`.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -11,7 +9,7 @@ use hums_tests::flights::{OWN, own, root};
 use hums_tests::program::{Machine, Recording};
 use serde_json::Value;
 
-/// The columns of the table of usage, each with its number of decimals.
+/// Columns with their decimals.
 const COLUMNS: [(&str, usize); 12] = [
     ("flights", 0),
     ("flight_time_s", 1),
@@ -42,7 +40,6 @@ fn usage_row(flight: &Path, json: &Value) -> String {
     row
 }
 
-/// One row for each warning and critical finding, without its text.
 fn finding_rows(flight: &Path, json: &Value) -> Vec<String> {
     let findings = json["findings"].as_array().unwrap().iter();
     let bad = findings.filter(|finding| finding["level"] == "warning" || finding["level"] == "critical");

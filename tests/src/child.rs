@@ -1,4 +1,4 @@
-//! Runs a program to its end, or to the end of its time.
+//! Runs a program with a time limit.
 
 use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt as _;
@@ -6,7 +6,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Polling interval of a running program: shorter in its first moments, because many run for a few milliseconds only.
+/// Shorter at first: many programs run for a few milliseconds.
 const POLL: Duration = Duration::from_millis(5);
 const POLL_FIRST: Duration = Duration::from_micros(300);
 
@@ -15,16 +15,16 @@ const POLL_FIRST: Duration = Duration::from_micros(300);
 pub struct Outcome {
     /// The exit code; `None` if a signal ended it.
     pub code: Option<i32>,
-    /// Its output on stdout.
+    /// On stdout.
     pub stdout: Vec<u8>,
-    /// Its output on stderr.
+    /// On stderr.
     pub stderr: String,
-    /// Its highest resident memory, in KiB, as far as polling every 5 ms, at first more often, shows.
+    /// KiB of resident memory, polled every 5 ms, at first more often.
     pub memory_kib_max: u64,
 }
 
 impl Outcome {
-    /// It ended by itself with one of `codes`, and did not panic.
+    /// Ended by itself with one of `codes`, without a panic.
     #[track_caller]
     #[allow(clippy::return_self_not_must_use, reason = "most callers are done when it ended well")]
     pub fn expect_code(self, codes: &[i32]) -> Self {
@@ -38,7 +38,7 @@ impl Outcome {
         self
     }
 
-    /// It failed with code 1 and gave the user the reason in a few lines.
+    /// Code 1, and the reason in a few lines.
     #[track_caller]
     #[allow(clippy::return_self_not_must_use, reason = "most callers are done when it ended so")]
     pub fn expect_clear_failure(self) -> Self {
@@ -56,23 +56,23 @@ impl Outcome {
     }
 }
 
-/// Runs `command` with nothing on its stdin.
+/// With nothing on stdin.
 ///
 /// # Panics
-/// If it is still running after `limit`: it is ended, and the test fails.
+/// After `limit` the program is ended, and the test fails.
 #[track_caller]
 pub fn run(command: &mut Command, limit: Duration) -> Outcome {
     run_with_input(command, None, limit)
 }
 
-/// As [`run`], with the contents of `input` on its stdin.
+/// As [`run`], with `input` on stdin.
 ///
 /// # Panics
-/// If it is still running after `limit`: it is ended, and the test fails.
+/// After `limit` the program is ended, and the test fails.
 #[track_caller]
 pub fn run_with_input(command: &mut Command, input: Option<File>, limit: Duration) -> Outcome {
     let dir = tempfile::tempdir().unwrap();
-    // Files and not pipes: no reader is needed while the program runs.
+    // Files need no reader while the program runs.
     let (out, err) = (dir.path().join("stdout"), dir.path().join("stderr"));
     let mut child = command
         .stdin(input.map_or_else(Stdio::null, Stdio::from))
@@ -89,7 +89,7 @@ pub fn run_with_input(command: &mut Command, input: Option<File>, limit: Duratio
     Outcome { code: status.code(), stdout: fs::read(&out).unwrap(), stderr, memory_kib_max }
 }
 
-/// The exit status of `child`, and its highest memory. After a timeout it is killed and has no status.
+/// Also its highest memory. After a timeout it is killed and has no status.
 fn wait(child: &mut Child, limit: Duration) -> (Option<ExitStatus>, u64) {
     let start = Instant::now();
     let mut memory_kib_max = 0;
@@ -107,8 +107,7 @@ fn wait(child: &mut Child, limit: Duration) -> (Option<ExitStatus>, u64) {
     }
 }
 
-/// The highest memory of a process. None while it is between `vfork` and `exec`: its memory is then this program's
-/// own.
+/// None between `vfork` and `exec`: the memory is then this program's own.
 fn resident_kib_max(process: u32) -> Option<u64> {
     let program = |of: &str| fs::read_link(format!("/proc/{of}/exe")).ok();
     if program(&process.to_string())? == program("self")? {

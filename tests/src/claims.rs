@@ -1,4 +1,4 @@
-//! Proofs named in documents: each named test exists, and so does each campaign.
+//! Each test and campaign that a document names exists.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -7,10 +7,8 @@ use std::path::Path;
 use crate::flights::root;
 use crate::prove::{CAMPAIGNS, diagnosis::DIAGNOSIS};
 
-/// Documents with promises and the names of their proofs.
 const DOCUMENTS: [&str; 2] = ["docs/safety.md", "docs/cards.md"];
 
-/// The functions in all files of Rust below a folder.
 fn functions(folder: &Path, found: &mut BTreeSet<String>) {
     for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
@@ -24,7 +22,6 @@ fn functions(folder: &Path, found: &mut BTreeSet<String>) {
     }
 }
 
-/// The texts between backquotes in a document.
 fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
 }
@@ -58,7 +55,6 @@ fn each_test_and_each_campaign_that_a_document_names_is_there() {
     assert!(tests > 20, "{tests} tests");
 }
 
-/// Each row of the table of failures in docs/safety.md names its proof.
 #[test]
 fn nothing_is_said_of_a_failure_that_nothing_shows() {
     let text = fs::read_to_string(root().join("docs/safety.md")).unwrap();

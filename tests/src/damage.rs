@@ -1,11 +1,11 @@
 //! Noise that can be repeated.
 
-/// Numbers that look random and are the same for the same seed (`SplitMix64`).
+/// Pseudo-random numbers (`SplitMix64`).
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
 impl Random {
-    /// The sequence of this seed.
+    /// Seeded.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -35,7 +35,7 @@ impl Random {
     }
 }
 
-/// Changes each byte with this probability; returns for each whether it was changed.
+/// With this probability each; returns the changed ones.
 pub fn noise(data: &mut [u8], probability: f64, seed: u64) -> Vec<bool> {
     let mut random = Random::new(seed);
     data.iter_mut()

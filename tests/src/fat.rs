@@ -1,4 +1,4 @@
-//! The file system of a card's image, examined with dosfstools and mtools.
+//! A card's file system by dosfstools and mtools.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -9,10 +9,10 @@ use std::time::Duration;
 use crate::child;
 
 const SECTOR: u64 = 512;
-/// Size of a copied piece; a piece of zeros is left out, so that sparse files stay sparse.
+/// Pieces of zeros are left out: sparse files stay sparse.
 const PIECE: usize = 1 << 16;
 
-/// Start and length of an image's first partition, in bytes.
+/// Start and length, bytes.
 fn partition(image: &mut File) -> (u64, u64) {
     let mut table = [0; 512];
     image.read_exact(&mut table).unwrap();
@@ -26,7 +26,7 @@ fn partition(image: &mut File) -> (u64, u64) {
 ///
 /// # Panics
 ///
-/// If it finds anything else.
+/// Anything else is found.
 #[track_caller]
 pub fn assert_clean(image: &Path) {
     let dir = tempfile::tempdir().unwrap();
@@ -36,7 +36,7 @@ pub fn assert_clean(image: &Path) {
     assert!(odd.is_empty(), "fsck.vfat says: {odd:#?}");
 }
 
-/// Complaints of `fsck.vfat -n` about a partition, beyond effects of a power cut.
+/// Complaints of `fsck.vfat -n`, beyond effects of a power cut.
 ///
 /// # Panics
 ///
@@ -51,10 +51,9 @@ pub fn complaints(partition: &Path) -> Vec<String> {
     odd
 }
 
-/// Copies all files of the card into `folder` with mtools, as any other computer would.
+/// Copies the card's files with mtools.
 ///
 /// # Panics
-/// If mtools cannot.
 #[track_caller]
 pub fn copy_files(image: &Path, folder: &Path) {
     let (start, _) = partition(&mut File::open(image).unwrap());
@@ -89,7 +88,7 @@ fn fsck() -> PathBuf {
     found.expect("fsck.vfat is missing: `cargo xtask setup` installs dosfstools")
 }
 
-/// Copies the first partition of an image into a file; returns its start in the image, in bytes.
+/// Returns the partition's start in the image, bytes.
 pub(crate) fn extract(image: &Path, to: &Path) -> u64 {
     let mut from = File::open(image).unwrap();
     let (start, length) = partition(&mut from);

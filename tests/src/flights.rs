@@ -15,30 +15,28 @@ use crate::frames::{self, Frame, Seeds};
 pub const OWN: [&str; 4] =
     ["ap_quad_guided.tlog", "ap_quad_signed.raw", "ap_quad_faults.tlog", "px4_hil_quad_low.tlog"];
 
-/// The root of the repository.
+/// The repository's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// The path of a recording of the repository.
+/// A recording of the repository.
 pub fn own(name: &str) -> PathBuf {
     root().join("tests/flights").join(name)
 }
 
-/// The recordings in the folders below `HUMS_FLIGHTS`, for tests of these alone. Those of the repository are left
-/// out.
+/// Recordings below `HUMS_FLIGHTS`, without the repository's.
 ///
 /// # Panics
 ///
-/// If `HUMS_FLIGHTS` names none: a test without input is not a success.
+/// There is none: a test without input is not a success.
 pub fn further() -> Vec<PathBuf> {
     let found = more();
     assert!(!found.is_empty(), "HUMS_FLIGHTS names no folder of recordings");
     found
 }
 
-/// The recordings in the folders below `HUMS_FLIGHTS`, for tests that read those of the repository too; none if it is
-/// not set.
+/// Recordings below `HUMS_FLIGHTS`; none if it is not set.
 pub fn more() -> Vec<PathBuf> {
     let Some(folder) = std::env::var_os("HUMS_FLIGHTS").filter(|folder| !folder.is_empty()) else {
         return Vec::new();
@@ -67,15 +65,15 @@ fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
 /// Pymavlink's result on one recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
-    /// A tlog, with times; otherwise the raw bytes of a port.
+    /// A tlog, with times; else a port's raw bytes.
     pub is_tlog: bool,
-    /// Its number of verified frames.
+    /// Verified frames.
     pub frames: u64,
-    /// The same per message id.
+    /// By message id.
     pub frames_by_id: BTreeMap<u32, u64>,
     /// Bytes outside frames and, in a tlog, outside their times.
     pub bytes_other: u64,
-    /// SHA-256 over the bytes of those frames, in their order.
+    /// SHA-256 over those frames, in order.
     pub sha256: String,
 }
 
@@ -83,12 +81,12 @@ pub struct Found {
 #[derive(Debug)]
 pub struct Manifest {
     flights: BTreeMap<String, Found>,
-    /// The checksum seeds that pymavlink used.
+    /// Pymavlink's checksum seeds.
     pub seeds: Seeds,
 }
 
 impl Manifest {
-    /// Reads what `tests/oracle/manifest.py` printed.
+    /// Output of `tests/oracle/manifest.py`.
     pub fn parse(text: &str) -> Self {
         let json: Value = serde_json::from_str(text).expect("the manifest is JSON");
         let flights = json["flights"].as_object().expect("flights").iter();
@@ -106,7 +104,7 @@ impl Manifest {
         Self { flights: flights.collect(), seeds }
     }
 
-    /// The manifest of the repository's own recordings.
+    /// The repository's manifest.
     pub fn own() -> &'static Self {
         static OWN: OnceLock<Manifest> = OnceLock::new();
         OWN.get_or_init(|| {
@@ -120,7 +118,7 @@ impl Manifest {
         self.flights.get(&*name).unwrap_or_else(|| panic!("the manifest has no {name}"))
     }
 
-    /// The frames of a recording, by its kind of file in the manifest.
+    /// By its kind in the manifest.
     pub fn frames_of<'a>(&self, path: &Path, data: &'a [u8]) -> Vec<Frame<'a>> {
         if self.found(path).is_tlog {
             frames::of_tlog(data, &self.seeds, false)
@@ -135,10 +133,7 @@ fn numbers(object: &Value) -> BTreeMap<u32, u64> {
     entries.map(|(key, value)| (key.parse().expect("an id"), value.as_u64().expect("a number"))).collect()
 }
 
-/// The frames are exactly those that pymavlink found: as many of each id, the same bytes, the same order.
-///
-/// # Panics
-/// If not.
+/// 2
 #[track_caller]
 pub fn assert_found(found: &Found, frames: &[Frame<'_>]) {
     let mut frames_by_id = BTreeMap::new();
@@ -155,7 +150,7 @@ pub fn assert_found(found: &Found, frames: &[Frame<'_>]) {
     assert_eq!(hex, found.sha256, "SHA-256 over all frames in their order");
 }
 
-/// The bytes that arrive at the UART: without the times of a tlog.
+/// Bytes at the UART: without a tlog's times.
 pub fn stream(is_tlog: bool, data: &[u8], frames: &[Frame<'_>]) -> Vec<u8> {
     if is_tlog { frames.iter().flat_map(|frame| frame.bytes).copied().collect() } else { data.to_vec() }
 }

@@ -1,5 +1,4 @@
-//! MAVLink frames, read with minimal code. The checksum seeds come from pymavlink, through the manifest, so this
-//! shares no line with the framer that the tests check.
+//! MAVLink frames with minimal code. Seeds come from pymavlink: no line is shared with the framer under test.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +6,23 @@ const STX_V1: u8 = 0xFE;
 const STX_V2: u8 = 0xFD;
 const SIGNED: u8 = 0x01;
 
-/// The checksum seed of each message id.
+/// Checksum seeds by message id.
 pub type Seeds = BTreeMap<u32, u8>;
 
 /// One frame of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Microseconds since 1970, if the recording has times.
+    /// Microseconds since 1970, if known.
     pub time_us: Option<u64>,
     /// The message id.
     pub id: u32,
-    /// The whole frame, from its start byte to its checksum or signature.
+    /// From start byte to checksum or signature.
     pub bytes: &'a [u8],
-    /// Its id is known and its checksum fits.
+    /// Known id, valid checksum.
     pub verified: bool,
 }
 
-/// Length of the frame that may start here, and its message id.
+/// Length and message id.
 fn header(data: &[u8]) -> Option<(usize, u32)> {
     let (length, id) = match *data.first()? {
         STX_V1 => (8 + usize::from(*data.get(1)?), u32::from(*data.get(5)?)),
@@ -41,7 +40,7 @@ fn header(data: &[u8]) -> Option<(usize, u32)> {
     (length <= data.len()).then_some((length, id))
 }
 
-/// The X.25 checksum that MAVLink uses, bit by bit.
+/// X.25, bit by bit.
 pub fn checksum(covered: &[u8], seed: u8) -> u16 {
     covered.iter().chain([&seed]).fold(0xFFFF, |crc, byte| {
         (0..8)
@@ -55,10 +54,10 @@ fn verified(frame: &[u8], id: u32, seeds: &Seeds) -> bool {
     checksum(&frame[1..end], *seed).to_le_bytes() == frame[end..end + 2]
 }
 
-/// The frames of a tlog: each entry that is one, whether its checksum can be verified or not.
+/// Entries of a tlog, verified or not.
 ///
 /// # Panics
-/// With `strict`, if anything but entries is in it.
+/// With `strict`: other bytes are in it.
 pub fn of_tlog<'a>(data: &'a [u8], seeds: &Seeds, strict: bool) -> Vec<Frame<'a>> {
     let mut frames = Vec::new();
     let mut at = 0;
@@ -77,7 +76,7 @@ pub fn of_tlog<'a>(data: &'a [u8], seeds: &Seeds, strict: bool) -> Vec<Frame<'a>
     frames
 }
 
-/// The frames of a raw recording whose checksum can be verified.
+/// Verified frames of a raw recording.
 pub fn of_raw<'a>(data: &'a [u8], seeds: &Seeds) -> Vec<Frame<'a>> {
     let mut frames = Vec::new();
     let mut at = 0;
@@ -93,7 +92,7 @@ pub fn of_raw<'a>(data: &'a [u8], seeds: &Seeds) -> Vec<Frame<'a>> {
     frames
 }
 
-/// Makes a v2 frame with the checksum that `seed` gives.
+/// A v2 frame with `seed`'s checksum.
 pub fn build_v2(sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
     let [low, middle, high, _] = id.to_le_bytes();
     let length = u8::try_from(payload.len()).unwrap();
@@ -104,12 +103,11 @@ pub fn build_v2(sequence: u8, id: u32, payload: &[u8], seed: u8) -> Vec<u8> {
     frame
 }
 
-/// Both have the same verified frames, bit for bit and in the same order. All other bytes in `output` are bytes of
-/// `stream`, in the same order.
+/// The same verified frames in order. Other bytes of `output` are bytes of `stream`, in order.
 ///
 /// # Panics
 ///
-/// If not, naming the first difference.
+/// At the first difference.
 #[track_caller]
 pub fn assert_same(expected: &[Frame<'_>], output: &[Frame<'_>], stream: &[u8]) {
     let expected: Vec<_> = expected.iter().filter(|frame| frame.verified).collect();
@@ -141,7 +139,7 @@ mod tests {
 
     #[test]
     fn the_checksum_is_the_published_one() {
-        // CRC-16/MCRF4XX of "123456789" is 0x6F91; the last digit stands in as the seed.
+        // CRC-16/MCRF4XX of "123456789" is 0x6F91; the last digit is the seed.
         assert_eq!(checksum(b"12345678", b'9'), 0x6F91);
     }
 

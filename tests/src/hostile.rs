@@ -1,4 +1,4 @@
-//! Inputs that try to take memory: well-formed, and far larger inside than outside.
+//! Well-formed inputs, far larger inside than outside.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Seek as _, SeekFrom, Write};
@@ -16,14 +16,13 @@ use hums_recorder::layout::Layout;
 
 use crate::program::hums;
 
-/// HEARTBEAT of an `ArduPilot` quadrotor with its checksum, as MAVLink 1.
+/// HEARTBEAT of an `ArduPilot` quadrotor, MAVLink 1.
 const HEARTBEAT: [u8; 17] = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
-/// Blocks of a directory at most: 65,536 entries of 32 bytes.
+/// 65,536 entries of 32 bytes.
 const DIRECTORY_BLOCKS: u32 = 4_096;
-/// The first of the clusters that are given away; those before it stay.
+/// Clusters before it stay.
 const CLUSTER: u32 = 60_000;
 
-/// Packs these bytes of a line.
 fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
     let (recording, log) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.hum")));
     fs::write(&recording, raw).unwrap();
@@ -43,7 +42,7 @@ fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {
     log
 }
 
-/// A file of `count` sectors, each the beginning of a session of its own.
+/// `count` sectors, each a session's beginning.
 pub fn starts(dir: &Path, count: u32) -> PathBuf {
     let first = fs::read(heartbeats(dir, 100)).unwrap();
     let mut sector = Sector::from_bytes(*first.first_chunk::<SECTOR_BYTES>().unwrap());
@@ -57,7 +56,7 @@ pub fn starts(dir: &Path, count: u32) -> PathBuf {
     path
 }
 
-/// A log of ten heartbeats, and behind it `count` parity sectors of its session.
+/// Ten heartbeats, then `count` parity sectors.
 pub fn parity(dir: &Path, count: u32) -> PathBuf {
     let log = heartbeats(dir, 10);
     let session = Header::read(fs::read(&log).unwrap().first_chunk().unwrap()).unwrap().session;
@@ -73,14 +72,14 @@ pub fn parity(dir: &Path, count: u32) -> PathBuf {
     path
 }
 
-/// The same heartbeat `count` times, as a port's bytes.
+/// One heartbeat `count` times, raw.
 pub fn raw_heartbeats(dir: &Path, count: usize) -> PathBuf {
     let path = dir.join("heartbeats.raw");
     fs::write(&path, HEARTBEAT.repeat(count)).unwrap();
     path
 }
 
-/// The same heartbeat `count` times: 200 bytes of the log are 30,000 frames.
+/// One heartbeat `count` times: 200 bytes are 30,000 frames.
 pub fn heartbeats(dir: &Path, count: usize) -> PathBuf {
     packed(dir, "heartbeats", &HEARTBEAT.repeat(count))
 }
@@ -95,27 +94,27 @@ fn messages(dir: &Path, name: &str, count: u32, packet: impl Fn(u32) -> Packet) 
     packed(dir, name, &raw)
 }
 
-/// Nothing but different texts.
+/// Different texts only.
 pub fn texts(dir: &Path, count: u32) -> PathBuf {
     messages(dir, "texts", count, |number| {
         Packet::new(253).u8(0, 4).text(1, 50, &format!("the same words over and over, {number:09}"))
     })
 }
 
-/// Nothing but parameters, each with a name of its own, of a HUMS on board.
+/// Parameters only, each with its own name.
 pub fn parameters(dir: &Path, count: u32) -> PathBuf {
     messages(dir, "parameters", count, |number| {
         Packet::new(22).f32(0, 1.0).u16(4, 60_000).text(8, 16, &format!("P{number:09}")).u8(24, 9)
     })
 }
 
-/// Only unknown messages, each with an id of its own.
+/// Unknown messages, each with its own id.
 pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
     let mut raw = HEARTBEAT.to_vec();
     for number in 0..count {
         let [low, middle, high, _] = (70_000 + number).to_le_bytes();
         let mut frame = vec![0xfd, 1, 0, 0, number as u8, 1, 1, low, middle, high, 1];
-        // With the seed 0: the checksum is valid for some seed, so it is a frame.
+        // Valid with the seed 0: a frame.
         let crc = crc::step(crc::update(crc::START, &frame[1..]), 0);
         frame.extend_from_slice(&crc.to_le_bytes());
         raw.extend_from_slice(&frame);
@@ -123,8 +122,7 @@ pub fn unknown_ids(dir: &Path, count: u32) -> PathBuf {
     packed(dir, "unknown", &raw)
 }
 
-/// A ground station's log of this many vehicles that send each quantity of each of twelve motors twenty times a
-/// second.
+/// Vehicles that send each quantity of twelve motors twenty times a second.
 pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
     let (mut log, log_path) = (Vec::new(), dir.join("fleet.tlog"));
     let mut encoders: Vec<Encoder> = (1..=vehicles).map(|system| Encoder::of(system, 1)).collect();
@@ -133,7 +131,7 @@ pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
         let heartbeat = Packet::new(0).u8(4, 2).u8(5, 3).u8(6, 0x51).u8(7, 4).u8(8, 3);
         let vibration = Packet::new(241).f32(8, value).f32(12, value).f32(16, value);
         let motors = [11_030, 11_031, 11_032].map(|id| {
-            // Voltage, current, total, speed, count: two bytes for each of four, then four temperatures.
+            // Two bytes for each of four: voltage, current, total, speed, count; then four temperatures.
             let numbers =
                 (0..20).fold(Packet::new(id), |packet, place| packet.u16(2 * place, 100 + tick as u16 % 100));
             (40..44).fold(numbers, |packet, place| packet.u8(place, 30))
@@ -150,7 +148,7 @@ pub fn fleet(dir: &Path, vehicles: u8, seconds: u64) -> PathBuf {
     log_path
 }
 
-/// A log of PX4's with two joined sets of topics, more than PX4 has: 2,000 tables of 30 columns each.
+/// Two joined sets of topics, more than PX4 has: 2,000 tables of 30 columns.
 pub fn wide_ulog(dir: &Path) -> PathBuf {
     const TOPICS: u16 = 1_000;
     const FIELDS: usize = 30;
@@ -186,7 +184,7 @@ pub fn wide_ulog(dir: &Path) -> PathBuf {
     path
 }
 
-/// A log of PX4's whose topics are arrays of bytes, each a column.
+/// Topics with an array of bytes, each a column.
 pub fn long_arrays(dir: &Path) -> PathBuf {
     let mut log = b"ULog\x01\x12\x35\x01".to_vec();
     log.extend_from_slice(&1_000_000_u64.to_le_bytes());
@@ -220,7 +218,7 @@ pub fn long_arrays(dir: &Path) -> PathBuf {
     path
 }
 
-/// A log of PX4's of 72 MB and a minute: an attitude and a long text 20 times a second.
+/// 72 MB and a minute: an attitude and a long text 20 times a second.
 pub fn long_ulog(dir: &Path) -> PathBuf {
     let mut text = vec![0; 60_000];
     text[..30_000].fill(b'x');
@@ -245,7 +243,7 @@ pub fn long_ulog(dir: &Path) -> PathBuf {
     })
 }
 
-/// A log of `ArduPilot`'s of 71 MB and twelve minutes: an attitude and 25 messages of three texts 20 times a second.
+/// 71 MB and twelve minutes: an attitude and 25 messages of three texts 20 times a second.
 pub fn long_dataflash(dir: &Path) -> PathBuf {
     let mut texts = [0; 3 * 64];
     texts.chunks_mut(64).for_each(|text| text[..12].fill(b'x'));
@@ -273,7 +271,7 @@ fn long(dir: &Path, name: &str, write: impl FnOnce(&mut dyn Write)) -> PathBuf {
     path
 }
 
-/// A port's bytes as `.gz`, which expand 900-fold to 70 MB: heartbeats, zeros, heartbeats.
+/// `.gz` that expands 900-fold to 70 MB: heartbeats, zeros, heartbeats.
 pub fn expanding(dir: &Path) -> PathBuf {
     let path = dir.join("expanding.raw.gz");
     let mut to = GzEncoder::new(File::create(&path).unwrap(), Compression::default());
@@ -286,7 +284,7 @@ pub fn expanding(dir: &Path) -> PathBuf {
     path
 }
 
-/// A text log of `ArduPilot`'s with a line of 80 MB.
+/// A line of 80 MB.
 pub fn long_line(dir: &Path) -> PathBuf {
     long(dir, "line.log", |log| {
         log.write_all(b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n").unwrap();
@@ -301,7 +299,6 @@ pub fn long_line(dir: &Path) -> PathBuf {
     })
 }
 
-/// The definition of a message of `DataFlash`.
 fn dataflash_format(kind: u8, bytes: usize, name: &str, format: &str, columns: &str) -> Vec<u8> {
     let mut message = vec![0xa3, 0x95, 128, kind, u8::try_from(bytes).unwrap()];
     for (text, room) in [(name, 4), (format, 16), (columns, 64)] {
@@ -312,8 +309,7 @@ fn dataflash_format(kind: u8, bytes: usize, name: &str, format: &str, columns: &
     message
 }
 
-/// A log of `ArduPilot`'s that defines each of 64 messages sixteen times with other columns: the maximum number of
-/// tables.
+/// 64 messages, each defined sixteen times: the maximum number of tables.
 pub fn wide_dataflash(dir: &Path) -> PathBuf {
     const COLUMNS: usize = 14;
     let mut log = dataflash_format(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns");
@@ -346,7 +342,7 @@ pub fn wide_dataflash(dir: &Path) -> PathBuf {
     path
 }
 
-/// A card of 64 MiB with a short session on it.
+/// 64 MiB, a short session.
 fn card(dir: &Path, name: &str) -> (PathBuf, File, Layout) {
     let (recording, image) = (dir.join(format!("{name}.raw")), dir.join(format!("{name}.img")));
     fs::write(&recording, HEARTBEAT.repeat(100)).unwrap();
@@ -373,7 +369,7 @@ fn entry(name: &[u8; 11], attributes: u8, cluster: u32, size: u32) -> [u8; 32] {
     entry
 }
 
-/// A card whose directories are full of segments: empty ones, or ones without a cluster.
+/// Directories full of segments: empty ones, or ones without a cluster.
 pub fn directories(dir: &Path, count: u32, bogus: bool) -> PathBuf {
     let (image, mut file, layout) = card(dir, if bogus { "bogus" } else { "empty" });
     let root: Vec<u8> = (0..count)
@@ -402,7 +398,7 @@ pub fn directories(dir: &Path, count: u32, bogus: bool) -> PathBuf {
     image
 }
 
-/// A card with `count` sectors, each of a session of its own.
+/// `count` sectors, each of its own session.
 pub fn sessions(dir: &Path, count: u32) -> PathBuf {
     let (image, mut file, layout) = card(dir, "sessions");
     let mut sectors = Vec::new();

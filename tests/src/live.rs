@@ -1,4 +1,4 @@
-//! `hums live` as a running program, and a vehicle for it.
+//! A running `hums live`, and a vehicle for it.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpStream, UdpSocket};
@@ -19,13 +19,13 @@ impl Drop for Running {
 }
 
 impl Running {
-    /// Sends it a signal by name, for instance `INT`.
+    /// By name: `INT`.
     pub fn signal(&self, name: &str) {
         let status = Command::new("kill").arg(format!("-{name}")).arg(self.0.id().to_string()).status();
         assert!(status.unwrap().success(), "no such process");
     }
 
-    /// Its exit code, within `limit`.
+    /// Exit code within `limit`.
     #[track_caller]
     pub fn end(&mut self, limit: Duration) -> Option<i32> {
         let start = Instant::now();
@@ -38,7 +38,7 @@ impl Running {
         }
     }
 
-    /// Its processor time, seconds, and its memory, now and at most, KiB.
+    /// Processor time, seconds; memory now and at most, KiB.
     pub fn cost(&self) -> Option<(f64, u64, u64)> {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.0.id())).ok()?;
         // After the name, which may contain spaces.
@@ -48,12 +48,12 @@ impl Running {
         let kib = |name: &str| -> Option<u64> {
             status.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
         };
-        // Linux counts in hundredths on every machine that this runs on.
+        // Linux counts in hundredths here.
         Some((ticks as f64 / 100.0, kib("VmRSS:")?, kib("VmHWM:")?))
     }
 }
 
-/// `hums live`, and the address that it printed.
+/// With the printed address.
 #[derive(Debug)]
 pub struct Live {
     /// The program.
@@ -64,19 +64,19 @@ pub struct Live {
 }
 
 impl Live {
-    /// Starts it with these arguments, at a free port.
+    /// At a free port.
     #[track_caller]
     pub fn start(arguments: &[&str]) -> Self {
         Self::start_at(crate::program::path(), arguments)
     }
 
-    /// As [`Self::start`], with the program at this path.
+    /// As [`Self::start`], with this program.
     #[track_caller]
     pub fn start_at(program: &Path, arguments: &[&str]) -> Self {
         Self::attempt_at(program, arguments).unwrap_or_else(|words| panic!("no address: {words}"))
     }
 
-    /// As [`Self::start`]; none if it ends with an error, for instance for a file that is not a recording.
+    /// None if it ends with an error.
     #[track_caller]
     pub fn attempt(arguments: &[&str]) -> Option<Self> {
         Self::attempt_at(crate::program::path(), arguments).ok()
@@ -104,13 +104,13 @@ impl Live {
         Ok(Self { program: Running(child), address: address.trim().to_owned(), stderr })
     }
 
-    /// Ends it by Ctrl-C: its exit code, and its output.
+    /// By Ctrl-C: exit code and output.
     #[track_caller]
     pub fn interrupt(self, limit: Duration) -> (Option<i32>, String) {
         self.end_by("INT", limit)
     }
 
-    /// Ends it like a service; as [`Self::interrupt`].
+    /// Like a service; as [`Self::interrupt`].
     #[track_caller]
     pub fn terminate(self, limit: Duration) -> (Option<i32>, String) {
         self.end_by("TERM", limit)
@@ -139,7 +139,7 @@ impl Live {
     }
 }
 
-/// Connects and asks for the page's WebSocket.
+/// Asks for the page's WebSocket.
 pub fn handshake(host: &str) -> TcpStream {
     let mut stream = TcpStream::connect(host).unwrap();
     let request = format!(
@@ -155,7 +155,7 @@ pub fn handshake(host: &str) -> TcpStream {
 pub struct Page(BufReader<TcpStream>);
 
 impl Page {
-    /// The next message: a frame of a WebSocket by RFC 6455, section 5.2, of a server, which is not masked.
+    /// An unmasked server's frame (RFC 6455, 5.2).
     #[track_caller]
     pub fn message(&mut self) -> String {
         let mut head = [0; 2];
@@ -177,12 +177,12 @@ impl Page {
     }
 }
 
-/// A UDP or TCP port that is free now.
+/// UDP or TCP.
 pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// Gives frames to `put`, evenly, at a rate each second; `each` gets the number sent so far.
+/// Evenly, at a rate each second; `each` gets the number so far.
 pub fn send<'a>(
     frames: impl Iterator<Item = &'a [u8]>,
     rate: f64,

@@ -1,4 +1,4 @@
-//! Asks pymavlink, in the environment that `cargo xtask setup` makes.
+//! Pymavlink in the environment of `cargo xtask setup`.
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ fn run(script: &str, arguments: &[PathBuf]) -> String {
 fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
     let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
     command.arg(root().join("tests/oracle").join(script)).args(arguments);
-    // The repository stays unchanged: no compiled scripts in it.
+    // No compiled scripts in the repository.
     command.env("PYTHONDONTWRITEBYTECODE", "1");
     child::run(&mut command, LIMIT).expect_code(&[0])
 }
@@ -40,53 +40,53 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("the script prints JSON")
 }
 
-/// The path of a program from the system's packages, unless the environment sets another.
+/// The environment may set another path.
 fn program(variable: &str, path: &str) -> PathBuf {
     std::env::var_os(variable).map_or_else(|| PathBuf::from(path), PathBuf::from)
 }
 
-/// Compares a decoded log with its recording, field by field: see `tests/oracle/readback.py`.
+/// Field by field: `tests/oracle/readback.py`.
 pub fn readback(recording: &Path, out: &Path) -> Value {
     let influxd = program("HUMS_INFLUXD", "/usr/bin/influxd");
     json(&ask("readback.py", &[recording.to_owned(), out.to_owned(), influxd]))
 }
 
-/// Reads a log's files for other programs: see `tests/oracle/exports.py`.
+/// `tests/oracle/exports.py`.
 pub fn exports(folder: &Path, name: &str) -> Value {
     json(&run("exports.py", &[folder.to_owned(), PathBuf::from(name)]))
 }
 
-/// Compares our reading of a PX4 log with pyulog's: see `tests/oracle/ulog.py`.
+/// Against pyulog: `tests/oracle/ulog.py`.
 pub fn ulog(log: &Path, folder: &Path) -> Value {
     json(&run("ulog.py", &[log.to_owned(), folder.to_owned()]))
 }
 
-/// Decodes a log to `tlog` or `jsonl` by the format document alone: see `tests/oracle/hums_log`.
+/// By the format document alone: `tests/oracle/hums_log`.
 pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
     outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout
 }
 
-/// Every message of an autopilot's own log, a line of JSON each: see `tests/oracle/dataflash.py`.
+/// A line of JSON for each message: `tests/oracle/dataflash.py`.
 pub fn dataflash(log: &Path) -> String {
     run("dataflash.py", &[log.to_owned()])
 }
 
-/// Runs a document's queries in a folder: see `tests/oracle/fleet.py`.
+/// A document's queries in a folder: `tests/oracle/fleet.py`.
 pub fn fleet(document: &Path, folder: &Path) -> Value {
     json(&run("fleet.py", &[document.to_owned(), folder.to_owned()]))
 }
 
-/// Runs a document's Python in a folder and returns the output of each block: see `tests/oracle/snippets.py`.
+/// The output of each block of Python: `tests/oracle/snippets.py`.
 pub fn snippets(document: &Path, folder: &Path) -> Value {
     json(&run("snippets.py", &[document.to_owned(), folder.to_owned()]))
 }
 
-/// The verdict of Grafana's own model on these dashboards: see `tests/oracle/grafana.py`.
+/// By Grafana's own model: `tests/oracle/grafana.py`.
 pub fn grafana(dashboards: &[PathBuf]) -> Value {
     json(&run("grafana.py", dashboards))
 }
 
-/// Opens a page in a browser, with the mouse at these parts of each plot: see `tests/oracle/browser.py`.
+/// With the mouse at these parts of each plot: `tests/oracle/browser.py`.
 pub fn browser(page: &Path, parts: &[f32]) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
     let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
@@ -97,7 +97,7 @@ pub fn browser(page: &Path, parts: &[f32]) -> Value {
     ))
 }
 
-/// A page of `hums live` in a browser: see `tests/oracle/live.py`. Ends with the browser.
+/// A page of `hums live`: `tests/oracle/live.py`. Ends with the browser.
 pub struct LivePage {
     browser: Child,
     asked: ChildStdin,
@@ -108,7 +108,7 @@ impl LivePage {
     /// Starts the browser.
     ///
     /// # Panics
-    /// If there is none.
+    /// There is no browser.
     pub fn start() -> Self {
         let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
         command.arg(root().join("tests/oracle/live.py")).env("PYTHONDONTWRITEBYTECODE", "1");
@@ -127,7 +127,7 @@ impl LivePage {
         json(&answer.unwrap_or_else(|| panic!("the browser's script has ended at {what}")))
     }
 
-    /// Opens an address, in a window of this size.
+    /// In a window of this size.
     #[track_caller]
     pub fn open(&mut self, url: &str, scheme: &str, width: u32, height: u32) {
         // Another fragment alone would not reload the page.
@@ -135,7 +135,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
     }
 
-    /// Shows it on a screen or, with `print`, on paper, with these preferences of the reader.
+    /// On a screen or on paper (`print`), with a reader's preferences.
     #[track_caller]
     pub fn media(&mut self, media: &str, features: &Value) {
         self.ask(&serde_json::json!({ "do": "media", "media": media, "features": features }));
@@ -147,50 +147,50 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "pdf", "path": path }));
     }
 
-    /// The content of the page at one moment.
+    /// Its content at one moment.
     #[track_caller]
     pub fn read(&mut self) -> Value {
         self.ask(&serde_json::json!({ "do": "read" }))
     }
 
-    /// Waits until a script returns something true.
+    /// Until a script's result is true.
     #[track_caller]
     pub fn wait(&mut self, script: &str, limit_s: u32) -> Value {
         self.ask(&serde_json::json!({ "do": "wait", "script": script, "limit_s": limit_s }))
     }
 
-    /// The result of a script.
+    /// A script's result.
     #[track_caller]
     pub fn run(&mut self, script: &str) -> Value {
         self.ask(&serde_json::json!({ "do": "run", "script": script }))
     }
 
-    /// Presses keys, one after the other.
+    /// One after the other.
     #[track_caller]
     pub fn press(&mut self, keys: &[&str]) {
         self.ask(&serde_json::json!({ "do": "press", "keys": keys }));
     }
 
-    /// Chooses files, or a folder, in the input that the selector means.
+    /// Into the input of the selector.
     #[track_caller]
     pub fn files(&mut self, selector: &str, paths: &[PathBuf]) {
         self.ask(&serde_json::json!({ "do": "files", "selector": selector, "paths": paths }));
     }
 
-    /// Saved files go to this folder.
+    /// The folder of saved files.
     #[track_caller]
     pub fn downloads(&mut self, folder: &Path) {
         self.ask(&serde_json::json!({ "do": "downloads", "path": folder }));
     }
 
-    /// Times of the browser's frames until they are painted, in milliseconds, over this span.
+    /// Milliseconds until each frame is painted.
     #[track_caller]
     pub fn frames_ms(&mut self, seconds: u32) -> Vec<f64> {
         let frames = self.ask(&serde_json::json!({ "do": "frames", "seconds": seconds }));
         frames.as_array().expect("a list").iter().filter_map(Value::as_f64).collect()
     }
 
-    /// A screenshot of the window, or of the whole page.
+    /// The window, or the whole page.
     #[track_caller]
     pub fn shot(&mut self, path: &Path, whole: bool) {
         self.ask(&serde_json::json!({ "do": "shot", "path": path, "whole": whole }));
@@ -205,7 +205,7 @@ impl LivePage {
 
 impl Drop for LivePage {
     fn drop(&mut self) {
-        // The script ends its browser at end of input; one that hangs is ended.
+        // Ends at end of input; a hanging script is ended.
         let _ = self.asked.write_all(b"{\"do\": \"quit\"}\n");
         for _ in 0..100 {
             if !matches!(self.browser.try_wait(), Ok(None)) {
@@ -218,88 +218,84 @@ impl Drop for LivePage {
     }
 }
 
-/// Pymavlink's results on these recordings.
+/// Pymavlink's results.
 pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&manifest_text(files))
 }
 
-/// The same as a file.
+/// As a file.
 pub fn manifest_text(files: &[PathBuf]) -> String {
     ask("manifest.py", files)
 }
 
-/// Usage of these recordings by pymavlink's messages: see `tests/oracle/usage.py`.
+/// By pymavlink's messages: `tests/oracle/usage.py`.
 pub fn usage(files: &[PathBuf]) -> Value {
     json(&ask("usage.py", files))
 }
 
-/// Parses a stream to the ground station strictly and returns its content: see `tests/oracle/gs_stream.py`.
+/// Parses a stream strictly: `tests/oracle/gs_stream.py`.
 ///
 /// # Panics
 ///
-/// If a single byte of it is not part of a valid frame.
+/// A byte is not part of a valid frame.
 pub fn ground_station(stream: &Path) -> Value {
     serde_json::from_str(&ask("gs_stream.py", &[stream.to_owned()])).expect("gs_stream.py prints JSON")
 }
 
-/// Talks to the box at this UDP port like a ground station: see `tests/oracle/companion.py`.
+/// Like a ground station, by UDP: `tests/oracle/companion.py`.
 pub fn companion(port: u16) -> Value {
     let said = ask("companion.py", &[PathBuf::from(port.to_string())]);
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
 
-/// Packs a text as the firmware stores it: see `tests/oracle/metadata.py`.
+/// As the firmware stores it: `tests/oracle/metadata.py`.
 pub fn pack(text: &Path, into: &Path) {
     run("metadata.py", &["pack".into(), text.to_owned(), into.to_owned()]);
 }
 
-/// The content of a packed file, by Python's xz.
+/// By Python's xz.
 pub fn unpack(file: &Path) -> String {
     run("metadata.py", &["unpack".into(), file.to_owned()])
 }
 
-/// Mission Planner's reading of its file of descriptions.
+/// As Mission Planner reads it.
 pub fn descriptions(file: &Path) -> Value {
     json(&run("metadata.py", &["words".into(), file.to_owned()]))
 }
 
-/// Fetches the box's component information at this UDP port with pymavlink's FTP into a folder: see `tests/oracle/metadata.py`.
+/// Over pymavlink's FTP: `tests/oracle/metadata.py`.
 pub fn metadata(port: u16, folder: &Path) -> Value {
     json(&ask("metadata.py", &["fetch".into(), port.to_string().into(), folder.to_owned()]))
 }
 
-/// Talks to the box at this UDP port with pymavlink's signing; `state` passes from one run to the next: see
-/// `tests/oracle/signing.py`.
+/// With pymavlink's signing; `state` passes from run to run: `tests/oracle/signing.py`.
 pub fn signing(port: u16, state: &Path) -> Value {
     json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
 }
 
-/// An autopilot in flight whose battery runs empty, and its pilot, at these UDP ports: see `tests/oracle/autopilot.py`.
+/// In flight, with an emptying battery: `tests/oracle/autopilot.py`.
 pub fn autopilot(autopilot: u16, gs: u16, pilot: &str) -> Value {
     let arguments = [autopilot.to_string(), gs.to_string(), pilot.to_owned()];
     json(&ask("autopilot.py", &arguments.map(PathBuf::from)))
 }
 
-/// Plays the autopilot (`px4` or `ardupilot`) at one UDP port of the box and the ground station at the other: see
-/// `tests/oracle/vehicle.py`.
+/// Autopilot (`px4` or `ardupilot`) and ground station: `tests/oracle/vehicle.py`.
 pub fn vehicle(autopilot: u16, ground: u16, kind: &str) -> Value {
     let arguments = [autopilot.to_string(), ground.to_string(), kind.to_owned()];
     json(&ask("vehicle.py", &arguments.map(PathBuf::from)))
 }
 
-/// Talks to MAVProxy's prompt: see `tests/oracle/gs_mavproxy.py`.
+/// MAVProxy's prompt: `tests/oracle/gs_mavproxy.py`.
 pub fn mavproxy(port: u16, folder: &Path) -> Value {
     json(&run("gs_mavproxy.py", &[PathBuf::from(port.to_string()), folder.to_owned()]))
 }
 
-/// Plays a recorded stream of the box to MAVProxy, without and with the module in this folder: see
-/// `tests/oracle/gs_mavproxy_alerts.py`.
+/// A recorded stream, without and with our module: `tests/oracle/gs_mavproxy_alerts.py`.
 pub fn mavproxy_alerts(stream: &Path, modules: &Path, folder: &Path) -> Value {
     json(&run("gs_mavproxy_alerts.py", &[stream.to_owned(), modules.to_owned(), folder.to_owned()]))
 }
 
-/// Downloads the oldest log to `out` like a ground station, with a `loss` of all frames: see
-/// `tests/oracle/log_download.py`.
+/// The oldest log, with a `loss` of frames: `tests/oracle/log_download.py`.
 pub fn log_download(port: u16, out: &Path, loss: f64) -> Value {
     let arguments = [PathBuf::from(port.to_string()), out.to_owned(), PathBuf::from(loss.to_string())];
     serde_json::from_str(&ask("log_download.py", &arguments)).expect("log_download.py prints JSON")

@@ -1,4 +1,4 @@
-//! The `hums` program, run as by a user.
+//! `hums` as run by a user.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -14,13 +14,13 @@ use crate::child::{self, Outcome};
 use crate::flights::root;
 use crate::frames::{self, Frame, Seeds};
 
-/// Time limit of all commands of the tests; one that takes longer hangs.
+/// A command that takes longer hangs.
 pub const LIMIT: Duration = Duration::from_mins(2);
 
-/// A second of flight takes some 0.15 s on the model of the chip, on a core of its own.
+/// A second of flight takes some 0.15 s on the chip's model.
 pub const LIMIT_CHIP: Duration = Duration::from_mins(20);
 
-/// The path of `hums`: from `HUMS_BIN`, or built once.
+/// From `HUMS_BIN`, or built once.
 pub fn path() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| match std::env::var_os("HUMS_BIN") {
@@ -39,11 +39,11 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
-/// The default board's image, made like a release: the ELF file of `HUMS_FIRMWARE`, otherwise the one from xtask.
+/// The default board's ELF file: `HUMS_FIRMWARE`, or xtask's.
 ///
 /// # Panics
 ///
-/// If it is not there.
+/// There is none.
 pub fn firmware() -> PathBuf {
     let built = || root().join(format!("target/firmware/hums-{}.elf", hums_boards::DEFAULT));
     let path = std::env::var_os("HUMS_FIRMWARE").map_or_else(built, PathBuf::from);
@@ -51,11 +51,11 @@ pub fn firmware() -> PathBuf {
     path
 }
 
-/// The program of the check in a browser: from `HUMS_BROWSER`, otherwise from its own build.
+/// The browser's program: `HUMS_BROWSER`, or its own build.
 ///
 /// # Panics
 ///
-/// If it is not there.
+/// There is none.
 pub fn browser() -> PathBuf {
     let built = || root().join("target/wasm32-wasip1/browser/hums-browser.wasm");
     let path = std::env::var_os("HUMS_BROWSER").map_or_else(built, PathBuf::from);
@@ -63,7 +63,7 @@ pub fn browser() -> PathBuf {
     path
 }
 
-/// `hums` with these arguments, not yet run.
+/// Not yet run.
 pub fn command<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(path());
     command.args(arguments);
@@ -79,13 +79,12 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
 /// The machine that runs the pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {
-    /// `hums sim`: this PC.
     Sim,
-    /// `hums sim --firmware`: the image that is flashed, on the model of its chip.
+    /// `hums sim --firmware`: the image on the model of its chip.
     Chip,
 }
 
-/// A finished recording, in a folder of its own.
+/// In a folder of its own.
 #[derive(Debug)]
 pub struct Recording {
     dir: TempDir,
@@ -94,7 +93,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Records `input` with these further flags, with any result.
+    /// With further flags; any result.
     #[track_caller]
     pub fn attempt(machine: Machine, input: &Path, flags: &[&str]) -> Self {
         let dir = tempfile::tempdir().unwrap();
@@ -113,8 +112,7 @@ impl Recording {
         Self { dir, outcome }
     }
 
-    /// Records `input`; exit code 0 is expected, or 3 if the input itself has bytes outside records, which is
-    /// reported.
+    /// Exit code 0, or 3 if the input has bytes outside records.
     #[track_caller]
     pub fn make(machine: Machine, input: &Path, flags: &[&str]) -> Self {
         let recording = Self::attempt(machine, input, flags);
@@ -123,7 +121,7 @@ impl Recording {
         recording.expect_code(if is_damaged { &[3] } else { &[0] })
     }
 
-    /// It ended with one of these codes.
+    /// One of these exit codes.
     #[track_caller]
     #[must_use]
     pub fn expect_code(self, codes: &[i32]) -> Self {
@@ -140,7 +138,7 @@ impl Recording {
         self.dir.path().join("gs.bin")
     }
 
-    /// The object that `--json` printed.
+    /// From `--json`.
     pub fn json(&self) -> Value {
         let text = self.outcome.text();
         serde_json::from_str(&text)
@@ -152,20 +150,20 @@ impl Recording {
         self.json()[name].as_u64().unwrap_or_else(|| panic!("--json has no number {name}: {}", self.json()))
     }
 
-    /// The monitor's own records on the card, in order, with their times.
+    /// The monitor's records on the card, in order.
     #[track_caller]
     pub fn records(&self) -> Vec<Value> {
         records(&self.image(), &[0])
     }
 
-    /// Everything on the card, decoded; the exit code is one of `codes`.
+    /// Exit code: one of `codes`.
     #[track_caller]
     pub fn decode(&self, codes: &[i32]) -> Decoded {
         Decoded::of(&self.image(), codes)
     }
 }
 
-/// The monitor's own records on a card, in order, with their times; the exit code is one of `codes`.
+/// The monitor's records on a card; exit code: one of `codes`.
 #[track_caller]
 pub fn records(image: &Path, codes: &[i32]) -> Vec<Value> {
     let mut command = command(["decode".as_ref(), image.as_os_str(), "-o".as_ref(), "-".as_ref()]);
@@ -181,7 +179,7 @@ pub struct Decoded {
 }
 
 impl Decoded {
-    /// Decodes to tlog; the exit code is one of `codes`.
+    /// To tlog; exit code: one of `codes`.
     #[track_caller]
     pub fn of(source: &Path, codes: &[i32]) -> Self {
         let dir = tempfile::tempdir().unwrap();
@@ -195,7 +193,7 @@ impl Decoded {
         Self { tlogs: files.iter().map(|file| fs::read(file).unwrap()).collect() }
     }
 
-    /// All frames, in the order of the files' names and in their order there.
+    /// In the order of file names.
     pub fn frames(&self, seeds: &Seeds) -> Vec<Frame<'_>> {
         self.tlogs.iter().flat_map(|tlog| frames::of_tlog(tlog, seeds, true)).collect()
     }
@@ -206,7 +204,7 @@ impl Decoded {
     }
 }
 
-/// The files at or below `path`, which may not exist.
+/// `path` may not exist.
 fn collect(path: &Path, files: &mut Vec<PathBuf>) {
     if path.is_file() {
         files.push(path.to_owned());

@@ -1,4 +1,4 @@
-//! The content of a store's file, read with the firmware's own crates. No other reader exists.
+//! A store's file, read with the firmware's own crates: no other reader exists.
 
 use std::fs;
 use std::path::Path;
@@ -7,17 +7,17 @@ use hums_core::lifetime::{Item as _, ItemKey, Lifetime, Session};
 use hums_store::sim::SimFlash;
 use hums_store::{Found, Store, param};
 
-/// The items that outlived power.
+/// Items that outlived power.
 #[derive(Debug, Default)]
 pub struct Stored {
-    /// The counters over the airframe's life, the last session included.
+    /// With the last session.
     pub lifetime: Option<Lifetime>,
-    /// Parameters that were set.
+    /// Set ones.
     pub params: Vec<(String, f32)>,
 }
 
 impl Stored {
-    /// Reads the file; it must be a store in order.
+    /// Must be a store in order.
     pub fn read(path: &Path) -> Self {
         let flash = SimFlash::<16_384>::with(&fs::read(path).unwrap());
         let (mut store, found) = Store::mount(flash).unwrap_or_else(|why| panic!("{why:?}"));
@@ -41,7 +41,7 @@ impl Stored {
         stored
     }
 
-    /// The counters, which must be there.
+    /// Must be there.
     pub fn lifetime(&self) -> &Lifetime {
         self.lifetime.as_ref().unwrap()
     }

@@ -8,7 +8,7 @@ use crate::model::{Kind, Model, crc7, crc16};
 
 /// Clocks with an unselected card that it needs before its first command (6.4.1).
 const WAKE_CLOCKS: u32 = 74;
-/// Clock limits of a card before its identification, and afterwards.
+/// Before its identification, and afterwards.
 const IDENTIFICATION_HZ: u32 = 400_000;
 const TRANSFER_HZ: u32 = 25_000_000;
 
@@ -24,7 +24,6 @@ const STATUS_LOCKED: u8 = 0x20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// It speaks the SD protocol, not this one.
     Native,
     Idle,
     Ready,
@@ -40,7 +39,7 @@ enum Transfer {
         block: Option<Vec<u8>>,
         failed: bool,
     },
-    /// Sends blocks one after the other; the next one.
+    /// The next block.
     Read {
         next: u32,
     },
@@ -55,21 +54,19 @@ pub(crate) struct SdCard {
     started_ns: Option<u64>,
     knows_conditions: bool,
     app: bool,
-    /// Blocks that the next write of many may erase before they come (ACMD23).
     erases: u32,
     checks: bool,
     status: u8,
     command: Vec<u8>,
     out: VecDeque<u8>,
-    /// A block that is on its way: from when on, and its bytes.
+    /// Ready from this time on.
     pending: Option<(u64, Vec<u8>)>,
     busy_until_ns: u64,
     was_busy: bool,
     transfer: Transfer,
-    /// The block that is being programmed while it is busy, and its content before.
+    /// Its content before.
     programmed: Option<(u32, [u8; 512])>,
     noise: u32,
-    /// The answer to a byte that has begun.
     begun: Option<u8>,
 }
 
@@ -97,7 +94,7 @@ impl SdCard {
         }
     }
 
-    /// One byte while another is sent; violations go to `wrong`.
+    /// Violations go to `wrong`.
     pub(crate) fn exchange(
         &mut self,
         now_ns: u64,
@@ -123,13 +120,11 @@ impl SdCard {
         answer
     }
 
-    /// Its answer to the byte that begins now.
     pub(crate) fn begin(&mut self, now_ns: u64) -> u8 {
         let answer = self.answer(now_ns);
         *self.begun.insert(answer)
     }
 
-    /// The select pin goes up: not during a transfer (7.2).
     pub(crate) fn deselected(&mut self, wrong: &mut impl FnMut(String)) {
         self.begun = None;
         if !self.command.is_empty() {
@@ -143,7 +138,7 @@ impl SdCard {
         }
     }
 
-    /// Its power fails: only the first half of a block in programming is new.
+    /// Only the first half of a block in programming is new.
     pub(crate) fn power_off(&self, now_ns: u64) {
         if let Some((at, before)) = self.programmed.filter(|_| self.is_busy(now_ns)) {
             self.model.medium.patch(at, 256, &before[256..]);
@@ -166,7 +161,7 @@ impl SdCard {
             self.out.extend(block);
             if let Transfer::Read { next: at } = self.transfer {
                 self.transfer = Transfer::Read { next: at + 1 };
-                // Behind the last block an error comes in place of the next one.
+                // Behind the last block.
                 let is_there = at < self.model.medium.size();
                 let bytes = if is_there {
                     let data = self.model.medium.get(at);
@@ -203,7 +198,7 @@ impl SdCard {
                 } else {
                     self.transfer = Transfer::None;
                     self.busy_until_ns = now_ns + self.model.write_ns.0;
-                    // One byte before the busy signal (7.2.4).
+                    // Before the busy signal (7.2.4).
                     self.out.push_back(0xFF);
                 }
                 return;
@@ -216,8 +211,7 @@ impl SdCard {
         if self.command.len() == 6 {
             let command: [u8; 6] = std::mem::take(&mut self.command).try_into().unwrap_or_default();
             if self.is_busy(now_ns) {
-                // One that stays busy for ever ignores commands; any other one may be reset, which should not be
-                // done.
+                // One that stays busy for ever ignores commands; others may be reset, which should not be done.
                 if self.busy_until_ns == u64::MAX {
                     return;
                 }
@@ -334,7 +328,7 @@ impl SdCard {
             }
             24 | 25 => {
                 self.answer_with(0, &[]);
-                // Undefined until they are written (4.3.4): here they are erased.
+                // Undefined until written (4.3.4): here erased.
                 let count = if number == 25 { std::mem::take(&mut self.erases) } else { 0 };
                 let end = at.saturating_add(count).min(self.model.medium.size());
                 (at..end).for_each(|at| self.model.medium.erase(at));
@@ -344,7 +338,6 @@ impl SdCard {
         }
     }
 
-    /// An answer comes one byte later; bits of the state are added.
     fn answer_with(&mut self, bits: u8, more: &[u8]) {
         self.out.push_back(0xFF);
         self.out.push_back(bits | u8::from(self.state == State::Idle));
@@ -366,7 +359,6 @@ impl SdCard {
         self.pending = Some((now_ns + after_ns, bytes));
     }
 
-    /// A block as it goes over the bus.
     fn block(&mut self, now_ns: u64, data: &[u8]) -> Vec<u8> {
         let mut bytes = vec![0xFE];
         bytes.extend(data);
@@ -377,7 +369,6 @@ impl SdCard {
         bytes
     }
 
-    /// A block has arrived whole.
     fn write_block(&mut self, now_ns: u64) {
         let Transfer::Write { many, at, block, failed } = &mut self.transfer else { return };
         let taken = block.take().unwrap_or_default();
@@ -415,6 +406,6 @@ impl SdCard {
         self.busy_until_ns = now_ns.saturating_add(busy_ns);
     }
 
-    /// Times of usual cards, without random long waits.
+    /// Usual cards, without random long waits.
     pub(crate) const POWER_UP_NS: u64 = MS;
 }

@@ -3,29 +3,23 @@
 /// The fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A command gets no answer.
     Silent,
-    /// A command arrives damaged: the card finds it by its checksum.
+    /// The checksum shows it.
     DamagedCommand,
-    /// A block that is read is damaged on its way.
     DamagedRead,
-    /// A block that is written is damaged on its way.
     DamagedWrite,
-    /// A block that is written is refused with a write error.
     WriteError,
-    /// A written block is taken, and not programmed; only the status shows it.
+    /// Only the status shows it.
     NotProgrammed,
-    /// This comes in place of a block's token.
+    /// In place of a block's token.
     Token(u8),
-    /// A requested block never comes.
     NoBlock,
-    /// A written block keeps the card busy for this time, nanoseconds.
+    /// Nanoseconds.
     Busy(u64),
-    /// The line carries noise.
     Noise,
 }
 
-/// A fault, and its time.
+/// A fault and its time.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     pub(crate) fault: Fault,
@@ -41,7 +35,7 @@ impl Plan {
         Self { fault, from_ns: 0, until_ns: u64::MAX, skip: 0, times: u32::MAX }
     }
 
-    /// Only from this moment on, nanoseconds since the slot got its power.
+    /// Nanoseconds since the slot got its power.
     pub const fn from(mut self, ns: u64) -> Self {
         self.from_ns = ns;
         self
@@ -65,7 +59,6 @@ impl Plan {
         self
     }
 
-    /// Whether it strikes now, at this occasion.
     pub(crate) fn strikes(&mut self, now_ns: u64) -> bool {
         if !(self.from_ns..self.until_ns).contains(&now_ns) || self.times == 0 {
             return false;

@@ -3,8 +3,8 @@
 //! ```text
 //! Recorder -> SpiCard -> SimPort -> Slot (bus, time, events) -> SdCard (state machine, faults) -> Medium (blocks)
 //! ```
-//! Time is virtual: each byte on the bus takes as long as its clock says, and nothing else takes any. Violations
-//! by a card or a driver are not corrected but noted ([`Slot::violations`]); a test can forbid them.
+//! Time is virtual: only bytes on the bus take any. Violations by a card or a driver are noted
+//! ([`Slot::violations`]).
 //!
 //! Source: SD Specifications Part 1, Physical Layer Simplified Specification 9.10, chapter 7 (SPI mode).
 

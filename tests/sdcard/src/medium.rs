@@ -19,12 +19,12 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// An empty one of `size` blocks.
+    /// Empty, of `size` blocks.
     pub fn new(size: u32) -> Self {
         Self { blocks: Rc::default(), size, writes: Rc::default() }
     }
 
-    /// One that holds an empty FAT32 volume.
+    /// Holds an empty FAT32 volume.
     ///
     /// # Panics
     /// If it is too small.
@@ -60,7 +60,7 @@ impl Medium {
         Ok(medium)
     }
 
-    /// Writes its content into this image, in place.
+    /// Writes the image in place.
     ///
     /// # Errors
     /// Of the image's writing.
@@ -74,7 +74,7 @@ impl Medium {
         })
     }
 
-    /// How many blocks it has.
+    /// Blocks.
     pub const fn size(&self) -> u32 {
         self.size
     }
@@ -116,23 +116,20 @@ impl Medium {
     }
 }
 
-/// Whether a sparse file has a hole there; reading it would give the same, but slowly.
+/// Reading a hole would give the same, but slowly.
 #[cfg(not(target_os = "linux"))]
 fn is_hole(_file: &File, _from: u64, _bytes: u64) -> bool {
     false
 }
 
-/// Whether a sparse file has a hole there.
 #[cfg(target_os = "linux")]
 fn is_hole(file: &File, from: u64, bytes: u64) -> bool {
     match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(from)) {
         Ok(data) => data >= from + bytes,
-        // No data up to the end.
         Err(error) => error == rustix::io::Errno::NXIO,
     }
 }
 
-/// As in a card reader, without a driver's faults.
 impl CardDevice for Medium {
     type Error = Infallible;
 

@@ -1,4 +1,4 @@
-//! The kind of card: its properties that do not change while it has power.
+//! Properties of a card that do not change while it has power.
 
 use crate::MS;
 use crate::fault::{Fault, Plan};
@@ -32,22 +32,22 @@ pub struct Model {
     pub medium: Medium,
     /// Its serial number.
     pub serial: u32,
-    /// How long it takes to start.
+    /// Nanoseconds to start.
     pub start_ns: u64,
-    /// How long it takes to find a block.
+    /// Nanoseconds to find a block.
     pub read_ns: u64,
-    /// Time between two blocks of a row that it sends.
+    /// Nanoseconds between two sent blocks of a row.
     pub read_next_ns: u64,
-    /// Time to take one block alone, and one of many.
+    /// Nanoseconds to take one block alone, and one of many.
     pub write_ns: (u64, u64),
-    /// Write protected, in its CSD: for now, for ever.
+    /// Write protection in its CSD: for now, for ever.
     pub locked: (bool, bool),
     /// Its faults.
     pub plans: Vec<Plan>,
 }
 
 impl Model {
-    /// A card of this kind without faults, with usual times.
+    /// Faultless, with usual times.
     pub fn new(kind: Kind, medium: Medium) -> Self {
         Self {
             kind,
@@ -88,7 +88,7 @@ impl Model {
     pub(crate) fn csd(&self) -> [u8; 16] {
         let size = self.medium.size();
         let mut csd = if self.kind.by_bytes() {
-            // Blocks of 512 bytes, in units of 512: the size in a CSD of this structure.
+            // The CSD of this structure counts units of 512 blocks.
             let units = (size >> 9) - 1;
             [
                 0x00,
@@ -117,7 +117,7 @@ impl Model {
     }
 }
 
-/// From the specification, bit by bit, and not the driver's code.
+/// From the specification, not the driver's code.
 pub(crate) fn crc7(bytes: &[u8]) -> u8 {
     let mut crc = 0_u8;
     for byte in bytes {

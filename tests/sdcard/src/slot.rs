@@ -1,4 +1,4 @@
-//! The slot: the bus, its clock and time, and events of the card in it.
+//! The bus, its clock and time, and events of the card.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -13,11 +13,10 @@ use crate::model::Model;
 /// An event of the card in the slot.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// It is pulled, and loses its power: a block that it is programming is torn.
+    /// A block that it is programming is torn.
     Pull,
-    /// A card is put in.
     Insert(Model),
-    /// It loses contact for a moment, and with it its power, as when it is pulled.
+    /// Power is lost for a moment, as by a pull.
     Bounce,
 }
 
@@ -26,9 +25,9 @@ pub enum Event {
 pub struct Counts {
     /// Bytes.
     pub bytes: u64,
-    /// Of them, those with no card selected.
+    /// With no card selected.
     pub unselected: u64,
-    /// Times that the select pin went down.
+    /// Falls of the select pin.
     pub selects: u64,
 }
 
@@ -40,19 +39,19 @@ struct Inner {
     counts: Counts,
     at_time: Vec<(u64, Event)>,
     at_byte: Vec<(u64, Event)>,
-    /// The time of the next one of each, for a fast check at every byte.
+    /// For a fast check at every byte.
     soonest: (u64, u64),
     violations: BTreeMap<String, u32>,
-    /// The processor stops after this many bytes on the bus.
+    /// Bytes on the bus.
     stop_at: Option<u64>,
 }
 
-/// A slot; a clone is the same one.
+/// A clone is the same slot.
 #[derive(Clone)]
 pub struct Slot(Rc<RefCell<Inner>>);
 
 impl Slot {
-    /// A slot with this card in it, at 0 s.
+    /// At 0 s.
     pub fn new(card: Option<Model>) -> Self {
         Self(Rc::new(RefCell::new(Inner {
             card: card.map(SdCard::new),
@@ -68,31 +67,31 @@ impl Slot {
         })))
     }
 
-    /// Schedules an event at a time.
+    /// Schedules an event, nanoseconds.
     pub fn at(&self, ns: u64, event: Event) {
         let mut inner = self.0.borrow_mut();
         inner.at_time.push((ns, event));
         inner.find_soonest();
     }
 
-    /// Schedules an event after this many bytes on the bus.
+    /// Schedules an event after this many bytes.
     pub fn at_byte(&self, bytes: u64, event: Event) {
         let mut inner = self.0.borrow_mut();
         inner.at_byte.push((bytes, event));
         inner.find_soonest();
     }
 
-    /// Stops the bus after this many bytes, like a restart of the processor; `None`: it runs again.
+    /// Stops the bus after this many bytes, like a processor's restart; `None`: runs on.
     pub fn stop_at(&self, bytes: Option<u64>) {
         self.0.borrow_mut().stop_at = bytes;
     }
 
-    /// Lets an event happen now.
+    /// Happens now.
     pub fn event(&self, event: Event) {
         self.0.borrow_mut().happen(event);
     }
 
-    /// Whether a card is in it.
+    /// With a card.
     pub fn has_card(&self) -> bool {
         self.0.borrow().card.is_some()
     }
@@ -107,31 +106,30 @@ impl Slot {
         Instant::from_micros(self.now_ns() / 1_000)
     }
 
-    /// Advances the time to this moment with an idle bus.
+    /// The bus is idle meanwhile.
     pub fn advance_to(&self, ns: u64) {
         let mut inner = self.0.borrow_mut();
         inner.now_ns = inner.now_ns.max(ns);
         inner.happen_what_is_due();
     }
 
-    /// Traffic of the bus so far.
+    /// Traffic so far.
     pub fn counts(&self) -> Counts {
         self.0.borrow().counts
     }
 
-    /// Violations so far, with their counts.
+    /// Their counts so far.
     pub fn violations(&self) -> BTreeMap<String, u32> {
         self.0.borrow().violations.clone()
     }
 
-    /// The slot as the driver's port.
+    /// The driver's port.
     pub fn port(&self) -> SimPort {
         SimPort { slot: self.clone(), transfer_hz: 21_000_000 }
     }
 }
 
 impl Slot {
-    /// The card's answer to the byte that begins now; its end is an exchange.
     pub(crate) fn begin(&self) -> u8 {
         let mut inner = self.0.borrow_mut();
         inner.happen_what_is_due();

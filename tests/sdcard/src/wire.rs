@@ -1,4 +1,4 @@
-//! The card at a bus of the chip's model, for the flashed image.
+//! The card at a bus of the chip's model.
 
 use hums_boards::Board;
 use hums_recorder::spi::{Clock, Port as _};
@@ -9,7 +9,7 @@ use stm32f405_model::spi::Wire;
 
 use crate::{Event, SimPort, Slot};
 
-/// Wires the slot to the chip as the board does.
+/// Wires slot and chip as the board does.
 pub fn connect(machine: &mut Machine, board: &Board, slot: &Slot) {
     let pin = |pin: hums_boards::Pin| Pin(pin.port, pin.number);
     let (wires, card) = (&board.card, Box::new(Card::new(slot)));

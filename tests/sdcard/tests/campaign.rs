@@ -1,5 +1,5 @@
-//! The card campaign. After any fault of the card the recorder records, or reports its state to the pilot, and
-//! records again with the card. Every frame is on a card or counted as lost.
+//! After any fault of the card the recorder records, or reports its state to the pilot, and records again with the
+//! card. Every frame is on a card or counted as lost.
 
 use crate::rig;
 
@@ -22,7 +22,7 @@ fn sdhc(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// Records for 10 s before an event.
+/// 10 s before an event.
 fn recording(model: Model) -> Rig {
     let mut rig = Rig::new(model);
     rig.run_to(9_000);
@@ -44,7 +44,7 @@ fn every_kind_of_card_is_recorded_on() {
     }
 }
 
-/// The box's own records, every 10 s, and its parity.
+/// Its own records, every 10 s, and parity.
 #[test]
 fn a_silent_line_wears_no_card() {
     let medium = medium();
@@ -58,8 +58,8 @@ fn a_silent_line_wears_no_card() {
     rig.finish_whole(&medium);
 }
 
-/// A slow line: for seconds the only data is a copy of the sector in progress. Then the card stalls until full
-/// sectors wait behind it, and is pulled while they are written.
+/// On a slow line only copies of the sector in progress are written. The card stalls until full sectors wait, and is
+/// pulled while they are written.
 #[test]
 fn a_card_that_erases_ahead_never_holds_less_than_was_on_it() {
     for step in 0..60 {
@@ -192,12 +192,12 @@ fn noise_on_the_line_is_told_and_recorded_over_again_once_it_is_gone() {
     rig.run_to(35_000);
     rig.assert_state(CardState::Recording);
     assert!(rig.longest < SERVICE_MAX + Span::from_secs(1), "{:?}", rig.longest);
-    // The traffic of that time is not the driver's fault.
+    // That traffic is not the driver's fault.
     let (found, lost) = rig.finish(&[&medium]);
     assert_eq!((lost, found[0].gaps.len()), (0, 0));
 }
 
-/// The card takes a block, and reports only on request that it could not program it.
+/// Reported on request only.
 #[test]
 fn a_block_that_was_taken_but_not_programmed_is_written_again() {
     for skip in [0, 1, 5] {
@@ -267,8 +267,7 @@ fn a_card_that_is_out_for_longer_than_the_queue_lasts_loses_counted_frames() {
     assert!(found.frames.last().is_some_and(|last| *last > 2_600), "it went on");
 }
 
-/// Pulled at bytes spread over all commands, from the first on, and put back two seconds later. A block that is being
-/// programmed then is torn.
+/// Pulled at bytes spread over all commands, and put back two seconds later.
 #[test]
 fn a_card_that_is_pulled_at_any_byte_misses_nothing() {
     const PULLS: u64 = 60;
@@ -362,7 +361,6 @@ fn a_card_full_of_other_files_is_told_and_not_touched() {
     assert_eq!(medium.content(), before);
 }
 
-/// Marks every cluster as used by others.
 fn fill(medium: &Medium) {
     let layout = hums_recorder::layout::Layout::read(medium).expect("it is formatted");
     for fat_block in 0..layout.fat_blocks {
@@ -374,7 +372,6 @@ fn fill(medium: &Medium) {
     }
 }
 
-/// A socket that wears out: the pilot gets texts about it, and others too.
 #[test]
 fn a_card_that_comes_and_goes_does_not_fill_the_line() {
     let medium = medium();

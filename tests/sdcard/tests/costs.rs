@@ -1,4 +1,4 @@
-//! The driver's costs on the bus, and its results for a card's faults (`docs/cards.md`).
+//! Costs on the bus, and results of faults (`docs/cards.md`).
 //!
 //! `cargo test -p hums-sdcard costs:: -- --nocapture` prints them.
 
@@ -6,14 +6,12 @@ use hums_recorder::{Block, CardDevice as _, SpiCard};
 use hums_sdcard::{Counts, Fault, Kind, MS, Medium, Model, Plan, Slot};
 
 const BLOCKS: u32 = 64;
-/// Time of the card's identification by the driver.
 const IDENTIFIED_NS: u64 = 200 * MS;
 
 fn model(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// The driver's result: its own report, the medium's content, and the traffic.
 #[derive(Debug)]
 struct Run {
     is_content: bool,
@@ -54,7 +52,7 @@ fn run(model: impl Fn(&Medium) -> Model, per_write: u32) -> Run {
 
 #[test]
 fn bytes_on_the_bus_for_a_block() {
-    // A card that takes its blocks at once, so that only the protocol takes time.
+    // Only the protocol takes time.
     let quick = |medium: &Medium| Model { write_ns: (0, 0), ..model(medium) };
     println!("| blocks a write | bytes a block | selects a block | ms for {BLOCKS} on a usual card |");
     println!("|---|---|---|---|");
@@ -71,7 +69,6 @@ fn bytes_on_the_bus_for_a_block() {
     assert!(run(model, 8).ms * 2 < run(model, 1).ms, "rows are what cards are fast at");
 }
 
-/// It reports its result, and writes the block if possible.
 #[test]
 fn what_the_driver_makes_of_a_fault() {
     let cases = [

@@ -1,4 +1,4 @@
-//! Downloads from a card that changes meanwhile: a download continues with the same log, or ends with an error.
+//! A download from a card that changes continues with the same log, or ends with an error.
 
 use crate::rig;
 
@@ -9,7 +9,7 @@ use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
 
 const MIB: u32 = 2_048;
 const S: u64 = 1_000;
-/// The downloaded log: the second of the full card's logs, the next to be overwritten.
+/// The next log to be overwritten.
 const VICTIM: LogName = LogName { session: 2, segment: 0 };
 
 const LIST: u8 = 3;
@@ -27,9 +27,9 @@ fn model(medium: &Medium) -> Model {
     Model::new(Kind::Sdhc, medium.clone())
 }
 
-/// A card with a session of this many seconds, and one more; power cuts end both.
+/// A session of this many seconds, and one more; power cuts end both.
 fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
-    // The volume's number comes from the size, and from that the mark that separates sessions of equal names.
+    // The size gives the volume's number, and that the mark that separates sessions of equal names.
     let medium = Medium::formatted(mib * MIB);
     for _ in 0..2 {
         let mut rig = Rig::new(model(&medium));
@@ -38,13 +38,12 @@ fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
     medium
 }
 
-/// The same, with later segments in the remaining room: the next one overwrites the oldest.
+/// Later segments fill the room: the next one overwrites the oldest.
 fn full() -> Medium {
     let medium = with_two_sessions(40, 20);
     let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
     let mut card = mounted.map_err(|(_, error)| error.to_string()).expect("it is in order");
-    // Also the short ones with which the recorder continues after a card came back.
     let mut segments = (0..).map(|segment| LogName { session: 3, segment });
     for kib in [2 * 1024, 128] {
         while segments.next().is_some_and(|name| card.create(name, kib * 1024).is_ok()) {}
@@ -52,7 +51,6 @@ fn full() -> Medium {
     medium
 }
 
-/// A power-on with this card, in recording.
 fn recording(medium: &Medium) -> Rig {
     let mut rig = Rig::new(model(medium));
     rig.run_to(12 * S);
@@ -60,7 +58,7 @@ fn recording(medium: &Medium) -> Rig {
     rig
 }
 
-/// The card is taken out and put in again, or another one: the session continues in another segment.
+/// The session continues in another segment.
 fn insert(rig: &mut Rig, medium: &Medium) {
     rig.slot.event(Event::Pull);
     let now_ms = rig.slot.now_ns() / MS;
@@ -75,10 +73,10 @@ fn wait(rig: &mut Rig, ms: u64) {
     rig.run_to(now_ms + ms);
 }
 
-/// An answer over FTP: operation, requested operation, complete, offset, data.
+/// Operation, requested operation, complete, offset, data.
 type Answer = (u8, u8, bool, u32, Vec<u8>);
 
-/// A request over FTP. Returns the answers within this many milliseconds.
+/// Answers within this many milliseconds.
 fn ftp(rig: &mut Rig, opcode: u8, offset: u32, size: u8, data: &[u8], ms: u64) -> Vec<Answer> {
     let size = if data.is_empty() { size } else { data.len() as u8 };
     let mut payload = vec![0, 1, 191, 7, 0, 0, opcode, size, 0, 0, 0];
@@ -102,14 +100,12 @@ fn path(name: LogName) -> Vec<u8> {
     format!("/{name}").into_bytes()
 }
 
-/// Opens a file; returns its length.
 fn open(rig: &mut Rig, name: LogName) -> u32 {
     let opened = ftp(rig, OPEN, 0, 0, &path(name), 2_000);
     assert_eq!((opened[0].0, opened[0].1), (ACK, OPEN), "{opened:?}");
     u32::from_le_bytes(opened[0].4[..4].try_into().expect("a length"))
 }
 
-/// Bytes of the open file, read piece by piece.
 fn read(rig: &mut Rig, bytes: u32) -> Vec<u8> {
     let mut data = Vec::new();
     while data.len() < bytes as usize {
@@ -121,14 +117,12 @@ fn read(rig: &mut Rig, bytes: u32) -> Vec<u8> {
     data
 }
 
-/// The checksum by the definition in the protocol.
 fn crc32(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 })
     })
 }
 
-/// `LOG_REQUEST_LIST`: the number of logs.
 fn list(rig: &mut Rig) -> usize {
     rig.logs.clear();
     rig.ask(117, &[0, 0, 255, 255, 1, 191]);
@@ -136,7 +130,6 @@ fn list(rig: &mut Rig) -> usize {
     rig.logs.iter().filter(|(id, _)| *id == LOG_ENTRY).count()
 }
 
-/// `LOG_REQUEST_DATA`: the answers, by offset.
 fn data(rig: &mut Rig, id: u16, offset: u32, count: u32) -> Vec<(u32, Vec<u8>)> {
     rig.logs.clear();
     let mut payload = offset.to_le_bytes().to_vec();
@@ -165,7 +158,7 @@ fn a_file_that_makes_room_while_it_is_read_ends_with_an_error() {
     insert(&mut rig, &medium);
     for opcode in [READ, BURST] {
         if opcode == BURST {
-            // It is still open for a client that lost the first answer.
+            // Still open for a client that lost the first answer.
             assert_eq!(ftp(&mut rig, OPEN, 0, 0, &path(VICTIM), 2_000)[0].4, [FILE_NOT_FOUND]);
         }
         let answers = ftp(&mut rig, opcode, before.len() as u32, 239, &[], 2_000);
@@ -173,7 +166,6 @@ fn a_file_that_makes_room_while_it_is_read_ends_with_an_error() {
         assert!(!answers.is_empty());
     }
     rig.assert_told("HUMS: this log is gone: download ended", since_ms);
-    // The new log in its place is offered by its own name.
     let newest = open(&mut rig, LogName { session: 4, segment: 1 });
     assert!(newest > 0);
 }
@@ -187,7 +179,7 @@ fn a_burst_that_is_under_way_when_its_file_makes_room_ends_with_an_error() {
         read(&mut rig, length.min(20_000))
     };
     let since_ms = rig.slot.now_ns() / MS;
-    // The burst goes on for ten seconds and more; the card changes after two.
+    // The burst goes on for ten seconds and more.
     let mut answers = ftp(&mut rig, BURST, 0, 239, &[], 2_000);
     insert(&mut rig, &medium);
     answers.extend(rig.logs.iter().filter(|(id, _)| *id == FILE_TRANSFER_PROTOCOL).map(|(_, payload)| {
@@ -221,10 +213,9 @@ fn a_log_that_makes_room_while_it_is_downloaded_by_number_is_not_gone_on_with() 
     insert(&mut rig, &medium);
     assert_eq!(data(&mut rig, 2, 900, 900), [], "what lies there now is another log");
     rig.assert_told("HUMS: this log is gone: download ended", since_ms);
-    // Also if the client lists again meanwhile.
     assert!(list(&mut rig) > 10);
     assert_eq!(data(&mut rig, 2, 900, 900), []);
-    // From its beginning on, the place means the new log.
+    // The place now means the new log.
     let fresh = data(&mut rig, 2, 0, 900);
     assert_eq!(fresh.len(), 10);
     assert_ne!(fresh[0], before[0]);
@@ -268,7 +259,7 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
     let whole = read(&mut rig, length);
     assert_eq!(ftp(&mut rig, READ, length, 239, &[], 2_000)[0].4, [END_OF_FILE]);
     for (asked, covered) in [(0, length), (700, 700), (length, length), (u32::MAX, length)] {
-        // Asked twice, like an impatient client: it is computed once and answered for the last.
+        // Computed once, answered for the last request.
         let mut answers = ftp(&mut rig, CHECKSUM, asked, 0, &path(VICTIM), 5);
         let again = ftp(&mut rig, CHECKSUM, asked, 0, &path(VICTIM), 10_000);
         answers.extend(again);
@@ -283,7 +274,7 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
     assert_eq!(read_card(&medium).gaps, []);
 }
 
-/// Place of a segment's blocks, and the number of recorded ones.
+/// Also the number of recorded blocks.
 fn places(medium: &Medium, name: LogName) -> (u32, u32) {
     let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);
@@ -307,14 +298,13 @@ fn what_a_card_has_lost_of_a_log_hides_nothing_of_the_rest() {
     let mut rig = recording(&medium);
     let pages = (0..sectors - 8).step_by(8).map(|at| (at, 8));
     let rows = [0, 1, sectors / 2, sectors - LOST_MAX - 1].map(|at| (at, LOST_MAX));
-    // More than that, if parity shows the log's length: it does not cover the last ten seconds.
+    // Parity shows the log's length, but does not cover the last ten seconds.
     let more = [(1, 150), (30, sectors - 100)];
     let whole = medium.content();
     let (other, _) = places(&medium, LogName { session: 1, segment: 0 });
     let text = b"0123456789abcdef".repeat(32);
     let fills = [[0; 512], [0xff; 512], *text.first_chunk().expect("a block"), whole[&(other + 9)]];
     for (at, lost) in pages.chain(rows).chain(more) {
-        // A log's identity comes from its first sound sector.
         let fills = if at == 0 { &fills[..3] } else { &fills[..] };
         for fill in fills {
             (at..at + lost).for_each(|at| medium.set(first + at, fill));
@@ -325,7 +315,6 @@ fn what_a_card_has_lost_of_a_log_hides_nothing_of_the_rest() {
                 &fill[..2]
             );
         }
-        // It is offered as it reads.
         if at == 8 {
             let came = read(&mut rig, 12 * 512);
             assert_eq!(came[11 * 512..][..512], fills[3], "a sector of another session");
@@ -365,7 +354,7 @@ fn a_burst_has_the_size_that_was_asked_for_and_is_complete_before_the_end_only_w
             }
             assert_eq!(*offset, had);
             assert!(data.len() == 239 || had + data.len() as u32 == length, "{} at {had}", data.len());
-            // MAVProxy takes this for the end of the file.
+            // MAVProxy takes this for the file's end.
             assert!(!*complete || data.len() == 239, "{} bytes at {had} are not the end", data.len());
             had += data.len() as u32;
         }
@@ -376,7 +365,6 @@ fn a_burst_has_the_size_that_was_asked_for_and_is_complete_before_the_end_only_w
 #[test]
 fn a_log_that_the_card_refuses_slowly_is_left_out_of_a_list_and_never_called_empty() {
     let medium = with_two_sessions(40, 20);
-    // After this many blocks the card keeps the reader waiting.
     let refusing = |skip| {
         let plan = Plan::always(Fault::NoBlock).from(20 * S * MS).until(60 * S * MS).skip(skip);
         let mut rig = Rig::new(model(&medium).with(plan));
@@ -389,7 +377,6 @@ fn a_log_that_the_card_refuses_slowly_is_left_out_of_a_list_and_never_called_emp
         let answers = ftp(&mut rig, LIST, 1, 0, b"/", 10_000);
         let [(kind, LIST, _, _, data)] = &answers[..] else { panic!("after {skip} blocks: {answers:?}") };
         assert_eq!((*kind, &data[..]), said, "the directory, and a log of it");
-        // It is not reported as gone, nor as empty.
         let opened = ftp(&mut rig, OPEN, 0, 0, &path(VICTIM), 10_000);
         assert!(opened.iter().all(|answer| (answer.0, &answer.4[..]) == (NAK, &[FAIL])), "{opened:?}");
         rig.run_to(60 * S);
@@ -409,7 +396,6 @@ fn a_log_that_the_card_refuses_slowly_is_left_out_of_a_list_and_never_called_emp
     }
 }
 
-/// Sets the budget of the ground station's port, bytes a second.
 fn set_budget(rig: &mut Rig, bytes_a_second: f32) {
     let mut payload = bytes_a_second.to_le_bytes().to_vec();
     payload.extend([1, 191]);

@@ -1,5 +1,4 @@
-//! The driver against the card, command by command. Each case ends with the right data or the right error, in bounded
-//! time, and without violations of the specification on the bus.
+//! The driver against the card, command by command, in bounded time and without violations on the bus.
 
 use hums_core::clock::Span;
 use hums_recorder::spi::{BUSY_MAX, SERVICE_MAX, SpiCard, SpiError};
@@ -43,7 +42,6 @@ impl Bench {
         Ok(block)
     }
 
-    /// The result, and its time.
     fn timed<T>(&self, act: impl FnOnce(&Self) -> T) -> (T, Span) {
         let before = self.slot.now();
         let done = act(self);
@@ -127,7 +125,7 @@ fn a_card_that_never_becomes_ready_is_given_up() {
         assert_eq!(done, Err(SpiError::Busy));
         assert!(took < BUSY_MAX + BUSY_MAX + Span::from_millis(500), "{count}: {took:?}");
         assert_eq!(SpiError::Busy.trouble(), Trouble::Stuck);
-        // It holds the line: a device that does not answer.
+        // A device that does not answer holds the line.
         let (done, took) = bench.timed(|bench| bench.read(0).map(|_| ()));
         assert_eq!(done, Err(SpiError::Busy));
         assert!(took < BUSY_MAX + Span::from_secs(1), "{took:?}");
@@ -170,7 +168,7 @@ fn what_is_damaged_on_its_way_is_sent_again() {
             assert!(bench.driver.num_blocks().is_ok());
             let faulty = card(Kind::Sdhc).with(Plan::always(fault).skip(skip).times(1));
             let bench = Bench::new(Model { medium: Medium::new(64 * MIB), ..faulty });
-            // During identification a card may be refused; at the next try it is not.
+            // A refused card is accepted at the next try.
             let first = bench.driver.num_blocks();
             assert!(first.is_ok() || bench.driver.num_blocks().is_ok(), "{fault:?} {skip}: {first:?}");
             assert_eq!(bench.write(7, &blocks(8)), Ok(()), "{fault:?} {skip}");
@@ -221,7 +219,6 @@ fn what_is_always_damaged_is_told() {
     }
 }
 
-/// A write error in the middle of a row is reported, and the card takes the next row.
 #[test]
 fn a_row_that_fails_in_the_middle_leaves_nothing_open() {
     for skip in 0..8 {
@@ -245,7 +242,6 @@ fn a_write_protected_card_is_told_and_not_written() {
     }
 }
 
-/// The card loses contact for a moment at any point: the access continues with the same card.
 #[test]
 fn a_bounce_at_any_byte_costs_a_second_try_and_nothing_else() {
     let clean = Bench::new(card(Kind::Sdhc));
@@ -281,7 +277,6 @@ fn another_card_is_never_taken_for_the_one_before() {
     assert_eq!(bench.write(7, &blocks(3)), Ok(()), "once somebody has looked at it");
 }
 
-/// The processor restarts at any byte of a write, without memory of the card, which continues.
 #[test]
 fn a_card_is_identified_wherever_the_processor_left_it() {
     let clean = Bench::new(card(Kind::Sdhc));

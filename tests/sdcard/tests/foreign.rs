@@ -1,4 +1,4 @@
-//! Foreign cards: reported with their kind, never touched unasked, and formatted on request.
+//! Reported with their kind, never touched unasked, formatted on request.
 
 use crate::rig;
 
@@ -16,7 +16,6 @@ const TEMPORARILY_REJECTED: u8 = 1;
 const DENIED: u8 = 2;
 const FAILED: u8 = 4;
 
-/// A partition table with one partition of this type.
 fn partitioned(kind: u8) -> Medium {
     let medium = Medium::new(128 * MIB);
     medium.patch(0, 446, &[0, 0, 2, 0, kind, 0xFE, 0xFF, 0xFF, 0, 8, 0, 0, 0, 0xF8, 3, 0]);
@@ -145,7 +144,6 @@ fn each_is_formatted_by_command_and_recorded_on() {
     }
 }
 
-/// Sizes of real cards, and the smallest possible one.
 #[test]
 fn cards_of_odd_sizes_are_formatted_whole() {
     let smallest = BLOCKS_MIN.next_multiple_of(512);
@@ -211,7 +209,6 @@ fn nobody_formats_a_card_by_mistake() {
     rig.finish_whole(&ours);
 }
 
-/// The pilot got a text about one card, and another one is in the slot at the command.
 #[test]
 fn a_card_that_was_put_in_after_the_one_that_was_told_is_not_formatted() {
     let (told, other) = (exfat(), Medium::formatted(64 * MIB));
@@ -233,8 +230,7 @@ fn there_must_be_a_card_to_format() {
     assert_eq!(rig.command(FORMAT, [1.0, 1.0]), Some(FAILED));
 }
 
-/// Pulled at any moment of formatting: the card is then unformatted and reported, and is formatted on another
-/// request.
+/// The card is then unformatted, and is formatted on another request.
 #[test]
 fn a_card_that_is_pulled_while_it_is_formatted_can_be_formatted_again() {
     for step in 0..12 {

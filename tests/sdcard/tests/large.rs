@@ -1,5 +1,4 @@
-//! Cards with long directories, of our own logs and of other files: recorded soon after power-on. The time
-//! of our own search does not count as the card's.
+//! Long directories, of our own logs and of other files. Our own search does not count as the card's time.
 
 use crate::rig;
 
@@ -13,7 +12,7 @@ use rig::Rig;
 const GIB: u32 = 2_097_152;
 const END: u32 = 0x0FFF_FFFF;
 
-/// Puts entries into the root directory of an empty card, each with a row of clusters.
+/// Each with a row of clusters.
 fn fill(medium: &Medium, entries: impl Iterator<Item = ([u8; 11], u8, u32)>) {
     let layout = Layout::read(medium).expect("it is formatted");
     let entries: Vec<_> = entries.collect();
@@ -46,7 +45,7 @@ fn fill(medium: &Medium, entries: impl Iterator<Item = ([u8; 11], u8, u32)>) {
     }
 }
 
-/// Our own logs, 8 MiB each, on this part of the card, and a foreign file.
+/// 8 MiB each, and a foreign file.
 fn own_logs(medium: &Medium, percent: u32) -> u32 {
     let layout = Layout::read(medium).expect("it is formatted");
     let clusters = SEGMENT_BYTES_MAX / (layout.cluster_blocks * 512);
@@ -67,7 +66,6 @@ fn a_large_card_of_own_logs_is_recorded_on_half_a_second_after_power_on() {
         let medium = Medium::formatted(gib * GIB);
         let logs = own_logs(&medium, percent);
         let before = medium.writes();
-        // A new segment begins in flight.
         let refusal = Plan::always(Fault::WriteError).from(3_000 * MS).times(8);
         let mut rig = Rig::new(Model::new(Kind::Sdxc, medium.clone()).with(refusal));
         while medium.writes() == before && rig.slot.now_ns() < 5_000 * MS {
@@ -89,7 +87,7 @@ fn a_large_card_of_own_logs_is_recorded_on_half_a_second_after_power_on() {
     }
 }
 
-/// More segments than noted oldest logs, each right after the one before: recording never waits for the directory.
+/// More segments than noted oldest logs: recording never waits for the directory.
 #[test]
 fn a_new_segment_on_a_full_large_card_takes_less_than_half_of_what_the_queue_rides_out() {
     let medium = Medium::formatted(118 * GIB);
@@ -109,7 +107,6 @@ fn a_new_segment_on_a_full_large_card_takes_less_than_half_of_what_the_queue_rid
     assert!(gone == reading.segments && gone > 10, "{reading:?}");
     let (found, lost) = rig.finish(&[&medium]);
     assert_eq!((lost, found[0].gaps.len()), (0, 0));
-    // The oldest log was overwritten.
     let status = CardStatus::new();
     let buffers = Buffers::new();
     let card = Card::mount(medium, &status, &buffers).map_err(|(_, error)| error).expect("it mounts");

@@ -1,4 +1,4 @@
-//! A mishap: all frames go to the card at once, because the next moment may be the last.
+//! All frames go to the card at once: the next moment may be the last.
 
 use crate::rig;
 
@@ -19,7 +19,7 @@ const LANDED: u32 = 245;
 const ON_GROUND: u8 = 1;
 const IN_AIR: u8 = 2;
 
-/// An autopilot's messages of a tenth of a second: at 30 m, turning at `rate`, and its landed state.
+/// A tenth of a second at 30 m, turning at `rate`.
 fn say(rig: &mut Rig, rate: f32, landed: u8) {
     let mut attitude = vec![0; 16];
     attitude.extend(rate.to_le_bytes());

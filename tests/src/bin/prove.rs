@@ -95,7 +95,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     let options = &arguments.options;
-    // Only a full run of all in their long form, with their own number of cases, is written to the document.
+    // Only a full long run writes the document.
     let is_whole = all && !options.short && options.runs.is_none() && arguments.report;
     let commit = if is_whole { Some(commit("docs/proof.md")?) } else { None };
     let parts = chosen.into_iter().map(|campaign| prove(campaign, options)).collect::<Result<Vec<_>>>()?;
@@ -119,7 +119,7 @@ fn prove(campaign: &'static Campaign, options: &Options) -> Result<Part> {
     Ok(Part { campaign, figures, seconds })
 }
 
-/// The commit that was built. Changed files would make a document without a commit.
+/// Changed files would make a document without a commit.
 fn commit(document: &str) -> Result<String> {
     let git = |arguments: &[&str]| -> Result<String> {
         let output = Command::new("git").current_dir(root()).args(arguments).output().context("git")?;

@@ -1,5 +1,5 @@
-//! A board on the model of the chip, with the simulated SD card of `hums-sdcard` at its bus. It runs the image that
-//! is flashed, and all devices around it can be made to fail (`docs/chip.md`).
+//! A board on the model of the chip, with the simulated SD card of `hums-sdcard` at its bus. All devices around it
+//! can fail (`docs/chip.md`).
 
 pub mod record;
 pub mod rig;
@@ -16,17 +16,17 @@ use stm32f405_model::time::{Ps, SECOND, US};
 /// The autopilot's rate.
 pub const BAUD: f64 = 921_600.0;
 
-/// Input of the first port: pieces of bytes, each at its time or as soon as the line is free.
+/// Input of the first port.
 #[derive(Debug, Default)]
 pub struct Feed {
     pieces: VecDeque<(Ps, Vec<u8>)>,
     free: Ps,
-    /// How much too fast the sender's clock is.
+    /// Relative error of the sender's clock.
     pub fast: f64,
 }
 
 impl Feed {
-    /// A tlog's frames at their own times, the first at `start`; other files' bytes back to back.
+    /// A tlog's frames at their own times, the first at `start`; other bytes back to back.
     pub fn read(path: &Path, start: Ps) -> std::io::Result<Self> {
         let bytes = std::fs::read(path)?;
         if path.extension().is_none_or(|extension| extension != "tlog") {
@@ -39,11 +39,10 @@ impl Feed {
         Ok(Self { pieces: pieces.collect(), ..Self::default() })
     }
 
-    /// Puts the bytes up to this moment on the line.
+    /// Puts bytes on the line until then.
     pub fn give(&mut self, machine: &mut Machine, until: Ps) {
         while let Some((at, bytes)) = self.pieces.pop_front_if(|(at, _)| *at < until && self.free < until) {
             let start = at.max(self.free);
-            // No more of it at once than until then.
             let fit = ((until - start.min(until)) as f64 * BAUD / 10.0 / SECOND as f64) as usize + 1;
             let now = bytes.len().min(fit);
             self.free = machine.send(0, &bytes[..now], start, BAUD * (1.0 + self.fast));
@@ -54,7 +53,7 @@ impl Feed {
     }
 }
 
-/// The frames of a tlog: microseconds and bytes, by the lengths in MAVLink's headers.
+/// Microseconds and bytes, by the lengths in MAVLink's headers.
 pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
     let mut frames = Vec::new();
     while let Some((time, rest)) = tlog.split_first_chunk::<8>() {
@@ -72,22 +71,22 @@ pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
     frames
 }
 
-/// Blocks of the card: 4 GB, a multiple of a CSD's unit.
+/// 4 GB, a multiple of a CSD's unit.
 pub const BLOCKS: u32 = 8_388_608;
 
-/// A board of this image with a card in good order.
+/// With a faultless card.
 pub fn board(image: Image, board: Board) -> (Machine, Slot, Medium) {
     board_with(image, board, Vec::new())
 }
 
-/// A board of this image with a card that has these faults.
+/// With a card of these faults.
 pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slot, Medium) {
     let medium = Medium::formatted(BLOCKS);
     let (machine, slot) = board_of(image, board, Model { plans, ..Model::new(Kind::Sdhc, medium.clone()) });
     (machine, slot, medium)
 }
 
-/// A board of this image with this card.
+/// With this card.
 pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
     let slot = Slot::new(Some(card));
     let wired = wired(&image);
@@ -96,26 +95,26 @@ pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
     (machine, slot)
 }
 
-/// The board that the image is for.
+/// The image's board.
 ///
 /// # Panics
-/// If the image names none.
+/// The image names none.
 pub fn wired(image: &Image) -> &'static hums_boards::Board {
     let name = image.pieces.iter().find_map(|(_, bytes)| hums_boards::name_in(bytes));
     hums_boards::find(name.expect("the image names its board")).expect("a board of this version")
 }
 
-/// A pin, as the model counts it.
+/// As the model counts pins.
 pub fn pin(pin: hums_boards::Pin) -> Pin {
     Pin(pin.port, pin.number)
 }
 
-/// A port, as the model counts it.
+/// As the model counts ports.
 pub fn usart(port: &hums_boards::Port) -> usize {
     usize::from(port.usart) - 1
 }
 
-/// Writes a card's image to a file.
+/// Writes the card's image.
 pub fn save(medium: &Medium, path: &Path) -> std::io::Result<()> {
     medium.save(&std::fs::File::create(path)?)
 }

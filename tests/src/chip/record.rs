@@ -1,4 +1,4 @@
-//! The record on a card, compared with the sent frames.
+//! A card's record, compared with the sent frames.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
@@ -11,17 +11,17 @@ use hums_sdcard::Medium;
 /// A session on a card.
 #[derive(Debug, Default)]
 pub struct Session {
-    /// Frames: milliseconds of the record's clock and bytes.
+    /// Milliseconds of the record's clock, and bytes.
     pub frames: Vec<(u64, Vec<u8>)>,
-    /// Reported losses: kind, count, from and to in milliseconds.
+    /// Kind, count, from and to in milliseconds.
     pub losses: Vec<(&'static str, u64, u64, u64)>,
-    /// Its own messages: faults, notes.
+    /// Faults and notes.
     pub texts: Vec<String>,
-    /// Parts that cannot be read.
+    /// Unreadable parts.
     pub gaps: usize,
 }
 
-/// All sessions, in their order.
+/// In their order.
 pub fn read(medium: &Medium) -> Vec<Session> {
     some(medium, 0)
 }
@@ -31,7 +31,7 @@ pub fn last(medium: &Medium) -> Option<Session> {
     some(medium, usize::MAX).pop()
 }
 
-/// All sessions but the first `skip`, and at least the last one.
+/// Skips `skip`, but not the last one.
 fn some(medium: &Medium, skip: usize) -> Vec<Session> {
     let (status, held) = (CardStatus::new(), Buffers::new());
     let Ok(card) = Card::mount(medium.clone(), &status, &held) else { return Vec::new() };
@@ -47,7 +47,7 @@ fn some(medium: &Medium, skip: usize) -> Vec<Session> {
         let mut session = Session::default();
         for name in names {
             let Ok(mut segment) = card.segment(name) else { continue };
-            // The newest copy of the last sector may be at the place after it, with nothing yet at its own.
+            // The newest copy of the last sector may be at the place after it.
             let mut empty = 0;
             for index in 0..segment.blocks() {
                 let mut block = [0; BLOCK_BYTES];
@@ -91,20 +91,20 @@ fn take(reader: &mut LogReader, session: &mut Session) {
     }
 }
 
-/// How recorded frames compare with those sent.
+/// Recorded frames against sent ones.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Compared {
-    /// Frames that are there unchanged.
+    /// Unchanged frames.
     pub right: usize,
-    /// Frames that were sent and are not there.
+    /// Sent frames that are not there.
     pub missing: usize,
-    /// Frames that were not sent, or come more often than sent.
+    /// Not sent, or more often than sent.
     pub wrong: usize,
-    /// Frames missing before the first that is there, and after the last.
+    /// Missing before the first and after the last one.
     pub ends: (usize, usize),
 }
 
-/// Compares by content; the reader checks their order.
+/// By content; the reader checks the order.
 pub fn compare<'a>(sent: &[Vec<u8>], recorded: impl Iterator<Item = &'a [u8]>) -> Compared {
     let mut places: HashMap<&[u8], VecDeque<usize>> = HashMap::new();
     for (place, frame) in sent.iter().enumerate() {

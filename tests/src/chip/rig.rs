@@ -1,4 +1,4 @@
-//! A board on a bench: frames come at its first port at full rate, and the record is compared with them.
+//! Frames at the first port at full rate, and their record.
 
 use hums_sdcard::{Medium, Plan, Slot};
 use stm32f405_model::image::Image;
@@ -15,17 +15,17 @@ use super::{BAUD, board_with, pin, usart, wired};
 pub struct Bench {
     /// The board's image.
     pub image: Image,
-    /// Input of its first port, over and over.
+    /// Sent over and over.
     pub frames: Vec<Vec<u8>>,
 }
 
 impl Bench {
-    /// A board that gets power for the first time.
+    /// At its first power-on.
     pub fn rig(&self, parts: Board) -> Rig {
         Rig::new(&self.image, parts, self.frames.clone())
     }
 
-    /// A board that has made its store before, and just got power again: its second reset.
+    /// Its store exists: the second reset.
     pub fn settled(&self, parts: Board) -> Result<Rig, Box<Report>> {
         let mut rig = self.rig(parts);
         rig.machine.run_until(2 * SECOND)?;
@@ -39,39 +39,39 @@ impl Bench {
 
 /// A board on a bench.
 pub struct Rig {
-    /// The board that the image is for.
+    /// The image's board.
     pub wired: &'static hums_boards::Board,
     /// The board.
     pub machine: Machine,
     /// Its card's slot.
     pub slot: Slot,
-    /// The record on the card.
+    /// The card's blocks.
     pub medium: Medium,
-    /// Sent frames, with the time of their last bits.
+    /// With the time of their last bits.
     pub sent: Vec<(Ps, Vec<u8>)>,
     frames: Vec<Vec<u8>>,
     next: usize,
     free: Ps,
-    /// How much too fast the sender's clock is.
+    /// Relative error of the sender's clock.
     pub fast: f64,
-    /// Times when the LED changed, and whether it was lit then.
+    /// Times of its changes, and whether it was lit then.
     pub led: Vec<(Ps, bool)>,
 }
 
 impl Rig {
-    /// With these frames to send, over and over.
+    /// Sends these frames over and over.
     pub fn new(image: &Image, parts: Board, frames: Vec<Vec<u8>>) -> Self {
         Self::with(image, parts, frames, Vec::new())
     }
 
-    /// The same with a card that has these faults.
+    /// With a card of these faults.
     pub fn with(image: &Image, parts: Board, frames: Vec<Vec<u8>>, plans: Vec<Plan>) -> Self {
         let (machine, slot, medium) = board_with(image.clone(), parts, plans);
         let (wired, sent, led) = (wired(image), Vec::new(), Vec::new());
         Self { wired, machine, slot, medium, sent, frames, next: 0, free: 0, fast: 0.0, led }
     }
 
-    /// Runs until this moment; with `busy` the line is full of frames.
+    /// `busy`: the line is full of frames.
     pub fn run(&mut self, until: Ps, busy: bool) -> Result<(), Box<Report>> {
         while self.machine.now() < until {
             let to = (self.machine.now() + 10 * MS).min(until);
@@ -100,7 +100,7 @@ impl Rig {
         Ok(())
     }
 
-    /// Fills the store by settings from a ground station, on the ground and disarmed, for 36 s: the next calm needs an erase.
+    /// 36 s of settings on the ground, disarmed: the next calm needs an erase.
     pub fn fill(&mut self) -> Result<(), Box<Report>> {
         const NAMES: [&str; 6] = [
             "BAT_TEMP_WARN",
@@ -124,12 +124,12 @@ impl Rig {
         Ok(())
     }
 
-    /// Other instructions at the beginning of this interrupt handler until the next reset (at most 15 s), at full
-    /// rate or with an idle line. Returns the handler's address.
+    /// Replaces the handler's beginning until the next reset (at most 15 s), at full rate or with an idle line. Returns its
+    /// address.
     ///
     /// # Panics
     ///
-    /// If the image has no such handler.
+    /// The image has no such handler.
     pub fn replace(&mut self, handler: &str, code: &[u8], busy: bool) -> Result<u32, Box<Report>> {
         let symbol = self.machine.image().symbols.iter().find(|symbol| symbol.name == handler);
         let address = symbol.expect("a handler of the image's").address;
@@ -155,7 +155,7 @@ impl Rig {
         read(&self.medium)
     }
 
-    /// The record, compared with the sent frames.
+    /// The record against the sent frames.
     pub fn compared(&self) -> Compared {
         let sent: Vec<Vec<u8>> = self.sent.iter().map(|(_, frame)| frame.clone()).collect();
         let sessions = self.sessions();
@@ -165,7 +165,7 @@ impl Rig {
     }
 }
 
-/// A `MAVLink` 2 frame of a ground station's, with the checksum's seed of its message.
+/// A `MAVLink` 2 frame of a ground station.
 pub fn frame(id: u32, payload: &[u8], seed: u8, sequence: u8) -> Vec<u8> {
     let mut frame = vec![0xFD, payload.len() as u8, 0, 0, sequence, 255, 190];
     frame.extend(&id.to_le_bytes()[..3]);
@@ -180,7 +180,7 @@ pub fn frame(id: u32, payload: &[u8], seed: u8, sequence: u8) -> Vec<u8> {
     frame
 }
 
-/// `PARAM_SET` of a number.
+/// `PARAM_SET`.
 pub fn set(name: &str, value: f32, sequence: u8) -> Vec<u8> {
     let mut payload = value.to_le_bytes().to_vec();
     payload.extend([1, 191]);
@@ -189,7 +189,7 @@ pub fn set(name: &str, value: f32, sequence: u8) -> Vec<u8> {
     frame(23, &payload, 168, sequence)
 }
 
-/// A heartbeat of a disarmed quadrotor of ArduPilot's.
+/// From a disarmed quadrotor of ArduPilot.
 pub fn heartbeat(sequence: u8) -> Vec<u8> {
     let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, 0x51, 3, 3], 50, sequence);
     // From the autopilot's own component.

@@ -1,4 +1,4 @@
-//! A card in a file, whose blocks can be changed one by one, with its partition in a second file for `fsck.vfat`.
+//! A card's file and a copy of its partition for `fsck.vfat`.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -22,12 +22,11 @@ pub(super) const BLOCK: usize = 512;
 pub(super) struct Card {
     dir: TempDir,
     file: File,
-    /// Made on first use, and kept up to date from then on.
+    /// Made on first use, then kept up to date.
     partition: Option<(File, u64)>,
 }
 
 impl Card {
-    /// A formatted card of this size.
     pub(super) fn new(mib: u64) -> Result<Self> {
         let dir = tempfile::tempdir()?;
         let file = open_or_make(&dir.path().join("card.img"), Some(mib), |_| Ok(()))?;
@@ -40,7 +39,6 @@ impl Card {
         self.dir.path().join("card.img")
     }
 
-    /// The card in its slot.
     pub(super) fn device(&self, faults: Faults) -> Result<SimCard> {
         Ok(SimCard::new(self.file.try_clone()?, faults)?)
     }
@@ -75,14 +73,13 @@ impl Card {
         Ok(())
     }
 
-    /// The files of its file system.
     pub(super) fn walk(&self) -> Result<Walk> {
         let device = ReadOnlyImage::new(self.file.try_clone()?)?;
         let layout = Layout::read(&device).map_err(|error| anyhow!("{error}"))?;
         Volume::new(&self.file, layout)?.walk().context("the file system cannot be walked")
     }
 
-    /// `fsck.vfat -n` finds only effects of a cut.
+    /// By `fsck.vfat -n`, without effects of a cut.
     pub(super) fn check(&mut self) -> Result<()> {
         let path = self.dir.path().join("partition");
         if self.partition.is_none() {

@@ -1,7 +1,5 @@
-//! Bit errors anywhere in a log; whole pages and ends are in [`super::pages`].
-//!
-//! A log is recorded once and read: every sent frame comes out. Then a bit, or a burst of bits, is flipped in the
-//! image, the log is read, and the bits are restored. The result is compared with the frames of the whole log.
+//! Bit errors anywhere in a log; [`super::pages`] has whole pages and ends. A bit or a burst is flipped in the image,
+//! the log is read against the whole log's frames, and the bits are restored.
 
 use std::collections::BTreeSet;
 
@@ -19,9 +17,9 @@ use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::{OWN, own};
 
-/// Seconds of each recording, at full rate: a dozen groups, so that ten thousand readings take minutes.
+/// At full rate: a dozen groups, so that ten thousand readings take minutes.
 const SECONDS: f64 = 15.0;
-/// The longest burst, in bits: a sector.
+/// A sector.
 const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
 
 pub(super) const LABELS: Labels = Labels {
@@ -84,7 +82,6 @@ fn bits(options: &Options, figures: &mut Figures) -> Result<()> {
     Ok(())
 }
 
-/// Pages and ends, of closed and of open logs.
 fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
     let logs: Vec<_> =
         OWN.into_iter().flat_map(|flight| [(flight, true), (flight, false)]).zip(1..).collect();
@@ -118,7 +115,7 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
 #[derive(Default)]
 struct Outcome {
     noticed: u64,
-    /// Not noticed, and all frames came out.
+    /// Not noticed; all frames came out.
     harmless: u64,
     single: u64,
     bursts: u64,
@@ -129,7 +126,7 @@ struct Outcome {
 struct Subject {
     card: Card,
     log: Log,
-    /// The blocks that hold sectors, in order, each with its group's number.
+    /// In order, each with its group.
     blocks: Vec<(u32, usize)>,
     whole: Record,
 }
@@ -161,7 +158,7 @@ impl Subject {
         Ok(Self { card, log, blocks, whole })
     }
 
-    /// On the card, or, with `in_memory`, before the touched sectors got their checksums.
+    /// `in_memory`: before the sectors got their checksums.
     fn damage_often(&self, count: u64, in_memory: bool, seed: u64) -> Result<Outcome> {
         let mut random = Random::new(seed);
         let mut outcome = Outcome::default();
@@ -192,7 +189,7 @@ impl Subject {
         Ok(outcome)
     }
 
-    /// Flips the first and the last bit of the burst and those between by chance; returns the original blocks.
+    /// Returns the original blocks.
     fn flip(&self, bit: u64, length: u64, random: &mut Random) -> Result<Vec<(u32, [u8; BLOCK])>> {
         let bits_of_block = 8 * BLOCK as u64;
         let mut before: Vec<(u32, [u8; BLOCK])> = Vec::new();
@@ -213,7 +210,6 @@ impl Subject {
         Ok(before)
     }
 
-    /// Gives a sector the checksum of its content.
     fn seal(&self, block: u32) -> Result<()> {
         let mut sector = Sector::from_bytes(self.card.read_block(block)?);
         sector.seal(self.whole.summary.session.context("no session")?);
@@ -225,7 +221,7 @@ impl Subject {
         let is_noticed =
             !damaged.gaps.is_empty() || blocks.damaged > 0 || blocks.foreign > 0 || blocks.repaired > 0;
         outcome.noticed += u64::from(is_noticed);
-        // Decoded frames are original ones, in order; missing ones are known by their place.
+        // Missing frames are known by their place.
         let mut missing = Vec::new();
         let mut given = damaged.frames.iter().peekable();
         for (index, frame) in self.whole.frames.iter().enumerate() {

@@ -24,20 +24,18 @@ const BAUD: u64 = 200_000;
 struct Form {
     card_mib: u64,
     seconds: u64,
-    /// Number of looks at the card.
     looks: u64,
     flights: &'static [&'static str],
 }
 
 const LONG: Form = Form { card_mib: 64, seconds: 24 * 3600, looks: 24, flights: &OWN };
-/// The smallest card and the flight that compresses least, so that the card is full after an hour and a half.
+/// The smallest card and the least compressible flight: full after an hour and a half.
 const SHORT: Form = Form { card_mib: 34, seconds: 6_500, looks: 4, flights: &["px4_hil_quad_low.tlog"] };
-/// Longest delay of the log at any moment, in milliseconds.
+/// Milliseconds, at any moment.
 const BEHIND_MS_MAX: u64 = 200;
-/// Least share of the card's space for the newest data: one segment of sixteen is being overwritten, and the file
-/// system takes some.
+/// One segment of sixteen is being overwritten, and the file system takes some.
 const KEPT_MIN: f64 = 0.8;
-/// Highest growth of allocations since the second look at the card, in bytes: the list of looks, a file's name.
+/// Bytes since the second look: the list of looks, a file's name.
 const GROWTH_BYTES_MAX: usize = 64 << 10;
 
 pub(super) const LABELS: Labels = Labels {
@@ -91,7 +89,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let last = look(&path, form, seconds * 1_000_000).context("at the end")?;
     ensure!(done.stats.frames_lost == 0, "{} frames lost", done.stats.frames_lost);
     ensure!(done.card.segments_overwritten > 0, "the card never became full");
-    // By the second look, data that is cached for later readings is already there.
+    // Data cached for later readings is there by then.
     let early = seen.get(1).context("looked too rarely")?.held_bytes;
     let late = seen.iter().skip(2).map(|about| about.held_bytes).max().unwrap_or(early);
     ensure!(late <= early + GROWTH_BYTES_MAX, "memory grew from {early} to {late} bytes");
@@ -122,7 +120,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     Ok(figures)
 }
 
-/// The recordings in turn, again and again, until the day is over.
+/// Recordings in turn, until the day is over.
 struct Day<'a> {
     streams: &'a [Stream],
     next: usize,
@@ -163,7 +161,7 @@ struct About {
     held_bytes: usize,
 }
 
-/// The newest data is on the card, without a hole, up to this moment.
+/// Without a hole up to this moment.
 fn look(path: &Path, form: &Form, now_us: u64) -> Result<About> {
     let held_bytes = held_bytes().context("this program does not count what it allocates")?;
     let logs = on_card(path);

@@ -1,18 +1,18 @@
-//! The results of a campaign.
+//! A campaign's results.
 
 use std::fmt::Write as _;
 
-/// The labels of a campaign's figures. Every test run compares `docs/proof.md` with them.
+/// Labels of the figures. Tests compare `docs/proof.md` with them.
 #[derive(Debug)]
 pub struct Labels {
-    /// The single figures, in the order in which they are printed.
+    /// Single figures, in printed order.
     pub facts: &'static [&'static str],
-    /// The heading of its table; empty without a table.
+    /// The table's heading; empty without a table.
     pub columns: &'static [&'static str],
 }
 
 impl Labels {
-    /// The lines of the document that are the same in each run: each fact up to its colon, and the table's heading.
+    /// Constant lines: each fact up to its colon, and the table's heading.
     #[cfg(test)]
     pub(super) fn lines(&self) -> Vec<String> {
         let heading = (!self.columns.is_empty()).then(|| heading(self.columns));
@@ -24,7 +24,7 @@ fn heading(columns: &[&str]) -> String {
     format!("| {} |", columns.join(" | "))
 }
 
-/// The results of a campaign.
+/// Labelled results.
 #[derive(Debug, Clone)]
 pub struct Figures {
     labels: &'static Labels,
@@ -33,7 +33,6 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// No figures yet, with these labels.
     pub(super) fn new(labels: &'static Labels) -> Self {
         Self { labels, facts: Vec::new(), rows: Vec::new() }
     }
@@ -41,26 +40,26 @@ impl Figures {
     /// The next figure.
     ///
     /// # Panics
-    /// If the next label is another one: the labels are the campaign's own.
+    /// The next label is another one.
     #[expect(clippy::needless_pass_by_value, reason = "numbers, and texts that are made for this")]
     pub(super) fn fact(&mut self, what: impl AsRef<str>, figure: impl ToString) {
         assert_eq!(self.labels.facts.get(self.facts.len()), Some(&what.as_ref()), "the campaign's labels");
         self.facts.push(figure.to_string());
     }
 
-    /// The next row of the table.
+    /// The next row.
     ///
     /// # Panics
-    /// If it has more or fewer cells than the table has columns.
+    /// Its cells are not as many as the columns.
     pub(super) fn row<const N: usize>(&mut self, row: [String; N]) {
         assert_eq!(self.labels.columns.len(), N, "the campaign's labels");
         self.rows.push(row.into());
     }
 
-    /// As text, which is Markdown too.
+    /// Text and Markdown.
     ///
     /// # Panics
-    /// If a label has no figure.
+    /// A label has no figure.
     pub fn text(&self) -> String {
         assert_eq!(self.labels.facts.len(), self.facts.len(), "each label has a figure");
         let mut text = String::new();

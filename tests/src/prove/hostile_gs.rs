@@ -25,23 +25,23 @@ use crate::flights::{OWN, own};
 
 /// 10 kB/s of the vehicle; the flights in turn.
 const BAUD: u64 = 100_000;
-/// The ground station's line, always full.
+/// Always full.
 const GS_BAUD: u64 = 57_600;
-/// Time resolution of watching the port, in microseconds.
+/// Microseconds.
 const STEP_US: u64 = 5_000;
 const SECOND_US: u64 = 1_000_000;
 const KEY: [u8; 32] = [0x5a; 32];
-/// The budget of the board that has a key, in bytes a second.
+/// With a key, bytes a second.
 const BUDGET: u32 = 1_000;
-/// The highest value that anybody may set.
+/// Also the seconds of each.
 const BUDGET_MAX: u32 = 5_000;
 const AP_BUDGET_MAX: u32 = 10_000;
 
 /// Earlier sessions on the card, and how long each is in seconds.
 const EARLIER: u32 = 3;
 const EARLIER_S: f64 = 3.0;
-/// Messages that the box sends to the autopilot by itself (docs/safety.md): HEARTBEAT, `PARAM_REQUEST_READ`,
-/// `REQUEST_DATA_STREAM` and `COMMAND_LONG`, of the latter these.
+/// The box's own messages (docs/safety.md): HEARTBEAT, `PARAM_REQUEST_READ`, `REQUEST_DATA_STREAM` and
+/// `COMMAND_LONG`, of the latter these.
 const OWN_IDS: [u32; 4] = [0, 20, 66, 76];
 const OWN_COMMANDS: [u16; 2] = [511, 512];
 const COMPONENT: u8 = 191;
@@ -73,7 +73,7 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     let seconds = options.runs(24 * 3600, 300);
     let mut figures = Figures::new(&LABELS);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
-    // Half of the time all settings are allowed, half of the time the key is needed.
+    // Half of the time the key is needed.
     for (name, key) in [("without a key", None), ("with a key", Some(KEY))] {
         let half = attack(options, seconds / 2, key).with_context(|| name.to_owned())?;
         figures.fact(format!("{name}: hostile bytes, MB"), format!("{:.1}", half.hostile_bytes as f64 / 1e6));
@@ -117,16 +117,15 @@ struct Half {
     to_autopilot: ToAutopilot,
     autopilot_budget: u32,
     changed: usize,
-    /// Logs of earlier sessions that are marked as erased.
+    /// Of earlier sessions.
     erased: usize,
 }
 
-/// Frames that reached the autopilot.
 #[derive(Default)]
 struct ToAutopilot {
     window: Window,
     frames: u64,
-    /// Of them frames of the kinds that the box sends by itself, in its own name.
+    /// The box's own kinds, in its own name.
     own: u64,
 }
 
@@ -144,7 +143,7 @@ impl ToAutopilot {
     }
 }
 
-/// The frames of each log of the earlier sessions, and the number of logs on the card that are marked as erased.
+/// Also the number of logs marked as erased.
 fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     let mut frames = BTreeMap::new();
     for log in on_card(&card.path()).into_iter().take(EARLIER as usize) {
@@ -159,8 +158,7 @@ fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     Ok((frames, erased))
 }
 
-/// Room for all logs of a day. Without a key any station can begin and end logs, and a full card overwrites the
-/// oldest.
+/// All logs of a day: without a key any station can begin logs, and a full card overwrites the oldest.
 const CARD_MIB: u64 = 4096;
 
 fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half> {
@@ -208,7 +206,7 @@ fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half
     Ok(half)
 }
 
-/// The board's parameters; with a key unsigned requests get no answer.
+/// With a key unsigned requests get no answer.
 fn params(keyed: bool) -> Result<Params> {
     let mut params = Params::defaults();
     let mut set = |name: &str, value: f32| {
@@ -223,7 +221,6 @@ fn params(keyed: bool) -> Result<Params> {
 }
 
 impl Half {
-    /// Conditions with and without a key.
     fn judge(&self) -> Result<()> {
         let (stats, left) = (self.outcome.done.stats, self.outcome.done.frames_left);
         ensure!(
@@ -238,13 +235,12 @@ impl Half {
         Ok(())
     }
 
-    /// Conditions with a key.
     fn judge_with_key(&self, card: &Card) -> Result<()> {
         let Self { changed, erased, to_autopilot: ToAutopilot { frames, own, .. }, .. } = self;
         ensure!(*changed == 0, "{changed} parameters were changed without the key");
         ensure!(*erased == 0, "{erased} logs were marked as erased without the key");
         ensure!(frames == own && *own > 0, "{own} of {frames} frames to the autopilot are the box's own");
-        // Recording never stopped, and none of its frames is foreign.
+        // Recording never stopped; no frame is foreign.
         let stats = self.outcome.done.stats;
         ensure!(stats.frames_logged == stats.frames_in, "{} of {}", stats.frames_logged, stats.frames_in);
         let logs = on_card(&card.path());
@@ -255,7 +251,6 @@ impl Half {
     }
 }
 
-/// The fullest second at a port.
 #[derive(Default)]
 struct Window {
     frames: VecDeque<(u64, usize)>,
@@ -275,7 +270,7 @@ impl Window {
     }
 }
 
-/// The vehicle's bytes and the ground station's, step by step.
+/// Step by step.
 fn both_sides<'a>(
     streams: &'a [Stream],
     seconds: u64,
@@ -296,10 +291,8 @@ struct Hostile {
     rng: Rng,
     encoder: Encoder,
     waiting: VecDeque<u8>,
-    /// The same frame again, this many times.
     flood: (u64, u64),
     bytes: u64,
-    /// A frame that was sent before.
     old: Vec<u8>,
     frames: u64,
 }
@@ -361,7 +354,7 @@ impl Hostile {
                 let command = if self.rng.chance(0.7) { known } else { self.rng.next_u64() as u16 };
                 let first = if self.rng.chance(0.5) { self.below(400) as f32 } else { self.value() };
                 let id = 75 + self.below(2) as u32;
-                // A valid format command, often enough.
+                // Often enough.
                 let (first, second) =
                     if command == 526 && self.rng.chance(0.5) { (1.0, 1.0) } else { (first, 0.0) };
                 at_target(Packet::new(id).f32(0, first).f32(4, second).u16(28, command), 30)
@@ -386,7 +379,7 @@ impl Hostile {
                 let key = self.random_bytes(32);
                 at_target(Packet::new(256).u64(0, self.rng.next_u64()).bytes(10, &key), 8)
             }
-            // Any message with any content; also under another identity.
+            // Also under another identity.
             12 | 13 => {
                 let id = self.below(512) as u32;
                 let size = self.below(255) as usize;
@@ -397,7 +390,6 @@ impl Hostile {
                 self.waiting.extend(old);
                 return;
             }
-            // As much as possible.
             _ if self.rng.chance(0.5) => {
                 Packet::new(23).f32(0, 5_000.0).u8(4, 1).u8(5, 191).text(6, 16, "GS_BUDGET")
             }
@@ -418,7 +410,7 @@ impl Hostile {
         if self.rng.chance(0.2) {
             return self.random_bytes(16);
         }
-        // Turning its own port off would end the attack.
+        // Its own port off would end the attack.
         let name =
             Some(TABLE[self.below(TABLE.len() as u64) as usize].name).filter(|name| *name != "GS_PATH");
         let mut name = name.unwrap_or("GS_BUDGET").as_bytes().to_vec();
@@ -435,8 +427,7 @@ impl Hostile {
         }
     }
 
-    /// As itself, as the vehicle, as the board, or with any ids; sometimes damaged, sometimes signed with another
-    /// key.
+    /// Any identity; sometimes damaged, sometimes signed with another key.
     fn say(&mut self, packet: &Packet) {
         let who = match self.below(8) {
             0 => (1, 1),
@@ -469,7 +460,7 @@ impl Hostile {
         if self.rng.chance(0.1) {
             self.old.clone_from(&frame);
         }
-        // An unknown message gives no frame.
+        // Unknown messages give no frame.
         if frame.is_empty() {
             frame = self.random_bytes(8);
         }

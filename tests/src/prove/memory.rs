@@ -1,12 +1,11 @@
-//! Memory that a campaign allocates, to the byte: resident memory also depends on the allocator.
+//! To the byte: resident memory also depends on the allocator.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 static HELD: AtomicUsize = AtomicUsize::new(0);
 
-/// The system's allocator, with a count of allocated bytes. A program that uses `held_bytes` sets it as its
-/// `#[global_allocator]`.
+/// The system's allocator with a count of bytes. Set as `#[global_allocator]` for `held_bytes`.
 #[derive(Debug)]
 pub struct Counting;
 
@@ -25,7 +24,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Bytes that are allocated now; `None` in a program without [`Counting`].
+/// `None` without [`Counting`].
 pub(super) fn held_bytes() -> Option<usize> {
     Some(HELD.load(Ordering::Relaxed)).filter(|&bytes| bytes > 0)
 }

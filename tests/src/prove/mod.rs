@@ -1,9 +1,7 @@
 //! Campaigns: the promises about the record, tested in thousands of cases each.
 //!
-//! Each campaign runs in this process, on the same bodies of tasks as `hums sim`, because ten thousand runs of a
-//! program would take a day. Results are compared with the recording itself, the card with `fsck.vfat`. A campaign is
-//! one file here and one line in [`CAMPAIGNS`]; `cargo xtask prove` runs them and writes `docs/proof.md`; a test
-//! compares its labels with those of the campaigns.
+//! Each runs in this process, on the same tasks as `hums sim`: ten thousand program runs would take a day. A campaign
+//! is one file here and one line in [`CAMPAIGNS`]; `cargo xtask prove` writes `docs/proof.md`.
 
 mod card;
 mod damage;
@@ -32,13 +30,13 @@ pub use report::{Part, Provenance, write as write_report};
 /// One campaign.
 #[derive(Debug)]
 pub struct Campaign {
-    /// Its name on the command line.
+    /// On the command line.
     pub name: &'static str,
-    /// The tested promise, as a sentence.
+    /// The promise, as a sentence.
     pub about: &'static str,
-    /// The labels of its figures.
+    /// Labels of its figures.
     pub labels: Labels,
-    /// Runs it; an error is a broken promise.
+    /// An error is a broken promise.
     pub run: fn(&Options) -> Result<Figures>,
 }
 

@@ -1,7 +1,4 @@
-//! Mutations of inputs for the readers: the fuzz targets of `hums-fuzz` on stable Rust, in a long round.
-//!
-//! Each target takes any bytes as its reader's input, and asserts its rules. A short round of the same mutations with
-//! another seed is a test of `hums-fuzz`.
+//! The fuzz targets of `hums-fuzz` on stable Rust, in a long round; a test of `hums-fuzz` is a short one.
 
 use anyhow::{Context as _, Result, bail};
 use hums_fuzz::{TARGETS, Target, mutate};
@@ -10,9 +7,9 @@ use rayon::prelude::*;
 use super::figures::{Figures, Labels};
 use super::options::Options;
 
-/// The long round has this many times the inputs of the test, which takes half a second a target.
+/// Times the test's inputs, which take half a second a target.
 const LONG: u64 = 400;
-/// The short round has this part of the test's inputs.
+/// Part of the test's inputs.
 const SHORT: u64 = 5;
 
 pub(super) const LABELS: Labels = Labels {
@@ -21,14 +18,14 @@ pub(super) const LABELS: Labels = Labels {
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    // The test has the seed 1.
+    // The test has 1.
     let seed = options.seed.wrapping_add(1);
     let outcomes = TARGETS.par_iter().with_max_len(1).map(|target| try_often(target, options, seed));
     let outcomes = outcomes.collect::<Result<Vec<_>>>()?;
     let mut figures = Figures::new(&LABELS);
     figures.fact("readers", outcomes.len());
     figures.fact("inputs tried", outcomes.iter().sum::<u64>());
-    // The first one ends the campaign with an error.
+    // The first one ends the campaign.
     figures.fact("inputs that broke a rule", 0);
     for (target, tried) in TARGETS.iter().zip(outcomes) {
         figures.row([target.name.to_owned(), tried.to_string()]);
@@ -36,7 +33,6 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     Ok(figures)
 }
 
-/// The number of inputs tried.
 fn try_often(target: &'static Target, options: &Options, seed: u64) -> Result<u64> {
     let rounds = options.runs(LONG * target.rounds, target.rounds / SHORT);
     match mutate::run(target, seed, |mutations| mutations < rounds).context(target.name)? {

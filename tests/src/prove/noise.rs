@@ -1,4 +1,4 @@
-//! Bytes on the line are damaged.
+//! Damaged bytes on the line.
 
 use anyhow::{Result, ensure};
 use hums::logs::on_card;
@@ -12,11 +12,11 @@ use super::stream::{Stream, hash};
 use crate::damage;
 use crate::flights::{OWN, own};
 
-/// The probability that a byte is damaged.
+/// Of a damaged byte.
 const PROBABILITIES: [f64; 5] = [0.000_01, 0.000_1, 0.001, 0.003, 0.01];
 /// Far below the recorder's limit: only the noise matters.
 const BAUD: u64 = 230_400;
-/// Whole frames that one false frame, of 280 bytes, can cover: none is shorter than 17 with its header.
+/// Whole frames under one false frame of 280 bytes: none is shorter than 17 with its header.
 const HIDDEN_MAX: usize = 16;
 /// Two causes, each with a chance of 1 in 65,536: a damaged frame whose checksum fits, and a damaged header that
 /// makes a candidate within a frame.
@@ -79,7 +79,6 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
 struct Outcome {
     frames: u64,
     whole: u64,
-    /// Whole frames under a false one from the noise.
     missing: u64,
     invented: u64,
 }
@@ -100,7 +99,7 @@ fn record(mut stream: Stream, probability: f64, seed: u64) -> Result<Outcome> {
     let record = Record::of(&log)?;
     ensure!(record.gaps.is_empty(), "gaps: {:?}", record.gaps);
     let (missing, invented) = compare(&whole, &record);
-    // Only a false frame from the noise, with a checksum that fits by chance, can hide a whole one: it covers it.
+    // Only a false frame, valid by chance, hides a whole one.
     ensure!(
         missing <= 3 * invented,
         "{missing} whole frames are missing, {invented} were made up, seed {seed}"
@@ -113,7 +112,7 @@ fn record(mut stream: Stream, probability: f64, seed: u64) -> Result<Outcome> {
     Ok(Outcome { frames: stream.frames.len() as u64, whole, missing, invented })
 }
 
-/// The number of whole frames that are not in the record, and of false frames from the noise. Both are in order.
+/// Missing whole frames, and false ones; both in order.
 fn compare(whole: &[u64], record: &Record) -> (usize, usize) {
     let (mut next, mut missing, mut invented) = (0, 0, 0);
     for frame in &record.frames {
@@ -129,8 +128,7 @@ fn compare(whole: &[u64], record: &Record) -> (usize, usize) {
     (missing + whole.len() - next, invented)
 }
 
-/// Bytes of a frame that its checksum covers, itself included. The signature after it can be verified only with the
-/// key.
+/// Checksum included. The signature needs the key.
 fn covered(frame: &[u8]) -> usize {
     let is_signed = frame[0] == 0xFD && frame[2] & 1 == 1;
     if is_signed { frame.len() - 13 } else { frame.len() }

@@ -1,6 +1,6 @@
 //! Damage of whole pages of a log, and lost ends.
 //!
-//! A log is recorded once. Then its file is changed in one of these ways:
+//! A recorded log is changed in one of these ways:
 //!
 //! - it is cut;
 //! - pages are erased, zeroed, copied, exchanged or replaced by those of an older session;
@@ -8,9 +8,9 @@
 //! - a sector is altered with a valid check;
 //! - a sector is lost and a parity sector of it is altered with a valid check.
 //!
-//! The rest is read and verified, and compared with the whole log. *Noticed* means that `hums info --verify` does not
-//! call it good; that includes lossless repair by parity. A cut behind an end mark looks like a power cut at that
-//! place. It is *told* if `verify` names the mark up to which the log is whole, and all of it is.
+//! The rest is read, verified and compared with the whole log. *Noticed* means that `hums info --verify` does not
+//! call it good; that includes lossless repair by parity. A cut behind an end mark looks like a power cut. It is
+//! *told* if `verify` names the mark up to which the log is whole, and all of it is.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -34,35 +34,29 @@ use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::own;
 
-/// Blocks of zeros behind the last sector, as in a segment that is not full.
+/// As in a segment that is not full.
 const SPACE_BLOCKS: usize = 64;
 
-/// The kinds of damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
-    /// It ends at any byte.
     Cut,
-    /// It ends behind any sector.
     CutAtSector,
-    /// One page is all ones or all zeros.
     Erased,
-    /// All blocks from a page on are.
+    /// All blocks from a page on.
     ErasedToTheEnd,
-    /// It goes on with the second half of another log.
     Spliced,
-    /// All of another log follows, at once or behind some space.
+    /// At once or behind some space.
     Joined,
     /// One page is also in the place of another one.
     Copied,
     /// One page is there twice, and later ones are moved back.
     Inserted,
-    /// Two pages are exchanged.
     Swapped,
-    /// One page has the content of another session.
+    /// A page of another session.
     Stale,
-    /// A byte of a sector is changed, with a valid check.
+    /// With a valid check.
     Altered,
-    /// A sector is lost, and a byte of one of the two from which it would be rebuilt is changed, with a valid check.
+    /// A sector is lost, and a source of its parity altered with a valid check.
     ParityAltered,
 }
 
@@ -101,17 +95,16 @@ impl Kind {
     }
 }
 
-/// Results for the damages of one kind.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
     pub(super) damages: u64,
     /// `verify` does not call it good.
     pub(super) noticed: u64,
-    /// `verify` calls it whole up to an end mark, and it is.
+    /// Whole up to an end mark, and it is.
     pub(super) told: u64,
-    /// Of the noticed ones: nothing is missing, and `verify` reports the repair.
+    /// Nothing is missing, and the repair is reported.
     pub(super) repaired: u64,
-    /// Read as the other session, because its sector is the first one.
+    /// Read as the other session: its sector is the first one.
     pub(super) other: u64,
     pub(super) missed: u64,
     pub(super) lost_max: u64,
@@ -130,7 +123,7 @@ impl Tally {
         self.frames += other.frames;
     }
 
-    /// A row for each kind of damage, with the sum over all subjects, and the total; `of` returns a kind's tallies.
+    /// A row for each kind, and the total.
     pub(super) fn tabulate<'a, I: Iterator<Item = &'a Self>>(
         figures: &mut Figures,
         kinds: impl IntoIterator<Item = &'static str>,
@@ -150,10 +143,9 @@ impl Tally {
     }
 }
 
-/// Results for the damages of one log.
 pub(super) struct Outcome {
     pub(super) tallies: Vec<(Kind, Tally)>,
-    /// Each miss in words.
+    /// In words.
     pub(super) misses: Vec<String>,
 }
 
@@ -161,12 +153,12 @@ struct Damage {
     kind: Kind,
     what: String,
     bytes: Vec<u8>,
-    /// The changed sectors; the rest of their groups is lost too.
+    /// Their groups' rest is lost too.
     touched: Vec<usize>,
 }
 
 impl Damage {
-    /// Damage that parity always repairs: up to eight changed sectors in a row.
+    /// Up to eight changed sectors in a row, which parity repairs.
     fn is_one_page(&self) -> bool {
         matches!(self.kind, Kind::Erased | Kind::Copied | Kind::Stale) && self.touched.len() <= COLUMNS
     }
@@ -178,25 +170,23 @@ impl fmt::Display for Damage {
     }
 }
 
-/// A whole recorded log.
 pub(super) struct Subject {
     dir: TempDir,
-    /// Its sectors, and some space behind them; then, of a closed one, the parity.
+    /// Sectors, some space, and the parity of a closed log.
     bytes: Vec<u8>,
     sectors: usize,
-    /// The number of each sector's group, from 0.
+    /// From 0.
     group_of: Vec<usize>,
     has_parity: bool,
     whole: Record,
 }
 
 impl Subject {
-    /// Records a vehicle that flies, rests, flies and rests; `closed`: the log was ended in order, otherwise power
-    /// failed while the vehicle rested. `boots` distinguishes its session from others.
+    /// Flies and rests twice; `closed`: in order, else power failed at rest. `boots` distinguishes its session.
     pub(super) fn record(flight: &str, closed: bool, boots: u32) -> Result<Self> {
         let card = Card::new(64)?;
         let stream = Stream::of_flight(&own(flight), FULL_RATE)?;
-        // An open one ends before its first parity: missing sectors would be reported before any damage.
+        // Ends before its first parity: missing sectors would be reported before any damage.
         let stream = stream.flying_and_resting(if closed {
             &[(9.0, 1.5), (4.0, 1.5)]
         } else {
@@ -246,7 +236,6 @@ impl Subject {
         self.dir.path().join("00001_00.HUM")
     }
 
-    /// These bytes as a log's file.
     fn log(&self, bytes: &[u8]) -> Result<Log> {
         fs::write(self.path(), bytes)?;
         let extents = vec![Extent { start: 0, length: bytes.len() as u64 }];
@@ -260,7 +249,7 @@ impl Subject {
         })
     }
 
-    /// This many damages, of all kinds in turn; the first misses in words.
+    /// All kinds in turn; the first misses in words.
     pub(super) fn damage_often(&self, other: &Self, count: u64, seed: u64) -> Outcome {
         let mut random = Random::new(seed);
         let tallies = Kind::ALL.into_iter().map(|kind| (kind, Tally::default())).collect();
@@ -352,7 +341,7 @@ impl Subject {
         Damage { kind, what, bytes, touched }
     }
 
-    /// Appends another log. Packed logs end with their last sector; files from a card have free blocks behind it.
+    /// Packed logs end with their last sector; a card's files have free blocks behind it.
     fn join(&self, bytes: &mut Vec<u8>, other: &Self, random: &mut Random) -> String {
         let space = random.below(SPACE_BLOCKS as u64 + 1) as usize;
         bytes.truncate((self.sectors + space) * BLOCK);
@@ -360,8 +349,7 @@ impl Subject {
         format!("{} sectors behind {} and {space} blocks of zeros", other.sectors, self.sectors)
     }
 
-    /// Alters a sector, or a parity sector; returns the covered sector that is to be lost, and the place. Without
-    /// parity nothing contradicts it.
+    /// Returns the covered sector to lose, and the place. Without parity nothing contradicts it.
     fn alter(
         &self,
         kind: Kind,
@@ -393,10 +381,9 @@ impl Subject {
         Some(told)
     }
 
-    /// Whether the result is reported correctly.
     fn judge(&self, damage: &Damage, tally: &mut Tally) -> Result<()> {
         if damage.bytes == self.bytes {
-            // A page exchanged with itself.
+            // Exchanged with itself.
             tally.damages -= 1;
             return Ok(());
         }
@@ -405,7 +392,7 @@ impl Subject {
         let verdict = verdict(&overview);
         tally.frames += read.frames.len() as u64;
         if read.summary.session.is_some() && read.summary.session != self.whole.summary.session {
-            // The first sector decides which of two sessions a file belongs to. The other one is reported.
+            // The first sector decides between two sessions.
             ensure!(
                 verdict == Verdict::NotProved && overview.ending.summary.blocks.stale > 0,
                 "not told apart"
@@ -453,7 +440,7 @@ impl Subject {
         Ok(())
     }
 
-    /// The missing frames, by their index; all others are frames of the log, in their order.
+    /// By index; all others are frames of the log, in order.
     fn missing(&self, read: &[Frame]) -> Result<Vec<usize>> {
         let (mut missing, mut given) = (Vec::new(), read.iter().peekable());
         for (index, frame) in self.whole.frames.iter().enumerate() {

@@ -1,9 +1,8 @@
 //! Power cuts at any block write.
 //!
-//! A session is recorded once, at full rate, with every block write kept. Then the card is restored to its state
-//! before, and the writes are replayed up to a random one, that one whole or in part. So one recording gives any
-//! number of cuts, each with the exact content of the card. Decoded frames are compared with the sent ones, one by
-//! one and in order, and with their arrival times.
+//! A session is recorded once, with every block write kept. Then the writes are replayed up to a random one, that one
+//! whole or in part. So one recording gives any number of cuts. Decoded frames are compared with the sent ones, in
+//! order, with their arrival times.
 
 pub(super) mod careless;
 
@@ -30,29 +29,25 @@ use crate::flights::own;
 
 /// A directory entry.
 const ENTRY: usize = 32;
-/// Highest loss by a cut, once the log has begun.
+/// Once the log has begun.
 const LOSS_MAX_US: u64 = 200_000;
-/// Time until the log has begun: the card is opened, the previous session is searched, and the first segment is made.
+/// The card is opened, the previous session searched, the first segment made.
 const BEGIN_MAX_US: u64 = 300_000;
 
-/// The smallest part of a block that is new by itself: an entry of the FAT has four bytes. Half an entry would damage
-/// any file system of this kind.
+/// Bytes that are old or new together: half an entry of the FAT would damage any file system of this kind.
 const WORD: usize = 4;
 
-/// A card that is back is found within a second, and has the waiting sectors half a second later.
+/// Found within a second; the waiting sectors half a second later.
 const CATCH_UP_US: u64 = 1_500_000;
 
-/// The recording before and at the cut.
 struct Scenario {
     name: &'static str,
     flight: &'static str,
     card_mib: u64,
-    /// Earlier sessions on the card.
     earlier: u32,
     seconds: f64,
-    /// Its rate, in baud.
     baud: u64,
-    /// When the card is out, in seconds.
+    /// Seconds.
     out: Option<(f64, f64)>,
 }
 
@@ -115,7 +110,7 @@ pub(super) const LABELS: Labels = Labels {
 pub(super) fn run(options: &Options) -> Result<Figures> {
     let runs = options.runs(10_000, 96);
     let share = runs.div_ceil(SCENARIOS.len() as u64);
-    // The split of a log takes minutes of recording, and is left to the long form.
+    // The split takes minutes of recording.
     let chosen: Vec<_> =
         (0..).zip(SCENARIOS).filter(|(_, one)| !options.short || one.seconds < 60.0).collect();
     let outcomes = chosen.into_par_iter().with_max_len(1).map(|(index, scenario)| {
@@ -163,25 +158,23 @@ struct Outcome {
     begin_us_max: u64,
 }
 
-/// The new part of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Tear {
     Whole,
-    /// The bytes before this one.
+    /// Before this byte.
     Before(usize),
-    /// The bytes from this one on.
+    /// From this byte on.
     From(usize),
 }
 
 impl Tear {
-    /// In the middle, or between any two pieces of this size.
+    /// In the middle, or between pieces of this size.
     fn by_chance(random: &mut Random, piece: usize) -> Self {
         let pieces = (BLOCK / piece) as u64;
         let at = if random.chance(0.5) { BLOCK / 2 } else { piece * (1 + random.below(pieces - 1)) as usize };
         if random.chance(0.5) { Self::Before(at) } else { Self::From(at) }
     }
 
-    /// The card's content after the cut.
     fn apply(self, old: &[u8; BLOCK], new: &[u8; BLOCK]) -> [u8; BLOCK] {
         let mut block = *new;
         match self {
@@ -193,23 +186,22 @@ impl Tear {
     }
 }
 
-/// A recorded session, on the card in its state before.
 struct Session {
     card: Card,
     before: Vec<u8>,
     files: Vec<CardFile>,
-    /// Files of earlier sessions that this one overwrote.
+    /// Of earlier sessions.
     overwritten: BTreeSet<String>,
-    /// The earlier session's file of a block.
+    /// By block.
     owners: BTreeMap<u32, usize>,
     trace: Vec<Written>,
-    /// The names of the session's own logs, and the session number in its sectors.
+    /// The session's own logs, and its number in sectors.
     logs: BTreeSet<String>,
     sealed_as: u32,
     arrivals_us: Vec<u64>,
     hashes: Vec<u64>,
     data_start: u32,
-    /// Times, in microseconds, when the card was out, and when the waiting sectors were written.
+    /// Out of the slot, and until the waiting sectors were written.
     out_us: Option<(u64, u64)>,
 }
 
@@ -271,7 +263,6 @@ impl Session {
         Ok(session)
     }
 
-    /// Restores the card to its state before the session.
     fn rewind(&self) -> Result<()> {
         self.trace
             .iter()
@@ -284,17 +275,17 @@ impl Session {
     }
 
     fn is_metadata(&self, write: &Written) -> bool {
-        // The root directory's first cluster; its further ones are few and written at the same moments.
+        // Its further clusters are few and written at the same moments.
         write.block <= self.data_start
     }
 
-    /// The parts of a block that are old or new as a whole. A torn directory entry is a name that no system accepts
-    /// (fsck renames it); the log is then found by its sectors. That is not tested here.
+    /// Parts that are old or new together. A torn directory entry is a name that no system accepts; the log is then
+    /// found by its sectors.
     fn piece(&self, write: usize) -> usize {
         if self.trace.get(write).is_some_and(|write| self.is_metadata(write)) { ENTRY } else { WORD }
     }
 
-    /// Cuts by chance: half of them torn, either way.
+    /// Half of them torn, either way.
     fn choose(&self, count: u64, seed: u64) -> Vec<(usize, Tear)> {
         let mut random = Random::new(seed);
         let mut cuts: Vec<_> = (0..count)
@@ -310,8 +301,7 @@ impl Session {
                 )
             })
             .collect();
-        // Few writes belong to the file system: those of the directory, and evenly chosen ones of the FAT, each of
-        // them whole and torn.
+        // Writes of the file system are few: the directory's, and evenly chosen ones of the FAT, whole and torn.
         let all = (0..self.trace.len()).filter(|index| self.is_metadata(&self.trace[*index]));
         let (directory, fat): (Vec<_>, Vec<_>) =
             all.partition(|index| self.trace[*index].block == self.data_start);
@@ -354,7 +344,6 @@ impl Session {
         Ok(outcome)
     }
 
-    /// All promises about a card after a power cut at this write.
     fn look(&mut self, cut: usize, outcome: &mut Outcome) -> Result<()> {
         self.card.check()?;
         outcome.files += self.earlier_files(cut)?;
@@ -363,7 +352,7 @@ impl Session {
         let cut_us = self.trace[cut].at_us;
         let given = self.arrivals_us.partition_point(|at| *at <= cut_us);
         let given_us = given.checked_sub(1).map_or(0, |last| self.arrivals_us[last]);
-        // Sectors for a card that is out are in memory only, and lost with power.
+        // Waiting sectors are in memory only.
         let out = self.out_us.filter(|(from, to)| (*from..*to).contains(&cut_us));
         let due_us = out.map_or(given_us, |(from, _)| given_us.min(from));
         let loss_us = due_us.saturating_sub(known_us);
@@ -377,7 +366,7 @@ impl Session {
         Ok(())
     }
 
-    /// Each file of an earlier session is unchanged, unless it was overwritten. Returns the number of compared files.
+    /// Unchanged, unless overwritten. Returns the compared ones.
     fn earlier_files(&self, cut: usize) -> Result<u64> {
         let walk = self.card.walk()?;
         ensure!(walk.damage.is_empty(), "{:?}", walk.damage);
@@ -387,7 +376,7 @@ impl Session {
             same[index] = now.get(file.path.as_str()) == Some(&file);
             ensure!(same[index] || self.overwritten.contains(&file.path), "{} is gone or changed", file.path);
         }
-        // Only blocks that were written can differ.
+        // Only written blocks can differ.
         let written: BTreeSet<_> = self.trace[..=cut].iter().map(|write| write.block).collect();
         for block in written {
             if let Some(owner) = self.owners.get(&block).filter(|owner| same[**owner]) {
@@ -398,14 +387,13 @@ impl Session {
         Ok(same.iter().filter(|same| **same).count() as u64)
     }
 
-    /// Decodes the session's log; returns the number of frames, and the arrival of the last one. Each equals the sent
-    /// one.
+    /// Returns the frames' number and the last arrival. Each equals the sent one.
     fn decode(&self) -> Result<(u64, u64)> {
         let (mut count, mut next, mut last_us) = (0, 0, 0);
         for log in on_card(&self.card.path()).iter().filter(|log| self.logs.contains(&log.name)) {
             let record = Record::of(log)?;
             if record.summary.session != Some(self.sealed_as) {
-                // It has no sector yet: the content belongs to the overwritten log.
+                // Without a sector it has the overwritten log's content.
                 continue;
             }
             let mut gaps = record.gaps.iter().peekable();

@@ -1,4 +1,4 @@
-//! The content of a log, small enough to be compared ten thousand times.
+//! Small enough to be compared ten thousand times.
 
 use anyhow::Result;
 use hums::logs::Log;
@@ -14,13 +14,12 @@ pub(super) struct Frame {
     pub(super) hash: u64,
 }
 
-/// The decoded content, in order.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
     pub(super) frames: Vec<Frame>,
-    /// The index of each group's first frame, gaps left out.
+    /// Without gaps.
     pub(super) groups: Vec<usize>,
-    /// Each gap with the number of frames before it.
+    /// After this many frames.
     pub(super) gaps: Vec<(usize, Gap)>,
     pub(super) summary: Summary,
 }
@@ -44,7 +43,7 @@ impl Collect for Group {
         }
     }
 
-    /// A campaign reads flights of ours: each group is passed on whole.
+    /// Each group is passed on whole.
     fn held_bytes(&self) -> usize {
         0
     }

@@ -1,6 +1,4 @@
-//! The results of the campaigns, as `docs/proof.md`.
-//!
-//! The document is written whole, by one run of all campaigns on one commit with one seed.
+//! `docs/proof.md`, written whole, by one run of all campaigns on one commit with one seed.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -11,27 +9,26 @@ use anyhow::{Context as _, Result};
 use super::Campaign;
 use super::figures::Figures;
 
-/// The source of figures.
+/// The figures' source.
 #[derive(Debug)]
 pub struct Provenance {
-    /// The commit, without any change.
+    /// Without any change.
     pub commit: String,
     /// The seed.
     pub seed: u64,
 }
 
-/// The results of one campaign.
+/// One campaign's results.
 #[derive(Debug)]
 pub struct Part {
     /// Which.
     pub campaign: &'static Campaign,
     /// Its results.
     pub figures: Figures,
-    /// How long it took, in seconds.
+    /// Seconds.
     pub seconds: f64,
 }
 
-/// The text before the campaigns.
 const HEAD: &str = "\
 # Proof
 
@@ -41,7 +38,7 @@ For people who ask how far the record can be trusted. Each section is a campaign
 prints one. `cargo xtask test` runs a short form of each. The same commit and seed give the same figures, apart from the seconds.
 ";
 
-/// The text in place of the commit, if campaigns changed and have not been run as a whole since.
+/// Campaigns changed and were not run as a whole since.
 #[cfg(test)]
 const OUTDATED: &str = "**Outdated:** the figures below are of several older commits, and campaigns have changed since. The \
                         next `cargo xtask prove` replaces all of them.";
@@ -70,7 +67,7 @@ fn heading(campaign: &Campaign) -> String {
     format!("## {}", campaign.name)
 }
 
-/// The tested promise, with a capital letter and a full stop.
+/// A capital letter and a full stop.
 fn sentence(about: &str) -> String {
     let mut letters = about.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect()) + "."
@@ -82,14 +79,14 @@ mod tests {
     use crate::flights::root;
     use crate::prove::CAMPAIGNS;
 
-    /// The lines of a document that are the same in each run, in order.
+    /// Constant lines, in order.
     fn labels(text: &str) -> Vec<&str> {
         let mut labels = Vec::new();
         let mut is_heading = true;
         for line in text.lines() {
             let table = line.starts_with('|');
             if line.starts_with("## ") || line.starts_with("* ") || (table && is_heading) {
-                // A figure has no colon and a space in it; a label may.
+                // A label may have a colon and a space.
                 labels.push(
                     line.starts_with("* ")
                         .then(|| line.rsplit_once(": "))
@@ -102,7 +99,6 @@ mod tests {
         labels
     }
 
-    /// The labels of the campaigns.
     fn expected() -> Vec<String> {
         CAMPAIGNS.iter().flat_map(|one| std::iter::once(heading(one)).chain(one.labels.lines())).collect()
     }

@@ -14,11 +14,10 @@ use super::options::Options;
 use super::stream::{FULL_RATE, Stream};
 use crate::flights::{OWN, own};
 
-/// Times when the card stops answering, in seconds: the first for the short form, all for the long one.
+/// Seconds: the first for the short form, all for the long one.
 const STALLS_AT_S: [u64; 7] = [5, 2, 3, 4, 6, 7, 8];
-/// Length of a stall.
 const STALL_MS: u64 = 2_500;
-/// Minimum recording time, in seconds: a shorter recording is repeated.
+/// Seconds; shorter recordings are repeated.
 const SECONDS_MIN: f64 = 12.0;
 
 pub(super) const LABELS: Labels = Labels {
@@ -65,14 +64,14 @@ fn seconds_of(moments: &[u64]) -> String {
     moments.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Records all of a stream while the card stalls once; an error if an unsigned frame is lost.
+/// The card stalls once; an unsigned frame must not be lost.
 fn stall(stream: &Stream, at_s: u64) -> Result<Stats> {
     let stall = Stall { from_us: at_s * 1_000_000, for_us: STALL_MS * 1_000 };
     let card = Card::new(256)?;
     let device = card.device(Faults { stalls: vec![stall], ..Faults::default() })?;
     let done = power_on(&device, &Params::defaults(), 1, &mut std::io::sink(), stream.chunks(), |_| Ok(()))?;
     let stats = done.stats;
-    // The write in which it happens begins a little before it.
+    // The write begins a little before it.
     ensure!(stats.sd_stall_ms_max >= STALL_MS - 250, "the card never stood still");
     ensure!(
         stream.is_signed || stats.frames_lost + done.frames_left == 0,

@@ -1,4 +1,4 @@
-//! The bytes at the port: a recording, back to back at a line rate, repeated as often as needed.
+//! A recording back to back at a line rate, repeated as needed.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -11,23 +11,21 @@ use hums::source::Chunk;
 use crate::flights::Manifest;
 use crate::frames;
 
-/// Bytes that arrive together: 0.35 ms at 921,600 baud.
+/// 0.35 ms at 921,600 baud.
 const SLICE: usize = 32;
-/// The fastest line that the recorder supports, in baud.
+/// Supported by the recorder, baud.
 pub(super) const FULL_RATE: u64 = 921_600;
 
-/// Bytes with the frames in them.
 pub(super) struct Stream {
     pub(super) bytes: Vec<u8>,
-    /// The place of each frame.
+    /// Places.
     pub(super) frames: Vec<Range<usize>>,
-    /// Whether most frames are signed.
+    /// Most frames.
     pub(super) is_signed: bool,
     baud: u64,
 }
 
 impl Stream {
-    /// A recording's bytes at this rate.
     pub(super) fn of_flight(path: &Path, baud: u64) -> Result<Self> {
         let data = fs::read(path).with_context(|| path.display().to_string())?;
         let seeds = &Manifest::own().seeds;
@@ -45,7 +43,7 @@ impl Stream {
         Ok(Self { bytes, frames: places, is_signed, baud })
     }
 
-    /// This many seconds of it; a shorter recording is repeated.
+    /// Shorter recordings are repeated.
     pub(super) fn for_seconds(&self, seconds: f64) -> Self {
         let wanted = (seconds * self.baud as f64 / 10.0) as usize;
         let (mut bytes, mut places) = (Vec::with_capacity(wanted + 512), Vec::new());
@@ -60,7 +58,7 @@ impl Stream {
         Self { bytes, frames: places, is_signed: self.is_signed, baud: self.baud }
     }
 
-    /// Seconds of all data, and then seconds of the data before arming, in turn.
+    /// All data, then data before arming, in turn.
     pub(super) fn flying_and_resting(&self, seconds: &[(f64, f64)]) -> Result<Self> {
         let armed = self.frames.iter().position(|frame| is_armed(&self.bytes[frame.clone()]));
         let armed =
@@ -77,12 +75,11 @@ impl Stream {
         Ok(Self { bytes, frames, is_signed: self.is_signed, baud: self.baud })
     }
 
-    /// How long it takes on the line, in seconds.
+    /// Seconds on the line.
     pub(super) fn seconds(&self) -> f64 {
         self.bytes.len() as f64 * 10.0 / self.baud as f64
     }
 
-    /// The bytes as they arrive.
     pub(super) fn chunks(&self) -> impl Iterator<Item = Chunk> + '_ {
         let ends = (SLICE..self.bytes.len() + SLICE).step_by(SLICE).map(|end| end.min(self.bytes.len()));
         ends.scan(0, |start, end| {
@@ -92,13 +89,12 @@ impl Stream {
         })
     }
 
-    /// When each frame has arrived, in microseconds since the first byte.
+    /// Microseconds since the first byte.
     pub(super) fn arrivals_us(&self) -> Vec<u64> {
         let slice_end = |end: usize| end.next_multiple_of(SLICE).min(self.bytes.len());
         self.frames.iter().map(|frame| self.at_us(slice_end(frame.end))).collect()
     }
 
-    /// A hash of each frame.
     pub(super) fn hashes(&self) -> Vec<u64> {
         self.frames.iter().map(|frame| hash(&self.bytes[frame.clone()])).collect()
     }
@@ -108,7 +104,7 @@ impl Stream {
     }
 }
 
-/// Whether a frame is a heartbeat with `MAV_MODE_FLAG_SAFETY_ARMED`.
+/// `MAV_MODE_FLAG_SAFETY_ARMED` in a heartbeat.
 fn is_armed(frame: &[u8]) -> bool {
     let (id, mode) = match frame {
         [0xFE, ..] => (frame.get(5..6), frame.get(6 + 6)),
@@ -117,7 +113,6 @@ fn is_armed(frame: &[u8]) -> bool {
     id.is_some_and(|id| id.iter().all(|byte| *byte == 0)) && mode.is_some_and(|mode| mode & 0x80 != 0)
 }
 
-/// 64 bits of these bytes.
 pub(super) fn hash(bytes: &[u8]) -> u64 {
     let mut hasher = DefaultHasher::new();
     bytes.hash(&mut hasher);

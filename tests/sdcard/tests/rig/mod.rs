@@ -1,8 +1,5 @@
-//! The firmware's own monitor and storage over the simulated card, in virtual time, and the pilot's view of it.
-//!
-//! Storage waits for the card with the processor, while more urgent tasks run. So, after a service of the card,
-//! frames and ticks of its time come first, and then the next service.
-// Each test file uses its own part of this.
+//! The firmware's monitor and storage over the simulated card, in virtual time. Storage waits for the card while more
+//! urgent tasks run: frames and ticks of a service's time come before the next service.
 #![allow(dead_code, missing_docs, unreachable_pub)]
 
 use std::collections::BTreeMap;
@@ -20,7 +17,7 @@ use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervi
 use hums_recorder::{BLOCK_BYTES, Buffers, Card, CardState, CardStatus, LogName, SpiCard};
 use hums_sdcard::{MS, Medium, Model, SimPort, Slot};
 
-/// Interval of the frames of noise: 2.5 kB/s of log.
+/// 2.5 kB/s of log.
 const FRAME_EVERY: Span = Span::from_millis(40);
 const TICK: Span = Span::from_millis(50);
 const NOISE_ID: u32 = 0xC0DE;
@@ -33,13 +30,12 @@ pub struct Rig {
     pub status: &'static CardStatus,
     pub texts: Vec<(Instant, String)>,
     pub acks: Vec<(u16, u8)>,
-    /// Answers about logs and files: message and payload.
+    /// Message and payload.
     pub logs: Vec<(u32, Vec<u8>)>,
     pub findings: Vec<(Instant, &'static str, Level)>,
     pub armed: bool,
-    /// The autopilot sends nothing.
     pub is_silent: bool,
-    /// The longest service of the card.
+    /// Of the card.
     pub longest: Span,
     supervisor: Supervisor,
     port: &'static PortStatus,
@@ -53,16 +49,15 @@ pub struct Rig {
     said: u32,
 }
 
-/// The content of a card in the end.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// Numbers of the frames of noise, in the order of sessions.
+    /// In the order of sessions.
     pub frames: Vec<u32>,
     pub all_frames: u64,
     pub gaps: Vec<Gap>,
     pub sessions: usize,
     pub segments: usize,
-    /// Numbers and texts of events, and reasons of end marks.
+    /// Events' numbers and texts, and reasons of end marks.
     pub events: Vec<(u8, String)>,
     pub marks: Vec<Resting>,
     /// Checks of snapshots, and whether each is from after the finding.
@@ -104,14 +99,12 @@ impl Rig {
         rig
     }
 
-    /// Runs until this many milliseconds after the start.
     pub fn run_to(&mut self, ms: u64) {
         while self.slot.now_ns() < ms * MS {
             self.service();
         }
     }
 
-    /// One round of the storage task, and other tasks meanwhile.
     fn service(&mut self) -> Service {
         let begun = self.slot.now();
         self.supervisor.report(Task::Storage, begun);
@@ -132,7 +125,6 @@ impl Rig {
         service
     }
 
-    /// Frames and ticks by now.
     fn meanwhile(&mut self) {
         let now = self.slot.now();
         while self.frame_at.min(self.tick_at) <= now {
@@ -185,7 +177,6 @@ impl Rig {
         });
     }
 
-    /// Frames that reach the ground station.
     fn listen(&mut self) {
         let mut bytes = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.gs_out.take(&mut bytes) {
@@ -208,13 +199,11 @@ impl Rig {
         while self.ends.autopilot_out.take(&mut bytes).is_some() {}
     }
 
-    /// A message of the autopilot.
     pub fn say(&mut self, id: u32, payload: &[u8]) {
         self.said += 1;
         self.give(id, payload);
     }
 
-    /// A command of a ground station; returns its answer.
     pub fn command(&mut self, command: u16, params: [f32; 2]) -> Option<u8> {
         let mut payload: Vec<u8> = params.iter().flat_map(|param| param.to_le_bytes()).collect();
         payload.resize(28, 0);
@@ -226,7 +215,6 @@ impl Rig {
         self.acks[before..].iter().find(|(number, _)| *number == command).map(|(_, result)| *result)
     }
 
-    /// A message of a ground station.
     pub fn ask(&mut self, id: u32, payload: &[u8]) {
         let bytes = frame(255, 190, id, payload);
         let now = self.slot.now();
@@ -240,7 +228,6 @@ impl Rig {
         self.status.read().state
     }
 
-    /// Whether the pilot got this text since then.
     pub fn was_told(&self, text: &str, since_ms: u64) -> bool {
         self.texts.iter().any(|(at, told)| at.as_millis() >= since_ms && told.contains(text))
     }
@@ -255,8 +242,7 @@ impl Rig {
         assert_eq!(self.state(), state, "{:?}", self.texts);
     }
 
-    /// Ends the power-on in order. Every frame is on one of these cards, once and in order, or counted as lost.
-    /// Returns the number of lost frames.
+    /// Every frame is on one of these cards, once and in order, or counted as lost. Returns the lost ones.
     #[track_caller]
     pub fn finish(mut self, cards: &[&Medium]) -> (Vec<Found>, u64) {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
@@ -275,7 +261,7 @@ impl Rig {
         let found: Vec<Found> = cards.iter().map(|medium| read(medium)).collect();
         let on_cards: u64 = found.iter().map(|found| found.all_frames).sum();
         let sent = u64::from(self.frames + self.heartbeats + self.said);
-        // On the first of two cards a copy of a sector in progress may hold frames that count as lost for the second.
+        // A copy of a sector in progress on the first card may hold frames that count as lost for the second.
         let twice = 10 * (cards.len() as u64 - 1);
         let accounted = on_cards + lost;
         assert!(
@@ -288,7 +274,7 @@ impl Rig {
         (found, lost)
     }
 
-    /// As [`Self::finish`], without losses, and without violations of the specification on the bus.
+    /// Without losses, and without violations on the bus.
     #[track_caller]
     pub fn finish_whole(self, medium: &Medium) -> Found {
         let slot = self.slot.clone();
@@ -329,7 +315,7 @@ fn frame(system: u8, component: u8, id: u32, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Reads a card like `hums`: its segments in order, one session after the other.
+/// Like `hums`: segments in order.
 #[track_caller]
 pub fn read(medium: &Medium) -> Found {
     let (status, held) = (CardStatus::new(), Buffers::new());
@@ -344,13 +330,12 @@ pub fn read(medium: &Medium) -> Found {
         let mut reader = Box::new(LogReader::new());
         for name in names {
             let mut segment = card.segment(name).expect("it is there");
-            // The newest copy of the last sector may be at the place after it, with nothing yet at its own.
+            // The newest copy of the last sector may be at the place after it.
             let mut empty = 0;
             for index in 0..segment.blocks() {
                 let mut block = [0; BLOCK_BYTES];
                 card.read(&mut segment, index, &mut block).expect("it reads");
                 empty = if block == [0; 512] { empty + 1 } else { 0 };
-                // From here on the segment was never written.
                 if empty > 1 {
                     break;
                 }

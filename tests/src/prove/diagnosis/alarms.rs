@@ -15,7 +15,6 @@ pub(super) const BY_CHECK: Form = Form {
     columns: &["check", "warnings", "criticals", "on the ground", "recordings with one"],
 };
 
-/// One row for each check, the most frequent first.
 pub(super) fn by_check(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut groups: BTreeMap<&str, (Vec<&False>, u64)> = BTreeMap::new();
     for one in with_label(sets, true).flat_map(|judged| &judged.outcomes) {
@@ -39,7 +38,6 @@ pub(super) fn by_check(sets: &[Judged]) -> Vec<Vec<String>> {
     groups.into_iter().map(row).collect()
 }
 
-/// The recordings whose counts are wrong, a line for each.
 pub(super) fn wrong_counts(sets: &[Judged]) -> Vec<String> {
     let mut lines = Vec::new();
     for one in with_label(sets, true).flat_map(|judged| &judged.outcomes) {

@@ -2,22 +2,22 @@
 
 /// The probability outside.
 const OUTSIDE: f64 = 0.05;
-/// Halvings of an interval: each gives a bit, and a double has 53.
+/// Each halving gives a bit; a double has 53.
 const HALVINGS: usize = 60;
 
-/// The greatest mean of a Poisson distribution that gives this count or fewer with 5 %: the upper bound for a count
-/// of events. Exact (Garwood 1936): half the 95 % quantile of chi-squared with `2 (count + 1)` degrees of freedom.
+/// The upper bound of a Poisson mean for this count. Exact (Garwood 1936): half the 95 % quantile of chi-squared with `2 (count
+/// + 1)` degrees of freedom.
 pub(super) fn events_at_most(count: u64) -> f64 {
     let highest = count as f64 + 10.0 * (count as f64 + 10.0).sqrt();
     boundary(highest, |mean| poisson_up_to(count, mean) > OUTSIDE)
 }
 
-/// The greatest share at which this many of `all`, or fewer, come with 5 % (Clopper and Pearson 1934).
+/// The upper bound of a share (Clopper and Pearson 1934).
 pub(super) fn share_at_most(count: u64, all: u64) -> f64 {
     if count >= all { 1.0 } else { boundary(1.0, |share| binomial_up_to(count, all, share) > OUTSIDE) }
 }
 
-/// The end of a condition that holds at zero.
+/// `holds` at zero.
 fn boundary(highest: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, highest);
     for _ in 0..HALVINGS {
@@ -27,7 +27,6 @@ fn boundary(highest: f64, holds: impl Fn(f64) -> bool) -> f64 {
     high
 }
 
-/// The probability of a count or fewer.
 fn poisson_up_to(count: u64, mean: f64) -> f64 {
     let mut logarithm = -mean;
     let mut sum = logarithm.exp();
@@ -38,7 +37,6 @@ fn poisson_up_to(count: u64, mean: f64) -> f64 {
     sum
 }
 
-/// The probability of a count or fewer, of `all`.
 fn binomial_up_to(count: u64, all: u64, share: f64) -> f64 {
     let odds = share / (1.0 - share);
     let mut logarithm = all as f64 * (1.0 - share).ln();

@@ -1,4 +1,4 @@
-//! The tables of foreign recordings: the share of true alarms, and each of them.
+//! Foreign recordings: the share of true alarms, and each of them.
 
 use std::collections::BTreeMap;
 
@@ -51,12 +51,11 @@ fn flown(outcome: &Outcome) -> &'static str {
     }
 }
 
-/// Whether it is from a vehicle, and was judged by hand.
+/// And judged by hand.
 pub(super) fn is_vehicle(outcome: &Outcome) -> bool {
     outcome.by_hand.as_ref().is_some_and(|known| known.flown == Flown::Vehicle)
 }
 
-/// Alarms in the air with this verdict.
 fn judged_so(outcomes: &[&Outcome], level: Level, wanted: Verdict) -> u64 {
     let alarms = outcomes
         .iter()
@@ -64,7 +63,6 @@ fn judged_so(outcomes: &[&Outcome], level: Level, wanted: Verdict) -> u64 {
     count(alarms, level, true)
 }
 
-/// The figures that count, in a sentence.
 pub(super) fn alarms(outcomes: &[&Outcome]) -> String {
     let air_s = outcomes.iter().map(|one| one.air_s).sum::<f64>();
     let words = |level, name: &str| {
@@ -82,7 +80,6 @@ fn verdict(outcome: &Outcome, check: &str) -> Verdict {
     outcome.by_hand.as_ref().map_or(Verdict::Unknown, |known| known.of(check).0)
 }
 
-/// One row for each way of flying.
 pub(super) fn rows(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut groups: BTreeMap<&str, Vec<&Outcome>> = BTreeMap::new();
     for one in recordings(sets) {
@@ -102,7 +99,6 @@ pub(super) fn rows(sets: &[Judged]) -> Vec<Vec<String>> {
     rows
 }
 
-/// One row for each recording and check.
 pub(super) fn each(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     for one in recordings(sets) {

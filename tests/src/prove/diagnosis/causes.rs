@@ -1,17 +1,14 @@
 //! The checks that name the cause of each class of fault.
 //!
-//! A check names a cause if a pilot or a mechanic who reads its text knows which part to examine. A general check (a
-//! failsafe, "a sensor is unhealthy", a large variance of the estimator) reports a fault, and names no cause. The
-//! table is the judge's own: no monitor and no check knows it, or the labels.
+//! A pilot or mechanic who reads the check's text knows which part to examine. A general check (a failsafe, "a sensor
+//! is unhealthy", a large variance of the estimator) names no cause. No monitor and no check knows this table.
 
-/// A class of faults, with the checks that name its cause.
 #[derive(Debug)]
 pub(super) struct Class {
     /// As in `labels.json`.
     pub(super) name: &'static str,
-    /// Its description for the document.
     pub(super) about: &'static str,
-    /// The checks that name the cause; none where no check does yet.
+    /// None if no check does yet.
     pub(super) checks: &'static [&'static str],
 }
 
@@ -32,7 +29,7 @@ pub(super) const CLASSES: &[Class] = &[
             "roll_rate",
             "pitch_rate",
             "drive_alert",
-            // They point people to propellers and motors first.
+            // Propellers and motors first.
             "vibration",
             "vibration_px4",
             "vibration_rise",
@@ -151,7 +148,6 @@ pub(super) const CLASSES: &[Class] = &[
     Class { name: "nominal", about: "nothing wrong", checks: &[] },
 ];
 
-/// The class of this name.
 pub(super) fn of(class: &str) -> Option<&'static Class> {
     CLASSES.iter().find(|one| one.name == class)
 }

@@ -1,4 +1,4 @@
-//! The results, as `docs/diagnosis.md`: one page for users, written whole by one run on one commit.
+//! The results, as `docs/diagnosis.md`, by one run on one commit.
 
 use super::alarms::{self, BY_CHECK};
 use super::by_hand::{self, BY_HAND};
@@ -6,7 +6,6 @@ use super::faults::{self, BY_CLASS, EACH, SETS};
 use super::judged::Judged;
 use super::summary;
 
-/// The beginning of the page.
 pub(super) const HEAD: &str = "\
 # Diagnosis: what the box finds, how fast, and how often it is wrong
 
@@ -24,7 +23,7 @@ fewer faults are found or more false alarms come than before.
 * Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air.
 ";
 
-/// Limits that no table shows, and earlier measurements.
+/// No table shows these.
 const LIMITS: &str = "\
 ## Known limits
 
@@ -76,7 +75,6 @@ repository. Together, of simulated flights: 624 of 680 faults told (92 %), and n
 | 100 recordings, at ea3e47e | real vehicles | 7 crashes | 5 | - | - | 0.39 | 2 | 1 |
 ";
 
-/// The page's sections, in order.
 pub(super) fn text(judged: &[Judged]) -> String {
     [
         summary::section(judged),
@@ -89,7 +87,7 @@ pub(super) fn text(judged: &[Judged]) -> String {
     .join("\n")
 }
 
-/// Each fault, each wrong count and each alarm of recordings without labels: printed, and not in the page.
+/// Each fault, wrong count and alarm without labels: printed, not in the page.
 pub(super) fn details(judged: &[Judged]) -> String {
     let wrong = alarms::wrong_counts(judged);
     [

@@ -1,4 +1,4 @@
-//! The tables of faults: the share that was found, the delays, and each of them.
+//! Faults: the share that was found, and the delays.
 
 use hums_core::health::Level;
 
@@ -56,7 +56,7 @@ pub(super) const EACH: Form = Form {
     columns: &["flight", "vehicle", "class", "fault", "told", "cause named", "autopilot's own text"],
 };
 
-/// Faults that the messages show, with their flights.
+/// With their flights.
 fn shown(judged: &Judged) -> impl Iterator<Item = (&Outcome, &Fault)> {
     let faults = judged.outcomes.iter().filter_map(|one| Some((one, one.fault.as_ref()?)));
     faults.filter(|(_, fault)| fault.visible)
@@ -66,7 +66,6 @@ fn delays_s<'a>(faults: impl Iterator<Item = &'a Fault>) -> Vec<f64> {
     faults.filter_map(|fault| Some(fault.told.as_ref()?.at_s)).collect()
 }
 
-/// One row for each set with labels.
 pub(super) fn sets(sets: &[Judged]) -> Vec<Vec<String>> {
     let row = |judged: &Judged| {
         let faults: Vec<&Fault> = shown(judged).map(|(_, fault)| fault).collect();
@@ -97,7 +96,6 @@ pub(super) fn sets(sets: &[Judged]) -> Vec<Vec<String>> {
     with_label(sets, true).map(row).collect()
 }
 
-/// One row for each class.
 pub(super) fn by_class(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     for class in CLASSES {
@@ -123,7 +121,6 @@ pub(super) fn by_class(sets: &[Judged]) -> Vec<Vec<String>> {
     rows
 }
 
-/// One row for each fault.
 pub(super) fn each(sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     for one in with_label(sets, true).flat_map(|judged| &judged.outcomes) {
@@ -147,7 +144,6 @@ fn alarm(alarm: &Alarm) -> String {
     format!("{:+.1} {} {}", alarm.at_s, alarm.check, alarm.level.name())
 }
 
-/// A file's name without its ending.
 pub(super) fn stem(file: &str) -> &str {
     file.split_once(".tlog").map_or(file, |(stem, _)| stem)
 }

@@ -7,7 +7,7 @@ use super::options::Known;
 use super::outcome::{Outcome, judge};
 use super::sets::Set;
 
-/// The results of one set's flights, in their order.
+/// In the set's order.
 #[derive(Debug)]
 pub(super) struct Judged {
     pub(super) name: String,
@@ -16,7 +16,7 @@ pub(super) struct Judged {
     pub(super) outcomes: Vec<Outcome>,
 }
 
-/// Judges a set: as many flights at once as there are processors, each read as a stream.
+/// As many at once as there are processors, each as a stream.
 pub(super) fn judge_all(set: &Set) -> Result<Judged> {
     let outcomes = set
         .flights
@@ -31,7 +31,6 @@ pub(super) fn judge_all(set: &Set) -> Result<Judged> {
     })
 }
 
-/// The sets with labels, or those without.
 pub(super) fn with_label(sets: &[Judged], labelled: bool) -> impl Iterator<Item = &Judged> {
     sets.iter().filter(move |judged| judged.is_labelled == labelled)
 }

@@ -16,7 +16,7 @@
 //! | `battery_low_s` | when the autopilot itself first called a battery low (null: never) |
 //! | `past` | recordings, in the same folder, of the same vehicle's earlier flights: trends are judged against them |
 //!
-//! Other fields are ignored. Without `flights`, the flight does not count for flights, landings and mishaps.
+//! Without `flights`, the flight does not count for flights, landings and mishaps.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,14 +27,12 @@ use serde::Deserialize;
 
 use super::causes;
 
-/// A mishap reported within this time before and after a crash is that crash.
+/// Within this time before and after a crash it is that crash.
 const CRASH_BEFORE_S: f64 = 3.0;
 const CRASH_AFTER_S: f64 = 10.0;
 
-/// The name of the file.
 pub(super) const FILE: &str = "labels.json";
 
-/// The truth about one flight.
 #[derive(Clone, Debug, Deserialize)]
 pub(super) struct Label {
     pub(super) file: String,
@@ -57,7 +55,6 @@ pub(super) struct Label {
     pub(super) past: Vec<PathBuf>,
 }
 
-/// The labels of a folder, in their order.
 pub(super) fn read(folder: &Path) -> Result<Vec<Label>> {
     let path = folder.join(FILE);
     let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
@@ -91,7 +88,7 @@ impl Label {
         Ok(())
     }
 
-    /// Whether an alarm is true without a deliberate fault: a crash, or a low battery.
+    /// A crash, or a low battery.
     pub(super) fn explains(&self, alarm: &str, at_s: f64) -> bool {
         let of =
             |subsystem: Subsystem| checks().any(|check| check.name == alarm && check.subsystem == subsystem);
@@ -100,7 +97,7 @@ impl Label {
             || (self.battery_low_s.is_some_and(|low_s| at_s >= low_s) && of(Subsystem::Power))
     }
 
-    /// The autopilot and the frame, without version and brackets: `ArduCopter quad`.
+    /// Without version and brackets: `ArduCopter quad`.
     pub(super) fn group(&self) -> String {
         let plain = self.vehicle.split('(').enumerate().map(|(place, part)| match part.split_once(')') {
             Some((_, rest)) if place > 0 => rest,
@@ -112,7 +109,7 @@ impl Label {
         words.next_back().map_or_else(|| first.to_owned(), |last| format!("{first} {last}"))
     }
 
-    /// The autopilot's first text of `MAV_SEVERITY_WARNING` or worse after the fault: seconds after it, and the text.
+    /// `MAV_SEVERITY_WARNING` or worse: seconds after the fault, and the text.
     pub(super) fn autopilot_said(&self) -> Option<(f64, &str)> {
         const WARNING: u8 = 4;
         let fault_s = self.fault_s?;

@@ -1,10 +1,8 @@
 //! The judge of the diagnosis: the monitor's findings on known faults, their delays, and its false alarms.
 //!
 //! Flights are recordings with labels (`labels`), in sets by whether they were known when the limits were chosen
-//! (`sets`). The monitor judges each as in `hums check` (`outcome`); the results of all are the tables of
-//! `docs/diagnosis.md` (`document`). Foreign recordings have no labels; `verdicts` has the truth about those that
-//! were judged by hand. It is not a campaign of `docs/proof.md`: those test promises, and this one measures an
-//! imperfect diagnosis.
+//! (`sets`); `verdicts` judges foreign ones by hand. It is not a campaign of `docs/proof.md`: those test promises,
+//! and this one measures an imperfect diagnosis.
 
 mod alarms;
 mod bound;
@@ -31,12 +29,12 @@ use crate::flights::root;
 use judged::judge_all;
 pub use options::Flights;
 
-/// Its name for `prove`.
+/// For `prove`.
 pub const DIAGNOSIS: &str = "diagnosis";
-/// Its description for a list.
+/// For a list.
 pub const ABOUT: &str = "faults found and false alarms, on labelled flights";
 
-/// Judges flights; returns the text to print. `commit` is called for the commit if the document is written.
+/// Returns the text to print. `commit` is called if the document is written.
 pub fn run(flights: &Flights, commit: impl FnOnce() -> Result<String>) -> Result<String> {
     if flights.short {
         return short::run();

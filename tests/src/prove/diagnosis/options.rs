@@ -4,25 +4,21 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
 
-/// Whether the flights were known when the limits were chosen.
+/// When the limits were chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Known {
-    /// They were, or might have been.
     Yes,
-    /// They were new to all who chose the limits.
     No,
-    /// They have no labels, and no limit was fitted to them; but their findings have been seen.
+    /// No labels, and no limit was fitted; but their findings were seen.
     Seen,
 }
 
-/// The flights to judge, and the use of the results.
+/// Flights to judge, and the results' use.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Flights {
-    /// Folders of flights besides those of the repository.
+    /// Besides those of the repository.
     pub(super) folders: Vec<(PathBuf, Known)>,
-    /// The flights of the repository alone, with limits for the results.
     pub(super) short: bool,
-    /// Write `docs/diagnosis.md`.
     pub(super) write: bool,
 }
 
@@ -32,7 +28,7 @@ impl Flights {
         Self { short: true, ..Self::default() }
     }
 
-    /// From the words of a command line.
+    /// From a command line.
     pub fn parse(words: &[String]) -> Result<Self> {
         let (mut options, mut words) = (Self::default(), words.iter());
         while let Some(word) = words.next() {

@@ -1,4 +1,4 @@
-//! One judged flight: alarms without a fault, and alarms about the fault.
+//! One judged flight.
 
 use std::path::{Path, PathBuf};
 
@@ -15,10 +15,10 @@ use super::causes;
 use super::labels::Label;
 use super::verdicts::{self, Recording};
 
-/// An alarm this soon after a landing belongs to the air: it waits for its debounce.
+/// It waits for its debounce, and belongs to the air.
 const AFTER_LANDING_S: f64 = 3.0;
 
-/// A rise of a level to a warning or to critical, as a pilot gets it.
+/// A rise to a warning or to critical, as a pilot gets it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Alarm {
     pub(super) check: String,
@@ -27,27 +27,24 @@ pub(super) struct Alarm {
     pub(super) at_s: f64,
 }
 
-/// An alarm without a fault.
 #[derive(Clone, Debug)]
 pub(super) struct False {
     pub(super) alarm: Alarm,
     pub(super) in_air: bool,
 }
 
-/// The result for a fault.
 #[derive(Clone, Debug)]
 pub(super) struct Fault {
-    /// Whether the messages show it at all.
+    /// In the messages at all.
     pub(super) visible: bool,
-    /// The first alarm after it; its time counts from the fault.
+    /// The first alarm; time from the fault.
     pub(super) told: Option<Alarm>,
-    /// The first alarm that names its cause.
+    /// The first that names its cause.
     pub(super) named: Option<Alarm>,
-    /// The autopilot's first own report: seconds after the fault, and its text.
+    /// The autopilot's first report: seconds after the fault.
     pub(super) autopilot: Option<(f64, String)>,
 }
 
-/// Flights, landings and mishaps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Counts {
     pub(super) flights: u64,
@@ -55,7 +52,6 @@ pub(super) struct Counts {
     pub(super) mishaps: u64,
 }
 
-/// The result for one flight.
 #[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub(super) file: String,
@@ -63,24 +59,23 @@ pub(super) struct Outcome {
     pub(super) vehicle: String,
     pub(super) class: &'static str,
     pub(super) what: String,
-    /// Time in the air, and on the ground, without a fault.
+    /// Without a fault.
     pub(super) air_s: f64,
     pub(super) alarms: Vec<False>,
     pub(super) fault: Option<Fault>,
-    /// True and counted numbers; none if the truth is unknown.
+    /// True and counted; none without a truth.
     pub(super) counts: Option<(Counts, Counts)>,
-    /// The verdict on a recording without a label.
+    /// Without a label.
     pub(super) by_hand: Option<Recording>,
 }
 
-/// The number of alarms that rose to a level, in the air or on the ground.
 pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Level, in_air: bool) -> u64 {
     alarms.into_iter().filter(|one| one.alarm.level == level && one.in_air == in_air).count() as u64
 }
 
 /// Judges one flight.
 pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
-    // The labelled flights were recorded on a telemetry port; the place of the others is unknown.
+    // Labelled flights come from a telemetry port.
     let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
     let past = label.map_or(&[][..], |label| &label.past);
     let mut judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
@@ -91,7 +86,6 @@ pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
     Ok(Outcome { by_hand, ..of(&judged, &place.name, label) })
 }
 
-/// The normal figures after these flights.
 fn learn(past: &[PathBuf]) -> Result<Baselines> {
     let places: Vec<_> = past.iter().map(|path| Place::file(path)).collect();
     hums::check::past::learn(&Limits::default(), &places)
@@ -135,7 +129,7 @@ fn span_s(flight: &Flight) -> (f64, f64) {
     (flight.from.as_secs_f64(), flight.to.as_secs_f64())
 }
 
-/// The severity of a level for a pilot; a stale or good one is 0.
+/// A stale or good level is 0.
 const fn rank(level: Level) -> u8 {
     match level {
         Level::Critical => 2,

@@ -4,12 +4,11 @@ use super::bound::{events_at_most, share_at_most};
 
 const SECONDS_AN_HOUR: f64 = 3_600.0;
 
-/// Hours, with two digits.
 pub(super) fn hours(seconds: f64) -> String {
     format!("{:.2}", seconds / SECONDS_AN_HOUR)
 }
 
-/// The rate of events by the hour: the counted one, and its upper bound.
+/// With the upper bound.
 pub(super) fn an_hour(events: u64, seconds: f64) -> [String; 2] {
     let hours = seconds / SECONDS_AN_HOUR;
     if hours <= 0.0 {
@@ -18,7 +17,7 @@ pub(super) fn an_hour(events: u64, seconds: f64) -> [String; 2] {
     [short(events as f64 / hours), short(events_at_most(events) / hours)]
 }
 
-/// A share in percent, and its lower bound.
+/// Percent, and its lower bound.
 pub(super) fn share(count: u64, all: u64) -> [String; 2] {
     if all == 0 {
         return ["-".to_owned(), "-".to_owned()];
@@ -32,7 +31,7 @@ fn short(rate: f64) -> String {
     if rate >= 10.0 || rate == 0.0 { format!("{rate:.0}") } else { format!("{rate:.2}") }
 }
 
-/// The delay that this share of all delays is within, in seconds.
+/// Seconds: this share of all delays is within.
 pub(super) fn quantile_s(delays_s: &[f64], share: f64) -> String {
     let mut sorted = delays_s.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -11,16 +11,15 @@ use super::labels::{self, FILE, Label};
 use super::options::{Flights, Known};
 use crate::flights;
 
-/// Depth of the search for labels in folders.
+/// Of the search for labels.
 const DEPTH_MAX: usize = 4;
 
-/// Flights that are counted together.
 #[derive(Debug)]
 pub(super) struct Set {
     /// Its name in tables.
     pub(super) name: String,
     pub(super) known: Known,
-    /// In the order of their labels or names; those without a label have no known truth.
+    /// In the order of labels or names.
     pub(super) flights: Vec<(Place, Option<Label>)>,
 }
 
@@ -30,7 +29,6 @@ impl Set {
     }
 }
 
-/// All requested sets, those with labels first.
 pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
     let mut sets = vec![
         repository("labelled, ArduPilot", "tests/labelled")?,
@@ -61,7 +59,7 @@ fn has_labels_beside(path: &Path) -> bool {
     path.parent().is_some_and(|folder| folder.join(FILE).is_file())
 }
 
-/// A folder from the user: the flights of every `labels.json` in and below it, or all its recordings.
+/// Every `labels.json` in and below it, or all its recordings.
 fn given(folder: &Path, known: Known) -> Result<Set> {
     let mut found = Vec::new();
     below(folder, 0, &mut found)?;

@@ -1,8 +1,5 @@
-//! The short form, for every change: the flights of the repository, a floor for found faults and a ceiling for false
-//! alarms.
-//!
-//! The limits are the results at the time when they were set. A commit that improves a check raises the floor or
-//! lowers the ceiling; a commit that eases one gives the reason.
+//! For every change: a floor for found faults, a ceiling for false alarms. A commit that improves a check tightens
+//! the limits; a commit that eases one gives the reason.
 
 use anyhow::{Result, ensure};
 use hums_core::health::Level;
@@ -12,19 +9,17 @@ use super::options::Flights;
 use super::outcome::count;
 use super::sets::find_all;
 
-/// Least number of reported faults, among those that the messages show, and least number with a named cause.
+/// Reported faults among the visible ones, and those with a named cause.
 const TOLD_MIN: usize = 71;
 const NAMED_MIN: usize = 69;
-/// Highest number of false warnings and false criticals in the air, and of false alarms on the ground. The third
-/// warning repeats a failsafe that PX4 declared before the labelled fault (p39); the critical one is the same
-/// failsafe.
+/// False alarms in the air and on the ground. The third warning and the critical repeat a failsafe of PX4 before the
+/// labelled fault (p39).
 const WARNINGS_MAX: usize = 3;
 const CRITICAL_MAX: usize = 1;
 const GROUND_MAX: usize = 0;
-/// Highest number of flights with wrong counts of flights, landings or mishaps.
+/// Flights with wrong counts.
 const MISCOUNTED_MAX: usize = 0;
 
-/// The sums over all flights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Sums {
     faults: usize,

@@ -1,4 +1,4 @@
-//! The main figures in a few sentences: of flights that were new when the limits were chosen, if there are any.
+//! Main figures: of flights that were new when the limits were chosen, if any.
 
 use std::fmt::Write as _;
 

@@ -2,19 +2,16 @@
 
 use std::fmt::Write as _;
 
-/// The constant parts of a table: a test compares the document with them.
+/// A test compares the document with this constant part.
 #[derive(Debug)]
 pub(super) struct Form {
     /// The section's heading.
     pub(super) title: &'static str,
-    /// How to read it.
     pub(super) about: &'static str,
-    /// The names of its columns.
     pub(super) columns: &'static [&'static str],
 }
 
 impl Form {
-    /// The section's heading and the table's.
     pub(super) fn lines(&self) -> [String; 2] {
         [format!("## {}", self.title), row(self.columns)]
     }
@@ -22,7 +19,7 @@ impl Form {
     /// The whole section.
     ///
     /// # Panics
-    /// If a row has more or fewer cells than the table has columns.
+    /// A row's cells are not as many as the columns.
     pub(super) fn section(&self, rows: &[Vec<String>]) -> String {
         let [heading, columns] = self.lines();
         let mut text = format!("{heading}\n\n{}\n\n{columns}\n|", self.about);

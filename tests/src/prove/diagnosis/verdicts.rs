@@ -1,10 +1,7 @@
-//! Foreign recordings, judged by hand, alarm by alarm: by the values at the time, the mode, the pilot's actions, and
-//! the autopilot's texts and events.
-//!
-//! `verdicts.json` has no content of them: it identifies a recording by its name and the beginning of its SHA-256. An
-//! alarm is true in three cases. The vehicle crashed or was about to, the autopilot reports the same, or a value
-//! exceeds its autopilot's published limit. One verdict is for all alarms of a check in a recording. Recordings that
-//! are not listed have no verdict.
+//! Foreign recordings, judged by hand: by the values, the mode, the pilot's actions, the autopilot's texts.
+//! `verdicts.json` identifies one by its name and the beginning of its SHA-256. True: the vehicle crashed or was
+//! about to, the autopilot reports the same, or a value exceeds its autopilot's published limit. One verdict is for
+//! all alarms of a check in a recording.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,7 +14,6 @@ use sha2::{Digest as _, Sha256};
 
 const JUDGED: &str = include_str!("verdicts.json");
 
-/// The kind of vehicle.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Flown {
@@ -26,15 +22,11 @@ pub(super) enum Flown {
     Simulator,
 }
 
-/// Whether an alarm was true.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, PartialOrd, Ord)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Verdict {
-    /// There was a fault.
     True,
-    /// There was no fault.
     False,
-    /// It was not examined.
     #[serde(skip)]
     Unknown,
 }
@@ -42,7 +34,6 @@ pub(super) enum Verdict {
 impl Verdict {
     pub(super) const ALL: [Self; 3] = [Self::True, Self::False, Self::Unknown];
 
-    /// As tables have it.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::True => "true",
@@ -52,7 +43,6 @@ impl Verdict {
     }
 }
 
-/// A verdict and its reason.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Word {
@@ -60,7 +50,6 @@ struct Word {
     why: String,
 }
 
-/// A recording that was judged by hand.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Recording {
@@ -72,7 +61,7 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// The verdict on a check's alarms, and why.
+    /// With the reason.
     pub(super) fn of(&self, check: &str) -> (Verdict, &str) {
         self.alarms.get(check).map_or((Verdict::Unknown, ""), |word| (word.verdict, &word.why))
     }
@@ -82,7 +71,7 @@ fn all() -> Result<Vec<Recording>> {
     serde_json::from_str(JUDGED).context("verdicts.json")
 }
 
-/// The verdict on a recording, by name and content.
+/// By name and content.
 pub(super) fn find(path: &Path) -> Result<Option<Recording>> {
     let name = path.file_name().unwrap_or_default();
     let Some(known) = all()?.into_iter().find(|known| name == known.file.as_str()) else { return Ok(None) };

@@ -1,13 +1,13 @@
 //! Power cuts with a card that loses acknowledged blocks, or spoils others.
 //!
-//! For the recorder each block that the card acknowledges is a barrier. These cards break that:
+//! For the recorder each acknowledged block is a barrier; these cards break that:
 //!
 //! - one writes the last blocks in any order, so that any of them may be missing;
 //! - one has lost a single acknowledged block;
 //! - one spoils the whole flash page of the last block.
 //!
-//! Such a card is examined in three ways: by `fsck.vfat`, by the readers behind `hums info --verify`, and by the
-//! recorder, which starts on it again.
+//! Each is examined by `fsck.vfat`, by the readers behind `hums info --verify`, and by the recorder, which starts on
+//! it again.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -32,13 +32,13 @@ use crate::prove::options::Options;
 use crate::prove::record::Record;
 use crate::prove::stream::{FULL_RATE, Stream};
 
-/// Highest number of blocks in a card's write cache, in any order.
+/// A write cache, in any order.
 const CACHE_BLOCKS_MAX: u64 = 64;
-/// Pages of flash, in blocks: 4 and 16 KiB.
+/// 4 and 16 KiB of flash.
 const PAGE_BLOCKS: [u32; 2] = [8, 32];
-/// Recording time of the next power-on, in seconds.
+/// Of the next power-on.
 const NEXT_S: f64 = 0.3;
-/// The boot number of the next power-on, which no earlier session has.
+/// No earlier session has it.
 const NEXT_BOOTS: u32 = 1_000;
 
 const SHORT: Scenario = Scenario { seconds: 10.0, ..LATER };
@@ -48,9 +48,9 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { seconds: 10.0, ..NEW_CARD },
     Scenario { flight: PX4, card_mib: 300, ..SHORT },
 ];
-/// Cases that are described in words.
+/// In words.
 const NOTES_MAX: usize = 40;
-/// Scenarios of the short form.
+/// In the short form.
 const SCENARIOS_SHORT: usize = 2;
 
 pub(in crate::prove) const LABELS: Labels = Labels {
@@ -127,7 +127,7 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
     }
     ensure!(all.beyond == 0, "more was lost than was spoiled:\n{}", figures.text());
     ensure!(all.untold == 0, "earlier sessions lost something and nothing tells:\n{}", figures.text());
-    // In some of a thousand cuts the recorder cannot know: counted, and described in docs/cards.md.
+    // Rarely the recorder cannot know: see docs/cards.md.
     ensure!(
         !options.short || all.written_over == 0,
         "the next power-on wrote over earlier sessions:\n{}",
@@ -139,11 +139,11 @@ pub(in crate::prove) fn run(options: &Options) -> Result<Figures> {
 /// The card's fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
-    /// Of the last blocks, any may be missing.
+    /// Any of the last blocks may be missing.
     Reordered,
-    /// One block that was acknowledged is missing.
+    /// One acknowledged block is missing.
     Forgotten,
-    /// The page around the last block holds noise, zeros or ones.
+    /// Noise, zeros or ones around the last block.
     Spoiled,
 }
 
@@ -159,23 +159,21 @@ impl Fault {
     }
 }
 
-/// Results of the cuts.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     cuts: u64,
     complaints: u64,
-    /// Cards on which the fault itself changed sectors of earlier sessions.
+    /// The fault itself changed sectors of earlier sessions.
     spoiled: u64,
-    /// Cards that gave fewer frames of an earlier session than before.
+    /// Fewer frames of an earlier session than before.
     less: u64,
-    /// Of them those without any report.
+    /// Without any report.
     untold: u64,
-    /// Frames of earlier sessions that were lost although none of the session's sectors was spoiled.
+    /// Lost although none of the session's sectors was spoiled.
     beyond: u64,
     recorded: u64,
     said_why: u64,
-    /// Sectors of the previous session in a file that it had taken over. The card lost the new name, so the file
-    /// counts as the oldest one and is overwritten again.
+    /// In a file that the session had taken over: the card lost the new name, so the file counts as the oldest.
     name_lost: u64,
     written_over: u64,
 }
@@ -195,33 +193,30 @@ impl Tally {
     }
 }
 
-/// Results of the cuts of one session.
 struct Outcome {
     tallies: [Tally; Fault::ALL.len()],
-    /// Unreported losses, and overwritten sectors, in words.
+    /// In words.
     notes: Vec<String>,
 }
 
 type Blocks = BTreeMap<u32, [u8; BLOCK]>;
 
-/// A sector of an earlier session.
 #[derive(Clone, Copy)]
 struct Kept {
     session: u32,
-    /// The index of its file.
+    /// Index.
     file: usize,
 }
 
-/// A recorded session, and the earlier content of the card.
 struct Subject {
     session: Session,
-    /// Sectors of earlier sessions by their block.
+    /// By block.
     kept: BTreeMap<u32, Kept>,
-    /// Frames of each earlier session.
+    /// By earlier session.
     frames: BTreeMap<u32, usize>,
-    /// The recording of the next power-on.
+    /// Of the next power-on.
     next: Stream,
-    /// The content of a faultless card, for blocks that differ from the earlier content.
+    /// A faultless card, where it differs from the earlier content.
     now: Blocks,
     name: &'static str,
     notes: Vec<String>,
@@ -236,7 +231,7 @@ impl Subject {
         for (index, file) in session.files.iter().enumerate() {
             for block in blocks_of(file) {
                 let Ok(header) = Header::read(&session.block_before(block)) else { continue };
-                // Blocks behind a file's own sectors belong to an overwritten session.
+                // Of an overwritten session.
                 if *sealed_as.entry(index).or_insert(header.session) == header.session {
                     kept.insert(block, Kept { session: header.session, file: index });
                 }
@@ -247,7 +242,7 @@ impl Subject {
         Ok(Self { session, kept, frames, next, now: Blocks::new(), name: scenario.name, notes: Vec::new() })
     }
 
-    /// Cuts by chance, half of them at writes of the file system.
+    /// Half of them at writes of the file system.
     fn choose(&self, count: u64, random: &mut Random) -> Vec<(usize, Fault)> {
         let trace = &self.session.trace;
         let metadata: Vec<_> =
@@ -302,13 +297,12 @@ impl Subject {
         Ok(Outcome { tallies, notes: self.notes })
     }
 
-    /// The content of a block: the faulty one, or the correct one.
+    /// Faulty or correct.
     fn at(&self, block: u32, wrong: &Blocks) -> [u8; BLOCK] {
         let known = wrong.get(&block).or_else(|| self.now.get(&block));
         known.copied().unwrap_or_else(|| self.session.block_before(block))
     }
 
-    /// The blocks with wrong content.
     fn wrong(&self, cut: usize, fault: Fault, random: &mut Random) -> Blocks {
         match fault {
             Fault::Reordered => {
@@ -325,7 +319,7 @@ impl Subject {
             }
             Fault::Forgotten => {
                 let trace = &self.session.trace[..=cut];
-                // Half of them of the file system, and any; the others among the last.
+                // Half of the file system's; the others among the last.
                 let metadata: Vec<_> =
                     (0..=cut).filter(|index| self.session.is_metadata(&trace[*index])).collect();
                 let last = cut - random.below(CACHE_BLOCKS_MAX.min(cut as u64 + 1)) as usize;
@@ -350,13 +344,12 @@ impl Subject {
         }
     }
 
-    /// The content of a block before this write.
     fn earlier(&self, block: u32, before: usize) -> [u8; BLOCK] {
         let write = self.session.trace[..before].iter().rev().find(|write| write.block == block);
         write.map_or_else(|| self.session.block_before(block), |write| write.bytes)
     }
 
-    /// Examines one card; returns the blocks that the next power-on wrote.
+    /// Returns the blocks of the next power-on.
     fn look(&mut self, wrong: &Blocks, tally: &mut Tally) -> Result<BTreeSet<u32>> {
         tally.cuts += 1;
         tally.complaints += u64::from(self.session.card.check().is_err());
@@ -364,9 +357,9 @@ impl Subject {
         self.record_again(wrong, tally)
     }
 
-    /// The readers' results on the earlier sessions.
+    /// On the earlier sessions.
     fn read(&self, wrong: &Blocks, tally: &mut Tally) -> Result<()> {
-        // Sessions that were overwritten in normal operation, and those with sectors that the fault changed.
+        // Overwritten in normal operation, and changed by the fault.
         let (mut made_room, mut spoiled) = (BTreeSet::new(), BTreeSet::new());
         for (block, kept) in &self.kept {
             let before = self.session.block_before(*block);
@@ -383,7 +376,7 @@ impl Subject {
                 of_file.filter(|_| self.session.overwritten.contains(&file.path)).map(|kept| kept.session),
             );
         }
-        // A card without any log is reported, with an error.
+        // Reported with an error.
         let Ok(found) = find(&[self.session.card.path()], false) else {
             tally.less += u64::from(!self.frames.is_empty());
             return Ok(());
@@ -404,7 +397,7 @@ impl Subject {
         Ok(())
     }
 
-    /// The recorder starts on this card, records, and overwrites no readable sector.
+    /// No readable sector is overwritten.
     fn record_again(&self, wrong: &Blocks, tally: &mut Tally) -> Result<BTreeSet<u32>> {
         let card = &self.session.card;
         let names = || card.walk().map(|walk| walk.files.into_iter().map(|file| (file.name, file.path))).ok();
@@ -446,7 +439,7 @@ impl Subject {
         Ok(written)
     }
 
-    /// Whether this block of the card holds a sector of a session, in a file that was not overwritten.
+    /// In a file that was not overwritten.
     fn is_readable(&self, block: u32, wrong: &Blocks, made_room: &BTreeSet<&str>) -> bool {
         let Ok(header) = Header::read(&self.at(block, wrong)) else { return false };
         if header.session == self.session.sealed_as {
@@ -457,12 +450,10 @@ impl Subject {
         path.is_some_and(|path| !made_room.contains(path) && !self.session.overwritten.contains(path))
     }
 
-    /// The file of an earlier session that the block was part of.
     fn owner(&self, block: u32) -> Option<&str> {
         self.session.owners.get(&block).map(|file| self.session.files[*file].path.as_str())
     }
 
-    /// Whether the next power-on's frames are readable.
     fn is_recorded(&self) -> Result<bool> {
         let hashes = self.next.hashes();
         for log in find(&[self.session.card.path()], false)?.logs.iter().rev() {
@@ -475,7 +466,6 @@ impl Subject {
     }
 }
 
-/// The card's blocks that a file has.
 fn blocks_of(file: &hums::logs::fat::CardFile) -> impl Iterator<Item = u32> + '_ {
     file.extents.iter().flat_map(|extent| {
         let first = (extent.start / BLOCK as u64) as u32;
@@ -494,8 +484,7 @@ fn frames_by_session(found: &Found) -> Result<BTreeMap<u32, usize>> {
     Ok(frames)
 }
 
-/// Whether `hums info --verify` reports missing data of these sessions: for the card, for the log, or for the log
-/// after.
+/// For the card, the log, or the log after.
 fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     if found.images.iter().any(|image| !image.damage.is_empty()) {
         return Ok(true);
