@@ -1,7 +1,7 @@
-//! Logs in order, each with the end that a later one recorded for it.
+//! Logs in order, each with the end that a later one recorded.
 //!
-//! The recorder notes at each start where the session before ended on that card. So a log is held back until the next
-//! ones were read. A file from the moment of a power cut has no sector, and so no such record.
+//! Each start notes the end of the session before: a log is held back until the next ones were read. A file from the
+//! moment of a power cut has no sector, and so no such record.
 
 use std::collections::VecDeque;
 
@@ -10,18 +10,17 @@ use hums_blackbox::record::{Before, Found};
 use crate::ending::{Ending, Proof, SessionBefore};
 use crate::logs::sessions::{Sessions, place};
 
-/// Number of files that a start looks at (`SEGMENTS_MAX` of the recorder).
+/// Files that a start looks at (`SEGMENTS_MAX` of the recorder).
 const LOOKED_AT_MAX: u32 = 3;
-/// Logs held back at most; this many later ones may record its end.
+/// Later logs that may record an end.
 pub const HELD_MAX: usize = 4;
 
 /// The result of a log that was read.
 pub trait HasEnding {
-    /// Its end, if it is a HUMS log.
     fn ending(&mut self) -> Option<&mut Ending>;
 }
 
-/// Holds logs back while a later one may have a record of their end.
+/// Holds logs back while a later one may record their end.
 #[derive(Debug)]
 pub struct EndResolver<T> {
     held: VecDeque<T>,
@@ -34,7 +33,7 @@ impl<T: HasEnding> EndResolver<T> {
         Self { held: VecDeque::new(), sessions }
     }
 
-    /// Takes the next log; returns those that no later one can concern, in order.
+    /// Returns the logs that no later one concerns.
     pub fn push(&mut self, mut next: T) -> Vec<T> {
         let mut has_sectors = false;
         if let Some(ending) = next.ending() {
@@ -51,7 +50,7 @@ impl<T: HasEnding> EndResolver<T> {
             }
         }
         self.held.push_back(next);
-        // Of the logs, only the newest with sectors can be the one that the next start found.
+        // The next start found the newest log with sectors.
         let keep = if has_sectors { 1 } else { HELD_MAX };
         let done = self.held.len().saturating_sub(keep);
         self.held.drain(..done).collect()
@@ -62,8 +61,7 @@ impl<T: HasEnding> EndResolver<T> {
         self.held.into_iter()
     }
 
-    /// Notes that the start of `next` found no sector in the newest files, up to number `newest`. Those that are
-    /// empty now were empty then.
+    /// The start of `next` found no sector in files up to `newest`. Files that are empty now were empty then.
     fn tell_empty(&mut self, newest: u32, next: &str) {
         for log in self.held.iter_mut().filter_map(HasEnding::ending) {
             let ((card, number), blocks) = (place(&log.name), &log.summary.blocks);
@@ -77,11 +75,11 @@ impl<T: HasEnding> EndResolver<T> {
         }
     }
 
-    /// Applies the record of `next` about the previous log.
+    /// The record of `next` about the log before.
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(HasEnding::ending).collect();
-        // The start looked at the log's last file, which was to be written anew and held another session's sectors.
+        // The last file was to be written anew, and held another session's sectors.
         let named = (card, Some(before.number));
         if self.sessions.may_be_oldest(card, before.session)
             && let Some(log) = held.iter_mut().find(|log| place(&log.name) == named)
@@ -90,16 +88,15 @@ impl<T: HasEnding> EndResolver<T> {
             next.before = SessionBefore::There;
             return;
         }
-        // Its place is between a log that was read and the next one, on the same card. Or a log of its number is
-        // there, from another session.
+        // The log's place is between two logs of the card, or its number is there with another session.
         let is_looked_at = |name: &str| {
             let (other, read) = place(name);
             let numbers = number.zip(read);
             card == other && numbers.is_some_and(|(next, read)| read <= before.number && before.number < next)
         };
         let is_looked_at = held.iter().any(|log| is_looked_at(&log.name));
-        // Numbers go up, so where a lower one is there, this one was not written over. A log that began on another
-        // card may have lost the record of this one.
+        // Numbers go up: with a lower one there, this one was not overwritten. A log that began on another card may
+        // have lost the record of this one.
         let began_here = next.summary.first_number == Some(0);
         let is_looked_at =
             is_looked_at || began_here && self.sessions.has_older(card, before.number.saturating_add(1));
@@ -113,7 +110,7 @@ impl<T: HasEnding> EndResolver<T> {
             None if is_looked_at => SessionBefore::Gone(before.number),
             None => SessionBefore::NotLookedFor(before.number),
         };
-        // The start looked at each file from the newest on until it found a sector.
+        // A start looks at files from the newest on until it finds a sector.
         for log in held.into_iter().filter(|log| log.summary.session.is_none()) {
             let (other, empty) = place(&log.name);
             let is_after = |empty: u32| before.number < empty && number.is_some_and(|next| empty < next);

@@ -1,4 +1,4 @@
-//! The losses that a log records, as counts and texts, and the reasons for missing data.
+//! Recorded losses as counts and texts.
 
 use hums_blackbox::record::{Loss, Lost};
 use hums_blackbox::{Cause, Gap};
@@ -6,7 +6,7 @@ use hums_blackbox::{Cause, Gap};
 use crate::plural::count;
 use crate::utc::moment;
 
-/// The number of losses in a record. Noise on the line is not the recorder's loss: it was no frame.
+/// Noise was no frame, so it is no loss.
 pub fn lost(loss: &Loss) -> u64 {
     match loss.what {
         Lost::NotFrames | Lost::DamagedFrames => 0,
@@ -20,10 +20,10 @@ pub fn lost(loss: &Loss) -> u64 {
     }
 }
 
-/// The queue was full: it lasts for 2.5 s of a card that stalls or is out of its slot.
+/// The queue lasts for 2.5 s without the card.
 const CARD_LATE: &str = "the card took nothing for too long";
 
-/// A loss record as the end of a sentence; `None` unless it concerns the recorder.
+/// The end of a sentence; `None` unless it concerns the recorder.
 pub fn words(loss: &Loss) -> Option<String> {
     let (one, why) = match loss.what {
         Lost::NotFrames | Lost::DamagedFrames | Lost::WrongChecksums | Lost::DamagedPlaces => return None,
@@ -37,14 +37,14 @@ pub fn words(loss: &Loss) -> Option<String> {
     Some(format!("{} {was} not recorded: {why}", count(loss.count, one)))
 }
 
-/// Missing sectors of a gap; none before the first sector of a log with an unknown beginning.
+/// None before the first sector of a log with an unknown beginning.
 pub fn sectors_lost(gap: &Gap) -> Option<u32> {
     let is_known =
         gap.from.is_some() || gap.sectors_lost > 0 || gap.sectors_skipped > 0 || gap.frames.is_some();
     is_known.then_some(gap.sectors_lost)
 }
 
-/// The likeliest reason why a log does not have something.
+/// The likeliest reason.
 pub const fn why(gap: &Gap) -> &'static str {
     match (gap.cause, gap.from, gap.to) {
         (Cause::Missing, None, _) => "the first sectors are not there: newer logs took their place",
@@ -60,7 +60,7 @@ pub const fn why(gap: &Gap) -> &'static str {
     }
 }
 
-/// The content of a loss record, with its time.
+/// With its time.
 pub fn told(loss: &Loss) -> String {
     let words = words(loss).unwrap_or_else(|| match loss.what {
         Lost::NotFrames => format!("{} of no frame came over the line", count(loss.count, "byte")),

@@ -1,4 +1,4 @@
-//! Names of numbers in a log: messages, usage counters, events, faults, sources of time, vehicles.
+//! Names of numbers in a log.
 
 use std::borrow::Cow;
 
@@ -8,7 +8,7 @@ use hums_core::usage::{self, CounterName};
 
 use crate::trend_words::WORDS;
 
-/// The name of a message, `UNKNOWN_12345` where the dialect has none.
+/// `UNKNOWN_12345` where the dialect has none.
 pub fn message_name(id: u32) -> Cow<'static, str> {
     match hums_dialect::message(id) {
         Some(message) => Cow::Borrowed(message.name),
@@ -16,24 +16,24 @@ pub fn message_name(id: u32) -> Cow<'static, str> {
     }
 }
 
-/// The words of a check, of the board's or of trends over flights.
+/// The board's, or trends'.
 pub fn vocabulary(check: &str) -> Option<&'static Words> {
     let of_trends = || WORDS.iter().find(|words| words.said.check == check);
     health::vocabulary(check).or_else(of_trends)
 }
 
-/// The name of one part's check in outputs: `battery 1 cell voltage`. A pilot's texts have other words.
+/// In outputs: `battery 1 cell voltage`. Texts for pilots differ.
 pub fn check_name(check: &str, instance: u8) -> String {
     vocabulary(check)
         .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
 }
 
-/// The name of a check without its part: `battery cell voltage`.
+/// Without its part: `battery cell voltage`.
 pub fn check_kind(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }
 
-/// A unit as people write it; logs and programs have it in ASCII.
+/// For people; logs have ASCII.
 pub fn unit_name(unit: &str) -> &str {
     match unit {
         "degC" => "\u{b0}C",
@@ -46,8 +46,7 @@ pub fn unit_name(unit: &str) -> &str {
     }
 }
 
-/// The name of a counter, for instance `flight_time_s`, `motor0_run_time_s` or `esc_temperature_45_to_60_degc_s`;
-/// `counter_123` where this program does not know it.
+/// `flight_time_s`, `motor0_run_time_s`; `counter_123` if unknown.
 pub fn counter_name(number: u8) -> String {
     match usage::counter_name(number) {
         Some(CounterName::Vehicle(name)) => name.to_owned(),
@@ -74,7 +73,7 @@ pub fn counter_name(number: u8) -> String {
     }
 }
 
-/// The source of the time of day, by the stored number.
+/// By the stored number.
 pub fn clock_source_name(number: u8) -> &'static str {
     match number {
         1 => "SYSTEM_TIME",
@@ -84,7 +83,7 @@ pub fn clock_source_name(number: u8) -> &'static str {
     }
 }
 
-/// The kind of a monitor's fault, by its number in a log.
+/// Of a monitor's fault.
 pub fn fault_name(number: u8) -> &'static str {
     match number {
         1 => "panic",
@@ -94,7 +93,7 @@ pub fn fault_name(number: u8) -> &'static str {
     }
 }
 
-/// The name of an event, by its number in a log.
+/// By its number in a log.
 pub fn event_name(number: u8) -> &'static str {
     match number {
         1 => "armed",
@@ -119,7 +118,7 @@ pub fn event_name(number: u8) -> &'static str {
     }
 }
 
-/// The names of `MAV_AUTOPILOT` that are met in the field.
+/// Of `MAV_AUTOPILOT`, as met in the field.
 pub fn autopilot_name(number: u8) -> String {
     match number {
         0 => "generic".into(),
@@ -129,7 +128,7 @@ pub fn autopilot_name(number: u8) -> String {
     }
 }
 
-/// The names of `MAV_TYPE` that are met in the field.
+/// Of `MAV_TYPE`, as met in the field.
 pub fn type_name(number: u8) -> String {
     let name = match number {
         0 => "generic",

@@ -1,4 +1,4 @@
-//! Names of a session's files: the session's name from [`crate::logs::naming`].
+//! Names of a session's files ([`crate::logs::naming`]).
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,23 +16,22 @@ use crate::logs::naming::{ends_with_identity, segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::recording::Place;
 
-/// Maximum length of a file's own name: file systems allow 255 bytes, and at most 55 follow.
+/// File systems allow 255 bytes, and at most 55 follow.
 const NAME_BYTES_MAX: usize = 190;
 
-/// The identity of a log, from its sectors' headers and its first records. For a session on a card it is the
-/// same for the card and all copies of it.
+/// A log's identity, from headers and first records. The same for a session on a card and its copies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traits {
-    /// The session in the sectors: 32 bits, random on a board.
+    /// 32 bits, random on a board.
     session: Option<u32>,
-    /// The board's unique id; `None` if the log does not begin with the record of its start.
+    /// `None` without the record of a start.
     board: Option<[u8; 12]>,
-    /// Hash of every sector's number and checksum: equal for copies only.
+    /// Equal for copies only.
     fingerprint: Fingerprint,
 }
 
 impl Traits {
-    /// Looks at all sectors of a log; at all bytes of another recording.
+    /// Reads all sectors, or all bytes of another recording.
     pub fn of(place: &Place) -> Result<Self> {
         let Some(log) = place.own() else {
             let fingerprint = place.path().map(fingerprint).transpose()?.unwrap_or_default();
@@ -52,12 +51,12 @@ impl Traits {
         Ok(Self { session: groups.session(), board, fingerprint: all.finish() })
     }
 
-    /// Whether it begins with the record of a box's start.
+    /// By the record of a start.
     pub fn has_board(&self) -> bool {
         self.board.is_some()
     }
 
-    /// The name of the log's files.
+    /// Of the log's files.
     pub fn name(&self, place: &Place) -> String {
         let Some(log) = place.own() else {
             return format!("{}-{}", file_name(place), self.identity(place));
@@ -65,8 +64,8 @@ impl Traits {
         session_name(&base(log), self.board.as_ref(), self.session)
     }
 
-    /// The session's name in tables and points, and at the end of its files' names. For a HUMS log it is the
-    /// number in its sectors, `s1a2b3c4d`; for any other recording a number made from its bytes, `r1a2b3c4d`.
+    /// For tables, points and the end of file names. A HUMS log's session, `s1a2b3c4d`; otherwise by its bytes,
+    /// `r1a2b3c4d`.
     pub fn identity(&self, place: &Place) -> String {
         let number = self.session.map(|session| format!("s{session:08x}"));
         let content = || place.path().and_then(content_identity);
@@ -75,20 +74,19 @@ impl Traits {
     }
 }
 
-/// The name of a log's files in one command.
+/// In one command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Named {
-    /// By this name, and as the so-and-so-many-th log of its session, from 1.
+    /// Name, and index within its session, from 1.
     As(String, u32),
-    /// Not at all: it is a copy of the log of this index.
+    /// A copy of the log of this index.
     Copy(usize),
 }
 
-/// Names the logs of one command, in their order. Two different logs of one session get different names: a
-/// shortened copy, for instance.
+/// Names one command's logs. Different logs of one session (a shortened copy) differ.
 #[derive(Debug, Default)]
 pub struct Names {
-    /// The indices of logs, by session and content.
+    /// By session and content.
     known: BTreeMap<(Option<u32>, [u8; 16]), usize>,
     of_session: BTreeMap<u32, u32>,
     taken: BTreeMap<String, u32>,
@@ -101,7 +99,7 @@ impl Names {
             return Named::Copy(*first);
         }
         self.known.insert((traits.session, traits.fingerprint), index);
-        // A recording without a session's number is named by its bytes, which no other one has.
+        // Without a session, the bytes name it, uniquely.
         let nth = traits.session.map_or(1, |session| {
             let count = self.of_session.entry(session).or_default();
             *count += 1;
@@ -114,7 +112,7 @@ impl Names {
     }
 }
 
-/// Names all logs of one command. A mere copy has no name, also if it comes before its original.
+/// Names one command's logs; copies have none.
 pub fn names(logs: &[(&Place, Traits)], sessions: &Sessions) -> Vec<Named> {
     let mut names = Names::default();
     let original = |log: &Place| {
@@ -128,9 +126,8 @@ pub fn names(logs: &[(&Place, Traits)], sessions: &Sessions) -> Vec<Named> {
     logs.iter().enumerate().map(name).collect()
 }
 
-/// Removes our own outputs that are not recordings (of `hums decode` and `hums report`) from the inputs, and
-/// returns remarks about them. A second `hums decode * -o .` gets the outputs of the first. A single input is
-/// always kept.
+/// Removes our own outputs from the inputs, with remarks: a second `hums decode * -o .` gets those of the first. A
+/// single input is kept.
 pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     let (made, others): (Vec<&PathBuf>, Vec<&PathBuf>) = inputs.iter().partition(|input| is_made(input));
     if others.is_empty() {
@@ -141,7 +138,7 @@ pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
     (others.into_iter().cloned().collect(), made.iter().map(remark).collect())
 }
 
-/// Whether a file's name, or a folder's name or stamp, marks an output of this program other than a recording.
+/// An output of this program other than a recording, by name or stamp.
 pub fn is_made(path: &Path) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
     if path.is_dir() {
@@ -156,15 +153,15 @@ pub fn is_made(path: &Path) -> bool {
     gaps.or_else(|| Some(other()?.0)).is_some_and(ends_with_identity)
 }
 
-/// Endings of recordings: `decode` makes some of them.
+/// `decode` makes some of them.
 const RECORDINGS: [&str; 6] = ["hum", "tlog", "raw", "bin", "log", "ulg"];
 
-/// Whether the beginning of a page names `hums report`: the table of a folder's pages has no session in its name.
+/// By its head: the table of a folder's pages has no session in its name.
 fn says_report(path: &Path) -> bool {
     head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
 }
 
-/// The first bytes of a file; empty if unreadable.
+/// Empty if unreadable.
 fn head(path: &Path) -> Vec<u8> {
     let mut head = Vec::new();
     // Bytes before an error count.
@@ -172,29 +169,27 @@ fn head(path: &Path) -> Vec<u8> {
     head
 }
 
-/// Mark in such a page's head.
 const GENERATOR: &[u8] = b"name=\"generator\" content=\"hums report\"";
 
-/// The name of a recording's file.
 fn file_name(place: &Place) -> String {
     let name = place.path().and_then(Path::file_name);
     name.map_or_else(|| "recording".to_owned(), |name| cut(name.to_string_lossy().into_owned()))
 }
 
-/// Shortens a name to leave room for the rest: the box, the session, a number, `.tlog.gaps.csv`.
+/// Leaves room for box, session, number, `.tlog.gaps.csv`.
 fn cut(mut name: String) -> String {
     let end = (0..=NAME_BYTES_MAX.min(name.len())).rev().find(|at| name.is_char_boundary(*at));
     name.truncate(end.unwrap_or(0));
     name
 }
 
-/// Hash of all bytes of a file.
+/// Of all bytes.
 fn fingerprint(path: &Path) -> Result<[u8; 16]> {
     let digest = digest(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(digest.first_chunk().copied().unwrap_or_default())
 }
 
-/// The name of a log without its identity: its number on the card, or the name of its file.
+/// Number on the card, or file name.
 fn base(log: &Log) -> String {
     let file = log.files.first().map_or(log.name.as_str(), String::as_str);
     let path = Path::new(file);

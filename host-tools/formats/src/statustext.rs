@@ -1,4 +1,4 @@
-//! What a vehicle's components say in words: `STATUSTEXT`, long ones put together from their parts.
+//! Components' texts: `STATUSTEXT`, joined from parts.
 
 use hums_core::alert;
 use hums_core::cause::Alert;
@@ -8,46 +8,46 @@ use hums_core::observation::Source;
 use crate::mavlink::ids::STATUSTEXT;
 use crate::mavlink::values::{Payload, Value};
 
-/// A text of several parts that lacks the next one for so long is as long as it is.
+/// Without the next part a text ends.
 const PATIENCE: Span = Span::from_secs(1);
-/// Senders whose texts are put together at a time. One more completes all.
+/// At a time. One more completes all.
 const SENDERS_MAX: usize = 64;
-/// The longest text that is put together, bytes.
+/// A joined text.
 const BYTES_MAX: usize = 1_000;
-/// A part with less than this is the last one: it has a NUL.
+/// A shorter part has a NUL: the last one.
 const PART_BYTES: usize = 50;
 
-/// A text, or what one message has of it.
+/// A text, or one message's part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
-    /// When its first part came.
+    /// Of the first part.
     pub at: Instant,
     /// Who says it.
     pub source: Source,
-    /// `MAV_SEVERITY`: 0 is an emergency, 7 is for debugging.
+    /// `MAV_SEVERITY`: 0 emergency, 7 debugging.
     pub severity: u8,
-    /// Text of the world, never markup.
+    /// Untrusted, never markup.
     pub words: String,
-    /// The alert in it, once it is put together.
+    /// Once joined.
     pub alert: Option<Alert>,
-    /// The number that its parts share; 0 where there is but one.
+    /// Shared by its parts; 0 for a single one.
     id: u16,
     /// Nothing follows.
     ends: bool,
 }
 
 impl Text {
-    /// A text that is whole.
+    /// A whole text.
     pub fn whole(at: Instant, source: Source, severity: u8, words: &str) -> Self {
         Self { at, source, severity, words: words.to_owned(), alert: None, id: 0, ends: true }
     }
 
-    /// The level of a finding as grave as this.
+    /// A finding's level of this severity.
     pub fn level(&self) -> &'static str {
         level(self.severity)
     }
 
-    /// From the payload of a frame whose checksum holds.
+    /// The frame's checksum must hold.
     pub fn of(at: Instant, source: Source, payload: &[u8]) -> Option<Self> {
         let payload = Payload::new(hums_dialect::message(STATUSTEXT)?, payload);
         let bytes = payload.fields().find_map(|(_, value)| match value {
@@ -62,8 +62,8 @@ impl Text {
     }
 }
 
-/// The level of a finding as grave as this, as the pages colour it. `MAV_SEVERITY` says what is a failure of a primary
-/// system (critical and above) and what of a secondary one (error).
+/// A finding's level, as pages colour it. `MAV_SEVERITY`: failure of a primary system (critical and above), of a secondary one
+/// (error).
 pub fn level(severity: u8) -> &'static str {
     match severity {
         0..=2 => "critical",
@@ -73,12 +73,12 @@ pub fn level(severity: u8) -> &'static str {
     }
 }
 
-/// Puts texts together: one of each sender at a time.
+/// Joins texts, one of each sender at a time.
 #[derive(Clone, Debug, Default)]
 pub struct Texts(Vec<Text>);
 
 impl Texts {
-    /// Takes the next message; gives what is whole.
+    /// Hands on whole texts.
     pub fn take(&mut self, next: Text, whole: &mut impl FnMut(Text)) {
         self.pass(next.at, whole);
         let (source, id, ends) = (next.source, next.id, next.ends);
@@ -92,7 +92,7 @@ impl Texts {
         self.complete(whole, |open| open.source == source && ends);
     }
 
-    /// Time passes: what has waited long enough is whole.
+    /// Ends texts that waited long enough.
     pub fn pass(&mut self, now: Instant, whole: &mut impl FnMut(Text)) {
         self.complete(whole, |open| now.since(open.at) > PATIENCE);
     }

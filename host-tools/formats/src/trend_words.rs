@@ -1,8 +1,8 @@
-//! The words of the trends over flights, which this program judges and a box does not.
+//! Words of trends over flights, which no box judges.
 
 use hums_core::health::{Said, Scope, Words};
 
-/// The words of a trend check: name for people, part, meaning, action, input.
+/// Name for people, part, meaning, action, input.
 const fn words(
     check: &'static str,
     [name, part, meaning, action, needs]: [&'static str; 5],
@@ -12,7 +12,7 @@ const fn words(
     Words { said, meaning, action, needs, scope: Scope::Stored }
 }
 
-/// The checks against earlier flights only. The alarms come from boxes that judged trends themselves.
+/// Checks against earlier flights. Boxes that judged trends sent alarms.
 pub static WORDS: [Words; 6] = [
     words(
         "batt_capacity",

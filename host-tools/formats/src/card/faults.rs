@@ -4,30 +4,29 @@ use std::str::FromStr;
 
 use crate::utc::{parse_seconds, seconds_to_micros};
 
-/// All faults of one run.
+/// Faults of one run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Power cuts; the first one reached ends the run.
+    /// Power cuts; the first one ends the run.
     pub cuts: Vec<Cut>,
     /// Pauses.
     pub stalls: Vec<Stall>,
-    /// Spans in which no card is there.
+    /// Spans without a card.
     pub outs: Vec<CardOut>,
-    /// The probability that a block write fails and leaves the block unchanged.
+    /// Probability that a block write fails and changes nothing.
     pub write_error: f64,
     /// Makes the write errors repeatable.
     pub seed: u64,
-    /// Block 0 is write protected. The recorder writes it only to format a card, and a user's image is never
-    /// formatted.
+    /// Block 0 is write protected: a user's image is never formatted.
     pub keeps_table: bool,
 }
 
 /// `--cut-after-writes N[:torn]`
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The block write at which power goes, counted from 1.
+    /// Block write at which power goes, from 1.
     pub write: u64,
-    /// Half of that block is old; otherwise it is written whole.
+    /// Half of that block is old.
     pub torn: bool,
 }
 
@@ -50,9 +49,9 @@ impl FromStr for Cut {
 /// `--stall MS@T`
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stall {
-    /// When it begins, in microseconds since the first input byte.
+    /// Start, microseconds since the first input byte.
     pub from_us: u64,
-    /// Duration of the card's silence, in microseconds.
+    /// Duration, microseconds.
     pub for_us: u64,
 }
 
@@ -74,9 +73,9 @@ impl FromStr for Stall {
 /// `--card-out T..T`
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardOut {
-    /// When it is pulled, in microseconds since the first input byte.
+    /// Start, microseconds since the first input byte.
     pub from_us: u64,
-    /// When it is back, in the same; `u64::MAX` for never.
+    /// End, likewise; `u64::MAX` for never.
     pub to_us: u64,
 }
 

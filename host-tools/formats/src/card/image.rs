@@ -1,4 +1,4 @@
-//! An image file: made when it is missing, and read without ever writing to it.
+//! An image file of a card.
 
 use std::borrow::Borrow;
 use std::fs::{File, Metadata, OpenOptions};
@@ -13,15 +13,15 @@ use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 use crate::files::{make_in_place, open_in_place};
 use crate::outcome::usage;
 
-/// The default size of a new image, in MiB (`--card-size`).
+/// Default of `--card-size`, MiB.
 pub const SIZE_MIB: u64 = 256;
-/// The smallest size for FAT32, in MiB.
+/// Least size for FAT32, MiB.
 pub const SIZE_MIB_MIN: u64 = (BLOCKS_MIN as u64 * 512).div_ceil(1 << 20);
 /// Block numbers have 32 bits, in MiB.
 pub const SIZE_MIB_MAX: u64 = 2 * 1024 * 1024 - 1;
 
-/// Opens the image for reading and writing, for this run alone. Without an image it makes a sparse file of
-/// `size_mib` and lets `format` format it.
+/// Opens the image for reading and writing, for this run alone; without one, makes a sparse file of
+/// `size_mib` for `format`.
 pub fn open_or_make(
     path: &Path,
     size_mib: Option<u64>,
@@ -64,8 +64,8 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
         .with_context(|| format!("{shown}: cannot be opened for writing"))
 }
 
-/// Refuses an image that is not a card. If the recorder finds no usable file system on it, the image must be
-/// completely empty, because such a card may be formatted by command. Returns the remark for an empty one.
+/// Refuses an image without a usable file system, unless it is empty: such a card may be formatted by
+/// command. Returns a remark for an empty one.
 pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
     let context = || format!("{}: cannot be read", path.display());
     let bytes = length(file).with_context(context)?;
@@ -81,7 +81,7 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
         Err(LayoutError::Device(error)) => return Err(error).with_context(context),
         Err(why) => why,
     };
-    // A partition table alone, as on a card with an unformatted partition, holds no data to lose.
+    // A partition table alone holds no data to lose.
     let from = if matches!(why, LayoutError::NoPartitionTable) { 0 } else { BLOCK_BYTES as u64 };
     if is_zero(file, from).with_context(context)? {
         return Ok(Some(format!(
@@ -96,12 +96,12 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
     )
 }
 
-/// Whether an image has a partition table and a FAT32 volume: that table is never rewritten.
+/// Whether an image has a partition table and a FAT32 volume.
 pub fn is_card(file: &File) -> io::Result<bool> {
     Ok(Layout::read(&ReadOnlyImage::new(file)?).is_ok())
 }
 
-/// Whether a file has only zeros from here on. Holes of a sparse file are not read.
+/// Holes of a sparse file are not read.
 fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     let mut bytes = vec![0; 1 << 20];
     loop {
@@ -119,31 +119,30 @@ fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     }
 }
 
-/// Place of a sparse file's next data from here on; `None` up to its end.
+/// The sparse file's next data; `None` up to its end.
 #[cfg(target_os = "linux")]
 fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
     match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(at)) {
         Ok(data) => Ok(Some(data)),
         Err(rustix::io::Errno::NXIO) => Ok(None),
-        // A file system that does not know.
+        // Unknown to the file system.
         Err(rustix::io::Errno::INVAL) => Ok(Some(at)),
         Err(error) => Err(error.into()),
     }
 }
 
-/// The same on a system without this call.
 #[cfg(not(target_os = "linux"))]
 #[expect(clippy::unnecessary_wraps, reason = "asking a system that tells may fail")]
 fn data_from(_: &File, at: u64) -> io::Result<Option<u64>> {
     Ok(Some(at))
 }
 
-/// Size of a file, or of a raw device, whose metadata has 0.
+/// Size of a file, or of a raw device (0 in its metadata).
 pub fn length(mut file: &File) -> io::Result<u64> {
     file.seek(SeekFrom::End(0))
 }
 
-/// An image file, owned or borrowed, as a card with its write protection on.
+/// An image file as a write-protected card.
 #[derive(Debug)]
 pub struct ReadOnlyImage<F> {
     file: F,

@@ -1,4 +1,4 @@
-//! The SD card as the host tools see it: an image file as a block device, to write (with faults) or only to read.
+//! The SD card as the host tools see it: an image file as a block device.
 
 pub mod faults;
 pub mod image;

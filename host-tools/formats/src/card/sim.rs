@@ -1,8 +1,5 @@
-//! The simulated card: an image file behind the same block device interface as a real one. It has a real
-//! one's faults and slowness, in the simulation's own time.
-//!
-//! Every operation takes virtual time, which the card adds to its clock. The caller sets the clock, lets the
-//! storage task run, and reads the time taken from the clock. A stall is an operation that takes longer.
+//! A simulated card: an image file with a real card's faults and slowness, in the simulation's time. Every
+//! operation advances the card's clock; a stall is a longer operation.
 
 use std::cell::{Cell, RefCell};
 use std::fs::File;
@@ -13,11 +10,11 @@ use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 use super::faults::{Cut, Faults, Stall};
 use crate::rng::Rng;
 
-/// Time of a command besides its data: a usual card's programming time, in microseconds.
+/// Microseconds of a command besides its data: a usual card's programming time.
 const COMMAND_US: u64 = 300;
-/// One block over SPI at 21 MHz, in microseconds.
+/// Microseconds of a block over SPI at 21 MHz.
 const BLOCK_US: u64 = 200;
-/// The driver's timeout for a missing card, in microseconds.
+/// The driver's timeout for a missing card, microseconds.
 const ABSENT_US: u64 = 10_000;
 
 const PURPOSE: u64 = 2;
@@ -25,15 +22,10 @@ const PURPOSE: u64 = 2;
 /// Why an operation failed.
 #[derive(Debug)]
 pub enum CardError {
-    /// The power is off: all operations fail.
     PowerGone,
-    /// No card is in the slot.
     Absent,
-    /// The card refused the write.
     WriteRefused,
-    /// The block is beyond the card's end.
     OutOfRange,
-    /// The image file itself failed.
     Image(io::Error),
 }
 
@@ -51,20 +43,20 @@ impl std::fmt::Display for CardError {
 
 impl std::error::Error for CardError {}
 
-/// One block write, as it was done.
+/// One block write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
-    /// The card's clock when the block was handed over, in microseconds.
+    /// The clock at the start, microseconds.
     pub at_us: u64,
     /// Which block.
     pub block: u32,
     /// Its new content.
     pub bytes: Block,
-    /// Blocks behind it that the same command writes: undefined while it goes on (SD specification, 4.3.4).
+    /// Blocks behind it in the same command: undefined meanwhile (SD specification, 4.3.4).
     pub behind: u32,
 }
 
-/// A card in an image file. The methods take `&self`, as the block device's do; one thread uses it.
+/// A card in an image file.
 #[derive(Debug)]
 pub struct SimCard {
     image: RefCell<File>,
@@ -80,7 +72,7 @@ pub struct SimCard {
 }
 
 impl SimCard {
-    /// A card of the size of `image`, whole blocks only.
+    /// A card of `image`'s whole blocks.
     pub fn new(image: File, faults: Faults) -> io::Result<Self> {
         let blocks = image.metadata()?.len() / BLOCK_BYTES as u64;
         let rng = RefCell::new(Rng::new(faults.seed, PURPOSE));
@@ -98,38 +90,38 @@ impl SimCard {
         })
     }
 
-    /// A card on which no log of an earlier power-on is overwritten, or one on which they may be.
+    /// Whether logs of earlier power-ons are kept or may be overwritten.
     #[must_use]
     pub fn keeping_logs(self, keeps_logs: bool) -> Self {
         Self { keeps_logs, ..self }
     }
 
-    /// Whether no log of an earlier power-on is overwritten.
+    /// Whether logs of earlier power-ons are kept.
     pub const fn keeps_logs(&self) -> bool {
         self.keeps_logs
     }
 
-    /// Sets the card's clock, in microseconds since the first input byte.
+    /// Microseconds since the first input byte.
     pub fn set_clock(&self, now_us: u64) {
         self.clock_us.set(now_us);
     }
 
-    /// The card's clock: the time set, plus the time of the operations since then.
+    /// The time set, plus operations since then, microseconds.
     pub fn clock(&self) -> u64 {
         self.clock_us.get()
     }
 
-    /// Block writes that reached the card, a torn one included.
+    /// Writes that reached the card, a torn one included.
     pub fn writes(&self) -> u64 {
         self.writes.get()
     }
 
-    /// Keeps every block write from now on, for [`Self::take_trace`].
+    /// Keeps every write for [`Self::take_trace`].
     pub fn start_trace(&self) {
         self.trace.replace(Some(Vec::new()));
     }
 
-    /// The block writes since [`Self::start_trace`]; ends the trace.
+    /// Ends the trace.
     pub fn take_trace(&self) -> Vec<Written> {
         self.trace.take().unwrap_or_default()
     }
@@ -139,18 +131,17 @@ impl SimCard {
         self.dead.get()
     }
 
-    /// Whether a card is in the slot now.
+    /// Whether a card is in the slot.
     pub fn is_present(&self) -> bool {
         let now = self.clock();
         !self.faults.outs.iter().any(|out| (out.from_us..out.to_us).contains(&now))
     }
 
-    /// The error of the image file itself, if there was one: a full disk is not the simulated card's fault.
+    /// The image file's own error: a full disk is not the simulated card's fault.
     pub fn take_image_error(&self) -> Option<io::Error> {
         self.image_error.borrow_mut().take()
     }
 
-    /// Start of every operation: takes its time, and checks that the card is there.
     fn begin(&self, cost_us: u64) -> Result<(), CardError> {
         if self.is_dead() {
             return Err(CardError::PowerGone);
@@ -169,7 +160,7 @@ impl SimCard {
         Err(CardError::Absent)
     }
 
-    /// One block write; false if the power failed during it.
+    /// False if the power failed meanwhile.
     fn write_block(
         &self,
         bytes: &[u8; BLOCK_BYTES],
@@ -207,8 +198,8 @@ impl SimCard {
         Ok(())
     }
 
-    /// The image file failed, as on a full disk. The power fails with it. Otherwise the recorder would see a
-    /// card that refuses some writes, and would go on over older logs.
+    /// The power fails with the image file: the recorder would take it for refused writes, and go on over
+    /// older logs.
     fn keep(&self, error: io::Error) -> CardError {
         self.dead.set(true);
         let copy = io::Error::new(error.kind(), error.to_string());

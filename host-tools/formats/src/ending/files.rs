@@ -1,4 +1,4 @@
-//! Foreign sectors in a log's files, missing files, and the blocks after its last sector.
+//! Foreign and missing parts of a log's files.
 
 use std::path::Path;
 
@@ -16,11 +16,9 @@ use crate::plural::count;
 const NAMED_MAX: usize = 3;
 
 impl Ending {
-    /// Blocks after the last sector that are neither empty nor sectors of any log, if the log's end is not
-    /// proved before them. Damaged sectors of the log look like that. Data from before the card's use in the
-    /// box are larger than a card's page, and go on to the end of the last file. A block that begins as a
-    /// sector and fails its check may be left over like sectors of another session. So it counts only without
-    /// sound ones of those.
+    /// Unknown blocks after the last sector, if the log's end is not proved before them. Damaged sectors of
+    /// the log look like that. Older data than the box's are larger than a card's page, and go on to the end
+    /// of the last file. An unsound head counts only without sound sectors of other sessions.
     pub fn noise(&self) -> Option<String> {
         let behind = &self.summary.behind;
         let unsound = if behind.stale == 0 { behind.unsound } else { 0 };
@@ -35,7 +33,7 @@ impl Ending {
         })
     }
 
-    /// That sectors disagree with their parity, which was made of them when they were on the card.
+    /// Sectors that disagree with their parity.
     pub fn contradicted(&self) -> Option<String> {
         let parity = &self.summary.parity;
         let (file, first, last) = parity.first?;
@@ -50,7 +48,7 @@ impl Ending {
         ))
     }
 
-    /// Which sectors of its files are not of the log, and which of its files are not there.
+    /// Foreign sectors in its files, and missing files.
     pub fn strange(&self) -> Vec<String> {
         let parts = self.files.iter().filter(|name| is_part(Path::new(name)));
         let part_words = |name: &String| {
@@ -66,8 +64,7 @@ impl Ending {
         all
     }
 
-    /// Files without a sector. The next start may have found one empty: it was made when the power failed.
-    /// The card may have refused one between consecutive sectors, or was missing.
+    /// Files without a sector: made when the power failed, refused by the card, or out of its slot.
     fn empty(&self) -> Option<String> {
         let is_usual = |strange: &Strange| {
             let is_between = strange.file + 1 < self.files.len() && self.summary.gaps == 0;
@@ -83,7 +80,6 @@ impl Ending {
         Some(format!("{name} has the name of a segment and holds nothing of ours{more}"))
     }
 
-    /// Sectors of its files that are not of the log.
     pub(super) fn others(&self) -> Vec<String> {
         let is_told = |strange: &&Strange| strange.sectors > 0 && !self.is_begun_anew(strange);
         let told: Vec<_> = self.summary.strange.iter().filter(is_told).collect();
@@ -104,17 +100,16 @@ impl Ending {
         all
     }
 
-    /// Whether the last file was to be rewritten when the power failed, and still holds another session from
-    /// its beginning on. Its first sector may be torn.
+    /// Whether the last file was about to be rewritten, and holds another session from its beginning on. Its
+    /// first sector may be torn.
     fn is_begun_anew(&self, strange: &Strange) -> bool {
         let is_last = strange.file + 1 == self.files.len();
         strange.hollow && is_last && strange.first <= 1 && matches!(self.proof, Proof::NextStart(None))
     }
 
-    /// Files of the log that are not there: the first ones, or those between two.
     fn missing(&self) -> Option<String> {
         let segment = |name: &String| segment_name(Path::new(name)).map(|name| name.segment);
-        // If the card was missing or refused data, an empty file may exist: it is not copied.
+        // Without data on the card an empty file may exist, which is not copied.
         let is_passed = self.summary.gaps == 0 && self.summary.marks.has_card_trouble();
         let between = || {
             self.files.iter().zip(self.files.iter().skip(1)).find_map(|(before, after)| {
@@ -131,15 +126,13 @@ impl Ending {
     }
 }
 
-/// The words for blocks that are not sectors.
 const fn foreign_words(number: u64) -> &'static str {
     if number == 1 { "that is no sector" } else { "that are no sectors" }
 }
 
-/// Text for blocks with the beginning of a sector and a wrong check.
 const UNSOUND: &str = "with the head of a sector and a wrong check";
 
-/// The blocks after the last sector, in words; empty without any.
+/// Empty without any.
 pub fn behind_words(behind: &BlockCounts) -> String {
     words_of(&[
         (behind.damaged, "damaged"),
@@ -152,8 +145,7 @@ pub fn behind_words(behind: &BlockCounts) -> String {
     ])
 }
 
-/// The foreign blocks before its last sector, in words; empty without any. A file other than the last may
-/// have been left before it was full.
+/// Foreign blocks before its last sector: an earlier file may not have been full.
 pub fn among_words(summary: &Summary) -> String {
     let (all, behind) = (&summary.blocks, &summary.behind);
     let foreign = all.foreign - behind.foreign;
@@ -164,7 +156,7 @@ pub fn among_words(summary: &Summary) -> String {
     ])
 }
 
-/// Sectors of the log that count as copies, in words; empty without any.
+/// Sectors that count as copies; empty without any.
 pub fn copies_words(all: &BlockCounts) -> String {
     let kinds = [(all.superseded, "superseded"), (all.misplaced, "there twice or where others belong")];
     let kinds = kinds.iter().filter(|(number, _)| *number > 0);

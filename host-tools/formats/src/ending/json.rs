@@ -11,25 +11,20 @@ use crate::utc::iso8601;
 /// The end of a log as JSON.
 #[derive(Debug, Serialize)]
 pub struct EndJson {
-    /// Kind of proof: `closed`, `next_start`, `mark`, `none`, `short`.
+    /// `closed`, `next_start`, `mark`, `none`, `short`.
     proof: &'static str,
-    /// The same in words.
     words: String,
-    /// The last end mark.
     mark: Option<MarkJson>,
-    /// Number of end marks.
     marks: u64,
-    /// Seconds after the last end mark, without a proof of their end.
+    /// Seconds after the last mark, without a proof of their end.
     after_mark_s: Option<f64>,
-    /// When the vehicle was armed or took off after the last end mark, seconds since power-on.
+    /// Arming or take-off after the last mark, seconds since power-on.
     moved_s: Option<f64>,
-    /// Missing sectors and frames that the next start found.
+    /// Found by the next start.
     sectors_missing: u32,
     frames_missing: Option<u32>,
-    /// The blocks after the last sector.
     behind: BlocksJson,
-    /// Reasons why the log does not count as whole, and a remark on rebuilt sectors, as sentences; empty
-    /// without both.
+    /// Sentences: why the log does not count as whole, and a remark on rebuilt sectors.
     not_proved: Vec<String>,
 }
 
@@ -69,22 +64,21 @@ impl EndJson {
     }
 }
 
-/// Blocks of 512 bytes, by kind.
+/// Blocks of 512 bytes.
 #[derive(Debug, Serialize)]
 pub struct BlocksJson {
     blocks: u64,
-    /// Copies of a sector in progress, and the file's older content of this session.
+    /// Copies of a sector in progress, and older content of this session.
     superseded: u64,
     misplaced: u64,
     damaged: u64,
     other_session: u64,
-    /// Sectors with parity of others.
     parity: u64,
-    /// Lost or damaged sectors that were rebuilt from parity.
+    /// Rebuilt from parity.
     repaired: u64,
     zero: u64,
     erased: u64,
-    /// They begin as a sector, fail its check, and are not of this session as far as known.
+    /// Heads without a valid check, of other sessions as far as known.
     unsound: u64,
     foreign: u64,
     older_format: u64,

@@ -11,24 +11,24 @@ use crate::plural::{are, count, noun};
 /// The end of a log that was read: the evidence of its completeness, the same for every command.
 #[derive(Clone, Debug, Default)]
 pub struct Ending {
-    /// Its name.
+    /// The log's files.
     pub name: String,
-    /// The files that hold it.
+    /// Totals.
     pub files: Vec<String>,
-    /// Totals of the reading.
+    /// Proof of the end.
     pub summary: Summary,
-    /// Proof of its end.
+    /// The session just before it.
     pub proof: Proof,
-    /// State of the session just before it on the card.
+    /// The original's name, if this is a copy.
     pub before: SessionBefore,
-    /// The name of the original, if it is a mere copy.
+    /// Rest of a session outside of all files.
     pub again: Option<String>,
-    /// It is the rest of a session outside of all files, left by newer ones.
+    /// A log alone; [`crate::followed`] adds later evidence.
     pub left_over: bool,
 }
 
 impl Ending {
-    /// A log by itself; [`crate::followed`] adds the evidence of later ones.
+    /// A part of a sentence.
     pub fn of(log: &Log, summary: Summary) -> Self {
         let proof = Proof::of(&summary, None);
         let (name, files, left_over) = (log.name.clone(), log.files.clone(), log.left_over);
@@ -40,8 +40,7 @@ impl Ending {
         self.proof.words(&self.summary)
     }
 
-    /// Its description, if its losses do not count: a mere copy of another log, the rest of a session, or a
-    /// file's old content.
+    /// A copy, a rest or old content: its losses do not count.
     pub fn aside(&self) -> Option<String> {
         let left_over = || {
             format!(
@@ -53,47 +52,45 @@ impl Ending {
         again.or_else(|| self.left_over.then(left_over))
     }
 
-    /// Whether it is to be counted: its session is not there under another name.
+    /// Whether its session is not there under another name.
     pub const fn is_counted(&self) -> bool {
         self.again.is_none()
     }
 
-    /// Whether earlier logs of its card were not among the inputs.
+    /// Whether earlier logs of its card are missing from the inputs.
     pub const fn is_without_earlier(&self) -> bool {
         matches!(self.before, SessionBefore::NotLookedFor(_))
     }
 
-    /// Whether it has no loss or damage, and is proved to its end or at least to its last end mark.
+    /// No loss or damage, and proved at least to its last end mark.
     pub fn is_sound(&self) -> bool {
         self.faults().is_empty()
     }
 
-    /// The faults, as parts of sentences: missing proof, rebuilt sectors, missing parity.
+    /// Parts of sentences: missing proof, rebuilt sectors, missing parity.
     pub fn faults(&self) -> Vec<String> {
         let weakened = [made_again_words(self.made_again()), unprotected_words(self.unprotected())];
         self.unproved().into_iter().chain(weakened.into_iter().flatten()).collect()
     }
 
-    /// Number of sectors rebuilt from parity. They show a damaged card although nothing is lost. In a file
-    /// just begun anew the new session has overwritten some, which do not count.
+    /// Sectors rebuilt from parity: a damaged card, but no loss. In a file begun anew the new session has
+    /// overwritten some, which do not count.
     pub const fn made_again(&self) -> u64 {
         self.summary.blocks.repaired
     }
 
-    /// Number of missing parity sectors: nothing is lost, but further losses of the card cannot be rebuilt. A
-    /// refused block is not written again, so after refused blocks they do not prove a loss.
+    /// Missing parity sectors: further losses cannot be rebuilt. A refused block is not written again: no
+    /// proof of a loss.
     pub fn unprotected(&self) -> u64 {
         if self.has_parity() && !self.summary.marks.refused { self.summary.parity.missing } else { 0 }
     }
 
-    /// Whether its parity should be there. It does not matter for copies and rests.
+    /// Whether its parity should be there.
     fn has_parity(&self) -> bool {
         self.aside().is_none() && self.summary.marks.has_boot
     }
 
-    /// Reasons why it is not proved to be whole, as parts of sentences: losses, missing proof, foreign data
-    /// in its files. A mere copy's losses are reported with its original; its additional data are reported
-    /// here.
+    /// Parts of sentences: losses, missing proof, foreign data. A copy reports only its additional data.
     pub fn unproved(&self) -> Vec<String> {
         if self.aside().is_some() {
             return self.besides();
@@ -142,13 +139,13 @@ impl Ending {
         all
     }
 
-    /// Sectors of a mere copy's files that are not of the session which it copies.
+    /// Foreign sectors in a copy's files.
     pub fn besides(&self) -> Vec<String> {
         if self.again.is_some() { self.others() } else { Vec::new() }
     }
 
-    /// The next start found sectors of this session in the log's last file. Returns whether that file has no
-    /// sectors of the log, because it was to be rewritten. This is then not a finding.
+    /// The next start found this session in the log's last file. Returns whether that file was to be
+    /// rewritten, which is not a finding.
     pub fn confirm_begun_anew(&mut self, session: u32) -> bool {
         let last = self.files.len().saturating_sub(1);
         let strange = &mut self.summary.strange;
@@ -161,7 +158,7 @@ impl Ending {
     }
 }
 
-/// The sentence about this many rebuilt sectors, with advice; `None` without any.
+/// With advice; `None` without any.
 pub fn made_again_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(
@@ -171,7 +168,7 @@ pub fn made_again_words(sectors: u64) -> Option<String> {
     })
 }
 
-/// The sentence about this many missing parity sectors, with advice; `None` without any.
+/// With advice; `None` without any.
 pub fn unprotected_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(

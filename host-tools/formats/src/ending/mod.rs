@@ -1,9 +1,8 @@
 //! The evidence of a log's end, and its words.
 //!
-//! A log that lost its last sectors looks like one whose power failed earlier. So only two records prove its
-//! end: the mark of a session that ended properly, and the findings of the next start on the card. Without
-//! these the log is proved up to its last end mark (a disarming or a landing). That holds only if the vehicle
-//! did not move on after it.
+//! A log that lost its last sectors looks like one whose power failed earlier. Two records prove its end: the
+//! mark of a proper end, and the findings of the next start. Otherwise the log is proved up to its last end
+//! mark (a disarming or a landing), if the vehicle did not move on after it.
 
 mod files;
 mod json;

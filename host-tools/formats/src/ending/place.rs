@@ -1,21 +1,20 @@
 //! A log's place among the logs of its card.
 
-/// The session that was recorded on a card just before a log, as the log's boot record names it.
+/// The session just before a log on its card, by the log's boot record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SessionBefore {
-    /// No boot record names one.
     #[default]
     NotNamed,
     /// It was read too.
     There,
-    /// It is not among the inputs, and may be gone: the oldest logs make room for new ones.
+    /// Not among the inputs; old logs make room for new ones.
     NotLookedFor(u32),
-    /// It is not there, and an older log of the card is; or its files hold another session.
+    /// Missing although an older log of the card is there, or replaced in its files.
     Gone(u32),
 }
 
 impl SessionBefore {
-    /// The missing session, as a part of a sentence.
+    /// A part of a sentence.
     pub fn gone(self) -> Option<String> {
         match self {
             Self::Gone(number) => Some(format!(

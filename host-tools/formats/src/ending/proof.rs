@@ -10,23 +10,21 @@ use crate::utc::iso8601_ms;
 /// The proof of a log's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Proof {
-    /// Its last sector has the mark of an orderly end.
+    /// The last sector has the mark of an orderly end.
     Closed,
-    /// The next start on the card found that it ends there. It has the time of arming or take-off if power
-    /// failed while the vehicle was armed or flying. The last data before the power cut are then unknown.
+    /// The next start found its end here. The time is of arming or take-off if power failed armed or flying:
+    /// the last data are then unknown.
     NextStart(Option<Instant>),
     /// It is whole to its last end mark.
     Mark(Instant, Resting),
-    /// No proof: it has no end mark, or the vehicle was armed or took off after the last one.
+    /// No end mark, or the vehicle was armed or took off after the last one.
     #[default]
     None,
-    /// The next start found as many sectors and frames, and they were others.
+    /// The next start found as many sectors and frames, but others.
     Differs,
-    /// Data were lost: this many sectors, and frames if counted.
+    /// Lost sectors, and frames if counted.
     Short {
-        /// Missing sectors; 0 if the last one is there in an older copy with fewer frames.
         sectors: u32,
-        /// Frames that are missing.
         frames: Option<u32>,
         /// The source.
         by: Teller,
@@ -36,14 +34,13 @@ pub enum Proof {
 /// The source of a log's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Teller {
-    /// The next start on the card.
     NextStart,
-    /// Its own parity, which covers sectors once they are on the card.
+    /// Its own parity covers sectors once they are on the card.
     Parity,
 }
 
 impl Proof {
-    /// The proof from the log itself, and from the record of the next start on the card, if known.
+    /// By the log, and by the next start's record if known.
     pub fn of(summary: &Summary, next: Option<&Before>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
@@ -55,7 +52,7 @@ impl Proof {
             let counted = (next.found == Found::Frames).then_some(next.frames);
             let frames = counted.zip(summary.frames_end).map(|(there, here)| there.wrapping_sub(here));
             let frames = frames.filter(|missing| *missing < 1 << 31);
-            // The sector in progress is written again and again: an older copy of it has fewer frames.
+            // The sector in progress is written again and again: an older copy has fewer frames.
             if next.sectors > sectors || frames.is_some_and(|missing| missing > 0) {
                 let by = Teller::NextStart;
                 return Self::Short { sectors: (next.sectors - sectors).max(covered), frames, by };
@@ -79,7 +76,7 @@ impl Proof {
         }
     }
 
-    /// Whether the end is complete, as far as known, up to the last end mark at least.
+    /// Up to the last end mark at least.
     pub const fn holds(self) -> bool {
         self.is_whole() || matches!(self, Self::Mark(..))
     }
@@ -100,7 +97,7 @@ impl Proof {
         }
     }
 
-    /// How the log ends, as a part of a sentence.
+    /// A part of a sentence.
     pub fn words(self, summary: &Summary) -> String {
         let moment = |at| moment(summary, at);
         match self {
@@ -155,12 +152,11 @@ impl Proof {
     }
 }
 
-/// From a time to the log's last entry.
 pub(super) fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
     summary.last.map(|last| last.since(at).as_micros() as f64 / 1e6)
 }
 
-/// A time in UTC if known, otherwise in seconds since power-on.
+/// UTC if known, otherwise seconds since power-on.
 fn moment(summary: &Summary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| crate::utc::moment(at), iso8601_ms)

@@ -1,4 +1,4 @@
-//! The logs in a file and on a card: by its file system, or if that is damaged, by searching every block.
+//! A card's logs: by its file system, or by searching every block.
 
 use std::borrow::Borrow;
 use std::collections::BTreeMap;
@@ -17,7 +17,6 @@ use super::places::{BLOCK_BYTES, Log, Piece};
 use super::scan::{Files, Scan, scan};
 use crate::card::{ReadOnlyImage, length};
 
-/// A file that is a log, or a segment of one.
 pub(super) fn whole_file(path: &Path) -> Result<Log> {
     let length = File::open(path).and_then(|file| length(&file));
     let length = length.with_context(|| format!("{}: cannot be read", path.display()))?;
@@ -32,7 +31,7 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     })
 }
 
-/// The layout of a card, or of its partition alone (`/dev/sdX1`).
+/// Also of a partition alone (`/dev/sdX1`).
 fn layout(device: &ReadOnlyImage<impl Borrow<File>>) -> Result<Layout, LayoutError<io::Error>> {
     Layout::read(device).or_else(|error| Layout::volume(device).map_err(|_| error))
 }
@@ -42,21 +41,21 @@ pub fn is_card(path: &Path) -> Result<bool> {
     Ok(layout(&ReadOnlyImage::new(File::open(path)?)?).is_ok())
 }
 
-/// The logs in a card's file system; empty without one. Only these blocks are searched.
+/// By the card's file system; empty without one.
 pub fn on_card(path: &Path) -> Vec<Log> {
     Card::of(path).map_or_else(Vec::new, |card| card.logs)
 }
 
-/// Facts from a card's file system. No further blocks are searched.
+/// Facts from a card's file system.
 #[derive(Clone, Debug)]
 pub struct Card {
-    /// The logs that it knows.
+    /// Known logs.
     pub logs: Vec<Log>,
-    /// Its damage, the most important first.
+    /// The most important first.
     pub damage: Option<String>,
-    /// Bytes that are free for files.
+    /// Bytes.
     pub free: u64,
-    /// Bytes for files in all.
+    /// Bytes.
     pub all: u64,
 }
 
@@ -76,7 +75,6 @@ impl Card {
     }
 }
 
-/// The logs on a card: by its file system, or if that is damaged, by searching every block.
 pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;
@@ -93,8 +91,8 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
             about.damage.push(cut.unwrap_or_else(|| error.to_string()));
         }
     }
-    // A damaged file system lists only some files, and none reliably: every block is searched instead. A
-    // sound one is read by its files, also if every block is searched for data outside of the files.
+    // A damaged file system lists files incompletely: every block is searched instead. A sound one is still
+    // read by its files.
     let known = if about.damage.is_empty() { sessions_of(path, &files) } else { Vec::new() };
     if !known.is_empty() {
         for name in files.iter().filter(|file| file.name.is_none()).map(|file| &file.path) {
@@ -113,7 +111,7 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     Ok(())
 }
 
-/// The log files in a card's file system, and its damage.
+/// And its damage.
 fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<CardFile>> {
     about.damage = walk.damage;
     about.lost_clusters = walk.lost_clusters;
@@ -151,12 +149,11 @@ fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Resu
     Ok(logs)
 }
 
-/// The message for an image that ends before its first partition does. Such an image is cut short; its volume
-/// is not damaged.
+/// The image ends before its partition: cut short, not damaged.
 fn cut_short(file: &File, device: &ReadOnlyImage<&File>) -> io::Result<Option<String>> {
     let mut entry = [0; BLOCK_BYTES];
     let has = length(file)?;
-    // The partition table's first entry: type, first block and blocks, behind the code.
+    // Type, first block and blocks, behind the code.
     file.read_at(0, &mut entry)?;
     let word = |at: usize| entry.get(at..at + 4).and_then(|word| word.first_chunk().copied());
     let [start, blocks] = [446 + 8, 446 + 12].map(|at| word(at).map_or(0, u32::from_le_bytes));
@@ -167,7 +164,6 @@ fn cut_short(file: &File, device: &ReadOnlyImage<&File>) -> io::Result<Option<St
     }))
 }
 
-/// Whether there is a sector of a log here, or the parity of some.
 fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
     let lost = lost(path, extents);
     let mut blocks = lost.blocks();
@@ -179,7 +175,7 @@ fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
     Ok(false)
 }
 
-/// Blocks here that belong to no file, as a log.
+/// Blocks without a file, as a log.
 fn lost(path: &Path, extents: Vec<Extent>) -> Log {
     Log {
         name: String::new(),
@@ -190,7 +186,7 @@ fn lost(path: &Path, extents: Vec<Extent>) -> Log {
     }
 }
 
-/// The segments of each session together, and each file of another name by itself.
+/// Each file of another name by itself.
 fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     let mut sessions: BTreeMap<u32, Vec<&CardFile>> = BTreeMap::new();
     for (name, file) in files.iter().filter_map(|file| Some((file.name?, file))) {

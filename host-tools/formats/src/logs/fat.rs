@@ -1,13 +1,10 @@
-//! Reads a card's FAT32 volume and trusts nothing on it. Every number is checked at its use, and every walk
-//! is bounded. Damage is reported, and all sound parts are still read.
+//! Reads a card's FAT32 volume and trusts nothing on it: every number is checked, every walk bounded. Damage is reported, and
+//! sound parts are read.
 //!
-//! Reading a whole card needs places (extents), not bytes, and a name for the damage. That is why this does
-//! not use the recorder, whose reader stops at the first error. Source of the layout: Microsoft FAT
-//! specification 1.03 (`fatgen103`).
+//! The recorder's reader would stop at the first error. Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
 //!
-//! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most
-//! `FILES_MAX` files in `EXTENTS_MAX` extents: 10 MiB and 16 MiB. Entries beyond that are counted and
-//! reported.
+//! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most `FILES_MAX` files in
+//! `EXTENTS_MAX` extents: 10 MiB and 16 MiB. More entries are counted.
 
 use std::fmt;
 use std::fs::File;
@@ -21,23 +18,21 @@ const BLOCK: u64 = 512;
 const ENTRY_BYTES: usize = 32;
 /// Directories deeper than this are not ours.
 const DEPTH_MAX: usize = 8;
-/// FAT32 allows no more entries in a directory.
+/// FAT32's own limit.
 const ENTRIES_MAX: usize = 65_536;
-/// Segments that are kept: those of one full directory, and the recorder uses one.
+/// One full directory's; the recorder uses one.
 const FILES_MAX: usize = ENTRIES_MAX;
-/// Extents that are kept, of all segments together. The recorder allocates a segment in a few runs.
+/// Of all segments together. The recorder allocates a segment in a few runs.
 const EXTENTS_MAX: usize = 1 << 20;
-/// Sentences about damage that are kept.
+/// Kept sentences.
 const DAMAGE_MAX: usize = 20;
-/// Bytes of a directory that are read at once.
+/// Bytes at once.
 const READ_BYTES: u64 = 64 * 1024;
-/// FAT entries that are read at once.
 const WINDOW_BLOCKS: u32 = 128;
 const ENTRIES_PER_BLOCK: u32 = 128;
 const END_OF_CHAIN: u32 = 0x0fff_fff8;
 const ENTRY_MASK: u32 = 0x0fff_ffff;
 
-/// The first byte of an entry whose file was deleted.
 const DELETED: u8 = 0xe5;
 const ATTRIBUTE_VOLUME: u8 = 0x08;
 const ATTRIBUTE_DIRECTORY: u8 = 0x10;
@@ -46,47 +41,45 @@ const ATTRIBUTE_LONG_NAME: u8 = 0x0f;
 /// A run of bytes in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Start of the volume, in bytes from the beginning of the image.
+    /// Bytes from the image's beginning.
     pub start: u64,
-    /// Its length, in bytes.
+    /// Bytes.
     pub length: u64,
 }
 
-/// A file of a log on the card: a segment, or a file that was given another name.
+/// A segment, or a log under another name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardFile {
-    /// Its directories and its short name, for instance `LOGS/00042_07.HUM`.
+    /// Directories and short name: `LOGS/00042_07.HUM`.
     pub path: String,
-    /// Segment and session by its name. `None` for any other name, if the file's first block is a sector of a
-    /// log.
+    /// Session and segment; `None` for another name whose first block is a log's sector.
     pub name: Option<LogName>,
-    /// The size by the directory, in bytes.
+    /// By the directory, bytes.
     pub size: u64,
-    /// Its places; less than `size` if its chain is damaged.
+    /// Less than `size` if its chain is damaged.
     pub extents: Vec<Extent>,
 }
 
 /// Result of a walk over the volume.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// The logs' segments and other files that begin with a sector of a log, in directory order, up to `FILES_MAX`. The rest
-    /// is only checked.
+    /// Sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub files: Vec<CardFile>,
     /// Damage, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,
     /// Clusters that are free.
     pub free_clusters: u64,
-    /// Allocated clusters without a file: space left by a power cut, or a file with a lost entry.
+    /// Clusters without a file: a power cut, or a lost entry.
     pub lost_clusters: u64,
-    /// Their places, as far as there is room.
+    /// As far as there is room.
     pub lost: Vec<Extent>,
-    /// Deleted segments with a free first cluster that begins with a sector of a log.
+    /// Their first cluster is free and begins with a log's sector.
     pub deleted_logs: u64,
 }
 
-/// Something that blocks can be read from at any place: an image file, a raw device, memory.
+/// An image file, a raw device or memory.
 pub trait ReadAt {
-    /// Reads all of `buffer` from this place, in bytes; bytes beyond the end read as zeros (a cut image).
+    /// Bytes beyond the end read as zeros (a cut image).
     fn read_at(&self, start: u64, buffer: &mut [u8]) -> io::Result<()>;
 }
 
@@ -116,12 +109,11 @@ pub struct Volume<'a, I> {
     layout: Layout,
     root: u32,
     window: Option<(u32, Vec<u8>)>,
-    /// One bit a cluster: already part of a file or directory.
+    /// A bit for each cluster in use.
     used: Vec<u64>,
     walk: Walk,
-    /// Extents kept so far.
     extents: usize,
-    /// Segments beyond [`FILES_MAX`], and damage beyond [`DAMAGE_MAX`].
+    /// Beyond [`FILES_MAX`] and [`DAMAGE_MAX`].
     files_more: u64,
     damage_more: u64,
 }
@@ -179,7 +171,6 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         u64::from(self.layout.data_start) * BLOCK + u64::from(cluster - 2) * self.cluster_bytes()
     }
 
-    /// The FAT's entry for a cluster.
     fn entry(&mut self, cluster: u32) -> io::Result<u32> {
         let block = cluster / ENTRIES_PER_BLOCK;
         let first = block - block % WINDOW_BLOCKS;
@@ -195,7 +186,6 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         Ok(raw & ENTRY_MASK)
     }
 
-    /// Marks a cluster as used; false if it already was.
     fn claim(&mut self, cluster: u32) -> bool {
         let (word, bit) = (cluster as usize / 64, 1_u64 << (cluster % 64));
         match self.used.get_mut(word) {
@@ -207,7 +197,7 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         }
     }
 
-    /// Follows the clusters from `first` on, at most `clusters_max`. Stops at the first error and reports it.
+    /// At most `clusters_max`; stops at the first error and reports it.
     fn chain(&mut self, first: u32, clusters_max: u64, what: &Name<'_>) -> io::Result<Chain> {
         let mut chain = Chain::default();
         let mut cluster = first;
@@ -251,7 +241,6 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         Ok(())
     }
 
-    /// The entries of the directory at these places.
     fn children(&mut self, extents: &[Extent], bytes_max: u64) -> io::Result<Vec<Child>> {
         let mut children = Vec::new();
         let mut bytes = Vec::new();
@@ -276,7 +265,6 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         Ok(children)
     }
 
-    /// The entry of a file that was deleted.
     fn deleted(&mut self, child: &Child) -> io::Result<()> {
         let is_segment = child.segment().is_some() && self.is_cluster(child.first);
         if is_segment && self.entry(child.first)? == 0 {
@@ -285,7 +273,6 @@ impl<'a, I: ReadAt> Volume<'a, I> {
         Ok(())
     }
 
-    /// Whether a file begins with a sector of a log.
     fn begins_as_log(&self, child: &Child) -> io::Result<bool> {
         let mut block = [0; BLOCK as usize];
         if child.is_directory || u64::from(child.size) < BLOCK || !self.is_cluster(child.first) {
@@ -364,22 +351,21 @@ impl<'a, I: ReadAt> Volume<'a, I> {
     }
 }
 
-/// A chain of clusters, as far as it holds.
 #[derive(Default)]
 struct Chain {
-    /// The clusters joined to runs, if requested.
+    /// Joined to runs.
     extents: Vec<Extent>,
     clusters: u64,
 }
 
-/// The owner of a chain. Its name is only put together for a report.
+/// A chain's owner; the name is only put together for a report.
 enum Name<'a> {
     Directory(&'a str),
     Child { path: &'a str, child: &'a Child, is_kept: bool },
 }
 
 impl Name<'_> {
-    /// Whether its extents are needed: those of directories and of logs.
+    /// Only directories and logs need extents.
     fn is_kept(&self) -> bool {
         match self {
             Self::Directory(_) => true,
@@ -405,9 +391,9 @@ enum Entry {
     Deleted(Child),
 }
 
-/// An entry of a directory. A directory has up to 65,536: it is small.
+/// Small: a directory has up to 65,536.
 struct Child {
-    /// The short name, padded with spaces: eight bytes of base, three of extension.
+    /// Padded with spaces: eight bytes of base, three of extension.
     short: [u8; 11],
     is_directory: bool,
     first: u32,
@@ -415,8 +401,7 @@ struct Child {
 }
 
 impl Entry {
-    /// `None` for entries other than files and directories: long-name parts, the volume's label, `.` and
-    /// `..`.
+    /// `None` for parts of long names, the volume's label, `.` and `..`.
     fn read(entry: &[u8]) -> Option<Self> {
         let entry: &[u8; ENTRY_BYTES] = entry.try_into().ok()?;
         let attributes = entry[11];
@@ -446,7 +431,7 @@ impl Entry {
 }
 
 impl Child {
-    /// The short name's base and its extension, without their padding.
+    /// Base and extension without padding.
     fn parts(&self) -> (&[u8], &[u8]) {
         let (base, extension) = self.short.split_at(8);
         (base.trim_ascii_end(), extension.trim_ascii_end())
@@ -458,7 +443,7 @@ impl Child {
     }
 
     fn name(&self) -> String {
-        // Only characters that are safe in a path of this PC.
+        // Safe in a path of this PC.
         let safe = |bytes: &[u8]| -> String {
             let keep = |byte: &u8| byte.is_ascii_alphanumeric() || b"_-~".contains(byte);
             bytes.iter().map(|byte| if keep(byte) { char::from(*byte) } else { '_' }).collect()

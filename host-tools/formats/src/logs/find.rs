@@ -14,13 +14,13 @@ use super::naming::{SegmentName, is_part, make_unique, name_after, segment_or_pa
 use super::places::Log;
 use crate::files::{is_seekable, why_unread};
 
-/// Finds all logs in `inputs`; with `salvage` it looks at every block of an image and ignores its file
-/// system. An input without a log is an error.
+/// With `salvage` every block of an image is searched, and its file system ignored. An input without a log is
+/// an error.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there", input.display()))
 }
 
-/// The same for one folder, which may have no log.
+/// One folder, which may have no log.
 pub fn find_in(folder: &Path, salvage: bool) -> Result<Found> {
     search(&[folder.to_owned()], salvage, |_| Ok(()))
 }
@@ -33,7 +33,7 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         let passed_over = found.logs_more + found.repeats;
         check_seekable(input, &about)?;
-        // As the shell names it with all others.
+        // As the shell names it.
         if let Some(why) = why_unread(input).filter(|_| about.is_dir() && inputs.len() > 1) {
             found.remark(format!("{}: {why}", input.display()));
             continue;
@@ -70,8 +70,7 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
     Ok(found)
 }
 
-/// Refuses inputs without random access: a pipe may never have another end, and a terminal waits for ever.
-/// Call it before a file is opened.
+/// Refuses inputs without random access before they are opened: a pipe may never have another end.
 pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
     if !about.is_dir() && !is_seekable(about) {
         bail!(
@@ -82,7 +81,7 @@ pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
     Ok(())
 }
 
-/// A file that the user named: it must be something.
+/// A named file must be something.
 fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
@@ -100,17 +99,16 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// The segments that were named one by one, by folder, and whether each is whole, or a part of one.
+/// By folder; whether each is whole or a part.
 type Segments = BTreeMap<PathBuf, Vec<(bool, SegmentName, Log)>>;
 
-/// The folder in which a file is, however that is spelled.
+/// However it is spelled.
 fn folder_of(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
-/// The logs of single segments, as if the user had named a folder with just these, in any order. Segments of
-/// one session are one log; those of one folder are of one card.
+/// As a folder with just these segments. Those of one folder are of one card.
 fn as_in_folders(segments: Segments) -> Vec<Log> {
     let (mut logs, mut prefixes) = (Vec::<Log>::new(), BTreeMap::<String, u32>::new());
     let is_one = segments.len() == 1;

@@ -1,4 +1,4 @@
-//! Fingerprints of logs: equal for two logs with the same sectors in different places.
+//! Fingerprints: equal for logs with the same sectors.
 
 use anyhow::Result;
 use sha2::{Digest as _, Sha256};
@@ -9,7 +9,7 @@ use super::places::Log;
 /// Hash of every sector's number and checksum: equal for copies only.
 pub type Fingerprint = [u8; 16];
 
-/// Makes the fingerprint of groups in their order.
+/// Takes groups in order.
 #[derive(Debug, Default)]
 pub struct Fingerprinter(Sha256);
 
@@ -18,18 +18,16 @@ impl Fingerprinter {
     pub fn add(&mut self, group: &Group) {
         for step in group {
             self.0.update(step.header.number.to_le_bytes());
-            // A sector's last four bytes are its checksum.
             self.0.update(step.sector.bytes().last_chunk::<4>().unwrap_or(&[0; 4]));
         }
     }
 
-    /// The hash of all sectors.
     pub fn finish(self) -> Fingerprint {
         self.0.finalize().first_chunk().copied().unwrap_or_default()
     }
 }
 
-/// Reads a log's sectors without decoding them.
+/// Without decoding.
 pub fn fingerprint(log: &Log) -> Result<Fingerprint> {
     let (mut groups, mut all) = (Groups::new(log), Fingerprinter::default());
     while let Some(group) = groups.next_group()? {

@@ -1,6 +1,5 @@
-//! Walks a folder for logs and images of cards. Links are followed, and each file and folder is read once, so a loop of
-//! links ends. Pipes, sockets, devices and links to nothing are passed over with a remark: a pipe without another end does
-//! not block.
+//! Walks a folder for logs and images of cards. Links are followed, but each file and folder is read once. Pipes, sockets,
+//! devices and dead links are passed over with a remark: opening a pipe may block.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, DirEntry, FileType};
@@ -16,23 +15,21 @@ use super::naming::{SegmentName, is_part, segment_name, segment_or_part};
 use super::places::Log;
 use crate::files::{FileId, why_unread};
 
-/// Folders deeper than this are not walked.
+/// Deeper folders are not walked.
 const DEPTH_MAX: usize = 16;
-/// Folders that wait to be walked, at most.
+/// Folders that wait.
 const WAITING_MAX: usize = 10_000;
-/// Segments of one folder that are kept.
+/// Of one folder.
 const SEGMENTS_MAX: usize = 8 * LOGS_MAX;
 
-/// How the names of cards' images end.
+/// Endings of cards' images.
 const IMAGES: [&str; 3] = [".img", ".dd", ".iso"];
 /// Endings of their compressed forms.
 const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];
 
-/// Entries of a folder that may be ours.
 #[derive(Default)]
 struct Entries {
-    /// Segments by session, under the name of its first one. Parts, which are not whole logs, are by
-    /// themselves.
+    /// By session, under its first one's name; parts are by themselves.
     sessions: BTreeMap<(bool, SegmentName), Vec<(SegmentName, PathBuf)>>,
     segments: usize,
     /// Logs and images.
@@ -40,7 +37,7 @@ struct Entries {
     folders: Vec<PathBuf>,
 }
 
-/// Walks a folder: segments of one session in one folder are one log.
+/// Segments of one session are one log.
 pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     let (mut waiting, mut walked) = (vec![(root.to_owned(), 0)], Walked::default());
     while let Some((dir, depth)) = waiting.pop() {
@@ -108,25 +105,25 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
     Ok(())
 }
 
-/// Folders that were walked, however links lead to them.
+/// However links lead to them.
 #[derive(Default)]
 pub struct Walked(BTreeSet<FileId>);
 
 impl Walked {
-    /// Whether a folder was not walked before.
+    /// Not walked before.
     pub fn is_new(&mut self, dir: &Path) -> bool {
         FileId::of(dir).map_or(true, |id| self.0.insert(id))
     }
 }
 
-/// The kind of an entry, or of the target of a link; a link to nothing stays a link.
+/// Also of a link's target; a dead link stays a link.
 pub fn kind_of(entry: &DirEntry) -> io::Result<FileType> {
     let kind = entry.file_type()?;
     let target = kind.is_symlink().then(|| fs::metadata(entry.path()).ok()).flatten();
     Ok(target.map_or(kind, |target| target.file_type()))
 }
 
-/// Looks at each entry of a folder as it is read: there may be millions of foreign ones.
+/// One by one: there may be millions of foreign entries.
 fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
     let context = || format!("{}: cannot be read", dir.display());
     let mut entries = Entries::default();
@@ -147,7 +144,6 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
 }
 
 impl Entries {
-    /// A file of a folder.
     fn file(&mut self, path: PathBuf, found: &mut Found) {
         let shown = path.display();
         let content = look(&path);
@@ -155,7 +151,7 @@ impl Entries {
         match (content, segment_name(&path).or_else(|| segment_or_part(&path).filter(|_| is_log))) {
             (Err(error), _) => found.leave_out(format!("{error:#}")),
             (Ok(Content::Unread(unread)), _) => found.leave_out(format!("{shown}: {unread}")),
-            // Any content is accepted: the report on a log says if the file holds none.
+            // The report on a log says if the file holds none.
             (Ok(content), Some(_)) if content != Content::Log && path.extension().is_none() => {}
             (Ok(_), Some(name)) if self.segments < SEGMENTS_MAX => {
                 self.segments += 1;
@@ -176,13 +172,12 @@ impl Entries {
     }
 }
 
-/// Whether its name ends like a log's, compressed or not. A file that is not a log is reported with the logs
-/// of a folder.
+/// By the name, compressed or not.
 pub fn is_named_as_log(path: &Path) -> bool {
     is_named(path, &[".hum"])
 }
 
-/// Whether its name ends like a card image's, compressed or not.
+/// By the name, compressed or not.
 pub fn is_named_as_card(path: &Path) -> bool {
     is_named(path, &IMAGES)
 }
@@ -210,7 +205,7 @@ fn nothing_of_ours(path: &Path) -> String {
     format!("{}: has the name {what}", path.display())
 }
 
-/// Remark about an entry of a folder that is not a file.
+/// For an entry that is not a file.
 pub fn passed_over(path: &Path, kind: FileType) -> String {
     let what = if kind.is_symlink() {
         "a link to nothing"
@@ -222,14 +217,13 @@ pub fn passed_over(path: &Path, kind: FileType) -> String {
     format!("{}: is {what}, and passed over", path.display())
 }
 
-/// A log or an image in a folder.
 fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
         Content::Image => {
             let before = found.logs.len();
             match image(path, salvage, found) {
-                // A large file may be a card without its first blocks.
+                // It may be a card without its first blocks.
                 Err(_) if !is_named_as_card(path) && !is_card(path)? => return Ok(()),
                 looked_at => looked_at?,
             }

@@ -1,4 +1,4 @@
-//! A log's blocks as groups of sectors. Each group decodes by itself: the unit of parallel work.
+//! A log's groups of sectors: units of parallel work.
 
 use anyhow::Result;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
@@ -8,16 +8,16 @@ use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
 
-/// Sectors of one group, in order, or of a part of one without its beginning.
+/// In order, or a group's part without its beginning.
 pub type Group = Vec<Step>;
 
-/// Whether a block was allocated and never written, like most of a short log's segment. The assembler only
-/// counts it, but takes as long as for a sector.
+/// Allocated and never written, like most of a short log's segment. The assembler needs as long as for a
+/// sector.
 fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// Whether the record of a start is at a log's beginning.
+/// At a log's beginning.
 pub fn has_start(log: &Log) -> bool {
     let mut groups = Groups::new(log);
     let mut first = (0..HEADING_GROUPS).map_while(|_| groups.next_group().ok()?);
@@ -31,19 +31,17 @@ pub struct Groups<'a> {
     group: Group,
     ended: bool,
     ends_short: bool,
-    /// Number of blocks at the end of all files that belong to no log.
+    /// At the end of all files.
     foreign_at_end: u64,
-    /// The file of the last block.
     file: usize,
-    /// The first block of a file, while the blocks before it are given out.
+    /// Kept while blocks before it are given out.
     first: Option<[u8; BLOCK_BYTES]>,
-    /// `None` if the sectors of a session were searched for on a card: their places have no meaning.
+    /// `None` if a scan found the sectors: their places have no meaning.
     strangers: Option<Strangers>,
-    /// Rebuilt sectors of the file of the last block, and that file. `None` as for `strangers`.
+    /// Of the last block's file. `None` as for `strangers`.
     repairs: Option<(Option<usize>, Repairs)>,
-    /// Number of rebuilt sectors.
     repaired: u64,
-    /// Evidence from the parity of the files so far.
+    /// From parity so far.
     evidence: Evidence,
 }
 
@@ -68,7 +66,7 @@ impl<'a> Groups<'a> {
         }
     }
 
-    /// The next group; `None` at the end.
+    /// `None` at the end.
     pub fn next_group(&mut self) -> Result<Option<Group>> {
         loop {
             let Some(step) = self.assembler.next() else {
@@ -114,7 +112,7 @@ impl<'a> Groups<'a> {
         Ok(())
     }
 
-    /// The next block as it was written, if known.
+    /// Rebuilt if known.
     fn read_block(&mut self) -> Result<Option<[u8; BLOCK_BYTES]>> {
         let (Some(block), (file, at)) = (self.blocks.next_block()?.copied(), self.blocks.place()) else {
             return Ok(None);
@@ -145,7 +143,7 @@ impl<'a> Groups<'a> {
         }
     }
 
-    /// Which sectors of its files are not of the log, once all is read.
+    /// Foreign sectors, once all is read.
     pub fn strange(&self) -> Vec<Strange> {
         self.strangers.as_ref().map_or_else(Vec::new, Strangers::strange)
     }
@@ -155,27 +153,27 @@ impl<'a> Groups<'a> {
         BlockCounts { repaired: self.repaired, ..self.assembler.counts() }
     }
 
-    /// Evidence from parity, once all is read.
+    /// From parity, once all is read.
     pub const fn evidence(&self) -> Evidence {
         self.evidence
     }
 
-    /// Counts of the blocks after the last sector.
+    /// After the last sector.
     pub const fn behind(&self) -> BlockCounts {
         self.assembler.behind_last()
     }
 
-    /// Number of blocks at the end of all files that belong to no log.
+    /// Foreign blocks at the end of all files.
     pub const fn foreign_at_end(&self) -> u64 {
         self.foreign_at_end
     }
 
-    /// The session that its sectors name, once one was seen.
+    /// The session in its sectors.
     pub fn session(&self) -> Option<u32> {
         self.assembler.session()
     }
 
-    /// Blocks after the last sector that were sectors of the session and fail their check, or end too soon.
+    /// After the last sector: broken sectors of the session.
     pub fn damaged_at_end(&self) -> u32 {
         self.assembler.damaged_since().max(u32::from(self.ends_short))
     }

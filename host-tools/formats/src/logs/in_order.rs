@@ -1,7 +1,7 @@
 //! Parallel work with results in order, in bounded memory.
 //!
-//! The calling thread is one of the workers: it fetches items, hands on results, and works itself whenever it
-//! is free. So one core needs no further thread, and no work waits for a thread to wake up.
+//! The calling thread fetches items, hands on results, and works itself when free: one core needs no further
+//! thread.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc;
@@ -10,9 +10,9 @@ use std::thread;
 
 use anyhow::Result;
 
-/// Number of workers: the processors available to this program, or `RAYON_NUM_THREADS`, as in other programs.
+/// Available processors, or `RAYON_NUM_THREADS`.
 pub fn workers() -> usize {
-    // Asked for by each log, and a dozen files of the system's to read.
+    // Each log asks, and the system reads a dozen files.
     static WORKERS: LazyLock<usize> = LazyLock::new(|| {
         let told = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok());
         let told = told.filter(|count| *count > 0);
@@ -21,8 +21,8 @@ pub fn workers() -> usize {
     *WORKERS
 }
 
-/// Calls `work` for each item from `next`, and `take` with the results in the items' order. At most
-/// `ahead_max` items are in work or wait for an earlier one. The first error ends it.
+/// Hands results of `work` to `take` in the items' order. At most `ahead_max` items are in work or wait. The
+/// first error ends it.
 pub fn in_order<T: Send, R: Send>(
     workers: usize,
     ahead_max: usize,
@@ -45,7 +45,7 @@ pub fn in_order<T: Send, R: Send>(
                 }
                 given += usize::from(!ended);
             }
-            // After the first items are there: a single one is sooner done than a thread awake.
+            // A single item is done sooner than a thread awakes.
             if let Some(sender) = sender.take() {
                 for _ in 1..workers.min(given) {
                     let (queue, work, sender) = (&queue, &work, sender.clone());
@@ -55,7 +55,7 @@ pub fn in_order<T: Send, R: Send>(
                             promise.keep(work(item));
                         }
                     };
-                    // If the system gives no more threads, the existing ones do the work.
+                    // Without more threads, the existing ones work.
                     if thread::Builder::new().spawn_scoped(scope, worker).is_err() {
                         break;
                     }
@@ -63,7 +63,7 @@ pub fn in_order<T: Send, R: Send>(
             }
             waiting.extend(results.try_iter());
             if let Some(result) = waiting.remove(&taken) {
-                // A worker that panicked has no result; the end of the scope reports it.
+                // The end of the scope reports a worker's panic.
                 let Some(result) = result else { break };
                 taken += 1;
                 take(result)?;
@@ -79,7 +79,7 @@ pub fn in_order<T: Send, R: Send>(
     })
 }
 
-/// Items that wait for a worker, oldest first.
+/// Waiting items, oldest first.
 struct Queue<T> {
     state: Mutex<(VecDeque<T>, bool)>,
     more: Condvar,
@@ -87,7 +87,7 @@ struct Queue<T> {
 
 impl<T> Queue<T> {
     fn lock(&self) -> MutexGuard<'_, (VecDeque<T>, bool)> {
-        // Nobody panics while holding it.
+        // Held without panics.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -100,7 +100,7 @@ impl<T> Queue<T> {
         self.lock().0.pop_front()
     }
 
-    /// Waits for an item; `None` once it is closed.
+    /// `None` once closed.
     fn wait(&self) -> Option<T> {
         let waits = |state: &mut (VecDeque<T>, bool)| state.0.is_empty() && !state.1;
         let mut state = self.more.wait_while(self.lock(), waits).unwrap_or_else(PoisonError::into_inner);
@@ -108,7 +108,7 @@ impl<T> Queue<T> {
     }
 }
 
-/// Closes the queue on every way out.
+/// On every way out.
 struct Closing<'a, T>(&'a Queue<T>);
 
 impl<T> Drop for Closing<'_, T> {
@@ -118,8 +118,7 @@ impl<T> Drop for Closing<'_, T> {
     }
 }
 
-/// A worker's result. It is sent also without a value if the worker panics, so that the receiver does not
-/// wait for it.
+/// A result, sent also without a value after a panic, for the waiting receiver.
 struct Promise<'a, R> {
     sender: &'a mpsc::Sender<(usize, Option<R>)>,
     index: usize,
@@ -134,7 +133,7 @@ impl<R> Promise<'_, R> {
 
 impl<R> Drop for Promise<'_, R> {
     fn drop(&mut self) {
-        // Without a receiver, the work has ended with an error.
+        // Without a receiver the work ended with an error.
         let _ = self.sender.send((self.index, self.result.take()));
     }
 }
@@ -190,7 +189,6 @@ mod tests {
             },
         )
         .expect("no error");
-        // The one that is taken counts until it has been.
         assert!(held_max.into_inner() <= 8);
     }
 
@@ -214,7 +212,7 @@ mod tests {
     #[should_panic(expected = "a scoped thread panicked")]
     fn a_worker_that_panics_is_told() {
         let work = |item: usize| {
-            // On the calling thread the panic would be reported anyway.
+            // A panic of the calling thread is reported anyway.
             assert!(thread::current().name().is_some() || item < 10, "for this test");
             thread::sleep(std::time::Duration::from_millis(1));
         };

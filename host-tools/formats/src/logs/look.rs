@@ -1,4 +1,4 @@
-//! The kind of a file, by its content.
+//! A file's kind, by content.
 
 use std::fs::File;
 use std::io::Read;
@@ -11,19 +11,18 @@ use super::places::BLOCK_BYTES;
 use crate::archive;
 use crate::mavlink::frame::{Peek, peek};
 
-/// Number of blocks searched for a first sector in a file.
+/// Blocks searched for a first sector.
 const LOOK_BLOCKS: usize = 2048;
 
-/// The kind of a file, by its content.
+/// A file's kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// Sectors of a log.
     Log,
-    /// A card: a partition table, or blocks to be looked through.
+    /// A partition table, or blocks to be searched.
     Image,
-    /// A log of a format that this program does not read.
+    /// A known but unreadable log.
     Unread(Unread),
-    /// A ground station's log or raw MAVLink: to be recorded first.
+    /// A ground station's log or raw MAVLink.
     Mavlink,
     /// An empty file.
     Empty,
@@ -34,11 +33,8 @@ pub enum Content {
 /// Why a log is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unread {
-    /// It is of this older version.
     Older(u8),
-    /// It is of this newer version.
     Newer(u8),
-    /// Its sectors are sealed.
     Sealed,
 }
 
@@ -62,14 +58,14 @@ impl std::fmt::Display for Unread {
     }
 }
 
-/// Finds the kind of a file.
+/// By content.
 pub fn look(path: &Path) -> Result<Content> {
     let context = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(context)?;
     let mut start = Vec::new();
     file.by_ref().take(BLOCK_BYTES as u64).read_to_end(&mut start).with_context(context)?;
     if start.first_chunk().is_some_and(|block| Header::read(block).is_ok()) {
-        // Nearly every log: its first block is a sector.
+        // Nearly every log begins with a sector.
         return Ok(Content::Log);
     }
     let rest = ((LOOK_BLOCKS - 1) * BLOCK_BYTES) as u64;
@@ -93,7 +89,7 @@ pub fn look(path: &Path) -> Result<Content> {
             Err(NotASector::Empty | NotASector::Erased | NotASector::Damaged) => {}
             Err(NotASector::Foreign) => other_blocks += 1,
         }
-        // A partition table is in front of everything else; a log has a sector early.
+        // A log has a sector early.
         if log_blocks > 0 {
             break;
         }
@@ -108,7 +104,7 @@ pub fn look(path: &Path) -> Result<Content> {
         _ if frame_at(0) || frame_at(8) => Content::Mavlink,
         // Large, and known to be something else.
         _ if start.starts_with(&archive::GZIP) || archive::hint(&start).is_some() => Content::Other,
-        // A card without its first blocks: only a search of all blocks shows it.
+        // Only a search shows a card without its first blocks.
         _ if large => Content::Image,
         _ => Content::Other,
     })

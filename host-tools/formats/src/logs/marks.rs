@@ -1,5 +1,4 @@
-//! Facts about a log from its own records. They are its end marks, movement after the last one, the
-//! recorder's losses, and the end of the log before it on the card.
+//! Facts from a log's own records.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{Before, Found, Resting};
@@ -7,53 +6,49 @@ use hums_core::clock::Instant;
 
 use crate::loss::lost;
 
-/// The number of the event of arming.
 const ARMED: u8 = 1;
-/// The number of the event of a take-off.
+/// Number of the event.
 pub const TAKE_OFF: u8 = 3;
-/// The number of the event of a landing.
+/// Number of the event.
 pub const LANDING: u8 = 4;
-/// The number of the event for a missing or unusable card.
 pub(super) const CARD_OUT: u8 = 7;
-/// The check that finds that the card refused blocks.
+/// The card refused blocks.
 pub(super) const REFUSED: &str = "card_errors";
-/// The box was started in the air.
+/// Event: started in the air.
 pub const RESUMED: u8 = 14;
 
-/// The note that a packed log begins with.
+/// Note at a packed log's beginning.
 pub const PACKED: &str = "packed on a PC by hums decode --format hum";
 
-/// Facts about a log from the records of a part of it.
+/// Facts from a part of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Marks {
-    /// Number of end marks.
+    /// End marks.
     pub count: u64,
-    /// Number of end marks with a different count of frames.
+    /// End marks with another count of frames.
     pub wrong: u64,
     /// The last one.
     pub last: Option<(Instant, Resting)>,
-    /// The first time after it that the vehicle was armed or took off.
+    /// Arming or take-off after the last mark.
     pub moved: Option<Instant>,
-    /// Whether the last take-off or landing is a take-off. The box stores its counts of a flight at the
-    /// landing.
+    /// The last take-off or landing is a take-off. A flight's counts are stored at the landing.
     pub took_off: Option<bool>,
-    /// Frames and records that the recorder lost, by its own records.
+    /// Lost frames and records, by the recorder.
     pub lost: u64,
-    /// The log before on the card, as the last boot record found it.
+    /// By the last boot record.
     pub before: Option<Before>,
-    /// No recorder made it: it was packed on a PC.
+    /// Packed on a PC.
     pub packed: bool,
-    /// A box recorded it: it has the record of its start.
+    /// Recorded by a box.
     pub has_boot: bool,
-    /// The card refused blocks: its recorder found that.
+    /// The card refused blocks.
     pub refused: bool,
-    /// The card was missing or unusable for a while.
+    /// Missing or unusable for a while.
     pub card_out: bool,
 }
 
 impl Marks {
-    /// Takes the next record; `frames` of the session were read before it, modulo 2^32.
     pub(super) fn record(&mut self, at: Instant, record: &Record<'_>, frames: u32) {
         match record {
             Record::Mark(mark) => {
@@ -79,12 +74,11 @@ impl Marks {
         }
     }
 
-    /// Whether the records report that the card took no data for a while. Then an empty file may exist.
+    /// An empty file may exist then.
     pub const fn has_card_trouble(&self) -> bool {
         self.refused || self.card_out
     }
 
-    /// Adds the facts from the next part.
     pub(super) fn add(&mut self, next: &Self) {
         self.count += next.count;
         self.wrong += next.wrong;

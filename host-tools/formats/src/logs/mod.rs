@@ -1,12 +1,12 @@
 //! Inputs of the command line (LOG, IMAGE and DIR), and the logs in them.
 //!
-//! A log is the recording of one session on one card. It comes in several forms:
+//! Its forms:
 //! - on the card, a row of segments (`00042_00.HUM`, `00042_01.HUM`, …);
 //! - copied off the card, the same files in a directory;
 //! - pulled, these with the session in their names (`naming`);
 //! - packed, one file.
 //!
-//! Here each of them is a list of places to read blocks of 512 bytes from.
+//! Here each is a list of places of 512-byte blocks.
 
 pub mod board;
 mod card;
@@ -35,7 +35,7 @@ pub use naming::segment_name;
 pub use places::{Log, Piece};
 
 impl Found {
-    /// All files in which something was found.
+    /// Files with a part of a log or damage.
     pub fn paths(&self) -> impl Iterator<Item = &std::path::Path> {
         let pieces = self.logs.iter().flat_map(|log| &log.pieces).map(|piece| piece.path.as_path());
         pieces.chain(self.images.iter().map(|image| image.path.as_path()))

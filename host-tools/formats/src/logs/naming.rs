@@ -1,8 +1,7 @@
 //! Names of the files of a log.
 //!
-//! On a card the name is just the number: `00042_07.HUM`. Elsewhere the name contains the session, so that it
-//! is unique: `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM` is the same segment of the card's log
-//! 00042. It has the unique id of the board, and the session in its sectors.
+//! On a card it is just the number: `00042_07.HUM`. Elsewhere it also has the board's id and the session:
+//! `00042-box3f0042000d51373435363338-s1a2b3c4d_07.HUM`
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -15,23 +14,21 @@ use crate::hex::hex;
 
 const SESSION_DIGITS: usize = 8;
 
-/// The name of a session: its name on the card, and its board and session. Unknown parts are left out: a
-/// packed log has no board.
+/// The name on the card, board and session. A packed log has no board.
 pub fn session_name(on_card: &str, board: Option<&Board>, session: Option<u32>) -> String {
     let board = board.map_or_else(String::new, |board| format!("-box{}", hex(board)));
     let session = session.map_or_else(String::new, |session| format!("-s{session:08x}"));
     format!("{on_card}{board}{session}")
 }
 
-/// Segment and session in a file's name. In order, the segments of a box are together, the oldest first: by
-/// number, not by the random name of the session.
+/// Session and segment by a file's name. Sorted, a box's segments are together, by number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SegmentName {
     /// Box and session, `box3f0042000d51373435363338-s1a2b3c4d`; empty in a name from a card.
     pub of: String,
-    /// The session's number on its card.
+    /// `box3f0042000d51373435363338-s1a2b3c4d`; empty on a card.
     pub session: u32,
-    /// The segment within the session.
+    /// Number on its card.
     pub segment: u32,
 }
 
@@ -52,17 +49,17 @@ impl PartialOrd for SegmentName {
 }
 
 impl SegmentName {
-    /// The first segment of its session.
+    /// Within the session.
     pub fn first(&self) -> Self {
         Self { segment: 0, ..self.clone() }
     }
 
-    /// The box, if it is in the name: the logs of one box are read as those of one card.
+    /// The session's first segment.
     pub fn recorder(&self) -> &str {
         self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
     }
 
-    /// The log's name for people: `00042`, after the name of its box if known.
+    /// Logs of one box are read as one card's.
     pub fn log(&self) -> String {
         match self.recorder() {
             "" => format!("{:05}", self.session),
@@ -71,7 +68,7 @@ impl SegmentName {
     }
 }
 
-/// The segment in a file's name, in upper or lower case, also without the ending.
+/// For people: `00042`, after the box if known.
 pub fn segment_name(path: &Path) -> Option<SegmentName> {
     let name = path.file_name()?.to_str()?.to_ascii_lowercase();
     let (base, extension) = name.split_once('.').unwrap_or((&name, "hum"));
@@ -86,29 +83,29 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
     Some(SegmentName { of, session, segment })
 }
 
-/// Mark of a part of a log, in front of the ending.
+/// By name, in any case, also without the ending.
 const PART: &str = ".part";
 
-/// The path of a part of this log, made by `hums box pull --around`: `00042-s1a2b3c4d_07.part.HUM`.
+/// In front of the ending.
 pub fn part_name(whole: &Path) -> PathBuf {
     whole.with_extension("part.HUM")
 }
 
-/// The segment by a file's name, or by the name of a part of it.
+/// Made by `hums box pull --around`: `00042-s1a2b3c4d_07.part.HUM`.
 pub fn segment_or_part(path: &Path) -> Option<SegmentName> {
     let whole = |stem: &str| Some(path.with_file_name(stem.get(..stem.len().checked_sub(PART.len())?)?));
     let part = path.file_stem().filter(|_| is_part(path)).and_then(|stem| whole(stem.to_str()?));
     segment_name(part.as_deref().unwrap_or(path))
 }
 
-/// Whether a file's name marks a part of a log.
+/// Also by a part's name.
 pub fn is_part(path: &Path) -> bool {
     let is_hum = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());
     is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
 }
 
-/// The logs of one of several inputs get its name before theirs: each card has a session 1.
+/// By the file's name.
 pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>) {
     let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
     for name in names.filter(|name| **name != stem) {
@@ -116,7 +113,7 @@ pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>)
     }
 }
 
-/// Of equal names the later ones get a number.
+/// With several inputs, the input's name comes first: each card has a session 1.
 pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
     for name in names {
@@ -128,9 +125,7 @@ pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     }
 }
 
-/// Whether the name of a file, without its ending, has an identity at its end, so that it was made from a log:
-/// a session, `s1a2b3c4d`, or the content of another recording, `r1a2b3c4d`. A further log of a session has a
-/// number after it.
+/// Later equal names get a number.
 pub fn ends_with_identity(stem: &str) -> bool {
     let is_identity = |name: &str| {
         let digits = name.rsplit_once('-').and_then(|(_, identity)| identity.strip_prefix(['s', 'r']));

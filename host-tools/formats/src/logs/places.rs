@@ -1,4 +1,4 @@
-//! A log as a list of places, and the blocks that are there, streamed.
+//! A log as places, and its blocks, streamed.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -8,71 +8,68 @@ use anyhow::{Context, Result};
 use super::fat::{Extent, ReadAt as _};
 use super::naming::segment_name;
 
-/// Bytes of a block: a sector of the log.
+/// One sector.
 pub const BLOCK_BYTES: usize = 512;
-/// Number of bytes in one read.
+/// Bytes of one read.
 const READ_BYTES: u64 = 64 * 1024;
 
-/// A part of a log: places in one file.
+/// Places in one file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// The file: a segment, a packed log or a card image.
+    /// A segment, packed log or card image.
     pub path: PathBuf,
-    /// Its places in the file.
+    /// Within the file.
     pub extents: Vec<Extent>,
 }
 
 /// One log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Log {
-    /// A name for directories and reports, unique within one call: `00042`, or `card/00042` with several
-    /// inputs.
+    /// Unique within one call: `00042`, or `card/00042` with several inputs.
     pub name: String,
-    /// The names of its files: on the card for a card's, on this PC otherwise.
+    /// On the card or on this PC.
     pub files: Vec<String>,
-    /// Its places, in order: a piece for each of its files.
+    /// A piece for each file, in order.
     pub pieces: Vec<Piece>,
-    /// The session of its sectors, if a scan found it; otherwise its first sector decides.
+    /// Known from a scan; otherwise the first sector decides.
     pub session: Option<u32>,
-    /// The rest of a session outside of all files of a sound file system: sectors that a newer session has
-    /// not overwritten.
+    /// The rest of a session outside of all files.
     pub left_over: bool,
 }
 
 impl Log {
-    /// Bytes that its places cover.
+    /// Bytes.
     pub fn bytes(&self) -> u64 {
         self.pieces.iter().flat_map(|piece| &piece.extents).map(|extent| extent.length).sum()
     }
 
-    /// Whether it ends within a block, as only a copy does that was cut short.
+    /// Ends within a block: a cut copy.
     pub fn ends_short(&self) -> bool {
         let last = self.pieces.last().and_then(|piece| piece.extents.last());
         last.is_some_and(|extent| extent.length % BLOCK_BYTES as u64 != 0)
     }
 
-    /// The number of its first file, if the files are segments by their names. Earlier files were deleted by
-    /// a full card, or by the ring of a vehicle that is recorded by arming. `None` for sectors found by a
-    /// search of a card.
+    /// The first file's number, by its name. Earlier files were deleted by a full card, or by the ring of a
+    /// vehicle that is recorded by arming. `None` for sectors found by a search.
     pub fn first_segment(&self) -> Option<u32> {
         let name = self.files.first().filter(|_| self.session.is_none());
         name.and_then(|name| segment_name(Path::new(name))).map(|name| name.segment)
     }
 
-    /// The blocks, in order.
+    /// In order.
     pub fn blocks(&self) -> Blocks<'_> {
         Blocks { log: self, piece: 0, extent: 0, offset: 0, begun: 0, file: None, buffer: Vec::new(), at: 0 }
     }
 }
 
-/// Streams a log's blocks. A last part of less than a block is padded with zeros: it is damaged either way.
+/// Streams blocks; a short last one is padded with zeros.
 pub struct Blocks<'a> {
     log: &'a Log,
     piece: usize,
     extent: usize,
-    /// Bytes of the extent already read.
+    /// Already read of the extent.
     offset: u64,
-    /// Bytes of the piece before the buffer.
+    /// Bytes before the buffer.
     begun: u64,
     file: Option<File>,
     buffer: Vec<u8>,
@@ -84,7 +81,7 @@ impl<'a> Blocks<'a> {
         self.log
     }
 
-    /// The next block; `None` at the end.
+    /// `None` at the end.
     pub fn next_block(&mut self) -> Result<Option<&[u8; BLOCK_BYTES]>> {
         while self.at + BLOCK_BYTES > self.buffer.len() {
             if !self.refill()? {
@@ -95,12 +92,12 @@ impl<'a> Blocks<'a> {
         Ok(self.buffer.get(self.at - BLOCK_BYTES..).and_then(|rest| rest.first_chunk()))
     }
 
-    /// Place of the last block: its piece, and the block number in that.
+    /// Piece, and block within it, of the last block.
     pub const fn place(&self) -> (usize, u64) {
         (self.piece, (self.begun + self.at as u64).saturating_sub(1) / BLOCK_BYTES as u64)
     }
 
-    /// At most this many blocks of the same file from this block on, as a log of its own.
+    /// Up to this many blocks of the same file, as a log.
     pub fn from(&self, at: u64, blocks: u64) -> Log {
         let (piece, _) = self.place();
         let (mut skipped, mut left) = (at * BLOCK_BYTES as u64, blocks * BLOCK_BYTES as u64);
@@ -143,7 +140,7 @@ impl<'a> Blocks<'a> {
                 none => none.insert(File::open(&piece.path).with_context(context)?),
             };
             self.begun += self.buffer.len() as u64;
-            // The bytes to be overwritten are not zeroed first.
+            // Not zeroed first.
             self.buffer.resize((length as usize).next_multiple_of(BLOCK_BYTES), 0);
             let (bytes, behind) = self.buffer.split_at_mut(length as usize);
             file.read_at(extent.start + self.offset, bytes).with_context(context)?;

@@ -1,10 +1,7 @@
-//! Reads a log. Groups are decoded in parallel, a few at a time. Their contents are handed on in order, with
-//! the gaps between them.
+//! Reads a log. Groups are decoded in parallel, and handed on in order with the gaps between them.
 //!
-//! Memory is bounded for any log. Two groups are in work for each worker, 16 at most, and each becomes
-//! [`PART_BYTES`] and one entry at most. A larger group (equal frames are coded 2,000 times smaller than they
-//! are) is handed on in parts. Its decoder waits with the first part until its turn comes, and decodes the
-//! rest then.
+//! Memory is bounded: two groups for each worker, 16 at most, of [`PART_BYTES`] and one entry at most. A
+//! larger group (equal frames are coded 2,000 times smaller) is handed on in parts.
 
 use std::cell::Cell;
 
@@ -20,44 +17,41 @@ pub use super::repair::Evidence;
 use super::strangers::Strange;
 use crate::plural::count;
 
-/// Groups in work for each worker, and at most.
+/// For each worker.
 const GROUPS_PER_WORKER: usize = 2;
 const GROUPS_MAX: usize = 16;
-/// Maximum size of a group's entries before they are handed on. A group of a usual flight is smaller in any
-/// format (a few megabytes as JSON lines). So usual flights are decoded in parallel from end to end.
+/// Bytes of a group's entries before they are handed on. A usual flight's group is smaller in any format (a
+/// few megabytes as JSON lines).
 pub const PART_BYTES: usize = 4 << 20;
 
-/// The result of one group's entries, or of a part of them; made in parallel, handed on in order.
+/// Collects a group's entries, or a part of them.
 pub trait Collect: Send {
-    /// Takes the next entry of the group.
     fn entry(&mut self, entry: &Entry<'_>);
 
-    /// Bytes of memory that it holds, roughly. Beyond [`PART_BYTES`] it is handed on, and another one goes on.
+    /// Bytes of memory, roughly. Beyond [`PART_BYTES`] it is handed on, and another one goes on.
     fn held_bytes(&self) -> usize;
 
-    /// Whether frames are only counted: then `frame` gets them, which is cheaper, but for those that are odd.
+    /// Then `frame` gets well-formed frames, which is cheaper.
     fn only_counts(&self) -> bool {
         false
     }
 
-    /// Takes the next entry, a well-formed frame of this id and size.
     fn frame(&mut self, _at: Instant, _id: u32, _bytes: usize, _verified: bool) {}
 }
 
-/// Receives the collected groups, in order.
+/// Receives groups in order.
 pub trait Deliver<C> {
-    /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
-    /// The entries of the next group, or of the next part of one.
+    /// The next group, or the next part of one.
     fn group(&mut self, collected: C) -> Result<()>;
 }
 
 /// Totals of the reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
-    /// The session that the sectors name.
+    /// By the sectors.
     pub session: Option<u32>,
-    /// It has a proper end; otherwise the power failed.
+    /// Ended in order; otherwise power failed.
     pub closed: bool,
     /// Frames read.
     pub frames: u64,
@@ -65,53 +59,52 @@ pub struct Summary {
     pub groups: u64,
     /// Gaps.
     pub gaps: u64,
-    /// Losses reported by the recorder itself, in recordings of other programs.
+    /// Reported by the recorder.
     pub losses: u64,
-    /// Frames that are known to be missing.
+    /// Known number.
     pub frames_missing: u64,
-    /// Gaps with an unknown number of missing frames.
+    /// Gaps with an unknown number.
     pub gaps_uncounted: u64,
-    /// Groups that begin before the end of the group before them.
+    /// Groups that begin before the end of the one before.
     pub times_fell: u64,
-    /// Entries with an earlier time than the entry before, within a group.
+    /// Earlier than the entry before, within a group.
     pub entries_fell: u64,
-    /// Counts of the blocks by kind.
+    /// Blocks by kind.
     pub blocks: BlockCounts,
-    /// The first entry's time.
+    /// Of the first entry.
     pub first: Option<Instant>,
-    /// The last entry's time.
+    /// Of the last entry.
     pub last: Option<Instant>,
-    /// UTC at power-on, microseconds since 1970, if the log has it anywhere: the last value counts for the
-    /// whole log.
+    /// UTC at power-on, microseconds since 1970; the last value counts.
     pub epoch_us: Option<u64>,
-    /// Facts from its records: end marks, losses, the log before.
+    /// From its records.
     pub marks: Marks,
-    /// The number of the first sector.
+    /// Of the first sector.
     pub first_number: Option<u32>,
-    /// The number of the last sector.
+    /// Of the last sector.
     pub last_number: Option<u32>,
-    /// The last sector is only a copy that was made while it was in progress.
+    /// The last sector is only a copy of one in progress.
     pub ends_partial: bool,
-    /// Frames of the session up to its end, modulo 2^32.
+    /// Modulo 2^32, up to the end.
     pub frames_end: Option<u32>,
-    /// The check of the session's entries up to its end, as its last sector has it.
+    /// The check of all entries, by the last sector.
     pub check_end: Option<u32>,
-    /// Groups that go on from other entries than the sectors before them end with.
+    /// Groups that continue other entries than those before them.
     pub unchained: u64,
-    /// Counts of the blocks after the last sector.
+    /// After the last sector.
     pub behind: BlockCounts,
-    /// Number of blocks up to the end of its files that belong to no log.
+    /// Foreign blocks up to its files' end.
     pub foreign_at_end: u64,
-    /// Evidence from its parity.
+    /// From parity.
     pub parity: Evidence,
-    /// Strange sectors in its files.
+    /// In its files.
     pub strange: Vec<Strange>,
-    /// Files that are missing before its first one.
+    /// Missing files before its first one.
     pub files_gone: u32,
 }
 
 impl Summary {
-    /// Number of missing frames, as far as known: the beginning of a phrase that goes on with `missing`.
+    /// Begins a phrase that goes on with `missing`.
     pub fn missing_words(&self) -> String {
         match (self.gaps_uncounted, self.frames_missing) {
             (0, number) => count(number, "frame"),
@@ -121,9 +114,9 @@ impl Summary {
     }
 }
 
-/// Reads a log: `new` makes the collector of a group, `deliver` gets them in order.
+/// `new` makes a group's collector, `deliver` gets them in order.
 ///
-/// Groups are decoded in parallel; this thread reads them, hands on results, and decodes too.
+/// This thread reads, hands on and decodes.
 pub fn read<C: Collect>(
     log: &Log,
     new: impl Fn() -> C + Sync,
@@ -160,11 +153,10 @@ pub fn read<C: Collect>(
     Ok(summary)
 }
 
-/// Decodes with this thread's decoder, which is large and made once; a decoder that waits for its turn is
-/// taken by that group.
+/// Uses this thread's decoder, which is large; a waiting group keeps it.
 ///
-/// An entry that a bad sector completes may be wrong, and that is found only later. Such a group is decoded
-/// once more, up to the sector before.
+/// A bad sector may complete an entry wrongly, found only later: such a group is decoded again, up to the
+/// sector before.
 fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     thread_local!(static DECODER: Cell<Option<Box<GroupDecoder>>> = const { Cell::new(None) });
     let decoder = DECODER.take().unwrap_or_else(|| Box::new(GroupDecoder::new()));
@@ -173,7 +165,7 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     let mut whole = decoded.go_on(&mut rest, &mut collected);
     let mut failed = decoded.unsound(&rest);
     if !whole && failed.is_none() {
-        // Contents of a sector are handed on only after it is known to be sound.
+        // A sector's contents are handed on only once it is known to be sound.
         let mut probe = Decoded::of(&rest.group);
         let (decoder, group) = (Box::new(GroupDecoder::new()), rest.group.clone());
         let mut again = Rest { decoder, end: group.len(), group, at: 0 };
@@ -195,7 +187,7 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     decoded
 }
 
-/// A collector that keeps no entries.
+/// Keeps no entries.
 struct Uncollected;
 
 impl Collect for Uncollected {
@@ -210,49 +202,49 @@ impl Collect for Uncollected {
     }
 }
 
-/// A group that is not decoded to its end.
+/// Not decoded to its end.
 struct Rest {
     decoder: Box<GroupDecoder>,
     group: Group,
-    /// Sectors of it that the decoder got.
+    /// Decoded sectors.
     at: usize,
-    /// Sectors of it that it is to get.
+    /// Sectors to decode.
     end: usize,
 }
 
-/// A group, decoded as far as it was.
+/// As far as it was decoded.
 struct Decoded<C> {
     collected: Option<C>,
     rest: Option<Rest>,
-    /// Sectors missing before it, and whether blocks there were damaged.
+    /// Before it; whether blocks there were damaged.
     missing: u32,
     damaged: bool,
     sectors: u32,
-    /// The number of its first sector.
+    /// Of its first sector.
     number: u32,
-    /// Frames that its sectors complete, by their own counts.
+    /// By its sectors' counts.
     frames_said: u32,
-    /// Its first time and the count of frames before it; `None` if it cannot be decoded at all.
+    /// First time and frames before it; `None` if it cannot be decoded.
     begun: Option<(Instant, u32)>,
-    /// The check over the session's entries, before the group and up to its last sector.
+    /// Before the group, and up to its last sector.
     check_before: Option<u32>,
     check_end: Option<u32>,
     frames: u32,
     last: Option<Instant>,
-    /// Entries with an earlier time than the one before.
+    /// Earlier than the one before.
     fell: u64,
     error: Option<GroupError>,
     ends_partial: bool,
-    /// For such an end: the number of damaged blocks there, one of them perhaps the whole sector.
+    /// For such an end: damaged blocks, one perhaps the whole sector.
     damaged_partial: u32,
     closed: bool,
     marks: Marks,
-    /// UTC at power-on by its last clock record, microseconds since 1970.
+    /// By its last clock record, microseconds since 1970.
     epoch_us: Option<u64>,
 }
 
 impl<C: Collect> Decoded<C> {
-    /// The facts from its sectors' headers.
+    /// From its sectors' headers.
     fn of(group: &Group) -> Self {
         let (first, last) = (group.first(), group.last());
         Self {
@@ -278,8 +270,7 @@ impl<C: Collect> Decoded<C> {
         }
     }
 
-    /// Decodes to the group's end, or until the collected entries fill a part. Returns whether it was the
-    /// end.
+    /// To the group's end, or until a part is full; returns whether it was the end.
     fn go_on(&mut self, rest: &mut Rest, collected: &mut C) -> bool {
         let Rest { decoder, group, at, end } = rest;
         let counts = collected.only_counts();
@@ -309,7 +300,7 @@ impl<C: Collect> Decoded<C> {
         }
     }
 
-    /// The error of an altered group, and the number of its sound sectors.
+    /// And the number of sound sectors.
     fn unsound(&self, rest: &Rest) -> Option<(GroupError, usize)> {
         let error = self.error.filter(|error| matches!(error, GroupError::Corrupt | GroupError::Altered))?;
         Some((error, rest.at.saturating_sub(1)))
@@ -347,23 +338,23 @@ impl<C: Collect> Decoded<C> {
     }
 }
 
-/// The next entry; of a frame only its outline if that is enough.
+/// Only a frame's outline if that is enough.
 fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, GroupError>> {
     if counts { decoder.next_outline() } else { Some(decoder.next_entry()?.map(Outline::Whole)) }
 }
 
-/// Puts groups together again and finds the gaps between them.
+/// Joins groups and finds the gaps.
 #[derive(Default)]
 struct Stitch {
     summary: Summary,
     open: Option<Gap>,
-    /// Frames of the session up to here, modulo 2^32, while the count is unbroken.
+    /// Modulo 2^32, while the count is unbroken.
     expected: Option<u32>,
-    /// The check that the last sector has.
+    /// By the last sector.
     check: Option<u32>,
     cut: bool,
     damaged_partial: u32,
-    /// The number of the log's first file.
+    /// By its number.
     first_file: Option<u32>,
 }
 
@@ -412,7 +403,7 @@ impl Stitch {
                 self.summary.last = group.last.or(self.summary.last);
                 self.summary.groups += 1;
                 self.summary.frames += u64::from(group.frames);
-                // All entries of its sectors were decoded, but the counts by kind differ: a header is wrong.
+                // Counts by kind differ: a header is wrong.
                 let is_other = group.frames != group.frames_said;
                 if let Some(error) = group.error.or(is_other.then_some(GroupError::Corrupt)) {
                     let gap = self.gap(error.into());
@@ -422,27 +413,24 @@ impl Stitch {
             }
         }
         self.check = group.check_end;
-        // Only now the group is decoded to its end.
         self.summary.marks.add(&group.marks);
         self.summary.entries_fell += group.fell;
         self.summary.epoch_us = group.epoch_us.or(self.summary.epoch_us);
         Ok(())
     }
 
-    /// Frames missing before a group whose own count before it is this.
+    /// By the group's own count before it.
     fn frames_missing(&self, before: u32) -> Option<u32> {
         let missing = before.wrapping_sub(self.expected.unwrap_or(0));
         Some(missing).filter(|missing| *missing < 1 << 31)
     }
 
-    /// Skips a group with all its entries.
     fn skip<C>(&mut self, group: &Decoded<C>) {
         let gap = self.gap(group.error.map_or(Cause::Missing, Cause::from));
         gap.sectors_skipped = gap.sectors_skipped.saturating_add(group.sectors);
         gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(group.frames_said));
     }
 
-    /// The open gap; a new one if there is none.
     fn gap(&mut self, cause: Cause) -> &mut Gap {
         let from = self.summary.last;
         let new = Gap { from, to: None, cause, sectors_lost: 0, sectors_skipped: 0, frames: None };
@@ -469,7 +457,7 @@ impl Stitch {
     }
 }
 
-/// Hands a group on: first its decoded entries, then the rest part by part.
+/// First the decoded entries, then the rest part by part.
 fn hand_on<C: Collect>(
     group: &mut Decoded<C>,
     new: &impl Fn() -> C,
@@ -488,33 +476,32 @@ fn hand_on<C: Collect>(
     Ok(())
 }
 
-/// UTC at power-on, microseconds since 1970, if the log has it anywhere: the last value counts for the whole
-/// log.
+/// UTC at power-on, microseconds since 1970; the last value counts.
 pub fn epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |_| true)
 }
 
-/// The same without decoding if a group's start has it. It is wrong only if the last group learned another
-/// one, or learned it twice; [`Summary::epoch_us`] is exact.
+/// Without decoding if a group's start has it. May miss the last group's value; [`Summary::epoch_us`] is
+/// exact.
 pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |epoch| epoch.is_none())
 }
 
-/// Looks at the starts of all groups, and at the last one's records while `go_on` is true.
+/// Starts of all groups, and the last one's records while `go_on`.
 fn last_epoch(log: &Log, go_on: impl Fn(Option<u64>) -> bool) -> Result<Option<u64>> {
     let mut groups = Groups::new(log);
     let mut decoder = Box::new(GroupDecoder::new());
     let (mut epoch, mut last) = (None, Vec::new());
     while let Some(group) = groups.next_group()? {
         if let Some(first) = group.first() {
-            // The preamble is plain: no decoding is needed.
+            // The preamble is plain.
             if decoder.push(&first.header, &first.sector).is_ok() {
                 epoch = decoder.preamble().epoch_micros.or(epoch);
             }
         }
         last = group;
     }
-    // A clock record in the last group has no preamble after it.
+    // No preamble follows.
     for step in &last {
         if !go_on(epoch) || decoder.push(&step.header, &step.sector).is_err() {
             break;

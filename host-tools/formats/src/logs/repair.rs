@@ -1,12 +1,11 @@
-//! Rebuilds lost sectors from parity before a log is read, and checks the remaining ones against parity. The
-//! recorder covers a sector after it is on the card. So every sector up to the last covered one was there,
-//! and a sector that disagrees with the sums was altered later.
+//! Rebuilds lost sectors from parity, and checks the others against it. Sectors are covered once they are on
+//! the card: one that disagrees was altered later.
 //!
-//! The sector with the number `n` is at block `n - base` of its file. So the base shows the lost sectors:
-//! every place with another sector, or none. Most sound sectors of the file agree on its base. The exception
-//! is a file that begins with a number after all others in it: the recorder had just begun to rewrite it.
+//! The sector with the number `n` is at block `n - base` of its file. The base shows the lost sectors: every
+//! place with another sector, or none. Most sound sectors agree on it, unless the recorder had just begun to
+//! rewrite the file.
 //!
-//! A file longer than any of the recorder is read without repair, so memory is bounded by a file's length.
+//! Files longer than any of the recorder are not repaired: memory is bounded.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,32 +16,31 @@ use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
 
-/// Maximum number of lost sectors in a column that can be rebuilt.
+/// Lost sectors of a column.
 const LOST_MAX: usize = 2;
-/// Files longer than this are not repaired: twice the longest file of the recorder. A hostile file of parity
-/// alone is held whole.
+/// Twice the recorder's longest file. A hostile file of parity is held whole.
 const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 
-/// Evidence about a log's sectors from the parity of its files.
+/// From the parity of a log's files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Evidence {
-    /// The last sector that any of it covers: all up to there were written.
+    /// The last covered sector.
     pub last: Option<u32>,
-    /// Parity sectors that the recorder had certainly written. It writes those of a full stretch before the
-    /// next stretch, and those of the last one before a proper end.
+    /// Certainly written parity sectors: a full stretch's before the next stretch, and the last at a proper
+    /// end.
     pub written: u64,
-    /// Number of missing or unsound ones among them.
+    /// Missing or unsound ones.
     pub missing: u64,
-    /// Columns of sectors that were held against it.
+    /// Checked columns.
     pub columns: u64,
-    /// Those that disagree with it.
+    /// Columns that disagree.
     pub contradicted: u64,
-    /// The first of these: which of the log's files, the number of its first sector and of its last one.
+    /// The first of these: file, first and last sector.
     pub first: Option<(usize, u32, u32)>,
 }
 
 impl Evidence {
-    /// Adds the evidence from the next file.
+    /// Adds the next file's.
     pub fn add(&mut self, next: &Self) {
         self.last = self.last.max(next.last);
         self.written += next.written;
@@ -53,7 +51,7 @@ impl Evidence {
     }
 }
 
-/// Rebuilt sectors of one file, by block, and the evidence from its parity.
+/// Rebuilt sectors by block, and evidence.
 #[derive(Debug, Default)]
 pub(super) struct Repairs {
     made: BTreeMap<u64, [u8; BLOCK_BYTES]>,
@@ -61,7 +59,7 @@ pub(super) struct Repairs {
 }
 
 impl Repairs {
-    /// Repairs this file of a log; its session is given, or else taken from its first sound sector.
+    /// The session is given, or that of the first sound sector.
     pub(super) fn of(log: &Log, index: usize, session: Option<u32>) -> Result<Self> {
         let Some(piece) = log.pieces.get(index) else { return Ok(Self::default()) };
         let file = Log { pieces: vec![piece.clone()], ..log.clone() };
@@ -88,7 +86,7 @@ impl Repairs {
         }
         for ((stretch, first), (column, lost)) in columns {
             all.evidence.columns += 1;
-            // The wrong one of them is unknown, so none is used.
+            // Which one is wrong is unknown.
             if !column.agrees(&lost) {
                 let first =
                     base.saturating_add(stretch.saturating_mul(STRETCH_SECTORS)).saturating_add(first);
@@ -103,31 +101,27 @@ impl Repairs {
         Ok(all)
     }
 
-    /// The rebuilt sector of this block.
     pub(super) fn at(&self, block: u64) -> Option<&[u8; BLOCK_BYTES]> {
         self.made.get(&block)
     }
 }
 
-/// A stretch of a file and a column of it.
 const fn column_of(at: u32) -> (u32, u32) {
     (at / STRETCH_SECTORS, at % COLUMNS as u32)
 }
 
-/// Contents of a file.
 struct FileSectors {
     session: u32,
-    /// The number of the file's first sector; `None` without a sector of the session.
+    /// `None` without a sector of the session.
     base: Option<u32>,
-    /// The number of the whole sector of the session in each block, if any.
+    /// Of the session's whole sector in each block.
     numbers: Vec<Option<u32>>,
-    /// The number of the one that ends the log in order.
+    /// The one that ends the log in order.
     closed: Option<u32>,
     parity: Vec<(Parity, [u8; BLOCK_BYTES])>,
 }
 
 impl FileSectors {
-    /// `None` without any sector.
     fn of(file: &Log, session: Option<u32>) -> Result<Option<Self>> {
         let (mut session, mut numbers, mut parity) = (session, Vec::new(), Vec::new());
         let (mut bases, mut begins, mut closed) = (BTreeMap::<u32, u32>::new(), None, None);
@@ -154,7 +148,7 @@ impl FileSectors {
             at = at.saturating_add(1);
         }
         let base = bases.into_iter().max_by_key(|(_, count)| *count).map(|(base, _)| base);
-        // A first sector that belongs before others of the file was only put there.
+        // Out of order: the file is begun anew.
         let anew = |begins: &u32| {
             let mut others =
                 (0_u32..).zip(&numbers).filter_map(|(at, number)| number.map(|number| (at, number)));
@@ -167,9 +161,8 @@ impl FileSectors {
         Ok(Some(Self { session, base, numbers, closed, parity }))
     }
 
-    /// Number of parity sectors that were certainly written, and of the missing ones. The recorder writes
-    /// those of a stretch before the first sector of the next one, and the last ones at a proper end. They
-    /// are at the end of the file: a file trimmed after its last sector, like a download, never had them.
+    /// Certainly written parity sectors, and missing ones. A file trimmed after its last sector, like a
+    /// download, never had the last ones.
     fn written_and_missing(&self, base: u32) -> (u64, u64) {
         let last = (0..self.numbers.len() as u32).rev().find(|at| self.in_place(base, *at).is_some());
         let Some(last) = last else { return (0, 0) };
@@ -194,17 +187,17 @@ impl FileSectors {
         (written, written - there.len() as u64)
     }
 
-    /// The number of the sector in this block, if it is the one that belongs there.
+    /// If it belongs there.
     fn in_place(&self, base: u32, at: u32) -> Option<u32> {
         let number = self.numbers.get(at as usize).copied().flatten();
         number.filter(|number| *number == base.wrapping_add(at))
     }
 
-    /// The columns with parity and with few enough lost sectors to rebuild, with the numbers of those.
+    /// With parity and few enough losses, and the lost numbers.
     fn columns(&self, base: u32) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
         let mut columns = BTreeMap::new();
         for (one, block) in &self.parity {
-            // Parity of the file's older content covers sectors before the base, or far away.
+            // Older content's parity covers sectors before the base, or far away.
             let last = one.last.checked_sub(base);
             let Some(last) = last.filter(|last| (*last as usize) < self.numbers.len()) else { continue };
             let empty = || (Column::new(self.session), Vec::new());

@@ -1,7 +1,7 @@
-//! Searches every block of a card for sectors of logs, and puts those of each session in order.
+//! Searches a card's blocks for sectors, by session.
 //!
-//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. A card with more is not ours,
-//! or hostile. Of too many sessions, those with the most sectors are listed, and the others are counted.
+//! Memory: at most [`RUNS_MAX`] runs of 16 bytes and twice [`SESSIONS_MAX`] sessions. The sessions with the most
+//! sectors are listed, others counted.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,22 +14,21 @@ use super::places::{BLOCK_BYTES, Blocks, Log, Piece};
 use super::sessions::first_session;
 use crate::progress;
 
-/// Runs of all sessions together: 16 MiB. The recorder makes a segment in a few runs.
+/// All sessions: 16 MiB. The recorder makes a segment in a few runs.
 const RUNS_MAX: usize = 1 << 20;
-/// Blocks between two looks at the bar.
+/// Between updates of the bar.
 const BLOCKS_OF_BAR: u64 = 2_048;
-/// Sessions that are kept.
+/// Kept sessions.
 const SESSIONS_MAX: usize = 10_000;
 
-/// Result of a scan.
 pub(super) struct Scan {
-    /// The sessions, by the place of their first sector.
+    /// By the place of the first sector.
     pub(super) logs: Vec<Log>,
-    /// Sectors without a session here, because there were too many sessions or runs.
+    /// Too many sessions or runs.
     pub(super) left_out: u64,
 }
 
-/// Sectors that follow each other, in place and in number; damaged ones between them are theirs.
+/// Consecutive in place and number; damaged ones between them are theirs.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     /// Its first block.
@@ -39,8 +38,7 @@ struct Run {
 }
 
 impl Run {
-    /// Whether a sector of this number in this block continues the run, after at most one group of other
-    /// blocks.
+    /// After at most one group of other blocks.
     fn goes_on(&self, number: u32, at: u64) -> bool {
         let blocks = at.checked_sub(self.start);
         let numbers = number.checked_sub(self.number).map(u64::from);
@@ -49,7 +47,6 @@ impl Run {
     }
 }
 
-/// The runs of each session.
 #[derive(Default)]
 struct Sessions {
     runs: BTreeMap<u32, Vec<Run>>,
@@ -77,7 +74,6 @@ impl Sessions {
         self.runs.entry(header.session).or_insert_with(|| Vec::with_capacity(1)).push(run);
     }
 
-    /// Leaves out the sessions with the fewest sectors, so that [`SESSIONS_MAX`] stay.
     fn make_room(&mut self) {
         if self.runs.len() <= SESSIONS_MAX {
             return;
@@ -93,10 +89,10 @@ impl Sessions {
     }
 }
 
-/// The files of a sound file system. Sectors of a log's own session are read through its files.
+/// A sound file system's files, through which their logs are read.
 #[derive(Debug, Default)]
 pub(super) struct Files {
-    /// The number of blocks of each extent and the session of its log, by its first block.
+    /// By first block: blocks of an extent, and its log's session.
     extents: BTreeMap<u64, (u64, u32)>,
 }
 
@@ -112,14 +108,13 @@ impl Files {
         files
     }
 
-    /// Whether a sector of this session in this block is read with its log.
     fn has(&self, session: u32, at: u64) -> bool {
         let extent = self.extents.range(..=at).next_back();
         extent.is_some_and(|(start, (blocks, of))| at - start < *blocks && *of == session)
     }
 }
 
-/// Looks at every block of `length` bytes for sectors that are not read with the logs of `files`.
+/// Skips sectors of `files`.
 pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     let everything = Piece { path: path.to_owned(), extents: vec![Extent { start: 0, length }] };
     let all = Log {
@@ -131,7 +126,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
     };
     let mut blocks: Blocks<'_> = all.blocks();
     let mut sessions = Sessions::default();
-    // A card of 128 GB takes minutes.
+    // 128 GB take minutes.
     let bar = progress::bytes(Some(length), &format!("{}: looking at every block", path.display()));
     let mut at: u64 = 0;
     while let Some(block) = blocks.next_block()? {
@@ -167,7 +162,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
         }
     };
     let mut logs: Vec<Log> = runs.into_iter().map(log).collect();
-    // Mostly in the order of recording: a log reports on the one before it, which needs their order.
+    // A log reports on the one before it: their order matters.
     logs.sort_by_key(|log| {
         log.pieces.first().and_then(|piece| piece.extents.first()).map(|extent| extent.start)
     });

@@ -1,5 +1,5 @@
-//! The session of each log number of a card. The first sector of each log has it, so it is known before the
-//! logs are read. A log that was copied, renamed or exchanged with another one is found anywhere.
+//! The session of each log number of a card, from first sectors, before the logs are read. Copied, renamed or
+//! exchanged logs are found anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,22 +8,22 @@ use hums_blackbox::Header;
 use super::fingerprint::{Fingerprint, fingerprint};
 use super::places::{Log, Piece};
 
-/// Number of blocks searched for a log's first sector: one read.
+/// One read.
 const LOOK_BLOCKS: usize = 128;
 
-/// The numbers under which each session is there, by card.
+/// The numbers of each session, by card.
 #[derive(Clone, Debug, Default)]
 pub struct Sessions {
-    /// The numbers of its logs, by the prefix of their names, and by the session in their sectors.
+    /// By the names' prefix and the session.
     logs: BTreeMap<(String, u32), Vec<u32>>,
-    /// Logs with equal content: the name of the first one, by the name of the copy.
+    /// Original by name of the copy.
     again: BTreeMap<String, String>,
-    /// The numbers of all logs of each card, also of those without a sector.
+    /// By card; also logs without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
 }
 
 impl Sessions {
-    /// Looks at the first sectors of these logs, by their names. Names without a number are left out.
+    /// From first sectors, by name. Names without a number are left out.
     pub fn of<'a>(logs: impl IntoIterator<Item = (&'a str, &'a Log)>) -> Self {
         let logs: Vec<(&str, &Log)> = logs.into_iter().collect();
         let mut all: BTreeMap<_, Vec<u32>> = BTreeMap::new();
@@ -44,13 +44,12 @@ impl Sessions {
         Self { logs: all, again, numbers }
     }
 
-    /// The name of the original if this log is a copy of it or of one of its files, sector by sector. Copies
-    /// are not counted.
+    /// The original of a copy (or of one of its files), sector by sector.
     pub fn again(&self, name: &str) -> Option<&str> {
         self.again.get(name).map(String::as_str)
     }
 
-    /// The numbers under which a session is there on a card.
+    /// A session's numbers on a card.
     pub fn numbers(&self, card: &str, session: u32) -> &[u32] {
         self.logs.get(&(card.to_owned(), session)).map_or(&[], Vec::as_slice)
     }
@@ -60,8 +59,7 @@ impl Sessions {
         self.numbers.get(card).is_some_and(|numbers| numbers.range(..number).next().is_some())
     }
 
-    /// Whether the content of a card's oldest file may be of this session. It may if the session has no log
-    /// on the card, or the one of the lowest number.
+    /// Whether the card's oldest file may be of this session: it has no log there, or the lowest number.
     pub fn may_be_oldest(&self, card: &str, session: u32) -> bool {
         let lowest = self.numbers.get(card).and_then(|numbers| numbers.first());
         let own = self.numbers(card, session).iter().min();
@@ -69,7 +67,7 @@ impl Sessions {
     }
 }
 
-/// A log of a session that may have copies.
+/// May have copies.
 struct Candidate<'a> {
     name: &'a str,
     number: Option<u32>,
@@ -77,8 +75,7 @@ struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// Fingerprints of the log, and of each of several files. An unreadable log does not count as a copy;
-    /// reading it reports the error.
+    /// Of the log, and of each of several files. Reading an unreadable one reports the error.
     fn fingerprints(&self) -> Vec<Fingerprint> {
         let file = |piece: &Piece| Log { pieces: vec![piece.clone()], ..self.log.clone() };
         let files = self.log.pieces.iter().map(file).filter(|_| self.log.pieces.len() > 1);
@@ -86,8 +83,7 @@ impl Candidate<'_> {
     }
 }
 
-/// Names of copies among the logs of one session, each with its original. A card's log counts as the original
-/// before one of another name, and one of more files before one of fewer.
+/// Copies with their originals. A card's log counts before another name, more files before fewer.
 fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
     if logs.len() < 2 {
         return Vec::new();
@@ -111,18 +107,18 @@ pub fn again_words(original: &str) -> String {
     format!("is the same session as {original} once more (not counted)")
 }
 
-/// A log's name in two: the prefix and the number.
+/// Prefix and number.
 pub fn place(name: &str) -> (&str, Option<u32>) {
     let (card, number) = name.rsplit_once('/').unwrap_or(("", name));
     (card, number.parse().ok().filter(|_| number.len() == 5))
 }
 
-/// The session of a log's first sector.
+/// By its first sector.
 pub fn first_session(log: &Log) -> Option<u32> {
     first_sector(log).map(|first| first.session)
 }
 
-/// A log's first sector. Reading the log reports errors.
+/// Reading the log reports errors.
 fn first_sector(log: &Log) -> Option<Header> {
     let mut blocks = log.blocks();
     for _ in 0..LOOK_BLOCKS {

@@ -1,17 +1,17 @@
-//! Several logs in parallel: each has a worker of its own with further workers. Results are reported in the
-//! logs' order, and the number of logs in work is bounded, and so is memory.
+//! Several logs in parallel, each with further workers. Results come in order; the number in work, and so
+//! memory, is bounded.
 
 use anyhow::Result;
 
 use super::in_order::{in_order, workers};
 
-/// Logs in work at most: writing one leaves its workers idle; a few fill these pauses.
+/// Writing one leaves its workers idle: a few fill the pauses.
 const AT_ONCE: usize = 4;
-/// Logs at most that are in work or done and wait for an earlier one.
+/// In work, or done and waiting for an earlier one.
 const AHEAD_MAX: usize = 16;
 
-/// Calls `work` for each item, some in parallel, and `tell` with the results in the items' order. The first
-/// error of `tell` ends it: begun items are finished, others are left.
+/// Hands results of `work` to `tell` in the items' order. After an error of `tell` only begun items are
+/// finished.
 pub fn side_by_side<I: Sync, R: Send>(
     items: &[I],
     work: impl Fn(&I) -> R + Sync,

@@ -1,55 +1,50 @@
-//! Sectors in a log's files that do not belong to the log.
+//! Foreign sectors in a log's files.
 //!
 //! The recorder writes a file from its beginning, so the sector at block `n` has at least the number `n`. A
-//! copy of a sector in progress may be one block further. In a recycled file this also holds for the sectors
-//! of the older session after the newest one. Sectors of another session with lower numbers came there in
-//! another way: logs were joined, or the file was made over a deleted log. In a file without a sector of the
-//! log all sectors are strange.
+//! copy of a sector in progress may be one block further. So in a recycled file the older session's sectors
+//! follow the newest one. Lower numbers of another session came in another way: joined logs, or a file over a
+//! deleted log. Without a sector of the log all are strange.
 
 use hums_blackbox::{Header, SECTOR_BYTES};
 
-/// Sectors in a file that are not of its log; or a file without any.
+/// Foreign sectors in a file, or a file without any own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strange {
-    /// Which of the log's files.
+    /// Index of the file.
     pub file: usize,
-    /// The file has no sector of the log.
+    /// No sector of the log.
     pub hollow: bool,
-    /// Number of sectors of other sessions.
+    /// Sectors of other sessions.
     pub sectors: u64,
-    /// The file's block with the first one.
+    /// Block of the first one.
     pub first: u64,
-    /// The session of the first one.
+    /// Session of the first one.
     pub session: u32,
 }
 
-/// Looks at the files of a log, block by block.
 #[derive(Debug, Default)]
 pub(super) struct Strangers(Vec<File>);
 
 #[derive(Clone, Copy, Debug, Default)]
 struct File {
-    /// It has a sector of the log.
     own: bool,
-    /// All sectors of other sessions, and those that a recycled file cannot have.
+    /// All, and those that a recycled file cannot have.
     others: Option<Strange>,
     misplaced: Option<Strange>,
 }
 
 impl Strangers {
-    /// For a log of this many files.
     pub(super) fn new(files: usize) -> Self {
         Self(vec![File::default(); files])
     }
 
-    /// This file has a sector of the log.
     pub(super) fn own(&mut self, file: usize) {
         if let Some(file) = self.0.get_mut(file) {
             file.own = true;
         }
     }
 
-    /// This block of a file is a sector of another session, if it is sound.
+    /// If it is sound.
     pub(super) fn other(&mut self, index: usize, at: u64, block: &[u8; SECTOR_BYTES]) {
         let (Some(file), Ok(header)) = (self.0.get_mut(index), Header::read(block)) else { return };
         let new = Strange { file: index, hollow: false, sectors: 0, first: at, session: header.session };
@@ -59,7 +54,7 @@ impl Strangers {
         }
     }
 
-    /// The sectors that are not of the log, and the files without one of it, once all blocks were seen.
+    /// Once all blocks were seen.
     pub(super) fn strange(&self) -> Vec<Strange> {
         let strange = |(index, file): (usize, &File)| {
             let none = Strange { file: index, hollow: true, sectors: 0, first: 0, session: 0 };
@@ -76,8 +71,8 @@ mod tests {
 
     use super::*;
 
-    /// The strange sectors of a log of these files. A block is a number, with `p` after it for a copy of a
-    /// sector in progress, and `x` before it for another session. `-` is a block without a sector.
+    /// A block is a number, with `p` after it for a copy in progress, `x` before it for another session. `-`
+    /// is a block without a sector.
     fn look(files: &[&str]) -> Vec<(usize, bool, u64, u64)> {
         let mut strangers = Strangers::new(files.len());
         for (file, blocks) in files.iter().enumerate() {
@@ -105,7 +100,6 @@ mod tests {
         assert_eq!(look(&["0 1 2 x0 x1 x2"]), [(0, false, 3, 3)], "joined");
         assert_eq!(look(&["0 1", "x0 x1 x2"]), [(1, true, 3, 0)]);
         assert_eq!(look(&["0 1 x7 x2 x3"]), [(0, false, 2, 3)]);
-        // A power cut in a recycled file, and blocks without sectors.
         for files in [&["0 1 2p x3 x4"][..], &["0 1 2 2p x4 x5"], &["0 1 x2p x4"], &["0 1 - -", "2 3"]] {
             assert_eq!(look(files), [], "{files:?}");
         }

@@ -1,58 +1,55 @@
-//! One MAVLink frame in a slice of bytes: its length, its header and whether its checksum holds.
+//! One MAVLink frame in a slice: length, header, checksum.
 //!
-//! The framer of the pipeline (`hums-link`) follows a stream byte by byte; this looks at bytes that are all there.
+//! `hums-link`'s framer follows a stream instead.
 
 use hums_dialect::Message;
 
-/// The longest frame: MAVLink 2 with 255 bytes of payload and a signature.
+/// MAVLink 2, 255 bytes of payload, a signature.
 pub const FRAME_BYTES_MAX: usize = 10 + 255 + 2 + 13;
 
 const MAGIC_V1: u8 = 0xfe;
 const MAGIC_V2: u8 = 0xfd;
-/// The bit of MAVLink 2's incompatibility flags that announces a signature; no other bit is known.
+/// Incompatibility flag of a signature; no other is known.
 const SIGNED: u8 = 0x01;
 
-/// Whether the checksum follows our definition.
+/// Result of the checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
     /// It holds.
     Good,
-    /// It does not: damage, or another definition of this id.
+    /// Damage, or another definition.
     Bad,
-    /// The dialect lacks this message id, so it is unknown.
     Unknown,
 }
 
-/// The structure at the beginning of some bytes.
+/// At the beginning of some bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Peek<'a> {
-    /// Not the beginning of a frame.
     Other,
-    /// The beginning of a frame, but the bytes end before the frame does.
+    /// The bytes end before the frame does.
     Short,
-    /// A frame, consistent in its length.
     Frame(Frame<'a>),
 }
 
-/// A frame, consistent in its length.
+/// Consistent in its length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// The whole frame, from the magic to the checksum or signature.
+    /// From magic to checksum or signature.
     pub bytes: &'a [u8],
     /// The message id.
     pub id: u32,
     /// The sequence number.
     pub sequence: u8,
-    /// The sender's system id.
+    /// Sender.
     pub system: u8,
-    /// The sender's component id.
+    /// Sender.
     pub component: u8,
-    /// The payload as sent: MAVLink 2 leaves trailing zeros out.
+    /// As sent: MAVLink 2 leaves trailing zeros out.
     pub payload: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// Whether the checksum holds. It takes time for every byte.
+    /// Looks at every byte.
     pub fn check(&self) -> Check {
         if self.message().is_none() {
             return Check::Unknown;
@@ -61,13 +58,13 @@ impl Frame<'_> {
         if checked == Some(hums_link::Check::Verified) { Check::Good } else { Check::Bad }
     }
 
-    /// The definition of the message, if the dialect has one.
+    /// If the dialect has one.
     pub fn message(&self) -> Option<&'static Message> {
         hums_dialect::message(self.id)
     }
 }
 
-/// Looks at the beginning of `bytes`.
+/// Looks at a beginning.
 pub fn peek(bytes: &[u8]) -> Peek<'_> {
     let Some(total) = length(bytes) else {
         return match bytes.first() {
@@ -87,7 +84,7 @@ pub fn peek(bytes: &[u8]) -> Peek<'_> {
     Peek::Frame(Frame { bytes: frame, id, sequence, system, component, payload })
 }
 
-/// The length of the frame that begins here, by its header;
+/// By the header.
 fn length(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [MAGIC_V1, length, ..] => Some(6 + usize::from(length) + 2),
@@ -101,7 +98,7 @@ fn length(bytes: &[u8]) -> Option<usize> {
 pub(crate) mod tests {
     use super::*;
 
-    /// A HEARTBEAT of ArduCopter 4.6, MAVLink 2, taken from a recording.
+    /// ArduCopter 4.6, MAVLink 2, recorded.
     pub(crate) const HEARTBEAT: [u8; 21] = [
         0xfd, 0x09, 0x00, 0x00, 0x00, 0xff, 0xbe, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x06, 0x08, 0x00,
         0x04, 0x03, 0x3d, 0x48,

@@ -1,4 +1,4 @@
-//! Ids of the messages that the host tools look at one by one; all others are looked up by the dialect.
+//! Ids of messages that the host tools look at one by one.
 
 macro_rules! ids {
     ($($name:ident $id:literal;)*) => {

@@ -1,4 +1,4 @@
-//! MAVLink as the host tools read it: frames apart, and payload bytes as typed values.
+//! MAVLink: frames, and payloads as typed values.
 
 pub mod frame;
 pub mod ids;

@@ -1,7 +1,7 @@
-//! Payload bytes as typed values, by the message's definition: the one place that does it, for every output format.
+//! Payload bytes as typed values, for every output format.
 //!
 //! MAVLink 2 omits the trailing zero bytes of a payload, and MAVLink 1 the extension fields: missing bytes read as
-//! zero. A payload longer than our definition (a newer one with more extensions) keeps its known fields.
+//! zero. Of a longer, newer payload the known fields are kept.
 
 use hums_dialect::{Field, Kind, Message};
 
@@ -10,18 +10,15 @@ use hums_dialect::{Field, Kind, Message};
 pub enum Value<'a> {
     /// A number.
     Scalar(Scalar),
-    /// An array of numbers.
     Array(Array<'a>),
-    /// A `char` array up to its first NUL. It should be UTF-8, but vehicles send any bytes.
+    /// Up to the first NUL. It should be UTF-8, but vehicles send any bytes.
     Text(&'a [u8]),
 }
 
-/// One number, in the type it was sent in.
+/// In the type it was sent in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scalar {
-    /// An unsigned integer of any width.
     Unsigned(u64),
-    /// A signed integer of any width.
     Signed(i64),
     /// A `float`.
     Single(f32),
@@ -30,7 +27,7 @@ pub enum Scalar {
 }
 
 impl Scalar {
-    /// The number as a `double`: exact but for integers beyond 2^53.
+    /// Exact but for integers beyond 2^53.
     pub fn as_f64(self) -> f64 {
         match self {
             Self::Unsigned(value) => value as f64,
@@ -41,7 +38,7 @@ impl Scalar {
     }
 }
 
-/// The elements of an array field.
+/// An array field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Array<'a> {
     kind: Kind,
@@ -49,18 +46,18 @@ pub struct Array<'a> {
 }
 
 impl<'a> Array<'a> {
-    /// The elements in order.
+    /// In order.
     pub fn iter(self) -> impl ExactSizeIterator<Item = Scalar> + 'a {
         self.bytes.chunks_exact(self.kind.size()).map(move |bytes| scalar(self.kind, bytes))
     }
 
-    /// The raw bytes: a `uint8_t` array is often tunnelled data, or a file's content.
+    /// A `uint8_t` array is often tunnelled data or a file's content.
     pub fn as_bytes(self) -> Option<&'a [u8]> {
         (self.kind == Kind::U8).then_some(self.bytes)
     }
 }
 
-/// A payload of full length, its missing end filled with zeros.
+/// Full length, its end filled with zeros.
 #[derive(Clone, Debug)]
 pub struct Payload {
     message: &'static Message,
@@ -68,7 +65,7 @@ pub struct Payload {
 }
 
 impl Payload {
-    /// The payload of a frame whose checksum matches the definition `message`.
+    /// The checksum must match `message`.
     pub fn new(message: &'static Message, payload: &[u8]) -> Self {
         let mut bytes = [0; 256];
         let known = payload.len().min(usize::from(message.len_max));
@@ -78,7 +75,7 @@ impl Payload {
         Self { message, bytes }
     }
 
-    /// Each field with its value, in wire order.
+    /// In wire order.
     pub fn fields(&self) -> impl Iterator<Item = (&'static Field, Value<'_>)> {
         let mut at = 0;
         self.message.fields.iter().map(move |field| {
@@ -88,7 +85,7 @@ impl Payload {
         })
     }
 
-    /// The value of a field by its name; of an array, its first element.
+    /// By name; of an array, its first element.
     pub fn number(&self, name: &str) -> Option<f64> {
         let (_, value) = self.fields().find(|(field, _)| field.name == name)?;
         match value {
@@ -107,9 +104,8 @@ fn value<'a>(field: &Field, bytes: &'a [u8]) -> Value<'a> {
     }
 }
 
-/// `bytes` has the length of the kind, by its definition.
 fn scalar(kind: Kind, bytes: &[u8]) -> Scalar {
-    /// A known number of bytes, without a count at run time: a table has millions of values.
+    /// Without a count at run time: a table has millions of values.
     fn these<const N: usize>(bytes: &[u8]) -> [u8; N] {
         bytes.first_chunk().copied().unwrap_or([0; N])
     }
@@ -147,7 +143,7 @@ mod tests {
 
     #[test]
     fn negative_and_wide_numbers_keep_their_type() {
-        // LOCAL_POSITION_NED: time_boot_ms u32, then six floats.
+        // time_boot_ms u32, then six floats.
         let ned = message("LOCAL_POSITION_NED");
         let mut bytes = vec![0xff, 0xff, 0xff, 0xff];
         bytes.extend((-1.5f32).to_le_bytes());

@@ -1,18 +1,16 @@
-//! Parts of raw bytes that did not come over a line: unwritten blocks of a file, and remains of another file.
+//! Raw bytes that no line made: unwritten blocks, and remains of another file.
 
 use hums_core::clock::Instant;
 
 use super::item::Gap;
 use crate::plural::count;
 
-/// An unwritten block of a file: at least this many bytes 0x00 or 0xff in a row. Frames and lines are shorter
-/// (a payload is 255 bytes at most).
+/// Bytes 0x00 or 0xff in a row: frames and lines are shorter (255 bytes of payload).
 const BLOCK_BYTES: u64 = 512;
-/// More bytes without a frame than this (5 s at 115,200 baud), blocks aside, are not noise of a line but
-/// foreign data.
+/// Without a frame: 5 s at 115,200 baud are foreign data, not noise.
 const FOREIGN_BYTES: u64 = 64 * 1024;
 
-/// A number of bytes, and the place of the first one.
+/// With the first one's place.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bytes {
     count: u64,
@@ -38,16 +36,16 @@ pub struct Blocks {
     length: u64,
     unwritten: Bytes,
     foreign: Bytes,
-    /// Frames so far; start of the bytes without a frame, and the number of unwritten ones among them.
+    /// Frames so far; start of bytes without a frame, and unwritten ones among them.
     frames: u64,
     since: u64,
     unwritten_since: u64,
-    /// The bytes so far.
+    /// Bytes so far.
     pub place: u64,
 }
 
 impl Blocks {
-    /// Takes the next bytes; `frames` is the number of frames so far.
+    /// `frames`: so far.
     pub fn take(&mut self, bytes: &[u8], frames: u64) {
         if self.frames != frames {
             self.end();
@@ -67,7 +65,7 @@ impl Blocks {
         }
     }
 
-    /// The bytes without a frame are over.
+    /// A frame follows.
     pub fn end(&mut self) {
         let count = (self.place - self.since).saturating_sub(self.unwritten_since);
         if count >= FOREIGN_BYTES {
@@ -81,7 +79,7 @@ impl Blocks {
         self.unwritten.count + self.foreign.count
     }
 
-    /// The damage, once all has been taken.
+    /// Once all has been taken.
     pub fn gaps(&self, at: Instant) -> impl Iterator<Item = Gap> {
         let unwritten = self.unwritten.gap(at, "of nothing but 0x00 or 0xff");
         unwritten.into_iter().chain(self.foreign.gap(at, "of something else than MAVLink"))
@@ -92,7 +90,7 @@ impl Blocks {
 mod tests {
     use super::*;
 
-    /// The report on these bytes; `frames` are the places of frames.
+    /// `frames`: places.
     fn told(bytes: &[u8], frames: &[usize]) -> Vec<(Option<u64>, u64)> {
         let mut blocks = Blocks::default();
         for (at, chunk) in (0..).zip(bytes.chunks(32)) {
@@ -109,7 +107,7 @@ mod tests {
         assert_eq!(told(&noise(90_000), &[]), [(Some(0), 90_000)]);
         assert_eq!(told(&noise(90_016), &[45_024]), []);
         assert_eq!(told(&[vec![1; 64], vec![0; 600], vec![1; 64]].concat(), &[]), [(Some(64), 600)]);
-        // Unwritten bytes are reported once.
+        // Reported once.
         let both = [vec![0xff; 100_000], noise(70_000)].concat();
         assert_eq!(told(&both, &[]), [(Some(0), 100_000), (Some(0), 70_000)]);
     }

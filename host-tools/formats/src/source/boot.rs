@@ -1,9 +1,8 @@
 //! The autopilot's own time in a ground station's recording: it distinguishes a joint of two recordings from a clock
 //! that was set.
 //!
-//! If a ground station's clock falls, or jumps by more than an hour, it was set, or another recording was joined on.
-//! The autopilot's messages have its time since power-on. If that time goes on, so does the recording. If it changes
-//! too, this is another recording: a restart in the air just when a clock is set is too unlikely.
+//! If a ground station's clock falls, or jumps by more than an hour, either happened. If the autopilot's time since power-on
+//! goes on, so does the recording. If it changes too, this is another recording.
 
 use std::io::Read;
 
@@ -11,21 +10,21 @@ use super::item::AUTOPILOT;
 use super::tlog::records::Records;
 use crate::mavlink::frame;
 
-/// A clock that jumps by more than this may belong to another recording: microseconds.
+/// Microseconds: beyond this another recording is possible.
 pub(super) const JOINT_US: u64 = 3_600_000_000;
-/// Messages with the time since power-on come at least this often, ms.
+/// ms, at least this often.
 const TOLD_MS: i64 = 60_000;
-/// Messages are out of order by this at most.
+/// ms.
 const DISORDER_MS: i64 = 1_000;
-/// No link holds frames back for longer, microseconds.
+/// Microseconds.
 const HELD_BACK_US: u64 = 10_000_000;
 
-/// `time_boot_ms` of an autopilot's `SYSTEM_TIME`, `ATTITUDE` and `GLOBAL_POSITION_INT`; zeros at the end of a payload are not sent.
+/// `SYSTEM_TIME`, `ATTITUDE`, `GLOBAL_POSITION_INT`; a payload's trailing zeros are not sent.
 pub(super) fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {
     boot_ms_of(frame.id(), frame.component(), frame.payload())
 }
 
-/// The same of a frame by its parts.
+/// By a frame's parts.
 pub(super) fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> {
     let offset = match id {
         2 => 8,
@@ -36,18 +35,17 @@ pub(super) fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> 
     (component == AUTOPILOT).then(|| u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]))
 }
 
-/// The last report of an autopilot: its system, and its time since power-on, ms.
+/// Last report: system, and ms since power-on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Joints(Option<(u8, u32)>);
 
 impl Joints {
-    /// An autopilot of the recording reported its time.
+    /// An autopilot's report.
     pub(super) const fn told(&mut self, system: u8, boot_ms: u32) {
         self.0 = Some((system, boot_ms));
     }
 
-    /// Time from an autopilot's last report before a jump of the recorder's clock to the jump, by its first
-    /// report after the jump, ms.
+    /// ms from the last report before a jump to the jump, by the first report after it.
     fn passed_ms<R: Read>(self, time_us: u64, after: &Records<R>) -> Option<i64> {
         let (system, before_ms) = self.0?;
         let (after_us, after_ms) = after.frames_after(|recorded_us, bytes| match frame::peek(bytes) {
@@ -60,8 +58,8 @@ impl Joints {
         Some(i64::from(after_ms) - i64::from(before_ms) - since_jump_ms)
     }
 
-    /// The real time passed, microseconds, if the recorder's clock was set while the autopilot's went on. A
-    /// link may hold frames back, so that a clock jumps forward by some seconds.
+    /// Microseconds passed, if the recorder's clock was set and the autopilot's went on. A link that holds frames back lets a
+    /// clock jump by some seconds.
     pub(super) fn elapsed_us<R: Read>(self, before_us: u64, time_us: u64, after: &Records<R>) -> Option<u64> {
         if (before_us..before_us.saturating_add(HELD_BACK_US)).contains(&time_us) {
             return None;
@@ -72,8 +70,7 @@ impl Joints {
         is_set.then_some(passed_us)
     }
 
-    /// Whether another recording begins at this jump of the recorder's clock: the autopilot's clock does not
-    /// go on. Without an autopilot's time, a jump by more than an hour counts.
+    /// Another recording: the autopilot's clock does not go on. Without its time, a jump by more than an hour.
     pub(super) fn is_joint<R: Read>(self, before_us: u64, time_us: u64, after: &Records<R>) -> bool {
         let Some(boot) = self.passed_ms(time_us, after) else {
             return before_us.abs_diff(time_us) > JOINT_US;

@@ -1,5 +1,4 @@
-//! Raw MAVLink in its autopilot's time: the same for readers of frames ([`BootTimes`]) and of bytes
-//! ([`Booted`]).
+//! Raw MAVLink in its autopilot's time: frames ([`BootTimes`]) and bytes ([`Booted`]).
 
 use std::io;
 
@@ -12,25 +11,23 @@ use super::stream::{Chunk, Source};
 use super::timeline::Timeline;
 use super::tlog::times::Begins;
 
-/// An autopilot restarted in a recording reports its time before this. If its time falls and it has run for
-/// longer, it is in another recording.
+/// ms: a restart reports less. A time that falls after more belongs to another recording.
 const STARTS_MS: u32 = 10_000;
 
-/// The time of frames without recorded times: the autopilot's time since boot. Until its first report, the
-/// time that a line takes for the bytes.
+/// Time since boot for frames without recorded times. Before the first report, the line's time.
 #[derive(Debug, Default)]
 pub struct BootTimes {
-    /// The first system with an autopilot that reports its time: only its times count.
+    /// The first system with an autopilot: only its times count.
     system: Option<u8>,
     timeline: Option<Timeline>,
-    /// The autopilot's last time since boot, with the bits that 32 bits of milliseconds do not hold (49.7 days).
+    /// Extended beyond 32 bits of milliseconds (49.7 days).
     boot_ms: u64,
-    /// The line's time at the first of them.
+    /// The line's time at the first report.
     base: Instant,
 }
 
 impl BootTimes {
-    /// The time of a frame, and the power-on or recording that begins with it.
+    /// And the power-on or recording that begins with it.
     pub fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
         let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
         if let Some(boot_ms) = told {
@@ -47,12 +44,11 @@ impl BootTimes {
         (self.timeline.map_or(line, |timeline| self.after_base(timeline.now())), None)
     }
 
-    /// Whether this frame is from that system.
+    /// Whether its system is the timed one.
     pub fn is_of(&self, frame: &hums_link::Frame<'_>) -> bool {
         self.system == Some(frame.system())
     }
 
-    /// Whether an autopilot has reported its time.
     const fn is_known(&self) -> bool {
         self.timeline.is_some()
     }
@@ -62,8 +58,7 @@ impl BootTimes {
     }
 }
 
-/// A time since boot by its lower 32 bits: the one near the last time; otherwise a later one of the same 49.7 days, or that of
-/// another boot.
+/// The time near the last one; otherwise a later one of the same 49.7 days, or another boot's.
 fn extend(last_ms: u64, boot_ms: u32) -> u64 {
     const NEAR_MS: u32 = 60_000;
     let step = boot_ms.wrapping_sub(last_ms as u32).cast_signed();
@@ -75,18 +70,18 @@ fn extend(last_ms: u64, boot_ms: u32) -> u64 {
     }
 }
 
-/// The fastest port: bytes between two times of the autopilot come no faster.
+/// Between two reports bytes come no faster.
 const PORT_BAUD: u64 = 921_600;
 
-/// Raw bytes as a source: whole frames at the times of [`BootTimes`], and between two of them as on the fastest port.
+/// Whole frames at [`BootTimes`], and between two as on the fastest port.
 pub struct Booted<S> {
     line: S,
     framer: Framer,
     times: BootTimes,
-    /// Bytes that have not been handed on: of a frame that is not whole yet.
+    /// An incomplete frame's.
     waiting: Vec<u8>,
     at_us: u64,
-    /// Another recording began with the latest chunk.
+    /// With the latest chunk.
     begins: bool,
     blocks: Blocks,
     /// The end cuts off a frame.
@@ -94,7 +89,7 @@ pub struct Booted<S> {
 }
 
 impl<S: Source> Booted<S> {
-    /// Takes the bytes of `line`, with times of a line.
+    /// Wraps `line`, which has a line's times.
     pub fn new(line: S) -> Self {
         Self {
             line,
@@ -108,7 +103,7 @@ impl<S: Source> Booted<S> {
         }
     }
 
-    /// Hands on bytes that were there at this time, by the autopilot's clock or by the line's.
+    /// At the autopilot's time, or the line's.
     fn chunk(&mut self, told_us: u64, bytes: Vec<u8>) -> Chunk {
         let baud = if self.times.is_known() { PORT_BAUD } else { u64::MAX };
         let line_us = (bytes.len() as u64).saturating_mul(10_000_000) / baud;

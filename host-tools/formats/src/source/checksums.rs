@@ -1,4 +1,4 @@
-//! Frames of a ground station's log with a wrong checksum: they are skipped and reported.
+//! Frames of a ground station's log with a wrong checksum.
 
 use hums_core::clock::Instant;
 use hums_link::{Check, Frame};
@@ -16,31 +16,31 @@ pub fn wrong_checksums(frames: u64) -> String {
     )
 }
 
-/// Finds the records with a wrong checksum. An unknown id, or one with another definition, cannot be checked.
+/// Finds wrong checksums. Unknown ids, or other definitions, cannot be checked.
 #[derive(Debug, Default)]
 pub struct Checksums {
-    /// Whether the message of the present record is known; `None` once its frame has come.
+    /// Message known; `None` once the record's frame has come.
     waits: Option<bool>,
-    /// Length of its frame, and its time and place.
+    /// Of its frame.
     length: usize,
     at: Instant,
     place: u64,
-    /// Number of damaged frames, and the first one.
+    /// And the first one.
     damaged: u64,
     first: Option<(Instant, u64)>,
-    /// Number of frames that cannot be checked.
+    /// Frames that cannot be checked.
     unchecked: u64,
 }
 
 impl Checksums {
-    /// A record with these bytes of a frame.
+    /// Begins a record.
     pub fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
         let Peek::Frame(frame) = peek(bytes) else { return };
         (self.waits, self.length) = (Some(frame.message().is_some()), frame.bytes.len());
         (self.at, self.place) = (at, place);
     }
 
-    /// A valid frame: the record's own, unless it is inside a damaged one.
+    /// The record's own, unless inside a damaged one.
     pub fn frame(&mut self, frame: &Frame<'_>) {
         if frame.bytes().len() == self.length || self.waits == Some(false) {
             self.waits = None;
@@ -48,8 +48,7 @@ impl Checksums {
         self.unchecked += u64::from(frame.check() == Check::Unverified);
     }
 
-    /// The record is over. Returns its frame of these bytes, if it failed only because its message is
-    /// unknown: it is kept unchanged.
+    /// Ends a record. Returns a frame of an unknown message, which is kept unchanged.
     pub fn end<'a>(&mut self, bytes: &'a [u8]) -> Option<Frame<'a>> {
         if self.waits.take()? {
             self.damaged += 1;
@@ -60,19 +59,19 @@ impl Checksums {
         Frame::again(bytes, Check::Unverified)
     }
 
-    /// Number of damaged frames.
+    /// Damaged frames.
     pub const fn damaged(&self) -> u64 {
         self.damaged
     }
 
-    /// Those that are damaged.
+    /// Damaged frames.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words = wrong_checksums(self.damaged);
         Some(Gap::damaged(at, place, words))
     }
 
-    /// The unchecked frames, as a sentence.
+    /// A sentence.
     pub fn words(&self) -> Option<String> {
         (self.unchecked > 0).then(|| {
             let frames = count(self.unchecked, "frame");

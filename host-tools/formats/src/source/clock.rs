@@ -1,13 +1,12 @@
-//! A recording's clock: makes recorded times that never fall, and finds the invalid ones.
+//! A recording's clock: never falls, and finds invalid times.
 //!
-//! Every reader of a format with recorded times asks here, message by message. A time within a second of the
-//! latest one counts; an earlier one is a reordering. Any other is a jump, and goes to [`super::doubt`]: it
-//! is wrong, or a pause, or the clock began again.
+//! Every format with recorded times uses it, message by message. A time within a second of the latest one
+//! counts; an earlier one is a reordering. Any other is a jump, and goes to [`super::doubt`]: it is wrong, or
+//! a pause, or the clock began again.
 //!
-//! **Old values.** A `ULog` begins with the last value of each topic, which may be minutes old; some topics
-//! come again late or never. For a format with such values ([`Rules::old_values`]), a time that is behind is
-//! *old*, not wrong. It is wrong only if it is also behind the last time of its own series. An old time
-//! counts as now, and is not a witness for other times.
+//! **Old values.** A `ULog` begins with each topic's last value, perhaps minutes old. For a format with such
+//! values ([`Rules::old_values`]), a time that is behind is *old*, not wrong. It is wrong only if also behind
+//! its own series. An old time counts as now, and is no witness for others.
 
 use hums_core::clock::Instant;
 
@@ -16,50 +15,48 @@ use super::item::Gap;
 use super::timeline::{Moment, STEP_BACK_US_MAX, STEP_FORWARD_US_MAX, Timeline};
 use crate::plural::count;
 
-/// Messages of a series are steady if they come at least this often, ...
+/// Steady messages come at least this often ...
 const STEADY_US: u64 = 500_000;
 /// ... for this many in a row.
 const STEADY_MIN: u8 = 32;
-/// A clock stands still if this many messages of a series in a row have no later time, and no other message
-/// goes on.
+/// This many messages of a series without a later time: the clock stands still.
 const STILL_MIN: u8 = 100;
-/// Number of times needed, most of them before a log's own beginning, to call that wrong.
+/// Times needed, most of them before a log's beginning, to call that wrong.
 pub const BEGINNING_ASKED: usize = 64;
-/// Maximum number of series followed; further ones count as rare.
+/// Followed series; further ones count as rare.
 const SERIES_MAX: usize = 65_537;
 
 /// A time in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
-    /// Microseconds, by whatever clock the recording has.
+    /// Microseconds, by the recording's clock.
     pub us: u64,
-    /// The series of messages that it belongs to: a type of message, a topic. Small numbers.
+    /// A type of message or topic. Small.
     pub series: usize,
 }
 
-/// The times that follow a message in the file.
+/// Times after a message in the file.
 #[derive(Clone, Debug, Default)]
 pub struct Ahead {
-    /// Up to [`super::doubt::ASKED`] of the requested ones.
+    /// Up to [`super::doubt::ASKED`].
     pub stamps: Vec<Stamp>,
-    /// No times follow them.
+    /// None follow.
     pub is_end: bool,
 }
 
 /// Differences between formats.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
-    /// The first time is the stream's time zero, whatever its value; otherwise times count from a power-on.
+    /// The first time is zero; otherwise times count from a power-on.
     pub from_first: bool,
-    /// A time that is behind may be an old value.
+    /// A time behind may be an old value.
     pub old_values: bool,
-    /// How the recording's ends are judged.
+    /// Rules for the ends.
     pub ends: Ends,
 }
 
-/// Start of a log that records its own start, and whether that is wrong. It is wrong if most of its first
-/// times (some are old values) are before it, or a day behind it. Then the log began at the time shared by
-/// many.
+/// A log's recorded start, and whether it is wrong: most of its first times are before it, or a day behind
+/// it. Then the time shared by many counts.
 pub fn beginning(told: u64, first: &[u64], is_end: bool) -> (u64, bool) {
     let fits = |time: u64| {
         time.saturating_add(STEP_BACK_US_MAX) >= told && time <= told.saturating_add(STEP_FORWARD_US_MAX)
@@ -70,7 +67,7 @@ pub fn beginning(told: u64, first: &[u64], is_end: bool) -> (u64, bool) {
     if first.len() < enough || fitting * 4 > first.len() {
         return (told, false);
     }
-    // Old values are from any time; those of the log follow each other.
+    // Those of the log follow each other.
     let followed = |time: u64| {
         first.iter().filter(|other| (time..=time.saturating_add(STEP_BACK_US_MAX)).contains(*other)).count()
     };
@@ -84,24 +81,22 @@ pub fn beginning(told: u64, first: &[u64], is_end: bool) -> (u64, bool) {
 pub enum Reading {
     /// It counts.
     Sound(Moment),
-    /// It is an old value, and counts as now.
+    /// Counts as now.
     Old,
-    /// The times around it contradict it. Whether one of the same series had counted before it.
+    /// Contradicted by the times around it.
     Wrong {
-        /// A time of the same series has counted.
+        /// An earlier time of the series counted.
         known: bool,
     },
 }
 
-/// State of a series of messages.
 #[derive(Clone, Copy, Debug, Default)]
 struct Series {
-    /// The latest time, be it old or not.
+    /// Old or not.
     last_us: Option<u64>,
-    /// Number of messages in a row without a pause.
+    /// Without a pause.
     steady: u8,
-    /// Number of messages in a row without a later time than the one before, while the recording's time was
-    /// this one.
+    /// Without a later time while the recording's time was this one.
     still: u8,
     still_at: Option<u64>,
     /// One has counted.
@@ -113,13 +108,12 @@ struct Series {
 pub struct Clock {
     rules: Rules,
     timeline: Timeline,
-    /// A valid time has come.
     begun: bool,
     series: Vec<Series>,
     steps: Steps,
 }
 
-/// Steps between the last valid times, microseconds: a ring.
+/// A ring of the last steps, microseconds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Steps {
     last_us: [u64; RUN as usize],
@@ -135,8 +129,7 @@ impl Steps {
         self.count += 1;
     }
 
-    /// Usual step between times: the largest of the last ones. With few of them, the median of those and the
-    /// following ones.
+    /// The largest of the last steps. With few, the median of those and the following ones.
     fn usual_us(&self, before: Option<u64>, times: &[Time]) -> u64 {
         let last = self.last_us.get(..self.count as usize).unwrap_or(&self.last_us);
         if self.count >= RUN as u64 {
@@ -157,12 +150,12 @@ impl Clock {
         Self { rules, timeline: Timeline::new(), begun: false, series: Vec::new(), steps }
     }
 
-    /// The time of the first message, as found by a search.
+    /// By a search.
     pub fn begin(&mut self, us: u64) {
         self.timeline.at(us);
     }
 
-    /// The log's own record of its beginning; `true` if another log came before it, from which time goes on.
+    /// By the log itself; `true` if another log came before, from which time goes on.
     pub fn begin_log(&mut self, us: u64) -> bool {
         let again = self.timeline.recorded_us().is_some();
         if again {
@@ -174,13 +167,13 @@ impl Clock {
         again
     }
 
-    /// The time of a message. At a jump `ahead` gives the next stamps that its argument accepts.
+    /// At a jump `ahead` gives the next stamps that its argument accepts.
     pub fn take(&mut self, stamp: Stamp, ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead) -> Reading {
         self.take_beside(stamp, ahead, || None)
     }
 
-    /// The same beside another clock that knows the time passed better. At a jump to a valid time, `passed`
-    /// returns the microseconds if this clock was set.
+    /// Beside a clock that knows the passed time better. At a valid jump, `passed` returns microseconds if
+    /// this clock was set.
     pub fn take_beside(
         &mut self,
         stamp: Stamp,
@@ -211,7 +204,7 @@ impl Clock {
         Reading::Wrong { known }
     }
 
-    /// Takes a valid time; if the clock was set, this much time passed before it.
+    /// After a set clock, this much time passed.
     fn count(&mut self, stamp: Stamp, passed_us: Option<u64>) -> Moment {
         if self.rules.from_first && !self.begun {
             self.timeline = Timeline::from_first(stamp.us);
@@ -253,7 +246,7 @@ impl Clock {
         self.series.get(series).copied().unwrap_or_default()
     }
 
-    /// Whether a time is behind, and its topic has reported no later one.
+    /// Behind, without a later one of its topic.
     fn is_old(&self, stamp: Stamp) -> bool {
         let Some(now) = self.timeline.recorded_us().filter(|_| self.rules.old_values) else { return false };
         let last_us = self.series(stamp.series).last_us;
@@ -261,12 +254,11 @@ impl Clock {
             && last_us.is_none_or(|last| stamp.us.saturating_add(DISORDER_US) >= last)
     }
 
-    /// Whether the clock stands still or runs backwards, by the messages of this series.
+    /// By this series.
     pub fn stands(&self, series: usize) -> bool {
         self.series(series).still >= STILL_MIN
     }
 
-    /// Whether messages of a series came again and again until now.
     fn is_steady(&self, series: usize) -> bool {
         let series = self.series(series);
         series.steady >= STEADY_MIN
@@ -276,12 +268,12 @@ impl Clock {
                 .is_some_and(|(last, now)| last.saturating_add(STEADY_US) >= now)
     }
 
-    /// Whether a valid time has come.
+    /// After the first valid time.
     pub const fn has_begun(&self) -> bool {
         self.begun
     }
 
-    /// More time passed than the recorded times show.
+    /// Time that no recorded time shows.
     pub fn pass(&mut self, us: u64) {
         self.timeline.pass(us);
     }
@@ -291,13 +283,13 @@ impl Clock {
         self.timeline.now()
     }
 
-    /// The latest time as it was recorded.
+    /// The latest, as recorded.
     pub const fn recorded_us(&self) -> Option<u64> {
         self.timeline.recorded_us()
     }
 }
 
-/// Messages with a wrong time: their number, and the first one's place.
+/// Number and first place.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wrong {
     count: u64,
@@ -305,13 +297,13 @@ pub struct Wrong {
 }
 
 impl Wrong {
-    /// One more, at this byte of the recording.
+    /// At this byte.
     pub fn add(&mut self, at: Instant, place: u64) {
         self.count += 1;
         self.first.get_or_insert((at, place));
     }
 
-    /// The damage report; `None` without wrong times.
+    /// `None` without wrong times.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words =
@@ -331,7 +323,7 @@ mod tests {
         ends: Ends { steady_us: SECOND, seldom_us: 3_600 * SECOND },
     };
 
-    /// Result of the times of several series: the latest time in seconds, and the validity of each.
+    /// Latest time in seconds, and validity of each.
     fn read(clock: &mut Clock, stamps: &[(usize, f64)]) -> (f64, String) {
         let stamps: Vec<Stamp> = stamps
             .iter()

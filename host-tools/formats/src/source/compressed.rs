@@ -1,18 +1,17 @@
-//! A recording as `.gz`: damage of its compressed bytes is damage of the recording.
+//! A `.gz` recording's damage is damage of the recording.
 
 use std::io;
 
 use super::input::Progress;
 use super::stream::{Chunk, Source};
 
-/// A source of bytes from an input that may be compressed.
 pub(super) struct Compressed<S> {
     inner: S,
     progress: Progress,
 }
 
 impl<S: Source> Compressed<S> {
-    /// The bytes of `inner`, which reads the input of `progress`.
+    /// `progress` is of the input that `inner` reads.
     pub(super) fn new(inner: S, progress: Progress) -> Self {
         Self { inner, progress }
     }

@@ -1,21 +1,20 @@
-//! MAVLink messages of a recording, counted by their ids.
+//! MAVLink messages by id.
 
 use std::collections::BTreeMap;
 
 use super::item::{Amount, MessageCount};
 use crate::names::message_name;
 
-/// Ids below half of this are counted in a table: most ids are small, and a tree takes longer to search.
+/// In a table: most ids are small.
 const NEAR: usize = 1024;
-/// Further ids that are counted one by one: there are 16 million, and hostile recordings.
+/// Counted one by one: there are 16 million.
 const FAR_MAX: usize = 4_096;
 
-/// Frames by their id, and by whether their checksum matches the definition known here.
+/// And by whether the checksum matches our definition.
 #[derive(Debug)]
 pub(super) struct Counts {
     near: Vec<Amount>,
     far: BTreeMap<(u32, bool), Amount>,
-    /// Amount for all further ids.
     other: Amount,
 }
 
@@ -28,14 +27,13 @@ impl Counts {
         self.place((id, verified)).add(Amount { count: 1, bytes: bytes as u64 });
     }
 
-    /// Adds those of the next part.
     pub(super) fn and(&mut self, next: &Self) {
         self.near.iter_mut().zip(&next.near).for_each(|(count, more)| count.add(*more));
         next.far.iter().for_each(|(key, more)| self.place(*key).add(*more));
         self.other.add(next.other);
     }
 
-    /// Counts by id, and the total of those beyond the limit.
+    /// And the total beyond the limit.
     pub(super) fn messages(self) -> (Vec<MessageCount>, Amount) {
         let near = (0_u32..).zip(self.near).filter(|(_, amount)| amount.count > 0);
         let near = near.map(|(place, amount)| ((place >> 1, place & 1 != 0), amount));

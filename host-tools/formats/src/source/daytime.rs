@@ -1,4 +1,4 @@
-//! The time of day of frames without recorded times, from their autopilot's reports.
+//! The time of day, by the autopilot's reports.
 
 use hums_core::clock::Instant;
 use hums_core::observation::{Observation, SystemTime};
@@ -7,11 +7,11 @@ use hums_link::{Frame, observe};
 use super::item::AUTOPILOT;
 use crate::mavlink::ids::SYSTEM_TIME;
 
-/// Two of the autopilot's times that are closer than this are of one clock: messages are late by tenths of a second.
+/// Of one clock: messages are late by tenths of a second.
 const SAME_US: u64 = 1_000_000;
 
-/// Learns UTC at time zero from `SYSTEM_TIME`. A clock that is set while it runs, as by the first fix of a
-/// receiver, counts after two messages in a row.
+/// UTC at time zero, from `SYSTEM_TIME`. A clock set while running, as by a first fix, counts after two messages in a
+/// row.
 #[derive(Debug, Default)]
 pub(super) struct Daytime {
     told_us: Option<u64>,
@@ -19,7 +19,7 @@ pub(super) struct Daytime {
 }
 
 impl Daytime {
-    /// New UTC at time zero from this frame, microseconds since 1970.
+    /// New UTC at time zero, microseconds since 1970.
     pub(super) fn of(&mut self, at: Instant, frame: &Frame<'_>) -> Option<u64> {
         let told = observe(frame).filter(|_| frame.id() == SYSTEM_TIME && frame.component() == AUTOPILOT);
         let Some((_, Observation::SystemTime(SystemTime { utc_micros: Some(utc_us), .. }))) = told else {

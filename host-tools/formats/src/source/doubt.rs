@@ -1,78 +1,75 @@
 //! Finds the wrong times of a recording: one rule for all formats.
 //!
-//! One damaged bit may change a time to any value; the times after it show which one is wrong. A clock goes
-//! on; it may pause for any time; it seldom falls. So take the present times and the next few. The right ones
-//! make the longest row that goes on. A fall costs as much as [`RUN`] wrong times and a half. So eight wrong
-//! times in a row are outvoted, and a clock that began again is confirmed by the times after it. A row leaves
-//! out whole runs only. If an omitted time goes on right into a kept one, both are right (a clock that was
-//! set back by a second, for instance).
+//! One damaged bit may change a time to any value; later times show the wrong one. A clock goes on; it may
+//! pause for any time; it seldom falls. Of the present and the next few times, the right ones make the
+//! longest row that goes on. A fall costs as much as [`RUN`] wrong times and a half. So eight wrong ones in a
+//! row are outvoted, and a new clock is confirmed. A row leaves out whole runs only: if an omitted time goes
+//! right on into a kept one, both are right (a clock set back by a second).
 //!
-//! At a recording's end no times follow. There a message that came steadily until just now never comes alone
-//! after a pause. A rare one may (saved parameters, a change of mode). At its beginning a pause counts unless
-//! it is long.
+//! At a recording's end a steady message never comes alone after a pause; a rare one may (saved parameters, a
+//! change of mode). At its beginning a pause counts unless it is long.
 
 use super::timeline::{STEP_BACK_US_MAX, STEP_FORWARD_US_MAX};
 
-/// Number of times compared after a jump: a run of wrong ones and twice as many others.
+/// Compared after a jump: a run of wrong ones and twice as many others.
 pub const ASKED: usize = 24;
-/// This many wrong times in a row are outvoted.
+/// Outvoted wrong times in a row.
 pub const RUN: i32 = 8;
-/// Neighbouring times in a file are usually out of order by this at most.
+/// Usual disorder of neighbours.
 pub const DISORDER_US: u64 = 200_000;
-/// Times that are not further apart go on from each other.
+/// Between times that go on.
 const GOES_ON_US: u64 = 500_000;
-/// A time within this of the next right one is only out of order: slow topics come late.
+/// Out of order up to here: slow topics come late.
 const FAR_US: u64 = 800_000;
 
-/// Value of each time in a row.
+/// Of each time in a row.
 const TIME: i32 = 10;
-/// Cost of a fall.
+/// Of a fall.
 const FALL: i32 = RUN * TIME + TIME / 2;
-/// Cost of a time out of order: a little more than its value.
+/// Of disorder: a little more than a time's value.
 const LATE: i32 = TIME + 2;
-/// Cost of a pause: of two rows, the one with fewer pauses wins.
+/// Of two rows, the one with fewer pauses wins.
 const PAUSE: i32 = 1;
 
-/// A time, as far as it is asked.
+/// A compared time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Time {
-    /// As it was recorded, microseconds.
+    /// As recorded, microseconds.
     pub us: u64,
-    /// Messages like this one came again and again until just now.
+    /// Steady until just now.
     pub steady: bool,
 }
 
-/// Maximum pauses at the ends of a recording.
+/// Longest pauses at a recording's ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Ends {
-    /// Before the last few messages, if they came steadily until the pause.
+    /// Before the last steady messages.
     pub steady_us: u64,
-    /// After the first few messages, and before the last few that come seldom.
+    /// After the first, and before the last rare messages.
     pub seldom_us: u64,
 }
 
 /// Whether a time is wrong.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'a> {
-    /// The last right one before it; `None` for the first of all.
+    /// `None` for the first of all.
     pub before: Option<u64>,
     /// It, and up to [`ASKED`] after it.
     pub times: &'a [Time],
-    /// No times follow them.
+    /// None follow.
     pub is_end: bool,
-    /// How the recording's ends are judged.
+    /// Rules for the ends.
     pub ends: Ends,
-    /// Usual step between its times, microseconds, as far as known.
+    /// Microseconds, as far as known.
     pub usual_us: u64,
 }
 
 impl Question<'_> {
-    /// Whether the first of the times is wrong: the longest row goes on without it.
+    /// The longest row goes on without the first time.
     pub fn is_wrong(&self) -> bool {
         let Some(&asked) = self.times.first() else { return false };
-        // For each time, two rows that end there: the best with the first time in it, and the best without.
+        // Two rows for each time: the best with the first one, and without.
         let mut rows: Vec<(Option<i32>, Option<i32>)> = Vec::with_capacity(self.times.len());
-        // All until now go on from the first one.
         let mut climbs = true;
         for (index, time) in self.times.iter().enumerate() {
             let begins = TIME - self.before.map_or(0, |before| self.cost(before, time));
@@ -99,24 +96,20 @@ impl Question<'_> {
         with.is_some_and(|with| without > with)
     }
 
-    /// Whether a time goes on right from the one before it in the file.
     fn goes_on_into(&self, index: usize) -> bool {
         self.pair(index.wrapping_sub(1)).is_some_and(|[last, time]| {
             time.us.saturating_add(DISORDER_US) >= last.us && time.us <= last.us.saturating_add(GOES_ON_US)
         })
     }
 
-    /// Whether the time after one in the file is far from it.
     fn is_jump_after(&self, index: usize) -> bool {
         self.pair(index).is_some_and(|[last, time]| time.us.abs_diff(last.us) > STEP_BACK_US_MAX)
     }
 
-    /// A time and the one after it.
     fn pair(&self, index: usize) -> Option<[Time; 2]> {
         Some([*self.times.get(index)?, *self.times.get(index.checked_add(1)?)?])
     }
 
-    /// Cost of one time after another.
     fn cost(&self, last: u64, time: &Time) -> i32 {
         let step = time.us.saturating_sub(last);
         if time.us.saturating_add(STEP_BACK_US_MAX) < last || step > STEP_FORWARD_US_MAX {
@@ -137,7 +130,7 @@ impl Question<'_> {
         if step > longest.max(self.usual_us.saturating_mul(2)) { self.fall() } else { PAUSE }
     }
 
-    /// If few times follow although the recording goes on, most of them decide.
+    /// With few times most of them decide.
     fn fall(&self) -> i32 {
         let most = self.times.len() as i32 * TIME / 2;
         if self.is_end { FALL } else { FALL.min(most) }
@@ -151,7 +144,7 @@ mod tests {
     const SECOND: f64 = 1e6;
     const ENDS: Ends = Ends { steady_us: 1_000_000, seldom_us: 3_600_000_000 };
 
-    /// Whether the first of these times, in seconds, is wrong.
+    /// Seconds.
     fn is_wrong(before: Option<f64>, seconds: &[f64], steady: bool, is_end: bool) -> bool {
         let us = |seconds: f64| (seconds * SECOND).round() as u64;
         let times: Vec<Time> =
@@ -204,7 +197,6 @@ mod tests {
         for every in [0.01, 0.05, 0.1, 0.2] {
             assert!(!is_wrong(Some(100.0), &going_on(98.912, 25, every), true, false), "{every}");
         }
-        // A tlog of 2025 from a slow link.
         let slow = [
             -1.088, -0.592, -0.59, -0.112, -0.09, 0.178, 0.196, 0.37, 0.405, 0.411, 0.889, 0.911, 1.406,
             1.412,

@@ -1,28 +1,26 @@
-//! UTC of a recording with several power-ons: each has its own.
+//! UTC of a recording's power-ons.
 
 use hums_core::clock::Instant;
 
 use super::item::Item;
 
-/// Maximum number of parts.
 const PARTS_MAX: usize = 10_000;
 
-/// UTC at time zero by the clock of each part, microseconds since 1970; the parts begin with each restart of the clock.
+/// UTC at time zero of each part, microseconds since 1970; a restart begins a part.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Epochs {
-    /// UTC of the first part's time zero.
     first_us: Option<u64>,
-    /// When each later part began, and its UTC.
+    /// Start and UTC.
     later: Vec<(Instant, Option<u64>)>,
 }
 
 impl Epochs {
-    /// For a log with one clock, with this UTC at time zero.
+    /// One clock, with this UTC at time zero.
     pub fn of(epoch_us: Option<u64>) -> Self {
         Self { first_us: epoch_us, later: Vec::new() }
     }
 
-    /// Takes the next item.
+    /// The next item.
     pub fn take(&mut self, at: Instant, item: &Item<'_>) {
         match item {
             Item::Epoch(epoch_us) => self.epoch(*epoch_us),
@@ -31,13 +29,12 @@ impl Epochs {
         }
     }
 
-    /// Takes UTC of the present part.
     fn epoch(&mut self, epoch_us: u64) {
         let part = self.later.last_mut().map_or(&mut self.first_us, |(_, epoch_us)| epoch_us);
         *part = Some(epoch_us);
     }
 
-    /// The clock begins again. After the maximum number of restarts the time of day is unknown.
+    /// After too many restarts the time of day is unknown.
     fn restart(&mut self, at: Instant) {
         if self.later.len() < PARTS_MAX {
             self.later.push((at, None));
@@ -46,20 +43,20 @@ impl Epochs {
         }
     }
 
-    /// Number of parts with unknown UTC, and of all parts.
+    /// Parts with unknown UTC, and all.
     pub fn untold(&self) -> (usize, usize) {
         let parts = std::iter::once(self.first_us).chain(self.later.iter().map(|(_, epoch_us)| *epoch_us));
         (parts.filter(Option::is_none).count(), 1 + self.later.len())
     }
 
-    /// UTC at a time of the recording, microseconds since 1970, by the clock of the part that it is in.
+    /// Microseconds since 1970, by the clock of that part.
     pub fn utc_us(&self, at: Instant) -> Option<u64> {
         let part = self.later.iter().rev().find(|(from, _)| *from <= at);
         let epoch_us = part.map_or(self.first_us, |(_, epoch_us)| *epoch_us)?;
         Some(epoch_us.saturating_add(at.as_micros()))
     }
 
-    /// UTC at time zero, if the whole recording has one clock.
+    /// If the recording has one clock.
     pub fn whole(&self) -> Option<u64> {
         self.first_us.filter(|_| self.later.is_empty())
     }

@@ -19,45 +19,45 @@ use crate::outcome::usage;
 use crate::plural::count;
 use crate::printable;
 
-/// Directories deeper than this are not walked.
+/// Deeper directories are not walked.
 const DEPTH_MAX: usize = 16;
-/// Recordings of one folder, and folders of one folder, that are kept: each takes some hundred bytes.
+/// Of one folder: each takes some hundred bytes.
 const WALKED_MAX: usize = 10_000;
 
-/// Files that are passed over and named.
+/// Named files.
 const PASSED_OVER_MAX: usize = 20;
 
 /// Result of a search.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// Recordings, in the order in which they were named, those of a folder by name.
+    /// In named order, a folder's by name.
     pub places: Vec<Place>,
-    /// Facts from the file systems of cards and images.
+    /// Of cards and images.
     pub images: Vec<Image>,
-    /// Entries passed over, as sentences.
+    /// Sentences.
     pub remarks: Vec<String>,
-    /// More logs or recordings than the limit, or files named like one without one in them.
+    /// Beyond the limit, or files named like a recording without one.
     pub is_cut: bool,
-    /// Files of the inputs so far, by device and number.
+    /// By device and number.
     seen: BTreeSet<FileId>,
 }
 
 impl Found {
-    /// Whether a card's file system is damaged, or logs were left out: exit code 3.
+    /// Damage of a card, or left-out logs: exit code 3.
     pub fn is_lossy(&self) -> bool {
         self.is_cut || self.images.iter().any(|image| !image.damage.is_empty())
     }
 
-    /// Adds the sessions of our own in a path.
+    /// HUMS sessions of a path.
     fn add_own(&mut self, path: &Path, own: logs::Found) {
         self.is_cut |= own.is_cut();
         self.images.extend(own.images);
         self.remarks.extend(own.remarks);
-        // A raw device is named as a file is.
+        // A raw device is named like a file.
         let single = own.logs.len() == 1 && !path.is_dir();
         for log in own.logs {
             let name = match log.files.first() {
-                // A log of segments that were named one by one.
+                // Segments named one by one.
                 Some(file) if path.is_file() && segment_name(path).is_some() => file.clone(),
                 _ if single => path.display().to_string(),
                 _ => format!("{}:{}", path.display(), log.name),
@@ -66,9 +66,9 @@ impl Found {
         }
     }
 
-    /// Drops the places added since there were `before`, if they are in files of earlier inputs.
+    /// Those after `before` in files of earlier inputs.
     fn drop_repeats(&mut self, before: usize) {
-        // The sessions of one card's image are in one file; a second path of that file is a second name of it.
+        // A second path is a second name.
         let mut inside: BTreeMap<FileId, PathBuf> = BTreeMap::new();
         for place in self.places.split_off(before) {
             let pieces =
@@ -95,7 +95,7 @@ impl Found {
         self.seen.extend(inside.into_keys());
     }
 
-    /// Drops the tlogs that `hums decode` made of another recording in the list: a flight counts once.
+    /// Made by `hums decode` from another input: a flight counts once.
     fn drop_made(&mut self) {
         let made_of = |stem: &str, other: &Place| match other.own() {
             Some(log) => first_session(log).is_some_and(|session| stem.contains(&format!("-s{session:08x}"))),
@@ -118,7 +118,7 @@ impl Found {
         self.remarks.extend(remarks.into_iter().flatten().take(REMARKS_MAX));
     }
 
-    /// Reads only the vehicle with this system id.
+    /// Of one system id.
     pub fn of_system(mut self, system: Option<u8>) -> Result<Self> {
         if let Some(own) = self.places.iter().find(|place| system.is_some() && place.own().is_some()) {
             return Err(usage(format!(
@@ -136,7 +136,7 @@ impl Found {
         Ok(self)
     }
 
-    /// Which of the sessions has this name, or this number.
+    /// By name or number.
     pub fn session(&self, name: &str) -> Result<usize> {
         let number = |name: &str| name.parse::<u32>().ok();
         let is_it = |place: &Place| {
@@ -148,7 +148,7 @@ impl Found {
         })
     }
 
-    /// Prints the remarks on the search.
+    /// Prints the remarks.
     pub fn tell(&self) {
         for remark in &self.remarks {
             note!("{remark}");
@@ -158,13 +158,13 @@ impl Found {
         }
     }
 
-    /// The name here of the requested session; `None` without a request.
+    /// `None` without a request.
     pub fn name_of(&self, asked: Option<&str>) -> Result<Option<String>> {
         let index = asked.map(|name| self.session(name)).transpose()?;
         Ok(index.and_then(|index| self.places.get(index)).map(|place| place.name.clone()))
     }
 
-    /// Every file that any of it is in.
+    /// All files.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         let pieces = self.places.iter().filter_map(Place::own).flat_map(|log| &log.pieces);
         let files = self.places.iter().filter_map(Place::path);
@@ -172,8 +172,7 @@ impl Found {
     }
 }
 
-/// Finds all recordings in `inputs`: files, folders, cards, images, `-`. An input named by the user must be a
-/// recording; other files in a folder are passed over.
+/// Files, folders, cards, images, `-`. Named inputs must be recordings; others in a folder are passed over.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     let mut found = Found::default();
     let is_segment = |input: &&PathBuf| segment_name(input).is_some() && is_own(input).unwrap_or(false);
@@ -189,7 +188,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
         let before = found.places.len();
         check_seekable(input, &about)?;
-        // As the shell names it with all others.
+        // As the shell names it.
         if let Some(why) = why_unread(input).filter(|_| about.is_dir() && inputs.len() > 1) {
             found.remarks.push(format!("{}: {why}", input.display()));
             continue;
@@ -212,7 +211,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
             }
             found.remarks.extend(walk.passed_over_words(input));
         } else if is_own(input)? {
-            // Those that are named one by one are judged together, as in a folder.
+            // As in a folder.
             let together =
                 if segment_name(input).is_none() { vec![input.clone()] } else { mem::take(&mut segments) };
             if together.is_empty() {
@@ -233,8 +232,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
     Ok(found)
 }
 
-/// Other contents of a folder besides our logs, as sentences, for a command that reads only our logs. Also
-/// returns whether a file is named like a recording and holds none.
+/// Other contents of a folder, as sentences. Also whether a file is named like a recording and holds none.
 pub fn besides(folder: &Path, own: &logs::Found) -> Result<(Vec<String>, bool)> {
     let walk = Walk::of(folder, own)?;
     let recordings = walk.paths.len();
@@ -252,39 +250,36 @@ pub fn besides(folder: &Path, own: &logs::Found) -> Result<(Vec<String>, bool)> 
     Ok((words, walk.unknown > 0))
 }
 
-/// Which session each number of the cards holds.
+/// By number of each card.
 pub fn sessions_of(places: &[Place]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }
 
-/// Whether a file is a HUMS log or a card's image.
 fn is_own(path: &Path) -> Result<bool> {
     const START_BYTES: usize = 512;
-    // Nearly every recording of an autopilot: its first bytes show it, without a search for a sector or a
-    // card.
+    // Shown by its first bytes, without a search.
     if start_of_bytes(path, START_BYTES).is_some_and(|start| begins_recording(&start)) {
         return Ok(false);
     }
     Ok(match logs::find::look(path)? {
         Content::Log | Content::Unread(_) => true,
-        // A large file may be a card without a partition table, unless its format is known.
+        // Perhaps a card without a partition table.
         Content::Image => !is_recording(path),
         Content::Mavlink | Content::Empty | Content::Other => false,
     })
 }
 
-/// Its first bytes as stored; `None` if unreadable.
+/// As stored; `None` if unreadable.
 fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     let mut start = Vec::new();
     fs::File::open(content).and_then(|file| file.take(bytes as u64).read_to_end(&mut start)).ok()?;
     Some(start)
 }
 
-/// The error for inputs without a HUMS log, for a command that reads only those. It names an input that is another
-/// kind of recording.
+/// Names an input that is another kind of recording.
 pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
     let is_ours = |input: &Path| input.is_dir() || is_own(input).unwrap_or(false);
-    // The search failed on the first of them.
+    // The search failed on the first one.
     let first = inputs.iter().find(|input| !is_ours(input));
     match first.and_then(|input| Some((input, format_of(&start_of(input))?))) {
         Some((input, format)) if !format.is_of_link() => anyhow!(
@@ -300,8 +295,7 @@ pub fn not_ours(inputs: &[PathBuf], error: anyhow::Error) -> anyhow::Error {
     }
 }
 
-/// The error for a large file that may be a card without its first blocks. The user may have named a wrong file, so
-/// the error mentions both.
+/// A large file, perhaps a card without its first blocks, perhaps a wrong name: the error mentions both.
 fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
     if matches!(logs::find::look(path), Ok(Content::Image)) && !logs::is_card(path).unwrap_or(true) {
         return error.context(format!("{}: is no log of HUMS, and not {KNOWN}; as a card", path.display()));
@@ -309,29 +303,26 @@ fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
     error
 }
 
-/// The files of a folder, and of those in it, that are recordings other than our own logs. Links are followed to each folder
-/// once; pipes, sockets and devices are not opened.
+/// A folder's recordings other than HUMS logs. Links lead to each folder once; pipes, sockets and devices are not opened.
 #[derive(Default)]
 struct Walk {
     paths: Vec<PathBuf>,
     walked: logs::Walked,
-    /// Recordings and folders for which there was no room.
+    /// No room.
     left_out: u64,
-    /// Files of our own logs and of cards.
+    /// HUMS logs and cards.
     ours: BTreeSet<PathBuf>,
-    /// Files that are neither these nor a recording.
     others: u64,
-    /// The first of them, by their names in the folder.
+    /// By name.
     passed_over: Vec<String>,
-    /// The first archives and the like, as sentences with advice.
+    /// Archives and the like, with advice.
     hinted: Vec<String>,
-    /// Files named like a recording without one in them, and the first of them as sentences.
+    /// Named like a recording, and none; the first as sentences.
     unknown: u64,
     remarks: Vec<String>,
 }
 
 impl Walk {
-    /// The contents of a folder besides our own logs.
     fn of(folder: &Path, own: &logs::Found) -> Result<Self> {
         let mut walk = Self { ours: own.paths().map(Path::to_owned).collect(), ..Self::default() };
         walk.folder(folder, 0)?;
@@ -362,7 +353,7 @@ impl Walk {
         })
     }
 
-    /// Other files are dropped at once: there may be millions of them.
+    /// Dropped at once: there may be millions of others.
     fn folder(&mut self, dir: &Path, depth: usize) -> Result<()> {
         if !self.walked.is_new(dir) {
             return Ok(());
@@ -372,7 +363,7 @@ impl Walk {
         for entry in fs::read_dir(dir).with_context(context)? {
             let entry = entry.with_context(context)?;
             let (path, kind) = (entry.path(), logs::kind_of(&entry).with_context(context)?);
-            // Incomplete or replaced files of this program are reported with our own logs.
+            // Reported with HUMS logs.
             if why_unread(&path).is_some() || self.ours.contains(&path) {
                 continue;
             }
@@ -391,7 +382,7 @@ impl Walk {
                     }
                     self.passed_over.push(words);
                 }
-                // An unreadable file is reported as such.
+                // Unreadable files are reported.
                 let is_read = || fs::File::open(&path).is_ok();
                 if kind.is_file() && hint(&start).is_none() && is_named_as_recording(&path) && is_read() {
                     self.unknown += 1;
@@ -411,7 +402,7 @@ impl Walk {
         inside.sort();
         for (path, is_folder) in inside {
             if is_folder {
-                // An unreadable folder is reported with our own logs.
+                // Reported with HUMS logs.
                 let _ = self.folder(&path, depth + 1);
             } else {
                 self.paths.push(path);
@@ -421,7 +412,7 @@ impl Walk {
     }
 }
 
-/// Whether its name ends like only a recording's does, `.gz` or not. The ending `.log` is too common.
+/// Only a recording's ending, `.gz` or not; `.log` is too common.
 fn is_named_as_recording(path: &Path) -> bool {
     let name =
         path.file_name().map_or_else(Default::default, |name| name.to_string_lossy().to_ascii_lowercase());

@@ -1,4 +1,4 @@
-//! The format of a recording, by its first bytes.
+//! A recording's format, by its first bytes.
 
 use std::path::Path;
 
@@ -10,35 +10,33 @@ use super::sniff::{Kind, sniff_bytes};
 use super::{dataflash, ulog};
 use crate::archive;
 
-/// Number of bytes read to find the format.
+/// Read to find the format.
 pub(super) const LOOK_BYTES: usize = 64 * 1024;
-/// In this many bytes of noise a frame is found by chance once in a hundred times. More than one frame for
-/// each of these is MAVLink.
+/// Noise has a frame by chance once in a hundred times of this size: more are MAVLink.
 const BY_CHANCE_BYTES: usize = LOOK_BYTES / 2;
-/// The known formats besides our own logs, for messages: the end of a sentence.
+/// For messages, besides HUMS logs.
 pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
                      each also as .gz";
 
-/// Size of a sector of the board's flash; two sectors are its store (`--store`).
+/// A sector of the board's flash; the store (`--store`) has two.
 pub const STORE_SECTOR_BYTES: usize = 16 * 1024;
 
 /// The format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Format {
-    /// A log of HUMS, from a file, a card or a card's image.
+    /// From a file, a card or an image.
     Hums,
-    /// A ground station's log.
     Tlog,
-    /// The bytes of a port.
+    /// A port's bytes.
     Raw,
-    /// ArduPilot's onboard log, binary or as text.
+    /// ArduPilot's, binary or text.
     DataFlash,
-    /// PX4's onboard log.
+    /// PX4's.
     Ulog,
 }
 
 impl Format {
-    /// The name that JSON and tables use.
+    /// For JSON and tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hums => "hums",
@@ -49,7 +47,7 @@ impl Format {
         }
     }
 
-    /// The name for people.
+    /// For people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Hums => "log of HUMS",
@@ -60,7 +58,7 @@ impl Format {
         }
     }
 
-    /// The name for people, in a sentence: `a PX4 log (ULog)`.
+    /// In a sentence: `a PX4 log (ULog)`.
     pub fn with_article(self) -> String {
         match self {
             Self::Raw => self.words().to_owned(),
@@ -69,23 +67,18 @@ impl Format {
         }
     }
 
-    /// Whether it was received over a link, by a ground station or a recorder on a port; otherwise the
-    /// autopilot wrote it itself.
+    /// Received over a link, not written by the autopilot.
     pub const fn is_of_link(self) -> bool {
         matches!(self, Self::Hums | Self::Tlog | Self::Raw)
     }
 }
 
-/// The kind found from some first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Detected {
-    /// A ground station's log.
     Tlog,
-    /// The bytes of a port.
     Raw,
     /// ArduPilot's onboard log.
     DataFlash(dataflash::Form),
-    /// PX4's onboard log.
     Ulog,
 }
 
@@ -100,15 +93,15 @@ impl Detected {
     }
 }
 
-/// Whether a file that begins so (some hundred bytes) is an autopilot's own log, whatever follows.
+/// An autopilot's log, by some hundred bytes.
 pub(super) fn begins_recording(start: &[u8]) -> bool {
     ulog::detect(start) || dataflash::begins(start).is_some()
 }
 
-/// The kind of a file with these first bytes; `None` if unknown.
+/// `None` if unknown.
 pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     if hint(start).is_some() {
-        // An uncompressed log in an archive would be read from its middle.
+        // An archive's uncompressed log would be read from its middle.
         return None;
     }
     if ulog::detect(start) {
@@ -117,8 +110,7 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     if let Some(form) = dataflash::begins(start) {
         return Some(Detected::DataFlash(form));
     }
-    // Before DataFlash's weaker signs. A valid frame of version 1 in 64 KiB of other data is rare, but
-    // happens.
+    // DataFlash's signs are weaker, and 64 KiB of other data rarely hold a valid frame of version 1.
     let (kind, frames) = sniff_bytes(start);
     let is_mavlink = frames > start.len() / BY_CHANCE_BYTES;
     if dataflash::is_headless(start, frames) {
@@ -131,7 +123,7 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
     }
 }
 
-/// Description of a known file that is not read, by its first bytes after unpacking, with advice.
+/// Known but not read, with advice.
 pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
     const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
     const STORE: &str = "is the memory of a simulated board (--store), and no recording; it may stay there";
@@ -143,18 +135,17 @@ pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
         .or_else(|| is_store::<STORE_SECTOR_BYTES>(start).then_some(STORE))
 }
 
-/// The format of a file with these first bytes (64 KiB, or the whole file), if it is a recording other than
-/// our own logs.
+/// By 64 KiB or the whole file; not HUMS logs.
 pub fn format_of(start: &[u8]) -> Option<Format> {
     detect(start).map(Detected::format)
 }
 
-/// Whether a file is a recording other than our own logs.
+/// Not a HUMS log.
 pub(super) fn is_recording(path: &Path) -> bool {
     detect(&start_of(path)).is_some()
 }
 
-/// The first bytes of a file; empty if unreadable.
+/// Empty if unreadable.
 pub(super) fn start_of(path: &Path) -> Vec<u8> {
     Input::open(path).ok().and_then(|mut input| input.peek(LOOK_BYTES).ok()).unwrap_or_default()
 }
@@ -172,7 +163,7 @@ mod tests {
             assert_eq!(format_of(&start), Some(Format::DataFlash));
         }
         assert_eq!(format_of(&HEARTBEAT.repeat(3)), Some(Format::Raw));
-        // A single frame in noise does not count.
+        // One frame in noise does not count.
         for (frames, expected) in [(1, None), (2, None), (3, Some(Format::Raw))] {
             let noise = vec![0x55; LOOK_BYTES - frames * HEARTBEAT.len()];
             assert_eq!(format_of(&[noise, HEARTBEAT.repeat(frames)].concat()), expected);

@@ -1,8 +1,6 @@
-//! The bytes of a recording: a file or standard input, plain or compressed by gzip, with the progress of
-//! reading.
+//! A recording's bytes, plain or gzip, with progress.
 //!
-//! Compression is found by content, never by name. Compressed bytes that are damaged or end too soon end the
-//! input; [`Progress::damage`] then names place and reason.
+//! Compression is found by content. Damaged compressed bytes end the input; [`Progress::damage`] has place and reason.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
@@ -19,46 +17,46 @@ use crate::archive::GZIP;
 
 const BUFFER_BYTES: usize = 64 * 1024;
 
-/// Progress of reading an input; clones share it.
+/// Shared by clones.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Bytes taken from the file, before unpacking.
+    /// Before unpacking.
     taken: AtomicU64,
-    /// Size of the file; 0 if unknown.
+    /// 0 if unknown.
     total: AtomicU64,
     damage: Mutex<Option<String>>,
 }
 
 impl Progress {
-    /// Bytes of the file that were read.
+    /// Bytes read, before unpacking.
     pub fn taken(&self) -> u64 {
         self.0.taken.load(Ordering::Relaxed)
     }
 
-    /// Size of the file, if known.
+    /// Bytes, if known.
     pub fn total(&self) -> Option<u64> {
         Some(self.0.total.load(Ordering::Relaxed)).filter(|total| *total > 0)
     }
 
-    /// The part read so far, 0 to 1; 0 if the size is unknown.
+    /// 0 to 1; 0 if the size is unknown.
     pub fn part(&self) -> f64 {
         self.total().map_or(0.0, |total| (self.taken() as f64 / total as f64).min(1.0))
     }
 
-    /// Damage of the compressed bytes, if any.
+    /// Of compressed bytes.
     pub fn damage(&self) -> Option<String> {
         self.0.damage.lock().ok()?.clone()
     }
 
-    /// Sets how much there is.
+    /// Total bytes.
     pub fn set_total(&self, bytes: u64) {
         self.0.total.store(bytes, Ordering::Relaxed);
     }
 
-    /// Sets how far it has been read.
+    /// Bytes read.
     pub fn set_taken(&self, bytes: u64) {
         self.0.taken.store(bytes, Ordering::Relaxed);
     }
@@ -70,7 +68,7 @@ impl Progress {
     }
 }
 
-/// An open input. It keeps only the present chunk.
+/// Keeps only the present chunk.
 pub struct Input {
     inner: Box<dyn Read + Send>,
     progress: Progress,
@@ -88,7 +86,7 @@ impl Input {
         Ok(input)
     }
 
-    /// The bytes of `inner`: standard input, memory.
+    /// From standard input or memory.
     pub fn new(inner: impl Read + Send + 'static) -> io::Result<Self> {
         let progress = Progress::default();
         let mut counted = Counted { inner, progress: progress.clone() };
@@ -103,7 +101,7 @@ impl Input {
         Ok(Self { inner, progress, compressed })
     }
 
-    /// Size of the content of the file at `path`, unpacked if compressed, as far as it is readable.
+    /// Unpacked bytes, as far as readable.
     pub fn bytes_of(path: &Path) -> u64 {
         match Self::open(path) {
             Ok(mut input) if input.compressed => io::copy(&mut input, &mut io::sink()).unwrap_or(u64::MAX),
@@ -117,7 +115,7 @@ impl Input {
         self.progress.clone()
     }
 
-    /// Looks at the first `bytes` bytes, or fewer at the end, and puts them back.
+    /// Fewer at the end; puts them back.
     pub fn peek(&mut self, bytes: usize) -> io::Result<Vec<u8>> {
         let start = read_start(self, bytes)?;
         let rest = std::mem::replace(&mut self.inner, Box::new(io::empty()));
@@ -145,13 +143,13 @@ impl Read for Input {
     }
 }
 
-/// Whether an error is by the decoder about its bytes, not by the file system about the file.
+/// The decoder's, not the file system's.
 fn is_damage(error: &io::Error) -> bool {
     use io::ErrorKind::{InvalidData, InvalidInput, UnexpectedEof};
     matches!(error.kind(), InvalidData | InvalidInput | UnexpectedEof)
 }
 
-/// The first bytes, fewer at the end.
+/// Fewer at the end.
 fn read_start(input: &mut impl Read, bytes: usize) -> io::Result<Vec<u8>> {
     let (mut start, mut filled) = (vec![0; bytes], 0);
     while filled < bytes {
@@ -164,8 +162,7 @@ fn read_start(input: &mut impl Read, bytes: usize) -> io::Result<Vec<u8>> {
     Ok(start)
 }
 
-/// The members of a gzip file, one after the other. Zeros behind one are padding, as of a tape or a block device: `gzip` passes over
-/// them too.
+/// Members of a gzip file. Zeros behind one are a tape's or a device's padding, as for `gzip`.
 struct Members<R>(Option<GzDecoder<R>>);
 
 impl<R: BufRead> Read for Members<R> {
@@ -193,7 +190,6 @@ impl<R: BufRead> Read for Members<R> {
     }
 }
 
-/// Counts the bytes taken.
 struct Counted<R> {
     inner: R,
     progress: Progress,

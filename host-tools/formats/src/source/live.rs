@@ -1,10 +1,10 @@
-//! Live bytes: UDP, TCP, serial. Their arrival times are from the clock, counted from the first byte.
+//! Live bytes: UDP, TCP, serial, at their arrival since the first byte.
 //!
-//! A live source ends when its peer closes it or on Ctrl-C (see [`crate::interrupt`]). Silence is handed on
-//! as chunks without bytes, so that the pipeline's clock goes on.
+//! A source ends with its peer or Ctrl-C ([`crate::interrupt`]). Silence is an empty chunk: the pipeline's
+//! clock goes on.
 //!
-//! A network delivers larger bursts than any UART. So bytes count as arriving at 921,600 baud at most, the
-//! fastest rate of the monitor's port.
+//! A network's bursts exceed any UART: bytes count as arriving at 921,600 baud at most, as at the monitor's
+//! port.
 
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
@@ -16,11 +16,11 @@ use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
-/// Silence before an empty chunk is handed on.
+/// Before an empty chunk.
 const SILENCE: Duration = Duration::from_millis(50);
-/// The largest UDP datagram.
+/// A UDP datagram.
 const BUFFER_BYTES: usize = 65_536;
-/// The fastest rate of the monitor's port, in bytes a second: 921,600 baud, ten bits a byte.
+/// 921,600 baud, ten bits a byte.
 const BYTES_PER_SECOND_MAX: u64 = 92_160;
 struct Live {
     port: Box<dyn Port>,
@@ -29,7 +29,7 @@ struct Live {
     buffer: Vec<u8>,
 }
 
-/// Opens a live SRC, with its writer.
+/// With its writer.
 pub(super) fn open(endpoint: &Endpoint) -> Result<(Box<dyn Source>, Box<dyn Write + Send>)> {
     let duplex = duplex::open(endpoint, SILENCE)?;
     interrupt::watch();
@@ -49,7 +49,6 @@ impl Source for Live {
                 Err(error) if duplex::is_silence(&error) => 0,
                 Err(error) => return Err(error),
             };
-            // Time starts with the first byte.
             if got == 0 && self.first.is_none() {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! MAVLink recordings, a ground station's tlog and the raw bytes of a port, as the one stream.
+//! MAVLink recordings: tlog, and a port's raw bytes.
 
 use std::collections::VecDeque;
 
@@ -23,7 +23,7 @@ use super::tlog::times::{Begins, Times};
 use crate::plural::count;
 use crate::utc::moment;
 
-/// The counts; a message with a definition here counts as verified.
+/// A message with a definition here counts as verified.
 fn summary(counts: Counts) -> Summary {
     let (mut messages, other_messages) = counts.messages();
     for message in &mut messages {
@@ -115,7 +115,7 @@ impl Reader for TlogReader {
     }
 }
 
-/// Bytes of a tlog outside of records, as one place.
+/// Outside of records, as one place.
 struct Noise {
     at: Instant,
     place: u64,
@@ -135,13 +135,13 @@ impl Noise {
     }
 }
 
-/// The raw bytes of a port, in the autopilot's time, or in the time that a line at this rate takes for them.
+/// A port's raw bytes, in the autopilot's time or a line's.
 pub struct RawReader {
     bytes: Paced<Raw<Input>>,
 }
 
 impl RawReader {
-    /// Reads from `input`, at `baud`.
+    /// At `baud`.
     pub fn new(input: Input, baud: u32) -> Self {
         Self { bytes: Paced::new(Raw::new(input), baud) }
     }
@@ -214,28 +214,28 @@ impl Reader for RawReader {
     }
 }
 
-/// Bytes outside of frames: text of an autopilot that boots, and noise.
+/// Outside of frames: a booting autopilot's text, and noise.
 #[derive(Default)]
 struct Strays {
-    /// The latest bytes; until a frame has come, the first ones.
+    /// Before a frame, the first ones.
     latest: VecDeque<u8>,
-    /// When the first frame came.
+    /// First frame.
     begun: Option<Instant>,
-    /// Bytes outside of frames so far, and the harmless text among them.
+    /// Outside of frames, and harmless text among them.
     bytes: u64,
     words: u64,
-    /// Time and place of the first noise, and time of the last.
+    /// First time and place, last time.
     noise: Option<(Instant, u64, Instant)>,
 }
 
-/// A longer run of bytes is not text of a boot. A boot is over this long after its first frame.
+/// Longer runs are not text of a boot, and it is over this long after its first frame.
 const WORDS_BYTES_MAX: usize = 16 * 1024;
 const BOOTS: Span = Span::from_secs(2);
-/// Number of bytes that a framer may hold before it reports them as outside of frames.
+/// A framer may hold them before its report.
 const HELD_BYTES: usize = 512;
 
 impl Strays {
-    /// These bytes have come, with this total of bytes outside of frames.
+    /// With this total outside of frames.
     fn take(&mut self, at: Instant, place: u64, bytes: &[u8], counts: FramerCounts) {
         self.latest.extend(bytes);
         let kept = if self.begun.is_none() { WORDS_BYTES_MAX } else { HELD_BYTES };
@@ -256,7 +256,7 @@ impl Strays {
         }
     }
 
-    /// Reports them, without those that are reported elsewhere.
+    /// Without those reported elsewhere.
     fn tell(self, now: Instant, others: u64, take: &mut Take<'_>) -> Result<()> {
         if self.words > 0 {
             let words = format!(
@@ -267,7 +267,7 @@ impl Strays {
         }
         let noise = self.bytes.saturating_sub(self.words + others);
         if noise > 0 {
-            // Noise on the line and damage of the file look alike here.
+            // A line's noise and a file's damage look alike.
             let (first, place, last) = self.noise.unwrap_or((now, 0, now));
             let until = if last > first { format!(", the last at {}", moment(last)) } else { String::new() };
             let words = format!("of no frame, noise on the line: {}{until}", count(noise, "byte"));
@@ -278,7 +278,7 @@ impl Strays {
     }
 }
 
-/// Whether this many bytes in a row are text.
+/// This many in a row.
 fn has_words(bytes: &VecDeque<u8>, wanted: u64) -> bool {
     let mut run = 0;
     bytes.iter().any(|byte| {
@@ -291,7 +291,7 @@ fn gap(at: Instant, cause: Cause, place: u64, bytes: usize, words: String) -> Ga
     Gap { from: Some(at), to: None, cause, place: Some(place), bytes: bytes as u64, words, own: None }
 }
 
-/// Pushes bytes into a framer with a fallible receiver of frames. `idle` means that silence follows.
+/// With a fallible receiver of frames; `idle`: silence follows.
 fn push(
     framer: &mut Framer,
     bytes: &[u8],

@@ -1,5 +1,5 @@
-//! Inputs: recordings of every format as one stream of items ([`item`], [`recording`]). For `hums sim` and its like
-//! they are the bytes of the autopilot's UART: chunks with their times of arrival.
+//! Inputs: recordings of every format as one stream of items ([`item`], [`recording`]). For `hums sim` and its like they are
+//! the UART's bytes: chunks with their times of arrival.
 //!
 //! | format | read by |
 //! |---|---|
@@ -8,8 +8,8 @@
 //! | ArduPilot's `DataFlash` | `dataflash` |
 //! | PX4's `ULog` | `ulog` |
 //!
-//! A further format is one more [`item::Reader`], and a line of [`recording::Recording::new`]. A command takes the items in order
-//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) to share the work among the cores.
+//! A further format is a [`item::Reader`], and a line of [`recording::Recording::new`]. Items come in order
+//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) for all cores.
 //!
 //! # Bytes
 //!
@@ -19,8 +19,7 @@
 //! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has the autopilot's |
 //! | UDP, TCP, serial | the clock's |
 //!
-//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall; [`tlog::times`] handles clocks that jumped.
-//! Everything streams: memory does not grow with the input.
+//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall ([`tlog::times`]).
 
 pub mod blocks;
 mod boot;
@@ -81,11 +80,11 @@ pub type Way = Box<dyn Write + Send>;
 /// Which times count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// Ignore recorded times: feed back to back at this rate, in baud.
+    /// Back to back at this rate, baud, whatever the recorded times.
     pub line_rate: Option<u32>,
 }
 
-/// Opens SRC, and the way back to it, if any.
+/// With the way back, if any.
 pub fn open_both(endpoint: &Endpoint, timing: Timing) -> Result<(Box<dyn Source>, Option<Way>)> {
     if endpoint.is_live() && timing.line_rate.is_none() {
         let (source, writer) = live::open(endpoint)?;
@@ -109,7 +108,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
             if about.is_dir() {
                 bail!("{}: is a directory; give a recording (tlog or raw MAVLink bytes)", path.display());
             }
-            // Checked before opening: opening a pipe would wait for its other end, without a message.
+            // Opening a pipe would wait for its other end, without a message.
             if !is_seekable(&about) {
                 bail!(
                     "{0}: is a pipe, a socket, a terminal or the like; copy it into a file, or name `-` and give it as \
@@ -150,12 +149,12 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
     Ok(Box::new(compressed::Compressed::new(source, progress)))
 }
 
-/// The error of a command that writes the frames of an input, for an input without any.
+/// For a command that writes frames.
 pub fn no_frame(input: &Endpoint) -> Error {
     anyhow!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
 }
 
-/// A recording by HUMS itself is full of frames, but not as received.
+/// Its frames are not as received.
 fn refuse_our_own(path: &Path) -> Result<()> {
     let name = path.display();
     let what = match logs::find::look(path)? {

@@ -7,7 +7,6 @@ use anyhow::{Result, bail};
 use super::Source;
 use crate::endpoint::Endpoint;
 
-/// Refuses a live SRC.
 pub(super) fn open(endpoint: &Endpoint) -> Result<(Box<dyn Source>, Box<dyn Write + Send>)> {
     bail!("{endpoint}: a browser opens no links; use the program hums")
 }

@@ -1,4 +1,4 @@
-//! A noisy line: each byte is damaged with a given probability, repeatably.
+//! A noisy line: repeatable damage by a probability.
 
 use std::io;
 
@@ -7,7 +7,7 @@ use crate::rng::Rng;
 
 const PURPOSE: u64 = 1;
 
-/// The bytes of another source, some of them damaged.
+/// Another source with damaged bytes.
 pub struct Noisy<S> {
     inner: S,
     probability: f64,
@@ -15,7 +15,7 @@ pub struct Noisy<S> {
 }
 
 impl<S: Source> Noisy<S> {
-    /// Damages each byte of `inner` with `probability`.
+    /// Damages bytes of `inner` with `probability`.
     pub fn new(inner: S, probability: f64, seed: u64) -> Self {
         Self { inner, probability, rng: Rng::new(seed, PURPOSE) }
     }
@@ -26,7 +26,7 @@ impl<S: Source> Source for Noisy<S> {
         let Some(mut chunk) = self.inner.next()? else { return Ok(None) };
         for byte in &mut chunk.bytes {
             if self.rng.chance(self.probability) {
-                // A damaged byte differs: exclusive or with 1 to 255.
+                // Exclusive or with 1 to 255: it differs.
                 *byte ^= (self.rng.next_u64() % 255 + 1) as u8;
             }
         }

@@ -1,4 +1,4 @@
-//! Logs of HUMS as the one stream. Groups are decoded in parallel ([`crate::logs::reader`]) and handed on in
+//! HUMS logs as the one stream. Groups are decoded in parallel ([`crate::logs::reader`]) and handed on in
 //! order.
 
 use anyhow::Result;
@@ -21,10 +21,10 @@ use crate::loss;
 use crate::mavlink::ids::{HEARTBEAT, PARAM_VALUE, STATUSTEXT};
 use crate::plural::{are, count};
 
-/// The note in a packed log behind which another recording goes on: the input was joined of several.
+/// A packed log's note: another recording goes on, because the input was joined.
 pub const JOINED: &str = "another recording begins here: the input was joined of several";
 
-/// A session of a HUMS log.
+/// A HUMS log's session.
 pub struct OwnReader {
     log: Log,
     progress: Progress,
@@ -43,7 +43,7 @@ impl OwnReader {
         self.progress.clone()
     }
 
-    /// Reads it in parts, which are its groups. `seen` gets the bytes that were read.
+    /// Parts are groups; `seen` gets the bytes read.
     pub fn in_parts<C: Collect>(
         &self,
         want: Want<'_>,
@@ -63,8 +63,7 @@ impl OwnReader {
         Ok(Summary { messages, other_messages, not_frames, span, gaps, losses, ending: Some(ending) })
     }
 
-    /// Reads it in parts, and also hands on observations and further items in order, as [`Reader::read`]
-    /// does: one reading for both.
+    /// Also hands on all items in order, as [`Reader::read`]: one reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
         want: Want<'_>,
@@ -101,7 +100,6 @@ impl Reader for OwnReader {
     }
 }
 
-/// A group's entries as items.
 struct Part<C> {
     frames: bool,
     observations: bool,
@@ -132,7 +130,7 @@ impl<C: Collect> reader::Collect for Part<C> {
     }
 
     fn held_bytes(&self) -> usize {
-        // The counts have a limit of their own.
+        // Counts have a limit of their own.
         self.collected.held_bytes()
     }
 
@@ -145,7 +143,6 @@ impl<C: Collect> reader::Collect for Part<C> {
     }
 }
 
-/// State common to all parts.
 struct Parts<'a, D> {
     deliver: &'a mut D,
     counts: Counts,
@@ -164,7 +161,7 @@ impl<C, D: Deliver<C>> reader::Deliver<Part<C>> for Parts<'_, D> {
     }
 }
 
-/// The items of a part until it is their turn.
+/// A part's items until their turn.
 #[derive(Default)]
 struct Kept {
     frames: bool,
@@ -174,10 +171,10 @@ struct Kept {
 }
 
 enum Stored {
-    /// A frame, which ends here in `bytes`; it is read later.
+    /// Ends here in `bytes`; read later.
     Frame(Check, usize),
     Observation(Source, Box<Observation>),
-    /// A record, which ends here in `bytes`.
+    /// Ends here in `bytes`.
     Record(usize),
 }
 
@@ -204,15 +201,14 @@ impl Collect for Kept {
     }
 
     fn held_bytes(&self) -> usize {
-        // Observations are on the heap, each with the allocator's overhead.
+        // Observations are on the heap, with the allocator's overhead.
         const ITEM_BYTES: usize = size_of::<(Instant, Stored)>() + size_of::<Observation>() + 16;
         self.bytes.len() + self.items.len() * ITEM_BYTES
     }
 }
 
-/// The result of a part, and its items until their turn.
 struct Both<C> {
-    /// The result needs frames.
+    /// For the result.
     frames: bool,
     collected: C,
     kept: Kept,
@@ -231,7 +227,6 @@ impl<C: Collect> Collect for Both<C> {
     }
 }
 
-/// Hands on the results of parts, and their items.
 struct HandBoth<'a, 'b, 'c, D> {
     deliver: &'c mut D,
     hand: Hand<'a, 'b>,
@@ -249,12 +244,11 @@ impl<C, D: Deliver<C>> Deliver<Both<C>> for HandBoth<'_, '_, '_, D> {
     }
 }
 
-/// Hands parts on, item by item.
 struct Hand<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
     said: Said,
-    /// Losses of the recorder, until recording goes on: it has a record for each second.
+    /// Until recording goes on: there is a record for each second.
     lost: Option<(Instant, Loss)>,
 }
 
@@ -288,7 +282,7 @@ impl Deliver<Kept> for Hand<'_, '_> {
 }
 
 impl Hand<'_, '_> {
-    /// Takes a record, also about the recording that was packed.
+    /// Also about the packed recording.
     fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
         (self.take)(at, Item::Record(record))?;
         if let Some((last, _)) = &mut self.lost {
@@ -318,7 +312,6 @@ impl Hand<'_, '_> {
         }
     }
 
-    /// Hands on the recorder's losses so far.
     fn tell_lost(&mut self) -> Result<()> {
         let Some((at, lost)) = self.lost.take() else { return Ok(()) };
         match not_recorded(&lost) {
@@ -334,23 +327,22 @@ impl Hand<'_, '_> {
     }
 }
 
-/// Damage of the recording that was packed, as a loss: the log itself is whole.
+/// As a loss: the log itself is whole.
 fn of_packed(loss: &Loss) -> Gap {
     let (words, to) = match loss.what {
-        // Counted over the whole recording.
+        // Over the whole recording.
         Lost::WrongChecksums => (wrong_checksums(loss.count), Some(loss.to)),
         _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
     };
     Gap { to, ..Gap::new(Some(loss.from), Cause::Lost, words) }
 }
 
-/// The recorder's count of lost data.
+/// The recorder's count.
 fn not_recorded(loss: &Loss) -> Option<Gap> {
     let gap = Gap::new(Some(loss.from), Cause::Lost, loss::words(loss)?);
     Some(Gap { to: Some(loss.to), ..gap })
 }
 
-/// A gap in the stream's words.
 fn gap(own: &OwnGap) -> Gap {
     let is_kept = own.cause != OwnCause::Disarmed;
     let cause = if is_kept { Cause::Damaged } else { Cause::NotKept };

@@ -1,7 +1,7 @@
-//! Checks whether a recording's clock runs, all along and by one rule for all formats.
+//! Checks whether a recording's clock runs.
 //!
-//! A bad clock stops, is zero from some place on, or has milliseconds as microseconds. Then a recording of
-//! hours seems to be a moment: checks have no time to find anything, and all seems well. Four signs show it:
+//! A bad clock stops, is zero from some place on, or has milliseconds as microseconds. Then hours seem to be
+//! a moment, in which checks find nothing. Four signs:
 //!
 //! | measure | reason |
 //! |---|---|
@@ -17,24 +17,23 @@ use hums_core::clock::{Instant, Span};
 use super::clock::Wrong;
 use super::item::{Cause, Gap};
 
-/// A data rate above any logger's, bytes a second: the fastest logs, of all inertial samples on an
-/// autopilot's card, have a quarter of it.
+/// Bytes a second: the fastest logs, of all inertial samples, have a quarter of it.
 const BYTES_PER_S: u64 = 4 * 1024 * 1024;
-/// Size of a burst: the data that a logger writes when it begins (parameters, a mission), or had to hold
-/// back. The most in 80 public logs of `ArduPilot` is 84 KB, definitions included.
+/// Bytes that a logger writes when it begins (parameters, a mission), or had to hold back. The most in 80
+/// public logs of `ArduPilot` is 84 KB, definitions included.
 const BURST_BYTES: u64 = 192 * 1024;
-/// A clock this many times slower than another one is wrong. (Simulators run at some tens of times at most.)
+/// A clock this many times slower than another is wrong: simulators run at some tens of times.
 pub const SLOWER: u64 = 100;
-/// The slow clock is reported after this much of the other clock.
+/// Of the other clock, until the slow one is reported.
 const WITNESSED: Span = Span::from_secs(10);
-/// A larger jump means that the other clock itself was set.
+/// The other clock was set.
 const APART: Span = Span::from_secs(60);
-/// A clock that falls this often, ...
+/// Falls, ...
 const FALLS: u32 = 8;
-/// ... with less than this between, runs backwards.
+/// ... with less than this between: backwards.
 const BETWEEN: Span = Span::from_secs(5);
 
-/// Falls of a clock in a row: time and place of the first, time of the last, and their number.
+/// In a row: first time and place, last time, number.
 #[derive(Clone, Copy, Debug)]
 struct Falls {
     first: (Instant, u64),
@@ -45,24 +44,24 @@ struct Falls {
 /// Follows a recording's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
-    /// The first and the latest time.
+    /// First and latest time.
     first: Option<Instant>,
     last: Option<Instant>,
-    /// Place of the latest message.
+    /// Of the latest message.
     place: u64,
     /// Bytes still without time, and their beginning.
     level: u64,
     since: Option<(Instant, u64)>,
-    /// The recording's time and the other clock's, when the first of them was not yet too slow.
+    /// Both times, before the first became too slow.
     witness: Option<(Instant, u64)>,
-    /// The clock's falls in a row.
+    /// In a row.
     falls: Option<Falls>,
-    /// Time and place at which the clock first did not run.
+    /// First time and place at which the clock did not run.
     stands: Option<(Instant, u64)>,
 }
 
 impl Pace {
-    /// A message at this place has this time; this many bytes of messages came since the last call.
+    /// `bytes`: of messages since the last call.
     pub fn at(&mut self, now: Instant, place: u64, bytes: u64) {
         self.place = place;
         self.first.get_or_insert(now);
@@ -80,7 +79,7 @@ impl Pace {
         }
     }
 
-    /// Another clock has this time, microseconds from any beginning.
+    /// Microseconds from any beginning.
     pub fn witness(&mut self, now: Instant, us: u64) {
         let Some((then, told)) = self.witness else {
             self.witness = Some((now, us));
@@ -102,7 +101,7 @@ impl Pace {
         }
     }
 
-    /// The clock fell, or was set, and it is this time now.
+    /// The clock fell or was set, to this time.
     pub fn fell(&mut self, now: Instant) {
         let in_a_row = self.falls.filter(|falls| now.since(falls.last) < BETWEEN);
         let before = in_a_row.unwrap_or(Falls { first: (now, self.place), last: now, count: 0 });
@@ -113,7 +112,7 @@ impl Pace {
         }
     }
 
-    /// The clock stands still ([`super::clock::Clock::stands`]) at this message.
+    /// The clock stands still ([`super::clock::Clock::stands`]).
     pub fn stood(&mut self, now: Instant, place: u64) {
         self.stands.get_or_insert((now, place));
     }
@@ -123,14 +122,14 @@ impl Pace {
         *self = Self { first: self.first, stands: self.stands, ..Self::default() };
     }
 
-    /// Faults of the recorded times, once all has been read: single ones, and the clock. If the clock never
-    /// ran, the single wrong times are unknown.
+    /// Once all has been read: single wrong times, and the clock. If the clock never ran, the single wrong
+    /// times are unknown.
     pub fn gaps(&self, wrong: &Wrong) -> impl Iterator<Item = Gap> + use<> {
         let never_ran = self.stands.is_some() && self.first == self.last;
         wrong.gap().filter(|_| !never_ran).into_iter().chain(self.gap())
     }
 
-    /// Faults of the clock, once all has been read.
+    /// Of the clock, once all has been read.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.stands?;
         let words = "the recorded times stand still, fall again and again, or go on far too slowly, from here on: what is \
@@ -147,7 +146,7 @@ mod tests {
         Instant::from_micros(us)
     }
 
-    /// A clock that advances by this many microseconds with every 100 bytes, from some time on.
+    /// Microseconds with every 100 bytes, from some time on.
     fn is_told(step_us: u64, bytes: u64) -> bool {
         let mut pace = Pace::default();
         (0..bytes / 100).for_each(|message| pace.at(at(message * step_us), message * 100, 100));
@@ -162,7 +161,7 @@ mod tests {
         assert!(!is_told(50, 10_000_000), "2 MB/s");
         let mut pace = Pace::default();
         for second in 0..100 {
-            // Held back for a second each.
+            // A second each.
             (0..1_000).for_each(|_| pace.at(at(second * 1_000_000), 0, 100));
         }
         assert!(pace.gap().is_none());

@@ -1,14 +1,14 @@
-//! Bytes back to back at a line rate, whatever their own times were.
+//! Bytes back to back at a line rate.
 
 use std::collections::VecDeque;
 use std::io;
 
 use super::stream::{Chunk, Source};
 
-/// Bits on the line for one byte: start, eight data, stop.
+/// Start, eight data, stop.
 const BITS_PER_BYTE: u64 = 10;
 
-/// Bytes handed on together: at 921,600 baud 0.35 ms worth, so that arrival times stay within the millisecond.
+/// 0.35 ms at 921,600 baud: times stay within the millisecond.
 const SLICE_BYTES: usize = 32;
 
 /// The bytes of another source, paced.
@@ -16,12 +16,11 @@ pub struct Paced<S> {
     inner: S,
     baud: u64,
     waiting: VecDeque<u8>,
-    /// Bytes handed on so far.
     sent: u64,
 }
 
 impl<S: Source> Paced<S> {
-    /// The bytes of `inner` with the times of a line at `baud` (at least 1).
+    /// At `baud` (at least 1).
     pub fn new(inner: S, baud: u32) -> Self {
         Self { inner, baud: u64::from(baud.max(1)), waiting: VecDeque::new(), sent: 0 }
     }

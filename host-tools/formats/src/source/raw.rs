@@ -1,4 +1,4 @@
-//! Raw bytes from a store: no times of their own, so they are always paced (see [`super::paced`]).
+//! Raw bytes without times, to be paced ([`super::paced`]).
 
 use std::io::{self, Read};
 
@@ -6,7 +6,7 @@ use super::stream::{Chunk, Source, read_some};
 
 const CHUNK_BYTES: usize = 4096;
 
-/// Bytes as they come, all at time zero.
+/// All at time zero.
 pub struct Raw<R> {
     input: R,
 }

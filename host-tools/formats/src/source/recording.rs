@@ -1,4 +1,4 @@
-//! A recording of any format: its place, and its reader.
+//! A recording's place and reader.
 
 use std::fs;
 use std::io;
@@ -21,31 +21,31 @@ use crate::progress;
 
 pub use super::format::{Format, format_of};
 
-/// The line rate at which bytes without recorded times are taken to have come, in baud: the rate of a telemetry port.
+/// Baud of bytes without recorded times: a telemetry port's.
 pub const RAW_BAUD: u32 = 115_200;
 
-/// A recording that was found, not yet open.
+/// A found recording, not yet open.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// Its place for people: its path, or path and session.
+    /// For people: path, or path and session.
     pub title: String,
-    /// A name for files made of it, unique within one call: the file's own, or a session's as in `hums info`.
+    /// For files made of it, unique within one call: the file's, or a session's as in `hums info`.
     pub name: String,
-    /// Only the vehicle with this system id is read ([`Want::system`]).
+    /// System id of the only wanted vehicle ([`Want::system`]).
     pub system: Option<u8>,
     source: From,
 }
 
 #[derive(Clone, Debug)]
 enum From {
-    /// Standard input: read once.
+    /// Read once.
     Standard,
     File(PathBuf),
     Log(Box<Log>),
 }
 
 impl Place {
-    /// The same place, of which only the vehicle with this system id is read.
+    /// With only this system id.
     pub fn of_system(&self, system: u8) -> Self {
         Self { system: Some(system), ..self.clone() }
     }
@@ -76,7 +76,7 @@ impl Place {
         Self { title, name: log.name.clone(), system: None, source: From::Log(Box::new(log)) }
     }
 
-    /// The HUMS log, if it is one.
+    /// The HUMS log, if any.
     pub fn own(&self) -> Option<&Log> {
         match &self.source {
             From::Log(log) => Some(log),
@@ -84,7 +84,7 @@ impl Place {
         }
     }
 
-    /// Its file, if it is a single one.
+    /// A single file's.
     pub fn path(&self) -> Option<&Path> {
         match &self.source {
             From::File(path) => Some(path),
@@ -92,12 +92,12 @@ impl Place {
         }
     }
 
-    /// Whether it can be read but once.
+    /// Whether it can be read only once.
     pub const fn is_standard(&self) -> bool {
         matches!(self.source, From::Standard)
     }
 
-    /// The bytes that it takes, as far as that is known.
+    /// As far as known.
     pub fn bytes(&self) -> u64 {
         match &self.source {
             From::Standard => 0,
@@ -129,8 +129,7 @@ impl Place {
         Ok(Recording { system: self.system, ..recording })
     }
 
-    /// Reads a HUMS log in parts, as [`Self::in_parts`] does, and also hands on its items in order: one
-    /// reading for both.
+    /// As [`Self::in_parts`], and hands on items in order: one reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
         log: &Log,
@@ -147,7 +146,7 @@ impl Place {
         summary
     }
 
-    /// Reads it in parts: `new` makes the collector of a part, `deliver` gets them in order.
+    /// `new` makes a part's collector, `deliver` gets them in order.
     pub fn in_parts<C: Collect>(
         &self,
         want: Want<'_>,
@@ -167,7 +166,7 @@ impl Place {
         let (mut part, mut items) = (new(), 0);
         let summary = recording.read(want, &mut |at, item| {
             let begins = match item {
-                // Observations of a frame stay with it.
+                // A frame's observations stay with it.
                 Item::Observation(..) => !is_of_link,
                 Item::Frame(_) | Item::Row(_) | Item::Gap(_) => true,
                 Item::Text(_) | Item::Parameter(_) => false,
@@ -194,14 +193,14 @@ impl Place {
     }
 }
 
-/// The error for a choice of a vehicle in an autopilot's own log.
+/// A vehicle was chosen in an autopilot's log.
 pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
     usage(format!(
         "--system is for a recording of several vehicles; {title} is an autopilot's own log, which is of one"
     ))
 }
 
-/// A recording, open at its beginning.
+/// Open at its beginning.
 pub struct Recording {
     /// Its format.
     pub format: Format,
@@ -213,7 +212,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// The recording in `input`, by content; `name` is for messages.
+    /// By content; `name` is for messages.
     pub fn new(mut input: Input, name: &str) -> Result<Self> {
         let context = || format!("{name}: cannot be read");
         let start = input.peek(LOOK_BYTES).with_context(context)?;
@@ -239,7 +238,7 @@ impl Recording {
         Ok(Self { format: format.format(), progress, name: name.to_owned(), system: None, reader })
     }
 
-    /// Reads it from its beginning to its end, or until `take` returns [`Stop`].
+    /// Until the end, or until `take` returns [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let want = Want { system: self.system, ..want };
         let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());
@@ -269,7 +268,6 @@ impl Recording {
     }
 }
 
-/// Counts of the items handed on.
 #[derive(Default)]
 struct Seen {
     span: Option<(Instant, Instant)>,
@@ -299,7 +297,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A log of ArduPilot that defines one message and has many of it.
+    /// With one definition and many messages.
     pub(in crate::source) fn dataflash() -> (Vec<u8>, Vec<u8>) {
         let mut fmt = [&[0xa3, 0x95, 128, 150, 13][..], b"ATT\0Qc"].concat();
         fmt.resize(3 + 2 + 4 + 16, 0);
@@ -336,7 +334,7 @@ pub(super) mod tests {
         });
         assert!(summary.is_ok());
         assert_eq!(gaps, [(Cause::Damaged, Some(0))]);
-        // A port over which such a log is downloaded is a port.
+        // The log is downloaded over the port.
         assert_eq!(format_of(&[&HEARTBEAT[..], &[0xa3, 0x95, 1]].concat().repeat(50)), Some(Format::Raw));
     }
 }

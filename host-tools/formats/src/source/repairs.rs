@@ -1,4 +1,4 @@
-//! Repairs of wrong reports by old autopilots, before they are judged.
+//! Repairs wrong reports of old autopilots.
 //!
 //! | report | by | repair |
 //! |---|---|---|
@@ -13,23 +13,23 @@ use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Attitude, Autopilot, GlobalPosition, Observation, Source, Wanted};
 use hums_core::units::Radians;
 
-/// Older values are not compared.
+/// Of compared values.
 const FRESH: Span = Span::from_secs(1);
-/// An attitude setpoint that equalled the turning attitude at each sample for this long is not a setpoint.
+/// Equal for this long while turning: no setpoint.
 const LEADS_FOR: Span = Span::from_secs(5);
 /// 0.6 degrees, which is more than rounding.
 const COPY_RAD: f32 = 0.01;
-/// Slower than this, rad/s, an attitude lags the wanted one by no more than [`COPY_RAD`]: by 0.1 s and more.
+/// rad/s: slower, the attitude lags by no more than [`COPY_RAD`], at 0.1 s and more.
 const HOLDS_RADPS: f32 = 0.1;
-/// Speed from which the sign of a vertical speed counts, m/s.
+/// m/s, from which the sign counts.
 const MOVES_MPS: f32 = 0.5;
-/// Votes for a sign; more are not counted.
+/// Votes for a sign, at most.
 const SURE: i8 = 8;
 const VOTES_MAX: i8 = 3 * SURE;
-/// `ArduPilot`'s versions are bytes from the top down: 4.0 counts down.
+/// `ArduPilot`'s 4.0 counts down.
 const COUNTS_DOWN_SINCE: u32 = 0x0400_0000;
 
-/// State of each source.
+/// By source.
 #[derive(Debug, Default)]
 pub struct Repairs(BTreeMap<(u8, u8), Teller>);
 
@@ -44,7 +44,7 @@ struct Teller {
 }
 
 impl Repairs {
-    /// The observation as it should have been reported.
+    /// As it should have been reported.
     pub fn mend(&mut self, at: Instant, source: Source, observation: &Observation) -> Observation {
         let teller = self.0.entry((source.system, source.component)).or_default();
         match *observation {
@@ -116,7 +116,7 @@ mod tests {
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-    /// The vertical speed after this many positions with this one, beside a displayed climb.
+    /// After this many positions, beside a displayed climb.
     fn down_of(firmware: (Autopilot, u32), positions: u64, down_mps: f32, climb_mps: f32) -> f32 {
         let (mut repairs, mut known) = (Repairs::default(), f32::NAN);
         let (autopilot, firmware) = firmware;
@@ -156,8 +156,7 @@ mod tests {
     #[test]
     fn a_wanted_attitude_counts_while_it_is_not_the_attitude_itself() {
         let (mut repairs, mut tenth) = (Repairs::default(), 0);
-        // Difference, turn rate, duration in tenths of a second, and whether the setpoint is known at the
-        // end.
+        // Difference, turn rate, tenths of a second, and whether the setpoint is known at the end.
         for (apart, rate, tenths, known) in [
             (0.0, 0.5, 100, false),
             (0.1, 0.5, 40, true),

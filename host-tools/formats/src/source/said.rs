@@ -1,5 +1,4 @@
-//! The contents of MAVLink frames as items: observations, parameters, modes, and texts put together from
-//! their parts.
+//! MAVLink frames as items: observations, parameters, modes, texts.
 
 use anyhow::Result;
 use hums_core::alert::event_name;
@@ -15,17 +14,15 @@ use super::item::{AUTOPILOT, About, Event, Fact, Item, Mode, Parameter, Take, Te
 use crate::mavlink::ids::{EVENT, PARAM_VALUE, STATUSTEXT};
 use crate::statustext::{self, Texts};
 
-/// Turns frames into items, in their order.
 #[derive(Debug, Default)]
 pub(super) struct Said {
     texts: Texts,
     long_texts: LongTexts,
-    /// Who speaks, as far as it matters how a parameter is coded.
+    /// Decides how parameters are coded.
     autopilot: Autopilot,
 }
 
 impl Said {
-    /// Hands on a frame, if wanted, and its contents.
     pub(super) fn frame(
         &mut self,
         at: Instant,
@@ -84,7 +81,7 @@ impl Said {
     }
 }
 
-/// Hands on the texts of `make`; each has the time of its first part.
+/// At the time of the first part.
 fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::Text))) -> Result<()> {
     let mut result = Ok(());
     make(&mut |text| {
@@ -95,7 +92,7 @@ fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::
     result
 }
 
-/// `ArduPilot` names its firmware in a text, when a ground station asks for its parameters (`send_banner`).
+/// `ArduPilot` names its firmware in a text, when parameters are requested (`send_banner`).
 fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
     let words = text.words.as_str();
     if text.source.component == AUTOPILOT && is_firmware(words) {
@@ -105,7 +102,7 @@ fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
     take(text.at, Item::Text(Text { source, severity, words, alert }))
 }
 
-/// `EVENT`: its number, its name if known, and its external level. From 8 on it is not for people.
+/// Number, name if known, external level. From 8 on it is not for people.
 fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut Take<'_>) -> Result<()> {
     let fields = Fields(frame.payload());
     let (number, severity) = (fields.u32(0), fields.u8(12) & 0xF);
@@ -114,8 +111,8 @@ fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut Take<'
     if severity < 8 { take(at, Item::Event(event)) } else { Ok(()) }
 }
 
-/// A parameter in an autopilot's report, and its value; `None` for any other frame. PX4 sends an integer as
-/// the bits of the float, ArduPilot as a number (MAVLink parameter protocol: byte-wise and cast encoding).
+/// A parameter's value in a report; `None` for other frames. PX4 sends an integer as the bits of the float,
+/// ArduPilot as a number (MAVLink parameter protocol: byte-wise and cast encoding).
 pub fn parameter(frame: &Frame<'_>, autopilot: Autopilot) -> Option<(String, f64)> {
     const INT32: u8 = 6;
     if frame.id() != PARAM_VALUE || frame.component() == COMPONENT || frame.check() != Check::Verified {
@@ -137,7 +134,6 @@ mod tests {
 
     use super::*;
 
-    /// The firmware named in this text of a component.
     fn firmware(component: u8, words: &str) -> Option<String> {
         let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
         let bytes = encoder.frame(&mut buffer, &messages::status_text(Severity::Info, words));

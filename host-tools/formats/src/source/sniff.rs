@@ -1,8 +1,7 @@
 //! Tells a tlog from raw bytes by content, never by name.
 //!
-//! A tlog has eight bytes of time before every frame; in raw bytes the next frame follows at once. Every
-//! frame with a right checksum is a vote, so a damaged beginning, or boot text before the first frame, does
-//! not matter.
+//! A tlog has eight bytes of time before every frame. Each valid frame is a vote: damage or boot text at the
+//! beginning does not matter.
 
 use std::io::{self, Cursor, Read};
 
@@ -10,10 +9,10 @@ use super::stream::read_some;
 use crate::mavlink::frame::FRAME_BYTES_MAX;
 use crate::mavlink::frame::{Check, Peek, peek};
 
-/// Number of bytes searched: room for a few hundred frames.
+/// A few hundred frames.
 const WINDOW_BYTES: usize = 64 * 1024;
 
-/// Votes that settle it, so that a live pipe is not held up until the window is full.
+/// Enough votes: a live pipe need not fill the window.
 const LEAD: i32 = 3;
 
 /// The kind of an input.
@@ -21,13 +20,13 @@ const LEAD: i32 = 3;
 pub enum Kind {
     /// Not one byte.
     Empty,
-    /// A ground station's log: time, frame, time, frame.
+    /// Time, frame, time, frame.
     Tlog,
-    /// The bytes of a port.
+    /// A port's bytes.
     Raw,
 }
 
-/// The input with its beginning put back.
+/// With its beginning put back.
 pub type Sniffed<R> = io::Chain<Cursor<Vec<u8>>, R>;
 
 /// Looks at the beginning of `input`.
@@ -56,7 +55,7 @@ pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
     Ok((kind, Cursor::new(window).chain(input)))
 }
 
-/// The kind of these first bytes, and the number of frames with a right checksum among them.
+/// With the number of valid frames.
 pub fn sniff_bytes(bytes: &[u8]) -> (Kind, usize) {
     let (votes, good) = count(bytes);
     let kind = match votes {
@@ -68,12 +67,12 @@ pub fn sniff_bytes(bytes: &[u8]) -> (Kind, usize) {
     (kind, good)
 }
 
-/// Frames followed by a time and a frame, less frames followed by a frame.
+/// Frames before a time, less frames before a frame.
 fn count_votes(bytes: &[u8]) -> i32 {
     count(bytes).0
 }
 
-/// The votes, and how many frames have a checksum that holds.
+/// Also the number of valid frames.
 fn count(bytes: &[u8]) -> (i32, usize) {
     let (mut votes, mut good) = (0, 0);
     let mut at = 0;
@@ -97,7 +96,7 @@ fn count(bytes: &[u8]) -> (i32, usize) {
     (votes, good)
 }
 
-/// Without neighbouring frames, one whole record at the beginning still is a tlog.
+/// A lone record at the beginning is a tlog.
 fn single_record(bytes: &[u8]) -> Kind {
     match bytes.get(8..).map(peek) {
         Some(Peek::Frame(_)) if !matches!(peek(bytes), Peek::Frame(_)) => Kind::Tlog,

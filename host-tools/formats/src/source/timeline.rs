@@ -1,58 +1,55 @@
 //! Makes times that never fall from recorded times.
 //!
-//! A recording's clock may fall (another power-on in the same file, a clock that was set), and damage may
-//! give it any value.
+//! A clock may fall (another power-on, a set clock), and damage may give it any value.
 //! - A small step back is a reordering: the late item counts as coming now.
-//! - A larger step back is a restart. Time goes on a microsecond after its last value, so each time is of one
-//!   power-on.
-//! - A step forward beyond a day is damage or a clock that was set. It does not count; if the clock stays
-//!   there, time goes on from there.
+//! - A larger step back is a restart. Time goes on a microsecond after its last value.
+//! - A step forward beyond a day does not count; if the clock stays there, time goes on from there.
 //!
 //! [`super::doubt`] finds the wrong times before.
 
 use hums_core::clock::Instant;
 
-/// A step back beyond this is a clock that began again, not a reordering.
+/// Beyond this it is a restart, not a reordering.
 pub const STEP_BACK_US_MAX: u64 = 1_000_000;
-/// A step forward beyond this is damage or a clock that was set; gaps of hours are real.
+/// Beyond this it is damage or a set clock; gaps of hours are real.
 pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
 
-/// Result of a recorded time.
+/// A time's result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     /// When it is.
     pub at: Instant,
-    /// The clock fell, or jumped, right before it.
+    /// Right before it the clock fell or jumped.
     pub restarted: bool,
 }
 
 /// Follows a recording's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timeline {
-    /// The latest recorded time of this power-on, and its result.
+    /// Latest recorded time of this power-on, and its result.
     last: Option<(u64, u64)>,
     restarts: u64,
 }
 
 impl Timeline {
-    /// A clock whose first time is the stream's: microseconds since a power-on. [`Timeline::from_first`]
-    /// makes one for times since 1970.
+    /// Starts at the first time: microseconds since a power-on. [`Timeline::from_first`] makes one for times
+    /// since 1970.
     pub const fn new() -> Self {
         Self { last: None, restarts: 0 }
     }
 
-    /// A clock whose first time, of any value, is the stream's time zero.
+    /// Any first time is the stream's zero.
     pub const fn from_first(first_us: u64) -> Self {
         Self { last: Some((first_us, 0)), restarts: 0 }
     }
 
-    /// Another recording begins here at this time: the stream's time goes on from its last value.
+    /// Another recording: time goes on from its last value.
     pub fn begin_again(&mut self, recorded_us: u64) {
         self.restarts += 1;
         self.last = Some((recorded_us, self.now().as_micros().saturating_add(1)));
     }
 
-    /// The clock was set to this time, and this much time passed meanwhile.
+    /// The clock was set; this much passed meanwhile.
     pub fn set(&mut self, recorded_us: u64, passed_us: u64) -> Moment {
         self.restarts += 1;
         let at = self.now().as_micros().saturating_add(passed_us.max(1));
@@ -60,24 +57,24 @@ impl Timeline {
         Moment { at: Instant::from_micros(at), restarted: true }
     }
 
-    /// More time passed than the recorded times show.
+    /// Time that no recorded time shows.
     pub fn pass(&mut self, us: u64) {
         if let Some((_, reached)) = &mut self.last {
             *reached = reached.saturating_add(us);
         }
     }
 
-    /// The next recorded time, in microseconds.
+    /// Microseconds.
     pub fn at(&mut self, recorded_us: u64) -> Moment {
         let Some((before, reached)) = self.last else {
-            // The first time of all may be damaged too: a day is enough.
+            // The first may be damaged too.
             let first = if recorded_us > STEP_FORWARD_US_MAX { 0 } else { recorded_us };
             self.last = Some((recorded_us, first));
             return Moment { at: Instant::from_micros(first), restarted: false };
         };
         let (at, restarted) = match recorded_us.checked_sub(before) {
             Some(step) if step <= STEP_FORWARD_US_MAX => (reached.saturating_add(step), false),
-            // The later time stays the base, so that a reordered pair does not stretch time.
+            // A reordered pair does not stretch time.
             None if before - recorded_us <= STEP_BACK_US_MAX => {
                 return Moment { at: Instant::from_micros(reached), restarted: false };
             }
@@ -88,13 +85,12 @@ impl Timeline {
         Moment { at: Instant::from_micros(at), restarted }
     }
 
-    /// The latest time; zero before the first.
+    /// Latest; zero before the first.
     pub fn now(&self) -> Instant {
         Instant::from_micros(self.last.map_or(0, |(_, reached)| reached))
     }
 
-    /// Whether a recorded time is so far from the latest one, forward or back, that it may be wrong; the
-    /// first one may.
+    /// So far from the latest time that it may be wrong; the first may.
     pub fn is_jump(&self, recorded_us: u64) -> bool {
         self.last.is_none_or(|(before, _)| recorded_us.abs_diff(before) > STEP_BACK_US_MAX)
     }

@@ -1,6 +1,4 @@
 //! A ground station's log: eight big-endian bytes of microseconds since 1970, one frame, repeated.
-//!
-//! [`records`] finds the records; [`times`] makes their times, the same for every command.
 
 pub mod records;
 pub mod times;
@@ -20,19 +18,19 @@ pub struct Tlog<R> {
     noise_bytes: u64,
     jumps: u64,
     utc_start_us: Option<u64>,
-    /// Another recording began with the latest record.
+    /// With the latest record.
     begins: bool,
     damages: u64,
     ended: bool,
 }
 
 impl<R: Read> Tlog<R> {
-    /// Reads from `input`, no further than needs be: times are held against the few that are there.
+    /// Reads no further than needed: few times are compared.
     pub fn new(input: R) -> Self {
         Self::of(Records::new(input))
     }
 
-    /// Reads from a file, and further on.
+    /// Reads ahead of a file.
     pub fn ahead(input: R) -> Self {
         Self::of(Records::ahead(input))
     }

@@ -1,4 +1,4 @@
-//! Records of a HUMS log besides frames, for commands that read recordings.
+//! A HUMS log's records besides frames.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Lost, Why};
@@ -11,28 +11,26 @@ use hums_onboard::persist::STORE_NEW;
 use super::item::Gap;
 use crate::loss;
 
-/// One of the monitor's own records.
+/// A record of the monitor's.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
-    /// A setting of the monitor.
     Parameter {
         /// Its name.
         name: String,
         /// Its value.
         value: f32,
-        /// It is part of the table as it stood at the session's start.
+        /// The table as of the session's start.
         start: bool,
     },
-    /// A part that wears, with all that it has run.
+    /// With all that it has run.
     Part {
         /// Its place, from 0.
         place: usize,
         /// The part.
         component: Component,
     },
-    /// A check changed its level.
     Finding(Box<Finding>),
-    /// The worst value of a check of this session so far.
+    /// The worst so far in this session.
     Peak {
         /// The check's stable name.
         check: String,
@@ -41,27 +39,25 @@ pub enum Told {
         /// In the check's unit.
         value: f32,
     },
-    /// The log has a gap between these times.
+    /// A gap between these times.
     Missing {
         /// Start of the gap.
         from: Instant,
         /// The last.
         to: Instant,
-        /// Number of missing frames, if known.
+        /// If known.
         frames: u64,
     },
-    /// The box does not know the cell count of a battery.
     CellsUnknown,
-    /// The box has no data of earlier flights.
     StoreNew,
-    /// A record that only a monitor with health checks writes: its findings are complete.
+    /// Only a monitor with checks writes it: its findings are complete.
     Checked,
 }
 
 /// A check's change of level, by any finder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// When, after the debounce.
+    /// After the debounce.
     pub at: Instant,
     /// The part of the vehicle.
     pub subsystem: Subsystem,
@@ -73,19 +69,19 @@ pub struct Finding {
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// The deciding value; NaN if the input stopped.
+    /// Decided; NaN if the input stopped.
     pub value: f32,
-    /// The limit it crossed; NaN without one.
+    /// NaN without one.
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
 }
 
 impl Finding {
-    /// The words for a check that no longer applies.
+    /// For a check that no longer applies.
     pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
-    /// Whether the check no longer applies (after landing): its value is not known to be good then.
+    /// After landing the check no longer applies: not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
     }
@@ -95,7 +91,7 @@ impl Finding {
         matches!(self.level, Level::Warning | Level::Critical)
     }
 
-    /// From a finding of the monitor's, found at about `now`.
+    /// Found at about `now`.
     pub fn new(now: Instant, finding: &health::Finding) -> Self {
         Self::from(&FindingRecord::new(now, finding))
     }
@@ -118,20 +114,20 @@ impl From<&FindingRecord<'_>> for Finding {
 }
 
 impl Told {
-    /// The gap of unreadable sectors; `None` if its times are unknown.
+    /// Unreadable sectors; `None` if its times are unknown.
     pub fn missing(gap: &Gap) -> Option<Self> {
         let (own, (from, to)) = (gap.own?, gap.from.zip(gap.to)?);
         Some(Self::Missing { from, to, frames: u64::from(own.frames.unwrap_or(0)) })
     }
 
-    /// The report in a record, if it is of use here.
+    /// If of use here.
     pub fn of(record: &Record<'_>) -> Option<Self> {
         match record {
             Record::Parameter(parameter) => {
                 let (value, start) = (parameter.value as f32, !parameter.changed);
                 Some(Self::Parameter { name: parameter.name.to_owned(), value, start })
             }
-            // After a replacement, the figures belong to the old part.
+            // After a replacement, figures belong to the old part.
             Record::Component(recorded) => {
                 let place = usize::from(recorded.place);
                 let mut component = Component::default();

@@ -1,4 +1,4 @@
-//! The times of the next messages: they distinguish a jump of the clock from a single damaged time.
+//! The next messages' times: they tell a jump of the clock from a damaged time.
 
 use std::collections::BTreeMap;
 
@@ -10,35 +10,33 @@ use super::text;
 use crate::source::clock::{self, Stamp};
 use crate::source::doubt::ASKED;
 
-/// Size of the look-ahead. It has room for more than [`ASKED`] of the longest binary messages, and for all
-/// definitions, which are among the first messages today. It also has room for damage, and for a second of
-/// the oldest logs, in which only GPS messages have times.
+/// More than [`ASKED`] of the longest messages, all definitions of today, some damage, and a second of the
+/// oldest logs, in which only GPS messages have times.
 pub(super) const AHEAD_BYTES: usize = 256 * 1_024;
-/// After this many bytes without a message, the rest is erased memory, not part of the log.
+/// Without a message, the rest is erased memory.
 const ERASED_BYTES: usize = 4 * 1_024;
-/// Fields of a line that are looked at.
+/// Of a line.
 const VALUES_MAX: usize = 32;
-/// Number of messages after a pause that are searched for arming: all that a logger begins with, ...
+/// Searched for arming after a pause: a logger's beginning ...
 const MESSAGES_MAX: usize = 2_048;
 /// ... within this of the first.
 const ARMS_US: u64 = 1_000_000;
-/// Definitions that are looked at.
+/// Searched definitions.
 const DEFINED_MAX: usize = 256;
 
-/// The bytes after a message in the file.
+/// After a message in the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead<'a> {
-    /// Its part in the buffer: [`AHEAD_BYTES`] or more, unless the file ends.
+    /// [`AHEAD_BYTES`] or more, unless the file ends.
     pub(super) bytes: &'a [u8],
-    /// It is a text log.
     pub(super) is_text: bool,
-    /// The file ends after these bytes.
+    /// Nothing follows.
     pub(super) is_end: bool,
 }
 
 impl Ahead<'_> {
-    /// Whether arming comes next, in this message or later ones, before any disarming: then the vehicle was
-    /// disarmed until now. (Copters of before 2016 log no disarming if they log only while armed.)
+    /// Arming comes next, before any disarming: the vehicle was disarmed until now. (Copters of before 2016
+    /// log no disarming if they log only while armed.)
     pub(super) fn arms(self, message: &Message<'_>, formats: &Formats) -> bool {
         if let Some(arms) = arming(message) {
             return arms;
@@ -59,7 +57,7 @@ impl Ahead<'_> {
         found == Some(true)
     }
 
-    /// The first few requested times of messages there.
+    /// The first few accepted times.
     pub(super) fn stamps(self, formats: &Formats, week: Week, asks: &dyn Fn(Stamp) -> bool) -> clock::Ahead {
         let bytes = self.bytes.get(..AHEAD_BYTES).unwrap_or(self.bytes);
         let mut is_end = self.is_end && bytes.len() == self.bytes.len();
@@ -78,7 +76,7 @@ impl Ahead<'_> {
     }
 }
 
-/// Whether a message is about arming or disarming: `EV` 10 and 11, and `ARM`.
+/// `EV` 10 and 11, and `ARM`.
 fn arming(message: &Message<'_>) -> Option<bool> {
     let format = message.format();
     let told = |field: &str| message.unsigned(format.field(field)?);
@@ -89,8 +87,8 @@ fn arming(message: &Message<'_>) -> Option<bool> {
     }
 }
 
-/// Passes on messages until `take` has enough or another log begins. Returns the end of the last one, and
-/// whether another log begins there. Definitions may come in between.
+/// Until `take` has enough or another log begins. Returns the end of the last message, and whether another
+/// log begins there.
 fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) -> bool) -> (usize, bool) {
     let (mut at, mut last) = (0, 0);
     let mut defined: BTreeMap<u8, Format> = BTreeMap::new();
@@ -120,7 +118,7 @@ fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) 
     (last, false)
 }
 
-/// The same of lines; whether another log begins.
+/// Whether another log begins.
 fn of_lines(
     bytes: &[u8],
     is_end: bool,

@@ -1,12 +1,12 @@
-//! The messages of a binary log: two bytes of head, the type, and as many bytes as FMT defines for it.
+//! A binary log's messages: two bytes of head, the type, and a length by FMT.
 //!
-//! A message counts if the next head, or the end, is right after it. Otherwise bytes were lost or changed:
+//! A message counts if the next head, or the end, follows it. Otherwise bytes were lost or changed:
 //! - If a chain of messages begins inside of it, it is damaged, and reading goes on at the chain.
 //! - If not, it is whole, and the bytes after it are skipped up to the next chain.
 //!
-//! Skipped bytes are reported once, with place and size, before the next message.
+//! Skipped bytes are reported once, before the next message.
 //!
-//! Memory: one buffer. Time: each byte is looked at a bounded number of times (a message has at most 255).
+//! Memory: one buffer; each byte is looked at a bounded number of times (255 at most).
 
 use std::io::{self, Read};
 
@@ -15,56 +15,53 @@ use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
-/// No message is as long.
+/// Longer than any message.
 const MESSAGE_BYTES_MAX: u64 = 256;
-/// The longest message, and the head of the one after it.
+/// The longest message, and the next head.
 const LOOKAHEAD_BYTES: usize = 2 * 258;
 
-/// The next piece of a log.
 #[derive(Debug)]
 pub(super) enum Piece<'a> {
-    /// A message: its type, its bytes after the header, and its place in the file.
+    /// Type, bytes after the header, place.
     Message {
         /// Its type.
         kind: u8,
-        /// The bytes after the header.
+        /// After the header.
         payload: &'a [u8],
         /// Its beginning.
         place: u64,
-        /// The bytes after it.
+        /// After the message.
         after: Ahead<'a>,
     },
-    /// Bytes that could not be read.
     Damage(Damage),
 }
 
-/// Bytes that could not be read.
+/// Unreadable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Damage {
     /// Their beginning.
     pub(super) place: u64,
     /// Their number.
     pub(super) bytes: u64,
-    /// Whether the file ends with them, and they are what a power-off leaves: a part of a message, or a fill.
+    /// The file ends with what a power-off leaves: a part of a message, or a fill.
     pub(super) is_cut: bool,
     /// Their description.
     pub(super) words: String,
 }
 
-/// Bytes that are being skipped.
+/// Being skipped.
 #[derive(Clone, Copy, Debug)]
 struct Skipped {
     place: u64,
     bytes: u64,
-    /// All of them are this one.
+    /// All are this byte.
     only: Option<u8>,
-    /// The type of an undefined message at their beginning.
+    /// Of an undefined message at their beginning.
     undefined: Option<u8>,
-    /// The type of a shortened message at their beginning.
+    /// Of a shortened message at their beginning.
     cut: Option<u8>,
 }
 
-/// A reader of messages.
 pub(super) struct Binary<R> {
     buffer: Buffer<R>,
     skipped: Option<Skipped>,
@@ -76,18 +73,17 @@ impl<R: Read> Binary<R> {
         Self { buffer: Buffer::new(input), skipped: None }
     }
 
-    /// The next bytes, without reading on.
+    /// Not consumed.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.buffer.window(bytes)
     }
 
-    /// Place of reading, in bytes.
     pub(super) fn place(&self) -> u64 {
         self.buffer.place()
     }
 
-    /// The next message, or the skipped bytes before it; `None` at the end. `lengths` learns the right one of
-    /// a type's two lengths.
+    /// Skipped bytes come before the next message; `None` at the end. `lengths` learns the right one of a
+    /// type's two lengths.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> io::Result<Option<Piece<'_>>> {
         loop {
             self.buffer.fill(LOOKAHEAD_BYTES.max(AHEAD_BYTES))?;
@@ -146,19 +142,17 @@ impl Skipped {
     }
 }
 
-/// The messages in complete bytes, in order; unreadable bytes between them are passed over.
+/// Complete bytes; unreadable ones are passed over.
 pub(super) struct Window<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
 impl<'a> Window<'a> {
-    /// Before the first one.
     pub(super) const fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0 }
     }
 
-    /// The next message: its type, its bytes after the header, its place, and the bytes after it.
     pub(super) fn next(&mut self, lengths: &mut Lengths) -> Option<(u8, &'a [u8], usize, Ahead<'a>)> {
         loop {
             let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
@@ -180,13 +174,12 @@ impl<'a> Window<'a> {
 }
 
 enum Look {
-    /// A message of this length begins here.
+    /// With this length.
     Message(usize),
-    /// This many bytes are not a message.
+    /// No message.
     Skip { bytes: usize, undefined: Option<u8>, cut: Option<u8> },
 }
 
-/// The piece that begins here.
 fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
     let kind = match rest {
         [a, b, kind, ..] if [*a, *b] == HEAD => *kind,
@@ -208,7 +201,7 @@ fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
     }
     let other = usize::from(lengths.fields[usize::from(kind)]);
     if other > HEADER_BYTES && other <= rest.len() && followed(rest, other, ended) {
-        // The columns were right and the length was not: from here on they count.
+        // The columns were right: from here on they count.
         lengths.told[usize::from(kind)] = other as u8;
         lengths.fields[usize::from(kind)] = 0;
         return Look::Message(other);
@@ -220,7 +213,7 @@ fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
     Look::Message(length)
 }
 
-/// Whether a head, or the end, follows after this many bytes.
+/// Head or end after this many bytes.
 fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
     match rest.get(length..) {
         Some([a, b, ..]) => [*a, *b] == HEAD,
@@ -230,14 +223,13 @@ fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
     }
 }
 
-/// Range of a search: a message that begins in it is completely visible.
+/// A message that begins here is completely visible.
 fn searched(rest: &[u8], ended: bool) -> &[u8] {
     let limit = if ended { rest.len() } else { rest.len().saturating_sub(LOOKAHEAD_BYTES / 2).max(1) };
     rest.get(..limit).unwrap_or(rest)
 }
 
-/// Number of bytes, at least one and at most those of `within`, that begin no message with another one after
-/// it.
+/// At least one; none begins a message with another after it.
 fn none(within: &[u8], rest: &[u8], ended: bool, lengths: &Lengths) -> usize {
     let mut at = 1;
     while let Some(found) = within.get(at..).and_then(|rest| rest.iter().position(|byte| *byte == HEAD[0])) {

@@ -1,21 +1,20 @@
-//! A buffer over a file's bytes, for both forms of a log.
+//! For both forms of a log.
 
 use std::io::{self, Read};
 
 use crate::source::stream::read_some;
 
-/// Read at once: pages that are touched for the first time cost a small log more than its messages.
+/// First touches of pages cost a small log more than its messages.
 const CHUNK_BYTES: usize = 64 * 1024;
-/// Number of bytes read beyond a smaller request, so that the rest is not moved for each chunk.
+/// Beyond a small request: the rest is not moved for each chunk.
 const MORE_BYTES: usize = 256 * 1024;
 
-/// The buffered part of a file, and the place of reading.
 pub(super) struct Buffer<R> {
     input: R,
     bytes: Vec<u8>,
-    /// Place of reading in the buffer.
+    /// Place of reading.
     at: usize,
-    /// Start of the buffer in the file.
+    /// Its start in the file.
     base: u64,
     ended: bool,
 }
@@ -25,40 +24,38 @@ impl<R: Read> Buffer<R> {
         Self { input, bytes: Vec::new(), at: 0, base: 0, ended: false }
     }
 
-    /// The next bytes, without reading on.
+    /// Not consumed.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.fill(bytes)?;
         Ok(self.rest())
     }
 
-    /// Place of reading, in bytes.
     pub(super) fn place(&self) -> u64 {
         self.base + self.at as u64
     }
 
-    /// Whether the file ends after the buffer.
+    /// After the buffer.
     pub(super) const fn ended(&self) -> bool {
         self.ended
     }
 
-    /// The bytes here that are still to be read.
     pub(super) fn rest(&self) -> &[u8] {
         self.bytes.get(self.at..).unwrap_or_default()
     }
 
-    /// The next bytes, which are read then.
+    /// Consumes them.
     pub(super) fn take(&mut self, bytes: usize) -> &[u8] {
         self.take_before(bytes).0
     }
 
-    /// Takes the next bytes; also returns the bytes here after them.
+    /// Also the buffered bytes after them.
     pub(super) fn take_before(&mut self, bytes: usize) -> (&[u8], &[u8]) {
         let start = self.at;
         self.at += bytes;
         (self.bytes.get(start..self.at).unwrap_or_default(), self.rest())
     }
 
-    /// Reads until this many bytes are there, or the file ends.
+    /// Or the file ends.
     pub(super) fn fill(&mut self, wanted: usize) -> io::Result<()> {
         if self.ended || self.rest().len() >= wanted {
             return Ok(());
@@ -77,7 +74,7 @@ impl<R: Read> Buffer<R> {
         Ok(())
     }
 
-    /// Bytes that it takes.
+    /// Bytes of memory.
     #[cfg(test)]
     pub(super) fn capacity(&self) -> usize {
         self.bytes.capacity()

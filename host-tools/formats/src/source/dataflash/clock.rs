@@ -1,8 +1,8 @@
 //! The time of a message.
 //!
-//! Logs of today have microseconds since power-on in every message. Those of before 2015 have milliseconds in
-//! most. The oldest (`ArduCopter` 2.9 and 3.0) have only the receiver's time of the week, in GPS messages. A
-//! message without a time, or with a wrong one, gets the time of the message before it.
+//! Since 2015 every message has microseconds since power-on; before, most have milliseconds. The oldest
+//! (`ArduCopter` 2.9 and 3.0) have only the receiver's time of week, in GPS messages. Without a valid time,
+//! that of the message before counts.
 
 use hums_core::clock::{Instant, Span};
 
@@ -13,49 +13,45 @@ use super::stamp::{Week, stamp, week_us};
 use crate::source::clock::{self, Reading, Rules};
 use crate::source::doubt::Ends;
 
-/// A log that is only written while armed has pauses of any length. After a pause, repeated messages are
-/// states or saved parameters, every 30 s.
+/// Logs written only while armed have pauses of any length. After a pause, states and saved parameters repeat
+/// every 30 s.
 const RULES: Rules = Rules {
     from_first: false,
     old_values: false,
     ends: Ends { steady_us: 1_000_000, seldom_us: 3_600_000_000 },
 };
-/// A silence of this length means that the logger pauses or fails: every log has a message at 5 Hz.
+/// The logger pauses or fails: every log has a message at 5 Hz.
 const SILENCE: Span = Span::from_secs(1);
 
-/// Follows the clock of a log.
 #[derive(Clone, Debug)]
 pub(super) struct Clock {
     times: clock::Clock,
-    /// The first time of the week, if that is the log's only clock.
+    /// The log's only clock.
     week_first_us: Option<u64>,
-    /// Start of a silence before the present message.
+    /// Before the present message.
     silence: Option<Instant>,
 }
 
-/// When a message was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct When {
-    /// In the recording's time.
+    /// Recording's time.
     pub(super) at: Instant,
-    /// Another power-on begins with it.
     pub(super) restarted: bool,
-    /// Microseconds since power-on in the message; `None` without a time.
+    /// Microseconds since power-on, if known.
     pub(super) boot_us: Option<u64>,
-    /// Validity of its own time.
+    /// Of its own time.
     pub(super) own: Own,
-    /// The clock stands still, by the messages of this type.
+    /// By messages of this type.
     pub(super) stands: bool,
 }
 
-/// Validity of a message's own time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Own {
     /// No time.
     None,
     /// It counts.
     Sound,
-    /// The times around it contradict it: the message is likely damaged.
+    /// Contradicted: the message is likely damaged.
     Wrong,
 }
 
@@ -66,12 +62,11 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// The first time of the log is this one.
     pub(super) fn begin(&mut self, first_us: u64) {
         self.times.begin(first_us);
     }
 
-    /// Another log begins, at this time if known: time goes on from its last value.
+    /// Time goes on from its last value.
     pub(super) fn begin_another(&mut self, first_us: Option<u64>) {
         (self.week_first_us, self.silence) = (None, None);
         if let Some(first_us) = first_us {
@@ -79,12 +74,11 @@ impl Clock {
         }
     }
 
-    /// Whether a message with a time has come.
     pub(super) const fn has_begun(&self) -> bool {
         self.times.has_begun()
     }
 
-    /// Start of a long silence before the present message; taken once.
+    /// Taken once.
     pub(super) fn silence(&mut self) -> Option<Instant> {
         self.silence.take()
     }
@@ -94,7 +88,7 @@ impl Clock {
         self.times.now()
     }
 
-    /// The time of a message; `ahead` are the bytes after it in the file.
+    /// `ahead`: the bytes after it.
     pub(super) fn at(&mut self, message: &Message<'_>, ahead: Ahead<'_>, formats: &Formats) -> When {
         let boot_us = message.time_us();
         if boot_us.is_none()
@@ -114,12 +108,10 @@ impl Clock {
         When { at: moment.at, restarted: moment.restarted, boot_us, own: Own::Sound, stands }
     }
 
-    /// Written with the message before it.
     fn as_before(&self, boot_us: Option<u64>, own: Own) -> When {
         When { at: self.now(), restarted: false, boot_us, own, stands: false }
     }
 
-    /// Conversion of times of the week.
     fn week(&self) -> Week {
         Week::new(self.week_first_us, self.times.recorded_us().unwrap_or(0))
     }

@@ -1,19 +1,17 @@
-//! The date: UTC at the log's time zero, reported repeatedly by the autopilot's GPS.
+//! UTC at the log's time zero, by the autopilot's GPS.
 
-/// A new UTC is reported if it differs by more than the receiver's delay.
+/// Beyond the receiver's delay.
 const DIFFERS_US: u64 = 1_500_000;
 
-/// UTC of time zero by the GPS.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Epoch {
     known_us: Option<u64>,
-    /// The last different value.
+    /// Different from the reported one.
     other_us: Option<u64>,
 }
 
 impl Epoch {
-    /// Takes a value; returns it if it is new. A different value counts only when it comes twice: one damaged
-    /// bit moves the date by years.
+    /// Returns a new value; it must come twice: one damaged bit moves the date by years.
     pub(super) fn take(&mut self, epoch_us: u64) -> Option<u64> {
         let is_near = |other: Option<u64>| other.is_some_and(|other| other.abs_diff(epoch_us) < DIFFERS_US);
         if is_near(self.known_us) {

@@ -5,18 +5,18 @@ use std::sync::Arc;
 
 use crate::source::item::Table;
 
-/// Bytes before a message's first field: two of head, one of type.
+/// Two of head, one of type.
 pub(super) const HEADER_BYTES: usize = 3;
-/// The type of FMT itself, with a fixed layout.
+/// Its layout is fixed.
 pub(super) const FMT_TYPE: u8 = 128;
-/// Length of FMT with its header.
+/// With its header.
 pub(super) const FMT_BYTES: u8 = 89;
-/// How a binary log begins: FMT defines itself.
+/// FMT defines itself.
 pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES];
-/// Columns of one message at most: the format string has 16 characters.
+/// The format string has 16 characters.
 const FIELDS_MAX: usize = 16;
 
-/// How a field's bytes are to be read: one for each format character.
+/// By format character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FieldKind {
     /// `b`
@@ -53,19 +53,18 @@ pub(super) enum FieldKind {
     CentiU32,
     /// `L`: 1e-7 degrees
     Degrees,
-    /// `n`, `N`, `Z`: text of this many bytes, ended by a NUL if shorter
+    /// `n`, `N`, `Z`: text, ended by a NUL if shorter
     Text(u8),
     /// `a`: 32 numbers of 16 bits
     Array,
 }
 
-/// Room for the names of a message's columns in a binary log's FMT.
+/// Names in a binary FMT.
 const COLUMNS_BYTES: usize = 64;
-/// Numbers in an `a` field.
+/// Of an `a` field.
 pub(super) const ARRAY_LENGTH: usize = 32;
 
 impl FieldKind {
-    /// The kind of a format character.
     fn of(character: u8) -> Option<Self> {
         Some(match character {
             b'b' => Self::I8,
@@ -93,7 +92,6 @@ impl FieldKind {
         })
     }
 
-    /// Bytes that it takes.
     pub(super) const fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 | Self::Mode => 1,
@@ -105,12 +103,12 @@ impl FieldKind {
         }
     }
 
-    /// Whether the format character itself scales the number, so that FMTU's multiplier is already in it.
+    /// FMTU's multiplier is then already in it.
     const fn scales(self) -> bool {
         matches!(self, Self::CentiI16 | Self::CentiU16 | Self::CentiI32 | Self::CentiU32 | Self::Degrees)
     }
 
-    /// Whether it is a number of whole steps that the format character does not scale.
+    /// Whole steps, not scaled by the format character.
     pub(super) const fn is_integer(self) -> bool {
         matches!(
             self,
@@ -127,55 +125,46 @@ impl FieldKind {
     }
 }
 
-/// One column of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Field {
     /// Its label.
     pub(super) name: String,
-    /// How it is read.
     pub(super) kind: FieldKind,
-    /// Offset after the header.
+    /// After the header.
     pub(super) offset: usize,
 }
 
-/// The definition of a message.
 #[derive(Clone, Debug)]
 pub(super) struct Format {
-    /// Its type: the third byte of a message.
+    /// Third byte of a message.
     pub(super) kind: u8,
     /// Its name: `ATT`.
     pub(super) name: String,
-    /// Its length with its header, by FMT.
+    /// By FMT, with header.
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
-    /// The length of the fields with the header, if it differs.
+    /// By the fields, if it differs.
     pub(super) fields_length: Option<u8>,
-    /// Its unreadable parts and the reason, until reported.
+    /// Unreadable parts, until reported.
     odd: Option<String>,
-    /// Whether all of its format characters are known.
+    /// All format characters are known.
     is_known: bool,
-    /// Fewer columns have names than there are format characters.
+    /// Fewer names than format characters.
     lacks_names: bool,
     pub(super) characters: usize,
-    /// The column of the time, and its kind.
+    /// Column and kind.
     pub(super) time: Option<TimeField>,
-    /// Its rows' table, once a row was made.
+    /// Once a row was made.
     pub(super) table: Option<Arc<Table>>,
-    /// Whether it defines something.
     pub(super) role: Role,
 }
 
-/// The purpose of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// It defines a message.
     Fmt,
-    /// It defines the units of a message.
     Fmtu,
-    /// It defines a unit.
     Unit,
-    /// It defines a multiplier.
     Mult,
     /// Not a definition.
     Other,
@@ -193,12 +182,11 @@ impl Role {
     }
 }
 
-/// Kind of a message's time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TimeField {
-    /// Microseconds since power-on in this column: since 2015.
+    /// Since power-on, since 2015.
     Micros(u8),
-    /// Milliseconds since power-on in this column: before.
+    /// Since power-on, before 2015.
     Millis(u8),
 }
 
@@ -231,7 +219,7 @@ impl Format {
         let role = Role::of(kind, name);
         let characters = characters.iter().take(FIELDS_MAX).take_while(|character| **character != 0).count();
         let named = columns.split(',').filter(|label| !label.trim().is_empty()).count();
-        // Names that fill FMT's own column are cut off by it.
+        // FMT's own column cuts names off.
         let lacks_names = named < characters && columns.len() + 1 < COLUMNS_BYTES;
         let odd = odd(name, length, unknown, HEADER_BYTES + offset)
             .or_else(|| lacks_names.then(|| unnamed(name, named, characters)));
@@ -252,23 +240,22 @@ impl Format {
         }
     }
 
-    /// Whether the other one defines the same.
     fn same(&self, other: &Self) -> bool {
         self.name == other.name && self.length == other.length && self.fields == other.fields
     }
 
-    /// Whether its last column is a text, which may contain commas.
+    /// May contain commas.
     pub(super) fn ends_in_text(&self) -> bool {
         self.fields.last().is_none_or(|field| matches!(field.kind, FieldKind::Text(_)))
     }
 
-    /// The column of this label.
+    /// By label.
     pub(super) fn field(&self, name: &str) -> Option<usize> {
         self.fields.iter().position(|field| field.name == name)
     }
 }
 
-/// In GPS messages of before 2015 `TimeMS` is the time of the week, and the time since power-on is `T`.
+/// Before 2015 a GPS message's `TimeMS` is the time of week, and `T` the time since power-on.
 fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
     let at = |label: &str, kinds: &[FieldKind]| {
         let found = fields.iter().position(|field| field.name == label && kinds.contains(&field.kind))?;
@@ -282,48 +269,46 @@ fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
     if name.starts_with("GPS") { at("T", &millis) } else { at("TimeMS", &millis) }.map(TimeField::Millis)
 }
 
-/// Units of one type from FMTU.
+/// From FMTU.
 #[derive(Clone, Debug, Default)]
 struct Units {
     units: Vec<u8>,
     multipliers: Vec<u8>,
 }
 
-/// All definitions of a file so far.
+/// So far.
 pub(super) struct Formats {
     by_kind: Vec<Option<Box<Format>>>,
-    /// Lengths with the header by type; 0 without a definition.
+    /// With header; 0 without a definition.
     pub(super) lengths: Lengths,
     units: Vec<Option<Units>>,
     unit_names: Vec<Option<String>>,
     multipliers: Vec<Option<f64>>,
-    /// Whether any message has the time since power-on: the oldest logs have only the GPS receiver's time.
+    /// The oldest logs have only the GPS receiver's time.
     pub(super) has_boot_clock: bool,
-    /// The type that was defined last.
+    /// Type.
     newest: Option<u8>,
 }
 
-/// Lengths of the types, as a scanner needs them.
+/// For a scanner.
 #[derive(Clone, Debug)]
 pub(super) struct Lengths {
-    /// From FMT; 0 without a usable definition.
+    /// By FMT; 0 if unusable.
     pub(super) told: [u8; 256],
-    /// From the fields, if different; 0 otherwise.
+    /// By the fields, if different; else 0.
     pub(super) fields: [u8; 256],
 }
 
-/// Result of a definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Defined {
-    /// It is new, or a change.
+    /// New or changed.
     New,
     Known,
-    /// It is not followed.
     Refused(String),
 }
 
 impl Formats {
-    /// Only FMT is defined.
+    /// Only FMT.
     pub(super) fn new() -> Self {
         let mut by_kind: Vec<Option<Box<Format>>> = Vec::new();
         by_kind.resize_with(256, || None);
@@ -341,7 +326,6 @@ impl Formats {
         }
     }
 
-    /// The definition of a type.
     pub(super) fn get(&self, kind: u8) -> Option<&Format> {
         self.by_kind.get(usize::from(kind))?.as_deref()
     }
@@ -351,13 +335,13 @@ impl Formats {
         self.get(self.newest?)
     }
 
-    /// For a file that is read again from its beginning: the units are known, and whether it has a clock; the messages are not.
+    /// For a second reading: units and the clock are kept, messages are not.
     pub(super) fn begun_again(self) -> Self {
         let Self { units, unit_names, multipliers, has_boot_clock, .. } = self;
         Self { units, unit_names, multipliers, has_boot_clock, ..Self::new() }
     }
 
-    /// Takes a definition. The definition of FMT itself is fixed.
+    /// FMT's own definition is fixed.
     pub(super) fn define(&mut self, format: Format) -> Defined {
         let place = usize::from(format.kind);
         if format.kind == FMT_TYPE {
@@ -378,38 +362,36 @@ impl Formats {
         Defined::New
     }
 
-    /// Whether only the length of a definition is wrong, which does not matter for a text log's lines.
+    /// Does not matter for a text log's lines.
     pub(super) fn is_only_long(&self, kind: u8) -> bool {
         self.get(kind).is_some_and(|format| format.is_known && !format.lacks_names)
     }
 
-    /// The fault of a definition, once.
+    /// Once.
     pub(super) fn take_odd(&mut self, kind: u8) -> Option<String> {
         self.by_kind.get_mut(usize::from(kind))?.as_deref_mut()?.odd.take()
     }
 
-    /// Takes a unit: FMTU names it by this character.
     pub(super) fn define_unit(&mut self, id: u8, name: &str) {
         if let Some(slot) = self.unit_names.get_mut(usize::from(id)) {
             *slot = Some(name.to_owned());
         }
     }
 
-    /// Takes a multiplier: FMTU names it by this character.
     pub(super) fn define_multiplier(&mut self, id: u8, factor: f64) {
         if let Some(slot) = self.multipliers.get_mut(usize::from(id)) {
             *slot = Some(factor);
         }
     }
 
-    /// Takes a type's units and multipliers, a character a column.
+    /// A character a column.
     pub(super) fn define_units(&mut self, kind: u8, units: &str, multipliers: &str) {
         if let Some(slot) = self.units.get_mut(usize::from(kind)) {
             *slot = Some(Units { units: units.into(), multipliers: multipliers.into() });
         }
     }
 
-    /// The unit of a column's values as read; empty if the file has none.
+    /// Empty if unknown.
     fn unit(&self, kind: u8, column: usize, field: FieldKind) -> String {
         let known = || {
             let units = self.units.get(usize::from(kind))?.as_ref()?;
@@ -422,13 +404,11 @@ impl Formats {
         known().unwrap_or_default()
     }
 
-    /// The units of a type's columns.
     pub(super) fn units(&self, kind: u8) -> Vec<String> {
         let fields = self.get(kind).map_or(&[][..], |format| &format.fields);
         fields.iter().enumerate().map(|(column, field)| self.unit(kind, column, field.kind)).collect()
     }
 
-    /// Remembers the table of a type's rows.
     pub(super) fn set_table(&mut self, kind: u8, table: &Arc<Table>) {
         if let Some(format) = self.by_kind.get_mut(usize::from(kind)).and_then(Option::as_deref_mut) {
             format.table = Some(Arc::clone(table));
@@ -444,7 +424,6 @@ fn unnamed(name: &str, named: usize, characters: usize) -> String {
     format!("FMT names {named} of the {characters} columns of {name}: those without a name are not read")
 }
 
-/// The unreadable part of a message.
 fn odd(name: &str, length: u8, unknown: Option<char>, fields: usize) -> Option<String> {
     if let Some(character) = unknown {
         return Some(format!(
@@ -461,7 +440,7 @@ fn odd(name: &str, length: u8, unknown: Option<char>, fields: usize) -> Option<S
     Some(format!("FMT says that {name} has {length} bytes, and its columns make {fields}: {so}"))
 }
 
-/// A unit's name with its multiplier as a prefix. With the multipliers `!` and `/`, `A.s` becomes `mAh` or `Ah`.
+/// With the multiplier as a prefix. `!` and `/` make `mAh` or `Ah` of `A.s`.
 fn unit_of(name: &str, factor: Option<f64>) -> String {
     if matches!(name, "" | "UNKNOWN" | "instance") {
         return String::new();
@@ -469,7 +448,7 @@ fn unit_of(name: &str, factor: Option<f64>) -> String {
     let Some(factor) = factor.filter(|factor| factor.is_finite() && *factor != 0.0) else {
         return name.to_owned();
     };
-    // A factor may have been written in single precision: 1e-6 reads 0.0000009999999974752427 then.
+    // Single precision reads 1e-6 as 0.0000009999999974752427.
     let is = |other: f64| (factor / other - 1.0).abs() < 1e-6;
     let prefix = [(1.0, ""), (0.1, "d"), (0.01, "c"), (1e-3, "m"), (1e-6, "u"), (1e-9, "n")];
     if let Some((_, prefix)) = prefix.iter().find(|(value, _)| is(*value)) {
@@ -514,7 +493,7 @@ mod tests {
         assert!(odd.contains("12 bytes") && odd.contains("13"), "{odd}");
         assert_eq!((formats.lengths.told[130], formats.lengths.fields[130]), (12, 13));
         assert_eq!(formats.take_odd(130), None, "once");
-        // Lengths that cannot hold a header are not followed.
+        // Too short for a header.
         formats.define(Format::new(131, 0, "IMU", b"Qf", "TimeUS,GyrX"));
         assert_eq!((formats.lengths.told[131], formats.lengths.fields[131]), (15, 0));
     }

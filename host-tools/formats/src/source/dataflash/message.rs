@@ -13,17 +13,15 @@ pub(super) struct Message<'a> {
     body: Body<'a>,
 }
 
-/// Content of a message.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Body<'a> {
-    /// The bytes after the header.
+    /// After the header.
     Bytes(&'a [u8]),
-    /// The words between the commas.
+    /// Between the commas.
     Words(&'a [&'a str]),
 }
 
 impl<'a> Message<'a> {
-    /// A message of this format.
     pub(super) const fn new(format: &'a Format, body: Body<'a>) -> Self {
         Self { format, body }
     }
@@ -37,12 +35,12 @@ impl<'a> Message<'a> {
         self.format.fields.get(column)
     }
 
-    /// A number, scaled by its format character; `None` if it is not finite.
+    /// Scaled; `None` if not finite.
     pub(super) fn number(&self, column: usize) -> Option<f64> {
         self.any_number(column).filter(|number| number.is_finite())
     }
 
-    /// The same, be it finite or not.
+    /// Also if not finite.
     pub(super) fn any_number(&self, column: usize) -> Option<f64> {
         let field = self.field(column)?;
         match self.body {
@@ -51,7 +49,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// A finite number in single precision.
+    /// Finite.
     pub(super) fn single(&self, column: usize) -> Option<f32> {
         let single = match (self.body, self.field(column)?) {
             (Body::Bytes(payload), Field { kind: FieldKind::Single, offset, .. }) => {
@@ -62,7 +60,7 @@ impl<'a> Message<'a> {
         Some(single).filter(|single| single.is_finite())
     }
 
-    /// A text in the place of a number, in a text log.
+    /// In a text log.
     pub(super) fn no_number(&self, column: usize) -> Option<&'a str> {
         match self.body {
             Body::Bytes(_) => None,
@@ -70,12 +68,11 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// Whether it is from a text log.
     pub(super) const fn is_words(&self) -> bool {
         matches!(self.body, Body::Words(_))
     }
 
-    /// The bytes of a text, those behind a zero too.
+    /// Also behind a zero.
     pub(super) fn bytes(&self, column: usize) -> Option<&'a [u8]> {
         let field = self.field(column)?;
         match (self.body, field.kind) {
@@ -86,7 +83,6 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// Its microseconds since power-on.
     pub(super) fn time_us(&self) -> Option<u64> {
         match self.format.time? {
             TimeField::Micros(column) => self.unsigned(column.into()),
@@ -94,7 +90,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// An unsigned number; `None` for a signed one.
+    /// `None` if signed.
     pub(super) fn unsigned(&self, column: usize) -> Option<u64> {
         let field = self.field(column)?;
         match self.body {
@@ -130,7 +126,7 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// A text. Invalid UTF-8 is read as ISO 8859-1, as in `pymavlink`.
+    /// Invalid UTF-8 is read as ISO 8859-1, as in `pymavlink`.
     pub(super) fn text(&self, column: usize) -> Option<Cow<'a, str>> {
         let field = self.field(column)?;
         match self.body {
@@ -142,7 +138,6 @@ impl<'a> Message<'a> {
         }
     }
 
-    /// One number of an array.
     pub(super) fn element(&self, column: usize, element: usize) -> Option<i16> {
         let field = self.field(column)?;
         match self.body {
@@ -167,7 +162,7 @@ fn words(bytes: &[u8]) -> Cow<'_, str> {
         .map_or_else(|_| bytes.iter().map(|byte| char::from(*byte)).collect::<String>().into(), Cow::Borrowed)
 }
 
-/// Division by 100 is exact, multiplication by 0.01 is not.
+/// Exact, unlike multiplication by 0.01.
 fn number(kind: FieldKind, bytes: &[u8]) -> Option<f64> {
     Some(match kind {
         FieldKind::I8 => f64::from(i8::from_le_bytes(*bytes.first_chunk()?)),

@@ -1,12 +1,12 @@
-//! `ArduPilot`'s onboard logs (`DataFlash`), binary (`.bin`) and text (`.log`), of 2012 until today.
+//! `ArduPilot`'s onboard logs (`DataFlash`), binary (`.bin`) and text (`.log`), since 2012.
 //!
-//! A log describes itself: FMT messages define the others, and FMTU, UNIT and MULT give their units. `format`
-//! keeps the definitions, `binary` and `text` find the messages, `message` reads their values, `clock` their
-//! times. `observe` turns them into the MAVLink reports of the same autopilot. Reading streams: for any file
-//! it keeps one buffer, the definitions (256 at most at a time) and the vehicle's state.
+//! A log describes itself: FMT messages define the others, FMTU, UNIT and MULT their units. `format` keeps
+//! the definitions, `binary` and `text` find the messages, `message` reads their values, `clock` their times.
+//! `observe` makes the MAVLink reports of the same autopilot. Reading keeps one buffer, the definitions (256
+//! at most) and the vehicle's state.
 //!
-//! The first part of a file is searched before it is read. Units may come after a message's first rows, and
-//! the kind of vehicle after its first observations.
+//! The first part of a file is searched first: units may follow a message's first rows, and the kind of
+//! vehicle its first observations.
 
 mod ahead;
 mod binary;
@@ -39,22 +39,22 @@ use self::text::{Line, Lines};
 use super::input::Input;
 use super::item::{Cause, Reader, Summary, Take, Want};
 
-/// The first part of a file, which is searched before it is read. A log of today writes its definitions and
-/// parameters, 100 KiB, within its first second, among up to 1 MiB of other messages.
+/// Searched first. Definitions and parameters, 100 KiB, come in the first second, among up to 1 MiB of other
+/// messages.
 const FIRST_BYTES: usize = 2 * 1024 * 1024;
-/// Number of bytes searched for a file's first definition.
+/// Searched for a first definition.
 const SEARCHED_BYTES: usize = 64 * 1024;
 
-/// How such a log is written.
+/// A log's encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Messages with a header of two bytes.
+    /// A header of two bytes.
     Binary,
-    /// A line for each message.
+    /// A line each.
     Text,
 }
 
-/// Whether a file that begins so is such a log, whatever follows: `FMT` is defined first, by itself.
+/// Whether a file begins as such a log: `FMT` defines itself.
 pub fn begins(start: &[u8]) -> Option<Form> {
     if start.starts_with(BEGINNING) {
         Some(Form::Binary)
@@ -63,9 +63,9 @@ pub fn begins(start: &[u8]) -> Option<Form> {
     }
 }
 
-/// Whether these first bytes of a file (64 KiB of a longer one) are those of such a log.
+/// By the first 64 KiB.
 pub fn detect(start: &[u8]) -> Option<Form> {
-    /// The header of a message that defines one: `FMT` is type 128 and 89 bytes long.
+    /// Type 128, 89 bytes.
     const FMT: &[u8] = &[0xa3, 0x95, FMT_TYPE];
     let start = start.get(..SEARCHED_BYTES).unwrap_or(start);
     let text =
@@ -77,18 +77,17 @@ pub fn detect(start: &[u8]) -> Option<Form> {
     }
 }
 
-/// Whether these first bytes are of a binary log without its own beginning. Messages are everywhere in it,
-/// and hardly any MAVLink frames. A recorded download of such a log consists of frames (90 bytes of the log
-/// in each).
+/// A binary log without its beginning: messages everywhere, and hardly any MAVLink frames. A recorded
+/// download has 90 bytes of the log in each frame.
 pub fn is_headless(start: &[u8], frames: usize) -> bool {
-    /// Maximum length of a message; by chance two such bytes occur in 64 KiB once.
+    /// Two such bytes occur in 64 KiB once by chance.
     const MESSAGE_BYTES: usize = 256;
     const HEADS_MIN: usize = 8;
     let heads = start.windows(2).filter(|bytes| *bytes == [0xA3, 0x95]).count();
     heads >= HEADS_MIN && heads * MESSAGE_BYTES >= start.len() && frames * 16 <= heads
 }
 
-/// The reader of such a log.
+/// The log's reader.
 pub fn open(input: Input, form: Form) -> Result<Box<dyn Reader>> {
     Ok(Box::new(DataFlash { input: Some(input), form }))
 }
@@ -108,11 +107,10 @@ impl Reader for DataFlash {
     }
 }
 
-/// Names of a text log at most: a file may define them for ever.
+/// A file may define names for ever.
 const NAMES_MAX: usize = 4_096;
 const CONTEXT: &str = "the log cannot be read on";
-/// A text log begins with a banner, or the menu of an old console. That is not damage of a log before it in
-/// the same file.
+/// A banner, or the menu of an old console: no damage of a log before it.
 const BANNER_BYTES_MAX: u64 = 4_096;
 const ODD_LINE: &str = "a line with bytes that are no text";
 const CUT_LINE: &str = "a line that the beginning of another log cuts off";
@@ -139,7 +137,6 @@ pub fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) ->
     session.end(take)
 }
 
-/// Looks through the first part of a log.
 fn first_of_bytes(bytes: &mut Binary<impl std::io::Read>) -> Result<First> {
     let bytes = bytes.window(FIRST_BYTES).context(CONTEXT)?;
     let (mut first, mut window, mut end) = (First::default(), Window::new(bytes), usize::MAX);
@@ -166,7 +163,7 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
     let mut skipped: Option<Skipped> = None;
     while let Some(line) = lines.next().context(CONTEXT)? {
         if let Some(at) = text::beginning(&line.words).filter(|_| session.is_timed()) {
-            // The words right before it are its banner, or the end of a line of the log before.
+            // A banner, or the end of a line of the log before.
             let (place, cut) = (line.place, at as u64);
             if cut > 0 {
                 session.gap(Cause::Cut, Some(place), cut, CUT_LINE.to_owned(), take)?;
@@ -223,7 +220,6 @@ fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Resul
     session.end(take)
 }
 
-/// Looks through the first part of a log.
 fn first_of_lines(lines: &mut Lines<impl std::io::Read>) -> Result<First> {
     let bytes = lines.window(FIRST_BYTES).context(CONTEXT)?;
     let (mut first, mut kinds, mut end) = (First::default(), Kinds::default(), u64::MAX);
@@ -253,44 +249,40 @@ fn first_of_lines(lines: &mut Lines<impl std::io::Read>) -> Result<First> {
     Ok(first)
 }
 
-/// The bytes after a line.
 fn ahead_of<'a>(line: &Line<'a>) -> Ahead<'a> {
     Ahead { bytes: line.after, is_text: true, is_end: line.is_end }
 }
 
-/// The values of a line of this type.
 fn values_of<'a>(line: &'a Line<'_>, kind: u8, formats: &format::Formats) -> Vec<&'a str> {
     let Some(format) = formats.get(kind) else { return Vec::new() };
     let mut values = text::values(&line.words, format.fields.len());
-    // Values after the last column are reported, and not read.
+    // Later values are reported, not read.
     if let Some(last) = values.last_mut().filter(|_| !format.ends_in_text()) {
         *last = last.split(',').next().unwrap_or_default();
     }
     values
 }
 
-/// Lines that could not be read.
 struct Skipped {
     place: u64,
     bytes: u64,
     words: String,
     whole: bool,
-    /// The firmware that one of them names: the banner of a log that was joined on.
+    /// The banner of a joined log.
     firmware: Option<String>,
 }
 
-/// The types of the names that lines begin with.
 #[derive(Default)]
 struct Kinds {
     by_name: HashMap<String, u8>,
-    /// Definitions have begun: earlier lines are a banner.
+    /// Earlier lines are a banner.
     begun: bool,
-    /// Types with a reported line of too many values.
+    /// Too many values were reported.
     surplus: BTreeSet<u8>,
 }
 
 impl Kinds {
-    /// The type of a line; `None` for an empty one and for a banner, an error for an invalid line.
+    /// `None` for an empty line or a banner, an error for an invalid line.
     fn of(&mut self, line: &Line<'_>, formats: &format::Formats) -> Result<Option<u8>, String> {
         let name = text::name(&line.words);
         if name == "FMT" {
@@ -300,7 +292,7 @@ impl Kinds {
         if !self.begun || line.words.trim().is_empty() {
             return Ok(None);
         }
-        // A type that has got another name since is another message.
+        // A renamed type is another message.
         let is_named = |kind: &&u8| formats.get(**kind).is_some_and(|format| format.name == name);
         let Some(&kind) = self.by_name.get(name).filter(is_named) else {
             let name: String = name.chars().take(20).collect();
@@ -314,7 +306,7 @@ impl Kinds {
         Ok(Some(kind))
     }
 
-    /// The fault of a line with more values than its type has columns; once for each type.
+    /// More values than columns; once for each type.
     fn surplus(&mut self, line: &Line<'_>, kind: u8, formats: &format::Formats) -> Option<String> {
         let format = formats.get(kind).filter(|format| !format.ends_in_text())?;
         let (columns, found) = (format.characters.max(format.fields.len()), line.words.matches(',').count());
@@ -326,7 +318,6 @@ impl Kinds {
         })
     }
 
-    /// After a definition: its name.
     fn learn(&mut self, kind: u8, formats: &format::Formats) {
         if kind == FMT_TYPE
             && let Some(format) = formats.newest()

@@ -1,4 +1,4 @@
-//! One reading of a log, message by message: keeps definitions, makes times, and hands on the wanted items.
+//! One reading of a log, message by message.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,25 +25,23 @@ use crate::source::item::{
 };
 use crate::source::pace::Pace;
 
-/// The autopilot: every log is of one.
+/// The autopilot.
 const SOURCE: Source = Source { system: 1, component: 1 };
 
-/// Maximum number of joined logs in a file: messages after these count as the last one's.
+/// Later messages count as the last log's.
 const JOINTS_MAX: u32 = 1_000;
 
-/// Facts about the whole file from its first part.
+/// From a file's first part.
 pub(super) struct First {
     formats: Formats,
     state: State,
     clock: Clock,
     handlers: Handlers,
-    /// For each type, whether the next messages have no facts about the whole file either.
+    /// By type: the next messages have no such facts either.
     idle: Vec<bool>,
-    /// The first time in a message.
     begins_us: Option<u64>,
-    /// A message that has a time has come.
     timed: bool,
-    /// The firmware, if a text log names it before its first message.
+    /// Of a text log, before its first message.
     banner: Option<String>,
 }
 
@@ -57,17 +55,16 @@ impl Default for First {
 }
 
 impl First {
-    /// The definitions so far.
     pub(super) fn formats(&self) -> &Formats {
         &self.formats
     }
 
-    /// The lengths so far, for a scanner.
+    /// For a scanner.
     pub(super) fn lengths(&mut self) -> &mut Lengths {
         &mut self.formats.lengths
     }
 
-    /// Takes a line before the first message.
+    /// Before the first message.
     pub(super) fn banner(&mut self, words: &str) {
         let words = words.trim();
         if self.banner.is_none() && self.state.is_firmware(words) {
@@ -75,12 +72,10 @@ impl First {
         }
     }
 
-    /// Whether a message that has a time has come.
     pub(super) const fn is_timed(&self) -> bool {
         self.timed
     }
 
-    /// Whether another log begins with this message.
     pub(super) fn is_another(&self, kind: u8, body: Body<'_>) -> bool {
         self.timed && begins_a_log(&self.formats, kind, body)
     }
@@ -112,8 +107,7 @@ impl First {
 }
 
 impl First {
-    /// After the first pass, the messages again: whether this one has the time of the log's beginning.
-    /// (Definitions are among the first messages, so only now can those after them be read.)
+    /// Second pass: this message has the time of the log's beginning; only now are all definitions known.
     pub(super) fn begins(&mut self, kind: u8, body: Body<'_>, ahead: Ahead<'_>) -> bool {
         let Self { formats, clock, begins_us, .. } = self;
         let Some(format) = formats.get(kind) else { return false };
@@ -123,25 +117,24 @@ impl First {
     }
 }
 
-/// Whether messages of a type have a time, also if only the receiver's.
+/// Also if only the receiver's.
 fn tells_time(format: &Format) -> bool {
     format.time.is_some() || format.name == "GPS"
 }
 
-/// Whether a message is the first one of a log.
 fn begins_a_log(formats: &Formats, kind: u8, body: Body<'_>) -> bool {
     let fmt = formats.get(kind).filter(|format| format.role == Role::Fmt);
     fmt.is_some_and(|format| is_of_itself(&Message::new(format, body)))
 }
 
-/// The type that a definition is of, and its name until now.
+/// And its name until now.
 fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String)> {
     let format = formats.get(kind).filter(|format| format.role == Role::Fmt)?;
     let of = u8::try_from(Message::new(format, body).unsigned(0)?).ok()?;
     Some((of, formats.get(of).map(|format| format.name.clone()).unwrap_or_default()))
 }
 
-/// Takes a definition, and reports its faults.
+/// Reports its faults.
 fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
     let format = formats.get(kind)?;
     let message = Message::new(format, body);
@@ -170,7 +163,6 @@ fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
     }
 }
 
-/// One reading of a log.
 pub(super) struct Session<'w> {
     want: Want<'w>,
     formats: Formats,
@@ -178,27 +170,26 @@ pub(super) struct Session<'w> {
     clock: Clock,
     handlers: Handlers,
     tables: Tables,
-    /// For each type, whether its messages are needed; not yet known after a definition.
+    /// By type; unknown after a definition.
     needed: Vec<Option<bool>>,
-    /// Messages and their bytes by type, those of a name that a type had before.
+    /// Messages and bytes by type, and by former names.
     counts: Vec<(u64, u64)>,
     counts_before: BTreeMap<String, (u64, u64)>,
     epoch: Epoch,
     firmware: String,
     rows_refused: bool,
-    /// Changes by messages without a certain time: they hold from the next message with a certain time on.
+    /// Without a certain time: from the next certain one on.
     later: Option<Standing>,
     wrong: Wrong,
     pace: Pace,
-    /// Bytes of messages since the time of one was looked at.
+    /// Since a time was looked at.
     unpaced: u64,
-    /// A message that has a time has come since the log at hand began.
+    /// In the present log.
     timed: bool,
     joints: u32,
 }
 
 impl<'w> Session<'w> {
-    /// Begins, knowing this much.
     pub(super) fn new(first: First, want: Want<'w>) -> Self {
         let mut clock = Clock::default();
         if let Some(begins_us) = first.begins_us {
@@ -226,17 +217,17 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Whether another log begins with this message: it was joined on.
+    /// Joined on.
     pub(super) fn is_another(&self, kind: u8, body: Body<'_>) -> bool {
         self.is_timed() && begins_a_log(&self.formats, kind, body)
     }
 
-    /// Whether a message that has a time has come since the log at hand began.
+    /// In the present log.
     pub(super) const fn is_timed(&self) -> bool {
         self.timed && self.joints < JOINTS_MAX
     }
 
-    /// Another log begins, with these facts: all earlier state is void.
+    /// All earlier state is void.
     pub(super) fn begin_another(&mut self, first: First, take: &mut Take<'_>) -> Result<()> {
         self.count_by_name();
         let First { formats, state, begins_us, banner, .. } = first;
@@ -254,7 +245,7 @@ impl<'w> Session<'w> {
         self.tell_banner(take)
     }
 
-    /// Messages by their names: another log has other types.
+    /// Another log has other types.
     fn count_by_name(&mut self) {
         for (kind, count) in (0..=u8::MAX).zip(&mut self.counts) {
             if let Some(format) = self.formats.get(kind).filter(|_| count.0 > 0) {
@@ -263,7 +254,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Hands on the firmware that is named before the first message.
+    /// Before the first message.
     pub(super) fn tell_banner(&mut self, take: &mut Take<'_>) -> Result<()> {
         if self.firmware.is_empty() {
             return Ok(());
@@ -271,12 +262,11 @@ impl<'w> Session<'w> {
         take(self.clock.now(), Item::Fact(Fact { about: About::Firmware, words: &self.firmware }))
     }
 
-    /// The definitions so far.
     pub(super) fn formats(&self) -> &Formats {
         &self.formats
     }
 
-    /// The lengths so far, for a scanner.
+    /// For a scanner.
     pub(super) fn lengths(&mut self) -> &mut Lengths {
         &mut self.formats.lengths
     }
@@ -318,7 +308,6 @@ impl<'w> Session<'w> {
         self.row(kind, body, take)
     }
 
-    /// Whether anything is to be done with the messages of a type.
     fn needs(&mut self, kind: u8) -> bool {
         let Self { want, formats, handlers, .. } = self;
         let Some(format) = formats.get(kind) else { return false };
@@ -327,7 +316,7 @@ impl<'w> Session<'w> {
         let rows = match want.rows {
             Rows::None => false,
             Rows::All => true,
-            // A name that changes its columns gets a number.
+            // Changed columns give the name a number.
             Rows::Named(names) => {
                 let mine = |name: &String| name.starts_with(&table::safe(&format.name));
                 names.iter().any(mine)
@@ -353,8 +342,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Reports the unreadable parts of a type at its first message: autopilots have wrong definitions of
-    /// messages that they never write.
+    /// At a type's first message: autopilots define messages wrongly that they never write.
     fn tell_odd(&mut self, kind: u8, place: u64, take: &mut Take<'_>) -> Result<()> {
         match self.formats.take_odd(kind) {
             Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),
@@ -362,7 +350,6 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// A type is another one from here on.
     fn forget(&mut self, kind: u8, name: String) {
         if let Some(needed) = self.needed.get_mut(usize::from(kind)) {
             *needed = None;
@@ -374,7 +361,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Hands on a message's reports, and the autopilot's periodic reports.
+    /// And the autopilot's periodic reports.
     fn say(
         &mut self,
         (kind, body): (u8, Body<'_>),
@@ -394,7 +381,7 @@ impl<'w> Session<'w> {
             if let Some(week_us) = receiver_us(&message) {
                 pace.witness(when.at, week_us);
             }
-            // Parameters come all at once; measurements do not.
+            // Parameters come all at once.
             if when.stands && handlers.of(format).is_some_and(|resolved| !resolved.handler.is_said) {
                 pace.stood(when.at, place);
             }
@@ -434,15 +421,14 @@ impl<'w> Session<'w> {
             state.repeat(when.at, &mut out);
         }
         if let Some(resolved) = handlers.of(format) {
-            // A message with a time that cannot be is likely damaged; its words are kept.
+            // An impossible time: likely damaged, but its words are kept.
             let is_said = resolved.handler.is_said;
             if is_said && when.own != Own::Sound {
                 let before = state.standing();
                 state.stand(later.unwrap_or(before));
                 observe::take(state, resolved, &message, (when.at, when.boot_us), &mut out);
                 let after = state.standing();
-                // Without a time, disarming counts as of the message before it, and arming as of the next: a logger pauses
-                // in between.
+                // Without a time, disarming counts with the message before, arming with the next: a logger pauses in between.
                 let waits = if when.own == Own::Wrong { after != before } else { after.arms(&before) };
                 *later = waits.then_some(after);
                 state.stand(if waits { before } else { after });
@@ -472,7 +458,7 @@ impl<'w> Session<'w> {
         })
     }
 
-    /// The table of a type's rows; `None` if the file has too many definitions.
+    /// `None` after too many definitions.
     fn table(&mut self, kind: u8, is_words: bool) -> Option<Arc<Table>> {
         let format = self.formats.get(kind)?;
         if let Some(table) = &format.table {
@@ -483,7 +469,7 @@ impl<'w> Session<'w> {
         Some(table)
     }
 
-    /// Reports once that the rows of a name with too many definitions are left out.
+    /// Once, after too many definitions.
     fn refuse_rows(&mut self, kind: u8, take: &mut Take<'_>) -> Result<()> {
         if std::mem::replace(&mut self.rows_refused, true) {
             return Ok(());
@@ -507,7 +493,6 @@ impl<'w> Session<'w> {
         take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words, own: None }))
     }
 
-    /// Totals of the reading.
     pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
         if let Some((_, words)) = self.state.open_text.take() {
             let alert = alert::of_text(None, words.as_bytes());
@@ -517,7 +502,7 @@ impl<'w> Session<'w> {
             take(self.clock.now(), Item::Gap(&gap))?;
         }
         let messages: u64 = self.counts.iter().map(|(count, _)| count).sum();
-        // The clock follows only the wanted messages.
+        // Unwanted messages are not followed.
         let has_time = |(kind, (count, _)): (u8, &(u64, u64))| {
             self.formats.get(kind).filter(|_| *count > 0).is_some_and(tells_time)
         };
@@ -534,7 +519,7 @@ impl<'w> Session<'w> {
     }
 }
 
-/// Names of a file that are counted at most: a file may define names for ever.
+/// A file may define names for ever.
 const NAMES_MAX: usize = 4_096;
 
 fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): (u64, u64)) {
@@ -546,7 +531,6 @@ fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): 
     sum.1 += bytes;
 }
 
-/// Hands on the outputs of handlers, as items.
 struct Said<'a, 't> {
     at: Instant,
     observations: bool,

@@ -4,10 +4,9 @@ use super::format::Formats;
 use super::message::Message;
 use crate::source::clock::Stamp;
 
-/// Microseconds in a week.
 const WEEK_US: u64 = 7 * 86_400 * 1_000_000;
 
-/// How times of the week become times since the first one.
+/// To times since the first one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Week {
     first_us: Option<u64>,
@@ -15,12 +14,11 @@ pub(super) struct Week {
 }
 
 impl Week {
-    /// From the first time of the week and the latest time since it.
     pub(super) const fn new(first_us: Option<u64>, before_us: u64) -> Self {
         Self { first_us, before_us }
     }
 
-    /// A time of the week as time since the first one; it goes on over the week's end.
+    /// Goes on over the week's end.
     fn since_first(self, week_us: u64) -> Option<u64> {
         let first = self.first_us?;
         let since = (week_us % WEEK_US + WEEK_US - first % WEEK_US) % WEEK_US;
@@ -30,7 +28,7 @@ impl Week {
     }
 }
 
-/// The time in a message that reports this time since power-on, microseconds.
+/// Microseconds since power-on.
 pub(super) fn stamp(
     message: &Message<'_>,
     boot_us: Option<u64>,
@@ -41,7 +39,7 @@ pub(super) fn stamp(
     Some(Stamp { us, series: usize::from(message.format().kind) })
 }
 
-/// A GPS message's time of the week, if the log has no other clock.
+/// If the log has no other clock.
 pub(super) fn week_us(message: &Message<'_>, formats: &Formats) -> Option<u64> {
     let format = message.format();
     if formats.has_boot_clock || format.name != "GPS" {
@@ -51,7 +49,7 @@ pub(super) fn week_us(message: &Message<'_>, formats: &Formats) -> Option<u64> {
     Some(ms.saturating_mul(1_000))
 }
 
-/// A receiver's time of the week, microseconds.
+/// Microseconds.
 pub(super) fn receiver_us(message: &Message<'_>) -> Option<u64> {
     let format = message.format();
     if format.name != "GPS" {

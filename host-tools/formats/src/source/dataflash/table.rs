@@ -1,4 +1,4 @@
-//! The tables of rows: a name for each definition, and the same name for the same columns only.
+//! Rows' tables: a name for each set of columns.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -7,22 +7,21 @@ use super::format::{ARRAY_LENGTH, FieldKind, Format};
 use super::message::Message;
 use crate::source::item::{Column, Columns, Kind, Table, Value};
 
-/// Tables of one name at most: a file that redefines a name for ever does not fill the memory.
+/// Of one name: a file may redefine it for ever.
 const VERSIONS_MAX: usize = 16;
-/// Tables at most: types have 256 numbers, and a definition may change. Each of them is a file of its own in Parquet, which
-/// takes some 16 KiB of memory until its end.
+/// Of 256 types with changing definitions. Each is a Parquet file, with some 16 KiB of memory until its end.
 const TABLES_MAX: usize = 1_024;
 
-/// The tables made so far, by the name of their messages.
+/// By message name.
 #[derive(Debug, Default)]
 pub(super) struct Tables {
     by_name: BTreeMap<String, Vec<Arc<Table>>>,
-    /// Their names. Two messages may get the same name, if only letters and digits are kept.
+    /// Two messages may share a name of only letters and digits.
     taken: BTreeSet<String>,
 }
 
 impl Tables {
-    /// The table of a definition with these units; `None` if there are too many. `is_words`: of a text log.
+    /// `None` if there are too many. `is_words`: of a text log.
     pub(super) fn of(&mut self, format: &Format, units: Vec<String>, is_words: bool) -> Option<Arc<Table>> {
         let columns = columns(format, units, is_words);
         if self.taken.len() >= TABLES_MAX && !self.by_name.contains_key(&format.name) {
@@ -42,7 +41,7 @@ impl Tables {
     }
 }
 
-/// The characters that are safe in a file's name.
+/// Safe in a file's name.
 pub(super) fn safe(name: &str) -> String {
     let safe = |character: char| {
         let keeps = character.is_ascii_alphanumeric() || matches!(character, '_' | '-');
@@ -66,7 +65,7 @@ fn columns(format: &Format, units: Vec<String>, is_words: bool) -> Vec<Column> {
     columns.finish()
 }
 
-/// The name of the message that holds files: its text is their content, which may be anything.
+/// Holds files: its text may be anything.
 const FILE: &str = "FILE";
 
 fn kind(format: &Format, field: FieldKind, is_words: bool) -> Kind {
@@ -86,7 +85,6 @@ fn kind(format: &Format, field: FieldKind, is_words: bool) -> Kind {
     }
 }
 
-/// Makes the values of a row and hands them on.
 pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[Value<'_>]) -> T) -> T {
     let (format, fields) = (message.format(), &message.format().fields);
     let kinds: Vec<_> = fields.iter().map(|field| kind(format, field.kind, message.is_words())).collect();

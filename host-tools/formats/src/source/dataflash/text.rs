@@ -1,7 +1,6 @@
-//! The lines of a text log: `NAME, value, value`. FMT lines define the others as in a binary log.
+//! The lines of a text log: `NAME, value, value`.
 //!
-//! Lines before the first FMT (a banner, the menu of an old console) are not damage. A line is at most 64
-//! KiB.
+//! A banner, or an old console's menu, before the first FMT is not damage. A line is at most 64 KiB.
 
 use std::borrow::Cow;
 use std::io::{self, Read};
@@ -10,32 +9,30 @@ use super::buffer::Buffer;
 
 const LINE_BYTES_MAX: usize = 64 * 1024;
 
-/// One line, without its end.
 #[derive(Debug)]
 pub(super) struct Line<'a> {
-    /// Its place in the file.
+    /// In the file.
     pub(super) place: u64,
-    /// Its bytes in the file, with its end.
+    /// With its end.
     pub(super) bytes: u64,
-    /// Its text. Invalid UTF-8 is read as ISO 8859-1.
+    /// Invalid UTF-8 is read as ISO 8859-1.
     pub(super) words: Cow<'a, str>,
-    /// It has a line end; only the last one may have none.
+    /// Only the last line may lack an end.
     pub(super) whole: bool,
-    /// The bytes here after it.
+    /// Buffered after it.
     pub(super) after: &'a [u8],
-    /// The file ends after these.
+    /// Nothing follows.
     pub(super) is_end: bool,
 }
 
 impl Line<'_> {
-    /// Whether it holds bytes that do not occur in text logs: invalid UTF-8 and control characters.
+    /// Invalid UTF-8 or control characters.
     pub(super) fn is_odd(&self) -> bool {
         let is_text = |byte: u8| byte == b'\t' || !byte.is_ascii_control();
         matches!(self.words, Cow::Owned(_)) || !self.words.bytes().all(is_text)
     }
 }
 
-/// A reader of lines.
 pub(super) struct Lines<R>(Buffer<R>);
 
 impl<R: Read> Lines<R> {
@@ -44,12 +41,12 @@ impl<R: Read> Lines<R> {
         Self(Buffer::new(input))
     }
 
-    /// The next bytes, without reading on.
+    /// Not consumed.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.0.window(bytes)
     }
 
-    /// The next line; `None` at the end.
+    /// `None` at the end.
     pub(super) fn next(&mut self) -> io::Result<Option<Line<'_>>> {
         self.0.fill(LINE_BYTES_MAX)?;
         let rest = self.0.rest();
@@ -72,7 +69,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// The values of a line after its name: as many as there are columns. The last column may contain commas.
+/// As many values as columns; the last may contain commas.
 pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
     match line.split_once(',') {
         Some((_, rest)) if columns > 0 => rest.splitn(columns, ',').collect(),
@@ -80,8 +77,7 @@ pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
     }
 }
 
-/// The place in a line at which a log begins: FMT defines itself. (The text before it is the end of another
-/// log in the same file.)
+/// FMT defines itself here; the text before is another log's end.
 pub(super) fn beginning(line: &str) -> Option<usize> {
     line.find("FMT, 128, 89, FMT")
 }

@@ -12,12 +12,11 @@ fn record(tenth: &u64) -> Vec<u8> {
     [&(1_700_000_000 * SECOND + tenth * SECOND / 10).to_be_bytes()[..], &HEARTBEAT].concat()
 }
 
-/// Results for a tlog with these times, in tenths of seconds: gaps, restarts, and the last time in tenths.
+/// Times in tenths of seconds: gaps, restarts, last time.
 fn told(tenths: &[u64]) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
     told_of(tenths.iter().flat_map(record).collect())
 }
 
-/// The same of the bytes of one.
 fn told_of(bytes: Vec<u8>) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let (mut gaps, mut restarts, mut last) = (Vec::new(), 0, Instant::ZERO);
@@ -41,13 +40,13 @@ fn one_wrong_time_is_damage_and_changes_no_other_time() {
     for (at, wrong) in [(100, 1_130), (100, 1_400), (100, 9_000), (100, 100), (0, 1_500)] {
         let mut times = usual.clone();
         times[at] = wrong;
-        // The first record's time begins the recording, unless it is the wrong one.
+        // Begins the recording, unless it is the wrong one.
         let end = if at == 0 { 198 } else { 199 };
         assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{wrong}");
     }
 }
 
-/// A tracker's records are minutes or hours apart: its last ones are as good as those before.
+/// Minutes or hours apart: the last ones are as good as those before.
 #[test]
 fn records_that_are_far_apart_have_right_times_and_a_wrong_one_at_the_end_is_seen() {
     for apart in [610, 30_000, 400_000] {
@@ -78,7 +77,7 @@ fn a_wrong_time_at_either_end_moves_no_other_time() {
             assert_eq!(told, (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{at} {wrong} {count}");
         }
     }
-    // A link that was silent for some seconds before its last frames.
+    // Silent for some seconds before the last frames.
     let late: Vec<u64> = (80_000..80_200).chain([80_250, 80_251]).collect();
     assert_eq!(told(&late), (vec![], 0, 251));
 }
@@ -99,7 +98,7 @@ fn a_wrong_time_before_a_damaged_stretch_and_before_zeros_moves_no_other_time() 
 
 #[test]
 fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
-    // Twenty records a second; every ten seconds the clock falls by 1.1 to 1.4 s.
+    // Every ten seconds the clock falls by 1.1 to 1.4 s.
     let mut times = Vec::new();
     let mut from = 80_000;
     for fall in [11, 14, 12, 13, 0] {
@@ -110,14 +109,13 @@ fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
     assert_eq!((gaps, restarts), (vec![], 4));
 }
 
-/// The report on a tlog's clock, from attitudes at these seconds of the ground station's clock and of the
-/// autopilot's.
+/// Attitudes at these seconds of the ground station's and the autopilot's clock.
 fn clock_of(times: &[(u64, u64)]) -> String {
     let tenths: Vec<(u64, u64)> = times.iter().map(|(recorded, boot)| (recorded * 10, boot * 10)).collect();
     clock_of_tenths(&tenths).0
 }
 
-/// The same of tenths of seconds, and when the last one is.
+/// In tenths, with the last one's time.
 fn clock_of_tenths(times: &[(u64, u64)]) -> (String, u64) {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let record = |(recorded, boot): &(u64, u64)| {
@@ -160,13 +158,13 @@ fn what_passed_is_told_by_the_autopilot_where_the_ground_stations_clock_is_set()
     let part = |recorded: u64, from: u64, to: u64| (from..to).map(move |boot| (recorded + boot, boot));
     for (set, forward_told) in [(15, false), (50, false), (150, true), (6_000, true), (400_000, true)] {
         let forward: Vec<_> = part(9_000, 1_000, 1_500).chain(part(9_000 + set, 1_500, 2_000)).collect();
-        // A link may hold back as much as ten seconds.
+        // As long as ten seconds.
         let told = if forward_told { ("restart ", 999) } else { ("", 999 + set) };
         assert_eq!(clock_of_tenths(&forward), (told.0.to_owned(), told.1), "{set}");
         let back: Vec<_> = part(900_000 + set, 1_000, 1_500).chain(part(900_000, 1_500, 2_000)).collect();
         assert_eq!(clock_of_tenths(&back), ("restart ".to_owned(), 999), "{set}");
     }
-    // A link that is silent, and then delivers the frames held back.
+    // Silent, then the held-back frames.
     let held = (1_500..1_560).map(|boot| (9_000 + 1_560, boot));
     let silent: Vec<_> = part(9_000, 1_000, 1_500).chain(held).chain(part(9_000, 1_560, 2_000)).collect();
     assert_eq!(clock_of_tenths(&silent), (String::new(), 999));
@@ -201,7 +199,7 @@ fn a_frame_with_a_wrong_checksum_is_damage_and_one_of_an_unknown_message_cannot_
     );
 }
 
-/// Records of attitudes and, every third, of a heartbeat, ten a second.
+/// Attitudes and, every third, a heartbeat, ten a second.
 fn records_of_two_lengths(records: u32) -> Vec<Vec<u8>> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let each = |at: u32| {
@@ -215,7 +213,6 @@ fn records_of_two_lengths(records: u32) -> Vec<Vec<u8>> {
     (0..records).map(each).collect()
 }
 
-/// Number of frames of a tlog, and its gaps.
 fn frames_and_gaps(bytes: Vec<u8>) -> (usize, Vec<(Cause, Option<u64>)>) {
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let (mut frames, mut gaps) = (0, Vec::new());
@@ -237,7 +234,7 @@ fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_an
     let place_of = |records: &[Vec<u8>], at: usize| records[..at].concat().len() as u64;
     let place = |at: usize| place_of(&records, at);
     assert_eq!(frames_and_gaps(records.concat()), (60, vec![]));
-    // The byte of a frame's length, of MAVLink 1 and 2, with each other value that there is.
+    // The length of MAVLink 1 and 2, with each other value.
     let (mut swallow, at_length) = (0, TIME_BYTES + 1);
     for at in [20, 21, 22, 57] {
         for length in 0..=u8::MAX {
@@ -250,14 +247,14 @@ fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_an
             let ends = (at + 1..60).any(|next| place(next + 1) - place(at + 1) == longer as u64);
             swallow += usize::from(ends);
             let (frames, gaps) = frames_and_gaps(bytes);
-            // The place of the record, or of its frame.
+            // The record's place, or its frame's.
             let is_told =
                 gaps.iter().any(|gap| [place(at), place(at) + TIME_BYTES as u64].map(Some).contains(&gap.1));
             assert!(frames == 59 && is_told, "{at} {length}: {frames} {gaps:?}");
         }
     }
     assert!(swallow >= 12, "{swallow}");
-    // The missing part of a record is so long that its frame ends with the next one.
+    // The cut record's frame ends with the next one.
     let mut cut = records;
     let (keep, start) = (cut[22].len() - record(&23).len(), place_of(&cut, 22));
     cut[22].truncate(keep);
@@ -273,8 +270,7 @@ fn a_clock_that_was_set_and_a_silence_are_none() {
     assert_eq!(told(&silent), (vec![], 0, 599));
 }
 
-/// The times, in milliseconds, of attitudes with these times since the autopilot's boot, and the number of
-/// restarts.
+/// Milliseconds of attitudes by time since boot, and the number of restarts.
 fn read(component: u8, boot_ms: &[u32]) -> (Vec<u64>, usize) {
     let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
     let frame = |boot_ms: &u32| encoder.frame(&mut buffer, &Packet::new(30).u32(0, *boot_ms)).to_vec();
@@ -300,7 +296,7 @@ fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_l
     assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
 }
 
-/// The gaps in raw bytes, and the power-ons and recordings that begin in them.
+/// Also power-ons and recordings that begin there.
 fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
     let mut told = Vec::new();
@@ -317,7 +313,7 @@ fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     told
 }
 
-/// Attitudes at these seconds of the autopilot's clock, raw.
+/// At seconds of the autopilot's clock.
 fn attitudes(seconds: std::ops::Range<u32>) -> Vec<u8> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let frame = |second| encoder.frame(&mut buffer, &Packet::new(30).u32(0, second * 1_000)).to_vec();
@@ -345,7 +341,7 @@ fn another_raw_recording_that_was_joined_on_is_told_from_a_restart() {
     assert_eq!(told_raw([attitudes(60..100), attitudes(3..40)].concat()), ["restart"]);
 }
 
-/// Attitudes of an autopilot that has been on for 60 to 260 s, ten a second, at times that are made of the seconds that passed.
+/// On for 60 to 260 s, ten a second, at times made of the passed seconds.
 fn ten_a_second(recorded: impl Fn(f64) -> u64) -> Vec<u8> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let record = |tenth: u64| {
@@ -368,7 +364,7 @@ fn where_the_recorded_times_stand_still_the_autopilots_count_and_it_is_damage() 
     let is_mended = |(causes, restarts, tenths): (Vec<Cause>, usize, u64)| {
         causes == [Cause::Damaged] && restarts <= 2 && (1_960..=2_010).contains(&tenths)
     };
-    // From the beginning, and from some place on: they stop, are zero, are milliseconds.
+    // They stop, are zero, are milliseconds.
     for from_s in [0.0, 20.0, 100.0, 180.0] {
         let stops = of(&|passed_s| sound(passed_s.min(from_s)));
         assert!(is_mended(stops.clone()), "{from_s}: {stops:?}");
@@ -378,10 +374,10 @@ fn where_the_recorded_times_stand_still_the_autopilots_count_and_it_is_damage() 
             of(&|passed_s| if passed_s < from_s { sound(passed_s) } else { sound(passed_s) / 1_000 });
         assert!(is_mended(milliseconds.clone()), "{from_s}: {milliseconds:?}");
     }
-    // They stand still for half a minute and then go on rightly.
+    // Half a minute of standing still.
     let stretch = of(&|passed_s| sound(if (50.0..80.0).contains(&passed_s) { 50.0 } else { passed_s }));
     assert!(is_mended(stretch.clone()), "{stretch:?}");
-    // A ground station hands on the frames of its start at once.
+    // The frames of its start come at once.
     let burst = of(&|passed_s| sound((passed_s - 8.0).max(0.0)));
     assert!(burst.0.is_empty() && (1_960..=2_010).contains(&burst.2), "{burst:?}");
     // A link that holds back five seconds again and again is sound.
@@ -400,10 +396,9 @@ fn a_clock_that_runs_backwards_is_damage() {
 #[test]
 fn nine_times_that_are_hours_ahead_move_no_other_time() {
     let sound = ten_a_second(|passed_s| 1_700_000_000 * SECOND + (passed_s * 1e6) as u64);
-    // All records are of one length.
     let (before, after) = sound.split_at(sound.len() / 2);
     let time = u64::from_be_bytes(after[..8].try_into().expect("a time"));
-    // Without any time of the autopilot.
+    // Without an autopilot's time.
     let ahead: Vec<u8> = (0..9)
         .flat_map(|record| {
             [&(time + 10_800 * SECOND + record * 1_000).to_be_bytes()[..], &HEARTBEAT].concat()

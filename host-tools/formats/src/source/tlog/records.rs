@@ -1,7 +1,6 @@
 //! The records of a tlog.
 //!
-//! Damage is walked over: bytes without a record are skipped up to the next record. Skipped bytes arrive as
-//! noise on the line, because no bytes of the file may vanish unseen.
+//! Bytes without a record are skipped, and handed on as noise.
 
 use std::io::{self, Read};
 
@@ -11,49 +10,49 @@ use crate::source::stream::read_some;
 
 pub(in crate::source) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
-/// Enough to see a record and the header of the next one.
+/// A record and the next header.
 const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
-/// Enough to see the records that confirm a time, behind damage as well.
+/// Records that confirm a time, behind damage as well.
 const AHEAD_BYTES: usize = 256 * 1024;
-/// After this many bytes without a record, the rest is not part of the log.
+/// Without a record, the rest is not the log's.
 const NOTHING_BYTES: usize = 64 * 1024;
 
-/// Recorded times before 2000 count from a power-on and are not UTC.
+/// Earlier times count from a power-on.
 pub(in crate::source) const UTC_US_MIN: u64 = 946_684_800_000_000;
-/// No recording is from after the year 2255: a time beyond is damage. It may be small: time since boot.
+/// After the year 2255: damage. Small times count since boot.
 const TIME_US_MAX: u64 = 9_000_000_000_000_000;
 
 /// One record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Record {
-    /// A frame with the time before it, in microseconds (since 1970, if the recorder knew it).
+    /// Microseconds (since 1970, if known), and a frame.
     Frame {
         /// The recorded time.
         time_us: u64,
         /// The frame.
         bytes: Vec<u8>,
     },
-    /// Bytes that belong to no record.
+    /// In no record.
     Noise(Vec<u8>),
 }
 
-/// The records of a tlog, in order.
+/// In order.
 pub struct Records<R> {
     input: R,
     buffer: Vec<u8>,
     at: usize,
     ended: bool,
-    /// Number of following bytes to keep.
+    /// Following bytes to keep.
     ahead_bytes: usize,
 }
 
 impl<R: Read> Records<R> {
-    /// Reads from `input`, no further than necessary: another program may be writing it.
+    /// No further than necessary: another program may be writing it.
     pub fn new(input: R) -> Self {
         Self { input, buffer: Vec::new(), at: 0, ended: false, ahead_bytes: RECORD_BYTES }
     }
 
-    /// Reads from `input`, and further on, so that the following records can confirm a time.
+    /// Further on: following records confirm a time.
     pub(in crate::source) fn ahead(input: R) -> Self {
         Self { ahead_bytes: AHEAD_BYTES, ..Self::new(input) }
     }
@@ -62,7 +61,7 @@ impl<R: Read> Records<R> {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// The times of the next few records, and whether no more follow.
+    /// Also whether no more follow.
     pub(in crate::source) fn times_after(&self) -> (Vec<u64>, bool) {
         let mut times = Vec::with_capacity(ASKED);
         let is_end = self.each_after(&mut |time_us, _| {
@@ -72,7 +71,7 @@ impl<R: Read> Records<R> {
         (times, is_end)
     }
 
-    /// The first result of `told` among the next frames, as far as they are here.
+    /// The first result among buffered frames.
     pub(in crate::source) fn frames_after<T>(
         &self,
         mut told: impl FnMut(u64, &[u8]) -> Option<T>,
@@ -85,7 +84,7 @@ impl<R: Read> Records<R> {
         found
     }
 
-    /// Hands on the next records until `each` returns `false`. Returns whether the recording ends with them.
+    /// Until `each` returns `false`. Returns whether the recording ends there.
     pub(in crate::source) fn each_after(&self, each: &mut dyn FnMut(u64, &[u8]) -> bool) -> bool {
         let (mut rest, mut nothing) = (self.rest(), 0);
         while !rest.is_empty() {
@@ -103,7 +102,7 @@ impl<R: Read> Records<R> {
         self.ended || nothing >= NOTHING_BYTES
     }
 
-    /// Whether the input ended with these bytes, which were the last that came, in the middle of a record.
+    /// The input ended with these last bytes, in a record.
     pub(in crate::source) fn is_cut(&self, noise: &[u8]) -> bool {
         let frame = noise.get(TIME_BYTES..).filter(|frame| !frame.is_empty());
         self.ended
@@ -118,7 +117,7 @@ impl<R: Read> Records<R> {
         }
         self.buffer.drain(..self.at);
         self.at = 0;
-        // Twice as much, so that the rest is not moved for each chunk.
+        // The rest is not moved for each chunk.
         while self.buffer.len() < 2 * self.ahead_bytes && !self.ended {
             let old = self.buffer.len();
             self.buffer.resize(old + BUFFER_BYTES, 0);
@@ -129,7 +128,7 @@ impl<R: Read> Records<R> {
         Ok(())
     }
 
-    /// The next record; `None` at the end.
+    /// `None` at the end.
     pub fn next_record(&mut self) -> io::Result<Option<Record>> {
         let mut noise = Vec::new();
         loop {
@@ -154,9 +153,8 @@ impl<R: Read> Records<R> {
     }
 }
 
-/// Time and frame length of the record that begins here. A frame with a wrong checksum counts if the next
-/// record, or the end of the file, is at its proper place. Then the message has another definition and is not
-/// damaged. A frame with a whole record in it does not count: its length is damaged, or its end is missing.
+/// Time and frame length. With a wrong checksum the next record, or the end, must be at its place: another
+/// definition. A frame around a whole record does not count: its length is damaged, or its end is missing.
 fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     let time_us = u64::from_be_bytes(bytes.get(..TIME_BYTES)?.try_into().ok()?);
     if time_us > TIME_US_MAX {
@@ -173,7 +171,7 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     counts.then_some((time_us, length))
 }
 
-/// Whether a record with a valid frame is after the first byte of a frame.
+/// After the frame's first byte.
 fn has_record_in(frame: &[u8]) -> bool {
     (1..frame.len()).any(|at| {
         let record = frame.get(at..).unwrap_or_default();

@@ -1,7 +1,4 @@
-//! The times of a tlog's records: their validity, their meaning for the recording, and whether the clock
-//! works at all.
-//!
-//! Every command that reads a tlog asks here, so that all of them have the same times.
+//! A tlog's times: validity, meaning, and whether the clock works, for every command.
 
 use std::io::Read;
 
@@ -16,45 +13,41 @@ use crate::source::doubt::Ends;
 use crate::source::item::{Cause, Gap};
 use crate::source::pace::{Pace, SLOWER};
 
-/// Microseconds since 1970, by the clock of a ground station, which may be set. A link may be silent for
-/// seconds before its last frames, and for longer after its first.
+/// Microseconds since 1970, by the clock of a ground station, which may be set. A link may be silent for seconds before its
+/// last frames, longer after its first.
 const RULES: Rules = Rules {
     from_first: true,
     old_values: false,
     ends: Ends { steady_us: 10_000_000, seldom_us: 60_000_000 },
 };
 
-/// Times that stand still from the first to the last record are invalid if there are this many records.
+/// Standing times are invalid from this many records on.
 const STILL_RECORDS: u64 = 100;
-/// A lead of the autopilot's clock from which the recorder's clock counts as stopped: a link that holds
-/// frames back makes them late, never early.
+/// A lead of the autopilot's clock: the recorder's stopped. Held-back frames are late, never early.
 const EARLY_US: i64 = 2_000_000;
-/// A ground station writes at once what it held back while it started. The recorder's clock may stand for so much of the
-/// autopilot's time at the beginning of a recording; microseconds.
+/// Microseconds: a starting ground station writes held-back frames at once, and its clock stands.
 const START_US: u64 = 30_000_000;
-/// An autopilot's times further apart than this are of two power-ons, or of two recordings; microseconds.
+/// Microseconds: two power-ons or recordings.
 const APART_US: i64 = 60_000_000;
-/// Messages of an autopilot are out of order by this at most, microseconds.
+/// Microseconds.
 const DISORDER_US: i64 = 1_000_000;
 
-/// The recorder's clock beside the autopilot's. A frame is never received before it is sent. So if the
-/// recorder's clock stands still, or goes on a hundred times slower (milliseconds as microseconds), the
-/// autopilot's clock counts.
+/// The recorder's clock beside the autopilot's: no frame is received before it is sent. A clock that stands still, or is a
+/// hundred times slower (milliseconds as microseconds), gives way to the autopilot's.
 #[derive(Clone, Copy, Debug, Default)]
 struct Beside {
-    /// The first system with an autopilot that reports its time, that time, and the recording's.
+    /// The first system that reports its time, that time, the recording's.
     last: Option<(u8, i64, i64)>,
-    /// By how much the recording's time is ahead of the autopilot's, at least.
+    /// Least lead over the autopilot's time.
     ahead_us: i64,
-    /// The recorder's clock does not run.
     stands: bool,
-    /// Time passed by the autopilot's clock alone, and its beginning.
+    /// By the autopilot's clock alone, and its beginning.
     passed_us: u64,
     began: Option<(Instant, u64)>,
 }
 
 impl Beside {
-    /// Further progress of the time beyond the recorder's clock, while that does not run.
+    /// Progress beyond a recorder's clock that does not run.
     fn told(&mut self, system: u8, boot_ms: u32, now: Instant, place: u64) -> u64 {
         let (boot_us, now_us) =
             (i64::from(boot_ms) * 1_000, i64::try_from(now.as_micros()).unwrap_or(i64::MAX));
@@ -89,7 +82,7 @@ impl Beside {
         early_us
     }
 
-    /// Faults of the recorder's clock.
+    /// Of the recorder's clock.
     fn gap(&self) -> Option<Gap> {
         let is_start = |at: Instant| at.as_micros() <= START_US && self.passed_us <= START_US && !self.stands;
         let (at, place) = self.began.filter(|(at, _)| !is_start(*at))?;
@@ -102,25 +95,25 @@ impl Beside {
     }
 }
 
-/// The power-on or recording that begins with a record.
+/// Begins with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begins {
-    /// The clock: it was set.
+    /// It was set.
     Clock,
     /// Another recording.
     Recording,
 }
 
-/// Meaning of a record's time.
+/// A record's time, judged.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Told {
-    /// Whether something begins with it.
+    /// Something begins with it.
     pub begins: Option<Begins>,
-    /// New UTC at time zero, if any: microseconds since 1970.
+    /// New UTC at time zero, microseconds since 1970.
     pub epoch_us: Option<u64>,
 }
 
-/// Follows the times of a tlog.
+/// Follows a tlog's times.
 #[derive(Debug)]
 pub struct Times {
     clock: Clock,
@@ -147,12 +140,12 @@ impl Default for Times {
 }
 
 impl Times {
-    /// The latest time that counts.
+    /// The latest valid time.
     pub const fn now(&self) -> Instant {
         self.now
     }
 
-    /// Takes the time of a record with this frame, at this byte.
+    /// Of a record at this byte.
     pub fn take<R: Read>(&mut self, time_us: u64, bytes: &[u8], place: u64, after: &Records<R>) -> Told {
         let told = self.time(time_us, place, after);
         if let Peek::Frame(frame) = peek(bytes)
@@ -170,7 +163,6 @@ impl Times {
         told
     }
 
-    /// Meaning of a time.
     fn time<R: Read>(&mut self, time_us: u64, place: u64, after: &Records<R>) -> Told {
         self.records += 1;
         let before = self.clock.recorded_us();
@@ -180,7 +172,7 @@ impl Times {
             Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
         };
         let (joints, stands) = (self.joints, self.beside.stands);
-        // While the clock stood still, the time passed has been counted.
+        // Counted while the clock stood still.
         let passed = || if stands { Some(1) } else { joints.elapsed_us(before?, time_us, after) };
         let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
             self.wrong.add(self.now, place);
@@ -210,7 +202,7 @@ impl Times {
         Told { begins, epoch_us }
     }
 
-    /// Faults of the times, once all were taken: damage.
+    /// Damage, once all were taken.
     pub fn gaps(&self) -> impl Iterator<Item = Gap> {
         self.wrong
             .gap()
@@ -219,7 +211,7 @@ impl Times {
             .chain(self.no_times().or_else(|| self.pace.gap()))
     }
 
-    /// The damage report if none of this many frames has a possible time.
+    /// None of the frames has a possible time.
     pub fn none_of(&self, frames: u64) -> Option<Gap> {
         let words = format!(
             "{} without a time that can be one: nothing in the log can be judged",
@@ -228,7 +220,7 @@ impl Times {
         (self.records == 0 && frames > 0).then(|| Gap::new(None, Cause::NoTimes, words))
     }
 
-    /// The damage report if the recorded times are invalid.
+    /// The recorded times are invalid.
     fn no_times(&self) -> Option<Gap> {
         if self.now != Instant::ZERO || self.records < STILL_RECORDS {
             return None;

@@ -1,9 +1,9 @@
-//! The fields of messages that the mapping needs, found once for a subscription.
+//! The mapping's fields, found once for a subscription.
 
 use super::format::{Layout, Number};
 use super::message::words;
 
-/// Place of a field for the mapping in a message's data.
+/// A field's place in a message's data.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     number: Number,
@@ -11,7 +11,7 @@ pub(super) struct Slot {
     count: u32,
 }
 
-/// Places of these fields, whose names have spaces between.
+/// `fields`: names with spaces between.
 pub(super) fn slots(layout: &Layout, fields: &str) -> Vec<Option<Slot>> {
     let slot = |name: &str| {
         let field = layout.fields.iter().find(|field| field.name == name)?;
@@ -20,7 +20,7 @@ pub(super) fn slots(layout: &Layout, fields: &str) -> Vec<Option<Slot>> {
     fields.split(' ').map(slot).collect()
 }
 
-/// The fields of a message that the mapping needs, by their places in `Topic::fields`.
+/// By place in `Topic::fields`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fields<'a> {
     slots: &'a [Option<Slot>],
@@ -32,7 +32,7 @@ impl<'a> Fields<'a> {
         Self { slots, data }
     }
 
-    /// An element of a field; `None` if this version of PX4 does not have it.
+    /// `None` if this version of PX4 lacks it.
     pub(super) fn element(&self, field: usize, element: usize) -> Option<f64> {
         let slot = (*self.slots.get(field)?)?;
         if element >= slot.count as usize {
@@ -48,12 +48,12 @@ impl<'a> Fields<'a> {
         self.element(field, 0)
     }
 
-    /// A number that is one.
+    /// Finite.
     pub(super) fn finite(&self, field: usize) -> Option<f32> {
         self.get(field).map(|value| value as f32).filter(|value| value.is_finite())
     }
 
-    /// An integer that is not negative.
+    /// Not negative.
     pub(super) fn count(&self, field: usize) -> Option<u64> {
         self.get(field).filter(|value| *value >= 0.0).map(|value| value as u64)
     }
@@ -63,12 +63,12 @@ impl<'a> Fields<'a> {
         self.count(field).and_then(|value| u8::try_from(value).ok())
     }
 
-    /// Whether a flag is set; `false` without one.
+    /// `false` without one.
     pub(super) fn flag(&self, field: usize) -> bool {
         self.get(field).is_some_and(|value| value != 0.0)
     }
 
-    /// All elements, if all are numbers.
+    /// All or none.
     pub(super) fn vector<const N: usize>(&self, field: usize) -> Option<[f32; N]> {
         let mut vector = [0.0; N];
         for (element, value) in vector.iter_mut().enumerate() {

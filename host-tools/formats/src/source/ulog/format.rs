@@ -1,9 +1,8 @@
-//! Format definitions, and the layouts of messages that follow from them.
+//! Format definitions and layouts of messages.
 //!
-//! A definition (`vehicle_attitude:uint64_t timestamp;float[4] q;`) may name other definitions as types of
-//! its fields, also later ones. [`Formats::layout`] resolves one to its numbers: a flat list of fields, each
-//! with its place. The limits guard against hostile files: a definition that names itself, a thousand that
-//! name each other, an array of four billion. PX4's own logs stay far below each.
+//! A definition (`vehicle_attitude:uint64_t timestamp;float[4] q;`) may name other definitions as types of its
+//! fields, also later ones. [`Formats::layout`] resolves one to a flat list of numbers with places. Limits guard
+//! against hostile files; PX4's logs stay far below.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -11,18 +10,17 @@ use std::sync::Arc;
 
 use crate::source::item::Value;
 
-/// Definitions in one log at most. PX4 has some 250.
+/// In one log. PX4 has some 250.
 const FORMATS_MAX: usize = 1_024;
-/// Bytes of all definitions at most: PX4's are some 60 KiB.
+/// PX4's are some 60 KiB.
 const TEXT_BYTES_MAX: usize = 1 << 20;
-/// How deep definitions may name each other. PX4's deepest is 2.
+/// Of definitions that name each other. PX4's deepest is 2.
 const DEPTH_MAX: usize = 8;
-/// Bytes of one message at most: its length is a `u16`, and two are the subscription's number.
+/// The length is a `u16`, two bytes of it the subscription's number.
 const MESSAGE_BYTES_MAX: usize = u16::MAX as usize - 2;
-/// Fields of all resolved definitions at most, each element of an array of definitions counted. PX4: some 6,000.
+/// Of all resolved definitions, elements of arrays of definitions counted. PX4: some 6,000.
 const FIELDS_MAX: usize = 32_768;
 
-/// A type of number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     I8,
@@ -67,7 +65,7 @@ impl Number {
         }
     }
 
-    /// The value in these bytes, which are as many as the type has; the code of a character.
+    /// As many bytes as the type has; the code of a character.
     pub(super) fn value(self, bytes: &[u8]) -> Option<Value<'static>> {
         Some(match self {
             Self::U8 | Self::Char => Value::Unsigned(u64::from(*bytes.first()?)),
@@ -85,15 +83,15 @@ impl Number {
     }
 }
 
-/// A number, or an array of them, in a message.
+/// Or an array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Field {
-    /// Its name with those of the definitions around it: `esc[3].esc_rpm`.
+    /// `esc[3].esc_rpm`, with the definitions around it.
     pub(super) name: String,
     pub(super) number: Number,
-    /// Number of elements of an array.
+    /// Elements of an array.
     pub(super) array: Option<u32>,
-    /// Offset in the message's data.
+    /// In the message's data.
     pub(super) offset: u32,
 }
 
@@ -101,30 +99,27 @@ pub(super) struct Field {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     pub(super) name: String,
-    /// Without padding, in order of their places.
+    /// Without padding, by place.
     pub(super) fields: Vec<Field>,
-    /// Bytes of its data.
+    /// Of its data.
     pub(super) bytes: usize,
-    /// The same without the padding at its end, which a writer leaves out.
+    /// Without padding at the end, which a writer leaves out.
     pub(super) least_bytes: usize,
-    /// Place of its time.
+    /// Of its time.
     pub(super) timestamp: Option<u32>,
 }
 
-/// Why a definition is of no use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum FormatError {
-    /// It does not read `name:type field;`.
     Malformed,
     /// There are too many already.
     TooMany,
-    /// It exists already, with another definition.
+    /// With another definition.
     Redefined(String),
-    /// No definition has this name.
     Unknown(String),
-    /// Definitions that name each other deeper than [`DEPTH_MAX`], or in a circle.
+    /// Deeper than [`DEPTH_MAX`], or in a circle.
     TooDeep(String),
-    /// A message of it would be longer than any message.
+    /// Longer than any message.
     TooLong(String),
 }
 
@@ -147,7 +142,6 @@ impl fmt::Display for FormatError {
 
 impl std::error::Error for FormatError {}
 
-/// A field as it is written down.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Written {
     kind: String,
@@ -155,13 +149,13 @@ struct Written {
     name: String,
 }
 
-/// The definitions of a log.
+/// Of a log.
 #[derive(Debug)]
 pub(super) struct Formats {
     written: HashMap<String, Vec<Written>>,
     layouts: HashMap<String, Result<Arc<Layout>, FormatError>>,
     text_bytes: usize,
-    /// Fields that there is room for.
+    /// Room for fields.
     left: usize,
 }
 
@@ -172,7 +166,7 @@ impl Default for Formats {
 }
 
 impl Formats {
-    /// Takes a definition. The same one again is harmless.
+    /// The same one again is harmless.
     pub(super) fn define(&mut self, text: &[u8]) -> Result<(), FormatError> {
         let (name, fields) = parse(text).ok_or(FormatError::Malformed)?;
         if let Some(known) = self.written.get(name) {
@@ -183,18 +177,18 @@ impl Formats {
             return Err(FormatError::TooMany);
         }
         self.written.insert(name.to_owned(), fields);
-        // A definition that was missing may be there now.
+        // A missing definition may be there now.
         self.layouts.retain(|_, layout| layout.is_ok());
         Ok(())
     }
 
-    /// The resolved definition of this name. Each is resolved once.
+    /// Resolved once.
     pub(super) fn layout(&mut self, name: &str) -> Result<Arc<Layout>, FormatError> {
         if let Some(known) = self.layouts.get(name) {
             return known.clone();
         }
         let layout = self.resolve(name);
-        // Results for names without a definition are not kept: there may be 65,536 of them.
+        // Not kept: 65,536 names are possible.
         if self.written.contains_key(name) {
             self.layouts.insert(name.to_owned(), layout.clone());
         }
@@ -204,7 +198,7 @@ impl Formats {
     fn resolve(&mut self, name: &str) -> Result<Arc<Layout>, FormatError> {
         let mut walk = Walk { formats: self, fields: Vec::new(), bytes: 0, left: self.left };
         let result = walk.definition(name, "", 0);
-        // The effort counts even without a result.
+        // Also without a result.
         let Walk { fields, bytes, left, .. } = walk;
         self.left = left;
         result?;
@@ -224,12 +218,11 @@ impl Formats {
     }
 }
 
-/// Goes through a definition and those that it names.
 struct Walk<'a> {
     formats: &'a Formats,
     fields: Vec<Field>,
     bytes: usize,
-    /// Fields that there is room for.
+    /// Room for fields.
     left: usize,
 }
 
@@ -249,7 +242,7 @@ impl Walk<'_> {
             }
             match field.array {
                 None => self.definition(&field.kind, &format!("{path}."), depth + 1)?,
-                // Each element has a byte at least, so this ends at the longest message.
+                // An element has a byte at least: this ends at the longest message.
                 Some(count) => (0..count).try_for_each(|element| {
                     self.definition(&field.kind, &format!("{path}[{element}]."), depth + 1)
                 })?,
@@ -301,7 +294,7 @@ fn parse(text: &[u8]) -> Option<(&str, Vec<Written>)> {
     (!written.is_empty()).then_some((name, written))
 }
 
-/// An array has at least one element: an empty one would make an empty definition.
+/// An empty array would make an empty definition.
 fn written(field: &str) -> Option<Written> {
     let (kind, name) = typed(field)?;
     let (kind, array) = kind;
@@ -311,12 +304,12 @@ fn written(field: &str) -> Option<Written> {
     Some(Written { kind: kind.to_owned(), array, name: name.to_owned() })
 }
 
-/// `type name` or `type[count] name`, as fields are written. PX4 writes empty lines as `char[0]`.
+/// `type name` or `type[count] name`. PX4 writes empty lines as `char[0]`.
 pub(super) fn typed(text: &str) -> Option<((&str, Option<u32>), &str)> {
     split(text).filter(|(_, name)| is_name(name))
 }
 
-/// The same as the keys of values are written: some writers put spaces into their names (`char[11] Build Date`).
+/// As [`typed`], for names with spaces (`char[11] Build Date`).
 pub(super) fn typed_key(text: &str) -> Option<((&str, Option<u32>), &str)> {
     split(text).filter(|(_, name)| name.split(' ').all(is_name))
 }
@@ -375,7 +368,7 @@ mod tests {
                 ("one.y", 40)
             ]
         );
-        // The padding within counts; that at the end may be left out.
+        // Padding at the end may be left out.
         assert_eq!((layout.bytes, layout.least_bytes, layout.timestamp), (47, 44, Some(0)));
     }
 
@@ -400,7 +393,6 @@ mod tests {
                 "{text}"
             );
         }
-        // Ten to the eighth, level by level.
         let texts: Vec<String> = (0..7).map(|level| format!("n{level}:n{}[15] x;", level + 1)).collect();
         let mut wide = formats(&texts.iter().map(String::as_str).collect::<Vec<_>>());
         wide.define(b"n7:uint8_t[255] _padding;").expect("a definition");

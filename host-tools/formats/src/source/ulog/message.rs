@@ -1,9 +1,8 @@
 //! Messages: three bytes of header (length, kind), and a body.
 //!
-//! `ULog` has no checksum, so a message counts by its content. Each kind has possible lengths and contents.
-//! If those leave doubt, the next header must be valid as well ([`Parser::look`]). After damage the next
-//! possible message is searched ([`Parser::find`]), such as the synchronisation message that the logger
-//! writes twice a second.
+//! Without a checksum in `ULog` a message counts by its content: each kind has possible lengths and contents.
+//! In doubt the next header must be valid as well ([`Parser::look`]). After damage the next message is
+//! searched ([`Parser::find`]): synchronisation comes twice a second.
 
 use super::format::{Number, typed_key};
 
@@ -11,24 +10,20 @@ use super::format::{Number, typed_key};
 pub(super) const HEADER_BYTES: usize = 3;
 /// The longest message.
 pub(super) const MESSAGE_BYTES_MAX: usize = HEADER_BYTES + u16::MAX as usize;
-/// The file's header: magic, version, and the time at which logging began.
+/// Magic, version, start of logging.
 pub(super) const FILE_HEADER_BYTES: usize = 16;
-/// How a file begins.
 pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
-/// Place of the format's version in the header, and the newest known version: PX4 writes 1, and wrote 0
-/// before v1.8.
+/// Of the format's version in the header; PX4 writes 1, and wrote 0 before v1.8.
 pub(super) const VERSION_AT: usize = MAGIC.len();
 pub(super) const VERSION_MAX: u8 = 1;
-/// The longest message other than data in a search after damage. Each byte may begin one, and checking 65,536
-/// bytes for each would take seconds a megabyte.
+/// In a search, other than data: checking 65,536 bytes for each byte would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
-/// Content of a synchronisation message.
+/// Of a synchronisation message.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
-/// A message in the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Message<'a> {
-    /// `B`: flags for the reader, and places of appended data.
+    /// `B`: flags, and places of appended data.
     Flags { incompatible: [u8; 8], appended: [u64; 3] },
     /// `F`
     Format(&'a [u8]),
@@ -36,7 +31,7 @@ pub(super) enum Message<'a> {
     Information { value: Keyed<'a>, multiple: bool },
     /// `P`
     Parameter(Keyed<'a>),
-    /// `Q`, with its groups: 1 system-wide, 2 of the configuration.
+    /// `Q`: 1 system-wide, 2 of the configuration.
     Default { groups: u8, value: Keyed<'a> },
     /// `A`
     Subscribe { id: u16, instance: u8, name: &'a str },
@@ -44,19 +39,19 @@ pub(super) enum Message<'a> {
     Unsubscribe(u16),
     /// `D`
     Data { id: u16, data: &'a [u8] },
-    /// `L`, and `C` with a tag: the module that sends it.
+    /// `L`, and `C` with the sending module's tag.
     Text { level: u8, tag: Option<u16>, time_us: u64, words: &'a [u8] },
     /// `O`, milliseconds.
     Dropout(u16),
     /// `S`
     Sync,
-    /// Another log begins: the header of a file in the middle of one.
+    /// A file's header in the middle.
     Beginning { version: u8, time_us: u64 },
-    /// A kind that is newer than this reader.
+    /// Newer than this reader.
     Unknown,
 }
 
-/// A value with its type and name.
+/// With type and name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Keyed<'a> {
     pub(super) name: &'a str,
@@ -73,7 +68,7 @@ impl<'a> Keyed<'a> {
         Some(Self { name, number: Number::named(kind), array, value })
     }
 
-    /// Whether the value has the length of its type.
+    /// As long as its type.
     fn fits(&self) -> bool {
         self.number
             .is_some_and(|number| number.bytes() * self.array.unwrap_or(1) as usize == self.value.len())
@@ -92,51 +87,46 @@ impl<'a> Keyed<'a> {
     }
 }
 
-/// The text at the beginning of some bytes: up to the first NUL or the first invalid UTF-8 byte.
+/// Up to the first NUL or invalid UTF-8 byte.
 pub(super) fn words(bytes: &[u8]) -> &str {
     let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
     bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid())
 }
 
-/// The piece at the beginning of some bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found<'a> {
-    /// A message, and its bytes with the header.
+    /// With its bytes, header included.
     Message(Message<'a>, usize),
-    /// The input ends within a message.
+    /// Within a message.
     Cut,
     /// No valid message.
     Nothing,
 }
 
-/// Whether messages of data have the length of their subscription: `Some(true)` or `Some(false)`; `None`
-/// without such a subscription.
+/// Data have their subscription's length; `None` without a subscription.
 pub(super) type Fits<'a> = dyn Fn(u16, usize) -> Option<bool> + 'a;
 
-/// Tells messages from other bytes.
 pub(super) struct Parser<'a> {
     pub(super) fits: &'a Fits<'a>,
 }
 
-/// Credibility of a message.
 enum Belief<'a> {
-    /// Its contents are such that chance does not make them.
+    /// Not made by chance.
     Sure(Message<'a>),
-    /// It could be one, if the next one is.
+    /// If the next one is.
     Likely(Message<'a>),
-    /// It cannot be one.
     Not,
 }
 
 impl Parser<'_> {
-    /// The piece at the beginning of `rest`. If `rest` is shorter than the longest message and the next
-    /// header, it is the end of the input.
+    /// The piece at the beginning. A `rest` shorter than the longest message and the next header ends the
+    /// input.
     pub(super) fn look<'a>(&self, rest: &'a [u8]) -> Found<'a> {
         if let Some((version, time_us)) = beginning(rest) {
             return Found::Message(Message::Beginning { version, time_us }, FILE_HEADER_BYTES);
         }
         let Some((kind, body_bytes)) = header(rest) else {
-            // Less than a header at the end is a message that was cut.
+            // A part of a header at the end is a cut message.
             let cut = rest.len() < HEADER_BYTES && rest.iter().any(|&byte| byte != 0);
             return if cut { Found::Cut } else { Found::Nothing };
         };
@@ -145,7 +135,7 @@ impl Parser<'_> {
             return if could_be(kind, body_bytes) { Found::Cut } else { Found::Nothing };
         };
         match self.believe(kind, body) {
-            // A log that was cut and had another one joined on: its last message is not whole.
+            // A cut log with another joined on: its last message is not whole.
             Belief::Sure(_) if self.swallows_a_beginning(rest, bytes) => Found::Nothing,
             Belief::Sure(message) => Found::Message(message, bytes),
             Belief::Likely(message) if self.goes_on(rest.get(bytes..).unwrap_or_default()) => {
@@ -155,8 +145,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Place in `rest` of the next valid message, from `from` on. `Err` is the number of bytes that certainly
-    /// begin none. At the end of the input (`last`) these are all, or else all but the longest message.
+    /// The next valid message's place, from `from` on. `Err`: bytes that begin none; at the input's end
+    /// (`last`) all, or else all but the longest message.
     pub(super) fn find(&self, rest: &[u8], from: usize, last: bool) -> Result<usize, usize> {
         let end = if last { rest.len() } else { rest.len().saturating_sub(MESSAGE_BYTES_MAX + HEADER_BYTES) };
         (from..end).find(|&at| self.begins(rest.get(at..).unwrap_or_default())).ok_or(end)
@@ -181,7 +171,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Whether a message, a header, or the end is here.
+    /// A message, a header, or the end.
     fn goes_on(&self, rest: &[u8]) -> bool {
         if rest.is_empty() || beginning(rest).is_some() {
             return true;
@@ -195,7 +185,7 @@ impl Parser<'_> {
         })
     }
 
-    /// Whether another log begins within these first bytes, and no message follows them.
+    /// Another log begins within, and no message follows these bytes.
     fn swallows_a_beginning(&self, rest: &[u8], bytes: usize) -> bool {
         let inside = rest.get(HEADER_BYTES..bytes + MAGIC.len() - 1).unwrap_or_default();
         !self.goes_on(rest.get(bytes..).unwrap_or_default())
@@ -204,7 +194,7 @@ impl Parser<'_> {
 
     fn believe<'a>(&self, kind: u8, body: &'a [u8]) -> Belief<'a> {
         if !could_be(kind, body.len()) {
-            // By the format, newer kinds are ignored: letters, so far always.
+            // Newer kinds are ignored: letters so far.
             let newer = kind.is_ascii_alphabetic() && !KINDS.contains(&kind) && !body.is_empty();
             return if newer { Belief::Likely(Message::Unknown) } else { Belief::Not };
         }
@@ -268,10 +258,8 @@ impl Parser<'_> {
     }
 }
 
-/// The kinds of message that there are.
 const KINDS: [u8; 13] = *b"BFIMPQARDLCSO";
 
-/// Whether a message of this kind can have this length.
 fn could_be(kind: u8, bytes: usize) -> bool {
     match kind {
         b'B' => (40..=1_024).contains(&bytes),
@@ -288,14 +276,13 @@ fn could_be(kind: u8, bytes: usize) -> bool {
     }
 }
 
-/// Kind, and length of the body.
+/// With the body's length.
 fn header(rest: &[u8]) -> Option<(u8, usize)> {
     let &[low, high, kind] = rest.first_chunk::<HEADER_BYTES>()?;
     Some((kind, usize::from(u16::from_le_bytes([low, high]))))
 }
 
-/// The messages of data at the beginning of some bytes, with the numbers of their subscriptions, until
-/// another message comes.
+/// Data messages until another kind, with their subscriptions.
 pub(super) const fn data_after(bytes: &[u8]) -> DataAfter<'_> {
     DataAfter { rest: bytes }
 }
@@ -320,7 +307,7 @@ impl<'a> Iterator for DataAfter<'a> {
     }
 }
 
-/// Version and time in the header of a file, if it is here.
+/// In a file's header.
 pub(super) fn beginning(rest: &[u8]) -> Option<(u8, u64)> {
     let header = rest.first_chunk::<FILE_HEADER_BYTES>()?;
     header.starts_with(&MAGIC).then(|| (header[VERSION_AT], word(header.get(8..))))
@@ -336,7 +323,7 @@ fn flags<'a>(body: &[u8]) -> Option<Message<'a>> {
     Some(Message::Flags { incompatible, appended })
 }
 
-/// A level is a digit; words are words.
+/// A digit, and words.
 fn text(kind: u8, body: &[u8]) -> Option<Belief<'_>> {
     let (&level, rest) = body.split_first()?;
     let level = level.checked_sub(b'0').filter(|level| *level < 8)?;

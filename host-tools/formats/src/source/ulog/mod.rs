@@ -1,8 +1,7 @@
 //! PX4's onboard logs (`ULog`): `.ulg`.
 //!
-//! A log begins with a header and definitions: formats of messages, parameters, information. Then come
-//! messages of data, each of a topic that a subscription gave a number. The format is described in PX4's
-//! guide, "`ULog` File Format".
+//! Header and definitions come first: formats, parameters, information. Then data, each of a topic that a
+//! subscription numbered. Source: PX4's guide, "`ULog` File Format".
 //!
 //! | file | does |
 //! |---|---|
@@ -16,9 +15,8 @@
 //! | `px4` | observations from PX4's topics, the same as from PX4's MAVLink messages |
 //! | `session` | one pass over all of it |
 //!
-//! Memory is bounded for any file: a window of 768 KiB, 1,024 definitions with 32,768 fields, 4,096
-//! subscriptions. Appended data (a crash dump) is read after the data before it. Nothing here panics for any
-//! input.
+//! Memory: a window of 768 KiB, 1,024 definitions with 32,768 fields, 4,096 subscriptions. Appended data (a
+//! crash dump) come last.
 
 mod fields;
 mod format;
@@ -41,7 +39,7 @@ use super::input::Input;
 use super::item::{Reader, Summary, Take, Want};
 use window::Window;
 
-/// Whether these first bytes of a file are those of such a log.
+/// By the first bytes.
 pub fn detect(start: &[u8]) -> bool {
     start.starts_with(&message::MAGIC)
 }
@@ -51,7 +49,7 @@ pub fn open(input: Input) -> Result<Box<dyn Reader>> {
     Ok(Box::new(Ulog::new(input)))
 }
 
-/// A log, to be read once.
+/// Read once.
 pub struct Ulog<R> {
     window: Window<R>,
 }

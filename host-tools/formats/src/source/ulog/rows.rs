@@ -1,15 +1,14 @@
-//! The log's own rows: every field of every message under its own name, with the unit if known.
+//! Every field of every message under its own name.
 //!
-//! `ULog` has no units. PX4's names end in them (`voltage_v`, `vel_m_s`), and `unit` uses that.
+//! `ULog` has no units. PX4's names end in units (`voltage_v`, `vel_m_s`): `unit` uses that.
 
 use super::format::{Field, Layout, Number};
 use super::message::words;
 use crate::source::item::{Columns, Kind, Table, Value};
 
-/// The column with the instance of a topic. It is the first one, as there may be two batteries.
+/// A topic's instance. There may be two batteries.
 pub(super) const INSTANCE: &str = "multi_id";
 
-/// The table of a topic's rows.
 pub(super) fn table(layout: &Layout) -> Table {
     let mut columns = Columns::default();
     columns.push(INSTANCE, "", Kind::Unsigned);
@@ -26,20 +25,19 @@ pub(super) fn table(layout: &Layout) -> Table {
     Table { name: table_name(layout), columns: columns.finish() }
 }
 
-/// Number of its columns.
 pub(super) fn columns(layout: &Layout) -> usize {
     1 + layout.fields.iter().map(|field| elements(field).unwrap_or(1) as usize).sum::<usize>()
 }
 
-/// Names of tables other than topics.
+/// Other than topics.
 pub(super) const DEFAULTS: &str = "default_parameters";
 pub(super) const INFORMATION: &str = "information";
 pub(super) const PARAMETERS: &str = "parameters";
 pub(super) const TEXTS: &str = "logged_messages";
 const OWN: [&str; 4] = [DEFAULTS, INFORMATION, PARAMETERS, TEXTS];
 
-/// Its name: the topic's, without characters that are invalid in file names. A topic with one of our own
-/// table names gets a prefix; PX4's topics have other names.
+/// The topic's, without characters that are invalid in file names; like one of our tables' names, with a
+/// prefix.
 pub(super) fn table_name(layout: &Layout) -> String {
     let name = layout.name.replace('/', "_");
     let is_taken =
@@ -47,7 +45,7 @@ pub(super) fn table_name(layout: &Layout) -> String {
     if is_taken { format!("topic_{name}") } else { name }
 }
 
-/// The values of a message, as many as its table has columns.
+/// As many as columns.
 pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<Value<'a>> {
     let mut values = Vec::with_capacity(layout.fields.len() + 1);
     values.push(Value::Unsigned(u64::from(instance)));
@@ -67,7 +65,7 @@ pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<V
     values
 }
 
-/// Number of columns of an array; `None` for a single value or a text.
+/// Columns of an array; `None` for a single value or a text.
 fn elements(field: &Field) -> Option<u32> {
     field.array.filter(|_| field.number != Number::Char)
 }
@@ -83,17 +81,17 @@ fn kind(number: Number) -> Kind {
     }
 }
 
-/// Ends of names and their units, the longest first. From the message definitions of PX4 v1.8 to v1.16.
+/// Ends of names, longest first. PX4 v1.8 to v1.16.
 const UNITS: &str = "_m_s_s=m/s2 _m_s2=m/s2 _m_s=m/s _rad_s=rad/s _deg_s=deg/s _rad=rad _deg=deg _msl_m=m _alt_meter=m \
     _ellipsoid_m=m _celcius=degC _celsius=degC _usec=us _us=us _ms=ms _hz=Hz _pa=Pa _mah=mAh _wh=Wh \
     _ga=G _gs=G _rpm=rpm _percent=% _cell_v=V _filtered_v=V voltage_v=V 5v_v=V 3v3_v=V current_a=A \
     _average_a=A _filtered_a=A";
 
-/// Names without their unit at the end.
+/// Without a unit at the end.
 const NAMED: &str = "timestamp=us timestamp_sample=us esc_voltage=V esc_current=A esc_temperature=degC vx=m/s vy=m/s \
     vz=m/s ref_alt=m dist_bottom=m eph=m epv=m time_remaining_s=s voltage5V_v=V";
 
-/// The unit of a field; empty if unknown.
+/// Empty if unknown.
 pub(super) fn unit(name: &str) -> &'static str {
     let name = name.rsplit_once('.').map_or(name, |(_, last)| last);
     let pairs = |table: &'static str| table.split(' ').filter_map(|pair| pair.split_once('='));

@@ -1,4 +1,4 @@
-//! One pass over a log: message by message, from the header to the last appended data.
+//! One pass over a log.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -26,25 +26,24 @@ use crate::source::item::{
 };
 use crate::source::pace::Pace;
 
-/// An event older than this when it comes is from before the log.
+/// An older event is from before the log.
 const OLD_US: u64 = 1_000_000;
 
-/// Bytes needed for a look: the longest message, and the look-ahead.
+/// The longest message, and the look-ahead.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
-/// Bytes needed for a search for the next message.
+/// For a search.
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
-/// The incompatible flag that is known: data was appended.
+/// Data was appended.
 const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
-/// Offsets of appended data that wait at most: the header has three.
+/// Waiting offsets: the header has three.
 const APPENDED_MAX: usize = 3;
-/// Topics that PX4 keeps on its card, with the time of the boot at which they were made.
+/// Kept on PX4's card, with the time of their boot.
 const KEPT_OVER_BOOTS: [&str; 1] = ["mission"];
-/// The dump that PX4 appends to the last log after a hard fault (`hardfault_log`).
+/// Appended to the last log after a hard fault (`hardfault_log`).
 const HARD_FAULT: &str = "hardfault_plain";
-/// Words of one piece of information at most.
+/// Of one piece of information.
 const WORDS_BYTES_MAX: usize = 256;
 
-/// Reads a log from its beginning to its end.
 pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
     window.fill(FILE_HEADER_BYTES);
     let Some((version, time_us)) = beginning(window.rest()) else {
@@ -81,7 +80,6 @@ pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut T
     session.end()
 }
 
-/// Goes on to the next message that can be believed.
 fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: bool) -> Result<()> {
     let place = window.place();
     let (mut from, mut bytes, mut zeros, mut found) = (1, 0, true, false);
@@ -108,7 +106,6 @@ fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: b
     session.gap(cause, Some(place), bytes, words)
 }
 
-/// State of a reading.
 struct Session<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
@@ -120,21 +117,21 @@ struct Session<'a, 'b> {
     information: BTreeMap<&'static str, String>,
     told_facts: bool,
     told_hard_fault: bool,
-    /// Places of appended data still to be read, in order.
+    /// To be read, in order.
     appended: Vec<u64>,
-    /// Place of the present log in the file.
+    /// The present log's place.
     base: u64,
-    /// Messages of data with an unknown subscription: their number, and the place of the first one.
+    /// Unknown subscriptions: number, first place.
     strays: (u64, u64),
-    /// The last text reported: a topic and a logged string may have the same.
+    /// A topic and a logged string may repeat it.
     last_words: String,
     wrong: Wrong,
-    /// Bytes that may be looked at for further jumps of the time.
+    /// For further jumps of the time.
     asked_left: usize,
     pace: Pace,
 }
 
-/// Information that is more than rows.
+/// Information besides rows.
 const KEPT: [&str; 8] = [
     "sys_name",
     "ver_sw",
@@ -169,7 +166,7 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    /// The rest up to the appended data: a message does not continue after that.
+    /// No message continues over appended data.
     fn part<'r>(&self, rest: &'r [u8], place: u64) -> &'r [u8] {
         let bytes = self
             .appended
@@ -178,7 +175,7 @@ impl<'a, 'b> Session<'a, 'b> {
         rest.get(..bytes).unwrap_or(rest)
     }
 
-    /// Goes on to appended data; `false` without any, or at the end of the input.
+    /// `false` without appended data, or at the input's end.
     fn next_part(&mut self, ended: bool) -> bool {
         if ended || self.appended.is_empty() {
             return false;
@@ -219,7 +216,6 @@ impl<'a, 'b> Session<'a, 'b> {
         (self.take)(self.clock.now(), item)
     }
 
-    /// A text or an event.
     fn tell_said(&mut self, item: Item<'_>) -> Result<()> {
         hand_said(self.clock.now(), item, self.want.observations, self.take)
     }
@@ -261,7 +257,7 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    /// A newer format may give these data another meaning: reported as damage of the log's beginning.
+    /// A newer format may give data another meaning: damage.
     fn version(&mut self, beginning: u64, version: u8) -> Result<()> {
         if version <= VERSION_MAX {
             return Ok(());
@@ -272,7 +268,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.gap(Cause::Damaged, Some(beginning + VERSION_AT as u64), 1, words)
     }
 
-    /// Unknown flags change the meaning of the rest: by the format a reader must refuse them.
+    /// By the format unknown flags must be refused.
     fn flags(&mut self, place: u64, incompatible: [u8; 8], appended: [u64; 3]) -> Result<()> {
         let unknown: Vec<String> = incompatible
             .iter()
@@ -410,8 +406,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.hand_on()
     }
 
-    /// Takes the time of the present message; returns whether it is wrong. Wrong ones are counted. A topic
-    /// that PX4 keeps over a boot is excepted, until it reports the time of this one.
+    /// Counts a wrong time. A topic kept over a boot is excepted until its first new time.
     fn time(&mut self, stamp: Stamp, place: u64, after: &[u8]) -> Result<bool> {
         let (subscriptions, left) = (&self.subscriptions, &mut self.asked_left);
         let ahead = |asks: &dyn Fn(Stamp) -> bool| times::ahead(subscriptions, after, left, asks);
@@ -432,12 +427,12 @@ impl<'a, 'b> Session<'a, 'b> {
         Ok(false)
     }
 
-    /// The latest time as the log has it.
+    /// As logged.
     fn recorded(&self) -> u64 {
         self.clock.recorded_us().unwrap_or(0)
     }
 
-    /// A log begins at this time, if its first data do; `true` if another one came before it.
+    /// If its first data begin then; `true` if another log came before.
     fn begin(&mut self, place: u64, time_us: u64, first: &[u64], is_end: bool) -> bool {
         let (time_us, is_wrong) = clock::beginning(time_us, first, is_end);
         let again = self.clock.begin_log(time_us);
@@ -447,7 +442,6 @@ impl<'a, 'b> Session<'a, 'b> {
         again
     }
 
-    /// Hands on the outputs of the mapping.
     fn hand_on(&mut self) -> Result<()> {
         if self.px4.reports.is_empty() {
             return Ok(());
@@ -456,7 +450,7 @@ impl<'a, 'b> Session<'a, 'b> {
         for report in reports.drain(..) {
             self.report(report)?;
         }
-        // The list is used again.
+        // Reused.
         self.px4.reports = reports;
         Ok(())
     }
@@ -480,7 +474,7 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    /// UTC at the autopilot's boot becomes UTC at time zero.
+    /// From the autopilot's boot to time zero.
     fn epoch(&mut self, boot_us: i128) -> Result<()> {
         let zero_us = i128::from(self.recorded()) - i128::from(self.clock.now().as_micros());
         match u64::try_from(boot_us + zero_us) {
@@ -527,7 +521,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Gap(&gap))
     }
 
-    /// Another log was joined on: all earlier state is void.
+    /// All earlier state is void.
     fn another(&mut self, place: u64, time_us: u64, after: &[u8]) -> Result<()> {
         self.tell_facts()?;
         self.formats = Formats::default();
@@ -542,7 +536,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Joint)
     }
 
-    /// The maker of the log, once all about it has come.
+    /// The log's maker, once known.
     fn tell_facts(&mut self) -> Result<()> {
         if std::mem::replace(&mut self.told_facts, true) {
             return Ok(());
@@ -571,7 +565,7 @@ impl<'a, 'b> Session<'a, 'b> {
     }
 }
 
-/// `0xAABBCCTT`: major, minor, patch, type (255 a release, 192 a candidate, 128 beta, 64 alpha).
+/// `0xAABBCCTT`: major, minor, patch, type (255 release, 192 candidate, 128 beta, 64 alpha).
 fn version(release: u32) -> String {
     let [major, minor, patch, kind] = release.to_be_bytes();
     let kind = match kind {
@@ -584,7 +578,6 @@ fn version(release: u32) -> String {
     format!("{major}.{minor}.{patch}{kind}")
 }
 
-/// Contents of a log besides topics, as rows.
 struct OwnTables {
     defaults: Option<Arc<Table>>,
     information: Option<Arc<Table>>,
@@ -619,7 +612,7 @@ impl OwnTables {
     }
 }
 
-/// A text without its module, which is in front of it in brackets.
+/// The module is in front, in brackets.
 fn without_module(words: &str) -> &str {
     words.strip_prefix('[').and_then(|words| words.split_once("] ")).map_or(words, |(_, words)| words)
 }

@@ -16,7 +16,7 @@ fn position(x: f32, n: u8) -> Vec<u8> {
     [&x.to_le_bytes()[..], &[n]].concat()
 }
 
-/// A log with a topic in two instances, and ten messages of each.
+/// Two instances, ten messages each.
 fn small() -> Writer {
     let mut writer = Writer::new(SECOND)
         .flags(0, [0; 3])
@@ -85,18 +85,16 @@ fn one_wrong_time_is_damage_and_changes_no_other_time() {
     for wrong in [1_300_000, 3 * SECOND, 8 * SECOND, 30 * SECOND, 1 << 50] {
         let mut times = usual.clone();
         times[500] += wrong;
-        // The time of the other instance is wrong as well.
         let told = log(&times).1.unwrap_or_default();
         assert_eq!(told, "Damaged 2 messages with a wrong time, far from the times around it", "{wrong}");
         assert_eq!(log(&times).2, end, "{wrong}");
     }
-    // A gap is one.
     let after: Vec<u64> =
         usual.iter().map(|time| if *time > 12 * SECOND { time + 5 * SECOND } else { *time }).collect();
     assert_eq!(log(&after), (0, None, end + 5 * SECOND));
 }
 
-/// A log of twenty topics that begins at 60 s: the old value of every third topic, then all of them every 20 ms.
+/// From 60 s on: old values of every third topic, then all every 20 ms.
 fn beginning(wrong: impl Fn(usize, u64) -> u64) -> Vec<u8> {
     let mut writer = Writer::new(60 * SECOND).format(POSITION);
     for id in 0..20 {
@@ -151,9 +149,9 @@ fn a_wrong_time_right_before_a_damaged_place_moves_no_other_time() {
     let end = |log: &[u8]| read(log).items.iter().map(|(at, _)| *at).max();
     for shift in [12, 33, 1 << 40] {
         let log = beginning(|index, time| if index == 200 { time + shift * SECOND } else { time });
-        // Each message of data has 18 bytes, and the first one follows the subscriptions.
+        // Each data message has 18 bytes.
         let next = log.len() - (400 - 201) * 18;
-        // Its header; three blocks of a card, and half of the wrong time; all to the end.
+        // A header; three blocks and half of a time; all to the end.
         for (from, bytes) in [(next, 3), (next - 4, 1_536), (next, 6_000)] {
             let mut log = log.clone();
             let to = log.len().min(from + bytes);
@@ -214,13 +212,13 @@ fn data_that_was_appended_to_a_log_that_ends_in_the_middle_of_a_message_is_read(
     assert_eq!(read.of("gap"), ["Cut a message that the end cuts off"]);
 }
 
-/// A read chunk and the longest message end near there.
+/// Near the end of a read chunk, or the longest message.
 #[test]
 fn a_log_that_is_cut_near_any_multiple_of_64_kib_says_so_unless_it_is_cut_between_two_messages() {
     const SEAM: usize = 64 * 1024;
     let (mut writer, mut ends) = (small(), Vec::new());
     for number in 0..16_u64 {
-        // Also messages across a seam or two, and the longest there is.
+        // Across a seam or two.
         let words = "x".repeat([20, 3_000, 40_000, 65_526][number as usize % 4]);
         writer = writer.data(0, (4 + number) * SECOND, &position(1.0, 1)).text(
             b'6',
@@ -356,7 +354,7 @@ fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definition
         .format("position:uint64_t timestamp;double x;")
         .subscribe(0, 0, "position")
         .data(0, 2 * SECOND, &1.25_f64.to_le_bytes());
-    // One that was cut, too: the header is not the rest of its last message.
+    // The header is not the rest of a cut message.
     let cut = [&log[..log.len() - 5], &other.bytes].concat();
     let told = read(&cut);
     assert_eq!((told.of("joint").len(), told.of("row position_2")), (1, vec!["0,2000000,1.25"]));
@@ -365,7 +363,7 @@ fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definition
     let read = read(&log);
     assert_eq!((read.of("joint").len(), read.of("restart").len(), read.gaps.len()), (1, 0, 0));
     assert_eq!(read.of("row position_2"), ["0,2000000,1.25"]);
-    // A second and a bit after the last of the first one, and the microsecond that parts them.
+    // A second and a bit after the first log.
     assert_eq!(read.items.last().map(|(at, _)| *at), Some(3 * SECOND + 900_001));
 }
 
@@ -384,7 +382,6 @@ fn a_version_that_is_not_known_is_told_and_what_can_be_read_is() {
     let gap = &told.gaps[0];
     assert_eq!((gap.cause, gap.place, told.gaps.len()), (Cause::Damaged, Some(7), 1));
     assert!(gap.words.contains("version 9") && gap.words.contains("read as version 1"), "{gap:?}");
-    // The same for a joined log.
     let first = small().bytes;
     let told = read(&[&first[..], &of_version(2)].concat());
     assert_eq!(told.gaps.iter().map(|gap| gap.place).collect::<Vec<_>>(), [Some(first.len() as u64 + 7)]);
@@ -442,7 +439,7 @@ fn no_flipped_bit_costs_more_than_its_neighbours() {
 
 #[test]
 fn lies_of_any_kind_take_neither_a_panic_nor_memory() {
-    // Each byte of the definitions, set to harmful values.
+    // Harmful values in each byte of the definitions.
     let log = small().bytes;
     for at in 0..log.len().min(420) {
         for value in [0, 1, 0x20, 0x3a, 0x5b, 0x7f, 0x80, 0xff] {
@@ -503,7 +500,7 @@ fn a_clock_that_stands_or_runs_backwards_is_told_in_a_log_of_any_size() {
     assert_eq!(gaps(&|_| 2 * SECOND), [Cause::NoTimes]);
     assert_eq!(gaps(&|number| 900 * SECOND - number * 100_000), [Cause::NoTimes]);
     assert_eq!(gaps(&|number| 2 * SECOND + number.min(250) * 10_000), [Cause::NoTimes]);
-    // Set back by less than a second, which is not a jump.
+    // Less than a second: no jump.
     let set = |number: u64| 2 * SECOND + number * 2_500 - if number < 100 { 0 } else { 900_000 };
     assert_eq!(gaps(&set), []);
 }

@@ -1,4 +1,4 @@
-//! The times of messages, and of those after them in the file, which show a wrong time.
+//! Times of messages, and of those after them.
 
 use std::io::Read;
 
@@ -8,37 +8,32 @@ use super::window::Window;
 use crate::source::clock::{Ahead, BEGINNING_ASKED, Rules, Stamp};
 use crate::source::doubt::{ASKED, Ends};
 
-/// Microseconds since the autopilot's boot. A log begins with old values; the logger does not pause, but drops out for a second
-/// or two.
+/// Since the autopilot's boot. A log begins with old values, and drops out for a second or two.
 pub(super) const RULES: Rules =
     Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
-/// Number of bytes searched for the first messages of data: definitions come before them, 100 to 200 KiB.
+/// Definitions come before data, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
-/// Number of bytes after a jump of the time that are looked at, damage too.
+/// After a jump, damage too.
 pub(super) const AHEAD_BYTES: usize = 256 * 1024;
-/// After this many bytes without a message, the rest is erased memory, not part of the log. Longer than any
-/// message.
+/// Longer than any message: the rest is erased memory.
 const NOTHING_BYTES: usize = 2 * MESSAGE_BYTES_MAX;
-/// Bytes that are looked at for all jumps of a file together: each of a hostile one could ask for all that there may be.
+/// For all jumps together: a hostile file could ask for all of it each time.
 pub(super) const ASKED_BYTES: usize = 64 * 1024 * 1024;
-/// Messages after one that are looked at for their times.
+/// Looked at after one.
 const MESSAGES_MAX: usize = 1_024;
-/// The series of texts; a topic's is its number and one.
+/// A topic's series is its number and one.
 const TEXTS: usize = 0;
 
-/// The time of a message of data.
 pub(super) fn stamp(id: u16, us: u64) -> Stamp {
     Stamp { us, series: usize::from(id) + 1 }
 }
 
-/// The time of a text.
 pub(super) const fn of_text(us: u64) -> Stamp {
     Stamp { us, series: TEXTS }
 }
 
-/// The next times as witnesses; damage between them is passed over. A topic with the time zero has none.
-/// `after` has [`AHEAD_BYTES`] and the longest message, or the rest of the file. At most `left` bytes are
-/// looked at.
+/// Witnesses; damage between them is passed over. A topic with time zero has none. `after`: [`AHEAD_BYTES`] and the longest
+/// message, or the rest of the file. Looks at `left` bytes at most.
 pub(super) fn ahead(
     subscriptions: &Subscriptions,
     after: &[u8],
@@ -80,15 +75,14 @@ pub(super) fn ahead(
     Ahead { is_end: stamps.len() < ASKED && messages < MESSAGES_MAX && (is_all || nothing), stamps }
 }
 
-/// The times of the first messages of data in these bytes, as many as needed for the log's start. (The time
-/// is first in each topic of PX4.)
+/// Enough for the log's start. Each topic of PX4 begins with its time.
 pub(super) fn first(bytes: &[u8]) -> Vec<u64> {
     let time = |(_, data): (u16, &[u8])| data.first_chunk().map(|time| u64::from_le_bytes(*time));
     let messages: DataAfter<'_> = data_after(bytes);
     messages.filter_map(time).take(4 * BEGINNING_ASKED).collect()
 }
 
-/// The same of a log whose header has been read.
+/// After the header.
 pub(super) fn first_in<R: Read>(window: &mut Window<R>) -> Vec<u64> {
     let times = first(window.rest());
     if times.len() >= BEGINNING_ASKED || window.ended() {

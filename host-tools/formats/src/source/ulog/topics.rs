@@ -1,4 +1,4 @@
-//! Subscriptions: the topic of a message of data, and its use.
+//! Subscriptions: a data message's topic and its use.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,15 +9,14 @@ use super::px4::{self, Topic};
 use super::rows;
 use crate::source::item::{Amount, MessageCount, Rows, Table};
 
-/// Subscriptions at a time at most. PX4 has some 200.
+/// At a time. PX4 has some 200.
 const SUBSCRIPTIONS_MAX: usize = 4_096;
-/// Columns of all tables at most, those of logs that were joined on too. A log of PX4 with all of its topics has 8,000.
+/// Of all tables, joined logs included. PX4 with all topics: 8,000.
 const COLUMNS_MAX: usize = 32_768;
-/// Columns of one table at most. The widest of PX4, an array of bytes that came from elsewhere, has 300.
+/// Of one table. PX4's widest, a foreign array of bytes, has 300.
 const TABLE_COLUMNS_MAX: usize = 1_024;
-/// Names of topics that are counted at most; the rest is counted together.
+/// Counted; the rest together.
 const NAMES_MAX: usize = 4_096;
-/// The name of the rest.
 const OTHERS: &str = "others";
 
 /// A topic's instance.
@@ -25,46 +24,45 @@ const OTHERS: &str = "others";
 pub(super) struct Subscription {
     pub(super) layout: Arc<Layout>,
     pub(super) instance: u8,
-    /// The mapping to observations, and the places of its fields.
+    /// With its fields' places.
     pub(super) topic: Option<(&'static Topic, Vec<Option<Slot>>)>,
-    /// If rows are wanted.
+    /// If wanted.
     pub(super) table: Option<Arc<Table>>,
-    /// The recorded time of the message that was observed last.
+    /// Of the last observed message.
     pub(super) observed_us: Option<u64>,
     count: u64,
     bytes: u64,
 }
 
 impl Subscription {
-    /// Counts a message; returns its time, if any.
+    /// Returns the message's time, if any.
     pub(super) fn take(&mut self, data: &[u8], message_bytes: usize) -> Option<u64> {
         self.count += 1;
         self.bytes += message_bytes as u64;
         self.time(data)
     }
 
-    /// The time of a message, if any.
     fn time(&self, data: &[u8]) -> Option<u64> {
         let at = self.layout.timestamp? as usize;
         Some(u64::from_le_bytes(*data.get(at..)?.first_chunk()?))
     }
 }
 
-/// All of them, by number.
+/// By number.
 #[derive(Debug, Default)]
 pub(super) struct Subscriptions {
     numbered: Vec<Option<Box<Subscription>>>,
     living: usize,
-    /// Tables by topic: the instances of a topic share one. In a log that was joined on it may have other columns.
+    /// By topic, shared by its instances. A joined log may have other columns.
     tables: BTreeMap<String, Vec<Arc<Table>>>,
-    /// The names of these: those of two topics may be one (`a/b` and `a_b`).
+    /// Two topics may have one name (`a/b` and `a_b`).
     taken: BTreeSet<String>,
     columns: usize,
     counted: BTreeMap<String, (u64, u64)>,
 }
 
 impl Subscriptions {
-    /// Whether data of this length can be of this subscription: its padding at the end may be left out.
+    /// Padding at the end may be left out.
     pub(super) fn fits(&self, id: u16, bytes: usize) -> Option<bool> {
         let layout = &self.numbered.get(usize::from(id))?.as_ref()?.layout;
         Some((layout.least_bytes..=layout.bytes).contains(&bytes))
@@ -74,17 +72,15 @@ impl Subscriptions {
         self.numbered.get_mut(usize::from(id))?.as_deref_mut()
     }
 
-    /// The time of a message of data, if known.
     pub(super) fn time(&self, id: u16, data: &[u8]) -> Option<u64> {
         self.numbered.get(usize::from(id))?.as_ref()?.time(data)
     }
 
-    /// The topic of a subscription.
     pub(super) fn name(&self, id: usize) -> Option<&str> {
         Some(&self.numbered.get(id)?.as_ref()?.layout.name)
     }
 
-    /// Adds a subscription. The error is a misfit, as the end of a sentence.
+    /// The error is the end of a sentence.
     pub(super) fn add(
         &mut self,
         id: u16,
@@ -124,7 +120,7 @@ impl Subscriptions {
         }
     }
 
-    /// The table of these fields: one that is there, or another.
+    /// Existing or new.
     fn table(&mut self, layout: &Layout) -> Option<Arc<Table>> {
         if rows::columns(layout) > TABLE_COLUMNS_MAX {
             return None;
@@ -166,7 +162,7 @@ impl Subscriptions {
         self.living = 0;
     }
 
-    /// Counts of messages by name.
+    /// By name.
     pub(super) fn counts(mut self) -> Vec<MessageCount> {
         self.clear();
         let of = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };

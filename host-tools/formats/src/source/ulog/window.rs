@@ -1,23 +1,22 @@
-//! A window that moves over the input: parsed bytes are contiguous, and memory does not grow with the input.
+//! A contiguous window over the input, of bounded memory.
 
 use std::io::{self, Read};
 
 use super::super::stream::read_some;
 
-/// Size of one read: more than the longest message (65,538 bytes), and many times a usual one, so that little
-/// is moved. Pages touched for the first time cost a small log more than its messages.
+/// Beyond the longest message (65,538 bytes), so that little is moved. First touches of pages cost a small
+/// log more than its messages.
 const READ_BYTES: usize = 128 * 1024;
 
-/// Part of the input, and its place.
 pub(super) struct Window<R> {
     input: R,
     buffer: Vec<u8>,
-    /// Place of the rest in the buffer.
+    /// The rest's place in the buffer.
     at: usize,
-    /// Place of the rest in the input.
+    /// The rest's place in the input.
     place: u64,
     ended: bool,
-    /// Why the input ended too early: a compressed stream that is damaged, a disk that fails.
+    /// A damaged compressed stream, a failing disk.
     trouble: Option<io::Error>,
 }
 
@@ -26,27 +25,26 @@ impl<R: Read> Window<R> {
         Self { input, buffer: Vec::new(), at: 0, place: 0, ended: false, trouble: None }
     }
 
-    /// Bytes read and not yet consumed.
+    /// Not yet consumed.
     pub(super) fn rest(&self) -> &[u8] {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// Place of the rest in the input.
     pub(super) fn place(&self) -> u64 {
         self.place
     }
 
-    /// Whether the rest is all that comes.
+    /// Nothing follows the rest.
     pub(super) fn ended(&self) -> bool {
         self.ended
     }
 
-    /// The error that ended the input before its end, once.
+    /// Once.
     pub(super) fn take_trouble(&mut self) -> Option<io::Error> {
         self.trouble.take()
     }
 
-    /// Reads until the rest has this length, or the input ends.
+    /// Until the rest is this long, or the input ends.
     pub(super) fn fill(&mut self, bytes: usize) {
         if self.rest().len() >= bytes || self.ended {
             return;

@@ -1,32 +1,28 @@
 //! The arming state: from the log's messages, or else from the vehicle's motion.
 //!
-//! Logs of today report arming by ARM, EV and MSG. Those of planes and rovers before 2015 do not report it at
-//! all, and a flying vehicle must have been armed. Evidence is a throttle above idle, or the speed of a
-//! flying plane. The first message about arming ends the guessing.
+//! Logs of today report arming by ARM, EV and MSG; planes and rovers before 2015 do not. Evidence is a throttle above
+//! idle, or a flying plane's speed. The first message about arming ends it.
 
 use hums_core::clock::{Instant, Span};
 
-/// Evidence that lasts this long counts: throttle is touched for a test.
+/// Throttle is touched for a test.
 const ARMED_AFTER: Span = Span::from_secs(2);
-/// Evidence with a pause longer than this begins again: the slowest message that it comes from is logged at 1 Hz.
+/// The slowest such message is logged at 1 Hz.
 const PAUSE_MAX: Span = Span::from_millis(2_500);
-/// Without evidence for this long it counts as disarmed: a plane glides, and a copter descends, with less
-/// than idle.
+/// A plane glides, and a copter descends, with less than idle.
 const DISARMED_AFTER: Span = Span::from_secs(10);
 
-/// How arming is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Word {
     /// Nobody knows.
     Unknown,
     /// From throttle and speed.
     Evidence,
-    /// By a message of the log.
     Told,
 }
 
 impl Word {
-    /// For people; empty if the log reports it.
+    /// Empty if the log reports it.
     pub(super) const fn words(self) -> &'static str {
         match self {
             Self::Unknown => "the log does not tell whether it was armed",
@@ -36,28 +32,25 @@ impl Word {
     }
 }
 
-/// Whether motors may turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Arming {
     armed: Option<bool>,
-    /// State in the first message about arming.
+    /// In the first message.
     first_told: Option<bool>,
-    /// Since when and until when the evidence has lasted.
+    /// Since and until.
     evidence: Option<(Instant, Instant)>,
 }
 
 impl Arming {
-    /// Whether it is armed; `None` if unknown.
+    /// `None` if unknown.
     pub(super) const fn armed(&self) -> Option<bool> {
         self.armed
     }
 
-    /// State in the first message about arming.
     pub(super) const fn first_told(&self) -> Option<bool> {
         self.first_told
     }
 
-    /// How it is known.
     pub(super) const fn word(&self) -> Word {
         match (self.first_told, self.armed) {
             (Some(_), _) => Word::Told,
@@ -66,18 +59,17 @@ impl Arming {
         }
     }
 
-    /// It was armed before the first message.
+    /// Before the first message.
     pub(super) const fn begin_armed(&mut self) {
         (self.armed, self.first_told) = (Some(true), Some(true));
     }
 
-    /// Takes a message about arming.
     pub(super) fn tell(&mut self, armed: bool) {
         self.first_told.get_or_insert(armed);
         self.armed = Some(armed);
     }
 
-    /// Evidence of arming from the vehicle's motion at this time. It counts until a message reports arming.
+    /// By motion, until a message reports arming.
     pub(super) fn evidence(&mut self, at: Instant, runs: bool) {
         if self.first_told.is_some() {
             return;

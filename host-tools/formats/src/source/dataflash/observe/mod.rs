@@ -1,10 +1,8 @@
-//! From `ArduPilot`'s messages to observations in SI units, equal to the MAVLink reports of the same
-//! autopilot.
+//! From `ArduPilot`'s messages to SI observations, equal to the same autopilot's MAVLink.
 //!
 //! Each useful message has a [`Handler`]: its names, its columns (with their labels in other versions), and
-//! one function. The columns of a file are found once, when FMT defines the message. Sources:
-//! `LogStructure.h` of `ArduPilot`'s libraries and vehicles for the messages; `GCS_Common.cpp` and
-//! `AP_NavEKF3_Outputs.cpp` for the MAVLink form of the same values.
+//! one function. Columns are found once, at the FMT. Sources: `LogStructure.h` for the messages;
+//! `GCS_Common.cpp` and `AP_NavEKF3_Outputs.cpp` for the MAVLink form.
 
 mod arming;
 mod handler;
@@ -27,19 +25,18 @@ pub use self::words::mode_name;
 use super::format::Format;
 use super::message::Message;
 
-/// The handler of a message of this name, and the number of the sensor in the name.
+/// With the sensor's number in the name.
 fn handler(name: &str) -> Option<(&'static Handler, u8)> {
     let lists = [motion::HANDLERS, power::HANDLERS, system::HANDLERS, said::HANDLERS];
     lists.into_iter().flatten().find_map(|handler| Some((handler, handler.sensor(name)?)))
 }
 
-/// Whether observations or other items are made of the messages of this name.
+/// Whether items are made of it.
 #[cfg(test)]
 pub(super) fn has_handler(name: &str) -> bool {
     handler(name).is_some()
 }
 
-/// A handler with the columns of the message that it is for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolved {
     /// The handler.
@@ -48,20 +45,16 @@ pub(super) struct Resolved {
     base: u8,
 }
 
-/// The handlers of a file's messages, found once for each definition.
 #[derive(Debug)]
 pub(super) struct Handlers {
     by_kind: Vec<Looked>,
 }
 
-/// The handler found for a type.
 #[derive(Clone, Copy, Debug)]
 enum Looked {
-    /// Not searched since its definition.
     NotYet,
     /// There is none.
     Nothing,
-    /// It has this one.
     Found(Resolved),
 }
 
@@ -72,7 +65,6 @@ impl Default for Handlers {
 }
 
 impl Handlers {
-    /// The handler of a message.
     pub(super) fn of(&mut self, format: &Format) -> Option<&Resolved> {
         let slot = self.by_kind.get_mut(usize::from(format.kind))?;
         if matches!(slot, Looked::NotYet) {
@@ -86,7 +78,6 @@ impl Handlers {
         }
     }
 
-    /// A type is another one from here on.
     pub(super) fn forget(&mut self, kind: u8) {
         if let Some(slot) = self.by_kind.get_mut(usize::from(kind)) {
             *slot = Looked::NotYet;
@@ -94,7 +85,6 @@ impl Handlers {
     }
 }
 
-/// Passes a message to its handler.
 pub(super) fn take(
     state: &mut State,
     resolved: &Resolved,

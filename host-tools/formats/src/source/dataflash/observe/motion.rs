@@ -29,16 +29,15 @@ const FIX_2D: u8 = 2;
 const FIX_3D: u8 = 3;
 /// A week of the receiver's time.
 const WEEK_MS: u64 = 7 * 86_400_000;
-/// Maximum age difference of log values in one MAVLink message.
+/// Of values in one MAVLink message.
 const TOGETHER: Span = Span::from_secs(2);
-/// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
-/// forces of nearly all flights.
+/// Of a shock: below its lowest limit, above nearly all flights' forces.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
-/// Sensors that feel the same shock report it within this time.
+/// Between sensors, in one shock.
 const AT_ONCE: Span = Span::from_millis(100);
-/// Angles beyond this are invalid.
+/// Larger angles are invalid.
 const TURN_DEG: f32 = 360.0;
-/// Rates go with an attitude within this.
+/// Of an attitude.
 const RATES_AGE: Span = Span::from_millis(500);
 
 /// Columns of GPS.
@@ -85,8 +84,7 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 
-/// Without a position of the estimator in use, the second estimator's does not count either: the first one's place
-/// then holds the receiver's position.
+/// Without the estimator's position the first place holds the receiver's: the second does not count either.
 fn second_estimate(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let angles =
         given.singles(0).filter(|angles: &[f32; 3]| angles.iter().all(|angle| angle.abs() <= TURN_DEG));
@@ -100,13 +98,12 @@ fn second_estimate(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// 0 to 360 degrees in the log, -180 to 180 in MAVLink.
+/// 0 to 360 in the log, -180 to 180 in MAVLink.
 fn signed(yaw_deg: f32) -> f32 {
     (yaw_deg + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// The body's rates and their setpoints at one moment: degrees a second, until 3.3 hundredths of them
-/// (`Log_Write_Rate` of `ArduCopter`). If the version is unknown, the gyro decides.
+/// Degrees a second, until 3.3 hundredths (`Log_Write_Rate` of `ArduCopter`). Without a version the gyro decides.
 fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     let Some(rates) = given.singles::<6>(0) else { return };
     let [_, _, _, flown @ ..] = rates;
@@ -119,7 +116,7 @@ fn rates(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
 }
 
 fn boot_ms(given: &Given<'_>) -> Option<u32> {
-    // 32 bits, as in MAVLink: they end after 49.7 days.
+    // 32 bits, as in MAVLink.
     given.boot_us.map(|us| (us / 1_000) as u32)
 }
 
@@ -136,7 +133,7 @@ fn imu(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         acceleration.map(|axes| norm(axes.map(|axis| axis.0))).filter(|force| *force > SHOCK_MIN)
     {
         let other = state.shaken.replace((instance, given.at));
-        // A single such sensor may be broken. The first one's values are judged as they are.
+        // One such sensor may be broken. The first one's values are judged as they are.
         let agrees = other.is_some_and(|(by, at)| by != instance && given.at.since(at) <= AT_ONCE);
         if instance > 0 && agrees {
             out.observe(&Observation::Shock(MetresPerSecond2(force)));
@@ -192,13 +189,13 @@ fn gnss(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
 }
 
-/// The receiver's time, modulo 2^32.
+/// Modulo 2^32.
 fn receiver_ms(given: &Given<'_>) -> Option<NonZeroU32> {
     let (week, ms) = given.unsigned(10).zip(given.unsigned(11))?;
     NonZeroU32::new(week.wrapping_mul(WEEK_MS).wrapping_add(ms) as u32)
 }
 
-/// UTC by the receiver's time of the week.
+/// By the receiver's time of week.
 fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
     /// 1980-01-06 in seconds since 1970.
     const GPS_EPOCH_S: u64 = 315_964_800;
@@ -225,7 +222,7 @@ fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
     }
 }
 
-/// A log of before 2015 has no POS: the receiver's position, and the barometer's height.
+/// Before 2015 there is no POS: receiver's position, barometer's height.
 fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut Out<'_>) {
     let Some(Metres(altitude)) = gnss.altitude else { return };
     let first = *state.first_altitude.get_or_insert(altitude);
@@ -240,7 +237,7 @@ fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut
         relative_altitude: Metres(relative),
         velocity: velocity(state, given).map(MetresPerSecond),
     }));
-    // The receiver's own course, without a better one of an estimator.
+    // Without an estimator's better one.
     if let Some([speed, course]) = given.singles(7) {
         let (east, north) = course.to_radians().sin_cos();
         let of_barometer = || state.climb.within(given.at, TOGETHER);
@@ -256,7 +253,7 @@ fn velocity(state: &State, given: &Given<'_>) -> [f32; 3] {
 }
 
 fn accuracy(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
-    /// 16 bits of centimetres that are full.
+    /// Full 16 bits of centimetres.
     const FULL_M: f32 = 655.0;
     let known = given.single(1).filter(|metres| *metres > 0.0 && *metres < FULL_M);
     if let (Some(metres), Some(slot)) = (known, state.accuracy.get_mut(usize::from(given.instance(0)))) {
@@ -281,7 +278,7 @@ fn air(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Air(Air { instance, pressure, temperature }));
 }
 
-/// In mG; MAVLink sends it with the inertial sensor of the same number.
+/// mG; MAVLink sends it with the inertial sensor of that number.
 fn compass(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let instance = given.instance(0);
     // SYS_STATUS is about the first one.
@@ -292,7 +289,7 @@ fn compass(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         return;
     };
     let before = state.fields.get_mut(usize::from(instance)).and_then(|slot| slot.replace(field));
-    // No inertial sensor took it along.
+    // No inertial sensor took it.
     if before.is_some() && !state.has_inertial {
         out.observe(&Observation::Imu(Imu { instance, field: before, ..Imu::default() }));
     }
@@ -318,7 +315,7 @@ fn position(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// Home position. The estimator's own origin (type 0) does not count.
+/// The estimator's own origin (type 0) does not count.
 fn origin(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     const HOME: u64 = 1;
     if given.unsigned(0) == Some(HOME) {
@@ -326,7 +323,7 @@ fn origin(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     }
 }
 
-/// Whether the message is of the estimator that flies: EKF3's begin with an X, EKF2's with an N.
+/// EKF3's begin with an X, EKF2's with an N.
 fn is_flying(state: &State, given: &Given<'_>) -> bool {
     let family = given.message.format().name.as_bytes().first();
     !matches!(
@@ -348,8 +345,8 @@ fn local(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
 }
 
-/// The figures are the same as in `EKF_STATUS_REPORT`, rounded to hundredths: roots of innovation test ratios, which
-/// `ArduPilot` calls variances. The lower ten bits of the filter's status are those of `EKF_STATUS_FLAGS`.
+/// As in `EKF_STATUS_REPORT`, in hundredths: roots of innovation test ratios, `ArduPilot`'s variances. The status has
+/// the lower ten bits of `EKF_STATUS_FLAGS`.
 fn estimator(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     const SAME_BITS: u64 = 0x3FF;
     const STATUS_GPS_GLITCHING: u64 = 1 << 14;
@@ -368,7 +365,7 @@ fn estimator(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         let glitching = if status & STATUS_GPS_GLITCHING == 0 { 0 } else { GPS_GLITCHING };
         (status & SAME_BITS) as u16 | glitching
     });
-    // Before the filter runs it reports zeros, which are not variances.
+    // Zeros before the filter runs are not variances.
     let runs = status.is_none_or(|status| status & SAME_BITS != 0);
     let known = |slot: usize| given.single(slot).filter(|value| *value >= 0.0 && runs);
     out.observe(&Observation::Estimator(Estimator {
@@ -381,7 +378,7 @@ fn estimator(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// Since 4.1 one message for each sensor; `VIBRATION` has the levels of the first and the clips of all.
+/// Since 4.1 by sensor; `VIBRATION` has the first one's levels and all clips.
 fn vibration(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let count = |slot: usize| given.unsigned(slot).and_then(|count| u32::try_from(count).ok());
     let instance = usize::from(given.byte(0).unwrap_or(0));
@@ -402,7 +399,7 @@ fn vibration(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 }
 
 fn hud(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    // A copter's CTUN has climb rates in cm/s; a plane's has none.
+    // A copter's is in cm/s; a plane has none.
     let rate =
         |slot| given.single(slot).map(|climb| if given.is_integer(slot) { climb / 100.0 } else { climb });
     let climb = rate(1);
@@ -414,7 +411,7 @@ fn hud(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
     let throttle = given.single(0).map(|throttle| match state.facts.craft {
         Craft::Plane | Craft::Rover => throttle / 100.0,
-        // A part of one since 3.4, thousandths before.
+        // Thousandths before 3.4.
         _ if given.is_integer(0) => throttle / 1_000.0,
         _ => throttle,
     });

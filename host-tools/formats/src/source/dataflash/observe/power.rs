@@ -23,14 +23,14 @@ pub(super) const HANDLERS: &[Handler] = &[
     handler("RPM", "I RPM|rpm1 rpm2", rpm),
 ];
 
-/// Older versions logged whole hundredths of volts and amperes.
+/// In older versions.
 fn hundredths(given: &Given<'_>, slot: usize) -> Option<f32> {
     given.single(slot).map(|value| if given.is_integer(slot) { value / 100.0 } else { value })
 }
 
 fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let id = given.instance(0);
-    // 0 V means that the monitor is off.
+    // The monitor is off.
     let Some(volts) = hundredths(given, 1).filter(|volts| *volts > 0.0) else { return };
     let current = hundredths(given, 2);
     let consumed_mah = given.single(3);
@@ -43,7 +43,7 @@ fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         if let Some(part) = remaining {
             state.remaining.set(given.at, part);
         }
-        // The oldest logs have the 5 V rail here, in mV.
+        // The oldest logs' 5 V rail, mV.
         if let Some(millivolts) = given.single(7).filter(|millivolts| *millivolts > 100.0) {
             let vcc = Some(Volts(millivolts / 1e3));
             out.observe(&Observation::Rails(Rails { vcc, servo: None }));
@@ -63,17 +63,17 @@ fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// `RemPct` came with 4.1; before that, the autopilot's own formula (`AP_BattMonitor_Backend`).
+/// `RemPct` since 4.1; before, the autopilot's formula (`AP_BattMonitor_Backend`).
 fn remaining(state: &State, given: &Given<'_>, id: u8, consumed_mah: Option<f32>) -> Option<f32> {
     if let Some(percent) = given.single(6) {
-        // -1, as an unsigned byte, is a monitor without current.
+        // -1 as a byte: a monitor without current.
         return (0.0..=100.0).contains(&percent).then_some(percent / 100.0);
     }
     let capacity_mah = (*state.facts.capacity_mah.get(usize::from(id))?)?;
     Some((1.0 - consumed_mah? / capacity_mah).clamp(0.0, 1.0))
 }
 
-/// A cell that is not there is 0: the autopilot adds 1 mV to 65535, and to all the others.
+/// 0 without a cell: the autopilot adds 1 mV to all, 65535 included.
 fn cells(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
     let mut cells = [None; CELLS_MAX];
     for (slot, cell) in (1..).zip(&mut cells) {
@@ -81,7 +81,7 @@ fn cells(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
         *cell = millivolts.and_then(|millivolts| CellVoltage::from_millivolts((millivolts - 1) as u16));
     }
     let id = given.instance(0);
-    // BCL2 of today has the cells beyond the twelfth; before 2021 it had a second battery.
+    // Before 2021 BCL2 had a second battery; today the cells beyond the twelfth.
     if given.column(1).is_none() {
         let before = state.cells_of(given.at, id);
         cells = std::array::from_fn(|cell| cells[cell].or(before[cell]));
@@ -118,7 +118,7 @@ fn observe_processor(given: &Given<'_>, first: usize, out: &mut Out<'_>) {
 }
 
 fn esc(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
-    // As in ESC_TELEMETRY: an ESC without speed and voltage is absent.
+    // As in ESC_TELEMETRY: the ESC is absent.
     if [1, 2].into_iter().all(|slot| given.single(slot).is_none_or(|value| value == 0.0)) {
         return;
     }
@@ -133,7 +133,7 @@ fn esc(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Escs(EscGroup { first: given.instance(0), escs }));
 }
 
-/// A negative speed is a sensor that is not there.
+/// Negative without a sensor.
 fn rpm(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let first = given.instance(0);
     let sensor = |index: u8, slot: usize| {

@@ -1,4 +1,4 @@
-//! A log's own texts and numbers: parameters, texts, modes, events, errors, arming.
+//! Parameters, texts, modes, events, errors, arming.
 
 use hums_core::alert;
 
@@ -9,7 +9,7 @@ use super::words::{self, CRASH_CHECK, Craft};
 
 /// `MAV_SEVERITY_INFO`: MSG has no severity.
 const INFO: u8 = 6;
-/// The bytes of a part that another one follows.
+/// A text's part that another one follows.
 const TEXT_BYTES: usize = 64;
 /// `MAV_SEVERITY_NOTICE`
 const NOTICE: u8 = 5;
@@ -43,9 +43,9 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         "LOG_DISARMED" => facts.logs_disarmed = Some(value != 0.0),
         "RSSI_TYPE" => facts.has_rssi = number > 0,
         "AHRS_EKF_TYPE" => facts.estimator = Some(number),
-        // Before 2016: 0 if the older estimator (DCM) is in use, and the filter runs beside it.
+        // Before 2016: 0 for the older estimator (DCM), with the filter beside it.
         "AHRS_EKF_USE" => facts.estimator = if number == 0 { Some(0) } else { facts.estimator },
-        // Only helicopters have these parameters; the name of the firmware is a copter's.
+        // Only helicopters have these; their firmware's name is a copter's.
         "H_RSC_MODE" | "H_SV_MAN" if matches!(facts.craft, Craft::Unknown | Craft::Copter) => {
             facts.craft = Craft::Heli;
         }
@@ -60,13 +60,13 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.say(&Say::Parameter(&name, value));
 }
 
-/// The battery of a capacity parameter.
+/// By its capacity parameter.
 fn capacity_of(name: &str) -> Option<usize> {
     let number = name.strip_prefix("BATT")?.strip_suffix("_CAPACITY")?;
     if number.is_empty() { Some(0) } else { number.parse::<usize>().ok()?.checked_sub(1) }
 }
 
-/// A text of a log. Since version 4.7 a long one is several messages with one ID (`LogStructure.h`).
+/// Since 4.7 a long text is several messages with one ID (`LogStructure.h`).
 fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let Some(part) = given.text(0).filter(|words| !words.is_empty()) else { return };
     let (Some(id), Some(sequence)) = (given.unsigned(1), given.unsigned(2)) else {
@@ -86,7 +86,6 @@ fn message(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }
 }
 
-/// No further part follows.
 fn end_text(state: &mut State, out: &mut Out<'_>) {
     if let Some((_, words)) = state.open_text.take() {
         text(state, &words, out);
@@ -108,12 +107,12 @@ fn text(state: &mut State, words: &str, out: &mut Out<'_>) {
             _ => {}
         }
     }
-    // A log keeps no severity of its texts.
+    // A log keeps no severity.
     out.say(&Say::Text(INFO, words, alert::of_text(None, words.as_bytes())));
 }
 
 fn firmware(state: &mut State, craft: Craft, words: &str, out: &mut Out<'_>) {
-    // VER marks helicopters; the name of the firmware does not.
+    // VER marks helicopters, the name does not.
     if !(state.facts.craft == Craft::Heli && craft == Craft::Copter) {
         state.facts.craft = craft;
     }
@@ -186,8 +185,8 @@ fn error(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.say(&Say::Event(number, severity, &words::error(subsystem, code), alert));
 }
 
-/// The watchdog restarted the autopilot before this log. `ArduPilot` writes the message once, after such a start
-/// (`AP_Scheduler`, `persistent_data`). The fault's number is the processor's exception (Armv7-M manual, B1.5.2).
+/// Written once, after the watchdog's restart (`AP_Scheduler`, `persistent_data`). The fault's number is the
+/// processor's exception (Armv7-M manual, B1.5.2).
 fn watchdog(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let fault = match given.unsigned(0) {
         Some(3) => ", after a hard fault",
@@ -199,7 +198,7 @@ fn watchdog(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.say(&Say::ProcessorFault(&format!("the watchdog restarted the autopilot{fault}")));
 }
 
-/// The autopilot counts the messages that its logger had no room for.
+/// Messages without room in the logger.
 fn dropped(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let Some(lost) = given.unsigned(0) else { return };
     // Losses before the first report may be of another log.

@@ -1,5 +1,4 @@
-//! State of a log that later messages need: a MAVLink message is put together from several of the log's, and
-//! some come from events alone.
+//! State for later messages: a MAVLink message comes from several of the log's, or from events alone.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::{
@@ -13,15 +12,13 @@ use super::say::{Out, Say};
 use super::words::{self, Craft, name_and_version};
 use crate::source::dataflash::format::Format;
 
-/// Period of the autopilot's state, because the log has only changes. `HEARTBEAT` and `SYS_STATUS` come at 1
-/// Hz or faster.
+/// The log has only changes; `HEARTBEAT` and `SYS_STATUS` come at 1 Hz or faster.
 const SAID_EVERY: Span = Span::from_millis(500);
 /// Older values are not repeated.
 const AGE: Span = Span::from_secs(12);
-/// Receivers, batteries and sensors that are put together.
+/// Receivers, batteries and sensors.
 pub(super) const INSTANCES: usize = 4;
 
-/// A value and when it came.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dated<T>(Option<(Instant, T)>);
 
@@ -37,7 +34,7 @@ impl<T: Copy> Dated<T> {
         self.0 = Some((at, value));
     }
 
-    /// The value, while it is not older than `age`.
+    /// If not older than `age`.
     pub(super) fn within(&self, now: Instant, age: Span) -> Option<T> {
         self.0.filter(|(at, _)| now.since(*at) <= age).map(|(_, value)| value)
     }
@@ -46,19 +43,17 @@ impl<T: Copy> Dated<T> {
 /// Body rates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rates {
-    /// About the body's roll, pitch and yaw, as the autopilot wants them.
+    /// Setpoints of roll, pitch, yaw.
     pub(super) wanted: [RadiansPerSecond; 3],
-    /// About roll, pitch and yaw, as they are.
+    /// Measured roll, pitch, yaw.
     pub(super) flown: [RadiansPerSecond; 3],
 }
 
-/// The unit of `RATE` by a gyro: number of samples that agree with degrees a second, less those that agree
-/// with hundredths.
+/// Samples that agree with degrees a second, less those with hundredths.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RateUnit(i8);
 
 impl RateUnit {
-    /// Takes a logged rate, and a gyro's in degrees a second.
     pub(super) fn take(&mut self, logged: f32, gyro_dps: f32) {
         /// Slower turns do not count.
         const TURNS_DPS: f32 = 10.0;
@@ -71,7 +66,7 @@ impl RateUnit {
         self.0 = self.0.saturating_add(vote);
     }
 
-    /// The unit, degrees a second.
+    /// Degrees a second.
     pub(super) const fn degrees(self) -> Option<f32> {
         const SURE: i8 = 5;
         match self.0 {
@@ -82,53 +77,49 @@ impl RateUnit {
     }
 }
 
-/// The part of the log with messages about arming.
+/// Where messages about arming are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ToldArming {
-    /// Nowhere, as far as the file is known.
+    /// As far as is known.
     #[default]
     Nowhere,
-    /// In the first part of the file; its value is that of the first message.
+    /// In the file's first part; the first message's value.
     First(bool),
-    /// Before the last power-on that the file holds.
+    /// Before the file's last power-on.
     Before,
 }
 
-/// Facts about the vehicle. The first part of a file is searched for them, so that they are known from the
-/// first message on.
+/// Found in the first part of a file, so known from the first message on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::source::dataflash) struct Facts {
     /// Kind of firmware.
     pub(super) craft: Craft,
     /// `FRAME_CLASS`
     pub(super) frame_class: Option<u8>,
-    /// Motors that `MOT` is defined with, in versions without `FRAME_CLASS`.
+    /// By `MOT`, without `FRAME_CLASS`.
     pub(super) motors: Option<u8>,
-    /// `Q_ENABLE` or `Q_AVAILABLE`: a plane that hovers.
+    /// `Q_ENABLE` or `Q_AVAILABLE`.
     pub(super) quadplane: bool,
     /// `Q_MAV_TYPE`
     pub(super) quadplane_type: u8,
-    /// `LOG_DISARMED`: whether it logs while disarmed.
+    /// `LOG_DISARMED`.
     pub(super) logs_disarmed: Option<bool>,
-    /// `RSSI_TYPE`: whether there is anything to measure.
+    /// `RSSI_TYPE`.
     pub(super) has_rssi: bool,
     /// `BATTn_CAPACITY`, mAh.
     pub(super) capacity_mah: [Option<f32>; INSTANCES],
     /// `AHRS_EKF_TYPE`: 2 or 3; 0 without a filter.
     pub(super) estimator: Option<u8>,
-    /// Version of the firmware, from the top byte down.
+    /// From the top byte down.
     pub(super) version: u32,
-    /// POS is logged: the estimator's own position.
+    /// POS is logged.
     pub(super) has_positions: bool,
-    /// The part of the log with messages about arming.
     pub(super) told_arming: ToldArming,
 }
 
 impl Facts {
-    /// The unit of `RATE`, degrees a second; `None` if the version is unknown, or is a development version
-    /// from the time of the change.
+    /// Degrees a second; `None` for an unknown or development version of the time of the change.
     pub(super) fn rate_unit_deg(&self) -> Option<f32> {
-        /// Versions are bytes from the top down.
         const DEGREES_SINCE: u32 = 0x0304_0000;
         (self.version > 0 && self.version != DEGREES_SINCE).then_some(if self.version < DEGREES_SINCE {
             0.01
@@ -138,66 +129,61 @@ impl Facts {
     }
 }
 
-/// State of a log so far.
 #[derive(Debug, Default)]
 pub(in crate::source::dataflash) struct State {
-    /// Facts about the vehicle.
     pub(super) facts: Facts,
-    /// Its version is known, from VER or a text.
+    /// By VER or a text.
     pub(super) identified: bool,
-    /// The version that was handed on.
+    /// Handed on.
     told_version: u32,
-    /// Motors may turn, as far as that is known.
     pub(super) arming: Arming,
     pub(super) landed: LandedState,
     pub(super) mode: u32,
-    /// Failsafes in force, a bit for each subsystem of ERR.
+    /// In force, a bit for each subsystem of ERR.
     pub(super) failsafes: u64,
     pub(super) load: Dated<f32>,
     pub(super) voltage: Dated<f32>,
     pub(super) current: Dated<f32>,
     pub(super) remaining: Dated<f32>,
-    /// Unhealthy sensors, by their own flags: bits of `MAV_SYS_STATUS_SENSOR`, one set for each instance.
+    /// `MAV_SYS_STATUS_SENSOR` bits by instance, from the sensors' own flags.
     pub(super) unhealthy: [u32; INSTANCES],
     pub(super) rates: Dated<Rates>,
-    /// The first gyro's rate, rad/s, and the unit of `RATE` by it.
+    /// rad/s; the unit of `RATE` by it.
     pub(super) gyro: Dated<f32>,
     pub(super) rate_unit: RateUnit,
-    /// The inertial sensor that felt a shock last, and when.
+    /// The last one, and when.
     pub(super) shaken: Option<(u8, Instant)>,
-    /// It logs inertial sensors.
     pub(super) has_inertial: bool,
     /// Accuracy by receiver.
     pub(super) accuracy: [Dated<Metres>; INSTANCES],
-    /// Last measurement of each compass, until an inertial sensor's observation takes it along.
+    /// By compass, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; INSTANCES],
-    /// Velocity of the estimator, north, east, down.
+    /// Estimator's north, east, down.
     pub(super) velocity: Dated<[f32; 3]>,
-    /// The same of the receiver, if the estimator has none.
+    /// Receiver's, without an estimator's.
     pub(super) receiver_velocity: Dated<[f32; 3]>,
     pub(super) primary_core: u8,
     pub(super) altitude: Dated<f32>,
     pub(super) baro_height: Dated<f32>,
     pub(super) climb: Dated<f32>,
-    /// The estimator's, of CTUN.
+    /// From CTUN.
     pub(super) told_climb: Dated<f32>,
     pub(super) airspeed: Dated<f32>,
     pub(super) ground_speed: Dated<f32>,
     pub(super) heading_deg: Dated<f32>,
-    /// Height of the first GPS fix, the reference of heights without a better one.
+    /// First fix: the reference without a better one.
     pub(super) first_altitude: Option<f32>,
     /// Height of home.
     pub(super) home_altitude: Option<f32>,
     pub(super) clips: [u32; 3],
     pub(super) cells: [Dated<[Option<CellVoltage>; CELLS_MAX]>; INSTANCES],
     pub(super) messages_lost: Option<u64>,
-    /// Bits of the internal errors so far.
+    /// Bits so far.
     pub(super) internal_errors: u64,
-    /// A text that still lacks its last part, with its number.
+    /// Lacks its last part, of this number.
     pub(in crate::source::dataflash) open_text: Option<(u64, String)>,
-    /// Time of the last report of UTC.
     pub(super) utc_said: Option<Instant>,
-    /// When the event of arming came last.
+    /// Last event of arming.
     armed_at: Option<Instant>,
     rearms: Rearms,
     said_at: Option<Instant>,
@@ -206,21 +192,20 @@ pub(in crate::source::dataflash) struct State {
     failsafes_said: u64,
 }
 
-/// Length of the inserted disarming: longer than the unjudged time after a gap.
+/// Longer than the unjudged time after a gap.
 const REARMS: Span = Span::from_millis(1_600);
 
-/// Whether a disarming is inserted although the vehicle is armed again.
+/// A disarming is inserted although armed again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Rearms {
     #[default]
     No,
-    /// From the next message on.
     Begins,
     /// Since then.
     Since(Instant),
 }
 
-/// State from messages of arming and take-off.
+/// By arming and take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::source::dataflash) struct Standing {
     arming: Arming,
@@ -229,21 +214,19 @@ pub(in crate::source::dataflash) struct Standing {
 }
 
 impl Standing {
-    /// It is armed here, and was not there.
+    /// Armed here, not there.
     pub(in crate::source::dataflash) fn arms(&self, before: &Self) -> bool {
         self.arming.armed() == Some(true) && before.arming.armed() != Some(true)
     }
 }
 
 impl State {
-    /// The state of a vehicle with these facts.
     pub(in crate::source::dataflash) fn new(facts: Facts) -> Self {
         let mut state = Self { facts, ..Self::default() };
         state.begin();
         state
     }
 
-    /// Facts about the vehicle.
     pub(in crate::source::dataflash) fn facts(&self) -> Facts {
         let told_arming = match (self.facts.told_arming, self.arming.first_told()) {
             (ToldArming::Nowhere, Some(armed)) => ToldArming::First(armed),
@@ -252,7 +235,7 @@ impl State {
         Facts { told_arming, ..self.facts }
     }
 
-    /// Takes a definition: `ArduCopter` until 3.1 was built for each frame, and logs the motors of that frame.
+    /// `ArduCopter` until 3.1 was built for each frame, and logs its motors.
     pub(in crate::source::dataflash) fn define(&mut self, format: &Format) {
         if format.name == "MOT" {
             let motors = format.fields.iter().filter(|field| field.name.starts_with("Mot")).count();
@@ -260,12 +243,11 @@ impl State {
         }
     }
 
-    /// The firmware that wrote the log.
     pub(in crate::source::dataflash) fn craft(&self) -> Craft {
         self.facts.craft
     }
 
-    /// Whether these words name a firmware, which is then known.
+    /// The firmware is then known.
     pub(in crate::source::dataflash) fn is_firmware(&mut self, words: &str) -> bool {
         let craft = Craft::of_firmware(words);
         self.facts.craft = craft.unwrap_or(self.facts.craft);
@@ -275,12 +257,12 @@ impl State {
         craft.is_some()
     }
 
-    /// Whether motors may turn, as far as is known.
+    /// As far as is known.
     pub(in crate::source::dataflash) fn is_armed(&self) -> bool {
         self.arming.armed() == Some(true)
     }
 
-    /// Another power-on: the same vehicle, but all earlier state is void.
+    /// The same vehicle; earlier state is void.
     pub(in crate::source::dataflash) fn restart(&mut self) {
         let mut facts = self.facts();
         if facts.told_arming != ToldArming::Nowhere {
@@ -289,29 +271,27 @@ impl State {
         *self = Self::new(facts);
     }
 
-    /// State from messages of arming and take-off.
     pub(in crate::source::dataflash) fn standing(&self) -> Standing {
         Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes }
     }
 
-    /// Sets the state from [`State::standing`].
+    /// From [`State::standing`].
     pub(in crate::source::dataflash) fn stand(&mut self, standing: Standing) {
         Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes } = standing;
     }
 
-    /// A log that is only written while armed begins armed if its first message about arming is a disarming.
-    /// A logger also begins before arming, and at an attempt to arm that fails (`AP_Logger`: `LOG_DISARMED`
-    /// 0).
+    /// Logged only while armed: begins armed if the first message is a disarming. A logger also begins before
+    /// arming, and at an attempt to arm that fails (`AP_Logger`: `LOG_DISARMED` 0).
     fn begin(&mut self) {
         if self.facts.logs_disarmed == Some(false) && self.facts.told_arming == ToldArming::First(false) {
             self.arming.begin_armed();
         }
     }
 
-    /// The event of arming came while armed, long after the last one: the disarming in between was not
-    /// logged. The vehicle counts as disarmed for a moment.
+    /// Armed again long after the last event: the disarming was not logged. It counts as disarmed for a
+    /// moment.
     pub(super) fn arm_again(&mut self, at: Instant) {
-        /// Newer logs report one arming by several messages.
+        /// Newer logs report one arming several times.
         const ONE_ARMING: Span = Span::from_secs(2);
         let before = self.armed_at.replace(at);
         if self.is_armed() && before.is_some_and(|before| at.since(before) > ONE_ARMING) {
@@ -320,8 +300,7 @@ impl State {
         }
     }
 
-    /// A message reports arming or disarming. A copter reports its take-off by an event, so it is on the
-    /// ground until then.
+    /// A copter's take-off is an event: it is on the ground until then.
     pub(super) fn arm(&mut self, armed: bool) {
         let changes = self.arming.armed() != Some(armed);
         self.arming.tell(armed);
@@ -334,22 +313,21 @@ impl State {
         }
     }
 
-    /// A message reports that it is on the ground.
+    /// By a message.
     pub(super) fn land(&mut self) {
         if self.tells_landing() {
             self.landed = LandedState::OnGround;
         }
     }
 
-    /// Whether events report take-off and landing: a copter's since 3.1 (`DATA_NOT_LANDED`).
+    /// A copter's since 3.1 (`DATA_NOT_LANDED`).
     fn tells_landing(&self) -> bool {
-        /// Versions are bytes from the top down.
         const SINCE: u32 = 0x0301_0000;
         self.facts.craft.tells_landing() && (self.facts.version == 0 || self.facts.version >= SINCE)
     }
 
-    /// The event comes when the motors spool up for a take-off. In the modes that climb by themselves the
-    /// autopilot then reports `MAV_LANDED_STATE_TAKEOFF` while it climbs; the end of that is not in the log.
+    /// Comes when the motors spool up. In modes that climb by themselves `MAV_LANDED_STATE_TAKEOFF` follows,
+    /// with an unknown end.
     pub(super) fn leave_ground(&mut self) {
         const AUTO: u32 = 3;
         const GUIDED: u32 = 4;
@@ -357,27 +335,27 @@ impl State {
         self.landed = if climbs { LandedState::TakingOff } else { LandedState::InAir };
     }
 
-    /// Its height above home.
+    /// Above home.
     pub(super) fn height(&mut self, metres: f32) {
-        /// Well above the height at which a take-off is reported.
+        /// Well above a reported take-off's height.
         const TAKEN_OFF_M: f32 = 3.0;
         if self.landed == LandedState::TakingOff && metres > TAKEN_OFF_M {
             self.landed = LandedState::InAir;
         }
     }
 
-    /// Throttle of the autopilot, 0 to 1: evidence of arming without messages about it.
+    /// 0 to 1: evidence of arming.
     pub(super) fn throttle(&mut self, at: Instant, throttle: f32) {
-        /// A multicopter idles on the ground below a tenth; so does an engine.
+        /// A multicopter idles below a tenth, so does an engine.
         const IDLE: f32 = 0.1;
         self.evidence(at, throttle > IDLE);
     }
 
-    /// The speed over ground, m/s: a plane that is this fast flies, whatever its throttle is.
+    /// m/s over ground: a plane this fast flies, whatever its throttle.
     pub(super) fn speed(&mut self, at: Instant, speed_mps: f32) {
         /// As `hums_core::flight` has it.
         const FLYING_MPS: f32 = 8.0;
-        /// Gliding against the wind it is slower over ground, and still not landed.
+        /// Gliding against the wind, still not landed.
         const MOVING_MPS: f32 = 2.0;
         let least_mps = if self.arming.armed() == Some(true) { MOVING_MPS } else { FLYING_MPS };
         if self.facts.craft == Craft::Plane {
@@ -386,14 +364,13 @@ impl State {
     }
 
     fn evidence(&mut self, at: Instant, runs: bool) {
-        // If every version of the firmware reports arming, the messages decide, unless the log is only
-        // written while armed.
+        // Messages decide if every version reports arming, unless only logged while armed.
         if !self.facts.craft.tells_arming() || self.facts.logs_disarmed == Some(false) {
             self.arming.evidence(at, runs);
         }
     }
 
-    /// Repeats the autopilot's periodic reports: heartbeat, status, landed state.
+    /// Heartbeat, status, landed state.
     pub(in crate::source::dataflash) fn repeat(&mut self, now: Instant, out: &mut Out<'_>) {
         if std::mem::replace(&mut self.failsafes_said, self.failsafes) != self.failsafes {
             out.say(&Say::Failsafes(&words::failsafes(self.failsafes)));
@@ -411,7 +388,7 @@ impl State {
         self.said_at = Some(now);
         self.said = Some(heartbeat);
         let word = self.arming.word();
-        // If the file reports arming later, it does not count as unknown until then.
+        // Reported later in the file: not unknown until then.
         let known =
             word == Word::Told || (word == Word::Unknown && self.facts.told_arming != ToldArming::Nowhere);
         if (!known || self.word_said.is_some()) && self.word_said.replace(word) != Some(word) {
@@ -455,7 +432,7 @@ impl State {
         })
     }
 
-    /// The kind of vehicle, with its `MAV_TYPE`; `None` for other senders.
+    /// With `MAV_TYPE`; `None` for other senders.
     fn kind(&self) -> Option<(VehicleKind, u8)> {
         let Facts { craft, frame_class, motors, quadplane, quadplane_type, .. } = self.facts;
         Some(match craft {
@@ -492,21 +469,21 @@ impl State {
         })
     }
 
-    /// Takes a sensor's flag of its health. `bit` is its bit in `MAV_SYS_STATUS_SENSOR`.
+    /// `bit` of `MAV_SYS_STATUS_SENSOR`.
     pub(super) fn health(&mut self, instance: u8, bit: u32, healthy: Option<f32>) {
         if let (Some(bits), Some(healthy)) = (self.unhealthy.get_mut(usize::from(instance)), healthy) {
             *bits = if healthy == 0.0 { *bits | bit } else { *bits & !bit };
         }
     }
 
-    /// A battery's recent cell voltages.
+    /// Recent ones.
     pub(super) fn cells_of(&self, now: Instant, id: u8) -> [Option<CellVoltage>; CELLS_MAX] {
         let known = self.cells.get(usize::from(id)).and_then(|cells| cells.within(now, Span::from_secs(3)));
         known.unwrap_or(Battery::default().cells)
     }
 }
 
-/// `MAV_TYPE` of a copter with this many motors; most have four.
+/// Most have four.
 const fn type_with(motors: Option<u8>) -> u8 {
     match motors {
         Some(3) => 15,
@@ -533,7 +510,7 @@ const fn copter_type(frame_class: u8) -> u8 {
     }
 }
 
-/// `ArduCopter V4.6.3 (92b0cd78)` is 4.6.3; an official release if the numbers are the end of the version.
+/// `ArduCopter V4.6.3 (92b0cd78)`; official if the numbers end it.
 pub(super) fn version_of(words: &str) -> Option<u32> {
     /// `FIRMWARE_VERSION_TYPE_OFFICIAL`
     const OFFICIAL: u32 = 255;

@@ -1,4 +1,4 @@
-//! The autopilot's processor, its radios, and a plane's state.
+//! Processor, radios, and a plane's state.
 
 use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::clock::Span;
@@ -19,7 +19,7 @@ pub(super) const HANDLERS: &[Handler] = &[
     handler("STAT", "isFlying Armed", status),
 ];
 
-/// Load in thousandths, as in `SYS_STATUS`; internal errors since power-on as bits (`AP_InternalError`).
+/// Load in thousandths, as in `SYS_STATUS`; internal errors as bits (`AP_InternalError`).
 fn performance(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let errors = given.unsigned(1).unwrap_or(0);
     let new = errors & !std::mem::replace(&mut state.internal_errors, errors);
@@ -44,7 +44,7 @@ fn radio(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// A part of one, which `RC_CHANNELS` has as 0 to 254. Without a sensor it is 0 for ever.
+/// A part of one (`RC_CHANNELS`: 0 to 254); always 0 without a sensor.
 fn rc(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     if !state.facts.has_rssi {
         return;
@@ -56,14 +56,14 @@ fn rc(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 
 /// A plane's own idea of flying.
 fn status(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
-    /// A brisk walk, over ground.
+    /// A brisk walk.
     const CARRIED_MPS: f32 = 2.5;
     const SPEED_AGE: Span = Span::from_secs(2);
     if let Some(armed) = given.unsigned(1) {
         state.arm(armed != 0);
     }
     if let Some(flying) = given.unsigned(0) {
-        // A plane that is armed and carried by hand calls itself flying; one that takes off is faster.
+        // A carried, armed plane calls itself flying.
         let is_carried = state.landed != LandedState::InAir
             && state.facts.craft == Craft::Plane
             && !state.facts.quadplane

@@ -3,7 +3,7 @@
 
 use hums_core::cause::{Alert, Cause, Urgency};
 
-/// Which firmware wrote the log.
+/// The log's firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::source::dataflash) enum Craft {
     /// Not known yet.
@@ -21,12 +21,12 @@ pub(in crate::source::dataflash) enum Craft {
     Sub,
     /// Blimp
     Blimp,
-    /// Antenna tracker: no vehicle.
+    /// No vehicle.
     Tracker,
 }
 
 impl Craft {
-    /// By the name of the firmware: `ArduCopter V4.6.3 (92b0cd78)`, `APM:Copter V3.3`, `ArduCopter V2.9.1`.
+    /// `ArduCopter V4.6.3 (92b0cd78)`, `APM:Copter V3.3`, `ArduCopter V2.9.1`.
     pub(super) fn of_firmware(words: &str) -> Option<Self> {
         let (name, _) = name_and_version(words)?;
         Some(match name {
@@ -40,7 +40,7 @@ impl Craft {
         })
     }
 
-    /// By the parameter `SYSID_SW_TYPE`, which versions of before 2019 have (`k_software_type`).
+    /// By `SYSID_SW_TYPE`, before 2019 (`k_software_type`).
     pub(super) const fn of_software(number: u8) -> Option<Self> {
         Some(match number {
             0 => Self::Plane,
@@ -52,7 +52,7 @@ impl Craft {
         })
     }
 
-    /// By the number of the build in VER (`APM_BUILD_*`).
+    /// By VER's build number (`APM_BUILD_*`).
     pub(super) const fn of_build(number: u8) -> Option<Self> {
         Some(match number {
             1 => Self::Rover,
@@ -66,17 +66,16 @@ impl Craft {
         })
     }
 
-    /// Whether events report take-off and landing.
+    /// By events.
     pub(super) const fn tells_landing(self) -> bool {
         matches!(self, Self::Copter | Self::Heli)
     }
 
-    /// Whether every version reports arming.
+    /// In every version.
     pub(super) const fn tells_arming(self) -> bool {
         matches!(self, Self::Sub)
     }
 
-    /// Numbers and names of its modes.
     fn modes(self) -> impl Iterator<Item = (u32, &'static str)> {
         let firmware = match self {
             Self::Copter | Self::Heli => "copter ",
@@ -93,7 +92,7 @@ impl Craft {
         self.modes().find(|(known, _)| *known == number).map(|(_, name)| name)
     }
 
-    /// A mode's number by the name that text logs have.
+    /// By a text log's name.
     pub(super) fn mode_number(self, name: &str) -> Option<u32> {
         let plain = |name: &str| name.chars().filter(char::is_ascii_alphanumeric).collect::<String>();
         let name = plain(name).to_ascii_uppercase();
@@ -101,7 +100,7 @@ impl Craft {
     }
 }
 
-/// The name of a mode, by its number and the `MAV_TYPE` of the vehicle (`HEARTBEAT`).
+/// By number and `MAV_TYPE` (`HEARTBEAT`).
 pub fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
     let craft = match vehicle {
         // Quadrotor, coaxial, helicopter, hexarotor, octorotor, tricopter, dodecarotor, decarotor.
@@ -116,34 +115,34 @@ pub fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
     craft.mode_name(number)
 }
 
-/// Whether a text is the name and version of an `ArduPilot` firmware, as at its start.
+/// Name and version, as sent at its start.
 pub(in crate::source) fn is_firmware(words: &str) -> bool {
     Craft::of_firmware(words).is_some()
 }
 
-/// The name and the version of a firmware; Rover's had a small v.
+/// Rover's has a small v.
 pub(super) fn name_and_version(words: &str) -> Option<(&str, &str)> {
     let (name, version) = words.split_once(' ')?;
     Some((name, version.strip_prefix(['V', 'v'])?))
 }
 
-/// Flight modes and events, a line each.
+/// A line each.
 const MODES: &str = include_str!("modes.txt");
 const EVENTS: &str = include_str!("events.txt");
 
-/// A line of a table: a number, and its words.
+/// Number and words.
 fn numbered(line: &'static str) -> Option<(u32, &'static str)> {
     let (number, words) = line.split_once(' ')?;
     Some((number.parse().ok()?, words))
 }
 
-/// The text of an EV; empty for an unknown number.
+/// Empty if unknown.
 pub(super) fn event(number: u8) -> &'static str {
     let event = EVENTS.lines().filter_map(numbered).find(|(known, _)| *known == u32::from(number));
     event.map_or("", |(_, words)| words)
 }
 
-/// The subsystem of an ERR, and the meaning of its code; the code 0 is always the end of it.
+/// The code 0 always ends it.
 pub(super) fn error(subsystem: u8, code: u8) -> String {
     let name =
         row(subsystem).map_or_else(|| format!("subsystem {subsystem}"), |(_, name, ..)| (*name).to_owned());
@@ -167,7 +166,7 @@ pub(super) fn error(subsystem: u8, code: u8) -> String {
     format!("{name}: {words}")
 }
 
-/// The alert of an ERR, or its end (code 0).
+/// Or its end (code 0).
 pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
     let cause = row(subsystem)?.2?;
     let urgency = match (subsystem, code) {
@@ -178,14 +177,12 @@ pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
     Some(Alert { cause, urgency })
 }
 
-/// The row of a subsystem.
 fn row(subsystem: u8) -> Option<&'static (u8, &'static str, Option<Cause>, bool)> {
     SUBSYSTEMS.iter().find(|(known, ..)| *known == subsystem)
 }
 
-/// The subsystems of ERR: number, name, cause of their alerts, and whether an error is a failsafe or an emergency. A failsafe lasts
-/// until it is resolved or the vehicle is disarmed. For 5, 6, 8, 17, 20, 23 and 31 the autopilot also reports a critical state in
-/// its heartbeat (`Copter::any_failsafe_triggered`), for the others not.
+/// Number, name, cause of alerts, and whether an error is a failsafe or an emergency. A failsafe lasts until resolved or
+/// disarmed. 5, 6, 8, 17, 20, 23 and 31 are also critical in the heartbeat (`Copter::any_failsafe_triggered`).
 const SUBSYSTEMS: &[(u8, &str, Option<Cause>, bool)] = &[
     (1, "main", None, false),
     (2, "radio", None, false),
@@ -220,23 +217,23 @@ const SUBSYSTEMS: &[(u8, &str, Option<Cause>, bool)] = &[
     (31, "dead reckoning failsafe", Some(Cause::Estimator), true),
 ];
 
-/// The subsystem of ERR that stops the motors at once, and so is not a lasting state.
+/// Stops the motors at once: no lasting state.
 pub(super) const CRASH_CHECK: u8 = 12;
 
-/// The subsystem of ERR for a failure of the estimator in flight.
+/// The estimator failed in flight.
 const EKF_FAILSAFE: u8 = 17;
 
-/// Whether a subsystem of ERR is a failsafe or an emergency.
+/// Or an emergency.
 pub(super) fn is_failsafe(subsystem: u8) -> bool {
     row(subsystem).is_some_and(|(.., is_failsafe)| *is_failsafe)
 }
 
-/// A subsystem's name; empty if unknown.
+/// Empty if unknown.
 pub(super) fn subsystem(number: u8) -> &'static str {
     row(number).map_or("", |(_, name, ..)| name)
 }
 
-/// The failsafes of these bits, by their names.
+/// By name.
 pub(super) fn failsafes(bits: u64) -> String {
     let named = SUBSYSTEMS.iter().filter(|(subsystem, ..)| bits & (1 << subsystem) != 0);
     named.map(|(_, name, ..)| *name).collect::<Vec<_>>().join(", ")

@@ -8,7 +8,6 @@ use super::writer::Writer;
 use super::{Seen, seen};
 use crate::source::item::Cause;
 
-/// Changes of the heartbeats' arming: seconds, armed.
 fn changes(seen: &Seen) -> Vec<(u64, bool)> {
     let mut changes: Vec<(u64, bool)> = Vec::new();
     for (ms, observation) in &seen.observations {
@@ -25,7 +24,7 @@ fn is_said(seen: &Seen, words: &str) -> bool {
     seen.said.iter().any(|said| said.contains(words))
 }
 
-/// A copter's log with the definitions of EV (161) and PARM (162).
+/// EV (161) and PARM (162).
 fn copter(logs_disarmed: f32) -> Writer {
     let mut log = Writer::new();
     log.format(160, "MSG", "QZ", "TimeUS,Message");
@@ -48,7 +47,6 @@ fn arming_right_after_a_pause_of_the_logger_does_not_count_as_of_before_it() {
     event(&mut log, 2, 10);
     log.attitudes(2..20);
     event(&mut log, 20, 11);
-    // The first message after the pause is the one that arms.
     event(&mut log, 200, 10);
     log.attitudes(200..210);
     assert_eq!(changes(&seen(&log.bytes)), [(1, false), (2, true), (20, false), (200, true)]);
@@ -88,7 +86,7 @@ fn a_log_that_opens_before_arming_begins_disarmed() {
     log.attitudes(6..9);
     assert_eq!(changes(&seen(&log.bytes)), [(1, false), (6, true)]);
 
-    // Arming failed: the logger ran all the same.
+    // Arming failed, the logger ran.
     let mut log = copter(0.0);
     log.attitudes(2..30);
     let refused = seen(&log.bytes);
@@ -103,8 +101,7 @@ fn a_log_that_opens_before_arming_begins_disarmed() {
     assert_eq!(changes(&seen(&log.bytes)), [(1, true), (6, false)]);
 }
 
-/// A plane's log of 2014, without any message about arming: 20 m/s from 10 s to 20 s, and then it glides
-/// against the wind until 40 s.
+/// A plane of 2014: 20 m/s from 10 s to 20 s, then gliding against the wind until 40 s.
 #[test]
 fn a_plane_whose_log_has_no_word_about_arming_is_armed_while_it_flies() {
     let mut log = "ArduPlane V3.1.2beta1 (834f90e8)\n\

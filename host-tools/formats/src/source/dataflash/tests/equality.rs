@@ -1,9 +1,7 @@
-//! One flight, two recordings: the autopilot's own log, and a ground station's. The same monitor finds the
-//! same in both.
+//! One flight, two recordings: the autopilot's and a ground station's; the monitor finds the same in both.
 //!
-//! The autopilot's logs in `tests/labelled/bin` are those of the labelled set, without messages that are
-//! unused for observations. They have only every tenth ESC message (the simulator writes 100 a second of
-//! each).
+//! `tests/labelled/bin` lacks messages that are unused for observations, and has every tenth ESC message (100
+//! a second of each).
 
 use std::path::Path;
 
@@ -18,10 +16,10 @@ use hums_onboard::monitoring::TICK;
 use crate::source::item::{Item, Want};
 use crate::source::recording::Place;
 
-/// A change of a level: the check, its instance, the level, and the seconds since the autopilot's power-on.
+/// Check, instance, level, seconds since the autopilot's power-on.
 type Change = (&'static str, u8, Level, f64);
 
-/// The monitor's findings, and the beginning of the recording in seconds since power-on.
+/// And the recording's beginning, seconds since power-on.
 fn findings(name: &str) -> (Vec<Change>, f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/labelled").join(name);
     let recording = Place::file(&path).open().expect("a recording");
@@ -34,7 +32,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
         let step = next.get_or_insert(at);
         while *step <= at {
             monitor.tick((*step).into(), &link, &recorder, &mut |finding| {
-                // An alarm that outlives its cause is reported again, and is not a change.
+                // Reported again, and no change.
                 if finding.level != finding.previous {
                     changes.push((
                         finding.check,
@@ -47,7 +45,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
             *step = *step + TICK;
         }
         if let Observation::Attitude(attitude) = observation {
-            // The times of both are compared as times since the autopilot's power-on.
+            // Compared since the autopilot's power-on.
             boot_s = f64::from(attitude.boot_ms.expect("ArduPilot")) / 1e3 - at.as_secs_f64();
             begins_s = begins_s.min(at.as_secs_f64() + boot_s);
         }
@@ -58,7 +56,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
     (changes, begins_s)
 }
 
-/// Findings about a ground station's link and the end of a recording are not about the vehicle.
+/// Not the link, not the recording's end.
 fn is_of_vehicle((check, _, level, _): &Change) -> bool {
     *level != Level::Stale && !matches!(*check, "heartbeat" | "frames_lost")
 }

@@ -1,4 +1,4 @@
-//! Hostile bytes: no panic, bounded memory, and time that never falls (which [`Seen`](super::Seen) asserts).
+//! Hostile bytes: no panic, bounded memory, rising time ([`Seen`](super::Seen)).
 
 use proptest::prelude::*;
 
@@ -7,7 +7,6 @@ use super::super::format::Formats;
 use super::writer::Writer;
 use super::{detect, read};
 
-/// A small log with something of everything.
 fn small() -> Vec<u8> {
     let mut log = Writer::new();
     log.format(160, "MSG", "QZ", "TimeUS,Message");

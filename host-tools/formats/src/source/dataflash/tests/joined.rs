@@ -1,8 +1,8 @@
-//! Logs that were joined to one file: each is one of its own.
+//! Joined logs in one file.
 
 use super::*;
 
-/// A log with its firmware, ten seconds of attitudes, and a type that differs in each log.
+/// Ten seconds of attitudes, and a type that differs in each log.
 fn flight(firmware: &str, from: u64, letter: &str) -> Writer {
     let mut log = Writer::new();
     log.format(160, "MSG", "QZ", "TimeUS,Message");
@@ -29,7 +29,6 @@ fn a_log_that_was_joined_to_another_is_another_recording_whatever_its_clock_says
     let first = flight("ArduPlane V4.5.7 (aaaaaaaa)", 20, "AAA").bytes;
     for from in [5, 20, 31, 700] {
         let second = flight("ArduCopter V4.5.7 (bbbbbbbb)", from, "BBB").bytes;
-        // The end of the first one may be cut off, or its last time be wrong.
         for (cut, wrong) in [(0, false), (5, false), (0, true)] {
             let mut all = first[..first.len() - cut].to_vec();
             if wrong {

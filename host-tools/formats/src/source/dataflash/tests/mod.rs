@@ -17,7 +17,6 @@ use self::writer::Writer;
 use super::*;
 use crate::source::item::{Amount, Item, Rows, Value};
 
-/// The items of a log, in a form that is easily compared.
 #[derive(Debug, Default)]
 struct Seen {
     observations: Vec<(u64, Observation)>,
@@ -71,7 +70,7 @@ impl Seen {
         }
     }
 
-    /// Gaps that have a place in the file.
+    /// With a place in the file.
     fn damage(&self) -> Vec<&(Cause, u64, u64, String)> {
         self.gaps.iter().filter(|gap| gap.1 != u64::MAX).collect()
     }
@@ -157,7 +156,7 @@ fn units_come_with_their_multipliers_though_they_are_told_after_the_first_rows()
     let seen = seen(&log.bytes);
     let columns = &seen.tables.iter().find(|(name, _)| name == "BAT").expect("rows").1;
     let units: Vec<&str> = columns.iter().map(|(_, unit)| unit.as_str()).collect();
-    // The hundredths of the temperature are in its format character.
+    // By the format character.
     assert_eq!(units, ["us", "mAh", "degC"]);
 }
 

@@ -7,7 +7,6 @@ use hums_core::observation::Observation;
 use super::seen;
 use super::writer::Writer;
 
-/// The documentation of these logs.
 const DOCUMENT: &str = include_str!("../../../../../../docs/dataflash.md");
 
 #[test]

@@ -1,13 +1,11 @@
-//! Times that one damaged bit has changed, beside pauses and restarts, which are as far off and are right.
+//! Damaged times beside pauses and restarts, which are as far off and right.
 
 use super::*;
 
-/// Sets the time of the message that begins at this byte.
 fn set_time(log: &mut Writer, message: usize, seconds: f64) {
     log.bytes[message + 3..message + 11].copy_from_slice(&((seconds * 1e6) as u64).to_le_bytes());
 }
 
-/// A log with its definitions.
 fn begun() -> Writer {
     let mut log = Writer::new();
     log.format(151, "IMU", "QB", "TimeUS,I");
@@ -25,7 +23,7 @@ fn tenths(log: &mut Writer, tenths: std::ops::Range<u64>) {
     }
 }
 
-/// Reports about time: gaps, restarts, and the last time.
+/// Gaps, restarts, last time.
 fn told(log: &[u8]) -> (Vec<(Cause, String)>, usize, u64) {
     let seen = seen(log);
     let gaps = seen.gaps.into_iter().map(|(cause, _, _, words)| (cause, words)).collect();
@@ -109,7 +107,7 @@ fn a_wrong_time_of_the_last_messages_is_told_and_a_saved_parameter_after_half_a_
         tenths(&mut log, 300 - count..300);
         for message in 0..count {
             let tenth = (300 - count + message) as f64 / 10.0;
-            // Tenths of whole seconds would have an attitude each.
+            // Whole seconds would have an attitude each.
             set_time(&mut log, last + message as usize * 12, tenth + shift);
         }
         let (gaps, restarts, end) = told(&log.bytes);
@@ -176,7 +174,7 @@ fn columns_without_names_are_damage_where_messages_of_them_come() {
 
 #[test]
 fn a_clock_that_does_not_run_from_some_place_on_is_told() {
-    // 32,000 attitudes of 17 bytes: four minutes of them.
+    // Four minutes.
     let of = |time: &dyn Fn(u64) -> u64| {
         let mut log = begun();
         for tick in 0..32_000_u64 {

@@ -1,6 +1,5 @@
 //! Writes logs, as they should be or not.
 
-/// A log in the making.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Writer {
     pub(super) bytes: Vec<u8>,
@@ -26,19 +25,16 @@ impl Writer {
         }
     }
 
-    /// A definition with the right length.
     pub(super) fn format(&mut self, kind: u8, name: &str, characters: &str, columns: &str) {
         let length = 3 + characters.chars().map(Self::size).fold(0, u8::wrapping_add);
         self.format_of(kind, length, name, characters, columns);
     }
 
-    /// A definition with any length.
     pub(super) fn format_of(&mut self, kind: u8, length: u8, name: &str, characters: &str, columns: &str) {
         let (name, characters, columns) = (padded(name, 4), padded(characters, 16), padded(columns, 64));
         self.raw(128, &[&[kind, length], &name, &characters, &columns]);
     }
 
-    /// A message of these bytes.
     pub(super) fn raw(&mut self, kind: u8, payload: &[&[u8]]) {
         self.bytes.extend([0xA3, 0x95, kind]);
         for bytes in payload {
@@ -46,7 +42,7 @@ impl Writer {
         }
     }
 
-    /// Units, with those of them that the tests use.
+    /// The tests' units.
     pub(super) fn units(&mut self, kind: u8, units: &str, multipliers: &str) {
         self.format(200, "UNIT", "QbZ", "TimeUS,Id,Label");
         self.format(201, "MULT", "Qbd", "TimeUS,Id,Mult");
@@ -61,7 +57,7 @@ impl Writer {
         self.raw(202, &[&time, &[kind], &padded(units, 16), &padded(multipliers, 16)]);
     }
 
-    /// An ATT, which is type 150, at each of these seconds.
+    /// ATT (150) each second.
     pub(super) fn attitudes(&mut self, seconds: std::ops::Range<u64>) {
         if !std::mem::replace(&mut self.has_attitude, true) {
             self.format(150, "ATT", "Qccc", "TimeUS,Roll,Pitch,Yaw");
@@ -72,7 +68,7 @@ impl Writer {
         }
     }
 
-    /// A MSG, which is type 160.
+    /// MSG (160).
     pub(super) fn message(&mut self, second: f64, words: &str) {
         self.raw(160, &[&((second * 1e6) as u64).to_le_bytes(), &padded(words, 64)]);
     }

@@ -1,12 +1,11 @@
-//! From PX4's topics to observations, equal to those of `hums_link::observe` from PX4's MAVLink messages. PX4
-//! computes these from the same topics (`src/modules/mavlink/streams` in PX4 is the source of each formula).
+//! From PX4's topics to observations, equal to `hums_link::observe` of PX4's MAVLink. Source of each formula:
+//! `src/modules/mavlink/streams` in PX4.
 //!
-//! Names of fields changed between versions; a topic's row lists those of v1.8 to v1.17, and takes the
-//! existing ones. Topics faster than the monitor's steps (attitude 250 times a second) are taken 20 or 10
-//! times a second. So usage counters mean the same for a log as on the board.
+//! A topic's row lists the field names of v1.8 to v1.17. Fast topics (attitude 250 times a second) are taken
+//! 20 or 10 times a second, so that usage counters agree with the board's.
 //!
-//! MAVLink repeats some messages by the clock even without a new topic (`HEARTBEAT`, `EXTENDED_SYS_STATE`,
-//! `SYSTEM_TIME`, `GPS_RAW_INT` of a silent receiver). They are repeated here once a second.
+//! Messages that MAVLink repeats by the clock (`HEARTBEAT`, `EXTENDED_SYS_STATE`, `SYSTEM_TIME`,
+//! `GPS_RAW_INT` of a silent receiver) come once a second.
 
 mod motion;
 mod power;
@@ -22,28 +21,27 @@ pub use self::system::{mode_name, nav_state};
 
 pub(super) use state::{Px4, Report, Sample, Topic};
 
-/// Period of the repeated messages.
 const REPEAT_US: u64 = 1_000_000;
-/// All topics that serve.
+/// Useful topics.
 const LISTS: [&[Topic]; 4] = [system::TOPICS, motion::TOPICS, power::TOPICS, receivers::TOPICS];
 
-/// The row of a topic, if it is needed.
+/// If needed.
 pub(super) fn topic(name: &str) -> Option<&'static Topic> {
     LISTS.into_iter().flatten().find(|topic| topic.name == name)
 }
 
 impl Px4 {
-    /// A parameter, at the beginning or changed.
+    /// At the beginning or changed.
     pub(super) fn parameter(&mut self, name: &str, value: f64) {
         self.system.parameter(name, value);
     }
 
-    /// The version of the firmware, once it is known.
+    /// Once known.
     pub(super) fn identity(&mut self, release: u32) {
         self.system.release = release;
     }
 
-    /// The logger lost data: silence has no meaning for a while.
+    /// Silence means nothing for a while.
     pub(super) fn dropout(&mut self) {
         receivers::dropout(&mut self.receivers);
     }

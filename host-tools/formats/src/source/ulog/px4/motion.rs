@@ -1,4 +1,4 @@
-//! How the vehicle moves, and how well its estimator knows that.
+//! Motion, and the estimator's confidence.
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, MOTORS_MAX,
@@ -11,37 +11,29 @@ use hums_core::units::{
 
 use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Sample, Topic, topic};
 
-/// The specific force of a shock is greater than this: below the lowest limit of a shock, and above the
-/// forces of nearly all flights.
+/// Of a shock: below its lowest limit, above nearly all flights' forces.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 
-/// Fields of `vehicle_imu`.
 const VEHICLE_IMU: &str = "delta_velocity delta_velocity_dt delta_angle delta_angle_dt";
-/// Fields of `vehicle_air_data`.
 const VEHICLE_AIR_DATA: &str = "baro_pressure_pa ambient_temperature baro_temp_celcius baro_alt_meter";
-/// Fields of `vehicle_local_position`.
 const VEHICLE_LOCAL_POSITION: &str = "x y z vx vy vz z_valid z_global v_z_valid ref_alt heading yaw";
-/// Fields of `estimator_status`.
 const ESTIMATOR_STATUS: &str = "vel_test_ratio pos_test_ratio hgt_test_ratio hdg_test_ratio mag_test_ratio solution_status_flags \
     vibe";
-/// Fields of `estimator_innovation_test_ratios`.
 const ESTIMATOR_INNOVATION_TEST_RATIOS: &str = "gps_hvel gps_vvel ev_hvel ev_vvel aux_hvel gps_hpos ev_hpos gps_vpos ev_vpos rng_vpos baro_vpos \
     mag_field heading";
-/// Fields of `estimator_status_flags`.
 const ESTIMATOR_STATUS_FLAGS: &str =
     "cs_tilt_align cs_fake_pos cs_constant_pos cs_gnss_fault fs_bad_acc_vertical";
-/// Fields of `vehicle_imu_status`.
 const VEHICLE_IMU_STATUS: &str = "accel_device_id delta_angle_coning_metric gyro_coning_vibration gyro_vibration_metric \
     accel_vibration_metric accel_clipping";
 
 pub(super) const TOPICS: &[Topic] = &[
-    // Thinned by its handler, which looks for shocks in all of them.
+    // Its handler looks for shocks in all.
     topic("sensor_combined", 1, 0, "accelerometer_m_s2 gyro_rad", imu),
     topic("vehicle_acceleration", 1, 0, "xyz", acceleration),
     topic("vehicle_angular_velocity", 1, FAST_US, "xyz", |px4, sample| {
         px4.motion.rate = sample.fields.vector(0);
     }),
-    // Each of several sensors; the one that flies is in the topics above.
+    // Several sensors; the flying one is above.
     topic("vehicle_imu", 3, MEDIUM_US, VEHICLE_IMU, other_imu),
     topic("vehicle_magnetometer", 3, MEDIUM_US, "magnetometer_ga", |px4, sample| {
         if let Some(slot) = px4.motion.fields.get_mut(usize::from(sample.instance)) {
@@ -52,7 +44,7 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("actuator_outputs", 2, MEDIUM_US, "output", outputs),
     topic("vehicle_air_data", 1, MEDIUM_US, VEHICLE_AIR_DATA, air),
     topic("vehicle_attitude", 1, FAST_US, "q rollspeed pitchspeed yawspeed", attitude),
-    // Until v1.15 the angles are in it too, and before v1.6 only they.
+    // Until v1.15 with angles, before v1.6 only angles.
     topic("vehicle_attitude_setpoint", 1, FAST_US, "q_d roll_body pitch_body", attitude_setpoint),
     topic("vehicle_rates_setpoint", 1, FAST_US, "roll pitch yaw", |px4, sample| {
         let rates = [0, 1, 2].map(|axis| sample.fields.finite(axis));
@@ -83,7 +75,7 @@ pub(super) const TOPICS: &[Topic] = &[
         let length = sample.fields.vector::<3>(0).map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
         px4.motion.set_thrust(sample.instance, length);
     }),
-    // Until v1.13 the throttle is the fourth control of a group: of the rotors, and of a VTOL's plane.
+    // Until v1.13 throttle is a group's fourth control: of the rotors, and of a VTOL's plane.
     topic("actuator_controls_0", 1, MEDIUM_US, "control", |px4, sample| {
         px4.motion.set_thrust(0, sample.fields.element(0, 3).map(|thrust| thrust as f32));
     }),
@@ -96,7 +88,7 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("estimator_status", 9, MEDIUM_US, ESTIMATOR_STATUS, estimator_status),
     topic("estimator_innovation_test_ratios", 9, MEDIUM_US, ESTIMATOR_INNOVATION_TEST_RATIOS, test_ratios),
     topic("estimator_status_flags", 9, 0, ESTIMATOR_STATUS_FLAGS, estimator_flags),
-    // Motors are given this since v1.13.
+    // Since v1.13.
     topic("actuator_motors", 1, MEDIUM_US, "control", motors),
     topic("sensor_selection", 1, 0, "accel_device_id", |px4, sample| {
         px4.motion.accelerometer = sample.fields.count(0).filter(|&id| id != 0);
@@ -104,7 +96,7 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("vehicle_imu_status", 3, 0, VEHICLE_IMU_STATUS, imu_status),
 ];
 
-/// With the field of the compass of the same number, as in MAVLink's messages.
+/// With the compass of the same number, as in MAVLink.
 fn inertial(px4: &mut Px4, instance: u8, acceleration: Option<[f32; 3]>, rate: Option<[f32; 3]>) {
     let field = px4.motion.fields.get_mut(usize::from(instance)).and_then(Option::take);
     px4.observe(Observation::Imu(Imu {
@@ -123,8 +115,7 @@ fn imu(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// Whether the specific force of a message is handed on. Between two of them only a shock is, as such:
-/// impacts are short.
+/// Between due messages only a shock is handed on: impacts are short.
 fn is_due(px4: &mut Px4, sample: &Sample<'_>) -> bool {
     let now_us = sample.recorded_us;
     let long_ago = |last: u64| now_us < last || now_us - last >= FAST_US;
@@ -138,7 +129,7 @@ fn is_due(px4: &mut Px4, sample: &Sample<'_>) -> bool {
     false
 }
 
-/// Velocity and angle over a time, which is in microseconds.
+/// Over a time in microseconds.
 fn other_imu(px4: &mut Px4, sample: &Sample<'_>) {
     let over = |delta: usize, dt: usize| {
         let dt_s = sample.fields.finite(dt).map(|us| us / 1e6).filter(|dt_s| *dt_s > 0.0)?;
@@ -159,14 +150,14 @@ fn other_air(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// The source of `SERVO_OUTPUT_RAW`.
+/// As `SERVO_OUTPUT_RAW`.
 fn outputs(px4: &mut Px4, sample: &Sample<'_>) {
     let pulse = |output: usize| sample.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
     let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);
     px4.observe(Observation::Outputs(Outputs { port: sample.instance, pulses }));
 }
 
-/// For a log without `sensor_combined`.
+/// Without `sensor_combined`.
 fn acceleration(px4: &mut Px4, sample: &Sample<'_>) {
     if !px4.motion.combined && is_due(px4, sample) {
         inertial(px4, 0, sample.fields.vector(0), px4.motion.rate);
@@ -186,13 +177,13 @@ fn air(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// Quaternion of the rotation from north, east, down to the body; the first element is its real part.
+/// From north, east, down to the body; real part first.
 fn attitude(px4: &mut Px4, sample: &Sample<'_>) {
     let Some([w, x, y, z]) = sample.fields.vector::<4>(0) else { return };
     let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
     let pitch = (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin();
     let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
-    // Until v1.9 the rates are in it, later in vehicle_angular_velocity. PX4 makes its ATTITUDE from the same.
+    // Rates: here until v1.9, later in vehicle_angular_velocity. As in PX4's ATTITUDE.
     let rates = match [1, 2, 3].map(|field| sample.fields.finite(field)) {
         [Some(x), Some(y), Some(z)] => Some([x, y, z]),
         _ => px4.motion.rate,
@@ -206,8 +197,7 @@ fn attitude(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// Maximum age of rate setpoints beside an attitude setpoint: some modes have no attitude setpoint, others no
-/// rate setpoints.
+/// Beside an attitude setpoint: some modes lack one of the two.
 const RATES_AGE_US: u64 = 500_000;
 
 fn attitude_setpoint(px4: &mut Px4, sample: &Sample<'_>) {
@@ -257,7 +247,7 @@ fn local_position(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// `GLOBAL_POSITION_INT`, as in PX4's stream: heights are the local position's, if it has any.
+/// `GLOBAL_POSITION_INT`: heights are the local position's, if any.
 fn global_position(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let Some(altitude) = fields.finite(2) else { return };
@@ -281,12 +271,12 @@ fn global_position(px4: &mut Px4, sample: &Sample<'_>) {
 pub(super) fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Position> {
     let (latitude_deg, longitude_deg) = (latitude?, longitude?);
     let valid = (-90.0..=90.0).contains(&latitude_deg) && (-180.0..=180.0).contains(&longitude_deg);
-    // The resolution of MAVLink's 1e-7 degrees.
+    // MAVLink's resolution is 1e-7 degrees.
     let nowhere = latitude_deg.abs() < 1e-7 && longitude_deg.abs() < 1e-7;
     (valid && !nowhere).then_some(Position { latitude_deg, longitude_deg })
 }
 
-/// Versions before the flag have a home as soon as there is one.
+/// Before the flag existed, any home is valid.
 fn home(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let valid = fields.get(2).is_none_or(|flag| flag != 0.0);
@@ -305,8 +295,7 @@ fn airspeed(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// `ESTIMATOR_STATUS` of the estimator that flies. The compass has the test ratio of the heading since it has no own
-/// (v1.16).
+/// `ESTIMATOR_STATUS` of the flying estimator. Since v1.16 the compass has the heading's test ratio.
 fn estimator_status(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     if sample.instance != px4.motion.estimator {
@@ -322,7 +311,7 @@ fn estimator_status(px4: &mut Px4, sample: &Sample<'_>) {
         compass: if fields.get(4).is_some() { ratio(4) } else { ratio(3) },
         flags: fields.count(5).unwrap_or(0) as u16,
     }));
-    // Before v1.11 the estimator reports the strength of vibration; clipped samples are not counted.
+    // Before v1.11 the estimator reports vibration, without clipped samples.
     if !px4.motion.imu_status
         && let Some(levels) = fields.vector::<3>(6)
     {
@@ -330,8 +319,8 @@ fn estimator_status(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// The same figures of a log without `estimator_status`, sensor by sensor: the largest counts, as PX4's estimator has it
-/// there. These are squares (innovation squared by its limit squared), and there they are not.
+/// Without `estimator_status`, by sensor: the largest counts, as in PX4. These are squares (innovation by its limit), those are
+/// not.
 fn test_ratios(px4: &mut Px4, sample: &Sample<'_>) {
     if sample.instance != px4.motion.estimator || px4.motion.estimator_status {
         return;
@@ -352,7 +341,7 @@ fn test_ratios(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// `ESTIMATOR_STATUS_FLAGS` of a log without `estimator_status`, as far as known.
+/// Without `estimator_status`, as far as known.
 fn estimator_flags(px4: &mut Px4, sample: &Sample<'_>) {
     const ATTITUDE: u16 = 1;
     const CONST_POS_MODE: u16 = 1 << 7;
@@ -365,7 +354,7 @@ fn estimator_flags(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// A missing or stopped motor has NaN or zero.
+/// NaN or zero: missing or stopped.
 fn motors(px4: &mut Px4, sample: &Sample<'_>) {
     let given = (0..12).filter_map(|motor| sample.fields.element(0, motor)).filter(|part| part.is_finite());
     let running: Vec<f64> = given.filter(|part| *part > 0.0).collect();
@@ -377,7 +366,7 @@ fn vibration(levels: [Option<f32>; 3], clips: [u32; 3]) -> Observation {
     Observation::Vibration(Vibration { scale: VibrationScale::Px4Metrics, levels, clips })
 }
 
-/// `VIBRATION`: the metrics of the accelerometer that flies, and the clipped samples of each.
+/// `VIBRATION` of the flying accelerometer, and clips of each.
 fn imu_status(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     px4.motion.imu_status = true;
@@ -386,7 +375,7 @@ fn imu_status(px4: &mut Px4, sample: &Sample<'_>) {
         *clips = sum as u32;
     }
     let id = fields.count(0);
-    // A log without the id of the one in use has one, or the first one is in use.
+    // Without an id the first one flies.
     let flies =
         px4.motion.accelerometer.map_or(sample.instance == 0, |accelerometer| id == Some(accelerometer));
     if flies {

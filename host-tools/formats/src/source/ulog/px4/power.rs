@@ -7,7 +7,6 @@ use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
 use super::state::{BATTERIES_MAX, MEDIUM_US, Pack, Px4, Sample, Topic, topic};
 
-/// The names of the fields of these ESCs.
 macro_rules! esc_fields {
     ($($n:literal),*) => {
         concat!("esc_count", $(" esc[", $n, "].esc_rpm esc[", $n, "].esc_voltage esc[", $n, "].esc_current esc[", $n,
@@ -15,14 +14,11 @@ macro_rules! esc_fields {
     };
 }
 
-/// Fields of one ESC above.
 const ESC_FIELDS: usize = 6;
 
-/// Fields of `battery_status`.
 const BATTERY_STATUS: &str = "connected voltage_v voltage_filtered_v current_a current_filtered_a remaining discharged_mah \
     temperature faults cell_count voltage_cell_v id warning";
 
-/// Fields of `esc_status`.
 const ESC_STATUS: &str = esc_fields!(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11);
 
 pub(super) const TOPICS: &[Topic] = &[
@@ -34,10 +30,10 @@ pub(super) const TOPICS: &[Topic] = &[
 
 fn battery(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
-    // Logs from before this field have a battery if its voltage is plausible.
+    // Before this field: a plausible voltage.
     let connected = fields.get(0).map_or(fields.finite(1) > Some(0.1), |flag| flag != 0.0);
     let when = |value: Option<f32>| value.filter(|_| connected);
-    // MAVLink sends the filtered ones, which ended with v1.16. -1 is unknown.
+    // MAVLink's are filtered (until v1.16). -1 is unknown.
     let current =
         when(fields.finite(4).or_else(|| fields.finite(3))).filter(|amperes| (*amperes + 1.0).abs() > 1e-6);
     let remaining = when(fields.finite(5)).filter(|part| (0.0..=1.0).contains(part));
@@ -45,7 +41,7 @@ fn battery(px4: &mut Px4, sample: &Sample<'_>) {
     let cells = cells(sample).filter(|_| connected);
     let voltage = cells.map_or(whole, |cells| Some(cells.iter().flatten().map(|cell| cell.0).sum()));
     let battery = Battery {
-        // PX4 counts from 1; versions without a number, and those that leave it at 0, have instances.
+        // Counts from 1; without a number, or with 0, instances count.
         id: fields.byte(11).and_then(|id| id.checked_sub(1)).unwrap_or(sample.instance),
         cells: cells
             .unwrap_or([None; CELLS_MAX])
@@ -58,7 +54,7 @@ fn battery(px4: &mut Px4, sample: &Sample<'_>) {
         temperature: when(fields.finite(7)).map(Celsius),
         faults: fields.count(8).unwrap_or(0) as u32,
         charge: if connected { charge(fields.byte(12)) } else { 0 },
-        // PX4 calls every battery lithium polymer.
+        // As PX4 calls every battery.
         ..Battery::default()
     };
     let voltage = when(fields.finite(2).or_else(|| fields.finite(1))).filter(|volts| *volts > 0.0).map(Volts);
@@ -73,8 +69,8 @@ fn battery(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// `MAV_BATTERY_CHARGE_STATE` of `battery_status.warning`, as in PX4's stream `BATTERY_STATUS`: none, low,
-/// critical, emergency, failed. 6 and 7 (since v1.13) are unhealthy and charging in both.
+/// `MAV_BATTERY_CHARGE_STATE` of `battery_status.warning`, as in PX4's `BATTERY_STATUS`: none, low, critical,
+/// emergency, failed. 6 and 7 (since v1.13) are unhealthy and charging in both.
 const fn charge(warning: Option<u8>) -> u8 {
     const UNDEFINED: u8 = 0;
     match warning {
@@ -84,7 +80,7 @@ const fn charge(warning: Option<u8>) -> u8 {
     }
 }
 
-/// The cells' voltages, if the battery measures them.
+/// If measured.
 fn cells(sample: &Sample<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
     let fields = &sample.fields;
     let count = fields.count(9).filter(|&count| count > 0)?;
@@ -102,7 +98,7 @@ fn load(px4: &mut Px4, sample: &Sample<'_>) {
     system_status(px4);
 }
 
-/// `SYS_STATUS`: the battery with the least left.
+/// The battery with the least left.
 fn system_status(px4: &mut Px4) {
     let left = |pack: &Pack| pack.remaining.map_or(1.0, |part| part.0);
     let lowest = px4.power.batteries.iter().flatten().min_by(|a, b| left(a).total_cmp(&left(b)));
@@ -116,14 +112,14 @@ fn system_status(px4: &mut Px4) {
     px4.observe(Observation::SystemStatus(status));
 }
 
-/// The name of the rail has a capital letter before v1.12.
+/// Capital letter before v1.12.
 fn rails(px4: &mut Px4, sample: &Sample<'_>) {
     let vcc = sample.fields.finite(0).or_else(|| sample.fields.finite(1)).filter(|volts| *volts > 0.0);
-    // MAVLink has a servo rail; PX4's topic does not.
+    // PX4's topic has no servo rail.
     px4.observe(Observation::Rails(Rails { vcc: vcc.map(Volts), servo: None }));
 }
 
-/// `ESC_STATUS` and `ESC_INFO` at once, in groups of four.
+/// `ESC_STATUS` and `ESC_INFO`, in groups of four.
 fn escs(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let count = (fields.count(0).unwrap_or(0) as usize).min(MOTORS_MAX);
@@ -136,14 +132,13 @@ fn escs(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// Until v1.11 PX4 hands on the values of CAN ESCs in kelvin. ESCs do not work above 200 degrees Celsius, nor
-/// below 200 kelvin.
+/// Until v1.11 CAN ESCs are in kelvin: none works above 200 degrees Celsius, nor below 200 kelvin.
 fn celsius(temperature: f32) -> Celsius {
     const ZERO_CELSIUS: f32 = 273.15;
     Celsius(if temperature > 200.0 { temperature - ZERO_CELSIUS } else { temperature })
 }
 
-/// A place with zeros or NaN for speed, voltage and current has no ESC, or one without power.
+/// Zeros or NaN for speed, voltage and current: no ESC, or no power.
 fn one_esc(sample: &Sample<'_>, at: usize) -> Esc {
     let fields = &sample.fields;
     let nothing = |value: Option<f32>| value.is_none_or(|value| value == 0.0);

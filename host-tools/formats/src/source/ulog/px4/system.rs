@@ -1,4 +1,4 @@
-//! The autopilot itself: its identity, arming, mode, landed state and texts.
+//! The autopilot itself: identity, arming, mode, landed state, texts.
 
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, RadioControl, Sensors,
@@ -8,13 +8,10 @@ use hums_core::units::Rpm;
 
 use super::state::{MEDIUM_US, Px4, Report, Sample, Status, System, Topic, topic};
 
-/// Fields of `vehicle_status`.
 const VEHICLE_STATUS: &str = "arming_state nav_state failsafe system_type hil_state takeoff_time onboard_control_sensors_present \
     onboard_control_sensors_enabled onboard_control_sensors_health calibration_enabled \
     nav_state_user_intention";
-/// Fields of `actuator_armed`.
 const ACTUATOR_ARMED: &str = "armed lockdown kill termination manual_lockdown force_failsafe";
-/// Fields of `failsafe_flags`.
 const FAILSAFE_FLAGS: &str = "manual_control_signal_lost gcs_connection_lost offboard_control_signal_lost battery_warning \
     battery_low_remaining_time battery_unhealthy geofence_breached mission_failure navigator_failure \
     vtol_fixed_wing_system_failure wind_limit_exceeded flight_time_limit_exceeded attitude_invalid \
@@ -42,14 +39,14 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("rpm", 2, MEDIUM_US, "rpm_estimate indicated_frequency_rpm", rpm),
 ];
 
-/// The conditions of `failsafe_flags`, in the order of its fields above, for people. Flags of unused modes,
-/// and flags that only prevent arming, are left out.
+/// Conditions of `failsafe_flags`, in the order above, for people. Flags of unused modes, and those that only prevent arming,
+/// are left out.
 const FAILSAFES: &str = "manual control,ground station,offboard control,battery,battery time,battery health,fence,\
     mission,navigator,VTOL system,wind,flight time,attitude,angular velocity,local position,\
     global position,position accuracy,position accuracy,attitude failure,motor failure,ESC,\
     propeller";
 
-/// `ARMING_STATE_ARMED`: the same number in all versions; 1 is standby, later called disarmed.
+/// 2 in all versions; 1 is standby, later disarmed.
 const ARMED: u8 = 2;
 /// `MAV_STATE`.
 const STANDBY: u8 = 3;
@@ -61,12 +58,11 @@ const TERMINATION: u8 = 8;
 const CALIBRATING: u8 = 2;
 
 impl System {
-    /// Whether it is armed.
     pub(super) fn armed(&self) -> bool {
         self.status.is_some_and(|status| status.arming == ARMED)
     }
 
-    /// State of sensors, if the log has it (until v1.13).
+    /// Until v1.13.
     pub(super) fn sensors(&self) -> Option<Sensors> {
         self.status?.sensors
     }
@@ -84,7 +80,7 @@ impl System {
         }
     }
 
-    /// Whether another computer flies it, or is meant to.
+    /// Or is meant to.
     fn is_offboard(&self) -> bool {
         const OFFBOARD: u8 = 14;
         self.status.is_some_and(|status| status.nav == OFFBOARD || status.meant == Some(OFFBOARD))
@@ -105,7 +101,7 @@ impl System {
         })
     }
 
-    /// `HEARTBEAT`'s state, as PX4's stream works it out.
+    /// As in PX4's stream.
     fn state(&self, status: Status) -> u8 {
         if self.terminated || (self.stopped && !status.hil) || status.nav == 13 {
             return TERMINATION;
@@ -125,7 +121,7 @@ impl System {
         }
     }
 
-    /// `EXTENDED_SYS_STATE`, as PX4's stream works it out.
+    /// `EXTENDED_SYS_STATE`, as in PX4's stream.
     fn landed(&self) -> Option<LandedState> {
         Some(match (self.landed?, self.setpoint.filter(|_| self.auto)) {
             (true, _) => LandedState::OnGround,
@@ -137,7 +133,7 @@ impl System {
     }
 }
 
-/// The kinds that `hums_link` makes of `MAV_TYPE`.
+/// As `hums_link` does.
 fn kind(type_number: u8) -> VehicleKind {
     match type_number {
         2 | 3 | 4 | 13 | 14 | 15 | 29 | 35 => VehicleKind::Rotorcraft,
@@ -148,8 +144,8 @@ fn kind(type_number: u8) -> VehicleKind {
     }
 }
 
-/// `nav_state` with the main and the sub mode that PX4 sends for it (`px4_custom_mode.h`) and its name. Numbers 6 to 9
-/// and 16 are of versions before v1.13 (6 is used again since v1.15).
+/// `nav_state`, main and sub mode (`px4_custom_mode.h`), name. Numbers 6 to 9 and 16 are of versions before v1.13 (6 is used
+/// again since v1.15).
 const MODES: [(u8, u8, u8, &str); 31] = [
     (0, 1, 0, "Manual"),
     (1, 2, 0, "Altitude"),
@@ -189,7 +185,8 @@ fn custom_mode(nav: u8) -> u32 {
     mode.map_or(0, |&(_, main, sub, _)| u32::from(main) << 16 | u32::from(sub) << 24)
 }
 
-/// The `nav_state` of a mode in `HEARTBEAT.custom_mode`. `PX4` sends manual flight for a termination too, and a landing for a descent.
+/// The `nav_state` of a mode in `HEARTBEAT.custom_mode`. `PX4` sends manual flight also for a termination, a landing for a
+/// descent.
 pub fn nav_state(mode: u32) -> Option<u8> {
     let mut navs = MODES.iter().map(|(nav, ..)| *nav).filter(|nav| !matches!(nav, 8 | 9 | 12 | 13));
     navs.find(|nav| mode != 0 && custom_mode(*nav) == mode)
@@ -213,16 +210,16 @@ fn status(px4: &mut Px4, sample: &Sample<'_>) {
     };
     px4.system.status = Some(status);
     px4.failsafes();
-    // Changes are reported at once; the rest waits for its turn.
+    // The rest waits for its turn.
     let now = |status: Status| (status.arming, status.nav, status.failsafe);
     if before.is_none_or(|before| now(before) != now(status)) {
         px4.heartbeat();
     }
 }
 
-/// Since v1.14. These conditions also hold without an active failsafe, so they are reported only in failsafe.
+/// Since v1.14. The conditions also hold without a failsafe: reported only in failsafe.
 fn failsafe_flags(px4: &mut Px4, sample: &Sample<'_>) {
-    // `BATTERY_WARNING_CRITICAL`: a low battery alone is a warning.
+    // A low battery alone is a warning.
     const BATTERY: &str = "battery";
     const OFFBOARD: &str = "offboard control";
     const CRITICAL: f64 = 2.0;
@@ -230,7 +227,7 @@ fn failsafe_flags(px4: &mut Px4, sample: &Sample<'_>) {
     for (field, name) in FAILSAFES.split(',').enumerate() {
         let least = if name == BATTERY { CRITICAL } else { 1.0 };
         let is_set = sample.fields.get(field).is_some_and(|value| value >= least);
-        // It is so on each vehicle that no other computer flies.
+        // So on vehicles that no other computer flies.
         let is_meant = name != OFFBOARD || px4.system.is_offboard();
         if is_set && is_meant && !names.contains(&name) {
             names.push(name);
@@ -242,7 +239,7 @@ fn failsafe_flags(px4: &mut Px4, sample: &Sample<'_>) {
 
 fn armed(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
-    // Lockdown is also how a simulation with hardware keeps its motors off.
+    // Simulations with hardware lock down too.
     px4.system.stopped = fields.flag(1);
     px4.system.terminated = (2..=5).any(|field| fields.flag(field));
 }
@@ -261,7 +258,7 @@ fn rc(px4: &mut Px4, sample: &Sample<'_>) {
     px4.observe(Observation::RadioControl(RadioControl { rssi }));
 }
 
-/// A telemetry radio, from v1.9 on.
+/// Since v1.9.
 fn radio(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let byte = |field| fields.byte(field).filter(|&value| value < u8::MAX);
@@ -274,7 +271,7 @@ fn radio(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// Until v1.8 the radio is in `telemetry_status`, which every link has, also such without a radio.
+/// Until v1.8 `telemetry_status`, which links without a radio have too.
 fn telemetry(px4: &mut Px4, sample: &Sample<'_>) {
     if sample.fields.byte(0).is_some_and(|rssi| rssi > 0) {
         radio(px4, sample);
@@ -300,7 +297,7 @@ fn ack(px4: &mut Px4, sample: &Sample<'_>) {
     px4.observe(Observation::CommandAck(CommandAck { command, result, target: None }));
 }
 
-/// The lower half of the levels is for those outside, as `MAV_SEVERITY`; 8 and more are not for people.
+/// The lower half is for those outside, as `MAV_SEVERITY`; from 8 on not for people.
 fn event(px4: &mut Px4, sample: &Sample<'_>) {
     let severity = sample.fields.byte(1).unwrap_or(0) & 0x0f;
     if let Some(number) = sample.fields.count(0)
@@ -319,9 +316,8 @@ fn log_message(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// The name of a mode in `HEARTBEAT.custom_mode`: the main mode in the third byte, the sub mode in the
-/// fourth. States before v1.13 that the pilot did not choose, such as failures, have the number of another
-/// mode.
+/// By `HEARTBEAT.custom_mode`: main mode in the third byte, sub mode in the fourth. Before v1.13 unchosen states, such as
+/// failures, have another mode's number.
 pub fn mode_name(mode: u32) -> Option<&'static str> {
     let [_, _, main, sub] = mode.to_le_bytes();
     let flown = MODES.iter().filter(|(nav, ..)| !matches!(nav, 8 | 9 | 11..=13));
@@ -346,13 +342,13 @@ impl Px4 {
         }
         if !self.system.told_identity && self.system.release != 0 {
             self.system.told_identity = true;
-            // The unique id that MAVLink sends is not in the log.
+            // The log lacks MAVLink's unique id.
             let identity = AutopilotIdentity { firmware: self.system.release, uid: 0 };
             self.observe(Observation::Identity(identity));
         }
     }
 
-    /// Tells why it is in failsafe, when that changes.
+    /// The reasons, when they change.
     fn failsafes(&mut self) {
         let in_failsafe = self.system.status.is_some_and(|status| status.failsafe);
         let words = if in_failsafe { self.system.failsafes.as_str() } else { "" };
@@ -368,7 +364,7 @@ impl Px4 {
         }
     }
 
-    /// The messages that MAVLink repeats without a new topic.
+    /// As MAVLink repeats them.
     pub(super) fn repeat(&mut self, recorded_us: u64) {
         self.heartbeat();
         self.landed();

@@ -4,7 +4,7 @@ use crate::source::ulog::tests::writer::{Read, Writer, read};
 
 const SECOND: u64 = 1_000_000;
 
-/// A topic: its name, its fields, and its messages, each with its time in seconds.
+/// Name, fields, messages with seconds.
 type Topic<'a> = (&'a str, &'a str, &'a [(u64, Vec<u8>)]);
 
 fn log(topics: &[Topic<'_>]) -> Read {
@@ -126,7 +126,7 @@ fn a_batterys_warning_is_its_charge_state() {
         let charge = said.split("charge: ").nth(1).and_then(|rest| rest.split([',', ' ']).next());
         charge.expect("a charge state").parse::<u8>().expect("a number")
     };
-    // none, low, critical, emergency, failed, unhealthy, charging, and an invalid value.
+    // None, low, critical, emergency, failed, unhealthy, charging, invalid.
     assert_eq!([0, 1, 2, 3, 4, 6, 7, 5].map(|warning| of(warning, 1)), [1, 2, 3, 4, 5, 6, 7, 0]);
     assert_eq!(of(2, 0), 0, "no battery is connected");
     let silent = log(&[(
@@ -341,7 +341,6 @@ fn the_throttle_is_that_of_the_motors_where_nothing_else_tells_it() {
     assert_eq!((throttle(false).as_str(), throttle(true).as_str()), ("0.6", "0.25"));
 }
 
-/// The documentation of PX4's logs.
 const DOCUMENT: &str = include_str!("../../../../../../docs/ulog.md");
 
 #[test]

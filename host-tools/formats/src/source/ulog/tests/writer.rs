@@ -1,18 +1,17 @@
-//! A small writer of `ULog`, for tests, by the format's description.
+//! Writes `ULog` by the format's description.
 
 use hums_core::clock::Instant;
 
 use crate::source::item::{Gap, Item, Reader, Rows, Summary, Value, Want};
 use crate::source::ulog::Ulog;
 
-/// A log in the making.
 #[derive(Clone)]
 pub(in crate::source::ulog) struct Writer {
     pub(in crate::source::ulog) bytes: Vec<u8>,
 }
 
 impl Writer {
-    /// A header, logging began at this time.
+    /// Logging began at this time.
     pub(in crate::source::ulog) fn new(time_us: u64) -> Self {
         let mut bytes = crate::source::ulog::message::MAGIC.to_vec();
         bytes.push(1);
@@ -82,7 +81,7 @@ impl Writer {
     }
 }
 
-/// The items of a log as texts: easy to compare, easy to read if they differ.
+/// As texts: comparable and readable.
 #[derive(Debug, Default)]
 pub(in crate::source::ulog) struct Read {
     pub(in crate::source::ulog) items: Vec<(u64, String)>,
@@ -91,18 +90,16 @@ pub(in crate::source::ulog) struct Read {
 }
 
 impl Read {
-    /// The items of this kind.
     pub(in crate::source::ulog) fn of(&self, kind: &str) -> Vec<&str> {
         self.items.iter().filter_map(|(_, item)| item.strip_prefix(kind)).map(str::trim_start).collect()
     }
 }
 
-/// Reads a log that is one.
 pub(in crate::source::ulog) fn read(bytes: &[u8]) -> Read {
     try_read(bytes).expect("a ULog")
 }
 
-/// Reads bytes that may be a log. Times never fall.
+/// Perhaps a log; times never fall.
 pub(in crate::source::ulog) fn try_read(bytes: &[u8]) -> anyhow::Result<Read> {
     let mut read = Read::default();
     let mut last = Instant::ZERO;
