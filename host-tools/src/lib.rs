@@ -1,4 +1,4 @@
-//! The `hums` command: the pipeline of the firmware on this PC, and all readers of its output.
+//! The `hums` command: the firmware's pipeline on this PC, and all readers of its output.
 
 #![deny(
     clippy::print_stderr,
@@ -34,20 +34,20 @@ use clap::{CommandFactory as _, Parser as _};
 use cli::{BoxAction, Cli, Command};
 use outcome::Outcome;
 
-/// Runs the program with these arguments (the first is the program's own name).
+/// The first argument is the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
     match Cli::try_parse_from(with_command(arguments.into_iter().collect())) {
         Ok(cli) => outcome::exit_code(command(&cli.command)),
         Err(error) => {
-            // Help and version go to standard output and succeed; so does output to a reader that has gone.
+            // Help and version succeed; so does output to a reader that has gone.
             let _ = error.print();
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         }
     }
 }
 
-/// The arguments with `check` before a file that is named in place of a command.
+/// `check` goes before a file in place of a command.
 fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
     let is_file = |first: &OsString| {
         let is_command = Cli::command().find_subcommand(first).is_some() || first == "help";

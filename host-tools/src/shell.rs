@@ -1,5 +1,4 @@
-//! `hums completions` and `hums man`: outputs for a shell and for readers of manuals, made from the definition of the
-//! command line.
+//! `hums completions` and `hums man`, from the command line's definition.
 
 use std::io::Write as _;
 

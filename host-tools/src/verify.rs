@@ -1,4 +1,4 @@
-//! `hums info --verify`: every check there is, each with what it looked at and what failed.
+//! `hums info --verify`: each check, its extent and its failures.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,6 @@ use crate::summary::{Contents, Overview};
 use hums_analysis::log_json::images_json;
 use hums_analysis::manifest::Manifest;
 
-/// What `hums info --verify --json` prints.
 const SCHEMA: Schema = Schema::first("hums-info-verify");
 
 /// Runs `hums info --verify`.
@@ -50,7 +49,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         }
         ok &= !is_broken;
     }
-    // The list is printed as it is made: a folder may have ten thousand logs.
+    // Printed as it is made: a folder may have ten thousand logs.
     let begin = || JsonList::begin(SCHEMA, &images_json(&found.images), "logs");
     let mut list = args.json.then(begin).transpose()?;
     for image in &found.images {
@@ -102,10 +101,10 @@ struct Totals {
     /// Number of sessions.
     logs: u64,
     worst: Verdict,
-    /// Sectors that were rebuilt, and missing ones with parity: a card is damaged, and no frame is lost.
+    /// Rebuilt, or missing parity: a damaged card without a lost frame.
     made_again: u64,
     unprotected: u64,
-    /// The first log of a card of which the logs before it were not read.
+    /// The logs before it were not read.
     without_earlier: Option<String>,
 }
 
@@ -120,12 +119,12 @@ impl Totals {
         }
     }
 
-    /// Whether a card has lost any of it.
+    /// Lost by a card.
     const fn is_damage(&self) -> bool {
         self.made_again + self.unprotected > 0
     }
 
-    /// The verdict on all logs that were read.
+    /// On all logs.
     fn words(&self, has_passed_over: bool) -> String {
         let all = self.without_earlier.is_none() && !has_passed_over;
         let words = match (self.worst, self.is_damage(), all) {
@@ -148,8 +147,7 @@ impl Totals {
     }
 }
 
-/// Reads all logs that were found through, and hands each on in their order, with what the others tell of it. Those that could not be
-/// read are told, and their number is given back.
+/// Hands each log on in order, with the others' evidence. Returns the number of unreadable ones, which are reported.
 pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
     let named = found.logs.iter().map(|log| (log.name.as_str(), log));
     let mut followed = EndResolver::new(Sessions::of(named));
@@ -166,27 +164,27 @@ pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>)
     Ok(failed)
 }
 
-/// What can be said of a log.
+/// A log's verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
-    /// All that is in it holds, and nothing is missing at its end.
+    /// Nothing is missing, nor at its end.
     Holds,
-    /// All that is in it holds up to its last end mark. The rest is read as far as it goes.
+    /// Up to the last end mark; the rest as far as it goes.
     ToMark,
-    /// A check failed, or nothing proves that it goes to a landing, a disarming or an orderly end.
+    /// A check failed, or no proof of a landing, disarming or orderly end.
     NotProved,
 }
 
-/// The verdict on a log that was read with [`Overview::verified`]. A log with rebuilt sectors never gets a good one.
+/// Needs [`Overview::verified`]; never good with rebuilt sectors.
 pub fn verdict(log: &Overview) -> Verdict {
     let log = LogJson::new(log);
     if log.ok { log.verdict } else { Verdict::NotProved }
 }
 
-/// The check of sectors that the card has lost, and that parity has rebuilt.
+/// Sectors lost and rebuilt.
 const INTACT: &str = "sectors intact";
 
-/// The failed checks of a log that was read with [`Overview::verified`], and the reason of each.
+/// With reasons; needs [`Overview::verified`].
 pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
     let judged = LogJson::new(log);
     let failed = judged.checks.into_iter().filter(|check| check.failed > 0);
@@ -224,21 +222,18 @@ struct LogJson {
     ok: bool,
     /// The session ended in order.
     closed: bool,
-    /// The name of the original, if this log is a mere copy. A copy is not examined again.
+    /// The original's name; a copy is not examined again.
     copy_of: Option<String>,
-    /// The log is the rest of one that newer sessions overwrote: its missing parts are no damage.
+    /// Overwritten by newer sessions: missing parts are no damage.
     left_over: bool,
-    /// What is known of its end.
     end: EndJson,
-    /// All blocks of its files.
     blocks: BlocksJson,
     checks: Vec<Check>,
-    /// Of what is in it, also where sectors had to be made again.
+    /// Also where sectors were rebuilt.
     #[serde(skip)]
     verdict: Verdict,
 }
 
-/// One kind of check.
 #[derive(Debug, Serialize)]
 struct Check {
     name: &'static str,
@@ -267,10 +262,10 @@ impl LogJson {
             .sum::<u64>()
             + contents.other_messages.count;
         let gaps = || contents.gaps.iter();
-        // An unknown number of missing sectors counts as one.
+        // Unknown numbers count as one.
         let missing: u64 = gaps().map(|gap| u64::from(loss::sectors_lost(gap).unwrap_or(1))).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
-        // A gap with an unknown number of missing frames counts as one.
+        // Unknown numbers count as one.
         let frames_missing = summary.frames_missing + summary.gaps_uncounted;
         let uncounted = match summary.gaps_uncounted {
             0 => String::new(),
@@ -320,7 +315,7 @@ impl LogJson {
     }
 }
 
-/// The parts of a mere copy that do not belong to the copied session.
+/// Outside the copied session.
 fn beside_copy(ending: &Ending) -> Vec<Check> {
     let (besides, files) = (ending.besides(), ending.files.len() as u64);
     let check =
@@ -328,7 +323,7 @@ fn beside_copy(ending: &Ending) -> Vec<Check> {
     Some(check).filter(|check| check.failed > 0).into_iter().collect()
 }
 
-/// What its card has lost of it without a loss of frames.
+/// Damage of the card without lost frames.
 fn weakened(log: &Overview) -> Vec<Check> {
     let (ending, summary) = (&log.ending, &log.ending.summary);
     let check = |name, checked, failed, words: &str| Check {
@@ -340,7 +335,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
     let sectors = summary.blocks.sectors;
     let intact = check(INTACT, sectors, ending.made_again(), "made again from parity, without a loss");
     if ending.aside().is_some() {
-        // Of a copy, too, it is told that its card is damaged.
+        // A copy's card may be damaged too.
         return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();
     }
     let words = "parity is missing: what the card loses of these files cannot be made again";
@@ -349,7 +344,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
     vec![intact, check("sectors protected", written, ending.unprotected(), words)]
 }
 
-/// The checks of a log's end and place.
+/// Of end and place.
 fn ends(log: &Overview) -> [Check; 7] {
     let ending = &log.ending;
     let summary = &ending.summary;
@@ -405,7 +400,7 @@ fn newer(log: &Overview) -> String {
     if log.needs_newer_program() { "some need a newer hums".to_owned() } else { String::new() }
 }
 
-/// Input that was damaged on the line, and so is in no log: it does not count against the log.
+/// In no log, so it does not count against it.
 fn came_damaged(contents: &Contents) -> Option<String> {
     let of = |what: Lost| contents.losses.get(what.name()).map(|loss| loss.count).filter(|count| *count > 0);
     let frames = of(Lost::DamagedFrames).map(|frames| count(frames, "damaged frame"));

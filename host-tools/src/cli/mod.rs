@@ -41,7 +41,7 @@ Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage 
 4 done, and `hums check` found something wrong with the vehicle, also in a damaged log.
 Results go to standard output, everything else to standard error. Colours are for terminals only, and NO_COLOR=1 turns them off.";
 
-/// The name of this program, its version and its commit.
+/// This program, its version and its commit.
 pub(crate) const PROGRAM: &str = concat!("hums ", env!("HUMS_VERSION"));
 
 /// The whole command line.
@@ -88,7 +88,6 @@ mod tests {
 
     use super::*;
 
-    /// A command line without pipes and redirections.
     fn without_redirection(line: &str) -> &str {
         line.split(['|', '>']).next().unwrap_or_default().trim_end()
     }

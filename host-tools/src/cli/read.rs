@@ -31,12 +31,12 @@ An output that exists is overwritten with --force only, once all of the new one 
 and a folder that holds another session's tables, are refused.
 Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
 
-/// The parser of an input's path: a name with a slash behind it is that file.
+/// A name with a slash behind it is that file.
 pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(without_slash)
 }
 
-/// An offset in seconds, of at most a week.
+/// In seconds, at most a week.
 fn offset(text: &str) -> Result<f64, String> {
     const WEEK_S: f64 = 604_800.0;
     let offset = text.parse::<f64>().map_err(|error| error.to_string())?;
@@ -107,7 +107,7 @@ pub enum Split {
 }
 
 impl Decode {
-    /// The request that the arguments make.
+    /// The arguments' request.
     pub fn request(&self) -> Request {
         Request {
             inputs: self.inputs.clone(),
@@ -129,7 +129,6 @@ impl Decode {
     }
 }
 
-/// The formats of `hums decode`, from their table.
 fn format() -> impl TypedValueParser<Value = &'static Format> {
     let values = FORMATS.iter().map(|format| PossibleValue::new(format.about.name).help(format.about.help));
     PossibleValuesParser::new(values).try_map(|name| find(&name).ok_or("is no format"))
@@ -162,7 +161,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// The request that the arguments make.
+    /// The arguments' request.
     pub fn request(&self) -> share::Request {
         let Self { input, session, output, force } = self.clone();
         share::Request { input, session, output, force }

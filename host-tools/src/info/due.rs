@@ -24,7 +24,6 @@ use crate::source::recording::Place;
 use crate::summary::{ComponentLine, Overview};
 use crate::utc::{clock, iso8601};
 
-/// Output of `hums due --json`.
 const SCHEMA: Schema = Schema::first("hums-due");
 const DAY_US: f64 = 86_400e6;
 
@@ -39,7 +38,7 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
         Ok(())
     })?;
     let outcome = read.end()?;
-    // In the order of their starts; a log without a start stays after the one before it.
+    // A log without a start stays after the one before it.
     let mut begun_us = 0;
     for (_, log) in &mut logs {
         begun_us = log.start_us.unwrap_or(begun_us);
@@ -60,7 +59,7 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
     Ok(outcome.and(if is_due { Outcome::Findings } else { Outcome::Done }))
 }
 
-/// The vehicle of a log: by its unique id, else by the name that the user gave, else by the folder, the kind and the autopilot.
+/// By its unique id, else by the user's name, else by folder, kind and autopilot.
 fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
     let known = log.contents.vehicle;
     if let Some(vehicle) = known.filter(|vehicle| vehicle.uid != 0) {
@@ -84,7 +83,6 @@ fn own_file(place: &Place) -> Option<&Path> {
     Some(place.own()?.pieces.first()?.path.as_path())
 }
 
-/// Figures of one log.
 struct Log {
     start_us: Option<u64>,
     order_us: u64,
@@ -124,14 +122,13 @@ struct Vehicle {
     parts: BTreeMap<u8, Part>,
 }
 
-/// One part over the logs that have it.
 struct Part {
     line: ComponentLine,
     limit: Option<Limit>,
-    /// Run, flights and time of the first log that has it.
+    /// Of the first log that has it.
     first: (f64, f64, Option<u64>),
     last_us: Option<u64>,
-    /// The logs have one before it in its place.
+    /// The logs have an earlier part in its place.
     is_new: bool,
 }
 
@@ -154,7 +151,7 @@ impl Vehicle {
                     == (line.kind, line.number, &line.serial, line.replaced)
             };
             if is_same(part) {
-                // A limit of another unit has another history.
+                // Another unit has another history.
                 if part.limit.map(|limit| limit.end) != limit.map(|limit| limit.end) {
                     part.first = first;
                 }
@@ -201,10 +198,10 @@ struct PartJson {
     unit: Option<&'static str>,
     /// How hours count: in the air, powered, turning.
     hours: Option<&'static str>,
-    /// At the present rate of use; `null` if that is not known.
+    /// At the present rate; `null` if unknown.
     left_flights: Option<f64>,
     due_utc: Option<String>,
-    /// The first log that has it; it may be older if `since_known` is false.
+    /// The first log that has it; the part may be older if `since_known` is false.
     since_utc: Option<String>,
     since_known: bool,
     /// The parameter that sets the limit.
@@ -246,7 +243,7 @@ impl PartJson {
         let span_us = first_us.zip(*last_us).map_or(0.0, |(first, last)| last.saturating_sub(first) as f64);
         let recently = ran - first_run;
         let due_us = left.zip(*last_us).filter(|_| span_us >= DAY_US && recently > 0.0);
-        // The cast saturates: of a part that is hardly used the date is far.
+        // Saturates: a hardly used part has a far date.
         let due_us = due_us.map(|(left, last)| last.saturating_add((left * span_us / recently) as u64));
         Self {
             place,
@@ -267,7 +264,6 @@ impl PartJson {
         }
     }
 
-    /// What is left of it, in words.
     fn left_words(&self) -> String {
         let (Some(left), Some(unit)) = (self.left, self.unit) else { return "no limit".to_owned() };
         if left <= 0.0 {
@@ -284,7 +280,7 @@ impl PartJson {
     }
 }
 
-/// So much of a unit: `3 flights`, `2.1 h`.
+/// `3 flights`, `2.1 h`.
 fn amount(value: f64, unit: &str) -> String {
     match unit.strip_suffix('s') {
         Some(one) if value.fract() == 0.0 => count(value as u64, one),
@@ -297,12 +293,11 @@ fn tenths(value: f64) -> String {
     short((value * 10.0).round() / 10.0)
 }
 
-/// The day of a time.
 fn day(utc: &str) -> &str {
     utc.get(..10).unwrap_or(utc)
 }
 
-/// A vehicle: a line, and a table of its parts.
+/// A line, and a table of its parts.
 fn text(vehicle: &VehicleJson) -> String {
     let span = match (&vehicle.first_utc, &vehicle.last_utc) {
         (Some(first), Some(last)) if day(first) == day(last) => format!(", {}", day(first)),
@@ -345,7 +340,6 @@ fn text(vehicle: &VehicleJson) -> String {
     text
 }
 
-/// The cells of a part.
 fn row(part: &PartJson) -> [String; 7] {
     let status = match part.status {
         "red" => "DUE",

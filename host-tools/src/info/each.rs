@@ -1,4 +1,4 @@
-//! Reads all logs that were found through, one after the other.
+//! Reads all found logs, one after the other.
 
 use anyhow::{Result, bail};
 
@@ -10,7 +10,6 @@ use crate::plural::count;
 use crate::source::find::{Found, sessions_of};
 use crate::summary::Overview;
 
-/// Result of the reading.
 pub(super) struct Read {
     outcome: Outcome,
     failed: u64,
@@ -27,8 +26,7 @@ impl Read {
     }
 }
 
-/// Reads all logs, or one session, and shows each with the evidence of the others about its end. For one
-/// session the logs beside it are read too.
+/// Shows each with the others' evidence about its end, for which those beside one session are read too.
 pub(super) fn each(
     found: &Found,
     wanted: Option<usize>,

@@ -1,4 +1,4 @@
-//! `hums info --list`: a line for each flight of a card, a folder or a log: when, how long, the worst that was found, how large.
+//! `hums info --list`: a line for each flight.
 
 use std::fmt::Write as _;
 
@@ -24,10 +24,8 @@ use crate::summary::Overview;
 use crate::utc::{clock, date_and_time, iso8601};
 use hums_analysis::log_json::{duration_s, images_json};
 
-/// Output of `hums info --list --json`.
 const SCHEMA: Schema = Schema::first("hums-info-list");
 
-/// Runs `hums info --list`.
 pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
     let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
@@ -42,7 +40,7 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&heading(width))?;
         }
     }
-    // In the order of their starts; a log without a start stays after the one before it.
+    // A log without a start stays after the one before it.
     let (mut lines, mut elements, mut begun_us) = (Vec::new(), Vec::new(), 0);
     let read = each(&found, wanted, |overview| {
         begun_us = start_utc_us(overview).unwrap_or(begun_us);
@@ -87,13 +85,12 @@ struct LogJson {
     worst: Option<WorstJson>,
     /// `null` if not counted.
     checks_judged: Option<usize>,
-    /// The number of all checks.
     checks_all: Option<usize>,
-    /// The vehicle was first received in the air.
+    /// First received in the air.
     begins_in_air: bool,
-    /// It ends in the air, as far as that was looked at.
+    /// In the air, as far as was looked at.
     ends_in_air: bool,
-    /// Part of the time was not recorded, in a recording of another program.
+    /// Unrecorded time, in another program's recording.
     lossy: bool,
     bytes: u64,
     /// Complete, undamaged and proved.
@@ -138,11 +135,10 @@ fn heading(width: usize) -> String {
     )
 }
 
-/// A log in a line.
 fn line(log: &Overview, width: usize) -> String {
     let date = start_utc_us(log).map_or_else(|| "unknown".to_owned(), date_and_time);
     let length = clock(span(duration_s(log)));
-    // The box's count up to its last store is a lower bound.
+    // The last stored count is a lower bound.
     let is_least = log.counted_until().is_some() && !log.contents.is_recounted;
     let least = if is_least { ">" } else { "" };
     let air =
@@ -165,14 +161,13 @@ fn line(log: &Overview, width: usize) -> String {
     }
     let lacks = log.soundness().words();
     if !lacks.is_empty() {
-        // A recording of another format is judged by another command.
+        // Another command judges other formats.
         let teller = if log.format.is_some() { "check says where" } else { "info --verify says why" };
         let _ = write!(text, "; {} (hums {teller})", warning(lacks));
     }
     text
 }
 
-/// The worst that was found, and how much there is besides.
 fn found(log: &Overview) -> String {
     let Some(worst) = worst(log) else {
         let checked = log.contents.checked_by() != "nobody";
@@ -185,7 +180,7 @@ fn found(log: &Overview) -> String {
     format!("{}: {}", level(worst.level), word(&check_name(&worst.check, worst.instance)))
 }
 
-/// The first problem of `hums check`; `None` if all is well.
+/// `None` if all is well.
 fn worst(log: &Overview) -> Option<WorstJson> {
     let contents = &log.contents;
     let problems = problems(&contents.findings, contents.checked_by() == "board");
@@ -204,20 +199,19 @@ pub(super) fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 
-/// Time in the air by the usage counters. They count from power-on: a later log of one power-on begins with
-/// the counts of the logs before it.
+/// By usage counters from power-on: a later log of one power-on begins with the earlier counts.
 pub(super) fn flight_s(log: &Overview) -> Option<f64> {
     let is_later = log.ending.summary.first_number.is_some_and(|first| first > 0);
     let before = log.contents.flight_before_s.filter(|_| is_later).unwrap_or(0.0);
     log.contents.usage.get(UsageCounter::Flight.name()).map(|all| (all - before).max(0.0))
 }
 
-/// Size of the recording, without the space allocated for it on a card.
+/// Without space allocated on a card.
 fn bytes(log: &Overview) -> u64 {
     if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
 }
 
-/// Bytes in the largest unit with a value of at least one.
+/// The largest unit with a value of at least one.
 fn binary(bytes: u64) -> String {
     let (mut size, mut units) = (bytes as f64, ["KiB", "MiB", "GiB", "TiB"].iter());
     let mut unit = "B";
@@ -229,7 +223,7 @@ fn binary(bytes: u64) -> String {
     if unit == "B" { format!("{bytes} B") } else { format!("{size:.2} {unit}") }
 }
 
-/// Seconds of a log, which may be any number: the cast saturates.
+/// Saturates: a log may have any number.
 fn span(seconds: f64) -> Span {
     Span::from_micros((seconds * 1e6) as u64)
 }
@@ -314,7 +308,7 @@ mod tests {
         assert!(told(None).contains("(hums info --verify says why)"));
     }
 
-    /// The box's count at a power cut in the air is a lower bound.
+    /// The stored count is a lower bound.
     #[test]
     fn a_time_in_the_air_that_was_stored_before_the_records_end_says_so() {
         let mut log = Overview::default();
@@ -324,7 +318,7 @@ mod tests {
         assert!(line(&log, 5).contains("   3:12 "), "on the ground nothing is counted after that");
         log.ending.summary.marks.moved = Some(Instant::from_millis(40_000));
         assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
-        // It was disarmed, and its log ended, before its landing was known.
+        // Its log ended before the landing was known.
         (log.ending.summary.marks.moved, log.ending.summary.marks.took_off) = (None, Some(true));
         assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
         log.ending.summary.marks.took_off = Some(false);

@@ -1,5 +1,4 @@
-//! `hums info`: the contents of a log or a recording; with `--list` a line for each, with `--verify` each
-//! check. For people and as JSON.
+//! `hums info`, for people and as JSON.
 
 pub mod due;
 mod each;
@@ -21,7 +20,6 @@ use each::each;
 use hums_analysis::log_json::{LogJson, images_json};
 use text::{image_text, text};
 
-/// Output of `hums info --json`.
 const SCHEMA: Schema = Schema::first("hums-info");
 
 /// Runs `hums info`.

@@ -1,6 +1,6 @@
 //! Text output of `hums info`.
 //!
-//! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
+//! Writing to a `String` cannot fail: results of `write!` are dropped.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -28,10 +28,9 @@ use crate::summary::{LISTED_MAX, Overview};
 use crate::utc::{clock, iso8601_ms, moment};
 use hums_analysis::log_json::{duration_s, vehicle};
 
-/// Findings and gaps that people are shown; the rest is counted, and is in `--json` and `hums decode`.
+/// Shown findings and gaps; `--json` and `hums decode` have the rest.
 const SHOWN_MAX: usize = 40;
 
-/// A card for people to read.
 pub(super) fn image_text(image: &logs::find::Image) -> String {
     let mut text = format!("Card {}", path(&image.path));
     for damage in &image.damage {
@@ -46,7 +45,6 @@ pub(super) fn image_text(image: &logs::find::Image) -> String {
     text
 }
 
-/// A log for people to read.
 pub(super) fn text(log: &Overview) -> String {
     let mut text = String::new();
     heading(&mut text, log);
@@ -117,13 +115,11 @@ fn heading(text: &mut String, log: &Overview) {
     text.push('\n');
 }
 
-/// Number of messages of a recording of another format.
 fn messages(log: &Overview) -> u64 {
     let messages = log.contents.messages.iter().map(|message| message.amount.count).sum::<u64>();
     if log.format.is_some() { messages + log.contents.other_messages.count } else { 0 }
 }
 
-/// Its end, and the blocks after that.
 fn ending(text: &mut String, log: &Overview) {
     let (ending, summary) = (&log.ending, &log.ending.summary);
     let _ = writeln!(text, "  end      {}", ending.words());
@@ -156,7 +152,7 @@ fn ending(text: &mut String, log: &Overview) {
 
 fn findings_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
-    // A recorder without checks has no findings, which does not mean that all was well.
+    // A recorder without checks has no findings: no proof of health.
     let by = match contents.checked_by() {
         "hums" if contents.is_little() => "",
         "hums" => " (checked here: what recorded this ran no checks)",
@@ -196,10 +192,10 @@ fn findings_text(text: &mut String, log: &Overview) {
     more(text, contents.findings_count, told);
 }
 
-/// This many changes in a row between data and no data become one line.
+/// Changes in a row between data and no data that become one line.
 const ROW_MIN: usize = 4;
 
-/// The words for a change that only means that data stopped or came again.
+/// Data stopped or came again.
 fn silence(finding: &Finding) -> Option<&'static str> {
     match (finding.previous, finding.level) {
         (Level::Ok, Level::Stale) => Some("that were ok have no data"),
@@ -208,7 +204,7 @@ fn silence(finding: &Finding) -> Option<&'static str> {
     }
 }
 
-/// The finding, its check, the part that is due, and its cause.
+/// With its check, the due part and the cause.
 fn sentence(finding: &Finding, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
     let Finding { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
     let mut sentence = format!("{}: {}", subsystem.name(), check_name(check, *instance));
@@ -253,7 +249,7 @@ fn more(text: &mut String, count: u64, shown: usize) {
 fn gaps_text(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     let is_part = log.ending.files.iter().any(|file| is_part(Path::new(file)));
-    // Frames and sectors are counted in HUMS logs only.
+    // Only in HUMS logs.
     let own = log.format.is_none();
     if summary.gaps + summary.losses + summary.blocks.damaged == 0 {
         text.push_str("  gaps     none\n");
@@ -302,7 +298,7 @@ fn gaps_text(text: &mut String, log: &Overview) {
     }
 }
 
-/// Gaps of a recording of another format: time, place in the file, and the data found there.
+/// In another format: time, place in the file, data found there.
 fn foreign_gaps(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     for (gap, (place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
@@ -326,7 +322,6 @@ fn foreign_gaps(text: &mut String, log: &Overview) {
     );
 }
 
-/// The likeliest reason why something is missing.
 fn why(log: &Overview, gap: &Gap) -> &'static str {
     if gap.cause == Cause::Missing && log.contents.did_not_record(gap) {
         return "not written: the box did not record then; most likely its card was out";

@@ -1,4 +1,4 @@
-//! The usage counters of a log, for people: zeros are left out, durations are hours and minutes.
+//! Usage counters for people: zeros are left out, durations are hours and minutes.
 
 use std::fmt::Write as _;
 
@@ -10,12 +10,11 @@ use crate::plural::count;
 use crate::summary::Overview;
 use crate::utc::clock;
 
-/// The usage counters of a log.
 pub(super) fn text(text: &mut String, log: &Overview) {
     let (session, life) = (&log.contents.usage, &log.contents.lifetime);
     let counters = counters::of(session, life);
     let mut lines: Vec<[String; 3]> = counters.plain.iter().filter_map(plain).collect();
-    // Counted in the board's life only.
+    // Only in a board's life.
     for (name, title) in [("boots", "Power-ons"), ("sessions", "Sessions")] {
         let life = life.get(name).filter(|life| **life > 0.0);
         lines.extend(life.map(|&life| [title.to_owned(), String::new(), short(life)]));
@@ -59,7 +58,6 @@ fn plain(counter: &Plain) -> Option<[String; 3]> {
         .then(|| [title.clone(), said(*session), life.map_or_else(String::new, said)])
 }
 
-/// Running time and revolutions.
 fn motor(motor: &Motor) -> Vec<[String; 3]> {
     let number = u16::from(motor.number) + 1;
     let line = |what: &str, session: Option<f64>, life: Option<f64>, said: fn(f64) -> String| {
@@ -84,7 +82,7 @@ fn band((from, to, time_s): &Band, unit: &str) -> Option<String> {
 }
 
 fn seconds(value: f64) -> String {
-    // A damaged log may hold any number: the cast saturates.
+    // Saturates: a damaged log may hold any number.
     clock(Span::from_micros((value * 1e6) as u64))
 }
 

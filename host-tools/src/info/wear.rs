@@ -14,7 +14,6 @@ use crate::summary::Overview;
 use crate::utc::moment;
 use hums_analysis::log_json::finite;
 
-/// Exceedances and components of a log.
 pub(super) fn text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
     if !contents.exceedances.is_empty() {

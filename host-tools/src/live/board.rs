@@ -1,7 +1,7 @@
 //! The health board: each subsystem's level with its reason in words.
 //!
-//! A HUMS on board receives every frame, so its level counts if there is one. The reason comes from the
-//! checks here. The state of its recorder comes from the HUMS alone.
+//! The level of a HUMS on board counts, because it receives every frame; the reason comes from the checks
+//! here. Its recorder's state comes from the HUMS alone.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
@@ -14,17 +14,16 @@ use crate::names::check_kind;
 use crate::page::note::CELLS_UNKNOWN;
 use crate::part;
 
-/// As long as a heartbeat may be missed.
+/// A heartbeat may be missed this long.
 const SILENT: Span = Span::from_secs(5);
 
-/// Prefix of a finding of a HUMS on the radio.
+/// Of a HUMS's findings on the radio.
 const OURS: &str = "HUMS: ";
 
 fn words(finding: &Finding) -> String {
     summary::text(finding).as_str().trim_start_matches(OURS).to_owned()
 }
 
-/// The same, without the recommended action.
 fn without_advice(finding: &Finding) -> String {
     words(&Finding { level: Level::Warning, ..*finding })
 }
@@ -36,8 +35,8 @@ pub struct Part {
     level: &'static str,
     /// The judge: `on board`, `here`, or `nobody`.
     by: &'static str,
-    /// Meaning of a stale level without cause for worry. `idle`: its checks are for an armed or flying
-    /// vehicle. `none`: the vehicle seems to have no such part.
+    /// A stale level without cause for worry: `idle`: its checks are for an armed or flying vehicle; `none`:
+    /// the vehicle seems to lack the part.
     calm: Option<&'static str>,
     reason: String,
 }
@@ -47,7 +46,7 @@ pub struct Part {
 pub struct Board {
     /// The whole vehicle's level, from the best source.
     pub overall: &'static str,
-    /// Text for an unknown level: `was critical`, and for a silent vehicle the cause.
+    /// For an unknown level: `was critical`, or why the vehicle is silent.
     pub said: Option<String>,
     /// The last level before it became unknown.
     pub was: Option<&'static str>,
@@ -55,33 +54,31 @@ pub struct Board {
     pub parts: Vec<Part>,
 }
 
-/// The state of a subsystem by the checks here.
 #[derive(Clone, Copy)]
 struct Known {
     level: Level,
     /// Whether any of them has a report.
     is_heard: bool,
-    /// Checks that are good, each once, however many parts it is of.
+    /// Each good check once, for all its parts.
     good: usize,
     last: &'static str,
 }
 
 impl Board {
-    /// The board of a vehicle. It goes once through the some hundred checks, because it runs for every update
-    /// of the pages.
+    /// The board of a vehicle. One pass over some hundred checks: it runs for every update.
     pub fn of(craft: &Craft, now: Instant) -> Self {
         let none = Known { level: Level::Stale, is_heard: false, good: 0, last: "" };
         let mut known = [none; Subsystem::ALL.len()];
         for (check, _, level) in craft.monitor.health().levels() {
             let Some(known) = known.get_mut(check.subsystem as usize) else { continue };
-            // A bad link other than the autopilot's wire is a fault of that link.
+            // Another link than the autopilot's wire has faults of its own.
             if rank(level) > 0 && !craft.on_the_wire && is_of_wire(check.name) {
                 continue;
             }
             if level == Level::Ok && known.last != check.name {
                 (known.good, known.last) = (known.good + 1, check.name);
             }
-            // The `ok` of a check that only raises alarms has no meaning.
+            // An alarm's `ok` has no meaning.
             if !check.alarm_only || level != Level::Ok {
                 if !known.is_heard || rank(level) > rank(known.level) {
                     known.level = level;
@@ -89,7 +86,7 @@ impl Board {
                 known.is_heard = true;
             }
         }
-        // Findings of the box that recorded this are not among the levels here.
+        // The recording box's findings are not among these levels.
         for worry in craft.worries.values().filter(|worry| !craft.judges(worry.check, worry.instance)) {
             if let Some(known) = known.get_mut(worry.subsystem as usize)
                 && (!known.is_heard || rank(worry.level) > rank(known.level))
@@ -120,8 +117,8 @@ impl Board {
     }
 }
 
-/// The worst known level of any part. Unknown if a part of every vehicle has no data, if the vehicle is
-/// silent, or if a bad check has lost its data.
+/// The worst known level. Unknown without data of a part that every vehicle has, for a silent vehicle, or
+/// after a bad check's silence.
 fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
     let unknown = is_silent(craft, now)
         || EXPECTED.into_iter().any(|part| known.get(part as usize).is_none_or(|known| !known.is_heard))
@@ -145,7 +142,6 @@ fn was_level(finding: &Finding) -> &'static str {
     if finding.level == Level::Critical { "was critical" } else { "was warning" }
 }
 
-/// Time since the vehicle was last received.
 fn seconds(craft: &Craft, now: Instant) -> String {
     format!("{} s", now.since(craft.heard).as_millis() / 1000)
 }
@@ -154,7 +150,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     let onboard = craft.companion.level(now, subsystem);
     let recorder = subsystem == Subsystem::Recorder;
     let silent = is_silent(craft, now);
-    // Only the silence of a silent vehicle is known.
+    // A silent vehicle's silence is all that is known.
     let unknown = recorder || (silent && (subsystem != Subsystem::Link || !craft.on_the_wire));
     let here = if unknown { Level::Stale } else { known.level };
     let before = craft.worries.values().filter(|finding| silent && is_bad(finding));
@@ -202,12 +198,11 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason }
 }
 
-/// Whether the vehicle has been silent for a while.
 fn is_silent(craft: &Craft, now: Instant) -> bool {
     now.since(craft.heard) > SILENT
 }
 
-/// Whether some of its checks begin when it is armed, or flies.
+/// Some checks begin with arming or flight.
 fn waits(craft: &Craft, subsystem: Subsystem) -> bool {
     let later = |when: When| match when {
         When::Always => false,
@@ -229,14 +224,14 @@ fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
     }
 }
 
-/// The worst finding, or the reason for its absence.
+/// Or the reason for its absence.
 fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: usize) -> String {
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at.as_millis()));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
         let alarm = |worry: &Finding| health::Alarm::of(worry.check, worry.instance, worry.level, worry.at);
         let alarms = craft.worries.values().filter_map(alarm);
-        // One cause has one order: its own.
+        // One cause has its own order.
         return match alarm(finding).and_then(|effect| health::root_cause(&effect, alarms)) {
             Some(cause) => {
                 format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name))
@@ -262,7 +257,7 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
     }
 }
 
-/// Not knowing is worse than a warning and better than a known danger, as [`hums_core::health`] has it.
+/// Unknown is between a warning and a known danger ([`hums_core::health`]).
 fn rank(level: Level) -> u8 {
     match level {
         Level::Ok => 0,
@@ -299,7 +294,6 @@ mod tests {
         }
     }
 
-    /// A vehicle on the link, with these worries.
     fn craft(worries: &[Finding]) -> Craft {
         let at = Instant::from_millis(1_000);
         let mut craft = Craft::new(at, &Params::defaults(), false);
@@ -344,7 +338,6 @@ mod tests {
         assert_eq!(part(&board, Subsystem::Power), words);
     }
 
-    /// A silent link does not clear a finding.
     #[test]
     fn what_was_bad_when_the_link_fell_silent_is_still_said() {
         let mut craft = craft(&[finding("cell_voltage", Subsystem::Power, Level::Critical)]);
@@ -361,7 +354,7 @@ mod tests {
         assert_eq!(part(&board, Subsystem::Power), words);
     }
 
-    /// A link between a radio and a PC is not the autopilot's wire.
+    /// A link between a radio and a PC.
     #[test]
     fn the_silence_of_a_link_is_no_finding_of_the_wire_and_nothing_is_called_well() {
         let mut craft = craft(&[]);

@@ -1,5 +1,5 @@
-//! Reports of a HUMS on board over the link. It is the authority on events on board, because it receives
-//! every frame, and this PC only those on the radio. See `hums_link::summary` for its messages.
+//! Reports of a HUMS on board ([`hums_link::summary`]). It is the authority on events on board: it receives
+//! every frame.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Level, Subsystem};
@@ -12,14 +12,14 @@ use crate::mavlink::ids::{HEARTBEAT, NAMED_VALUE_FLOAT, NAMED_VALUE_INT};
 
 /// Five heartbeats missed.
 const GONE: Span = Span::from_secs(5);
-/// The levels come every two seconds if the budget allows; over the slowest radio every half minute.
+/// Levels come every two seconds, over the slowest radio every half minute.
 const LEVELS_AGE_MAX: Span = Span::from_secs(60);
 
 /// State of the HUMS on board.
 #[derive(Clone, Debug, Default)]
 pub struct Companion {
     heard: Option<Instant>,
-    /// It named itself a HUMS by a value that only HUMS sends.
+    /// By a value that only HUMS sends.
     named: bool,
     levels: Option<(Instant, [Level; Subsystem::ALL.len()])>,
     overall: Option<Level>,
@@ -34,7 +34,6 @@ pub struct CompanionJson {
     heard_ms: u64,
     gone: bool,
     overall: Option<&'static str>,
-    /// By subsystem, in the order of the board.
     levels: Option<Vec<&'static str>>,
     levels_ms: Option<u64>,
     recorder: Option<&'static str>,
@@ -94,12 +93,12 @@ impl Companion {
         self.named
     }
 
-    /// Its level of the whole vehicle, while it is received.
+    /// While it is received.
     pub fn overall(&self, now: Instant) -> Option<Level> {
         self.overall.filter(|_| self.present(now))
     }
 
-    /// Its level of a subsystem, unless too old.
+    /// Unless too old.
     pub fn level(&self, now: Instant, subsystem: Subsystem) -> Option<Level> {
         let (at, levels) = self.levels.filter(|(at, _)| now.since(*at) <= LEVELS_AGE_MAX)?;
         // The levels of a silent one are out of date.

@@ -1,8 +1,6 @@
-//! One vehicle: the monitor that also flies on board, fed with the frames on this PC, and other reports about
-//! the vehicle.
+//! One vehicle: the monitor of the board, fed on this PC, and further reports.
 //!
-//! It is small and can be copied: playback keeps copies to go back to. Growing data are in
-//! [`crate::page::history`].
+//! Small: playback keeps copies to go back to. Growing data are in [`crate::page::history`].
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -33,13 +31,11 @@ use crate::statustext::{Text, Texts};
 
 /// A HUMS on board has reported itself by then.
 const SETTLE: Span = Span::from_secs(5);
-/// After a silence of the whole vehicle of this length, silent ESCs are not a finding.
+/// Silent ESCs are no finding after the whole vehicle's silence of this length.
 const SILENT: Span = Span::from_secs(1);
-/// The check of that.
 const ESC_SILENT: &str = "esc_silent";
-/// The check of the autopilot's silence on its wire.
 const HEARTBEAT: &str = "heartbeat";
-/// A state within this time of the first heartbeat is older than that: flight is detected with a delay.
+/// After the first heartbeat: flight is detected with a delay.
 const JOINED: Span = Span::from_secs(5);
 /// Period of the limits' update.
 const LIMITS_EVERY: Span = Span::from_secs(1);
@@ -52,43 +48,41 @@ pub struct Craft {
     pub monitor: Monitor,
     /// The reference system's view of it.
     pub reference: Reference,
-    /// Time of the last value of each quantity of the reference system.
+    /// By quantity of the reference system.
     pub latest: Latest,
     /// A HUMS on board.
     pub companion: Companion,
     /// `RPM`, `RAW_RPM`: the first two sensors.
     pub speed_sensors: [Option<(Instant, f32)>; 2],
-    /// The last finding of each check that is not well.
+    /// By check that is not well.
     pub worries: BTreeMap<(&'static str, u8), Finding>,
-    /// Findings that were not good, and are no longer judged: until it is armed again, or they are good.
+    /// Bad, and no longer judged, until armed again or good.
     pub unjudged: BTreeMap<(&'static str, u8), Finding>,
-    /// The cell count of its battery is unknown, and the vehicle flies or will not report it.
+    /// And the vehicle flies or will not report it.
     pub cells_unknown: bool,
     /// That was reported.
     cells_said: bool,
-    /// The frames come from the autopilot's own wire: a box recorded them. On another link, missing frames
-    /// are a fault of that link.
+    /// A box recorded the autopilot's own wire: elsewhere missing frames are a fault of the link.
     pub on_the_wire: bool,
     /// It was armed when first received.
     joined: bool,
     /// Time of its autopilot's last message.
     pub heard: Instant,
-    /// Frames of its system, and how many of them are missing by their own count.
+    /// And those missing by their own count.
     pub frames: u64,
     /// See [`Self::frames`].
     pub missing: u64,
-    /// The part of its frames that was lost in the last ten seconds.
+    /// Lost part in the last ten seconds.
     pub loss: Option<f32>,
-    /// Texts of its components.
     texts: Texts,
     sequences: Sequences,
     began: Instant,
     limits_at: Option<Instant>,
-    /// A barometer reports itself, so air data in an inertial sensor's message are from another sensor.
+    /// Air data in an inertial message are then another sensor's.
     barometer: bool,
-    /// Parts with known hours before this session.
+    /// Before this session.
     lives: [bool; COMPONENTS_MAX],
-    /// Seconds in the air, by the usage: on the ground last, and before the last flight.
+    /// By usage: on the ground last, and before the last flight.
     grounded_s: f64,
     before_flight_s: f64,
 }
@@ -123,7 +117,7 @@ impl Craft {
         }
     }
 
-    /// Time in the air of the last flight, which may go on, in seconds: by the usage counters.
+    /// Seconds, by usage; the flight may go on.
     pub fn flown_s(&self) -> f64 {
         self.airborne_s() - self.before_flight_s
     }
@@ -132,7 +126,7 @@ impl Craft {
         self.monitor.usage().value(UsageCounter::Flight).unwrap_or(0.0)
     }
 
-    /// A log has reported a part with all its hours.
+    /// With all its hours, from a log.
     pub fn learn_part(&mut self, place: usize, part: Component) {
         self.monitor.learn_component(place, part);
         if let Some(known) = self.lives.get_mut(place) {
@@ -140,7 +134,7 @@ impl Craft {
         }
     }
 
-    /// Whether a part's hours cover its whole life, not just this session.
+    /// Hours of its whole life are known.
     pub fn knows_life(&self, place: usize) -> bool {
         self.lives.get(place).copied().unwrap_or(false)
     }
@@ -173,13 +167,13 @@ impl Craft {
         self.parameter(at, frame, history);
     }
 
-    /// This many of its frames are missing from the recording, so the following sequence numbers start again.
+    /// Missing from the recording: sequence numbers start again.
     pub fn miss(&mut self, frames: u64) {
         self.missing = self.missing.saturating_add(frames);
         self.sequences = Sequences::new();
     }
 
-    /// Takes a parameter reported by its autopilot.
+    /// Reported by its autopilot.
     pub fn parameter(&self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
         if let Some(history) = history
             && let Some((name, value)) = parameter(frame, self.autopilot())
@@ -192,12 +186,12 @@ impl Craft {
         self.monitor.vehicle().heartbeat.get().map_or(Autopilot::Other, |heartbeat| heartbeat.autopilot)
     }
 
-    /// Takes one of its texts.
+    /// A text of the vehicle.
     pub fn text(&mut self, text: Text, history: &mut Option<&mut History>) {
         self.texts.take(text, &mut |text| say(history, text));
     }
 
-    /// Takes an observation of it.
+    /// An observation of the vehicle.
     pub fn observe(
         &mut self,
         at: Instant,
@@ -240,15 +234,15 @@ impl Craft {
         }
     }
 
-    /// Whether an observation of another component than the autopilot is one of the vehicle: a battery's, an ESC's.
+    /// Observations of other components that are the vehicle's: a battery's, an ESC's.
     pub fn told_by_part(&self, source: Source, observation: &Observation) -> bool {
         let part = observation.may_be_of_another_component()
             && !matches!(observation, Observation::TelemetryRadio(_));
         part && self.monitor.vehicle().source.is_some_and(|vehicle| vehicle.system == source.system)
     }
 
-    /// The component whose sequence numbers show the link's losses. A HUMS on board thins out the frames that
-    /// it forwards, so its own numbers count. It is known after some seconds.
+    /// The component whose sequence numbers show the link's losses, known after seconds. A HUMS on board thins out
+    /// forwarded frames: its own numbers count.
     fn counted(&self, now: Instant) -> Option<Source> {
         let autopilot = self.monitor.vehicle().source?;
         if self.companion.known() {
@@ -266,10 +260,9 @@ impl Craft {
     ) {
         let link = self.sequences.reading(now, self.counted(now));
         self.loss = link.frames_lost;
-        // This PC has no card: the state of the recording comes from the box.
+        // The box reports the recording's state.
         let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
-        // A HUMS on board forwards as much as the radio can carry: a slow stream here is not a fault of the
-        // vehicle.
+        // A HUMS forwards what the radio carries: a slow stream is no fault.
         let thin = self.companion.present(now);
         let cut_off = now.since(self.heard) >= SILENT;
         let Self { monitor, worries, unjudged, on_the_wire, .. } = self;
@@ -287,12 +280,12 @@ impl Craft {
                 return;
             }
             let key = (finding.check, finding.instance);
-            // During a silence a return to normal is not seen.
+            // Unseen during a silence.
             if cut_off && finding.level == Level::Ok {
                 unjudged.extend(worries.remove(&key).map(|before| (key, before)));
                 return;
             }
-            // A silent link is reported once, as a fault of the link.
+            // A silent link is one fault, of the link.
             let echo = match finding.level {
                 Level::Stale => finding.because == HEARTBEAT,
                 _ => silence && !worries.contains_key(&key),
@@ -316,7 +309,7 @@ impl Craft {
             keep(history, now, Note::finding(now, &finding).of_part(self.due(&finding).as_ref()));
         }
         self.happenings(now, history);
-        // Snapshots are not used here and are dropped; the monitor makes new ones.
+        // Snapshots are not used here.
         while self.monitor.take_snapshot(now.into()).is_some() {}
         self.texts.pass(now, &mut |text| say(history, text));
         if let Some(history) = history {
@@ -330,7 +323,6 @@ impl Craft {
         }
     }
 
-    /// Events since the last tick.
     fn happenings(&mut self, now: Instant, history: &mut Option<&mut History>) {
         let mut cells_come = self.cells_said;
         while let Some(happening) = self.monitor.take_happening() {
@@ -352,7 +344,7 @@ impl Craft {
         if !self.monitor.flight().airborne() {
             self.grounded_s = self.airborne_s();
         }
-        // A box may know more cell counts, and reports unknown ones itself.
+        // A box reports unknown counts itself.
         if !self.on_the_wire {
             let flies = self.monitor.flight().airborne();
             self.cells_unknown = self.monitor.lacks_cells() && (flies || cells_come);
@@ -362,7 +354,7 @@ impl Craft {
         }
     }
 
-    /// The cell count of its battery is unknown: reported once.
+    /// Reported once.
     pub fn say_cells_unknown(&mut self, now: Instant, history: &mut Option<&mut History>) {
         self.cells_unknown = true;
         if !std::mem::replace(&mut self.cells_said, true)
@@ -372,18 +364,17 @@ impl Craft {
         }
     }
 
-    /// The part of a finding that a part is due, and its limit; `None` for another check.
+    /// And its limit; `None` for another check.
     pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
         part::is_due(finding.check).then(|| part::due(&self.monitor, finding.subsystem)).flatten()
     }
 
-    /// Whether the monitor here has had something to judge in a check of a part.
+    /// This check of a part had something to judge.
     pub fn judges(&self, check: &str, instance: u8) -> bool {
         self.monitor.health().levels().any(|(known, of, _)| known.name == check && of == instance)
     }
 
-    /// Takes a finding of the box that recorded this, if no check here can make it. The box made it from its
-    /// store or its cell count.
+    /// A box's finding that no check here can make: from its store or its cell count.
     pub fn found_on_board(&mut self, finding: &told::Finding) -> bool {
         let Some(check) = check_named(&finding.check) else { return false };
         if self.judges(check.name, finding.instance) {

@@ -1,9 +1,8 @@
 //! A live source: bytes as they arrive, on this PC's clock, until Ctrl-C.
 //!
-//! The thread waits at most `SILENCE` for bytes, passes them through the framer into the world, and publishes
-//! 20 to 25 times a second. The first bytes after a pause are published at once. In between it rests for
-//! short times (`GATHER`). A broken connection is opened again by a thread of its own, as that may take ten
-//! seconds. Meanwhile the values grow old, and the page shows that.
+//! Waits at most `SILENCE` for bytes, and publishes 20 to 25 times a second; the first bytes after a pause at
+//! once. In between it gathers bytes (`GATHER`). A thread reopens a broken connection, which may take ten
+//! seconds; meanwhile values grow old.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -23,21 +22,20 @@ use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
-/// Timeout of a read: the page's clock goes on meanwhile.
+/// Of a read: the clock goes on.
 const SILENCE: Duration = Duration::from_millis(10);
-/// Time to gather bytes while no update is due. A vehicle sends hundreds of messages a second, and a wake-up
-/// for each would cost several times the message. Radios and USB adapters gather as long.
+/// While no update is due: a wake-up for each message would cost several times the message. Radios and USB
+/// adapters gather as long.
 const GATHER: Duration = Duration::from_millis(20);
-/// More bytes than the fastest port (921,600 baud) delivers in half of that time end the gathering.
+/// Half of that time at 921,600 baud ends the gathering.
 const GATHERED_BYTES: usize = 1_024;
-/// Gathered bytes are spread evenly over the time since the last look, in this number of pieces.
+/// Gathered bytes are spread over the time since the last look.
 const PIECES: usize = 8;
-/// Time between two updates of the page; the first bytes after a pause are shown at once. Pages that draw in
-/// 10 ms keep up.
+/// Between two updates. Pages that draw in 10 ms keep up.
 const SOON: Duration = Duration::from_millis(40);
-/// How soon a broken connection is tried again.
+/// Of a broken connection.
 const AGAIN: Duration = Duration::from_secs(1);
-/// A source without data for this long is silent.
+/// Of data.
 const SILENT: Duration = Duration::from_secs(3);
 
 /// Follows a live source until Ctrl-C.
@@ -58,22 +56,20 @@ pub struct Feed {
     rate: Rate,
 }
 
-/// The connection to the source.
 enum Link {
     Open(Box<dyn Port>),
-    /// It is tried again at this time.
+    /// Until the next try.
     Lost(Wall),
-    /// A thread opens it and sends it, or why that failed.
+    /// Sent by a thread.
     Opening(Receiver<Result<Box<dyn Port>>>),
 }
 
 impl Link {
-    /// Starts to open it. A thread that still waits for an answer at the end of the program ends with it.
     fn opening(endpoint: &Endpoint) -> Result<Self> {
         let (opened, link) = sync_channel(1);
         let endpoint = endpoint.clone();
         std::thread::Builder::new().name("opening".to_owned()).spawn(move || {
-            // Nobody waits for it any longer at the end of the program.
+            // Nobody waits at the program's end.
             let _ = opened.send(duplex::open(&endpoint, SILENCE).map(|duplex| duplex.reader));
         })?;
         Ok(Self::Opening(link))
@@ -81,7 +77,7 @@ impl Link {
 }
 
 impl Feed {
-    /// Opens the source; an error in its name is reported at once.
+    /// An error in the name is reported at once.
     pub fn open(endpoint: &Endpoint, limits: Limits, hub: Arc<Hub>, influx: Option<Influx>) -> Result<Self> {
         let port = duplex::open(endpoint, SILENCE)?.reader;
         Ok(Self {
@@ -100,7 +96,7 @@ impl Feed {
         })
     }
 
-    /// Runs until Ctrl-C; returns the points still to be written.
+    /// Returns points to write.
     pub fn run(mut self) -> Option<Influx> {
         let mut buffer = vec![0; duplex::ALL_BYTES];
         let (mut published, mut shown, mut news) = (Wall::now(), Wall::now(), false);
@@ -129,7 +125,6 @@ impl Feed {
         Instant::from_micros(u64::try_from(self.start.elapsed().as_micros()).unwrap_or(u64::MAX))
     }
 
-    /// Takes the bytes that have arrived, or waits a while for some; returns their number.
     fn read(&mut self, buffer: &mut [u8]) -> usize {
         let Link::Open(port) = &mut self.link else {
             self.open_again();
@@ -151,14 +146,14 @@ impl Feed {
         let now = self.now();
         let Self { hub, world, framer, influx, epoch_us, .. } = self;
         let mut take = |at, frame: hums_link::Frame<'_>| {
-            // Pages wait for the histories only as long as a frame takes, and never for the database's queue.
+            // Pages wait only for a frame, never for the database's queue.
             world.frame(at, &frame, Some(&mut hub.histories()));
             if let Some(influx) = influx {
                 influx.frame(at, *epoch_us, &frame, world);
             }
         };
         if got == 0 {
-            // Nobody finishes a frame after such a pause.
+            // No frame continues after such a pause.
             framer.idle(&mut |frame| take(now, frame));
         } else {
             for (at, piece) in evenly(buffer.get(..got).unwrap_or_default(), self.looked, now) {
@@ -169,7 +164,7 @@ impl Feed {
         got
     }
 
-    /// All steps of time until now, so that each update is consistent.
+    /// Each update is consistent.
     fn pass(&mut self, now: Instant) {
         self.looked = now;
         let Self { hub, world, influx, epoch_us, .. } = self;
@@ -186,7 +181,7 @@ impl Feed {
         (self.source.phase, self.source.words) = ("lost", why);
     }
 
-    /// Waits a moment for the connection to be opened, or for the time to try that.
+    /// Or until the next try.
     fn open_again(&mut self) {
         let opened = match &self.link {
             Link::Opening(link) => link.recv_timeout(SILENCE),
@@ -227,14 +222,14 @@ impl Feed {
     }
 }
 
-/// UTC at time zero of the monotonic clock, microseconds since 1970, by UTC now. It is computed again and
-/// again: the monotonic clock stops while the PC sleeps, and UTC may be set meanwhile.
+/// Microseconds since 1970 at the monotonic clock's zero. Computed again and again: that clock stops in
+/// sleep, and UTC may be set.
 fn epoch_us(utc: SystemTime, now: Instant) -> u64 {
     let utc_us = utc.duration_since(UNIX_EPOCH).unwrap_or_default().as_micros();
     u64::try_from(utc_us).unwrap_or(0).saturating_sub(now.as_micros())
 }
 
-/// The bytes between two looks, in pieces, each with its time of arrival.
+/// In pieces with times of arrival.
 fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Instant, &[u8])> {
     let pieces = bytes.chunks(bytes.len().div_ceil(PIECES).max(1));
     let count = pieces.len() as u64;
@@ -252,7 +247,7 @@ mod tests {
         let at = |seconds| UNIX_EPOCH + Duration::from_secs(seconds);
         let (start, later) = (Instant::ZERO, Instant::from_millis(5_000));
         assert_eq!(epoch_us(at(1_000), start), epoch_us(at(1_005), later));
-        // The lid was closed for an hour.
+        // Asleep for an hour.
         assert_eq!(epoch_us(at(4_605), later) + later.as_micros(), 4_605_000_000);
     }
 

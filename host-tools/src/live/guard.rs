@@ -1,10 +1,10 @@
 //! Access control: only pages of this server, and other machines only with the token.
 //!
-//! * The `Host` of a request must be an address, `localhost`, or the name that the user gave. A foreign name
-//!   pointed at this machine (DNS rebinding) is refused.
-//! * A browser names the requesting page in `Origin`: only ours is accepted. Other programs send no `Origin`.
-//! * On an address that other machines reach, the data connection needs the token. The page itself is part of
-//!   the program and public.
+//! * `Host` must be an address, `localhost`, or the user's name: a foreign name pointed here (DNS rebinding)
+//!   is refused.
+//! * A browser names the requesting page in `Origin`: only ours is accepted. Programs send none.
+//! * Where other machines reach it, the data connection needs the token. The page itself is part of the
+//!   program and public.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -16,20 +16,19 @@ use crate::outcome::usage;
 
 /// A token of this length cannot be guessed.
 const TOKEN_BYTES: usize = 16;
-/// Minimum length of the user's own token.
+/// Of the user's own token.
 const TOKEN_CHARS_MIN: usize = 8;
 
-/// The checks of a request.
+/// Checks of a request.
 #[derive(Clone, Debug)]
 pub struct Guard {
     /// Hashed, so that the time of a comparison reveals no part of it.
     token: Option<[u8; 32]>,
-    /// The host that the user named.
     host: String,
 }
 
 impl Guard {
-    /// For a server at `listen`, named `host` by the user; returns the token that the page needs.
+    /// The user named it `host`; returns the token that the page needs.
     pub fn new(listen: SocketAddr, host: &str, token: Option<&str>) -> Result<(Self, Option<String>)> {
         let token = match token {
             Some(short) if short.len() < TOKEN_CHARS_MIN => {
@@ -48,7 +47,7 @@ impl Guard {
         Ok((Self { token: hashed, host: host.to_ascii_lowercase() }, token))
     }
 
-    /// Whether the request names this server by a name that cannot be taken over.
+    /// A name that nobody can take over.
     pub fn knows_host(&self, headers: &HeaderMap) -> bool {
         host(headers).is_some_and(|host| {
             let name = without_port(host).to_ascii_lowercase();
@@ -56,14 +55,14 @@ impl Guard {
         })
     }
 
-    /// Whether it comes from no foreign page.
+    /// No foreign page's.
     pub fn knows_origin(&self, headers: &HeaderMap) -> bool {
         let Some(origin) = headers.get(header::ORIGIN) else { return true };
         let ours = host(headers).map(|host| format!("http://{host}"));
         ours.is_some_and(|ours| origin.to_str().is_ok_and(|origin| origin.eq_ignore_ascii_case(&ours)))
     }
 
-    /// Whether it has the token, if one is needed.
+    /// Has the token, if needed.
     pub fn knows_token(&self, query: Option<&str>) -> bool {
         let Some(wanted) = &self.token else { return true };
         let mut pairs = query.unwrap_or_default().split('&').filter_map(|pair| pair.split_once('='));

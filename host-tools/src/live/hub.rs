@@ -1,6 +1,5 @@
-//! Connects the vehicle's thread with the pages. It holds the present state, always the newest, and the
-//! histories, from which each page takes the part it lacks. Neither side waits for the other: a slow page
-//! skips states, and gets a larger part of the history the next time.
+//! Connects the vehicle's thread with the pages. It holds the newest state, and the histories. Neither waits:
+//! a slow page skips states, and gets more history the next time.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,7 +10,7 @@ use tokio::sync::watch;
 use super::world::Histories;
 use crate::page::history::{Cursor, Part};
 
-/// Commands of all pages that wait; more are refused, which a second key press repeats.
+/// Of all pages; a refused one is repeated by a second key press.
 const COMMANDS_MAX: usize = 64;
 
 /// The present state, as text made once for all pages.
@@ -21,24 +20,22 @@ pub struct Published {
     pub epoch: u64,
     /// Pages see no later data.
     pub now: Instant,
-    /// Source, time and vehicles.
+    /// Made once for all pages.
     pub head: String,
-    /// The recording's time line; the same text until it changes.
+    /// Time went back: take the histories again.
     pub timeline: Arc<str>,
     /// Each vehicle by system id.
     pub crafts: Vec<(u8, String)>,
 }
 
-/// A request of a page; apart from the vehicle, only for playback.
+/// Source, time, vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// Stops time.
+    /// The same text until it changes.
     Pause,
     /// Time goes on.
     Play,
-    /// Go to this time, seconds since the first byte.
     Seek(f64),
-    /// Seconds of the recording per second.
     Speed(f64),
 }
 
@@ -58,19 +55,19 @@ impl Hub {
         (Arc::new(Self { state, histories: Mutex::default(), commands }), taken)
     }
 
-    /// The newest state replaces the one before.
+    /// Replaces the state before.
     pub fn publish(&self, published: Published) {
         self.state.send_replace(Arc::new(published));
     }
 
-    /// For a page: the state, and when it changes.
+    /// The state, and when it changes.
     pub fn follow(&self) -> watch::Receiver<Arc<Published>> {
         self.state.subscribe()
     }
 
-    /// The histories, to be held for moments.
+    /// Held for moments.
     pub fn histories(&self) -> MutexGuard<'_, Histories> {
-        // The data that a panicked thread left are still usable.
+        // Usable after a thread's panic.
         self.histories.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -79,7 +76,7 @@ impl Hub {
         self.histories().get(&vehicle)?.since(vehicle, cursor, until)
     }
 
-    /// A page sends a command; `false` if too many wait.
+    /// `false` if too many wait.
     pub fn command(&self, command: Command) -> bool {
         self.commands.try_send(command).is_ok()
     }

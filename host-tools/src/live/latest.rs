@@ -1,4 +1,4 @@
-//! Last values of the reference system's quantities: those shown, their names, and their maximum ages.
+//! Quantities of the reference system: names, maximum ages, last values.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::MOTORS_MAX;
@@ -6,12 +6,12 @@ use hums_core::observation::MOTORS_MAX;
 use crate::mavlink::values::Scalar;
 use crate::reference::Quantity;
 
-/// Streams of motion come several times a second, over a thin radio once a second.
+/// Several times a second, over a thin radio once.
 pub const MOTION: Span = Span::from_millis(2_500);
-/// Everything else may come every two seconds.
+/// Other quantities, every two seconds.
 pub const SLOW: Span = Span::from_millis(6_000);
 
-/// Quantities of the reference system that are one for the vehicle, with the page's names.
+/// One for the vehicle, with the page's names.
 pub const QUANTITIES: [(&str, Quantity, Span); 23] = [
     ("flight_time", Quantity::FlightTime, SLOW),
     ("battery_percent", Quantity::BatteryPercent, SLOW),
@@ -39,7 +39,7 @@ pub const QUANTITIES: [(&str, Quantity, Span); 23] = [
 ];
 const PLACES: usize = QUANTITIES.len() + 6 * MOTORS_MAX;
 
-/// Time and last value of each quantity.
+/// By quantity.
 #[derive(Clone, Debug)]
 pub struct Latest([Option<(Instant, Scalar)>; PLACES]);
 
@@ -49,7 +49,7 @@ impl Default for Latest {
     }
 }
 
-/// A name of the page's, and the quantity of a motor.
+/// The page's name, and a motor's quantity.
 pub type OfMotor = (&'static str, fn(usize) -> Quantity);
 
 /// Shown values of an ESC.

@@ -1,13 +1,13 @@
-//! `hums live`: a page that shows the vehicle as it flies, from a link or from a recording.
+//! `hums live`: a page of the vehicle as it flies, from a link or a recording.
 //!
 //! ```text
 //! link or recording -> frames -> world (a monitor a vehicle) -> hub -> server -> pages
 //!                                       \-> points -> InfluxDB
 //! ```
 //!
-//! One thread follows the vehicle (`feed` on this PC's clock, `playback` on a recording's). The first thread serves
-//! the pages, and one writes to a database if requested. The vehicle's thread never waits for the others. Pages take
-//! the newest state and the missing part of the history (`hub`); points wait in memory (`influx`).
+//! One thread follows the vehicle (`feed`, `playback`) and never waits for the others; the first one serves pages,
+//! one writes to a database. Pages take the newest state and the missing history (`hub`); points wait in memory
+//! (`influx`).
 
 pub mod assets;
 pub mod board;
@@ -75,23 +75,20 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     if let Some(page) = pages.first().filter(|_| args.open) {
         open(page);
     }
-    // Whichever fails ends the program; with Ctrl-C and SIGTERM the follower ends, and with it the server.
+    // Whichever fails ends the program; on Ctrl-C and SIGTERM the follower ends first.
     server::serve(listener, hub, guard, followed)?;
     let influx = follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
     Ok(influx.map_or(Outcome::Done, finish))
 }
 
-/// Output of `hums live --json`.
 const SCHEMA: Schema = Schema::first("hums-live");
 
-/// Addresses of the page.
 #[derive(Debug, Serialize)]
 struct PagesJson<'a> {
     pages: &'a [String],
 }
 
-/// Prints the page's addresses, on a terminal also as a code for a phone's camera, if a phone can reach the
-/// page.
+/// On a terminal also as a code for a phone that can reach it.
 fn tell(args: &cli::Live, pages: &[String]) -> Result<()> {
     if args.json {
         return output::json(SCHEMA, &PagesJson { pages });
@@ -111,8 +108,7 @@ fn is_here_only(page: &str) -> bool {
 
 type Follower = JoinHandle<Result<Option<Influx>>>;
 
-/// Starts the thread that follows the vehicle; errors of the source are reported at once. The returned
-/// receiver never gets a value, and is closed when the thread ends.
+/// Errors of the source are reported at once. The receiver never gets a value, and closes with the thread.
 fn follow(
     args: &cli::Live,
     limits: &Limits,
@@ -144,7 +140,6 @@ fn follow(
     Ok((started.context("no thread")?, followed))
 }
 
-/// The database that is written to, if any.
 fn database(args: &cli::Live) -> Result<Option<Influx>> {
     let Some(url) = &args.influx else {
         if args.token.is_some() || args.org.is_some() {
@@ -158,7 +153,7 @@ fn database(args: &cli::Live) -> Result<Option<Influx>> {
     Influx::start(target, session, !args.input.is_live()).map(Some)
 }
 
-/// Waits for the database, and prints the counts of the points.
+/// And prints the counts.
 fn finish(influx: Influx) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
@@ -190,8 +185,7 @@ fn listen(text: &str) -> Result<(TcpListener, SocketAddr)> {
     Ok((listener, address))
 }
 
-/// Addresses for a browser: on this machine first, then on others. The token is after the `#`, so the browser
-/// does not send it.
+/// This machine first. The token is after the `#`: the browser does not send it.
 fn page_addresses(
     listen: SocketAddr,
     token: Option<&str>,
@@ -207,8 +201,7 @@ fn page_addresses(
     [format!("http://localhost:{}/{token}", listen.port())].into_iter().chain(elsewhere).collect()
 }
 
-/// Addresses of this PC for other machines, IPv4 first, without those of one cable only (`fe80::`,
-/// 169.254.0.0/16). Empty if the system does not list them.
+/// For other machines, IPv4 first, without link-local ones (`fe80::`, 169.254.0.0/16). Empty if unknown.
 fn others() -> Vec<IpAddr> {
     let interfaces = if_addrs::get_if_addrs().unwrap_or_default();
     let mut addresses: Vec<IpAddr> = interfaces
@@ -221,7 +214,7 @@ fn others() -> Vec<IpAddr> {
     addresses
 }
 
-/// Opens the page in the user's browser; without one the printed address is enough.
+/// Without a browser the printed address is enough.
 fn open(page: &str) {
     let (program, first): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])

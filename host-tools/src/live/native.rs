@@ -1,5 +1,5 @@
-//! Playback of an autopilot's own log. It has no frames for a file in [`super::spool`]. So a thread reads it again
-//! from its beginning to the requested place, a little ahead.
+//! Playback of an autopilot's own log. It has no frames for [`super::spool`]: a thread reads it again up to the
+//! requested place, a little ahead.
 
 use std::collections::VecDeque;
 use std::io;
@@ -14,27 +14,23 @@ use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::Place;
 use crate::statustext::Text;
 
-/// Entries that are handed over at once, and how many such batches wait.
+/// Entries of a batch, and waiting batches.
 const BATCH: usize = 256;
 const BATCHES: usize = 4;
 
-/// An entry of such a log.
+/// A log's entry.
 #[derive(Clone, Debug)]
 pub enum Entry {
-    /// An observation of the vehicle.
     Observation(Source, Box<Observation>),
-    /// A text of the vehicle.
     Text(Text),
-    /// A parameter and its value.
     Parameter(String, f64),
     /// Further values for plots.
     More(More),
-    /// The log has a gap between these times.
     Gap(Instant, Instant),
 }
 
 impl Entry {
-    /// The entry of an item, if it is of use here.
+    /// If of use here.
     pub fn of(at: Instant, item: &Item<'_>) -> Option<Self> {
         match *item {
             Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
@@ -47,14 +43,14 @@ impl Entry {
     }
 }
 
-/// The parts of such a log to read.
+/// Parts to read.
 pub fn want() -> Want<'static> {
     Want { observations: true, rows: rows(), ..Want::default() }
 }
 
 type Batch = Vec<(Instant, Entry)>;
 
-/// A log that is played.
+/// A played log.
 #[derive(Debug)]
 pub struct Native {
     place: Place,
@@ -72,7 +68,7 @@ impl Native {
     pub fn seek(&mut self, entries: u64) -> io::Result<()> {
         let (sender, batches) = sync_channel(BATCHES);
         let place = self.place.clone();
-        // A thread without a receiver ends with its next batch.
+        // Without a receiver it ends with its next batch.
         thread::Builder::new().name("log".to_owned()).spawn(move || {
             let (mut passed, mut batch) = (0_u64, Batch::new());
             let read = place.open().and_then(|recording| {
@@ -89,7 +85,7 @@ impl Native {
                 })
             });
             let _ = sender.send(batch);
-            // It was read once already, with a report of its unreadable parts.
+            // Its unreadable parts were reported.
             drop(read);
         })?;
         self.batches = Some(batches);
@@ -97,7 +93,7 @@ impl Native {
         Ok(())
     }
 
-    /// The next entry, if it came by `until`; otherwise it stays the next.
+    /// If it came by `until`; otherwise it stays the next.
     pub fn next_until(&mut self, until: Instant) -> io::Result<Option<(Instant, Entry)>> {
         if self.batches.is_none() {
             self.seek(0)?;
@@ -138,7 +134,7 @@ mod tests {
         assert!(first.len() > 500 && rest.len() > 10_000, "{} and {}", first.len(), rest.len());
         native.seek(first.len() as u64).expect("it is read");
         assert_eq!(take(&mut native, 10_000), rest, "again from there");
-        // In the middle of its being read.
+        // While it is read.
         native.seek(0).expect("it is read");
         assert_eq!(take(&mut native, 10), first);
         native.seek(0).expect("it is read");

@@ -1,5 +1,5 @@
-//! Playback of a recording or a HUMS log. It is read once at the start for the whole history, the time line,
-//! and copies of the vehicles' state to go back to. Then it plays at any speed, from any place.
+//! Playback of a recording or a HUMS log. One reading gives the history, the time line, and copies of the
+//! state to go back to. Then it plays at any speed.
 
 use std::io;
 use std::sync::Arc;
@@ -21,30 +21,29 @@ use super::told::{Limits, Told};
 use super::world::World;
 use crate::interrupt;
 
-/// Copies of the state at most; when they are this many, every second one goes.
+/// Beyond this every second one goes.
 const COPIES_MAX: usize = 128;
-/// Vehicles in all copies together at most, some 8 KiB each: of eight vehicles there are 32 copies.
+/// In all copies, some 8 KiB each: 32 copies of eight vehicles.
 const COPIED_MAX: usize = 256;
-/// The first distance between two.
+/// Between the first copies.
 const COPY_EVERY: Span = Span::from_secs(5);
-/// Speeds that make sense.
 const SPEEDS: (f64, f64) = (0.1, 64.0);
-/// Maximum number of kept reports other than frames: a log's parameters and parts, some hundred at its start.
+/// Besides frames: a log's parameters and parts.
 const TOLD_MAX: usize = 8_192;
-/// Frames between two looks at the clock while reading.
+/// Frames between two looks at the clock.
 const LOOK_EVERY: u64 = 4_096;
 
-/// The state at a moment, and the place in the recording after it.
+/// With the place after it.
 #[derive(Debug)]
 struct Copy {
     at: Instant,
     offset: u64,
-    /// Index of the next report from here on.
+    /// Next report.
     told: usize,
     world: World,
 }
 
-/// A recording that was read.
+/// A read recording.
 #[derive(Debug)]
 struct Loaded {
     played: Played,
@@ -56,21 +55,18 @@ struct Loaded {
     frames: u64,
 }
 
-/// The source of playback.
 #[derive(Debug)]
 enum Played {
     /// Frames, kept.
     Frames(Spool),
-    /// An autopilot's own log, read again.
+    /// Read again.
     Native(Native),
 }
 
-/// Callback after the world has taken a frame of a recording, or an entry of one without frames; `false` ends
-/// it.
+/// After each frame, or entry without frames; `false` ends it.
 type Each<'a> = dyn FnMut(Instant, Option<&Frame<'_>>, &mut World) -> bool + 'a;
 
 impl Loaded {
-    /// Goes to a place in it.
     fn seek(&mut self, offset: u64, told: usize) -> io::Result<()> {
         self.told_next = told;
         match &mut self.played {
@@ -79,7 +75,6 @@ impl Loaded {
         }
     }
 
-    /// The world takes all frames up to `now`.
     fn go(&mut self, world: &mut World, now: Instant) -> io::Result<()> {
         self.follow(world, now, &mut |_, _, _| true)?;
         world.advance(now, None);
@@ -114,12 +109,11 @@ impl Loaded {
     }
 }
 
-/// Vehicles in all copies together.
 fn copied(copies: &[Copy]) -> usize {
     copies.iter().map(|copy| copy.world.crafts.len()).sum()
 }
 
-/// Keeps a report. A gap is known only after it: copies made meanwhile take it too.
+/// Copies made before a gap was known take it too.
 fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what: &Told) {
     let at = if let Told::Missing { from, .. } = what { at.min(*from) } else { at };
     let place = told.partition_point(|(known, _)| *known <= at);
@@ -130,7 +124,6 @@ fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what:
     }
 }
 
-/// Passes on the reports up to this time.
 fn tell(told: &[(Instant, Told)], next: &mut usize, by: Instant, world: &mut World) {
     while let Some((at, what)) = told.get(*next).filter(|(at, _)| *at <= by) {
         world.told(*at, what, None);
@@ -146,12 +139,11 @@ pub struct Player {
     source: SourceJson,
     epoch_us: Option<u64>,
     influx: Option<Influx>,
-    /// The part of the recording that was read, 0 to 1, if the user stopped the reading.
+    /// 0 to 1, if the user stopped the reading.
     read_to: Option<f64>,
     rate: Rate,
     /// See [`World::on_the_wire`].
     is_of_box: bool,
-    /// Number of jumps back in time.
     epoch: u64,
     timeline: Arc<str>,
 }
@@ -177,8 +169,7 @@ impl Player {
         Self { hub, commands, limits, source, epoch_us, influx, read_to, rate, is_of_box, epoch: 0, timeline }
     }
 
-    /// Runs until Ctrl-C; returns the points still to be written. An unreadable recording is reported on the
-    /// page too.
+    /// Returns points to write; an unreadable recording shows on the page too.
     pub fn run(mut self, mut opened: Opened) -> Result<Option<Influx>> {
         let mut loaded =
             self.load(&mut opened).with_context(|| format!("{}: cannot be read", self.source.name))?;
@@ -189,7 +180,6 @@ impl Player {
         Ok(self.influx)
     }
 
-    /// A world without frames.
     fn world(&self) -> World {
         World::new(self.limits.clone()).on_the_wire(self.is_of_box)
     }
@@ -203,7 +193,7 @@ impl Player {
         let (mut start, mut end, mut frames) = (None, Instant::ZERO, 0_u64);
         let mut shown = Wall::now();
         let Self { hub, source, epoch_us, influx, .. } = self;
-        // `Ctrl-C` ends a long reading too.
+        // `Ctrl-C` ends a long reading.
         let ending = recording::each(opened, &mut |at, epoch, progress, content| -> io::Result<bool> {
             *epoch_us = epoch.or(*epoch_us);
             source.progress = progress;
@@ -225,7 +215,7 @@ impl Player {
             };
             let due = copies.last().is_none_or(|copy: &Copy| at.since(copy.at) >= copy_every);
             if due {
-                // Later vehicles make the later copies larger, so several rounds may be needed.
+                // Several rounds: later vehicles enlarge later copies.
                 while copies.len() >= COPIES_MAX || copied(&copies) + world.crafts.len() > COPIED_MAX {
                     let mut odd = false;
                     copies.retain(|_| {
@@ -269,7 +259,7 @@ impl Player {
         Ok(Loaded { played, told, told_next: 0, copies, start, end, frames })
     }
 
-    /// Writes the whole recording to the database, now that vehicle and date are known.
+    /// Vehicle and date are known now.
     fn write(&mut self, loaded: &mut Loaded) -> io::Result<()> {
         let Some(influx) = &mut self.influx else { return Ok(()) };
         let epoch_us = self.epoch_us.unwrap_or(0);
@@ -299,7 +289,6 @@ impl Player {
         loaded.seek(0, 0)
     }
 
-    /// Plays it, as the pages ask.
     fn play(&mut self, loaded: &mut Loaded) -> Result<()> {
         let mut world = self.world();
         world.begin(loaded.start);
@@ -327,8 +316,7 @@ impl Player {
             before = Wall::now();
             turn = (turn + PUBLISH).max(before);
             if self.source.phase == "playing" {
-                // After sleep of the PC, or if it is too slow for this speed, playback goes on from its last
-                // place.
+                // After sleep, or on a slow PC, playback goes on from its place.
                 let passed_us = passed.min(Duration::from_millis(250)).as_micros() as f64 * self.source.speed;
                 now = (now + Span::from_micros(passed_us as u64)).min(loaded.end);
                 loaded.go(&mut world, now)?;
@@ -364,13 +352,13 @@ impl Player {
                     self.source.phase = "paused";
                 }
             }
-            // Nothing to pause, or a time that is not a number.
+            // Nothing to pause, or an invalid time.
             Command::Pause | Command::Speed(_) | Command::Seek(_) => {}
         }
         Ok(())
     }
 
-    /// Goes to a time: from the last copy before it, or on from here if that is nearer.
+    /// From the last copy before it, or from here if nearer.
     fn seek(&mut self, to: Instant, loaded: &mut Loaded, world: &mut World, now: &mut Instant) -> Result<()> {
         let copy = loaded.copies.iter().rev().find(|copy| copy.at <= to);
         if to < *now {
@@ -409,7 +397,7 @@ impl Player {
     }
 }
 
-/// Findings and events of each vehicle, for the time line.
+/// Findings and events.
 fn timeline(hub: &Hub) -> Arc<str> {
     let marks: std::collections::BTreeMap<u8, _> =
         hub.histories().iter().map(|(system, history)| (*system, history.marks())).collect();

@@ -1,11 +1,10 @@
-//! An address as a QR code (ISO/IEC 18004) of characters, which the camera of a phone reads from a terminal.
+//! An address as a QR code (ISO/IEC 18004) for a phone's camera.
 
 use anyhow::{Context as _, Result};
 use qrcode::render::unicode::Dense1x2;
 use qrcode::{EcLevel, QrCode};
 
-/// The code of a text. In colour it is black on white, as a camera expects it, on any terminal; without
-/// colours it is right on a dark terminal.
+/// Black on white in colour, as a camera expects; without colours right on a dark terminal.
 pub fn code(text: &str, in_colour: bool) -> Result<String> {
     let code = QrCode::with_error_correction_level(text, EcLevel::L).context("no QR code of the address")?;
     let mut image = code.render::<Dense1x2>();
@@ -31,7 +30,7 @@ mod tests {
         let coloured = code(address, true).expect("a code");
         let lines: Vec<&str> = plain.lines().collect();
         let width = lines[0].chars().count();
-        // Two modules a character upwards, and a quiet zone of four on each side.
+        // Two modules a character upwards; a quiet zone of four.
         assert!(width.div_ceil(2) == lines.len() && (33..=57).contains(&width), "{plain}");
         let other = |c| match c {
             '\u{2588}' => ' ',

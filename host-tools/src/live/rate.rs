@@ -22,12 +22,12 @@ impl Default for Rate {
 }
 
 impl Rate {
-    /// Jumps to this number of frames; those in between do not count.
+    /// Skips the frames in between.
     pub fn jump(&mut self, frames: u64) {
         (self.frames, self.since) = (frames, Wall::now());
     }
 
-    /// Takes the number of frames so far.
+    /// Frames so far.
     pub fn count(&mut self, frames: u64) {
         let passed = self.since.elapsed().as_secs_f64();
         if passed >= 1.0 {

@@ -1,5 +1,4 @@
-//! Sources of playback: a recording of any kind, or one session of a HUMS log (a log file, segments, a
-//! card's image or folder).
+//! Sources of playback: any recording, or a HUMS log's session.
 
 use std::io;
 use std::path::Path;
@@ -18,7 +17,7 @@ use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::{Place, Recording};
 
-/// Maximum number of sessions listed for a choice.
+/// For a choice.
 const LISTED_MAX: usize = 12;
 
 /// An input, found good.
@@ -26,24 +25,24 @@ pub struct Opened {
     /// Its name.
     pub name: String,
     recording: Option<Recording>,
-    /// Its place, if it has no frames.
+    /// Without frames.
     native: Option<Place>,
     is_of_box: bool,
 }
 
 impl Opened {
-    /// Whether a box recorded it, on the autopilot's own wire.
+    /// Recorded by a box, on the autopilot's own wire.
     pub fn is_of_box(&self) -> bool {
         self.is_of_box
     }
 
-    /// An autopilot's own log, which is read again to be played.
+    /// Read again to be played.
     pub fn native(&self) -> Option<Native> {
         self.native.clone().map(Native::new)
     }
 }
 
-/// Opens SRC, which is not live; of several sessions the newest, or the one of this name.
+/// The newest session, or the one of this name.
 pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
     let place = match endpoint {
         Endpoint::File(path) => chosen(path, session)?,
@@ -64,12 +63,12 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
         Some(log) => format!("{endpoint}, session {}", log.name),
         None => endpoint.to_string(),
     };
-    // A packed recording has no start of a box, and may be of any link.
+    // A packed recording may be of any link.
     let is_of_box = place.own().is_some_and(has_start);
     Ok(Opened { name, recording: Some(recording), native, is_of_box })
 }
 
-/// The recording to play, of all those in a path.
+/// Of all in a path.
 fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
     let mut found = find(&[path.to_owned()], false)?;
     let names: Vec<String> = found.places.iter().map(|place| place.name.clone()).collect();
@@ -81,7 +80,6 @@ fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
     Ok(found.places.swap_remove(index))
 }
 
-/// Some names, the newest first.
 fn listed(names: &[String]) -> String {
     let shown: Vec<&str> = names.iter().rev().take(LISTED_MAX).map(String::as_str).collect();
     let more = names.len() - shown.len();
@@ -94,17 +92,16 @@ fn listed(names: &[String]) -> String {
 pub enum Content<'a> {
     /// A frame.
     Frame(&'a Frame<'a>),
-    /// An entry of an autopilot's own log.
+    /// Of an autopilot's log.
     Entry(&'a Entry),
-    /// Another report of a log.
+    /// Another report.
     Told(&'a Told),
 }
 
-/// Callback for each item: its time, UTC of time zero if known, the part read so far, 0 to 1, and the item.
-/// `false` ends the reading.
+/// Time, UTC of time zero if known, part read (0 to 1), item. `false` ends the reading.
 pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
 
-/// Reads it from its beginning to its end, once; returns the evidence of a log's end.
+/// Once; returns the evidence of a log's end.
 pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> {
     let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();
@@ -129,7 +126,7 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> 
                 Some(Told::Checked | Told::Peak { .. }) | None => return Ok(()),
                 Some(told) => Content::Told(told),
             },
-            // Each that the player counts when it goes to a place.
+            // As the player counts them.
             _ => match &entry {
                 Some(entry) => Content::Entry(entry),
                 None => return Ok(()),

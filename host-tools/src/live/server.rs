@@ -1,7 +1,7 @@
 //! The page, and its data connection: a WebSocket.
 //!
-//! Each page has a task that takes the newest state when it can send, so a slow one skips states. A page that
-//! takes no data for `PATIENCE` is dropped.
+//! Each page's task takes the newest state when it can send. A page that takes nothing for `PATIENCE` is
+//! dropped.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -29,13 +29,12 @@ use crate::page::json;
 
 /// Pages at once.
 const PAGES_MAX: usize = 16;
-/// Maximum size of a page's message: its commands are short. It is also the size of the buffer cleared before
-/// each check for a message, once for every update of the page.
+/// Of a page's commands, and of the buffer cleared before each look for one.
 const COMMAND_BYTES_MAX: usize = 1_024;
-/// A page that takes no data for this long is gone.
+/// Then a page is gone.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Only our own scripts and styles, no inline code, no foreign frame around the page.
+/// Our scripts and styles, no inline code, no frame around the page.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -46,8 +45,8 @@ struct Shared {
     pages: Arc<AtomicUsize>,
 }
 
-/// One page's place. Dropping it frees the place. That also works if the connection breaks before it is a
-/// WebSocket: the closure that holds the place is then dropped without a call.
+/// One page's place. Freed when dropped, also if the connection breaks before it is a WebSocket: the closure
+/// is then dropped without a call.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {
@@ -64,8 +63,7 @@ impl Drop for Place {
     }
 }
 
-/// Serves pages until the thread that follows the vehicle ends, as after Ctrl-C: then the other end of
-/// `followed` is gone.
+/// Until the following thread ends: `followed` is then closed.
 pub fn serve(
     listener: std::net::TcpListener,
     hub: Arc<Hub>,
@@ -90,7 +88,7 @@ pub fn serve(
     })
 }
 
-/// Rules for every request and every answer.
+/// For every request and answer.
 async fn check(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let mut response = if !shared.guard.knows_host(headers) {
@@ -151,7 +149,7 @@ async fn connect(
     })
 }
 
-/// Sends them as one write: each of its own would wake the page and the network once more.
+/// One write: several would wake page and network.
 async fn send(socket: &mut WebSocket, messages: Vec<String>) -> Result<(), axum::Error> {
     for text in messages {
         socket.feed(Message::Text(text.into())).await?;
@@ -159,7 +157,6 @@ async fn send(socket: &mut WebSocket, messages: Vec<String>) -> Result<(), axum:
     socket.flush().await
 }
 
-/// A message of a page.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "cmd", rename_all = "lowercase")]
 enum Asked {
@@ -170,7 +167,7 @@ enum Asked {
     Speed { to: f64 },
 }
 
-/// One page, and the data it has.
+/// With the data it has.
 struct Page {
     follow: tokio::sync::watch::Receiver<Arc<Published>>,
     vehicle: Option<u8>,
@@ -213,7 +210,6 @@ impl Page {
         }
     }
 
-    /// An unreadable message is ignored.
     fn obey(&mut self, text: &str, hub: &Hub) {
         let command = match serde_json::from_str(text) {
             Ok(Asked::Vehicle { system }) => {
@@ -231,7 +227,7 @@ impl Page {
         hub.command(command);
     }
 
-    /// The newest state, and the part of the history that this page lacks.
+    /// With the history that the page lacks.
     fn news(&mut self, hub: &Hub) -> Vec<String> {
         let published = Arc::clone(&self.follow.borrow_and_update());
         if published.epoch != self.epoch {

@@ -18,18 +18,18 @@ use crate::page::json::json;
 use crate::page::modes;
 use crate::part;
 
-/// The source of the bytes, and its state.
+/// The bytes' source and state.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SourceJson {
-    /// As the command line names it.
+    /// From the command line.
     pub name: String,
-    /// A recording can be paused, sought and played at other speeds.
+    /// Can be paused and sought.
     pub recording: bool,
     /// `waiting`, `live`, `silent`, `lost`, `reading`, `playing`, `paused`, `ended` or `failed`.
     pub phase: &'static str,
-    /// More about it, in words.
+    /// More in words.
     pub words: String,
-    /// The end of a HUMS log, in words.
+    /// Of a HUMS log.
     pub log_end: Option<String>,
     /// Progress of reading, 0 to 1.
     pub progress: f64,
@@ -46,7 +46,7 @@ struct Head<'a> {
     t: &'static str,
     source: &'a SourceJson,
     now_s: f64,
-    /// UTC now, milliseconds since 1970, if known.
+    /// Milliseconds since 1970, if known.
     utc_ms: Option<u64>,
     frames: u64,
     frames_s: f64,
@@ -64,7 +64,7 @@ struct VehicleJson {
     heard_ms: u64,
 }
 
-/// Data in the head of the page, apart from the world.
+/// The head's data, apart from the world.
 #[derive(Clone, Debug)]
 pub struct Around<'a> {
     /// The source.
@@ -73,11 +73,11 @@ pub struct Around<'a> {
     pub epoch_us: Option<u64>,
     /// Frames a second, lately.
     pub frames_s: f64,
-    /// Counts of the points for a database.
+    /// Points for a database.
     pub influx: Option<super::influx::Figures>,
 }
 
-/// Source, time and vehicles; then each vehicle by system id.
+/// Source, time and vehicles; each vehicle by system id.
 pub fn all(world: &World, now: Instant, around: &Around<'_>) -> (String, Vec<(u8, String)>) {
     let boards: Vec<_> = world.crafts.values().map(|craft| Board::of(craft, now)).collect();
     let crafts = || world.crafts.iter().zip(&boards);
@@ -112,13 +112,12 @@ struct State<'a> {
     firmware: Option<String>,
     armed: bool,
     airborne: bool,
-    /// The flight state is known.
     tells_flight: bool,
     phase: &'static str,
     mode: Cow<'static, str>,
     overall: &'static str,
     overall_said: Option<&'a str>,
-    /// The last level before it became unknown.
+    /// Before it became unknown.
     overall_was: Option<&'static str>,
     heard_ms: u64,
     px4: bool,
@@ -157,12 +156,12 @@ struct ComponentJson {
     name: String,
     status: &'static str,
     used_percent: Option<f32>,
-    /// The limit that it reaches first.
+    /// Reached first.
     limit: Option<String>,
     flight_h: f64,
     motor_h: f64,
     flights: f64,
-    /// These are of its whole life, and not of this session alone.
+    /// Of its whole life.
     life: bool,
 }
 
@@ -212,7 +211,6 @@ fn name(craft: &Craft) -> String {
     format!("{} {}", autopilot_name(heartbeat.autopilot_number), type_name(heartbeat.type_number))
 }
 
-/// The counters of a session that the page shows.
 const SHOWN: [UsageCounter; 12] = [
     UsageCounter::Flight,
     UsageCounter::Flights,

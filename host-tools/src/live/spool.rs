@@ -1,5 +1,4 @@
-//! A recording's frames with their times, in a file without a name. The recording may be a tlog, raw bytes, a
-//! pipe or a HUMS log. From here on they are alike, and any place is reached at once.
+//! Any recording's frames and times, in a file without a name. Any place is reached at once.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
@@ -69,12 +68,12 @@ impl SpoolWriter {
 }
 
 impl Spool {
-    /// Goes to an offset from [`SpoolWriter::offset`].
+    /// From [`SpoolWriter::offset`].
     pub fn seek(&mut self, offset: u64) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(offset)).map(|_| ())
     }
 
-    /// The next frame, if it came by `until`; otherwise it stays the next.
+    /// If it came by `until`; otherwise it stays the next.
     pub fn next_until(&mut self, until: Instant) -> io::Result<Option<Spooled<'_>>> {
         let mut header = [0; HEADER_BYTES];
         match self.file.read_exact(&mut header) {

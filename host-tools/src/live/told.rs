@@ -1,5 +1,4 @@
-//! Settings and part hours as the box on board has recorded or reported them. With these, the limits here are
-//! its own, and a part's hours before this session are known.
+//! Settings and part hours of the box on board: limits here are its own.
 
 use std::sync::Arc;
 
@@ -11,7 +10,7 @@ use hums_link::{Check, Frame};
 use crate::mavlink::ids::PARAM_VALUE;
 pub use crate::source::told::Told;
 
-/// The limits that hold here: those that the user gave, and the box's own for all others.
+/// The user's, and the box's for all others.
 #[derive(Clone, Debug, Default)]
 pub struct Limits {
     params: Params,
@@ -19,11 +18,11 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// These are given, in this order.
+    /// In this order.
     pub fn new(given: &[(&'static ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
-            // Name and range were checked when the file was read.
+            // Checked when read.
             let _ = limits.params.set(spec.name, *value);
         }
         limits.given = given.iter().map(|(spec, _)| spec.name).collect();
@@ -35,15 +34,14 @@ impl Limits {
         &self.params
     }
 
-    /// Takes a parameter of the box into `params`; an unknown parameter or a value out of range changes
-    /// nothing.
+    /// Unknown parameters and values out of range change nothing.
     pub fn take(&self, params: &mut Params, name: &str, value: f32) {
         if !self.given.contains(&name) {
             let _ = params.set(name, value);
         }
     }
 
-    /// The same for all vehicles that come.
+    /// For later vehicles.
     pub fn learn(&mut self, name: &str, value: f32) {
         let mut params = self.params;
         self.take(&mut params, name, value);
@@ -51,12 +49,12 @@ impl Limits {
     }
 }
 
-/// The place of the part that this parameter describes, from 0: of `CMP1_KIND` 0.
+/// From 0, of `CMP1_KIND`.
 pub fn place_of(name: &str) -> Option<usize> {
     name.strip_prefix("CMP")?.strip_suffix("_KIND")?.parse::<usize>().ok()?.checked_sub(1)
 }
 
-/// A parameter that the box on board reports to a ground station, and its value.
+/// Sent to a ground station.
 pub fn parameter(frame: &Frame<'_>) -> Option<(String, f32)> {
     if frame.id() != PARAM_VALUE || frame.component() != COMPONENT || frame.check() != Check::Verified {
         return None;

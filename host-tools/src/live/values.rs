@@ -1,4 +1,4 @@
-//! The latest values as the page takes them: each with its age and whether that is too old.
+//! Latest values for the page, with age and staleness.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::latest::Latest;
@@ -14,7 +14,7 @@ use crate::counters::tells_flight;
 use crate::mavlink::values::Scalar;
 use crate::reference::Quantity;
 
-/// A value, its age in milliseconds, and 1 if stale.
+/// Value, milliseconds of age, 1 if stale.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     value: Scalar,
@@ -33,7 +33,7 @@ impl Serialize for Shown {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut tuple = serializer.serialize_tuple(3)?;
         match self.value {
-            // As short as it was sent: 15.3, not 15.300000190734863. Infinite values and `NaN` become null.
+            // 15.3, not 15.300000190734863. Infinite values and `NaN` become null.
             Scalar::Single(value) => tuple.serialize_element(&value)?,
             other => tuple.serialize_element(&other.as_f64())?,
         }
@@ -43,18 +43,17 @@ impl Serialize for Shown {
     }
 }
 
-/// When a value came, and the value if it is known.
+/// And when, if known.
 type Told = (Option<time::Instant>, Option<f32>);
 
-/// A value of a message.
 fn of<T>(message: &Latest<T>, value: impl FnOnce(&T) -> Option<f32>) -> Told {
     (message.at(), message.get().and_then(value))
 }
 
-/// A value's name, the age up to which it is shown, and its reader.
+/// Name, maximum age, reader.
 type OfVehicle = (&'static str, Span, fn(&Vehicle) -> Told);
 
-/// Values of the monitor's vehicle: the page's names, maximum ages, and places.
+/// The page's names, maximum ages, readers.
 const OF_VEHICLE: &[OfVehicle] = &[
     ("roll", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.roll.0.to_degrees()))),
     ("pitch", MOTION, |vehicle| of(&vehicle.attitude, |angles| Some(angles.pitch.0.to_degrees()))),
@@ -98,19 +97,18 @@ const OF_VEHICLE: &[OfVehicle] = &[
     }),
 ];
 
-/// Clipped samples of all accelerometers.
 fn clips(of_each: [u32; 3]) -> f32 {
     of_each.iter().fold(0_u32, |sum, clips| sum.saturating_add(*clips)) as f32
 }
 
-/// The first battery's current, or else the one in the autopilot's status.
+/// Or the current in the autopilot's status.
 fn amperes(vehicle: &Vehicle) -> Told {
     let of_battery = of(&vehicle.batteries[0], |pack| pack.current.map(|amperes| amperes.0));
     let of_system = || of(&vehicle.system, |system| system.current.map(|amperes| amperes.0));
     if of_battery.1.is_some() { of_battery } else { of_system() }
 }
 
-/// Everything that is known now, by name.
+/// Known values by name.
 #[derive(Debug)]
 pub struct Values<'a> {
     craft: &'a Craft,
@@ -161,7 +159,7 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// The motors received so far, by number; a missing one in between is an empty object.
+/// By number; a missing one is an empty object.
 #[derive(Debug)]
 pub struct Motors<'a>(pub Values<'a>);
 

@@ -1,4 +1,4 @@
-//! Everything on the link: each vehicle apart, by its system id.
+//! Vehicles on the link, by system id.
 
 use std::collections::BTreeMap;
 
@@ -19,48 +19,48 @@ use crate::page::more::More;
 use crate::page::note::Note;
 use crate::source::told::Finding as BoxFinding;
 
-/// Maximum number of vehicles; further ones are counted.
+/// Further ones are counted.
 pub const VEHICLES_MAX: usize = 8;
-/// A silence that is longer than this is stepped through only at its beginning and end.
+/// Longer silences are stepped through only at both ends.
 const SILENCE_MAX: Span = Span::from_secs(600);
-/// Time for a check's debounce and age at its beginning.
+/// For debounce and age at a silence's beginning.
 const SILENCE_HEAD: Span = Span::from_secs(60);
 
-/// A session's start, which is recorded at once.
+/// A session's start is recorded at once.
 const BEGINNING: Instant = Instant::from_millis(10_000);
 
 /// Histories by system id.
 pub type Histories = BTreeMap<u8, History>;
 
-/// All vehicles, and the counts of all frames.
+/// All vehicles and frames.
 #[derive(Clone, Debug)]
 pub struct World {
     /// By system id.
     pub crafts: BTreeMap<u8, Craft>,
-    /// Number of frames received, from any sender.
+    /// From any sender.
     pub frames: u64,
-    /// Number of frames among them that match no definition of ours.
+    /// Of no known definition.
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
-    /// Findings since this was last cleared, with their vehicles; at most `FOUND_MAX`.
+    /// Since last cleared, at most `FOUND_MAX`.
     pub found: Vec<(Instant, u8, Finding)>,
     limits: Limits,
     /// See [`Craft::on_the_wire`].
     on_the_wire: bool,
-    /// The vehicle of a log: the first one in it.
+    /// The log's first vehicle.
     owner: Option<u8>,
-    /// Parameters that autopilots reported before their first heartbeat: system and frame.
+    /// Before their first heartbeat: system and frame.
     early: Vec<(u8, Vec<u8>)>,
-    /// The log's parts before that.
+    /// Before that.
     parts: [Option<Component>; COMPONENTS_MAX],
     next_tick: Instant,
 }
 
-/// Parameters that are kept until their autopilot's heartbeat comes, of all systems.
+/// Of all systems, until a heartbeat.
 const EARLY_MAX: usize = 2_048;
 
-/// More in one step than all checks together could change is not possible.
+/// More than all checks could change in a step.
 const FOUND_MAX: usize = 4_096;
 
 impl World {
@@ -81,18 +81,18 @@ impl World {
         }
     }
 
-    /// For a recording of a box: its frames come from the autopilot's own wire.
+    /// From the autopilot's own wire.
     #[must_use]
     pub fn on_the_wire(self, on_the_wire: bool) -> Self {
         Self { on_the_wire, ..self }
     }
 
-    /// Time begins here: a HUMS log's first frame may come long after power-on.
+    /// A HUMS log's first frame may come long after power-on.
     pub fn begin(&mut self, at: Instant) {
         self.next_tick = at;
     }
 
-    /// Takes a frame. Growing data go to `histories`, if given.
+    /// Growing data go to `histories`, if given.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, mut histories: Option<&mut Histories>) {
         self.advance(at, histories.as_deref_mut());
         self.frames += 1;
@@ -102,11 +102,11 @@ impl World {
         }
         let system = frame.system();
         let known = self.crafts.contains_key(&system);
-        // Only an autopilot's heartbeat makes a system a vehicle.
+        // An autopilot's heartbeat makes a vehicle.
         let told = if known { None } else { observe(frame) };
         match told {
             Some((_, Observation::Heartbeat(_))) => self.meet(at, system),
-            // A radio is a system of its own, and everybody's.
+            // A radio is a system of its own.
             Some((source, radio @ Observation::TelemetryRadio(_))) => {
                 for (system, craft) in &mut self.crafts {
                     let mut history =
@@ -135,7 +135,6 @@ impl World {
         }
     }
 
-    /// A vehicle was received for the first time.
     fn meet(&mut self, at: Instant, system: u8) {
         if self.crafts.len() >= VEHICLES_MAX {
             self.refused += 1;
@@ -153,7 +152,7 @@ impl World {
         self.crafts.insert(system, craft);
     }
 
-    /// Takes an entry of an autopilot's own log, which has no frames.
+    /// An entry of a log without frames.
     pub fn entry(&mut self, at: Instant, entry: &Entry, mut histories: Option<&mut Histories>) {
         let system = match entry {
             Entry::Observation(source, _) => source.system,
@@ -179,8 +178,7 @@ impl World {
         }
     }
 
-    /// The only vehicle of an autopilot's own log: system 1, because its parameters come before the vehicle
-    /// is known.
+    /// System 1: parameters come before the vehicle is known.
     fn only(&self) -> u8 {
         self.crafts.keys().next().copied().unwrap_or(1)
     }
@@ -197,10 +195,9 @@ impl World {
         }
     }
 
-    /// An autopilot's own log has a gap between these times; the vehicle was not silent. The world is not
-    /// stepped over it, nor for a moment after it, until the first values have come ([`SETTLE`]).
+    /// A gap in an autopilot's log is no silence: no steps over it, nor until the first values ([`SETTLE`]).
     fn pass(&mut self, from: Instant, to: Instant, histories: Option<&mut Histories>) {
-        // A gap that begins before the last item is a count over the whole log.
+        // A gap from before the last item is a count over the log.
         if self.next_tick <= to && from + SETTLE + TICK >= self.next_tick {
             self.advance(from, histories);
             let settle = if to.since(from) >= SETTLE { SETTLE } else { TICK };
@@ -208,7 +205,7 @@ impl World {
         }
     }
 
-    /// Takes another report of a log.
+    /// Another report of a log.
     pub fn told(&mut self, at: Instant, told: &Told, mut histories: Option<&mut Histories>) {
         if let Told::Missing { from, to, frames } = told {
             return self.miss(*from, *to, *frames, histories);
@@ -217,8 +214,8 @@ impl World {
         match told {
             Told::Parameter { name, value, start } => {
                 self.limits.learn(name, *value);
-                // Each file of a log repeats the table. At the session's start it comes before the parts with
-                // their earlier hours: a part not listed has run zero hours.
+                // Each file repeats the table. At the start it comes before parts with hours: others have run
+                // zero.
                 let new = |place: &usize| matches!(self.parts.get(*place), Some(None));
                 if let Some(place) = place_of(name).filter(|_| *start && at < BEGINNING).filter(new) {
                     self.part(place, Component::default());
@@ -240,7 +237,7 @@ impl World {
         }
     }
 
-    /// The log has a gap between these times; the vehicle was not silent.
+    /// A gap is no silence.
     fn miss(&mut self, from: Instant, to: Instant, frames: u64, mut histories: Option<&mut Histories>) {
         self.pass(from, to, histories.as_deref_mut());
         for (system, craft) in &mut self.crafts {
@@ -251,8 +248,7 @@ impl World {
         }
     }
 
-    /// Takes a finding of the box. The monitor here finds the same from the frames. Only findings about the
-    /// box itself cannot be made here.
+    /// The monitor here finds the same from frames, except for findings about the box.
     fn found_on_board(&mut self, finding: &BoxFinding, histories: Option<&mut Histories>) {
         let Some(owner) = self.owner else { return };
         let is_new = finding.subsystem == Subsystem::Recorder
@@ -272,7 +268,7 @@ impl World {
         }
     }
 
-    /// Time passes: every check is stepped until `now`.
+    /// Steps every check until `now`.
     pub fn advance(&mut self, now: Instant, mut histories: Option<&mut Histories>) {
         if now.since(self.next_tick) > SILENCE_MAX {
             let head = self.next_tick + SILENCE_HEAD;
@@ -315,7 +311,6 @@ mod tests {
     use crate::mavlink::ids::HEARTBEAT;
     use crate::page::history::Cursor;
 
-    /// HEARTBEAT of an `ArduPilot` quadrotor, disarmed.
     fn heartbeat(system: u8) -> Vec<u8> {
         let mut buffer = [0; FRAME_BYTES_MAX];
         let packet = Packet::new(HEARTBEAT).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
@@ -339,8 +334,7 @@ mod tests {
         }));
     }
 
-    /// The number of frames in a second is known at its end, which a page that looks all the time has just
-    /// seen.
+    /// Known at the second's end, which a looking page has just seen.
     #[test]
     fn a_page_is_told_how_many_frames_came_in_each_second() {
         let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());
@@ -355,11 +349,10 @@ mod tests {
             let part = serde_json::to_value(part).expect("JSON");
             told.extend(part["series"]["Frames:0"][1].as_array().into_iter().flatten().cloned());
         }
-        // Each twice, as the lowest and the highest of its moment.
+        // Twice: lowest and highest of its moment.
         assert_eq!(told, [9.0, 9.0, 8.0, 8.0, 9.0, 9.0, 9.0, 9.0, 8.0, 8.0]);
     }
 
-    /// A gap of an autopilot's own log is not a silence of the vehicle: no value is stale or lost for it.
     #[test]
     fn a_gap_of_an_autopilots_own_log_is_no_silence_of_the_vehicle() {
         let source = Source { system: 1, component: 1 };
@@ -381,7 +374,6 @@ mod tests {
         assert_eq!(found(true), 0);
     }
 
-    /// Frames that the box counted as lost are missing here too, and are not a silence of the vehicle.
     #[test]
     fn what_a_box_lost_is_counted_and_is_a_gap_of_the_page() {
         let (mut world, mut histories) = (World::new(Limits::default()).on_the_wire(true), Histories::new());
@@ -404,7 +396,6 @@ mod tests {
         assert_eq!((part(19), part(60)), (serde_json::json!([]), serde_json::json!([[19.1, 39.9]])));
     }
 
-    /// A state at first reception is not an event of that moment.
     #[test]
     fn a_vehicle_that_is_first_heard_in_the_air_has_not_just_taken_off() {
         let mut encoder = Encoder::of(1, 1);
@@ -430,7 +421,7 @@ mod tests {
         assert_eq!(words, ["armed when it was first heard", "in the air when it was first heard"]);
     }
 
-    /// A vehicle first received in the air, whose pack of 20.4 V has five cells or six.
+    /// 20.4 V: five cells or six.
     #[test]
     fn cells_that_are_not_known_are_said_at_once_in_the_air_and_a_box_that_knew_them_has_its_word() {
         let source = Source { system: 1, component: 1 };
@@ -514,7 +505,7 @@ mod tests {
         assert_ne!(link, hums_core::health::Level::Ok, "nobody has been heard for hours");
     }
 
-    /// A motor's limit of ten hours, as a log's parameters have it.
+    /// Ten hours, as in a log's parameters.
     fn tell_limits(world: &mut World) {
         for (name, value) in [("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 10.0)] {
             let told = Told::Parameter { name: name.to_owned(), value, start: true };
@@ -522,7 +513,7 @@ mod tests {
         }
     }
 
-    /// The second motor, which has turned nine and a half of them.
+    /// Has turned nine and a half of them.
     fn motor() -> Told {
         let mut component = Component::default();
         (component.kind, component.number) = (Kind::Motor, 2);
@@ -560,7 +551,6 @@ mod tests {
         assert!(world.crafts[&1].knows_life(0));
         assert_eq!(world.crafts[&1].monitor.component_used_percent(0), Some(0.0));
 
-        // A later file of the log repeats the table; the part is unchanged.
         world.told(Instant::from_millis(3_500), &motor(), None);
         tell_limits(&mut world);
         world.advance(Instant::from_millis(4_000), Some(&mut histories));

@@ -1,4 +1,4 @@
-//! What arrives at the autopilot UART, and when: the source, noise and all, cut into pieces that every machine takes.
+//! Bytes at the autopilot's UART and their times.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -16,30 +16,29 @@ use crate::sink::{SideOutput, nowhere};
 use crate::source::noise::Noisy;
 use crate::source::{self, Chunk, Source, Timing};
 
-/// The most bytes that arrive at once: as much as the board's ring holds.
+/// The board's ring.
 pub const CHUNK_BYTES_MAX: usize = 2048;
-/// In so many bytes of standard input, which cannot be read twice, the first frame must be.
+/// Of standard input, until the first frame.
 const FIRST_BYTES_MAX: usize = 16 << 20;
 
 /// The stream of arrivals.
 pub struct Arrivals {
     source: Noisy<Box<dyn Source>>,
-    /// The part of standard input that was read to find its first frame.
+    /// Read to find the first frame.
     first: VecDeque<Chunk>,
     name: String,
     waiting: VecDeque<Chunk>,
     tap: SideOutput,
     bytes: u64,
-    /// The way to the autopilot, if a live one is connected.
+    /// Of a live one.
     autopilot: Option<Box<dyn Write + Send>>,
-    /// The run was ended before its end.
+    /// Ended early.
     broken_off: bool,
 }
 
 impl Arrivals {
-    /// Opens the input of the command line; --tap gets a copy of the bytes, and is not an input. `prepare` makes
-    /// everything else ready. For a stored input it runs after a MAVLink frame was found, so that a slip leaves
-    /// nothing behind. For a live one it runs before, because that does not wait.
+    /// --tap gets a copy of the bytes. `prepare` runs after a stored input's first frame, so that a slip leaves
+    /// nothing behind; before a live one, which does not wait.
     pub fn open<T>(run: &Sim, inputs: &Inputs, prepare: impl FnOnce() -> Result<T>) -> Result<(Self, T)> {
         if run.input.is_live() {
             let prepared = prepare()?;
@@ -52,7 +51,7 @@ impl Arrivals {
     fn new(run: &Sim, inputs: &Inputs) -> Result<Self> {
         let timing = Timing { line_rate: run.faults.line_rate };
         if let Endpoint::File(_) = run.input {
-            // Read again from its beginning below: any amount may come before the first frame.
+            // Any amount may come before the first frame.
             until_frame(&mut *source::open(&run.input, timing)?, &run.input, |_| true)?;
         }
         let (source, autopilot) = source::open_both(&run.input, timing)?;
@@ -99,37 +98,37 @@ impl Arrivals {
         Ok(self.waiting.pop_front())
     }
 
-    /// The end of the run: the copy of the bytes is complete, or its error was reported.
+    /// Completes the copy, or reports its error.
     pub fn finish(&self) -> Outcome {
         self.tap.finish()
     }
 
-    /// The machine did not take this one: its power went before.
+    /// The power went before this one.
     pub fn put_back(&mut self, chunk: Chunk) {
         self.waiting.push_front(chunk);
     }
 
-    /// The way to the autopilot, once; bytes to a recording are dropped.
+    /// Taken once; bytes to a recording are dropped.
     pub fn take_autopilot(&mut self) -> Box<dyn Write + Send> {
         self.autopilot.take().unwrap_or_else(nowhere)
     }
 
-    /// Bytes that have arrived.
+    /// Arrived so far.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// The recording is damaged, as far as it has come. (Raw bytes are never damaged: a line may be noisy.)
+    /// As far as it has come; raw bytes are never damaged.
     pub fn is_damaged(&self) -> bool {
         self.broken_off || self.source.damages() > 0
     }
 
-    /// The user has ended the run before the end of a recording.
+    /// By the user.
     pub const fn break_off(&mut self) {
         self.broken_off = true;
     }
 
-    /// Oddities of the input.
+    /// Of the input.
     pub fn remark(&self) -> Option<String> {
         let broken_off =
             self.broken_off.then(|| "was not read to its end: the run was ended before".to_owned());
@@ -138,7 +137,7 @@ impl Arrivals {
     }
 }
 
-/// Reads to the first frame with a valid checksum, while `go_on` agrees. An error if there is none.
+/// The first valid frame, while `go_on` agrees. An error if there is none.
 fn until_frame(
     source: &mut dyn Source,
     input: &Endpoint,
@@ -162,7 +161,7 @@ fn until_frame(
     Err(source::no_frame(input))
 }
 
-/// A file for a copy of the bytes. It must not be one of the inputs.
+/// Must not be an input.
 fn tap_of(path: &Path, inputs: &Inputs) -> Result<SideOutput> {
     Ok(SideOutput::file("--tap", Output::create(path, inputs)?))
 }

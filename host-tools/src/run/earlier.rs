@@ -1,6 +1,5 @@
-//! The sessions that are on a card before a run. A card without room makes the recorder overwrite the oldest of them:
-//! right on a vehicle, and a surprise on a PC. So a run does not begin on a card that may become full, unless a flag
-//! allows it. Overwritten logs are reported by session.
+//! Sessions on a card before a run. A full card overwrites the oldest: a surprise on a PC. So a flag must allow a run on a card
+//! that may become full. Overwritten logs are reported.
 
 use std::path::Path;
 
@@ -14,10 +13,10 @@ use crate::logs::{Card, Log, segment_name};
 use crate::outcome::usage;
 use crate::source::input::Input;
 
-/// The recorder makes a segment as long as this part of a card at most, so that a small card holds several.
+/// Of a card: a small one holds several segments.
 const SEGMENTS_MIN: u64 = 16;
 
-/// A session by its name on the card and by the number in its sectors, with the number of its files.
+/// Name on the card, number in its sectors, number of files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Session {
     name: String,
@@ -35,19 +34,17 @@ impl Session {
     }
 }
 
-/// The sessions before a run.
+/// Sessions before a run.
 #[derive(Clone, Debug, Default)]
 pub struct EarlierSessions {
     sessions: Vec<Session>,
-    /// They may be overwritten.
     allowed: bool,
 }
 
 impl EarlierSessions {
-    /// Looks at a card. A usage error where the run may have to overwrite a session; `unknown` is how much comes of an input
-    /// that has no length.
+    /// Looks at a card. A usage error if a session may be overwritten; `unknown`: bytes of an input without a length.
     pub fn of(run: &cli::Sim, unknown: u64) -> Result<Self> {
-        // A card that cannot be read has no session to lose.
+        // An unreadable card has no session to lose.
         let Some(card) = Card::of(&run.sd) else {
             return Ok(Self { sessions: Vec::new(), allowed: run.overwrite_oldest });
         };
@@ -77,7 +74,7 @@ impl EarlierSessions {
         self.sessions.iter().any(|session| session.is(&log))
     }
 
-    /// The names of those that are gone now, or have fewer files.
+    /// Gone, or with fewer files.
     pub fn overwritten(&self, after: &[Log]) -> Vec<String> {
         let after: Vec<Session> = after.iter().map(Session::of).collect();
         let is_whole =
@@ -95,15 +92,13 @@ impl EarlierSessions {
     }
 }
 
-/// The session that a recorder without room overwrites. It knows the root directory only: logs in folders are copies
-/// by hand.
+/// The session that a full recorder overwrites. It sees only the root directory: logs in folders are copies.
 fn oldest(logs: &[Log]) -> Option<&Log> {
     let is_segment = |file: &String| !file.contains('/') && segment_name(Path::new(file)).is_some();
     logs.iter().find(|log| log.files.iter().any(is_segment))
 }
 
-/// Whether a card has room for a run's output: as much as its input, and one new segment for each of its starts.
-/// Writing errors may use up any room: segments are left early.
+/// As much as the input, and a new segment for each start. Writing errors may use up any room.
 fn has_room(card: &Card, run: &cli::Sim, unknown: u64) -> bool {
     if run.faults.write_error.is_some_and(|probability| probability > 0.0) {
         return false;

@@ -1,5 +1,4 @@
-//! The ground station: its output, and its input, either live or from a file with its own times (`--gs-input`). With
-//! a file the conversation repeats to the byte.
+//! The ground station's output, and its input, live or timed (`--gs-input`). With a file the run repeats to the byte.
 
 use std::io::Write;
 
@@ -20,7 +19,7 @@ pub struct Ground {
     got: SideOutput,
 }
 
-/// Opens both directions by the command line. Outputs must differ from the inputs.
+/// Outputs must differ from the inputs.
 pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>)> {
     let sink::Ground { writer, input } = match &run.gs {
         Some(endpoint) => sink::open(endpoint, inputs)?,
@@ -32,12 +31,12 @@ pub fn open(run: &Sim, inputs: &Inputs) -> Result<(Ground, Box<dyn Write + Send>
 }
 
 impl Ground {
-    /// The run is over: an output file is complete, unless an error was reported.
+    /// Completes an output file, unless an error was reported.
     pub fn finish(&self) -> Outcome {
         self.got.finish()
     }
 
-    /// Its bytes until `now_us`, the oldest first; `None` at the end.
+    /// The oldest first; `None` at the end.
     pub fn until(&mut self, now_us: u64) -> Result<Option<Chunk>> {
         if self.next.is_none()
             && let Some(stored) = &mut self.stored

@@ -1,8 +1,7 @@
 //! `hums sim`: a recording goes in at the UART and comes out on a card.
 //!
-//! Both machines get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]). They differ in
-//! the machine: [`sim`] runs the tasks' bodies on this PC, `emulate` the image that is flashed on the model of its
-//! chip.
+//! Two machines get the same bytes at the same times ([`arrivals`]) and report alike ([`report`]): [`sim`] runs the
+//! tasks on this PC, `emulate` the image on its chip's model.
 
 pub mod arrivals;
 mod earlier;
@@ -37,19 +36,19 @@ use ground::Ground;
 use report::Report;
 use store::FileFlash;
 
-/// In real time the machine's clock goes on at least this often, also while nothing arrives.
+/// In real time, while nothing arrives.
 const STEP: Duration = Duration::from_millis(20);
 
 /// A machine that receives the bytes.
 pub trait Machine {
-    /// Time goes on to the chunk's, then its bytes are there. `false`: the run is over (power went).
+    /// Bytes at the chunk's time. `false`: the run is over (power went).
     fn arrive(&mut self, chunk: &Chunk) -> Result<bool>;
 
-    /// The same for bytes of the ground station.
+    /// Bytes of the ground station.
     fn hear(&mut self, chunk: &Chunk) -> Result<bool>;
 }
 
-/// Gives all arriving bytes to the machine, at the requested pace.
+/// At the requested pace.
 fn drive(
     arrivals: &mut Arrivals,
     ground: &mut Ground,
@@ -95,7 +94,7 @@ fn drive(
     Ok(true)
 }
 
-/// Gives the machine the bytes that the ground station has sent by now.
+/// Sent by now.
 fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<bool> {
     while let Some(chunk) = ground.until(now_us)? {
         if !machine.hear(&chunk)? {
@@ -105,7 +104,7 @@ fn hear(ground: &mut Ground, now_us: u64, machine: &mut impl Machine) -> Result<
     Ok(true)
 }
 
-/// How fast a run goes, and whether its input is live.
+/// Whether the input is live.
 fn pace(run: &Sim) -> Result<(Speed, bool)> {
     let live = run.input.is_live();
     match run.speed {
@@ -117,27 +116,27 @@ fn pace(run: &Sim) -> Result<(Speed, bool)> {
     }
 }
 
-/// Makes the card image where it is missing, and gives it for reading and writing.
+/// Makes a missing one.
 fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
     let context = || format!("{}: cannot be formatted", path.display());
     let file = image::open_or_make(path, size_mib, |file| {
         let card =
             SimCard::new(file.try_clone().with_context(context)?, Faults::default()).with_context(context)?;
-        // A run is repeatable to the byte, the volume's number included.
+        // Repeatable to the byte.
         let volume_id = (seed as u32).wrapping_mul(0x9e37_79b9) ^ 0x4855_4d53;
         hums_recorder::format::format(&card, volume_id).map_err(|error| {
             let why = card.take_image_error().map_or_else(|| format!("{error:?}"), |error| error.to_string());
             anyhow::anyhow!("{}: {why}", context())
         })
     })?;
-    // A run with an empty card is allowed: it shows the recorder's reaction.
+    // Shows the recorder's reaction.
     if let Some(words) = image::check(&file, path)? {
         note!("{}: {words}", path.display());
     }
     Ok(file)
 }
 
-/// A run before its first byte: everything that it reads and writes is open.
+/// Before the first byte: all is open.
 struct Prepared {
     speed: Speed,
     live: bool,
@@ -146,12 +145,11 @@ struct Prepared {
     flash: FileFlash,
     earlier: EarlierSessions,
     ground: Ground,
-    /// What the ground station gets.
     gs: Box<dyn Write + Send>,
     entropy: u32,
 }
 
-/// The inputs of a run, and its parameters: refused before anything is opened.
+/// Refused before anything is opened.
 type Request = (Inputs, Vec<(&'static ParamSpec, f32)>);
 
 fn check_request(run: &Sim) -> Result<Request> {
@@ -162,7 +160,6 @@ fn check_request(run: &Sim) -> Result<Request> {
     Ok((inputs, params::read(run.params.as_deref())?))
 }
 
-/// Opens the files of a run. An input without a length may have `unknown` bytes.
 fn prepare(run: &Sim, (inputs, params): &Request, unknown: u64) -> Result<Prepared> {
     let (speed, live) = pace(run)?;
     let (mut arrivals, (card, flash)) = Arrivals::open(run, inputs, || {
@@ -176,7 +173,7 @@ fn prepare(run: &Sim, (inputs, params): &Request, unknown: u64) -> Result<Prepar
     Ok(Prepared { speed, live, arrivals, card, flash, earlier, ground, gs, entropy })
 }
 
-/// The end of a run: remarks, and the report.
+/// Remarks and the report.
 fn finish(run: &Sim, arrivals: &Arrivals, ground: &Ground, report: &Report) -> Result<Outcome> {
     let beside = ground.finish().and(arrivals.finish());
     for remark in arrivals.remark().into_iter().chain(report.remark(&run.input)) {
@@ -186,7 +183,6 @@ fn finish(run: &Sim, arrivals: &Arrivals, ground: &Ground, report: &Report) -> R
     Ok(outcome.and(beside).and(Outcome::lossy(arrivals.is_damaged())))
 }
 
-/// Fails if the store's file could not be written.
 fn check_store(run: &Sim, flash: &FileFlash) -> Result<()> {
     match (flash.take_error(), &run.store) {
         (Some(error), Some(store)) => bail!("--store {}: {error}", store.display()),
@@ -194,7 +190,6 @@ fn check_store(run: &Sim, flash: &FileFlash) -> Result<()> {
     }
 }
 
-/// Two kinds of output cannot share standard output.
 fn check_standard_output(run: &Sim) -> Result<()> {
     if run.gs == Some(Endpoint::Standard) && run.json {
         return Err(usage("--gs - and --json both want standard output; give --gs a file"));

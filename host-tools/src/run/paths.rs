@@ -1,4 +1,4 @@
-//! The files of a run: none may be two things at once.
+//! A run's files: none may be two things at once.
 
 use std::path::{self, Path};
 
@@ -9,8 +9,7 @@ use crate::endpoint::Endpoint;
 use crate::files::{FileId, Inputs, Output, is_seekable, means_standard_output};
 use crate::outcome::usage;
 
-/// Files of a run that must not be overwritten: its inputs, and the card and the store, which are updated in place.
-/// Refuses a run that names one file twice.
+/// Files that must not be overwritten: inputs, card and store. Refuses a run that names one file twice.
 pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
     let tap = run.tap.as_deref();
     let mut inputs = Inputs::of(run.params.as_deref().into_iter().chain(run.firmware.as_deref()));
@@ -35,7 +34,7 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
         return Err(usage("--gs - and --tap - both want standard output; give one of them a file"));
     }
     for output in gs.into_iter().chain(tap) {
-        // Before the run changes the card.
+        // Before the card changes.
         Output::check(output, &inputs)?;
     }
     if let (Some(gs), Some(tap)) = (gs, tap)
@@ -51,7 +50,7 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
     Ok(inputs)
 }
 
-/// Whether two paths lead to one file, which may not be there yet.
+/// One may not be there yet.
 fn is_same(one: &Path, other: &Path) -> bool {
     match [one, other].map(FileId::of) {
         [Ok(one), Ok(other)] => one == other,
@@ -60,7 +59,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     }
 }
 
-/// Whether something is there that is neither a file nor a folder: `/dev/null` may be written by both.
+/// Neither file nor folder: `/dev/null` may be written by both.
 fn is_device(path: &Path) -> bool {
     path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
 }

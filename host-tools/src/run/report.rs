@@ -1,4 +1,4 @@
-//! The output of `hums sim`: counters of the run, and the findings in the card's newest logs.
+//! Output of `hums sim`: counters, and findings in the newest logs.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -20,10 +20,9 @@ use crate::source::told;
 use crate::summary::Overview;
 use crate::utc::moment;
 
-/// The output of `hums sim --json`.
 const SCHEMA: Schema = Schema::first("hums-run");
 
-/// The object of `--json`; its names are a contract.
+/// For `--json`; its names are a contract.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// Frames that came in.
@@ -34,72 +33,72 @@ pub struct Report {
     pub frames_lost: u64,
     /// Bytes that came in.
     pub bytes_in: u64,
-    /// Bytes of them that belong to no frame.
+    /// Outside frames.
     pub bytes_not_frames: u64,
     /// Bytes of log on the card.
     pub bytes_logged: u64,
-    /// 512-byte blocks written, file system included.
+    /// File system included.
     pub blocks_written: u64,
-    /// The fullest the sector queue was.
+    /// Of the sector queue.
     pub queue_bytes_max: u64,
     /// Its size.
     pub queue_bytes_capacity: u64,
-    /// The longest the card took for one call.
+    /// Longest call of the card, ms.
     pub sd_stall_ms_max: u64,
     /// Frames sent to the ground station.
     pub gs_frames: u64,
     /// Bytes sent to the ground station.
     pub gs_bytes: u64,
-    /// Changes of level, in order, up to [`FINDINGS_MAX`]; the log has all of them.
+    /// In order, up to [`FINDINGS_MAX`]; the log has all.
     pub findings: Vec<Finding>,
-    /// How many more there were.
+    /// Beyond the limit.
     #[serde(skip_serializing_if = "is_none")]
     pub findings_left_out: u64,
     /// Usage counters, units in their names.
     pub usage: serde_json::Map<String, serde_json::Value>,
-    /// The run's log files on the card.
+    /// On the card.
     pub log_files: Vec<String>,
-    /// Earlier sessions that were overwritten, in whole or in part, because the card had no room.
+    /// In whole or in part, for want of room.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub overwritten: Vec<String>,
-    /// The command line allows that.
+    /// Allowed by the command line.
     #[serde(skip)]
     pub may_overwrite: bool,
-    /// The card had no room in the end, and no session that may be overwritten.
+    /// No room in the end, and no session to overwrite.
     #[serde(skip)]
     pub card_full: bool,
-    /// Power went at a block write that the command line chose.
+    /// At a chosen block write.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
-    /// The deepest use of the firmware's stack, if it has one.
+    /// Deepest use, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_bytes_max: Option<u64>,
     /// Its size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_bytes: Option<u64>,
-    /// The deepest use by each urgency alone, if measured.
+    /// Deepest use by urgency, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_by_urgency: Option<serde_json::Value>,
-    /// Cycles of the processor by stage, if measured.
+    /// By stage, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycles: Option<serde_json::Value>,
-    /// Load of the processor in the worst second except the first, in percent, if measured.
+    /// Percent in the worst second but the first, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub busy_percent_max: Option<f64>,
 }
 
-/// The logs of a run on the card.
+/// A run's logs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OnCard {
     /// Bytes of log.
     pub bytes: u64,
-    /// Recorded frames that are missing: each stretch of unknown length counts as one.
+    /// A stretch of unknown length counts as one.
     pub frames_missing: u64,
-    /// The recorder's last figures, if it recorded any.
+    /// The recorder's last figures, if any.
     pub stats: Option<Stats>,
 }
 
-/// Changes of level that are kept one by one: a run may go on for days.
+/// Kept: a run may go on for days.
 pub const FINDINGS_MAX: usize = 10_000;
 
 fn is_none(count: &u64) -> bool {
@@ -117,16 +116,16 @@ pub struct Finding {
     pub instance: u8,
     /// The new level.
     pub level: String,
-    /// Seconds since the first input byte.
+    /// Since the first input byte.
     pub time_s: f64,
-    /// The decisive value; `null` where the input stopped.
+    /// `null` if the input stopped.
     pub value: Option<f64>,
     /// Its unit.
     pub unit: String,
 }
 
 impl Finding {
-    /// The level for people. Without a value the level `ok` means an end, not health.
+    /// For people; `ok` without a value is an end, not health.
     fn word(&self) -> &str {
         if self.level == Level::Ok.name() && self.value.is_none() { "ended" } else { &self.level }
     }
@@ -165,7 +164,7 @@ fn known(value: f32) -> Option<f64> {
 }
 
 impl Report {
-    /// Takes over the recorder's own counters.
+    /// The recorder's counters.
     pub fn set_stats(&mut self, stats: &Stats) {
         self.frames_in = stats.frames_in;
         self.frames_logged = stats.frames_logged;
@@ -181,12 +180,12 @@ impl Report {
         self.gs_bytes = stats.gs_bytes;
     }
 
-    /// Adds the card's logs of this run, and the earlier ones that it overwrote. Returns the number of frames and
-    /// bytes of the run's logs, and the recorder's last figures.
+    /// Logs of this run, and those that it overwrote. Returns frames and bytes of the run's logs, and the recorder's
+    /// last figures.
     pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, OnCard)> {
         let mut frames = 0;
         let mut on_card = OnCard::default();
-        // A card that cannot be read has no readable log; the counters have the losses.
+        // The counters have the losses.
         let logs = logs::on_card(card);
         if !logs.is_empty() {
             self.overwritten = earlier.overwritten(&logs);
@@ -209,7 +208,7 @@ impl Report {
         Ok((frames, on_card))
     }
 
-    /// Prints it, and returns how the run ended: a deliberate power cut is not a loss of the recorder.
+    /// A deliberate power cut is no loss.
     pub fn print(&self, json: bool, quiet: bool) -> Result<Outcome> {
         if json {
             output::json(SCHEMA, self)?;
@@ -232,7 +231,7 @@ impl Report {
         Ok(Outcome::lossy(self.frames_lost > 0 || !self.overwritten.is_empty() && !self.may_overwrite))
     }
 
-    /// A remark about an input without any frame.
+    /// For an input without frames.
     pub fn remark(&self, input: &Endpoint) -> Option<String> {
         (self.bytes_in > 0 && self.frames_in == 0).then(|| {
             format!(

@@ -1,5 +1,4 @@
-//! A substitute for a board's true random number. On a board every session has a number of its own. Here two
-//! recordings have two, and the same run has the same one again.
+//! In place of a board's random number: two recordings have two, and the same run has the same again.
 
 use anyhow::{Context as _, Result};
 use sha2::{Digest as _, Sha256};
@@ -9,8 +8,7 @@ use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{add_ends, short};
 
-/// A number that depends on the input, on the parameters and on the chosen faults. Live input cannot be repeated, so
-/// it is random then.
+/// By input, parameters and faults; random for live input.
 pub(super) fn salt(run: &Sim, arrivals: &mut Arrivals) -> Result<u32> {
     let mut hash = Sha256::new();
     hash.update(format!("{:?}", run.faults));
@@ -25,7 +23,7 @@ pub(super) fn salt(run: &Sim, arrivals: &mut Arrivals) -> Result<u32> {
             let random = getrandom::u64().map_err(|error| anyhow::anyhow!("no random number: {error}"))?;
             hash.update(random.to_le_bytes());
         }
-        // A pipe is read once: its first bytes must do.
+        // A pipe is read once: its first bytes.
         _ => {
             if let Some(first) = arrivals.next_arrival()? {
                 hash.update(&first.bytes);

@@ -1,4 +1,4 @@
-//! `--store FILE`: the flash in which counters and parameters outlive power, the same for `sim` and `emulate`.
+//! `--store FILE`: flash that outlives power.
 
 use std::cell::RefCell;
 use std::fs::{File, OpenOptions};
@@ -18,14 +18,13 @@ use crate::source::format::STORE_SECTOR_BYTES as SECTOR;
 /// Two of them are the store.
 const BYTES: usize = 2 * SECTOR;
 
-/// Opens the file and makes it where it is missing, and sets parameters in it as a ground station would have. Without a
-/// path everything ends with the run.
+/// Makes a missing file, and sets parameters like a ground station. Without a path everything ends with the run.
 pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<FileFlash> {
     let (bytes, mut file) = match path {
         Some(path) => read(path)?,
         None => (Vec::new(), None),
     };
-    // A damaged store is overwritten with the items that still count.
+    // Overwritten with the items that still count.
     if let Some(path) = path.filter(|_| found(&bytes) == Some(Found::Damaged)) {
         drop(file);
         let whole = |mut file: &File| file.write_all(&bytes).with_context(|| cannot_write(path));
@@ -51,7 +50,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
     }
 }
 
-/// Refuses a store that cannot be opened, before other files are made.
+/// Before other files are made.
 pub(super) fn check(path: &Path) -> Result<()> {
     if path.exists() {
         let (bytes, _) = read(path)?;
@@ -70,7 +69,7 @@ pub(super) fn check(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The content of the file, and the file for writing.
+/// And the open file.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if let Ok(about) = path.metadata() {
         if !about.is_file() {
@@ -98,7 +97,7 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if !bytes.is_empty() && !is_store::<SECTOR>(&bytes) {
         bail!("--store {}: is no store, though it has the length of one; name a new file", path.display());
     }
-    // A board cannot refuse, and begins the store anew; here the file is left unchanged.
+    // A board begins anew; here the file stays.
     if found(&bytes) == Some(Found::Unreadable) {
         bail!(
             "--store {}: is damaged: nothing in it can be read, and the run would begin it anew; move it away, or name a new file",
@@ -108,17 +107,17 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     Ok((bytes, Some(file)))
 }
 
-/// Writes flash in its state of delivery.
+/// The state of delivery.
 fn fill(mut file: &File, path: &Path) -> Result<()> {
     file.write_all(&vec![0xFF; BYTES]).with_context(|| cannot_write(path))
 }
 
-/// The state of a store with these bytes, as a board would find it.
+/// As a board would find it.
 fn found(bytes: &[u8]) -> Option<Found> {
     Store::mount(SimFlash::<SECTOR>::with(bytes)).ok().map(|(_, found)| found)
 }
 
-/// Flash whose content is written through to a file. Clones are the same flash.
+/// Written through to a file; clones share it.
 #[derive(Clone, Debug)]
 pub(super) struct FileFlash(Rc<RefCell<Inside>>);
 
@@ -130,12 +129,11 @@ struct Inside {
 }
 
 impl FileFlash {
-    /// Cuts power in the middle of the `steps`-th word or erase from now on.
+    /// At the `steps`-th word or erase, in its middle.
     pub(super) fn cut_after(&self, steps: u64, seed: u64) {
         self.0.borrow_mut().flash.cut_after(steps, seed);
     }
 
-    /// Whether power has gone.
     pub(super) fn is_dead(&self) -> bool {
         self.0.borrow().flash.is_dead()
     }
@@ -145,7 +143,7 @@ impl FileFlash {
         self.0.borrow().flash.bytes().to_vec()
     }
 
-    /// Makes a store of it where it is empty: a first start would erase it, which takes half a second.
+    /// Of empty flash: a first start would erase for half a second.
     pub(super) fn prepare(&self) -> Result<()> {
         if self.bytes().iter().any(|byte| *byte != 0xFF) {
             return Ok(());
@@ -153,13 +151,12 @@ impl FileFlash {
         Store::mount(self.clone()).map(drop).map_err(|error| anyhow!("the store cannot be made: {error:?}"))
     }
 
-    /// Holds this from now on.
     pub(super) fn set(&self, bytes: &[u8]) {
         self.0.borrow_mut().flash = SimFlash::with(bytes);
         self.write_out(0, BYTES);
     }
 
-    /// The error of the file itself, if there was one.
+    /// Of the file itself.
     pub(super) fn take_error(&self) -> Option<io::Error> {
         self.0.borrow_mut().error.take()
     }

@@ -1,4 +1,4 @@
-//! `hums box format-card`: the board formats a card that it cannot record on.
+//! `hums box format-card`.
 
 use std::time::{Duration, Instant};
 
@@ -17,16 +17,15 @@ use crate::output::{self, Schema};
 const FORMAT: u16 = 526;
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
-/// A card of 512 GB takes two minutes, one of 1 TB four.
+/// 512 GB take two minutes, 1 TB four.
 const LIMIT: Duration = Duration::from_mins(5);
-/// A board without any message, also without heartbeats, for this long is gone.
+/// Of any message: the board is gone.
 const SILENCE: Duration = Duration::from_secs(15);
 
 /// `MAV_RESULT`
 const ACCEPTED: u8 = 0;
 const IN_PROGRESS: u8 = 5;
 
-/// Output of `hums box format-card --json`.
 const SCHEMA: Schema = Schema::first("hums-format");
 
 #[derive(Debug, Serialize)]
@@ -51,9 +50,8 @@ pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// A message of a board about formatting.
 enum Answer {
-    /// To our command: a `MAV_RESULT`.
+    /// A `MAV_RESULT`.
     Result(u8),
     Card(String),
 }
@@ -74,8 +72,7 @@ impl Answer {
     }
 }
 
-/// Formats the card and waits until the board records again: at most `limit`, and at most `silence` without a
-/// message of the board.
+/// Waits until the board records again: at most `limit`, with at most `silence` between messages.
 fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
     let (system, component) = client.target();
     let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);
@@ -91,9 +88,9 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
     ));
     let end = Instant::now() + limit;
     loop {
-        // Any frame from the board proves its presence.
+        // Any frame proves its presence.
         match client.until(end.min(Instant::now() + silence), |frame| Some(Answer::read(frame)))? {
-            // A result after the acceptance answers the repeated command.
+            // After the acceptance: of the repeated command.
             Some(Some(Answer::Result(next))) if result == IN_PROGRESS => {
                 check(next)?;
                 result = next;
@@ -115,7 +112,6 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
     }
 }
 
-/// Fails if the command was refused.
 fn check(result: u8) -> Result<()> {
     match result {
         ACCEPTED | IN_PROGRESS => Ok(()),
@@ -138,7 +134,7 @@ mod tests {
     use super::*;
     use crate::talk::tests::fake::{self, found};
 
-    /// The result for this answer of the board to the command.
+    /// By the board's answer.
     fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Answers) -> Result<()> {
         let mut client = found(&[1], move |_| said());
         format(&mut client, Duration::from_millis(silence_ms), Duration::from_millis(limit_ms))
@@ -163,7 +159,7 @@ mod tests {
         end(5_000, 5_000, || vec![ack(5, 255), ack(5, 255), ack(0, 255), recording(1)]).expect("done");
         let failed = end(5_000, 5_000, || vec![ack(5, 255), ack(4, 255), recording(1)]);
         assert!(failed.expect_err("it failed").to_string().contains("no card that can be formatted"));
-        // The command was sent twice; the second answer came while the card was being formatted.
+        // The second answer came during formatting.
         end(5_000, 5_000, || vec![ack(0, 255), ack(2, 255), recording(1)]).expect("done");
     }
 

@@ -1,4 +1,4 @@
-//! Talking with a board as a ground station does: `hums box params`, `pull`, `replaced` and `format-card`.
+//! Talking with a board like a ground station.
 
 pub mod format;
 pub mod params;
@@ -28,50 +28,49 @@ use crate::outcome::usage;
 
 /// `MAV_CMD_REQUEST_MESSAGE`
 const REQUEST_MESSAGE: u16 = 512;
-/// Offset of `uid2` in `AUTOPILOT_VERSION`.
+/// In `AUTOPILOT_VERSION`.
 const UID_AT: usize = 60;
-/// A ground station's usual identity.
+/// A ground station's.
 const SYSTEM: u8 = 255;
 /// `MAV_COMP_ID_MISSIONPLANNER`
 const OUR_COMPONENT: u8 = 190;
-/// Timeout for the board's first message.
+/// Until the board's first message.
 const CONNECT: Duration = Duration::from_secs(15);
-/// Time to look for further boards after the first one: two heartbeats of each, because a radio may lose one.
+/// For further boards: two heartbeats of each, since a radio may lose one.
 const LISTEN: Duration = Duration::from_millis(2_200);
-/// Period of our own heartbeats: radios and UDP peers learn from them where to answer.
+/// Radios and UDP peers learn from them where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
 /// A passphrase has a line.
 const KEY_FILE_BYTES_MAX: u64 = 4096;
-/// Our link id: unlike a ground station's first, so that each counts its own time.
+/// Unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;
 
-/// A conversation with one board.
+/// With one board.
 pub struct Client {
     duplex: Duplex,
     framer: Framer,
     encoder: Encoder,
-    /// Signs outgoing frames with this PC's time.
+    /// With this PC's time.
     seal: Option<Seal>,
     begun: Instant,
-    /// System id of the board; 0, an invalid id, until it is known.
+    /// 0 until known.
     system: u8,
     frames: VecDeque<Vec<u8>>,
     heartbeat_at: Option<Instant>,
 }
 
 impl Client {
-    /// Opens the link and finds the board: the one of `--system`, or the only one on the link. Prints which
-    /// one it is.
+    /// Finds the board of `--system`, or the only one on the link, and prints which.
     ///
     /// # Errors
-    /// No board is on the link. Several boards without `--system` are a usage error.
+    /// No board; several without `--system` (usage error).
     pub fn connect(link: &Link) -> Result<Self> {
-        // With a system id there is no wait for other boards.
+        // No wait for other boards.
         Self::find_on(link, if link.system.is_some() { Duration::ZERO } else { LISTEN })
     }
 
-    /// The same for a command that cannot be undone: it looks for further boards even with `--system`.
+    /// For a command that cannot be undone: looks for further boards even with `--system`.
     pub fn connect_alone(link: &Link) -> Result<Self> {
         Self::find_on(link, LISTEN)
     }
@@ -90,7 +89,7 @@ impl Client {
         Ok(client)
     }
 
-    /// Before a board is found.
+    /// Without a board yet.
     fn over(duplex: Duplex, seal: Option<Seal>) -> Self {
         Self {
             duplex,
@@ -104,8 +103,8 @@ impl Client {
         }
     }
 
-    /// Takes the board of this system, or the only one on the link within `listen` after the first. Two
-    /// boards of one system differ in their unique ids, so each board is asked for its id.
+    /// The board of this system, or the only one within `listen` after the first. Two boards of one system differ in unique
+    /// ids, so each is asked.
     fn find(&mut self, wanted: Option<u8>, listen: Duration) -> Result<()> {
         let mut heard: BTreeMap<u8, BTreeSet<Board>> = BTreeMap::new();
         let (mut end, mut is_found) = (Instant::now() + CONNECT, false);
@@ -137,7 +136,7 @@ impl Client {
         Ok(())
     }
 
-    /// The system that the board is part of.
+    /// The board's system id.
     pub const fn system(&self) -> u8 {
         self.system
     }
@@ -158,7 +157,7 @@ impl Client {
         self.duplex.writer.write_all(frame).and_then(|()| self.duplex.writer.flush()).context("--link")
     }
 
-    /// Looks at the board's frames until `look` makes something of one, or time is up. No other board's frames are looked at.
+    /// Until `look` accepts a frame of this board, or time is up.
     pub fn until<T>(
         &mut self,
         end: Instant,
@@ -168,7 +167,7 @@ impl Client {
         self.next(end, |frame| if frame.system() == system { look(frame) } else { None })
     }
 
-    /// As [`Self::until`], of all boards.
+    /// Of all boards.
     fn next<T>(&mut self, end: Instant, mut look: impl FnMut(&Frame<'_>) -> Option<T>) -> Result<Option<T>> {
         loop {
             while let Some(bytes) = self.frames.pop_front() {
@@ -192,7 +191,7 @@ impl Client {
         }
     }
 
-    /// Asks, and asks again, until `look` accepts an answer; `None` after the last try.
+    /// Repeats until `look` accepts; `None` after the last try.
     pub fn ask<T>(
         &mut self,
         packet: &Packet,
@@ -232,7 +231,7 @@ impl Client {
     }
 }
 
-/// A board's report of itself: its system, and on request its unique id.
+/// Its system, and on request its unique id.
 fn told(frame: &Frame<'_>) -> Option<(u8, Option<Board>)> {
     match frame.id() {
         HEARTBEAT => Some((frame.system(), None)),
@@ -241,7 +240,7 @@ fn told(frame: &Frame<'_>) -> Option<(u8, Option<Board>)> {
     }
 }
 
-/// The error without a usable board; these are the systems on the link.
+/// `heard`: systems on the link.
 fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> anyhow::Error {
     let systems = heard.map(u8::to_string).collect::<Vec<_>>().join(", ");
     match wanted {
@@ -258,12 +257,12 @@ fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> any
     }
 }
 
-/// Whether a message that names whom it is for is for us, or for all.
+/// For us, or for all.
 const fn is_for_us(system: u8, component: u8) -> bool {
     (system == SYSTEM || system == 0) && (component == OUR_COMPONENT || component == 0)
 }
 
-/// The key in a key file: 64 hexadecimal digits, or a passphrase.
+/// 64 hexadecimal digits, or a passphrase.
 pub fn key(path: &Path) -> Result<Key> {
     let text = String::from_utf8(read_short(path, KEY_FILE_BYTES_MAX).context("--key")?).map_err(|_| {
         usage(format!(
@@ -281,13 +280,13 @@ pub fn key(path: &Path) -> Result<Key> {
     Ok(hex::bytes_of(text).map_or_else(|| Key::of_passphrase(text), Key))
 }
 
-/// This PC's time, as signatures count it.
+/// As signatures count it.
 pub fn stamp_now() -> u64 {
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     stamp(since_1970.as_micros() as u64)
 }
 
-/// A clock that begins with it.
+/// Starts with this PC's time.
 fn our_time() -> Clock {
     let mut clock = Clock::default();
     clock.is_at_least(hums_core::clock::Instant::ZERO, stamp_now());

@@ -1,4 +1,4 @@
-//! `hums box params`: the board's parameters, as ground stations ask for them.
+//! `hums box params`.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -19,7 +19,7 @@ use crate::output::{self, Schema};
 use crate::printable;
 use crate::talk;
 
-/// After a pause of this length in a list, the missing values are lost.
+/// In a list: the missing values are lost.
 const GAP: Duration = Duration::from_millis(1_500);
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
@@ -54,7 +54,7 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             if *json {
                 show(system, values.collect::<Result<Vec<_>>>()?, true)?;
             } else {
-                // Each value as it arrives: a later one may fail.
+                // A later one may fail.
                 values.into_iter().try_for_each(|value| show(system, [value?], false))?;
             }
         }
@@ -91,19 +91,16 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Output of `hums box params list`, `get` and `set` with `--json`.
 const VALUES: Schema = Schema::first("hums-params");
-/// Output of `hums box params sign --json`.
 const SIGNED: Schema = Schema::first("hums-params-sign");
 
-/// The board's report about its key.
 #[derive(Debug, Serialize)]
 struct KeyJson {
     system: u8,
     has_key: bool,
 }
 
-/// Prints parameters, as lines that `hums sim --params` reads back, or as one object.
+/// Lines for `hums sim --params`, or one object.
 fn show(system: u8, values: impl IntoIterator<Item = Param>, json: bool) -> Result<()> {
     if json {
         let values = values.into_iter().map(|value| (shown(&value.name), f64::from(value.value).into()));
@@ -118,8 +115,7 @@ const fn is_of_names(c: char) -> bool {
     c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_'
 }
 
-/// A name that fits in a line of NAME VALUE and among the members of our JSON. Characters that do not occur
-/// in parameter names become their numbers.
+/// Fits into NAME VALUE and our JSON: other characters become numbers.
 fn shown(name: &str) -> String {
     if name.is_empty() {
         return '\0'.escape_unicode().to_string();
@@ -127,8 +123,7 @@ fn shown(name: &str) -> String {
     printable::rewritten(name, |c| !is_of_names(c), |out, c| out.extend(c.escape_unicode())).into_owned()
 }
 
-/// The number in single precision, and whether that changes it. Numbers are compared as printed, so rounding
-/// to single precision is not a change.
+/// And whether rounding changes it, as printed.
 fn single(wanted: f64) -> Result<(f32, bool)> {
     let value = wanted as f32;
     if wanted.is_finite() && value.is_infinite() {
@@ -137,7 +132,7 @@ fn single(wanted: f64) -> Result<(f32, bool)> {
     Ok((value, wanted.is_finite() && value.to_string().parse() != Ok(wanted)))
 }
 
-/// Sends the key to the board, or removes it; returns its system. The board answers with a text.
+/// Sends or removes the key; returns the board's system. The board answers with a text.
 fn sign(at: &Link, remove: bool) -> Result<u8> {
     let path = at.key.as_deref();
     let key = match path {
@@ -145,7 +140,7 @@ fn sign(at: &Link, remove: bool) -> Result<u8> {
         None if remove => Key([0; KEY_BYTES]),
         None => return Err(usage("params sign: which key? --key FILE")),
     };
-    // Unsigned: the board does not know the key yet, and does not ask over the port that it trusts.
+    // Unsigned: the board trusts this port.
     let mut client = Client::connect(&Link { key: None, ..at.clone() })?;
     let key = if remove { Key([0; KEY_BYTES]) } else { key };
     let (system, component) = client.target();
@@ -168,7 +163,7 @@ fn no_answer(system: u8, name: &str) -> String {
     format!("system {system}: {name}: no answer; is there such a parameter?")
 }
 
-/// A name, ended by a zero or by the 16th byte.
+/// Ended by a zero or the 16th byte.
 fn name_of(bytes: [u8; 16]) -> String {
     let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
     String::from_utf8_lossy(name).into_owned()
@@ -184,7 +179,6 @@ fn value_of(frame: &Frame<'_>) -> Option<Param> {
     })
 }
 
-/// The value of a parameter.
 pub(super) fn value(client: &mut Client, name: &str) -> Result<f32> {
     read(client, name).map(|param| param.value)
 }
@@ -198,7 +192,7 @@ fn read(client: &mut Client, name: &str) -> Result<Param> {
     answer.with_context(|| no_answer(system, name))
 }
 
-/// The whole list, and its faults. Lost values are requested one by one.
+/// And its faults; lost values are requested one by one.
 fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     let (system, component) = client.target();
     let request = Packet::new(PARAM_REQUEST_LIST).u8(0, system).u8(1, component);
@@ -221,7 +215,7 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
         if value.count != said && wrong.is_empty() {
             wrong.push(format!("the board says that it has {said} parameters, and {}", value.count));
         }
-        // A value without a place in the list answers another program's request by name.
+        // Without a place: another program's request by name.
         if value.index < count {
             let (index, name) = (value.index, shown(&value.name));
             let before = values.insert(index, value).map(|before| shown(&before.name));
@@ -250,7 +244,7 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     Ok((values.into_values().collect(), wrong))
 }
 
-/// Invalid names, and names of two parameters.
+/// Invalid names, and duplicate ones.
 fn strange_names(values: &BTreeMap<u16, Param>) -> Vec<String> {
     let mut wrong = Vec::new();
     let mut places: BTreeMap<&str, u16> = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! `hums box replaced`: a part was replaced; the box counts what the new one runs. Over a link, or by a file on the card.
+//! `hums box replaced`, over a link or by a file on the card: the box counts the new part.
 
 use std::fs;
 use std::io::Write as _;
@@ -25,14 +25,13 @@ use crate::source::find::find;
 /// `MAV_CMD_USER_1`
 const REPLACED: u16 = 31_010;
 const ANSWER: Duration = Duration::from_secs(2);
-/// A command with a serial number may be repeated because its answer was lost: the box replaces the part once.
+/// With a serial number a repeated command replaces the part once.
 const TRIES: usize = 3;
-/// The file of settings in a card's root, which the box reads at each power-on.
+/// In a card's root, read at each power-on.
 const SETTINGS: &str = "PARAMS.TXT";
-/// Characters in a parameter of the command: single precision holds 24 bits exactly.
+/// Single precision holds 24 bits exactly.
 const CHARACTERS: usize = 3;
 
-/// Output of `hums box replaced --json`.
 const SCHEMA: Schema = Schema::first("hums-replaced");
 
 #[derive(Debug, Serialize)]
@@ -41,7 +40,7 @@ struct ReplacedJson {
     place: usize,
     part: String,
     serial: String,
-    /// The file that was written; `null` over a link.
+    /// `null` over a link.
     file: Option<PathBuf>,
 }
 
@@ -81,7 +80,7 @@ pub fn run(args: &cli::Replaced) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// The place of a part, from 1, among the components of this kind and number.
+/// From 1.
 fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, number: u8) -> Result<usize> {
     let known: Vec<_> = known.into_iter().filter(|(_, kind, _)| *kind != Kind::None).collect();
     let mut mine = known.iter().filter(|(_, kind, of)| *kind == part && *of == number);
@@ -103,7 +102,7 @@ fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, numb
     }
 }
 
-/// The place of a part by the board's parameters.
+/// By the board's parameters.
 fn on_board(client: &mut Client, part: Kind, number: u8) -> Result<usize> {
     let mut known = Vec::new();
     for place in 1..=COMPONENTS_MAX {
@@ -114,7 +113,6 @@ fn on_board(client: &mut Client, part: Kind, number: u8) -> Result<usize> {
     place_of(known, part, number)
 }
 
-/// Tells the board, and waits for its answer.
 fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     let (system, component) = client.target();
     let number = |characters: &[u8]| {
@@ -144,7 +142,7 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     }
 }
 
-/// The place of a part, and its serial number, by the newest log of a card that has components.
+/// And serial number, by the newest log with components.
 fn on_card(card: &Path, part: Kind, number: u8) -> Result<(usize, String)> {
     if !card.is_dir() {
         return Err(usage(format!(
@@ -168,7 +166,7 @@ fn on_card(card: &Path, part: Kind, number: u8) -> Result<(usize, String)> {
     bail!("{}: no log on it has components; set CMPn_KIND first (docs/usage.md)", card.display())
 }
 
-/// Writes the new and the old serial number into the card's settings, as their first line; their other lines stay.
+/// New and old serial number as the first line; other lines stay.
 fn write(card: &Path, place: usize, serial: &str, old: &str) -> Result<PathBuf> {
     if serial.is_empty() {
         return Err(usage("--serial is missing: on a card, the box knows a new part by its serial number"));
@@ -200,7 +198,7 @@ mod tests {
         let mut client = found(&[1], move |frame| {
             let fields = Fields(frame.payload());
             if frame.id() == 76 {
-                // Component 3; "A-4" and "711" as numbers of 24 bits.
+                // Component 3; "A-4" and "711" in 24 bits.
                 let told = [0, 4, 8, 12].map(|at| fields.f32(at) as u32);
                 let is_it = told == [3, 4_271_412, 3_617_073, 0];
                 return vec![(1, command_ack(REPLACED, if is_it { 0 } else { 3 }, 255, 190))];

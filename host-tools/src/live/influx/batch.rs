@@ -1,6 +1,6 @@
 //! Points on their way to the database.
 
-/// Lines, and how many they are.
+/// Lines and their number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Batch {
     /// Line protocol.

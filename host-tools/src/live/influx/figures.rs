@@ -2,21 +2,21 @@
 
 use serde::Serialize;
 
-/// Counts of the points by their fate.
+/// Points by their fate.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Figures {
     /// The database has them.
     pub written: u64,
     /// They wait.
     pub waiting: u64,
-    /// Invalid points that the database refused.
+    /// Refused as invalid.
     pub rejected: u64,
-    /// Its last reason for a refusal.
+    /// Last reason.
     pub refusal: String,
-    /// The part of a recording without points, because the user stopped the program; empty if there is none.
+    /// Part of a recording that the user stopped; else empty.
     pub left_out: String,
-    /// Points dropped in favour of newer ones while the database took none.
+    /// Dropped for newer ones.
     pub lost: u64,
-    /// Its last reason for not taking a batch; empty while all is well.
+    /// Last reason for not taking a batch; else empty.
     pub trouble: String,
 }

@@ -1,7 +1,6 @@
-//! `--influx`: points to a database as they come, named and tagged as `hums decode --format influx` does.
+//! `--influx`: points named and tagged as by `hums decode --format influx`.
 //!
-//! The thread that follows the vehicle makes the lines and puts them into batches; another one writes these
-//! ([`writer`]). Batches wait in a bounded memory while the database is away ([`queue`]).
+//! The vehicle's thread makes batches, another writes them ([`writer`]). They wait in bounded memory ([`queue`]).
 
 pub mod batch;
 mod figures;
@@ -33,15 +32,14 @@ use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::epochs::Epochs;
 
-/// A batch is given away when it has this many bytes, far less than any database refuses.
+/// Far less than any database refuses.
 const BATCH_BYTES: usize = 256 * 1024;
-/// Or when its first point is this old.
+/// Of the first point.
 const BATCH_AGE: Duration = Duration::from_millis(250);
-/// Period of the usage counters.
+/// Of usage counters.
 const USAGE_EVERY: Span = Span::from_secs(10);
-/// Period of the check whether all points are written.
 const LOOK: Duration = Duration::from_millis(20);
-/// Maximum wait for the database at the end.
+/// At the end.
 const LAST_WAIT: Duration = Duration::from_secs(15);
 
 /// The side that makes points.
@@ -58,8 +56,7 @@ pub struct Influx {
 }
 
 impl Influx {
-    /// Starts writing points to a database; `session` tags each of them. If `patient`, making points waits for a database that
-    /// takes them more slowly.
+    /// `session` tags each point; a `patient` one waits for a slow database.
     pub fn start(target: Target, session: String, patient: bool) -> Result<Self> {
         let queue = Arc::new(Queue::new(patient));
         let writer = writer::start(target, Arc::clone(&queue))?;
@@ -80,12 +77,12 @@ impl Influx {
         })
     }
 
-    /// All vehicles of a recording are known before its first point is made.
+    /// Before a recording's first point.
     pub fn know(&mut self, world: &World) {
         self.names.know(world);
     }
 
-    /// Points for a frame that the world has taken.
+    /// The world took the frame before.
     pub fn frame(&mut self, at: Instant, epoch_us: u64, frame: &Frame<'_>, world: &World) {
         let tags = self.names.tags(frame.system(), world);
         if let Peek::Frame(raw) = peek(frame.bytes()) {
@@ -105,7 +102,7 @@ impl Influx {
         }
     }
 
-    /// Points for the findings that the world has made.
+    /// The world's findings.
     pub fn found(&mut self, epoch_us: u64, world: &World) {
         for (at, system, finding) in &world.found {
             let tags = self.names.tags(*system, world);
@@ -119,7 +116,7 @@ impl Influx {
         self.settle(world);
     }
 
-    /// Points for the usage counters, when it is their turn.
+    /// When it is their turn.
     pub fn usage(&mut self, at: Instant, epoch_us: u64, world: &World) {
         if at.since(self.usage_at) < USAGE_EVERY {
             return;
@@ -167,7 +164,6 @@ impl Influx {
         }
     }
 
-    /// Hands over the points that waited for their vehicles' names, when it is time.
     fn settle(&mut self, world: &World) {
         if self.names.is_waiting() {
             self.give_away();
@@ -176,7 +172,7 @@ impl Influx {
         }
     }
 
-    /// In parts that a database takes.
+    /// In sizes that a database takes.
     fn give_settled(&self, settled: Option<&Batch>) {
         let mut part = Batch::default();
         for line in settled.into_iter().flat_map(|all| all.text.split_inclusive(|byte| *byte == b'\n')) {
@@ -204,14 +200,13 @@ impl Influx {
         self.left_out = words;
     }
 
-    /// Hands over the rest and waits for the database, for a while, or until the user stops again. Returns
-    /// the counts of all points.
+    /// Waits for the database a while, or until the user stops again. Returns the counts.
     pub fn finish(mut self) -> Figures {
         self.give_away();
         let settled = self.names.end();
         self.give_settled(settled.as_ref());
         self.queue.close(Wall::now() + LAST_WAIT);
-        // A panic of the writer shows in the figures: its points still wait.
+        // After a writer's panic its points still wait.
         while self.writer.as_ref().is_some_and(|writer| !writer.is_finished())
             && !interrupt::requested_again()
         {
@@ -230,7 +225,6 @@ mod tests {
     use crate::live::told::Limits;
     use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
 
-    /// The reported id of the autopilot.
     const UID: u64 = 0x0031_002a_3035_510a;
 
     fn heartbeat() -> Packet {
@@ -242,7 +236,6 @@ mod tests {
         Packet::new(AUTOPILOT_VERSION).u32(8, UID as u32).u32(12, (UID >> 32) as u32)
     }
 
-    /// Passes these packets; returns the lines for the database, the last ones at the end.
     fn fly(packets: &[Packet], know: bool) -> Vec<String> {
         let queue = Arc::new(Queue::new(false));
         let mut influx = Influx::new(Arc::clone(&queue), None, "s1".to_owned()).expect("random numbers");

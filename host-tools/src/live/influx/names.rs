@@ -1,7 +1,6 @@
-//! The vehicle of the points: the tag `vehicle` is the same as in `hums decode` of the flight, the
-//! autopilot's unique id. An autopilot reports its id only on request, perhaps some seconds after its first
-//! frame. Until then points wait, with a mark in place of the tag, for at most [`WAIT`] and
-//! [`WAITING_BYTES_MAX`]. A vehicle without an id by then is `system-1`, until it reports one.
+//! The tag `vehicle` is the autopilot's unique id, as in `hums decode`. It is reported only on request,
+//! perhaps seconds after the first frame. Until then points wait with a mark, at most [`WAIT`] and
+//! [`WAITING_BYTES_MAX`]. A vehicle without an id is `system-1`, until it reports one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant as Wall, SystemTime, UNIX_EPOCH};
@@ -12,13 +11,12 @@ use super::batch::Batch;
 use crate::decode::formats::influx::Tags;
 use crate::live::world::World;
 
-/// Programs ask an autopilot for its id at once, and again after some seconds.
+/// The id is requested at once, and again after some seconds.
 pub const WAIT: Duration = Duration::from_secs(10);
-/// Data of a fast link in that time.
+/// A fast link in that time.
 pub const WAITING_BYTES_MAX: usize = 8 * 1024 * 1024;
 
-/// A new name for a session. Names are in the order of time by the second. Two sessions of the same second
-/// get the same name once in four thousand million.
+/// Sorted by the second; two of one second agree once in four thousand million.
 pub fn session(now: SystemTime) -> Result<String> {
     let seconds = now.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     Ok(format!("s{:08x}{:08x}", seconds as u32, u32::from_le_bytes(random()?)))
@@ -30,19 +28,18 @@ fn random<const N: usize>() -> Result<[u8; N]> {
     Ok(random)
 }
 
-/// Names of vehicles and sessions, as far as known.
+/// As far as known.
 #[derive(Debug)]
 pub struct Names {
     session: String,
-    /// Vehicles by system, with their unique ids; 0 if unknown.
+    /// By system; 0 unknown.
     vehicles: BTreeMap<u8, u64>,
     tags: BTreeMap<u8, (String, Tags)>,
-    /// Placeholder for a name not known yet; a vehicle cannot guess it.
+    /// No vehicle can guess it.
     mark: String,
     waiting: Option<Waiting>,
 }
 
-/// Points that wait for a name.
 #[derive(Debug, Default)]
 struct Waiting {
     batch: Batch,
@@ -51,14 +48,14 @@ struct Waiting {
 }
 
 impl Names {
-    /// Nobody is known; `session` tags every point.
+    /// `session` tags every point.
     pub fn new(session: String) -> Result<Self> {
         let mark = format!("mark-{:016x}-", u64::from_le_bytes(random()?));
         let (vehicles, tags) = (BTreeMap::new(), BTreeMap::new());
         Ok(Self { session, vehicles, tags, mark, waiting: Some(Waiting::default()) })
     }
 
-    /// All of a recording is known before its first point is made.
+    /// Before a recording's first point.
     pub fn know(&mut self, world: &World) {
         self.learn(world);
         self.waiting = None;
@@ -82,8 +79,7 @@ impl Names {
         self.waiting.as_ref().map_or(0, |waiting| waiting.batch.points)
     }
 
-    /// The tags of a system's points. A vehicle has its own. Other senders get those of the first vehicle, as
-    /// a log's points get its vehicle's.
+    /// The tags of a system's points. Senders that are no vehicle get the first vehicle's.
     pub fn tags(&mut self, system: u8, world: &World) -> Tags {
         let name = if let Some(waiting) = &mut self.waiting {
             waiting.systems.insert(system);
@@ -102,7 +98,6 @@ impl Names {
         }
     }
 
-    /// The placeholder for a system's name.
     fn place(&self, system: u8) -> String {
         format!("{}{system:03}", self.mark)
     }
@@ -116,7 +111,7 @@ impl Names {
         }
     }
 
-    /// Takes points whose tags may be placeholders; returns them if no name is awaited.
+    /// Returns them if no name is awaited.
     pub fn pass(&mut self, batch: Batch) -> Option<Batch> {
         let Some(waiting) = &mut self.waiting else { return Some(batch) };
         waiting.since.get_or_insert_with(Wall::now);
@@ -125,7 +120,7 @@ impl Names {
         None
     }
 
-    /// The waiting points with their names, once all vehicles have reported theirs or their time is over.
+    /// Once all vehicles are named, or their time is over.
     pub fn settle(&mut self, world: &World) -> Option<Batch> {
         let waiting = self.waiting.as_ref()?;
         let late = waiting.since.is_some_and(|since| since.elapsed() >= WAIT)
@@ -135,10 +130,10 @@ impl Names {
         if told || late { self.end() } else { None }
     }
 
-    /// The waiting points, with the names known so far.
+    /// With the names so far.
     pub fn end(&mut self) -> Option<Batch> {
         let Waiting { mut batch, systems, .. } = self.waiting.take()?;
-        // Invalid UTF-8 was replaced when it became a field.
+        // Already replaced as a field.
         let mut text = String::from_utf8_lossy(&batch.text).into_owned();
         for system in systems {
             text = text.replace(&self.place(system), &self.name(system));

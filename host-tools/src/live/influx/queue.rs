@@ -1,8 +1,7 @@
-//! Queue of batches for the database, in order, in bounded memory.
+//! Batches for the database, in order, in bounded memory.
 //!
-//! While the database is away, a live link's oldest batches are dropped for its newest ones, and their points
-//! are counted as lost. The database shows the present; the record on the card has the whole flight. A
-//! recording waits for room instead.
+//! A live link's oldest batches give way, counted as lost; a recording waits for room. The card has the whole
+//! flight.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -12,29 +11,29 @@ use super::batch::Batch;
 use super::figures::Figures;
 use crate::interrupt;
 
-/// Bytes that wait at most: two minutes of a fast link, an hour of a usual one.
+/// Two minutes of a fast link, an hour of a usual one.
 const BYTES_MAX: usize = 64 * 1024 * 1024;
-/// The longest time between two looks at Ctrl-C while a recording waits for room.
+/// At Ctrl-C, while a recording waits.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Result of a batch.
+/// A batch's result.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Delivered {
-    /// Number of points in the database.
+    /// Points in the database.
     pub written: u64,
-    /// Number of invalid points that it refused.
+    /// Invalid points.
     pub refused: u64,
-    /// Its reason for the refusal.
+    /// Reason of the refusal.
     pub why: String,
 }
 
-/// The batches that wait.
+/// Waiting batches.
 #[derive(Debug)]
 pub struct Queue {
     inner: Mutex<Inner>,
     changed: Condvar,
     bytes_max: usize,
-    /// [`Queue::put`] waits for room: for a recording, which can wait.
+    /// [`Queue::put`] waits for room.
     patient: bool,
 }
 
@@ -43,10 +42,10 @@ struct Inner {
     waiting: VecDeque<Batch>,
     /// Bytes of `waiting`.
     bytes: usize,
-    /// Points of the batch that the writer has taken and not delivered.
+    /// Taken by the writer, not delivered.
     in_hand: u64,
     figures: Figures,
-    /// The queue takes no more batches, and waiting ends at this time.
+    /// Waiting ends at this time.
     closed: Option<Wall>,
 }
 
@@ -64,8 +63,7 @@ impl Queue {
         self.changed.wait_timeout(inner, time).unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Takes a batch. A patient queue waits for room, until the user stops the program. Any other drops its
-    /// oldest batches at once.
+    /// A patient queue waits for room until the user stops; others drop their oldest batches.
     pub fn put(&self, batch: Batch) {
         let mut inner = self.lock();
         let has_room = |inner: &Inner| inner.bytes + batch.text.len() <= self.bytes_max;
@@ -82,8 +80,7 @@ impl Queue {
         self.changed.notify_all();
     }
 
-    /// The oldest batch, once there is one; `None` at the end. Its points count as waiting until
-    /// [`Self::done`].
+    /// The oldest; `None` at the end. Counts as waiting until [`Self::done`].
     pub fn take(&self) -> Option<Batch> {
         let mut inner = self.lock();
         loop {
@@ -100,7 +97,7 @@ impl Queue {
         }
     }
 
-    /// The batch in hand was delivered.
+    /// The taken batch was delivered.
     pub fn done(&self, delivered: Delivered) {
         let mut inner = self.lock();
         inner.in_hand = 0;
@@ -109,11 +106,11 @@ impl Queue {
         if delivered.refused > 0 {
             inner.figures.refusal.clone_from(&delivered.why);
         }
-        // On the page the reason of a refusal stays until all is well.
+        // Shown until all is well.
         inner.figures.trouble = delivered.why;
     }
 
-    /// The database takes no data now. Waits this long; `false` when the time at the end is over.
+    /// The database takes none: waits; `false` when the end's time is over.
     pub fn trouble(&self, why: String, wait: Duration) -> bool {
         let mut inner = self.lock();
         inner.figures.trouble = why;
@@ -128,7 +125,7 @@ impl Queue {
         }
     }
 
-    /// No more comes; points that are not written by `until` are lost.
+    /// Points unwritten by `until` are lost.
     pub fn close(&self, until: Wall) {
         self.lock().closed = Some(until);
         self.changed.notify_all();

@@ -14,9 +14,9 @@ use crate::outcome::usage;
 /// A database.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
-    /// The address that takes batches.
+    /// Takes batches.
     pub write: String,
-    /// The address that creates the database, if that may be needed: 1.x has no buckets to set up before.
+    /// Creates the database: 1.x has no buckets to set up.
     pub create: Option<String>,
     /// Value of the header `Authorization`.
     pub authorization: Option<String>,
@@ -58,7 +58,7 @@ impl Target {
     }
 }
 
-/// Text as a part of an address.
+/// Escaped for an address.
 fn percent(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for byte in text.bytes() {

@@ -1,8 +1,7 @@
-//! The thread that writes batches: each until the database has it, or refuses it as invalid.
+//! Writes each batch until the database has it, or refuses it.
 //!
-//! A refused batch is tried again in halves, and these in halves: so a bad point costs only itself. A point written
-//! twice is the same point. `InfluxDB` 1.x and 2 write the good points of a batch themselves. They still answer 400
-//! or 422, with the number of dropped points; then the batch is not tried again.
+//! A refused batch is tried again in halves: a bad point costs only itself. A point written twice is the same point. `InfluxDB`
+//! 1.x and 2 write the good points, and answer 400 or 422 with the number of dropped ones: no second try.
 
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -15,35 +14,31 @@ use super::batch::Batch;
 use super::queue::{Delivered, Queue};
 use super::target::Target;
 
-/// A database that has not answered by then will not.
+/// Until an answer.
 const LIMIT: Duration = Duration::from_secs(10);
-/// The first wait after a failure, which doubles up to the longest.
+/// After a failure; doubles up to the longest.
 const WAIT_MIN: Duration = Duration::from_millis(200);
 const WAIT_MAX: Duration = Duration::from_secs(5);
-/// Maximum number of bytes read from an answer.
+/// Of an answer.
 const ANSWER_BYTES_MAX: u64 = 64 * 1024;
-/// Maximum number of characters reported from it.
+/// Of an answer's characters.
 const WORDS_MAX: usize = 200;
-/// Requests for one batch. A bad point among 2,048 takes at most 30. Beyond this number of requests the good
-/// points beside bad ones are lost with them.
+/// For one batch: a bad point among 2,048 takes at most 30; beyond this good points are lost with bad ones.
 const REQUESTS_MAX: usize = 64;
 
-/// Result of a request.
 #[derive(Debug)]
 enum Answer {
     Taken,
-    /// Invalid: another try would fail too. If the rest was written, the number of points not written.
+    /// Invalid: no other try; with the number of unwritten points if the rest was written.
     Refused(String, Option<u64>),
-    /// The database does not exist.
     Missing(String),
-    /// The server is away, busy, or wants another token.
+    /// Busy, or wants another token.
     Away(String),
 }
 
-/// Starts the thread; it ends when the queue is closed and empty, or its time is up.
+/// Ends with a closed, empty queue, or its time.
 pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
-    // A redirect is reported as an error: the server behind it would get no points, and may still confirm
-    // them.
+    // An error: the server behind it gets no points, and may confirm them.
     let config = Agent::config_builder()
         .timeout_global(Some(LIMIT))
         .http_status_as_error(false)
@@ -55,13 +50,13 @@ pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
 }
 
 fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
-    // A server that has taken a point is the right database. If it refuses all, its address may be wrong.
+    // A server that refuses all may be the wrong one.
     let mut has_taken = false;
     while let Some(batch) = queue.take() {
         let mut wait = WAIT_MIN;
         loop {
             let deliver = |lines: &[u8]| persist(agent, target, queue, lines);
-            // Without an answer it stays counted as waiting.
+            // Counted as waiting.
             let Some(delivered) = in_halves(&batch, deliver) else { return };
             has_taken |= delivered.written > 0;
             if has_taken {
@@ -76,7 +71,7 @@ fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
     }
 }
 
-/// Writes these lines, again and again while the database is away; `None` when the time at the end is over.
+/// Until the database takes them; `None` when the time at the end is over.
 fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Option<Answer> {
     let mut wait = WAIT_MIN;
     loop {
@@ -95,10 +90,10 @@ fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Optio
     }
 }
 
-/// Delivers a batch, its refused parts in halves, with a bounded number of requests.
+/// Refused parts in halves, with bounded requests.
 fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) -> Option<Delivered> {
     let mut delivered = Delivered::default();
-    // The parts that are still to be written, the first of them last.
+    // The first one last.
     let mut parts: Vec<(&[u8], u64)> = vec![(&batch.text, batch.points)];
     let mut requests = 0;
     while let Some((lines, points)) = parts.pop() {
@@ -125,7 +120,7 @@ fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) ->
     Some(delivered)
 }
 
-/// Cuts lines into two parts of about equal length; `None` for a single line.
+/// `None` for a single line.
 fn halves(lines: &[u8]) -> Option<(&[u8], &[u8])> {
     let end = |from: usize| lines.get(from..)?.iter().position(|byte| *byte == b'\n').map(|at| from + at + 1);
     let start = lines.get(..lines.len() / 2)?.iter().rposition(|byte| *byte == b'\n').map(|at| at + 1);
@@ -151,8 +146,8 @@ fn write(agent: &Agent, target: &Target, lines: &[u8]) -> Answer {
     answer(status, &body.unwrap_or_default())
 }
 
-/// Meaning of an answer. A database that took all points answers exactly 204. It explains refused points with
-/// a JSON object. The same status with another text is from another server, or from one that wants https.
+/// A database answers exactly 204 for all points, and explains refused ones with a JSON object. Another text is another
+/// server's, or of one that wants https.
 fn answer(status: u16, body: &str) -> Answer {
     let words: String = body.chars().take(WORDS_MAX).collect();
     let words = words.trim();
@@ -169,16 +164,15 @@ fn answer(status: u16, body: &str) -> Answer {
     }
 }
 
-/// Whether an answer is a database's, about points: `InfluxDB` 1.x and 3 and Telegraf's listener have an `error`, `InfluxDB` 2,
-/// `QuestDB` and Telegraf's listener of version 2 a `code` and a `message`. (`VictoriaMetrics` passes over bad lines itself.)
+/// About points: `InfluxDB` 1.x and 3 and Telegraf's listener have an `error`, `InfluxDB` 2, `QuestDB` and Telegraf's listener
+/// of version 2 a `code` and a `message`. (`VictoriaMetrics` passes over bad lines.)
 fn is_refusal(body: &str) -> bool {
     let Ok(serde_json::Value::Object(answer)) = serde_json::from_str(body) else { return false };
     let has = |name| answer.get(name).is_some_and(serde_json::Value::is_string);
     has("error") || has("code") && has("message")
 }
 
-/// Number of points dropped while the rest was written: "partial write: ... dropped=3". For unreadable lines
-/// (`InfluxDB` 1.x) it is 0, which does not give their number.
+/// "partial write: ... dropped=3". 0 for unreadable lines (`InfluxDB` 1.x).
 fn dropped(body: &str) -> Option<u64> {
     let (_, partial) = body.split_once("partial write")?;
     let (_, after) = partial.rsplit_once("dropped=")?;
@@ -186,7 +180,7 @@ fn dropped(body: &str) -> Option<u64> {
     digits.parse().ok().filter(|dropped| *dropped > 0)
 }
 
-/// Makes the database; whether that worked shows at the next batch.
+/// Its success shows at the next batch.
 fn create(agent: &Agent, target: &Target) {
     if let Some(address) = &target.create {
         let mut request = agent.post(address);
@@ -201,7 +195,6 @@ fn create(agent: &Agent, target: &Target) {
 mod tests {
     use super::*;
 
-    /// Answer of `InfluxDB` 2 to a batch with a bad line.
     const UNREADABLE: &str = "{\"code\":\"invalid\",\"message\":\"unable to parse 'BAD': missing fields\"}";
 
     #[test]
@@ -237,15 +230,13 @@ mod tests {
         }
     }
 
-    /// A batch of this many lines, some of them bad.
     fn batch(lines: u64, bad: &[u64]) -> Batch {
         let line =
             |number| if bad.contains(&number) { "BAD\n".to_owned() } else { format!("m v={number}\n") };
         Batch { text: (0..lines).map(line).collect::<String>().into_bytes(), points: lines }
     }
 
-    /// Delivers to a database that refuses any request with a bad line. Returns the result, the stored lines,
-    /// and the number of requests.
+    /// Refuses any request with a bad line. Returns result, stored lines and requests.
     fn deliver(batch: &Batch) -> (Delivered, Vec<String>, usize) {
         let (mut has, mut requests) = (Vec::new(), 0);
         let delivered = in_halves(batch, |lines| {

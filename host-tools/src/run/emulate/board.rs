@@ -1,4 +1,4 @@
-//! The board on the model of its chip: input and output of its ports, its card and its power.
+//! The board on its chip's model: ports, card, power.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -17,28 +17,27 @@ use stm32f405_model::usart::Usart;
 use crate::run;
 use crate::source::Chunk;
 
-/// The store in the chip's flash: sectors 1 and 2.
+/// Sectors 1 and 2.
 const STORE: std::ops::Range<usize> = 16 * 1024..48 * 1024;
-/// Time from power-on to the first byte: a start takes some 20 ms until it listens.
+/// Until the first byte: a start takes some 20 ms.
 const LEAD: Ps = 30 * MS;
-/// How long power is away when it goes for a moment.
+/// Of a short power cut.
 const AWAY: Ps = 100 * MS;
-/// Wait at the end for data in memory: a sector in progress waits for 0.15 s (`hums_onboard::monitoring`).
+/// At the end: a sector in progress waits 0.15 s (`hums_onboard::monitoring`).
 const LEAST: Ps = 2_400 * MS;
-/// On a slow card the wait ends after this time without a write, at the latest before the silence is a finding (3 s).
+/// Without a write on a slow card; before silence is a finding (3 s).
 const QUIET: Ps = 200 * MS;
 const MOST: Ps = 3_000 * MS;
-/// The ports are looked after this often.
+/// Between looks at the ports.
 const STEP: Ps = 20 * MS;
-/// The rate of the autopilot's port, and that of the radio's until a parameter sets another.
+/// Autopilot's, and radio's until a parameter sets another.
 const BAUDS: [f64; 2] = [921_600.0, 57_600.0];
 
-/// The stages of the firmware's own account, in its order; the first is idle.
+/// Of the firmware's account; the first is idle.
 const STAGES: [&str; 9] =
     ["idle", "tasks", "framer", "monitor", "encode", "observe", "summary", "tick", "storage"];
-/// The symbol of that account.
 const STAGE_CYCLES: &str = "STAGE_CYCLES";
-/// What runs as which exceptions, from the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
+/// From the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
 const URGENCIES: [(&str, &[u16]); 7] = [
     ("watch", &[15, 17]),
     ("clock", &[44]),
@@ -49,7 +48,6 @@ const URGENCIES: [(&str, &[u16]); 7] = [
     ("start", &[0]),
 ];
 
-/// A line into a port.
 #[derive(Debug, Default)]
 struct Line {
     /// The end of the last transfer.
@@ -64,31 +62,29 @@ pub(super) struct Board {
     to_ground: Box<dyn Write + Send>,
     to_autopilot: Box<dyn Write + Send>,
     lines: [Line; 2],
-    /// When power goes for a moment, sorted.
+    /// Of short power cuts, sorted.
     reboots: VecDeque<u64>,
-    /// Framers of the received bytes and of those to the ground station.
+    /// Received, and to the ground station.
     came: Framer,
     went: Framer,
     load: Load,
 }
 
-/// The places of a board's parts in the chip.
 struct Wiring {
-    /// The autopilot's port and the radio's.
+    /// Autopilot's and radio's.
     ports: [usize; 2],
-    /// Exceptions of the DMA of ports and card.
+    /// Of ports and card.
     dma: Vec<u16>,
 }
 
-/// The part of each second that the processor did not sleep; not of the first one, in which the card is mounted.
+/// Awake part of each second but the first, which mounts the card.
 #[derive(Debug)]
 struct Load {
-    /// When this second began, with the cycles and those asleep by then.
+    /// Start of this second, cycles and sleeping cycles by then.
     since: Option<(Ps, u64, u64)>,
     worst: f64,
 }
 
-/// Traffic of the ports.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Traffic {
     pub(super) frames_in: u64,
@@ -99,7 +95,7 @@ pub(super) struct Traffic {
 }
 
 impl Board {
-    /// A board with this program, card and store, whose power comes a moment before the first byte.
+    /// Power comes a moment before the first byte.
     pub(super) fn new(
         (wired, image): (&hums_boards::Board, Image),
         seed: u32,
@@ -111,7 +107,7 @@ impl Board {
         let slot = Slot::new(Some(Model::new(Kind::Sdhc, medium.clone())));
         let parts = Parts { hse_hz: wired.crystal_hz, seed: u64::from(seed), ..Parts::default() };
         let mut chip = Chip::new(image, parts);
-        // The image's own handler would reset it, again and again.
+        // The image's handler would reset it again and again.
         chip.core.stop_at_faults(true);
         hums_sdcard::connect(&mut chip, wired, &slot);
         if let Some(flash) = chip.chip.flash.content.all_mut().get_mut(STORE) {
@@ -131,7 +127,7 @@ impl Board {
         }
     }
 
-    /// Microseconds since the first byte, in the chip's time.
+    /// In the chip's time.
     fn moment(at_us: u64) -> Ps {
         LEAD.saturating_add(at_us.saturating_mul(US))
     }
@@ -162,7 +158,7 @@ impl Board {
 
     fn send(&mut self, port: usize, chunk: &Chunk) -> Result<()> {
         let at = Self::moment(chunk.at_us);
-        // An input may be faster than the line. At most a second of it waits.
+        // At most a second of an input faster than the line waits.
         let waits = self.lines.get(port).map_or(0, |line| line.free.saturating_sub(SECOND));
         let power = self.reboots.front().map_or(Ps::MAX, |at_us| Self::moment(*at_us));
         self.run_until(at.max(waits.min(power)))?;
@@ -184,7 +180,7 @@ impl Board {
         Ok(())
     }
 
-    /// The input has ended: goes on until all of it is on the card.
+    /// Until all input is on the card.
     pub(super) fn settle(&mut self) -> Result<()> {
         self.run_until(self.lines[0].free.max(self.lines[1].free).max(self.chip.now()))?;
         let end = self.chip.now();
@@ -193,13 +189,12 @@ impl Board {
         while self.chip.now() < end.saturating_add(MOST) && writes.replace(self.medium.writes()) != writes {
             self.run_until(self.chip.now().saturating_add(QUIET))?;
         }
-        // The framer's rest is a complete frame, or nothing.
+        // A complete frame, or nothing.
         self.came.idle(&mut |_| {});
         self.went.idle(&mut |_| {});
         self.to_ground.flush().context("--gs: cannot be written")
     }
 
-    /// The content of the store.
     pub(super) fn store(&self) -> &[u8] {
         self.chip.memory(FLASH.0 + STORE.start as u32, STORE.len() as u32)
     }
@@ -215,7 +210,7 @@ impl Board {
         }
     }
 
-    /// How often it reset itself, by its program or its watchdog, and when first, in seconds since the first byte.
+    /// By program or watchdog; the first one in seconds since the first byte.
     pub(super) fn resets(&self) -> Option<(u64, f64)> {
         let own = |(_, cause): &&Reset| matches!(cause, Cause::Software | Cause::Watchdog);
         let (at, _) = self.chip.resets.iter().find(own)?;
@@ -227,7 +222,7 @@ impl Board {
         self.load.worst
     }
 
-    /// Cycles by stage since the last start, by the firmware's own account; `None` where the image has no such name.
+    /// Since the last start; `None` without the symbol.
     pub(super) fn stage_cycles(&self) -> Option<serde_json::Value> {
         let symbol = self.chip.image().symbols.iter().find(|symbol| symbol.name == STAGE_CYCLES)?;
         let words = self.chip.memory(symbol.address, 8 * STAGES.len() as u32).as_chunks::<8>().0;
@@ -239,7 +234,7 @@ impl Board {
         )
     }
 
-    /// Bytes of stack that each urgency took at its deepest.
+    /// Deepest by urgency.
     pub(super) fn stack_by_urgency(&self) -> serde_json::Value {
         let deepest = |exceptions: &[u16]| {
             exceptions.iter().map(|number| self.chip.core.stack_depth(*number)).max().unwrap_or(0)
@@ -295,7 +290,7 @@ impl Load {
     }
 }
 
-/// The usual rate that a port's divider stands for.
+/// For a port's divider.
 fn nearest(baud: f64) -> f64 {
     const USUAL: [f64; 9] =
         [9_600.0, 19_200.0, 38_400.0, 57_600.0, 115_200.0, 230_400.0, 460_800.0, 921_600.0, 1_500_000.0];

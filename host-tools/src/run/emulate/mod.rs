@@ -19,10 +19,9 @@ use crate::files::read_short;
 use crate::outcome::Outcome;
 use crate::plural::count;
 
-/// The ELF file of a release with all of its symbols has 8 MB.
+/// A release's ELF file with symbols has 8 MB.
 const IMAGE_FILE_BYTES_MAX: u64 = 32 << 20;
 
-/// Runs `hums sim --firmware`.
 pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     check_standard_output(run)?;
     let request = check_request(run)?;
@@ -48,7 +47,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     if is_card && medium.get(0) != table {
         bail!("{}: was formatted by command in this run, and is left as it was before", run.sd.display());
     }
-    // Also after an early end of the run: the card keeps its data.
+    // Also after an early end.
     medium.save(&card).with_context(|| format!("{}: cannot be written", run.sd.display()))?;
     flash.set(board.store());
     check_store(run, &flash)?;
@@ -68,7 +67,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     finish(run, &arrivals, &ground, &report)
 }
 
-/// Reports the traffic of the ports, and the part of it on the card.
+/// And the part of it on the card.
 fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     report.frames_in = traffic.frames_in;
     report.frames_logged = frames.min(traffic.frames_in);
@@ -87,7 +86,6 @@ fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     }
 }
 
-/// The image in the file, and its board.
 fn image(path: &Path) -> Result<(&'static hums_boards::Board, Image)> {
     let file = read_short(path, IMAGE_FILE_BYTES_MAX)?;
     let image = Image::parse(&file)

@@ -1,4 +1,4 @@
-//! A power-on with a ground station at its port, step by step, to see how both sides work together.
+//! A power-on with a ground station, step by step.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,7 +16,7 @@ use crate::run::report::Finding;
 use crate::run::store;
 use crate::source::Chunk;
 
-/// The number under which the store keeps the signing key.
+/// The signing key's item in the store.
 const ITEM_KEY: u8 = 32;
 
 /// The side that sends bytes.
@@ -28,7 +28,7 @@ pub enum Side {
     Ground,
 }
 
-/// The board before its first byte.
+/// Before its first byte.
 #[derive(Clone, Copy, Debug)]
 pub struct Board<'a> {
     /// Its card.
@@ -39,19 +39,19 @@ pub struct Board<'a> {
     pub key: Option<[u8; 32]>,
 }
 
-/// The result of a power-on, and each change of level with its time.
+/// With each change of level and its time.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The figures.
     pub done: PowerOn,
     /// Changes of level.
     pub findings: Vec<Finding>,
-    /// Parameters at the end.
+    /// At the end.
     pub params: Params,
 }
 
-/// Gives both ports their bytes in time. `told` gets each frame that begins to leave a port, with the port and the
-/// time of the chunk before. For times to a millisecond, give a chunk, which may be empty, each millisecond.
+/// Both ports get their bytes in time. `told` gets each frame that leaves a port, with the time of the chunk before.
+/// For milliseconds, give a chunk each millisecond.
 pub fn run(
     board: &Board<'_>,
     chunks: impl IntoIterator<Item = (Side, Chunk)>,
@@ -93,7 +93,7 @@ pub fn run(
     Ok(Outcome { done: PowerOn { stats, frames_left, card: memory.card_reading() }, findings, params })
 }
 
-/// Keeps each frame: the port writes them one by one.
+/// Written one by one.
 #[derive(Clone, Default)]
 struct Frames(Arc<Mutex<Vec<Vec<u8>>>>);
 

@@ -1,8 +1,7 @@
-//! `hums sim`: the bodies of the firmware's tasks on this PC, in virtual time.
+//! `hums sim`: the firmware's tasks in virtual time.
 //!
-//! A discrete-event simulation: time jumps from one event to the next. At equal times the more urgent task goes first,
-//! as on the board: reception and monitor, then the downlink, then storage. Only the card takes time (see
-//! [`crate::card::sim`]): while it is busy everything else goes on, and the sector queue fills.
+//! Time jumps from event to event. At equal times the more urgent goes first: reception and monitor, downlink, storage. Only
+//! the card takes time ([`crate::card::sim`]): meanwhile everything else goes on.
 //!
 //! Power-on is the moment of the first input byte.
 
@@ -42,7 +41,7 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
         return emulate::run(run, image);
     }
     check_standard_output(run)?;
-    // The recorder itself keeps earlier sessions, however much comes.
+    // The recorder keeps earlier sessions.
     let prepared = prepare(run, &check_request(run)?, 0)?;
     let Prepared { speed, live, mut arrivals, card: image, flash, earlier, mut ground, gs, entropy } =
         prepared;
@@ -89,11 +88,9 @@ fn card(image: File, flags: &cli::FaultFlags) -> std::io::Result<SimCard> {
     SimCard::new(image, faults)
 }
 
-/// Records all chunks on any card, as one power-on. It is for callers that need more of the recorder than the command
-/// line offers. `boots` distinguishes the power-ons on a card.
+/// Records chunks on any card, as one power-on. `boots` distinguishes power-ons on a card.
 ///
-/// `gs` gets the bytes for the ground station. `moment` is called with each chunk before it arrives. A card whose
-/// power went ends it.
+/// `gs` gets the bytes for the ground station. `moment` is called before each chunk. A card whose power went ends it.
 pub fn power_on(
     card: &SimCard,
     params: &Params,
@@ -129,14 +126,14 @@ pub fn power_on(
     Ok(PowerOn { stats, frames_left, card: memory.card_reading() })
 }
 
-/// The result of one power-on.
+/// A power-on's result.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerOn {
     /// The pipeline's figures.
     pub stats: Stats,
-    /// Frames that were still in memory when it ended.
+    /// In memory at the end.
     pub frames_left: u64,
-    /// The state of the card, by storage.
+    /// By storage.
     pub card: CardReading,
 }
 
@@ -150,26 +147,25 @@ fn identity(boots: u32) -> Boot<'static> {
     }
 }
 
-/// The parts that outlive a power-on: the card, the store, the ground station, and the report.
 struct World<'a> {
     card: &'a SimCard,
     flash: &'a FileFlash,
     gs: Box<dyn Write + Send>,
     autopilot: Box<dyn Write + Send>,
     report: Report,
-    /// When our own power goes for a moment, sorted.
+    /// Of short power cuts, sorted.
     reboots: Vec<u64>,
     boots: u32,
     entropy: u32,
     power_on_us: u64,
-    /// The writer's counts match the card: every power-on ended in order and with an empty queue.
+    /// Every power-on ended in order, with an empty queue.
     frames_on_card: bool,
-    /// The oldest segments were overwritten: those of this run may be among them.
+    /// Segments of this run may be among them.
     overwritten: bool,
 }
 
 impl World<'_> {
-    /// One power-on, until the input ends or power goes; whether there is another one after it.
+    /// Whether another one follows.
     fn power_on(
         &mut self,
         arrivals: &mut Arrivals,
@@ -209,7 +205,7 @@ impl World<'_> {
         self.add(&stats, lost);
         let cut = self.card.is_dead() || self.flash.is_dead();
         self.report.power_cut |= cut;
-        // A sector in the queue may be on the card in part: only the card shows how much of it.
+        // Only the card shows how much of it is there.
         self.frames_on_card &= ended && !cut && lost == 0;
         if ended || cut {
             return Ok(false);
@@ -233,20 +229,20 @@ impl World<'_> {
         report.gs_bytes += stats.gs_bytes;
     }
 
-    /// The report, with the data of the card itself.
+    /// With the card's data.
     fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<Report> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();
         let findings = std::mem::take(&mut report.findings);
         let (frames, _) = report.read_card(card, earlier)?;
-        // Findings of the monitor at their time, also those that the card did not take.
+        // Also those that the card did not take.
         report.findings = findings;
         if self.overwritten {
             // The first frames may be overwritten.
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         } else if !self.frames_on_card {
-            // Frames were left in memory: only the card shows which were saved.
+            // Only the card shows which were saved.
             report.frames_logged = frames.min(report.frames_in);
             report.frames_lost = report.frames_in - report.frames_logged;
         }

@@ -1,4 +1,4 @@
-//! The empty memory at a power-on, and the surroundings of the board.
+//! A power-on's empty memory, and the board's surroundings.
 
 use std::io::Write;
 
@@ -17,7 +17,7 @@ use crate::card::sim::CardError;
 use crate::run::report::Finding;
 use crate::run::store::FileFlash;
 
-/// The empty memory at a power-on: everything static on the board.
+/// Everything static on the board.
 pub(super) struct Memory {
     pub(super) card_status: CardStatus,
     pub(super) port_status: PortStatus,
@@ -43,27 +43,25 @@ impl Memory {
         }
     }
 
-    /// The state of the card, by storage.
     pub(super) fn card_reading(&self) -> CardReading {
         self.card_status.read()
     }
 }
 
-/// The surroundings of the board.
 pub(super) struct Outside<'a, 'w> {
     pub(super) card: &'a SimCard,
     pub(super) flash: &'a FileFlash,
     pub(super) gs: &'w mut (dyn Write + Send),
     pub(super) autopilot: &'w mut (dyn Write + Send),
-    /// Takes each change of level.
+    /// Changes of level.
     pub(super) findings: &'w mut dyn FnMut(Finding),
-    /// When this power-on is, in microseconds since the first input byte.
+    /// Microseconds since the first input byte.
     pub(super) power_on_us: u64,
-    /// When our own power goes for a moment, in the same.
+    /// Next short power cut, microseconds since the first input byte.
     pub(super) reboot_at_us: Option<u64>,
 }
 
-/// The slot that the card is in, as the recorder sees it.
+/// As the recorder sees it.
 pub(super) struct Slot<'a> {
     pub(super) card: &'a SimCard,
     pub(super) power_on_us: u64,

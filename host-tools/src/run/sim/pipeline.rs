@@ -1,4 +1,4 @@
-//! The tasks of one power-on, and the events that move them.
+//! A power-on's tasks, and their events.
 
 mod ending;
 
@@ -21,12 +21,11 @@ use crate::run::report::Finding;
 use crate::run::store::FileFlash;
 use crate::source::Chunk;
 
-/// A line that is silent for this long will not finish the frame it began.
+/// A line silent for this long will not finish its frame.
 const SILENCE: Span = Span::from_millis(20);
-/// How soon storage looks again after it found no card.
+/// Until storage looks for a card again.
 const NO_CARD_RETRY: Span = Span::from_millis(100);
 
-/// The tasks of one power-on.
 pub(super) struct Pipeline<'a, 'w> {
     outside: Outside<'a, 'w>,
     slot_status: &'a CardStatus,
@@ -38,18 +37,16 @@ pub(super) struct Pipeline<'a, 'w> {
     storage: Storage<'a, Slot<'a>>,
     store_writer: StoreWriter<'a, FileFlash>,
     handover: Handover<'a>,
-    /// Since this power-on, as all that follow.
+    /// Since this power-on, like all times here.
     now: Instant,
     tick_at: Instant,
-    /// When storage goes on; `None` while it waits for a sector.
+    /// `None` while it waits for a sector.
     storage_at: Option<Instant>,
-    /// Until when the card keeps storage.
+    /// The card keeps storage.
     busy_until: Instant,
-    /// When the GS port can take the next frame.
+    /// For the port's next frame.
     gs_at: Instant,
-    /// When the line counts as silent.
     silent_at: Option<Instant>,
-    /// When the ground station's line does.
     uplink_silent_at: Option<Instant>,
 }
 
@@ -59,7 +56,7 @@ enum Event {
     Silence,
     UplinkSilence,
     Tick,
-    /// The ground station's port has sent a frame, and takes the next one without a pause.
+    /// The port has room for a frame.
     Port,
     Storage,
 }
@@ -145,7 +142,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.after_monitor()
     }
 
-    /// Lets time go on to `to`, with everything that happens on the way, and at `to` itself. `false`: power went.
+    /// Runs all events up to `to`. `false`: power went.
     fn advance(&mut self, to: Instant) -> Result<bool> {
         while let Some((at, event)) = self.next_event().filter(|(at, _)| *at <= to) {
             self.now = self.now.max(at);
@@ -176,7 +173,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         Ok(true)
     }
 
-    /// The next event; of several at once the most urgent.
+    /// Of several at once the most urgent.
     fn next_event(&self) -> Option<(Instant, Event)> {
         let silence = self.silent_at.map(|at| (at, Event::Silence));
         let storage = self.storage_at.map(|at| (at, Event::Storage));
@@ -216,7 +213,6 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.after_monitor()
     }
 
-    /// The monitor may have left work for the others.
     fn after_monitor(&mut self) -> Result<()> {
         let work = !self.ends.sectors_out.is_empty() || self.ends.shelf.is_wanted();
         if self.storage_at.is_none() && work {
@@ -225,11 +221,11 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.send_gs()
     }
 
-    /// Sends the bytes for which the GS port has had time by now.
+    /// As much as the port had time for.
     fn send_gs(&mut self) -> Result<()> {
         let mut frame = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
-            // An autopilot that has gone receives nothing: its own bytes show its end.
+            // An autopilot that has gone receives nothing.
             let _ = self.outside.autopilot.write_all(frame.get(..length).unwrap_or_default());
             let _ = self.outside.autopilot.flush();
         }
@@ -245,7 +241,6 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         Ok(())
     }
 
-    /// Storage does one task, and is busy while the card is.
     fn storage(&mut self) {
         let begin_us = self.outside.power_on_us.saturating_add(self.now.as_micros());
         self.outside.card.set_clock(begin_us);
@@ -260,17 +255,15 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         };
     }
 
-    /// Whether power has gone at a write that the command line chose.
+    /// At a chosen write.
     fn is_dead(&self) -> bool {
         self.outside.card.is_dead() || self.outside.flash.is_dead()
     }
 
-    /// Saves the waiting items.
     fn keep(&mut self, may_erase: bool) {
         while !self.is_dead() && self.store_writer.service(may_erase) == Saved::Took {}
     }
 
-    /// Records news of the store.
     fn note(&mut self) {
         while let Some(news) = self.handover.news() {
             self.monitoring.note(self.now, news.severity, news.text, &mut self.ends.sectors_in);

@@ -1,8 +1,8 @@
 //! `hums box pull --around`: over a slow radio the minute of a crash first.
 //!
-//! The files of a log count as one row of sectors. A group begins with its time, so each sector read halves the
-//! search. Whole groups around the moment come into partial files. A partial file is as long as the board's file
-//! and has zeros in place of all other sectors. Its name ends in `.part.HUM`, and every reader reports that.
+//! The files of a log count as one row of sectors. Groups begin with their times: each sector read halves the search. Whole
+//! groups around the moment come into partial files, as long as the board's, with zeros for other sectors. They end in
+//! `.part.HUM`, which every reader reports.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -31,26 +31,25 @@ use crate::source::told::Finding;
 use crate::summary::Overview;
 use crate::utc::{When, date_and_time, moment};
 
-/// Sectors searched backwards from an unreadable one for the beginning of a group.
+/// Backwards from an unreadable one, for a group's beginning.
 const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;
-/// Twice the longest file of the recorder: a longer one would fill the disk.
+/// Twice the recorder's longest file: more would fill the disk.
 const FILE_BYTES_MAX: u32 = 2 * SEGMENT_BYTES_MAX;
 const SECTOR: u32 = SECTOR_BYTES as u32;
 
-/// The result of a download.
 #[derive(Debug)]
 pub(super) struct Brought {
-    /// Names on the board, and the partial files.
+    /// By name on the board.
     pub(super) files: Vec<(String, PathBuf)>,
     /// The moment.
     pub(super) at: Instant,
-    /// The finding, if one was requested.
+    /// If requested.
     pub(super) found: Option<Finding>,
-    /// Whether all requested sectors were read. Losses are reported.
+    /// Whether all requested sectors were read.
     pub(super) outcome: Outcome,
 }
 
-/// Downloads this span around a moment from the files of one log, which are in order, with their lengths.
+/// The files of one log, in order, with lengths.
 pub(super) fn pull(
     ftp: &mut Ftp,
     files: &[(String, u32)],
@@ -88,7 +87,7 @@ pub(super) fn pull(
     Ok(Brought { files: log.finish(&places)?, at, found, outcome: outcome.and(searched) })
 }
 
-/// Refuses a moment without a recording.
+/// Without a recording.
 fn check_recorded(at: Instant, overview: &Overview, is_to_end: bool) -> Result<()> {
     let summary = &overview.ending.summary;
     let (Some(first), Some(last)) = (summary.first, summary.last) else {
@@ -107,11 +106,11 @@ fn check_recorded(at: Instant, overview: &Overview, is_to_end: bool) -> Result<(
     Ok(())
 }
 
-/// Reports losses within the brought sectors. If they reach the end of the log before the time `to`, the proof of that end counts too.
+/// Reports losses within the brought sectors. At the log's end before `to`, the proof of that end counts too.
 fn tell_faults(overview: &Overview, to: Option<Instant>) -> Outcome {
     let ending = &overview.ending;
     let mut faults: Vec<String> = Vec::new();
-    // Sectors before the first brought one are not lost.
+    // Those are not lost.
     let gaps = overview.contents.gaps.iter().filter(|gap| gap.from.is_some() || gap.sectors_skipped > 0);
     faults.extend(Some(gaps.count() as u64).filter(|gaps| *gaps > 0).map(|gaps| count(gaps, "gap")));
     if ending.summary.marks.lost > 0 {
@@ -131,7 +130,7 @@ fn tell_faults(overview: &Overview, to: Option<Instant>) -> Outcome {
     Outcome::lossy(!faults.is_empty())
 }
 
-/// Whether a change of level matches the request. A return to normal does not.
+/// A return to normal does not match.
 fn is_wanted(what: &Around, finding: &Finding) -> bool {
     match what {
         Around::Level(Level::Critical) => finding.level == Level::Critical,
@@ -141,23 +140,22 @@ fn is_wanted(what: &Around, finding: &Finding) -> bool {
     }
 }
 
-/// A log on the board with random access to its sectors.
+/// With random access to sectors.
 struct RemoteLog<'a> {
     ftp: &'a mut Ftp,
     output: &'a Path,
     files: Vec<RemoteFile>,
-    /// The file that the board has open.
+    /// Open on the board.
     open: Option<usize>,
-    /// Brought places without a readable sector of the log.
+    /// No readable sector of the log.
     unread: BTreeSet<u32>,
-    /// Whether a file of the log is empty: then later findings may be lost.
+    /// An empty file may have lost later findings.
     empty: Outcome,
 }
 
-/// A file of the log.
 struct RemoteFile {
     name: String,
-    /// Place of its first sector in the log, and number of its sectors.
+    /// In the log; and number of sectors.
     first: u32,
     sectors: u32,
     partial: Option<PartialFile>,
@@ -191,12 +189,11 @@ impl<'a> RemoteLog<'a> {
         Ok(log)
     }
 
-    /// Number of its sectors.
     fn count(&self) -> u32 {
         self.files.last().map_or(0, |last| last.first + last.sectors)
     }
 
-    /// The file with this place, open on the board, and the place in it.
+    /// Opens it; with the place in it.
     fn file_at(&mut self, place: u32) -> Result<(&mut Ftp, &mut PartialFile, u32)> {
         let index = self.files.partition_point(|file| file.first <= place).saturating_sub(1);
         let file = self.files.get_mut(index).context("a place beyond the log")?;
@@ -221,7 +218,7 @@ impl<'a> RemoteLog<'a> {
         Ok((&mut *self.ftp, partial, place - file.first))
     }
 
-    /// The sector at this place; `None` if it is damaged, or another one is there.
+    /// `None` if damaged or another's.
     fn sector(&mut self, place: u32) -> Result<Option<(Header, Sector)>> {
         let (ftp, partial, at) = self.file_at(place)?;
         if !partial.has(at) {
@@ -232,8 +229,7 @@ impl<'a> RemoteLog<'a> {
         partial.sector(at)
     }
 
-    /// Place and time of the beginning of the group with this sector. If that is unreadable, of the last
-    /// readable one before it.
+    /// Place and time of this sector's group; if unreadable, of the last readable one before.
     fn group_of(&mut self, place: u32) -> Result<Option<(u32, Instant)>> {
         let mut next = Some(place);
         for _ in 0..STEPS_BACK_MAX {
@@ -250,8 +246,7 @@ impl<'a> RemoteLog<'a> {
         Ok(None)
     }
 
-    /// The whole group that ends before this place, with unreadable sectors in front of the place; to the
-    /// beginning of the log if no earlier one is readable.
+    /// With unreadable sectors up to the place; from the log's beginning if no earlier one is readable.
     fn group_before(&mut self, end: u32) -> Result<Range<u32>> {
         let mut place = end;
         while let Some(last) = place.checked_sub(1) {
@@ -263,8 +258,7 @@ impl<'a> RemoteLog<'a> {
         Ok(0..end)
     }
 
-    /// Places with the recording of this time: they begin with a group that starts then or before, and end with
-    /// one that starts later, or with the log.
+    /// From a group that starts then or before, to one that starts later, or the end.
     fn before(&mut self, time: Instant) -> Result<Range<u32>> {
         let group = GROUP_SECTORS as u32;
         let (mut start, mut end) = (0, self.count());
@@ -274,21 +268,21 @@ impl<'a> RemoteLog<'a> {
             match self.group_of(middle)? {
                 Some((place, at)) if place > start && at <= time => start = place,
                 Some((place, _)) if place > start => end = place,
-                // The times before it are unknown: all of it is taken.
+                // The times before are unknown.
                 _ => break,
             }
         }
         Ok(start..end)
     }
 
-    /// UTC at power-on by the last clock record, microseconds since 1970.
+    /// By the last clock record, microseconds since 1970.
     fn power_on_us(&mut self) -> Result<u64> {
         let last = self.group_before(self.count())?;
         let epoch_us = self.bring(last)?.ending.summary.epoch_us;
         epoch_us.context("the log has no time of day; give the time since power-on, as --around 4:20")
     }
 
-    /// The latest matching finding, searched from the end group by group, and whether nothing was lost there.
+    /// Group by group from the end; whether nothing was lost there.
     fn latest(&mut self, what: &Around) -> Result<(Finding, Outcome)> {
         let (count, mut start, mut found) = (self.count(), self.count(), None);
         while start > 0 && found.is_none() {
@@ -300,7 +294,7 @@ impl<'a> RemoteLog<'a> {
                 note!("no such finding from {} on; searching before that", moment(first));
             }
         }
-        // All of it together: the sectors' numbers show a missing file.
+        // The numbers show a missing file.
         let outcome = tell_faults(&self.bring(start..count)?, None).and(self.empty);
         let Some(found) = found else {
             self.tell_unread();
@@ -321,7 +315,7 @@ impl<'a> RemoteLog<'a> {
         Outcome::lossy(!self.unread.is_empty())
     }
 
-    /// Downloads these places as far as they are missing, and reads them.
+    /// The missing ones; and reads them.
     fn bring(&mut self, places: Range<u32>) -> Result<Overview> {
         let mut place = places.start;
         while place < places.end {
@@ -351,7 +345,7 @@ impl<'a> RemoteLog<'a> {
         Overview::verified(&self.read_as_log(&places))
     }
 
-    /// These places of the partial files.
+    /// Of the partial files.
     fn read_as_log(&self, places: &Range<u32>) -> Log {
         let piece = |file: &RemoteFile| {
             let start = places.start.clamp(file.first, file.first + file.sectors) - file.first;
@@ -365,7 +359,7 @@ impl<'a> RemoteLog<'a> {
         Log { name, files: Vec::new(), pieces, session: None, left_over: false }
     }
 
-    /// Names the partial files with these places; deletes the others.
+    /// Deletes files without these places.
     fn finish(self, places: &Range<u32>) -> Result<Vec<(String, PathBuf)>> {
         let is_in = |file: &RemoteFile| file.first < places.end && places.start < file.first + file.sectors;
         let files = self.files.into_iter().filter(is_in);
@@ -374,21 +368,21 @@ impl<'a> RemoteLog<'a> {
     }
 }
 
-/// A file with each downloaded sector at its place, and zeros for the others.
+/// Zeros for missing sectors.
 #[derive(Debug)]
 struct PartialFile {
     file: NamedTempFile<File>,
-    /// Its name, once complete.
+    /// Once complete.
     target: PathBuf,
-    /// Whether each sector was downloaded.
+    /// Downloaded sectors.
     has: Vec<bool>,
-    /// Session of the file, and number of its first sector, by its first sectors.
+    /// By its first sectors.
     session: Option<u32>,
     base: Option<u32>,
 }
 
 impl PartialFile {
-    /// Begins the partial file beside the path of the whole one, with these first sectors.
+    /// Beside the whole file's path.
     fn begin(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Self> {
         let target = part_name(whole);
         if target.symlink_metadata().is_ok() {
@@ -408,14 +402,13 @@ impl PartialFile {
         self.has.get(at as usize).is_some_and(|has| *has)
     }
 
-    /// The end of the sectors from `at` on that are missing, at most `end`; `at` if that one is there.
+    /// From `at` on, at most `end`.
     fn end_of_missing(&self, at: u32, end: u32) -> u32 {
         let end = end.min(self.has.len() as u32);
         (at..end).find(|at| self.has(*at)).unwrap_or(end)
     }
 
-    /// The header of a sector that belongs at this place. A copy of a sector in progress may be one place
-    /// further.
+    /// If it belongs here; a copy in progress may be one place further.
     fn header(&self, at: u32, sector: &Sector) -> Option<Header> {
         let header =
             Header::read(sector.bytes()).ok().filter(|header| self.session == Some(header.session))?;
@@ -424,7 +417,7 @@ impl PartialFile {
         is_here.then_some(header)
     }
 
-    /// Puts a sector at its place; zeros in place of a sector of another session, whose log has come in its place.
+    /// Zeros for another session's, whose log took the place.
     fn put(&mut self, at: u32, sector: &Sector) -> Result<()> {
         let header = Header::read(sector.bytes()).ok();
         self.session = self.session.or(header.map(|header| header.session));
@@ -438,7 +431,7 @@ impl PartialFile {
         Ok(())
     }
 
-    /// A downloaded sector, if it belongs at this place.
+    /// If it belongs here.
     fn sector(&mut self, at: u32) -> Result<Option<(Header, Sector)>> {
         let mut bytes = [0; SECTOR_BYTES];
         self.seek(at)

@@ -1,5 +1,4 @@
-//! Compares bytes on this PC with the beginning of a board's log. Logs of two cards have the same names and often the
-//! same lengths: only their content differs.
+//! Bytes on this PC against a board's log: logs of two cards share names and often lengths.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -13,24 +12,20 @@ use super::ftp::Ftp;
 use crate::logs::board::{heading, known};
 use crate::logs::naming::{segment_name, session_name};
 
-/// Bytes compared if the board computes no checksum: the first sector, which has the session's random number,
-/// and the last one.
+/// Without checksums: the first sector (with the session's random number) and the last.
 const SECTOR: u32 = 512;
-/// A file begins with the record of its box, after at most three sectors of an earlier group.
+/// The box's record comes after at most three sectors of an earlier group.
 const HEADING_SECTORS: u32 = 8;
 
-/// Result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Likeness {
-    /// The checksums are equal.
     Same,
-    /// The board computes no checksum; the first and the last bytes are equal.
+    /// No checksum; both ends are equal.
     SameEnds,
-    /// It is another log.
     Other,
 }
 
-/// Compares the first `bytes` of a file with those of the board's log that is open by this name.
+/// Of the open log.
 pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Result<Likeness> {
     let mut file = File::open(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     if bytes == 0 {
@@ -54,17 +49,16 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
     Ok(Likeness::SameEnds)
 }
 
-/// The beginning of a log on the board.
 pub(super) struct Heading {
-    /// Name of the log on this PC.
+    /// On this PC.
     pub(super) name: String,
-    /// The session in its first sectors, if one of them is readable.
+    /// If readable.
     pub(super) session: Option<u32>,
-    /// The first sectors, as far as they were looked at.
+    /// As far as looked at.
     pub(super) sectors: Vec<Sector>,
 }
 
-/// The session of the log with these first sectors, and the number of its first one, as far as known.
+/// And the first sector's number, as far as known.
 pub(super) fn beginning_of(head: &[Sector]) -> (Option<u32>, Option<u32>) {
     let headers =
         || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));
@@ -74,13 +68,12 @@ pub(super) fn beginning_of(head: &[Sector]) -> (Option<u32>, Option<u32>) {
     (session, whole.and_then(|(at, header): (u32, _)| header.number.checked_sub(at)))
 }
 
-/// Name on this PC for the board's open log of this many bytes. It has the session from the first sectors,
-/// and the box from the record of the start.
+/// The open log's name on this PC. Session by first sectors, box by the record of the start.
 pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Heading> {
     heading_by(name, length, |at| bytes_of(ftp, at, SECTOR))
 }
 
-/// The same for a downloaded file on this PC.
+/// Of a file on this PC.
 pub(super) fn heading_here(path: &Path, name: &str, length: u32) -> Result<Heading> {
     let unread = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(unread)?;
@@ -120,7 +113,7 @@ fn heading_by(name: &str, length: u32, mut sector_at: impl FnMut(u32) -> Result<
     Ok(Heading { name: format!("{of}_{:02}.HUM", segment.segment), session, sectors })
 }
 
-/// These bytes of the board's log that is open.
+/// Of the open log.
 pub(super) fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     while bytes.len() < wanted as usize {

@@ -1,4 +1,4 @@
-//! A client of MAVLink FTP (<https://mavlink.io/en/services/ftp.html>), as far as downloads need it.
+//! MAVLink FTP (<https://mavlink.io/en/services/ftp.html>), as far as needed.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -14,18 +14,17 @@ use crate::talk::{Client, is_for_us};
 
 const HEAD: usize = 12;
 const DATA_MAX: u8 = 239;
-/// At the slowest budget that can carry a piece, one comes in about two seconds.
+/// The slowest budget delivers a piece in about two seconds.
 const ANSWER: Duration = Duration::from_secs(3);
 const TRIES: usize = 10;
-/// A board reads a log of 8 MiB in some 20 s while it has little to record, and in as many minutes at worst.
+/// 8 MiB take some 20 s, at worst as many minutes.
 const CHECKSUM_TRIES: usize = 100;
-/// A burst is over after a pause of this length.
+/// Ends a burst.
 const GAP: Duration = Duration::from_millis(2_500);
 
-/// More logs than a card has: its directory has 65,536 entries at most.
+/// A card's directory has 65,536 entries.
 const LOGS_MAX: usize = 100_000;
-/// Maximum number of pieces taken and held from a burst: boards send far fewer in one. Later pieces are
-/// requested again.
+/// Of a burst; boards send far fewer, and later pieces are requested again.
 const PIECES_MAX: usize = 4_096;
 
 /// `MAV_FTP_OPCODE`
@@ -63,7 +62,7 @@ impl Answer {
             of: fields.u8(5),
             complete: fields.u8(6) != 0,
             offset: fields.u32(8),
-            // Zeros at the end are left out on the way.
+            // Not sent.
             data: (0..size).map(|at| fields.u8(HEAD + at)).collect(),
         })
     }
@@ -76,25 +75,23 @@ impl Answer {
         self.offset.saturating_add(self.data.len() as u32)
     }
 
-    /// Offset of the data, and the data before `length`. An open log may have grown, and a board sends all it
-    /// has.
+    /// An open log may have grown: data before `length` only.
     fn before(mut self, length: u32) -> (u32, Vec<u8>) {
         self.data.truncate(length.saturating_sub(self.offset) as usize);
         (self.offset, self.data)
     }
 
-    /// The first four bytes of its data.
     fn word(&self) -> u32 {
         self.data.iter().take(4).rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
     }
 }
 
-/// A timeout, which concerns every log: an error of the link.
+/// Concerns every log: a link's error.
 fn silence(words: &'static str) -> Error {
     io::Error::new(io::ErrorKind::TimedOut, words).into()
 }
 
-/// The board has deleted a log since it listed it.
+/// Deleted since it was listed.
 #[derive(Debug)]
 pub(super) struct NoSuchLog;
 
@@ -108,7 +105,6 @@ impl std::fmt::Display for NoSuchLog {
 
 impl std::error::Error for NoSuchLog {}
 
-/// The error of a refusal.
 fn refused(answer: &Answer, what: &str) -> Error {
     if answer.is_nak(FILE_NOT_FOUND) {
         return NoSuchLog.into();
@@ -117,21 +113,19 @@ fn refused(answer: &Answer, what: &str) -> Error {
     anyhow!("the board refuses {what} of this log{why}; call again")
 }
 
-/// A conversation with a board's file server.
+/// With a board's file server.
 pub(super) struct Ftp {
     client: Client,
     sequence: u16,
 }
 
 impl Ftp {
-    /// Ends whatever was open.
     pub(super) fn new(client: Client) -> Result<Self> {
         let mut ftp = Self { client, sequence: 0 };
         ftp.ask(RESET, 0, 0, b"", TRIES)?;
         Ok(ftp)
     }
 
-    /// The system that the board is part of.
     pub(super) const fn system(&self) -> u8 {
         self.client.system()
     }
@@ -162,7 +156,7 @@ impl Ftp {
         Err(silence("the board does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?"))
     }
 
-    /// Names and lengths of all logs, and how many more there are that the board's card did not give.
+    /// Also the number of those that the card did not give.
     pub(super) fn list(&mut self) -> Result<(Vec<(String, u32)>, usize)> {
         let (mut logs, mut skipped) = (Vec::new(), 0);
         loop {
@@ -175,7 +169,7 @@ impl Ftp {
             skipped += text.split('\0').filter(|entry| entry.starts_with('S')).count();
             for entry in text.split('\0').filter_map(|entry| entry.strip_prefix('F')) {
                 let (name, bytes) = entry.split_once('\t').context("a directory entry without a length")?;
-                // A valid name is a plain file name in our directory.
+                // A plain file name in our directory.
                 if name.contains(['/', '\\']) || name.starts_with('.') {
                     bail!("the board names a file that is none: {name:?}");
                 }
@@ -190,7 +184,7 @@ impl Ftp {
         }
     }
 
-    /// Opens a log; how many bytes it has.
+    /// Returns its bytes.
     pub(super) fn open(&mut self, name: &str) -> Result<u32> {
         let opened = self.ask(OPEN, 0, 0, format!("/{name}").as_bytes(), TRIES)?;
         if opened.opcode != ACK {
@@ -199,20 +193,19 @@ impl Ftp {
         Ok(opened.word())
     }
 
-    /// The checksum of a log's first bytes (at least one), as in [`hums_link::ftp::checksum`]; `None` if the
-    /// board's firmware is too old for it.
+    /// Of the first bytes (at least one), as [`hums_link::ftp::checksum`]; `None` for old firmware.
     pub(super) fn checksum(&mut self, name: &str, bytes: u32) -> Result<Option<u32>> {
         let answer = self.ask(CHECKSUM, bytes, 0, format!("/{name}").as_bytes(), CHECKSUM_TRIES)?;
         match answer.opcode {
             ACK if answer.offset == bytes => Ok(Some(answer.word())),
-            // Another server: its checksum is always of the whole file.
+            // Another server: always of the whole file.
             ACK => Ok(None),
             _ if answer.is_nak(UNKNOWN_COMMAND) => Ok(None),
             _ => Err(refused(&answer, "the checksum")),
         }
     }
 
-    /// Downloads these bytes of the open log, in order. Each piece is handed on once all before it have come.
+    /// In order, piece by piece.
     pub(super) fn bring(
         &mut self,
         from: u32,
@@ -224,7 +217,7 @@ impl Ftp {
         while have < to {
             let (before, mut pieces) = (have, BTreeMap::new());
             let came = self.burst(have, to, |at, data| {
-                // Pieces after a lost one wait for it.
+                // Wait for a lost one.
                 if at >= have {
                     pieces.insert(at, data);
                 }
@@ -258,7 +251,7 @@ impl Ftp {
         Ok(())
     }
 
-    /// Hands on the pieces of a burst from `offset`, each with its offset. Returns whether any came.
+    /// Pieces from `offset`; returns whether any came.
     fn burst(
         &mut self,
         offset: u32,
@@ -289,7 +282,7 @@ impl Ftp {
         }
     }
 
-    /// Between one and this many bytes of the open log from `offset` on.
+    /// At least one byte.
     pub(super) fn piece(&mut self, offset: u32, bytes: u32) -> Result<Vec<u8>> {
         let size = bytes.min(u32::from(DATA_MAX)) as u8;
         let mut answer = self.ask(READ, offset, size, b"", TRIES)?;

@@ -1,5 +1,5 @@
-//! Verifies the downloaded logs as `hums info --verify` does with their folder. A check that needs other files
-//! counts only if those were requested: a file that was left out on purpose is not missing.
+//! Verifies downloaded logs as `hums info --verify` does their folder. A file left out on purpose is not
+//! missing.
 
 use std::path::{Path, PathBuf};
 use std::slice;
@@ -14,34 +14,32 @@ use crate::outcome::Outcome;
 use crate::summary::Overview;
 use crate::verify::{failed, verify_each};
 
-/// Checks of a log that need all of its files.
+/// Need all files of a log.
 const NEED_ALL_FILES: [&str; 5] = ["sector sequence", "group decoding", "frames missing", "files", "end"];
-/// The check that needs the log before.
+/// Needs the log before.
 const NEEDS_LOG_BEFORE: &str = "session before";
 
-/// A log that came, or was there already.
+/// New, or there already.
 #[derive(Debug, Serialize)]
 pub(super) struct LogJson {
-    /// As the board calls it.
+    /// On the board.
     pub(super) name: String,
     pub(super) path: PathBuf,
-    /// It was not there already.
     pub(super) is_new: bool,
-    /// `hums info --verify` finds no fault, and the end is proved if all files of the log were requested.
+    /// No fault, and a proved end if all files were requested.
     pub(super) whole: bool,
-    /// The end of the log in its last file, as far as known.
+    /// In the last file, as far as known.
     pub(super) end: Option<EndJson>,
 }
 
 impl LogJson {
-    /// The download; the other fields are for [`judge`].
+    /// The other fields are for [`judge`].
     pub(super) const fn new(name: String, path: PathBuf, is_new: bool) -> Self {
         Self { name, path, is_new, whole: false, end: None }
     }
 }
 
-/// Judges logs together and prints faults and missing proofs. `left_out` are the board's files that were not
-/// requested.
+/// Prints faults and missing proofs. `left_out`: not requested.
 pub(super) fn judge(left_out: &[String], pulled: &mut [LogJson]) -> Result<Outcome> {
     let (mut outcome, mut paths) = (Outcome::Done, Vec::new());
     for log in &*pulled {
@@ -64,7 +62,6 @@ pub(super) fn judge(left_out: &[String], pulled: &mut [LogJson]) -> Result<Outco
     Ok(outcome.and(Outcome::lossy(unread > 0)))
 }
 
-/// Prints the faults and missing proofs of a log that was read.
 fn tell(overview: &Overview, left_out: &[String], pulled: &mut [LogJson]) -> Outcome {
     let ending = &overview.ending;
     let is_of = |log: &&mut LogJson| {

@@ -1,9 +1,8 @@
-//! `hums box pull`: the board's logs over MAVLink FTP, burst by burst; lost pieces are read one by one.
+//! `hums box pull`: logs over MAVLink FTP, burst by burst.
 //!
-//! An interrupted download is resumed if its bytes match the beginning of the board's log. They are compared
-//! by checksum, or by both ends if the firmware computes none. At the end the whole file is compared and
-//! verified as by `hums info --verify`, also if it was there already. A file's name contains its session, so
-//! files of two cards never collide.
+//! An interrupted download resumes if its bytes match the log's beginning, by checksum, or by both ends with
+//! old firmware. At the end the whole file is compared, and verified as by `hums info --verify`. File names
+//! contain the session: two cards never collide.
 
 mod around;
 mod compare;
@@ -29,10 +28,9 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::word;
 
-/// Bytes between two progress messages.
+/// Between two messages.
 const TOLD_BYTES: u32 = 8 * 1024;
 
-/// Output of `hums box pull --json`.
 const SCHEMA: Schema = Schema::first("hums-pull");
 
 #[derive(Debug, Serialize)]
@@ -60,7 +58,6 @@ pub fn run(args: &cli::Pull) -> Result<Outcome> {
     bring(client, args).with_context(|| format!("system {system}"))
 }
 
-/// Downloads the requested logs.
 fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     let mut ftp = Ftp::new(client)?;
     let (mut logs, skipped) = ftp.list()?;
@@ -75,7 +72,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
         let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
         bail!("{missing}: the board lists no such log now; it has {}", names.join(", "));
     }
-    // With named logs, others are not missing.
+    // Others are not missing.
     let listed = Outcome::lossy(skipped > 0 && args.names.is_empty());
     let newest = logs.last().map(|(log, _)| log.clone());
     let oldest = args.last.map(|most| first_of_newest(&logs, most));
@@ -102,12 +99,12 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The number of a board's log.
+/// Of a board's log.
 fn number(log: &str) -> Option<u32> {
     segment_name(Path::new(log)).map(|name| name.session)
 }
 
-/// The number of the first of this many newest logs. A log begun just now that is still empty is not counted.
+/// The first of this many newest. An empty log begun just now is not counted.
 fn first_of_newest(logs: &[(String, u32)], most: usize) -> u32 {
     let filled = logs.iter().filter(|(_, bytes)| *bytes > 0);
     let mut numbers: Vec<u32> = filled.filter_map(|(log, _)| number(log)).collect();
@@ -118,7 +115,7 @@ fn first_of_newest(logs: &[(String, u32)], most: usize) -> u32 {
     }
 }
 
-/// Downloads these logs one after the other. A fault of one does not stop the others.
+/// A fault of one does not stop the others.
 fn each(
     ftp: &mut Ftp,
     logs: Vec<(String, u32)>,
@@ -144,9 +141,9 @@ fn each(
                 );
                 outcome = Outcome::Losses;
             }
-            // An error of the link or of the disk would also stop the others.
+            // Of link or disk: the others would fail too.
             Err(error) if error.root_cause().is::<io::Error>() => return Err(error),
-            // The card has made room for later logs.
+            // Made room for later logs.
             Err(error) if error.root_cause().is::<ftp::NoSuchLog>() => {
                 note!("{error:#}");
                 outcome = Outcome::Losses;
@@ -163,7 +160,7 @@ fn each(
     failed.map_or(Ok(outcome), Err)
 }
 
-/// Downloads a moment of the newest of these logs.
+/// Of the newest log.
 fn around(
     ftp: &mut Ftp,
     mut logs: Vec<(String, u32)>,
@@ -192,7 +189,7 @@ fn around(
     Ok(outcome)
 }
 
-/// Downloads a log. Returns its path and whether it is new; `None` for an empty log.
+/// Path, and whether it is new; `None` if empty.
 fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, bool)>> {
     let length = ftp.open(name)?;
     if length == 0 {
@@ -226,7 +223,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     Ok(Some((path, true)))
 }
 
-/// Downloads the missing rest of a log until it equals the board's; the counts are bytes here and in all.
+/// Until it equals the board's; counts are bytes here and in all.
 fn complete(
     ftp: &mut Ftp,
     name: &str,
@@ -254,7 +251,6 @@ fn complete(
     }
     same
 }
-/// Data of one session never get the name of another.
 fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     match (first.session, now.session) {
         (first, now) if first == now => Ok(()),
@@ -268,11 +264,11 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     }
 }
 
-/// The file already on this PC under the log's name.
+/// Under the log's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LocalCopy {
     Nothing,
-    /// This many bytes of it: the log has grown since.
+    /// The log has grown since.
     Beginning(u32),
     /// All of it.
     Whole,
@@ -299,7 +295,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
         ),
         Likeness::Same if bytes < length => Ok(LocalCopy::Beginning(bytes)),
         Likeness::Same => Ok(LocalCopy::Whole),
-        // Equality is not proved: the log is downloaded again and replaces the file once complete.
+        // Not proved: downloaded again, and replaced once complete.
         Likeness::SameEnds => Ok(LocalCopy::Nothing),
         Likeness::Other => bail!(
             "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums info --verify` \
@@ -309,8 +305,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
     }
 }
 
-/// The bytes left by an earlier run that can be resumed, and the kind of proof. Bytes of another log are
-/// deleted.
+/// Resumable bytes and their proof; another log's are deleted.
 fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u32, Likeness)> {
     let part = file.part().to_owned();
     let bytes = u32::try_from(part.metadata()?.len()).unwrap_or(u32::MAX);
@@ -323,7 +318,6 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
     Ok((0, likeness))
 }
 
-/// Downloads the missing sectors.
 fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -> Result<()> {
     let (mut done, mut told) = (have, have);
     let brought = ftp.bring(have, length, |bytes| {
@@ -338,7 +332,7 @@ fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -
     brought.with_context(|| format!("after {done} of {length} bytes"))
 }
 
-/// Whether the download equals the board's log.
+/// Equals the board's.
 fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<bool> {
     let flushed = file.flush();
     settle(flushed, file.path())?;

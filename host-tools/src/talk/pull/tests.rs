@@ -13,7 +13,7 @@ use hums_recorder::card::SEGMENT_BYTES_MAX;
 use super::*;
 use crate::talk::tests::fake;
 
-/// The sectors of a recording of the repository, as `hums decode --format hum` makes them.
+/// As by `hums decode --format hum`.
 pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
     let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
     let output = dir.join(name);
@@ -24,7 +24,6 @@ pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
 
 const NAME: &str = "00001_00.HUM";
 
-/// The names in a folder.
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("there");
     let mut names: Vec<String> =
@@ -33,15 +32,14 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Files on a board.
 type Files = Vec<(String, Vec<u8>)>;
 
-/// A board with these logs. Before each answer `change` gets them, with the opcode, and may give an error that is answered.
+/// Before each answer `change` gets the logs and the opcode, and may give an error.
 fn board_of(files: Files, change: impl FnMut(&mut Files, u8) -> Option<u8> + Send + 'static) -> Client {
     board_with(files, None, change)
 }
 
-/// The same with a card that does not list the log of this name.
+/// The card does not list this name.
 fn board_with(
     mut files: Files,
     skipped: Option<&'static str>,
@@ -95,7 +93,7 @@ fn board_with(
     })
 }
 
-/// A board with this log, which is replaced by the other one at this number of requests for bytes.
+/// Replaced by the other log at this request for bytes.
 fn board(log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
     let client = board_of(vec![(NAME.to_owned(), log)], move |files, opcode| {
         if matches!(opcode, 5 | 15) {
@@ -109,7 +107,7 @@ fn board(log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
     Ftp::new(client).expect("it answers")
 }
 
-/// The first sectors of two sessions, and the name that `pull` gives the first one.
+/// And the name that `pull` gives the first.
 fn two_logs(dir: &Path) -> (Vec<u8>, Vec<u8>, String) {
     let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]
         .map(|name| packed(dir, name).get(..80 * SECTOR_BYTES).expect("a longer log").to_vec());
@@ -140,11 +138,11 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
         } else {
             let told = pulled.expect_err("it is another one").to_string();
             assert!(told.contains("another log has come in its place"), "{told}");
-            // The begun file was deleted.
+            // Deleted.
             assert_eq!(names_in(&output), Vec::<String>::new());
         }
     }
-    // The other one from its first byte on.
+    // From its first byte on.
     let output = dir.path().join("early");
     fs::create_dir(&output).expect("made");
     let mut ftp = board(log.clone(), other.clone(), 8 * 3 + 1);
@@ -157,7 +155,7 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
 fn a_card_that_loses_the_beginning_of_a_log_is_not_called_another_log() {
     let dir = tempfile::tempdir().expect("a folder");
     let (log, _, name) = two_logs(dir.path());
-    // The first sector alone, whose session the others name; then the whole first page.
+    // The first sector alone, then the whole first page.
     let without = |bytes: usize| [&vec![0; bytes][..], &log[bytes..]].concat();
     for (next, words) in [
         (without(SECTOR_BYTES), None),
@@ -197,7 +195,6 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     let dir = tempfile::tempdir().expect("a folder");
     let (log, other, name) = two_logs(dir.path());
     let what: cli::Around = "0".parse().expect("a time");
-    // The log's beginning is read before.
     let mut ftp = board(log.clone(), other, 8 * 3 + 5);
     let span = hums_core::clock::Span::from_secs(9_999);
     let files = [(NAME.to_owned(), log.len() as u32)];
@@ -208,7 +205,7 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     assert_eq!(part.len(), log.len());
     let mut others = 0;
     for (ours, theirs) in part.chunks(SECTOR_BYTES).zip(log.chunks(SECTOR_BYTES)) {
-        // One is half of each, and fails its check.
+        // Half of each, which fails its check.
         let is_sector = Header::read(ours.first_chunk().expect("a sector")).is_ok();
         assert!(ours == theirs || !is_sector);
         others += u32::from(!is_sector && ours.iter().any(|byte| *byte != 0));
@@ -217,7 +214,7 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     assert_eq!(brought.outcome, Outcome::Losses);
 }
 
-/// Length of the recording by [`recorded`] in seconds, and the times of its criticals.
+/// Seconds of [`recorded`], and its criticals.
 const SECONDS: u64 = 1_500;
 const CRITICALS_S: [u64; 2] = [200, 1_000];
 /// UTC at its power-on, microseconds since 1970.
@@ -241,12 +238,12 @@ impl SectorSink for Memory {
     }
 }
 
-/// A session that ends in order: a note each tenth of a second, two criticals, and the time of day, which is learned at once.
+/// A note each tenth of a second, two criticals, the time of day at once; ends in order.
 fn recorded(session: u32, seconds: u64) -> Vec<u8> {
     recorded_by(session, seconds, &[(10, EPOCH_US)])
 }
 
-/// The same with these clocks: from which tenth of a second on, and UTC at power-on.
+/// Tenth of a second, and UTC at power-on.
 fn recorded_by(session: u32, seconds: u64, clocks: &[(u64, u64)]) -> Vec<u8> {
     let mut memory = Memory { session, ..Memory::default() };
     let mut writer = Box::new(Writer::new());
@@ -277,14 +274,13 @@ fn recorded_by(session: u32, seconds: u64, clocks: &[(u64, u64)]) -> Vec<u8> {
     memory.sectors
 }
 
-/// A command line with only `hums box pull`'s arguments.
+/// Only `hums box pull`'s arguments.
 #[derive(clap::Parser)]
 struct Line {
     #[command(flatten)]
     pull: cli::Pull,
 }
 
-/// Runs `pull` with these arguments on these logs.
 fn brought(files: &Files, args: &[&str]) -> Result<Outcome> {
     brought_of(board_of(files.clone(), |_, _| None), args)
 }
@@ -304,7 +300,7 @@ fn named(log: Vec<u8>) -> Files {
     vec![(NAME.to_owned(), log)]
 }
 
-/// The group that is recorded at this time: its first place, and the one behind it.
+/// First place, and the one behind it.
 fn group_at(log: &[u8], second: u64) -> std::ops::Range<usize> {
     let starts = (0..).zip(log.chunks(SECTOR_BYTES)).filter_map(|(place, sector)| {
         let sector = Sector::from_bytes(*sector.first_chunk().expect("a sector"));
@@ -314,7 +310,7 @@ fn group_at(log: &[u8], second: u64) -> std::ops::Range<usize> {
     before.last().expect("it begins").0..after.first().map_or(log.len() / SECTOR_BYTES, |(place, _)| *place)
 }
 
-/// The log with this sector lost, in all the ways in which a card loses one.
+/// In all ways of a card.
 fn spoiled(log: &[u8], place: usize) -> Vec<Files> {
     let at = place * SECTOR_BYTES;
     let with = |sector: &[u8]| {
@@ -394,7 +390,7 @@ fn a_moment_at_which_nothing_was_recorded_is_refused() {
     for moment in ["0", "0:29.9", "2026-09-21T14:13:20Z", "2026-09-21T14:13:49Z"] {
         assert_eq!(brought(&files, &["--around", moment]).expect("it comes"), Outcome::Done, "{moment}");
     }
-    // It may be in the unreadable sectors.
+    // Perhaps in the unreadable sectors.
     for files in spoiled(&log, log.len() / SECTOR_BYTES - 1).into_iter().take(4) {
         assert_eq!(brought(&files, &["--around", "0:29.9"]).expect("it comes"), Outcome::Losses);
     }
@@ -423,7 +419,6 @@ fn a_time_of_day_goes_by_the_last_clock_record_of_its_log() {
         let told = around(&files, "2026-09-21T14:19:30Z").expect_err("by no clock").to_string();
         assert!(told.contains("begins later, 2026-09-21 15:13:20 UTC"), "{told}");
     }
-    // An unreadable place is reported.
     let mut lost = log.clone();
     lost[in_group..in_group + 512].fill(0);
     assert_eq!(around(&named(lost), "2026-09-21T14:14:20Z").expect("it comes"), Outcome::Losses);
@@ -439,7 +434,7 @@ fn a_file_that_begins_in_the_middle_of_a_group_is_read_with_the_one_before_it() 
     };
     let middle = (group_at(&log, 200).start + 9) * SECTOR_BYTES;
     for (cut, at_it) in [(cut, "399"), (middle, "200")] {
-        // Before the change of files, at it, and perhaps behind it.
+        // Around the change of files.
         for at in ["20", at_it, "399"] {
             let dir = tempfile::tempdir().expect("a folder");
             let board = board_of(files(cut), |_, _| None);
@@ -449,13 +444,12 @@ fn a_file_that_begins_in_the_middle_of_a_group_is_read_with_the_one_before_it() 
             let paths: Vec<PathBuf> = found.paths().map(Path::to_owned).collect();
             let named = crate::logs::find(&paths, false).expect("parts");
             for found in [found, named] {
-                // Parts of one log are read as one.
                 let [log] = &found.logs[..] else { panic!("{at}: {:?}", found.logs) };
                 if at != at_it {
                     continue;
                 }
                 let overview = crate::summary::Overview::verified(log).expect("it reads");
-                // Sectors that were only looked at on the way are of no use elsewhere.
+                // Sectors looked at on the way are of no use elsewhere.
                 let moment = Instant::from_millis(at.parse::<u64>().expect("seconds") * 1_000);
                 let hides = |gap: &hums_blackbox::Gap| {
                     gap.from.is_none_or(|from| from <= moment) && gap.to.is_none_or(|to| to >= moment)
@@ -569,7 +563,7 @@ fn a_refusal_says_no_more_than_is_known() {
     }
 }
 
-/// A log in files of this many groups each, by the board's names.
+/// Of this many groups each.
 fn files_of(log: &[u8], groups: usize) -> Files {
     let starts: Vec<usize> = (0..log.len() / SECTOR_BYTES)
         .filter(|place| {
@@ -584,7 +578,6 @@ fn files_of(log: &[u8], groups: usize) -> Files {
         .collect()
 }
 
-/// Result of `hums info --verify` on a folder.
 fn verified(folder: &Path) -> Outcome {
     let found = crate::logs::find::find_in(folder, false).expect("a folder");
     let mut outcome = Outcome::Done;
@@ -620,7 +613,7 @@ fn all_logs_of_a_board_are_judged_as_verify_judges_their_folder() {
             brought_into(folder.path(), board_of(files.clone(), |_, _| None), &[]).expect("they come");
         assert_eq!((pulled, verified(folder.path())), (expected, expected), "{names:?}");
     }
-    // A log that was not requested is not lost.
+    // Not requested is not lost.
     let code = |args: &[&str]| brought(&files, args).expect("they come");
     assert_eq!(code(&["--last", "2"]), Outcome::Done);
     assert_eq!(code(&["00001_01.HUM", "00001_03.HUM", &files[last].0]), Outcome::Done);
@@ -692,7 +685,7 @@ fn what_no_file_of_a_session_has_is_told_of_a_moment_and_of_a_search() {
     for files in [&absent, &empty, &cut, &first] {
         assert!(files.len() == first.len() || moment(files, 600) == Outcome::Losses);
         assert_eq!(moment(files, 1_400), Outcome::Done, "nothing of that moment is missing");
-        // An empty file may be of any time.
+        // Of any time.
         let has_empty = files.iter().any(|(_, bytes)| bytes.is_empty());
         let expected = if has_empty { Outcome::Losses } else { Outcome::Done };
         assert_eq!(search(files), expected, "nor what comes after the latest one");

@@ -1,4 +1,4 @@
-//! A line with boards at its other end, for tests.
+//! A line with boards, for tests.
 
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind, Write};
@@ -14,7 +14,7 @@ use crate::duplex::{Duplex, Port};
 use crate::mavlink::ids::HEARTBEAT;
 use crate::talk::Client;
 
-/// The other end's answers to a frame: sender and packet.
+/// To a frame: sender and packet.
 pub(in crate::talk) type Answers = Vec<(u8, Packet)>;
 
 struct Line {
@@ -24,7 +24,7 @@ struct Line {
     coming: VecDeque<u8>,
 }
 
-/// A client on a line with boards of these systems, which answer each of its heartbeats with their own, and all else so.
+/// Boards of these systems answer heartbeats with their own, and all else so.
 pub(in crate::talk) fn client(
     systems: &'static [u8],
     answer: impl FnMut(&Frame<'_>) -> Answers + Send + 'static,
@@ -35,7 +35,7 @@ pub(in crate::talk) fn client(
     Client::over(Duplex { reader: Box::new(End(line)), writer }, None)
 }
 
-/// A client that has found the board of system 1 on it.
+/// Has found system 1.
 pub(in crate::talk) fn found(
     systems: &'static [u8],
     answer: impl FnMut(&Frame<'_>) -> Answers + Send + 'static,

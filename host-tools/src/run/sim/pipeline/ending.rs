@@ -1,4 +1,4 @@
-//! The end of a power-on, and its result.
+//! A power-on's end and result.
 
 use anyhow::Result;
 use hums_blackbox::record::Stats;
@@ -10,11 +10,11 @@ use hums_recorder::CardState;
 
 use super::Pipeline;
 
-/// Longest wait at the end of a run for a card that is out; then the waiting data is lost.
+/// At the end, for a card that is out.
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
 impl Pipeline<'_, '_> {
-    /// The input has ended: the record is closed and written out. Gives the frames that found no card.
+    /// Writes the record out. Returns frames without a card.
     pub(in crate::run::sim) fn finish(&mut self) -> Result<u64> {
         self.reception.idle(self.now, &mut self.ends.frames_in);
         self.drain()?;
@@ -32,7 +32,7 @@ impl Pipeline<'_, '_> {
         }
         self.now = self.now.max(self.busy_until);
         self.storage.finish();
-        // The port sends its waiting bytes, at its pace.
+        // At its pace.
         self.now = self.now.max(self.gs_at);
         for _ in 0..1000 {
             self.send_gs()?;
@@ -41,7 +41,7 @@ impl Pipeline<'_, '_> {
         Ok(self.ends.sectors_out.abandon())
     }
 
-    /// Hands over everything that is to outlive power, as fast as the store takes it.
+    /// As fast as the store takes it.
     fn save_all(&mut self) {
         self.monitoring.save_signing(self.now, &mut self.handover);
         while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {
@@ -55,37 +55,35 @@ impl Pipeline<'_, '_> {
         self.slot_status.read().state != CardState::Recording
     }
 
-    /// The figures of this power-on.
     pub(in crate::run::sim) fn stats(&self) -> Stats {
         let mut stats = self.monitoring.stats(&self.ends.gs_in);
         catch_up(&mut stats, self.port_status.read());
         stats
     }
 
-    /// Parameters as they are now.
     pub(in crate::run::sim) fn params(&self) -> Params {
         *self.monitoring.monitor().params()
     }
 
-    /// Whether the card had no room in the end.
+    /// In the end.
     pub(in crate::run::sim) fn is_full(&self) -> bool {
         self.slot_status.read().state == CardState::Full
     }
 
-    /// Whether the card had no room, so that the oldest segments were overwritten.
+    /// Oldest segments were overwritten.
     pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
         self.slot_status.read().segments_overwritten > 0
     }
 }
 
-/// The monitor adds up the port's counters at each tick; power may have gone since the last one.
+/// The monitor adds counters at each tick; power may have gone since.
 fn catch_up(stats: &mut Stats, port: PortReading) {
     for (sum, counter) in [
         (&mut stats.frames_in, port.frames),
         (&mut stats.bytes_in, port.bytes),
         (&mut stats.bytes_not_frames, port.bytes_not_frames),
     ] {
-        // The counter is the sum modulo 2^32, and ahead of it.
+        // The sum modulo 2^32, and ahead of it.
         *sum += u64::from(counter.wrapping_sub(*sum as u32));
     }
 }
