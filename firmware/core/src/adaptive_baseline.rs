@@ -3,8 +3,6 @@
 //! The baseline is the mean of the smoothed figure over the last minute; its range is [`SPREADS`] times the mean distance from that mean.
 //! The caller says which samples are learnt. So a fault does not become the baseline, and an offset from the beginning of a flight does.
 
-use crate::initial::Initial;
-
 /// The baseline is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;
 const MEMORY_S: f32 = 60.0;
@@ -26,11 +24,13 @@ state! {
 
 impl AdaptiveBaseline {
     /// It is known to be zero.
-    pub(crate) const ZERO: Self = Self { learnt_s: MEMORY_S, ..Self::NEW };
+    pub(crate) fn zero() -> Self {
+        Self { learnt_s: MEMORY_S, ..Self::default() }
+    }
 
     /// Nothing learnt, also not in the first seconds given, in which the figure settles.
-    pub(crate) const fn after(settles_s: f32) -> Self {
-        Self { learnt_s: -settles_s, ..Self::NEW }
+    pub(crate) fn after(settles_s: f32) -> Self {
+        Self { learnt_s: -settles_s, ..Self::default() }
     }
 
     /// Whether a sample is in the possible range.

@@ -23,7 +23,6 @@
 
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
-use crate::initial::Initial;
 use crate::latest::Reading;
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::RECEIVERS_MAX;
@@ -208,8 +207,8 @@ state! {
 
 impl Residual {
     /// A residual of many samples: it settles for this time, s, before it is learnt.
-    pub(crate) const fn after(settles_s: f32) -> Self {
-        Self { figure: AdaptiveBaseline::after(settles_s), ..Self::NEW }
+    pub(crate) fn after(settles_s: f32) -> Self {
+        Self { figure: AdaptiveBaseline::after(settles_s), ..Self::default() }
     }
 
     /// When it was compared last.
@@ -224,7 +223,7 @@ impl Residual {
         }
         let step = self.at.age(at);
         if row.learn == Learn::Nothing && step.is_none_or(|step| step > PAUSE) {
-            *self = Self { figure: AdaptiveBaseline::ZERO, ..Self::default() };
+            *self = Self { figure: AdaptiveBaseline::zero(), ..Self::default() };
         }
         let clamp = if self.at.is_set() { row.clamp } else { f32::INFINITY };
         let step = step.filter(|_| self.at.is_set()).unwrap_or(Span::ZERO);

@@ -47,7 +47,7 @@ state! {
     /// The memory of all checks.
     #[derive(Clone, Copy, Debug)]
     pub struct Health {
-        states: [State; STATES],
+        states: [State; STATES] = [State::default(); STATES],
         alarms: Alarms,
     }
 }
