@@ -5,8 +5,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hums_core::param_words::{DECIMAL_PLACES, group, short};
 use hums_core::params::Param;
+use hums_core_tests::{DECIMAL_PLACES, group, short};
 use hums_link::ftp;
 use hums_tests::flights::root;
 use hums_tests::oracle;

@@ -43,7 +43,6 @@ mod motors;
 pub mod observation;
 mod outputs;
 mod pairs;
-pub mod param_words;
 pub mod params;
 mod power_draw;
 mod pressure;

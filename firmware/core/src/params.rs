@@ -19,8 +19,7 @@ pub struct ParamSpec {
 pub struct ParamWords {
     /// The unit of value, default and range.
     pub unit: &'static str,
-    /// A description in a few words; empty for the limit of one check, which the check's name describes
-    /// ([`crate::param_words`]).
+    /// A description in a few words; empty for the limit of one check, which the check's name describes.
     pub what: &'static str,
     /// The meanings of its values from 0; empty for quantities.
     pub options: &'static [&'static str],

@@ -9,7 +9,6 @@ use std::path::PathBuf;
 
 use hums_core::exposure;
 use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
-use hums_core::param_words;
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Span;
 use hums_core::usage::UsageCounter;
@@ -160,7 +159,7 @@ fn the_parameters_are_documented_as_they_are() {
         .to_owned();
     for param in Param::ALL {
         let (spec, words) = (param.spec(), param.words());
-        let (unit, default, what) = (words.unit, number(spec.default), param_words::short(param));
+        let (unit, default, what) = (words.unit, number(spec.default), hums_core_tests::short(param));
         let options = words.options.iter().enumerate().map(|(number, option)| format!("{number} {option}"));
         let options = options.collect::<Vec<_>>().join(", ");
         let options = if options.is_empty() { options } else { format!(": {options}") };
@@ -189,9 +188,10 @@ fn mission_planner_gets_the_words_of_every_parameter() {
                 let _ = writeln!(text, "      <{element}>{value}</{element}>");
             }
         };
-        say("DisplayName", &param_words::short(param));
-        let meaning = param_words::meaning(param).map_or_else(String::new, |meaning| format!("{meaning} "));
-        let (more, default) = (param_words::long(param), number(spec.default));
+        say("DisplayName", &hums_core_tests::short(param));
+        let meaning =
+            hums_core_tests::meaning(param).map_or_else(String::new, |meaning| format!("{meaning} "));
+        let (more, default) = (hums_core_tests::long(param), number(spec.default));
         say("Description", &format!("{meaning}{more} Default: {default}."));
         say("Units", &words.unit);
         say("Range", &format!("{} {}", spec.min, spec.max));

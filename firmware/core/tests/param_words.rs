@@ -1,10 +1,10 @@
 //! Texts of a parameter for editors and lists: the words of its row, or of its check if it is the limit of one.
-//! Documents, component information and Mission Planner's file are made of them; the firmware does not use them.
+//! Documents, component information and Mission Planner's file are made of them by tests.
 
 use core::fmt;
 
-use crate::health::{Check, Side, checks, vocabulary};
-use crate::params::Param;
+use hums_core::health::{Check, Side, checks, vocabulary};
+use hums_core::params::Param;
 
 /// Decimal places that a quantity is shown with.
 pub const DECIMAL_PLACES: u8 = 3;
