@@ -39,23 +39,20 @@ pub const ENDED: f32 = -1.0;
 /// (`docs/stations/hums_texts.lua`), and marked texts of others in `ArduPilot`'s log
 /// (`GCS_MAVLINK::handle_statustext`).
 pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
-    const NOTICE: u8 = 5;
-    const WARNING: u8 = 4;
-    const ALERT: u8 = 1;
     const REPEATED: [&[u8]; 3] = [b"HUMS: ", b"SRC=", b"GCS:"];
     if REPEATED.iter().any(|mark| text.starts_with(mark)) {
         return None;
     }
-    let severity = severity.filter(|severity| *severity != ALERT);
-    if severity.is_some_and(|severity| severity >= NOTICE) {
-        return None;
-    }
+    // MAV_SEVERITY: 1 is alert, 4 warning, 5 notice.
+    let severity = match severity {
+        Some(1) => None,
+        Some(5..) => return None,
+        severity => severity,
+    };
     match texts::meaning(text, severity.is_some()) {
         Meaning::Wrong(alert) => Some(alert),
         Meaning::Fine => None,
-        Meaning::Unknown => {
-            severity.filter(|severity| *severity < WARNING).map(|_| Alert::warning(Cause::Other))
-        }
+        Meaning::Unknown => severity.filter(|severity| *severity < 4).map(|_| Alert::warning(Cause::Other)),
     }
 }
 
@@ -76,13 +73,10 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 /// - PX4: 10 GPS glitch, 11 accelerometer error.
 /// - ArduPilot: 15 GPS glitching. It also sets this one indoors without GPS, with beacons, optical flow or vision.
 pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
-    const PX4_GLITCH: u32 = 1 << 10;
-    const PX4_ACCELEROMETER: u32 = 1 << 11;
-    const ARDUPILOT_GLITCH: u32 = 1 << 15;
     let flags = estimator.flags;
     let (glitch, accelerometer) = match estimator.scale {
-        EstimatorScale::TestRatio => (PX4_GLITCH, PX4_ACCELEROMETER),
-        EstimatorScale::Variance => (ARDUPILOT_GLITCH, 0),
+        EstimatorScale::TestRatio => (1 << 10, 1 << 11),
+        EstimatorScale::Variance => (1 << 15, 0),
     };
     let glitch = if had_both && has_fix { glitch } else { 0 };
     let said =

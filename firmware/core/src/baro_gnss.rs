@@ -10,28 +10,24 @@
 //!    while the vehicle climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`.
 //!    The change of the whole dynamic pressure is taken off.
 //! 4. The wrong height after a leap ([`Heights::receiver_leapt`]): the estimator's climb decides, which over so short
-//!    a time is its accelerometer's. If the receiver's height moved within [`VOTE_S`] without that climb, and the
+//!    a time is its accelerometer's. If the receiver's height moved within [`RECEIVER_S`] without that climb, and the
 //!    barometer's by less than half as much, the receiver is wrong. A slow drift takes the estimator along and is
 //!    blamed on neither.
 
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
-use crate::motion::{SPEED_MAX_MPS, climb_mps, ground_speed_mps};
+use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::pressure::SCALE_HEIGHT_M;
-use crate::residual::{Comparison, Residuals, smooth};
+use crate::residual::{Comparison, LATE_S, RECEIVER_S, Residuals, smooth};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, Hectopascals};
 use crate::vehicle::Vehicle;
 
 /// Error of the standard atmosphere as a part of the climb, in air that is 28 K warmer or colder.
 const SCALE_PART: f32 = 0.1;
-/// Delay of messages on a link: a step takes that much longer or shorter.
-const LATE_S: f32 = 0.3;
 /// Delay of a receiver's height, s: 1 for those of 2013.
 const RECEIVER_LATE_S: f32 = 1.0;
-/// Heights and climb are summed over this time, s, when they vote.
-const VOTE_S: f32 = 4.0;
 /// Time constant of the usual height and speed, s.
 const AIR_S: f32 = 30.0;
 /// A sample with a greater leap is one wrong message, unless the next one leaps too. No vehicle climbs so fast, m/s,
@@ -40,7 +36,7 @@ const LEAPS_MPS: f32 = 50.0;
 const LEAPS_M: f32 = 5.0;
 
 state! {
-    /// Movement of a height without a climb, within [`VOTE_S`].
+    /// Movement of a height without a climb, within [`RECEIVER_S`].
     #[derive(Clone, Copy, Debug)]
     struct Leap {
         /// The last height, m, and when it was measured.
@@ -63,7 +59,7 @@ impl Leap {
             return;
         };
         let step_s = step.as_secs_f32();
-        let kept = VOTE_S / (VOTE_S + step_s);
+        let kept = RECEIVER_S / (RECEIVER_S + step_s);
         let leapt_m = kept * (self.leapt_m + risen_m - climb_mps * step_s);
         self.leapt_m = if leapt_m.is_finite() { leapt_m } else { 0.0 };
         self.late_m = (kept * self.late_m).max(RECEIVER_LATE_S * libm::fabsf(climb_mps));
@@ -141,9 +137,9 @@ impl Heights {
             let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * changed_mps;
             residuals.take(Comparison::BaroNoise, at, gates, (off_m - late_m).max(0.0), 0.0);
         }
-        let display = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
+        let display = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb?.sane());
         // Zero is sent if no climb is known.
-        if let Some(climb_mps) = display.filter(|climb| climb.abs() > 0.0 && climb.abs() <= SPEED_MAX_MPS) {
+        if let Some(climb_mps) = display.filter(|climb| climb.abs() > 0.0) {
             let missing_m = risen_m - step_s * climb_mps;
             let by_wind_m = libm::fabsf(wind_m - before.wind_m);
             let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);

@@ -5,7 +5,6 @@ use crate::cells::Cells;
 use crate::crosscheck::Crosschecks;
 use crate::flight::{Flight, FlightEvent};
 use crate::gates;
-use crate::inertial::FORCE_MAX;
 use crate::latest::{Latest, Reading};
 use crate::motion::MOTION_AGE;
 use crate::motors::Motors;
@@ -52,18 +51,20 @@ state! {
         resumed: Instant,
         /// The longest pause of late between two observations, s.
         pause_s: f32,
-        had_fix: [bool; RECEIVERS_MAX],
+        /// Receivers that have had a 3D fix since power-on.
+        pub(crate) had_fix: [bool; RECEIVERS_MAX],
         clips: Lately,
         clips_known: bool,
-        frames_lost: Lately,
-        write_errors: Lately,
+        /// Frames that our own recording lost, and block writes that the card refused.
+        pub(crate) frames_lost: Lately,
+        pub(crate) write_errors: Lately,
     }
 }
 
 state! {
     /// A count of the last ten seconds, of one that only rises.
     #[derive(Clone, Copy, Debug)]
-    struct Lately {
+    pub(crate) struct Lately {
         count: u32,
         before: u32,
         rose_at: Stamp,
@@ -82,7 +83,7 @@ impl Lately {
         }
     }
 
-    const fn lately(&self) -> f32 {
+    pub(crate) const fn lately(&self) -> f32 {
         self.count.saturating_sub(self.before) as f32
     }
 }
@@ -271,26 +272,13 @@ impl Derived {
     pub(crate) fn load_factor_g(&self) -> Option<f32> {
         self.load_factor.get().map(|[_, smooth_g]| *smooth_g)
     }
-
-    /// Whether a receiver has had a 3D fix since power-on.
-    pub(crate) fn had_fix(&self, receiver: u8) -> bool {
-        self.had_fix.get(usize::from(receiver)).copied().unwrap_or(false)
-    }
-
-    /// Frames that our own recording lost in the last ten seconds.
-    pub(crate) fn frames_lost_lately(&self) -> f32 {
-        self.frames_lost.lately()
-    }
-
-    /// Block writes that the card refused in the last ten seconds.
-    pub(crate) const fn write_errors_lately(&self) -> f32 {
-        self.write_errors.lately()
-    }
 }
 
 /// A sample of the specific force in units of gravity; `None` where it was not measured.
 pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
-    Some(norm(force.map(|axis| axis.0))).filter(|force| *force <= FORCE_MAX).map(|force| force / GRAVITY)
+    Some(norm(force.map(|axis| axis.0)))
+        .filter(|force| *force <= MetresPerSecond2::MAX)
+        .map(|force| force / GRAVITY)
 }
 
 /// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.

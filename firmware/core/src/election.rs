@@ -14,12 +14,10 @@ use crate::time::{Instant, Span};
 
 /// Autopilots that are compared; others are not counted.
 const CANDIDATES_MAX: usize = 4;
-/// How long after the first heartbeat another system may take its place.
+/// How long after the first heartbeat another system may take its place. Observations are counted in windows of this length.
 pub const SETTLES: Span = Span::from_secs(10);
 /// How long the vehicle must have been silent before another one is chosen.
 pub const SILENT: Span = Span::from_secs(30);
-/// Observations are counted in windows of this length.
-const WINDOW: Span = Span::from_secs(10);
 /// Observations in a window that make a stream: heartbeats alone, one a second, are fewer.
 const STREAM_MIN: u16 = 20;
 /// Time in which one system is asked. Its streams are awaited for 5 s before it is asked message by message, or by
@@ -155,7 +153,7 @@ impl Election {
     }
 
     fn count(&mut self, at: Instant, vehicle: Option<Source>, source: Source, heartbeat: Option<Autopilot>) {
-        if at.since(self.window) >= WINDOW {
+        if at.since(self.window) >= SETTLES {
             self.window = at;
             for candidate in self.candidates.iter_mut().flatten() {
                 (candidate.before, candidate.now) = (candidate.now, 0);

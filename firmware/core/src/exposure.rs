@@ -7,8 +7,6 @@ use crate::vehicle::Vehicle;
 
 /// Ranges of a quantity.
 pub const BINS: usize = 8;
-/// Hotter than anything that still measures: garbage.
-const CELSIUS_MAX: f32 = 1_000.0;
 
 numbered! {
     /// A quantity that ages a part.
@@ -48,23 +46,21 @@ impl Quantity {
     }
 
     fn value(self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) -> Option<f32> {
-        let hottest = |temperature: Option<Celsius>, other: Option<f32>| match (temperature, other) {
-            (Some(Celsius(one)), Some(other)) if one.abs() <= CELSIUS_MAX => Some(other.max(one)),
-            (Some(Celsius(one)), None) if one.abs() <= CELSIUS_MAX => Some(one),
-            _ => other,
-        };
+        fn hottest(temperatures: impl Iterator<Item = Option<Celsius>>) -> Option<f32> {
+            temperatures.flatten().filter_map(Celsius::sane).reduce(f32::max)
+        }
         match self {
             Self::EscTemperature => {
                 let motors = vehicle.motors.iter();
                 let fresh = motors.filter(|motor| motor.state_at.is_some_and(|at| now.since(at) <= SILENT));
-                fresh.fold(None, |hot, motor| hottest(motor.esc.temperature, hot))
+                hottest(fresh.map(|motor| motor.esc.temperature))
             }
             Self::BatteryTemperature => {
                 let batteries = vehicle.batteries.iter().filter_map(|slot| slot.within(now, SILENT));
-                batteries.fold(None, |hot, battery| hottest(battery.temperature, hot))
+                hottest(batteries.map(|battery| battery.temperature))
             }
             Self::McuTemperature => {
-                hottest(vehicle.processor.within(now, SILENT).and_then(|mcu| mcu.temperature), None)
+                hottest(vehicle.processor.within(now, SILENT).into_iter().map(|mcu| mcu.temperature))
             }
             Self::Vibration => vehicle.vibration.within(now, SILENT).filter(|_| vehicle.armed())?.highest(),
             Self::Current => current_a.filter(|_| vehicle.armed()),

@@ -14,7 +14,7 @@
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
-use crate::observation::{Autopilot, MOTORS_MAX, VehicleKind};
+use crate::observation::{MOTORS_MAX, VehicleKind};
 use crate::params::Params;
 use crate::power_draw::drawn;
 use crate::time::{Instant, PAUSE, Span, Stamp};
@@ -63,26 +63,17 @@ impl Quantity {
 
     /// All of them, by [`Self::index`].
     pub fn all() -> impl Iterator<Item = Self> {
-        (0..Self::COUNT).filter_map(Self::from_index)
+        let each = |count: usize, of: fn(u8) -> Self| (0..count as u8).map(of);
+        let first = [Self::Vibration, Self::HoverThrottle].into_iter();
+        let with_motors =
+            first.chain(each(BATTERIES_MAX, Self::Resistance)).chain(each(MOTORS_MAX, Self::MotorSpeed));
+        let with_outputs = with_motors.chain([Self::HoverPower]).chain(each(OUTPUTS_MAX, Self::MotorOutput));
+        with_outputs.chain(each(BATTERIES_MAX, Self::Capacity))
     }
 
     /// The quantity of a place in the record.
-    pub const fn from_index(index: usize) -> Option<Self> {
-        const RESISTANCES: usize = Quantity::Resistance(0).index();
-        const SPEEDS: usize = Quantity::MotorSpeed(0).index();
-        const POWER: usize = Quantity::HoverPower.index();
-        const OUTPUTS: usize = Quantity::MotorOutput(0).index();
-        const CAPACITIES: usize = Quantity::Capacity(0).index();
-        match index {
-            0 => Some(Self::Vibration),
-            1 => Some(Self::HoverThrottle),
-            RESISTANCES..SPEEDS => Some(Self::Resistance((index - RESISTANCES) as u8)),
-            SPEEDS..POWER => Some(Self::MotorSpeed((index - SPEEDS) as u8)),
-            POWER => Some(Self::HoverPower),
-            OUTPUTS..CAPACITIES => Some(Self::MotorOutput((index - OUTPUTS) as u8)),
-            CAPACITIES..Self::COUNT => Some(Self::Capacity((index - CAPACITIES) as u8)),
-            _ => None,
-        }
+    pub fn from_index(index: usize) -> Option<Self> {
+        Self::all().nth(index)
     }
 
     /// Its place in the record, which never changes.
@@ -251,10 +242,6 @@ fn sample(
     }
 }
 
-fn is_linear_in_thrust(vehicle: &Vehicle) -> bool {
-    vehicle.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot)
-}
-
 /// The air's density as a part of that at sea level.
 fn density(vehicle: &Vehicle) -> f32 {
     let pressure =
@@ -276,7 +263,7 @@ fn lift(now: Instant, vehicle: &Vehicle, derived: &Derived, params: &Params) -> 
         _ => 1.0,
     };
     let lift = volts * volts * density(vehicle);
-    Some(if is_linear_in_thrust(vehicle) { lift } else { libm::sqrtf(lift.max(0.0)) })
+    Some(if vehicle.is_ardupilot() { lift } else { libm::sqrtf(lift.max(0.0)) })
 }
 
 #[cfg(test)]

@@ -37,38 +37,34 @@ mod witness;
 
 use crate::latest::{Latest, Reading};
 use crate::mishap::{Change, Kind, Place, Report};
-use crate::motion::{Kinematics, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
+use crate::motion::{Kinematics, MOVES_MPS, OFF, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
 use crate::params::Params;
 use crate::pressure::Pressure;
 use crate::thrust::{Power, Thrust};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, SILENT, Span, Stamp};
 use crate::units::norm;
-use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+use crate::vehicle::Vehicle;
 use disarming::DisarmWatch;
 use signs::{Peak, Shock, Signs};
 use touchdown::Touchdown;
 use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 
-/// Below this throttle rotors are off, or as slow as they go.
-const OFF: f32 = 0.05;
 /// In the air for so long it has left the ground.
 const SETTLED: Span = Span::from_secs(3);
 /// Steady flight is not tilted further, rad.
 const STEADY_TILT_RAD: f32 = 0.26;
 /// Vertical speed from which it is a climb or a descent, m/s; half of it near the ground.
 const VERTICAL_MPS: f32 = 0.7;
-/// Speed over ground from which it is a cruise, m/s.
-const CRUISE_MPS: f32 = 1.5;
 /// Within this height of the place of arming it takes off or lands, m.
 const NEAR_GROUND_M: f32 = 3.0;
 /// A clear majority moves the phase after so long: one wrong message at 2 Hz does not last.
 const BRIEF: Span = Span::from_millis(600);
 /// A majority against the word begins a flight after so long, as long as a landed state lasts that is not told again.
-const LONG: Span = LANDED_STATE_AGE;
+const LONG: Span = SILENT;
 /// A majority without the word ends one after so long: a slow hover near the ground is shorter.
 const LANDS: Span = Span::from_secs(2);
-/// On the ground, still armed, for so long: the flight is over. A plane rolls on from a touch-and-go within this.
+/// On the ground, still armed, for so long: the flight is over, and the vehicle is known to stand. A plane rolls on from a touch-and-go within this.
 const GROUND_LASTS: Span = Span::from_secs(8);
 /// How long after disarming it is watched.
 const WATCHED: Span = Span::from_secs(10);
@@ -588,7 +584,7 @@ impl Flight {
             Phase::Climb
         } else if climb_mps < -VERTICAL_MPS {
             Phase::Descent
-        } else if ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > CRUISE_MPS) {
+        } else if ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > MOVES_MPS) {
             Phase::Cruise
         } else {
             Phase::Hover

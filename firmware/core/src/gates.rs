@@ -3,8 +3,8 @@
 use crate::flight::Flight;
 use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
-use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
-use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+use crate::time::{FRESH, Instant, PAUSE, SILENT, Span, Stamp};
+use crate::vehicle::Vehicle;
 
 /// In the air.
 pub(crate) const AIRBORNE: u16 = 1 << 0;
@@ -91,7 +91,7 @@ fn is_level(now: Instant, vehicle: &Vehicle) -> bool {
 }
 
 fn is_clear(now: Instant, vehicle: &Vehicle) -> bool {
-    let landed = vehicle.landed.within(now, LANDED_STATE_AGE);
+    let landed = vehicle.landed.within(now, SILENT);
     !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
         && vehicle
             .global

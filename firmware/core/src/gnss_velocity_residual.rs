@@ -1,7 +1,7 @@
 //! A receiver's velocity against the movement of its position: both come from the same signals, by different
 //! measurements.
 //!
-//! The difference is smoothed with [`MEMORY_S`], as a vector, so that an error in one direction does not hide in
+//! The difference is smoothed with [`RECEIVER_S`], as a vector, so that an error in one direction does not hide in
 //! turns. A position that is repeated bit for bit is the same measurement. A receiver's filters may delay one of the
 //! two by [`LATE_S`]: that part of the change of velocity is taken off.
 //!
@@ -11,20 +11,13 @@
 use core::num::NonZeroU32;
 
 use crate::latest::Reading;
-use crate::motion::SPEED_MAX_MPS;
 use crate::observation::Gnss;
-use crate::residual::smooth;
+use crate::residual::{LATE_S, RECEIVER_S, smooth};
 use crate::time::{Instant, PAUSE, Span, Stamp};
-use crate::units::Position;
+use crate::units::{Metres, Position};
 
-/// Time constant, s; nothing is judged before it has passed.
-const MEMORY_S: f32 = 4.0;
-/// Delay of one of the two against the other, s.
-const LATE_S: f32 = 0.3;
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = 0.011_132;
-/// Greater jumps, m, are garbage or the date line.
-const JUMP_MAX_M: f32 = 100_000.0;
 
 /// One measurement of a receiver.
 #[derive(Clone, Copy, Debug)]
@@ -72,14 +65,14 @@ impl GnssVelocity {
         let units = [0, 1].map(|axis| fix.place[axis].wrapping_sub(before.place[axis]) as f32 * UNIT_M);
         let latitude = fix.place[0] as f32 * 1e-7;
         let moved_m = [units[0], units[1] * libm::cosf(latitude.to_radians())];
-        // A step without time is skipped.
-        let is_leap = moved_m.iter().any(|moved_m| libm::fabsf(*moved_m) > JUMP_MAX_M);
+        // A step without time is skipped, and garbage, and the date line.
+        let is_leap = moved_m.iter().any(|moved_m| Metres(*moved_m).sane().is_none());
         if step_ms == 0 || step > PAUSE || is_leap {
             *self = begun;
             return;
         }
         let step_s = step.as_secs_f32();
-        let weight = step_s / (MEMORY_S + step_s);
+        let weight = step_s / (RECEIVER_S + step_s);
         let off = [0, 1]
             .map(|axis| f32::midpoint(fix.velocity[axis], before.velocity[axis]) - moved_m[axis] / step_s);
         smooth(&mut self.off, off, weight, f32::INFINITY);
@@ -91,8 +84,8 @@ impl GnssVelocity {
     pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
         let velocity = self.before?.velocity;
         let changed_mps = length([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
-        let off_mps = (length(self.off) - LATE_S / MEMORY_S * changed_mps).max(0.0);
-        Reading::new(self.at.instant(now).filter(|_| self.known_s >= MEMORY_S), Some(off_mps))
+        let off_mps = (length(self.off) - LATE_S / RECEIVER_S * changed_mps).max(0.0);
+        Reading::new(self.at.instant(now).filter(|_| self.known_s >= RECEIVER_S), Some(off_mps))
     }
 }
 
@@ -102,7 +95,7 @@ fn length([north, east]: [f32; 2]) -> f32 {
 
 /// Position and velocity of an exact receiver.
 fn fix(gnss: &Gnss) -> Option<Fix> {
-    let speed_mps = gnss.speed.map(|speed| speed.0).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))?;
+    let speed_mps = gnss.speed?.sane().filter(|speed| *speed >= 0.0)?;
     let course = gnss.course.map(|course| course.0).filter(|course| course.is_finite() && gnss.is_exact())?;
     let Position { latitude_deg, longitude_deg } = gnss.position?;
     Some(Fix {
@@ -114,7 +107,7 @@ fn fix(gnss: &Gnss) -> Option<Fix> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Metres, MetresPerSecond, Radians};
+    use crate::units::{MetresPerSecond, Radians};
 
     /// The residual of a flight whose velocity turns once in `turn_s` and is reported with `error_mps`, north and
     /// east. Each position comes twice. `measured` is the time of a step, ms.

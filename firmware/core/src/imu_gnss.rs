@@ -16,14 +16,13 @@
 //! degrees on the change of velocity is taken off. So a compass that led the attitude astray hardly shows here.
 
 use crate::gates::{self, Gates};
-use crate::inertial::FORCE_MAX;
 use crate::latest::Reading;
 use crate::motion::climb_within;
 use crate::observation::Gnss;
 use crate::residual::smooth;
 use crate::rotation::to_earth;
 use crate::time::{Instant, Span, Stamp};
-use crate::units::{GRAVITY, norm};
+use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::Vehicle;
 
 /// Maximum age of an attitude and of forces that are of one moment.
@@ -67,7 +66,7 @@ state! {
 
 impl ImuGnssResidual {
     pub(crate) fn take_force(&mut self, force: [f32; 3]) {
-        if !force.iter().all(|axis| axis.abs() <= FORCE_MAX) {
+        if !force.iter().all(|axis| axis.abs() <= MetresPerSecond2::MAX) {
             return;
         }
         // On the ground no step takes them.

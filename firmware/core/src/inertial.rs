@@ -17,11 +17,9 @@
 
 use crate::motion::TILTED_RAD;
 use crate::observation::Imu;
-use crate::time::{FRESH, Instant, Span, Stamp};
+use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
-/// No autopilot's sensor measures more than 32 g an axis: beyond this, m/s2, a value is garbage.
-pub(crate) const FORCE_MAX: f32 = 60.0 * GRAVITY;
 /// Time constant of the force, of 0.53 Hz: a shock counts for little, a lasting turn fully.
 const SMOOTHING_S: f32 = 0.3;
 /// Minimum time level and still.
@@ -53,8 +51,6 @@ const SHAKES_MPS2: f32 = 0.01;
 /// Rotors that carry a vehicle make the steps larger than this, m/s2. The least of real flights is 0.11 (5 % of 13
 /// logs), the most of standing boards 0.09 (95 % of 6 logs, without handling). Simulators have no noise.
 const CALM_MPS2: f32 = 0.1;
-/// A longer gap between samples ends each course, s.
-const GAP_S: f32 = 2.0;
 /// Time that it must lie over.
 pub(crate) const LIES: Span = Span::from_millis(700);
 
@@ -124,7 +120,7 @@ impl Inertial {
     fn take_force(&mut self, at: Instant, force: [f32; 3]) {
         let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
         let [x, y, z] = force;
-        let is_measured = x * x + y * y + z * z <= FORCE_MAX * FORCE_MAX;
+        let is_measured = x * x + y * y + z * z <= MetresPerSecond2::MAX * MetresPerSecond2::MAX;
         if step_s == 0.0 || !is_measured {
             return;
         }
@@ -141,7 +137,7 @@ impl Inertial {
         // No root: squares of cosines, with the sign of z, which is negative for an upright vehicle.
         let level = rests && self.still && z < 0.0 && z * z > LEVEL * LEVEL * square;
         let over = rests && (z > 0.0 || z * z < OVER * OVER * square);
-        if step_s >= GAP_S {
+        if step_s >= PAUSE.as_secs_f32() {
             (self.rests_since, self.level_since, self.over_since) = (Stamp::NONE, Stamp::NONE, Stamp::NONE);
         }
         self.rests_since.run(rests && self.still, at, Span::ZERO);

@@ -10,16 +10,11 @@ pub struct Latest<T> {
 
 impl<T> Default for Latest<T> {
     fn default() -> Self {
-        Self::nothing()
+        Self { slot: None }
     }
 }
 
 impl<T> Latest<T> {
-    /// No value.
-    pub const fn nothing() -> Self {
-        Self { slot: None }
-    }
-
     /// Replaces the value.
     pub fn set(&mut self, at: Instant, value: T) {
         self.slot = Some((at, value));
@@ -75,7 +70,7 @@ mod tests {
 
     #[test]
     fn a_value_ages() {
-        let mut latest = Latest::nothing();
+        let mut latest = Latest::default();
         assert_eq!(latest.within(Instant::ZERO, Span::from_secs(9)), None);
         latest.set(Instant::from_millis(100), 7);
         assert_eq!(latest.within(Instant::from_millis(600), Span::from_millis(500)), Some(&7));

@@ -7,9 +7,8 @@ use crate::vehicle::Vehicle;
 
 /// Positions and speeds older than this decide nothing.
 pub(crate) const MOTION_AGE: Span = Span::from_secs(3);
-/// Nothing that is watched here is faster: garbage, which must not get into sums and maxima.
-pub(crate) const SPEED_MAX_MPS: f32 = 1_000.0;
-
+/// Below this part of throttle or output a motor is off, or as slow as it goes.
+pub(crate) const OFF: f32 = 0.05;
 /// With less throttle no rotors carry anything: hover takes a quarter to three quarters.
 pub(crate) const IDLE_THROTTLE: f32 = 0.1;
 
@@ -32,7 +31,8 @@ pub fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
 
 /// The speed through the air, in m/s.
 pub(crate) fn airspeed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
-    displayed(now, vehicle, |hud| Some(hud.airspeed?.0)).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
+    displayed(now, vehicle, |hud| Some(hud.airspeed?.0))
+        .filter(|speed| (0.0..=MetresPerSecond::MAX).contains(speed))
 }
 
 /// The altitude of the pilot's display, which is the barometer's without a position.
@@ -50,7 +50,7 @@ pub(crate) fn climb_within(now: Instant, vehicle: &Vehicle, age: Span) -> Option
     let global = vehicle.global.within(now, age).map(|global| -global.velocity[2].0);
     let local = || vehicle.local.within(now, age).map(|local| -local.velocity[2].0);
     let hud = || vehicle.hud.within(now, age).and_then(|hud| hud.climb).map(|climb| climb.0);
-    global.or_else(local).or_else(hud).filter(|climb| climb.abs() <= SPEED_MAX_MPS)
+    global.or_else(local).or_else(hud).filter(|climb| climb.abs() <= MetresPerSecond::MAX)
 }
 
 /// Speed over ground from the best source that is fresh, in m/s.
@@ -59,7 +59,7 @@ pub fn ground_speed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     let global = vehicle.global.within(now, MOTION_AGE).map(|global| level(global.velocity));
     let local = || vehicle.local.within(now, MOTION_AGE).map(|local| level(local.velocity));
     let hud = || displayed(now, vehicle, |hud| Some(hud.groundspeed?.0));
-    global.or_else(local).or_else(hud).filter(|speed| (0.0..=SPEED_MAX_MPS).contains(speed))
+    global.or_else(local).or_else(hud).filter(|speed| (0.0..=MetresPerSecond::MAX).contains(speed))
 }
 
 /// Beyond 45 degrees of roll or pitch rotors carry less than 0.7 of their thrust upwards. No level flight is there,

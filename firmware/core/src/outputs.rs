@@ -38,7 +38,7 @@ use core::ops::RangeInclusive;
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::figures::OUTPUTS_MAX;
 use crate::flight::Flight;
-use crate::motion::IDLE_THROTTLE;
+use crate::motion::{IDLE_THROTTLE, OFF};
 use crate::observation::{MOTORS_MAX, Outputs};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::Vehicle;
@@ -68,8 +68,6 @@ const SUM_MAX_PERCENT: f32 = 12.0;
 const SHUT_OFF_SHARE: f32 = -70.0;
 /// A motor at the end of its range stands out by so much, percent, and none by more.
 const SATURATED_PERCENT: f32 = 100.0;
-/// A motor that is given less is given nothing.
-const OFF: f32 = 0.05;
 /// Outputs end here or beyond: `MOT_PWM_MAX` of ArduPilot is 1950 us, `PWM_MAIN_MAX` of PX4 2000.
 const FULL: f32 = 0.94;
 /// Two thirds of the range: an output above it shares the load with one at the end, as in a turn or a climb.

@@ -4,10 +4,6 @@ use crate::time::{Instant, PAUSE, SILENT};
 use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
 
-/// Beyond these a value is garbage: no vehicle here reaches them.
-const VOLTS_MAX: f32 = 1_000.0;
-const AMPERES_MAX: f32 = 10_000.0;
-
 /// Voltage of the first battery (or the autopilot's figure if none reports itself), and discharge current and power
 /// of all batteries. Without a battery current: the sum of all ESCs (PX4 in simulation).
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,8 +47,8 @@ pub(crate) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f6
 impl Drawn {
     /// Garbage is left out: the sums are permanent.
     fn add(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
-        let voltage_v = voltage.map(|voltage| voltage.0).filter(|volts| (0.0..=VOLTS_MAX).contains(volts));
-        let current_a = current.map(|current| current.0).filter(|amperes| amperes.abs() <= AMPERES_MAX);
+        let voltage_v = voltage.and_then(Volts::sane).filter(|volts| *volts >= 0.0);
+        let current_a = current.and_then(Amperes::sane);
         self.voltage_v = self.voltage_v.or(voltage_v);
         if let Some(current_a) = current_a {
             let discharge_a = current_a.max(0.0);

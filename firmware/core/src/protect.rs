@@ -41,8 +41,8 @@ use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
 use crate::params::{Param, Params};
-use crate::time::{Instant, PAUSE, Span, Stamp};
-use crate::vehicle::{BATTERIES_MAX, LANDED_STATE_AGE, Vehicle};
+use crate::time::{Instant, PAUSE, SILENT, Span, Stamp};
+use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Bytes of a text that a ground station shows to the pilot: one `STATUSTEXT`.
 pub const TEXT_BYTES_MAX: usize = 50;
@@ -60,9 +60,6 @@ const MISSION_ENDS: Span = Span::from_secs(3);
 /// A mission that sinks faster than this, within this height of home, may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
-/// A sign of landing that has lasted so long is believed. One message proves nothing, nor do the pauses of a stream
-/// at 1 Hz.
-const LANDING_SHOWS: Span = PAUSE;
 /// Time after the last sign of landing in which a vehicle still lands: it may flare.
 const LANDING_LASTS: Span = Span::from_secs(15);
 /// A mode change is the autopilot's own if a sign of that comes within this time, before or after.
@@ -320,7 +317,8 @@ impl Protect {
         let cancelled = core::mem::take(&mut self.cancelled);
         let changed = self.note_mode(now, vehicle);
         let lands_now = is_landing(situation);
-        if self.lands_since.run(lands_now, now, LANDING_SHOWS) {
+        // One message proves nothing, nor do the pauses of a stream at 1 Hz.
+        if self.lands_since.run(lands_now, now, PAUSE) {
             self.landing_at = Stamp::at(now);
         }
         if !flight.is_open() {
@@ -535,7 +533,7 @@ fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bo
 /// Whether the vehicle shows a sign of landing: by its landed state, because it sinks close to the ground, or in a mission.
 fn is_landing(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, flight, .. } = *situation;
-    vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::Landing)
+    vehicle.landed.within(now, SILENT) == Some(&LandedState::Landing)
         || flight.phase(now, vehicle) == Phase::Landing
         || approaches(situation)
 }

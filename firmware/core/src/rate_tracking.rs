@@ -25,8 +25,6 @@ const FRESH: Span = Span::from_millis(150);
 const HOLE: Span = Span::from_millis(1_500);
 /// This part of the rates of the setpoint may be missing.
 const LATE_PART: f32 = 0.3;
-/// No vehicle turns faster, rad/s: garbage.
-const RATE_MAX: f32 = 60.0;
 /// At full throttle multicopters climb faster than this, m/s, unless tilted further, rad; planes sink more slowly.
 const CLIMBS_MPS: f32 = 0.3;
 const TILT_RAD: f32 = 0.52;
@@ -64,8 +62,7 @@ pub(crate) fn take_attitude(
     let (Some(setpoint), Some([roll, pitch, _])) = (setpoint.within(at, FRESH), attitude.rates) else {
         return;
     };
-    let is_sane = |rate: &RadiansPerSecond| rate.0.abs() <= RATE_MAX;
-    if setpoint.iter().chain(&[roll, pitch]).all(is_sane) {
+    if setpoint.iter().chain(&[roll, pitch]).all(|rate| rate.sane().is_some()) {
         for ((of, setpoint), flown) in Comparison::RATES.into_iter().zip(setpoint).zip([roll, pitch]) {
             residuals.take(of, at, gates, setpoint.0 - flown.0, LATE_PART * setpoint.0.abs());
         }

@@ -27,6 +27,11 @@ use crate::latest::Reading;
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::RECEIVERS_MAX;
 
+/// Delay of one message, or of one of a receiver's figures, against another, s.
+pub(crate) const LATE_S: f32 = 0.3;
+/// Time over which a receiver's position and height are compared with its speed and the climb, s.
+pub(crate) const RECEIVER_S: f32 = 4.0;
+
 /// Which side of the baseline is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {

@@ -5,7 +5,7 @@
 pub const GRAVITY: f32 = 9.806_65;
 
 macro_rules! units {
-    ($($(#[$doc:meta])* $name:ident, $symbol:literal;)*) => {$(
+    ($($(#[$doc:meta])* $name:ident, $symbol:literal $(, $max:expr)?;)*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
         pub struct $name(pub f32);
@@ -13,6 +13,16 @@ macro_rules! units {
         impl $name {
             /// The unit's symbol as findings and reports print it.
             pub const SYMBOL: &'static str = $symbol;
+
+            $(
+                /// Greater values, in either direction, are garbage: no vehicle here reaches them.
+                pub const MAX: f32 = $max;
+
+                /// The number, unless it is garbage.
+                pub fn sane(self) -> Option<f32> {
+                    (self.0.abs() <= Self::MAX).then_some(self.0)
+                }
+            )?
 
             /// The value if it is a number; NaN and infinities are nothing that a sensor can have measured.
             pub fn finite(self) -> Option<Self> {
@@ -24,27 +34,27 @@ macro_rules! units {
 
 units! {
     /// Electric potential.
-    Volts, "V";
+    Volts, "V", 1_000.0;
     /// Electric current.
-    Amperes, "A";
+    Amperes, "A", 10_000.0;
     /// Electric charge.
     AmpereHours, "Ah";
     /// Energy.
     WattHours, "Wh";
     /// Temperature.
-    Celsius, "degC";
+    Celsius, "degC", 1_000.0;
     /// Length.
-    Metres, "m";
+    Metres, "m", 100_000.0;
     /// Speed.
-    MetresPerSecond, "m/s";
-    /// Acceleration.
-    MetresPerSecond2, "m/s2";
+    MetresPerSecond, "m/s", 1_000.0;
+    /// Acceleration. No autopilot's sensor measures more than 32 g an axis.
+    MetresPerSecond2, "m/s2", 60.0 * GRAVITY;
     /// Angle.
     Radians, "rad";
     /// Angular speed.
-    RadiansPerSecond, "rad/s";
+    RadiansPerSecond, "rad/s", 60.0;
     /// Revolutions a minute; negative is reverse.
-    Rpm, "rpm";
+    Rpm, "rpm", 1e6;
     /// Pressure.
     Hectopascals, "hPa";
     /// Magnetic flux density: the earth's is 0.25 to 0.65.

@@ -13,15 +13,13 @@ use crate::observation::{
     MOTORS_MAX, Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime,
     TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
-use crate::time::{Instant, Span};
+use crate::time::{Instant, SILENT, Span};
 use crate::units::{MetresPerSecond, Radians, Rpm};
 
 /// Batteries that are monitored.
 pub const BATTERIES_MAX: usize = 4;
 /// GNSS receivers that are monitored.
 pub const RECEIVERS_MAX: usize = 2;
-/// `EXTENDED_SYS_STATE` comes at 1 Hz or faster where it comes at all.
-pub const LANDED_STATE_AGE: Span = Span::from_secs(5);
 /// `MAV_COMP_ID_BATTERY`, `MAV_COMP_ID_BATTERY2`
 const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
 /// Boot times follow each other within this of the time that went by, milliseconds: messages overtake each other and wait in line.
@@ -220,12 +218,12 @@ impl Vehicle {
         match self.kind() {
             VehicleKind::Rotorcraft => Some(true),
             VehicleKind::Plane => Some(false),
-            VehicleKind::Vtol => match (self.vtol, self.landed.within(now, LANDED_STATE_AGE)) {
+            VehicleKind::Vtol => match (self.vtol, self.landed.within(now, SILENT)) {
                 (VtolState::Hover, Some(_)) => Some(true),
                 (VtolState::Forward, Some(_)) => Some(false),
                 (VtolState::Transition, Some(_)) => None,
                 _ => {
-                    let hud = self.hud.within(now, LANDED_STATE_AGE)?;
+                    let hud = self.hud.within(now, SILENT)?;
                     let speed_mps = hud.airspeed.into_iter().chain(hud.groundspeed).map(|speed| speed.0);
                     let speed_mps = speed_mps.reduce(f32::max)?;
                     let between = (ROTORS_MPS..WINGS_MPS).contains(&speed_mps);

@@ -4,14 +4,13 @@
 //! breaks off: it falls to half of the greatest sink of the last second ([`crate::motion::WindowMax`]). This speed counts if the vehicle stays at
 //! this height until it has landed. A stop higher up was a hover.
 
-use crate::time::{Instant, Span};
+use super::GROUND_LASTS;
+use crate::time::Instant;
 
 /// A slower sink does not count, m/s.
 const SINK_MIN_MPS: f32 = 0.3;
 /// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
 const SAME_HEIGHT_M: f32 = 1.5;
-/// A vehicle is known to stand this long after the touch, at most.
-const KNOWN_AFTER: Span = Span::from_secs(8);
 
 /// The end of a descent.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +31,7 @@ impl Touchdown {
             return;
         }
         let same = |stop: &Stop| {
-            (stop.height_m - height_m).abs() <= SAME_HEIGHT_M && at.since(stop.at) <= KNOWN_AFTER
+            (stop.height_m - height_m).abs() <= SAME_HEIGHT_M && at.since(stop.at) <= GROUND_LASTS
         };
         let stop = self.0.filter(same).filter(|stop| stop.sink_mps >= fastest_mps);
         self.0 = stop.or(Some(Stop { at, height_m, sink_mps: fastest_mps }));
@@ -41,7 +40,7 @@ impl Touchdown {
     /// The vehicle stands at this height: how fast it touched, m/s. 0 where nothing broke off: it came down gently.
     pub(super) fn take(&mut self, at: Instant, height_m: Option<f32>) -> f32 {
         let here = |stop: &Stop| {
-            at.since(stop.at) <= KNOWN_AFTER
+            at.since(stop.at) <= GROUND_LASTS
                 && height_m.is_none_or(|height_m| (stop.height_m - height_m).abs() <= SAME_HEIGHT_M)
         };
         self.0.take().filter(here).map_or(0.0, |stop| stop.sink_mps)

@@ -22,9 +22,9 @@ use crate::observation::{LandedState, VehicleKind};
 use crate::params::Params;
 use crate::pressure::NOISE_M;
 use crate::thrust::Power;
-use crate::time::{Instant, PAUSE, Span};
+use crate::time::{Instant, PAUSE, SILENT, Span};
 use crate::units::{GRAVITY, norm};
-use crate::vehicle::{LANDED_STATE_AGE, Vehicle};
+use crate::vehicle::Vehicle;
 
 /// Rotors pull upwards: what carries the vehicle from above by more than this, g, is the ground under its back.
 const ON_BACK_G: f32 = 0.5;
@@ -110,7 +110,7 @@ impl Flight {
     }
 
     fn word(&self, now: Instant, vehicle: &Vehicle) -> Vote {
-        match vehicle.landed.within(now, LANDED_STATE_AGE) {
+        match vehicle.landed.within(now, SILENT) {
             Some(LandedState::OnGround) => Stands,
             Some(LandedState::InAir | LandedState::Landing) if self.arming.is_on => Flies,
             // Taking off: from the spooling up of the motors until the height that was asked for is reached.

@@ -7,16 +7,15 @@ use super::inputs::Inputs;
 use super::suppression::{FAILSAFES, Group, Role};
 use crate::cause::Cause;
 use crate::latest::Reading;
-use crate::motion::{climb_mps, ground_speed_mps};
+use crate::motion::{STILL_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Heartbeat;
 use crate::params::Param;
 use crate::time::Span;
 
-/// A vehicle that was killed at its touchdown is at rest after [`COMES_TO_REST`]: level and still for [`RESTS`], slower than [`SLOW_MPS`]. In
+/// A vehicle that was killed at its touchdown is at rest after [`COMES_TO_REST`]: level and still for [`RESTS`], slower than [`STILL_MPS`]. In
 /// two real landings the sensors were still 0.6 and 1.2 s after the kill.
 const COMES_TO_REST: Span = Span::from_secs(2);
 const RESTS: Span = Span::from_millis(300);
-const SLOW_MPS: f32 = 1.0;
 
 const LOAD: Check = Check {
     name: "load",
@@ -50,7 +49,7 @@ pub(super) const CHECKS: &[Check] = &[
 fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     const ACTIVE: u8 = 4;
     let Inputs { now, vehicle, .. } = *inputs;
-    let slow = |speed_mps: Option<f32>| speed_mps.is_none_or(|speed_mps| libm::fabsf(speed_mps) < SLOW_MPS);
+    let slow = |speed_mps: Option<f32>| speed_mps.is_none_or(|speed_mps| libm::fabsf(speed_mps) < STILL_MPS);
     let rests = || {
         vehicle.inertial.is_level_for(now, RESTS)
             && slow(climb_mps(now, vehicle))

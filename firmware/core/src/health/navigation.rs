@@ -262,8 +262,9 @@ fn second_largest(estimator: &Estimator) -> Option<f32> {
 
 /// A second receiver that never had a fix is not fitted; it says nothing.
 fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f32>) -> Option<Reading> {
-    let slot = inputs.vehicle.gnss.get(usize::from(receiver))?;
-    slot.read(|gnss| value(gnss).filter(|_| inputs.derived.had_fix(receiver)))
+    let place = usize::from(receiver);
+    let had_fix = *inputs.derived.had_fix.get(place)?;
+    inputs.vehicle.gnss.get(place)?.read(|gnss| value(gnss).filter(|_| had_fix))
 }
 
 /// A receiver with half of the allowed inaccuracy is exact, with however few satellites: their number depends on the systems and bands that it

@@ -58,12 +58,6 @@ pub enum ItemKey {
 }
 
 impl ItemKey {
-    /// How many keys there are.
-    pub const COUNT: usize = Self::ALL.len();
-
-    const COMPONENT_FIRST: u8 = 16;
-    const SESSION: u8 = 24;
-
     /// All keys, by number.
     pub const ALL: [Self; 4 + COMPONENTS_MAX] = {
         let mut all = [Self::Session; 4 + COMPONENTS_MAX];
@@ -82,25 +76,14 @@ impl ItemKey {
             Self::Lifetime => 1,
             Self::Exceedances => 3,
             Self::Exposure => 4,
-            Self::Component(place) => Self::COMPONENT_FIRST + place,
-            Self::Session => Self::SESSION,
+            Self::Component(place) => 16 + place,
+            Self::Session => 24,
         }
     }
 
     /// The key of a stored number; `None` for an item that this version does not know.
     pub fn from_number(number: u8) -> Option<Self> {
         Self::ALL.into_iter().find(|key| key.number() == number)
-    }
-
-    /// Its place in [`Self::ALL`].
-    const fn index(self) -> usize {
-        match self {
-            Self::Lifetime => 0,
-            Self::Exceedances => 1,
-            Self::Exposure => 2,
-            Self::Component(place) => 3 + place as usize,
-            Self::Session => 3 + COMPONENTS_MAX,
-        }
     }
 }
 
@@ -330,9 +313,8 @@ mod tests {
     fn keys_have_numbers_of_their_own() {
         let known = (0..=255).filter_map(ItemKey::from_number);
         assert!(known.eq(ItemKey::ALL), "each number is one key's");
-        for (index, key) in ItemKey::ALL.into_iter().enumerate() {
+        for key in ItemKey::ALL {
             assert_eq!(ItemKey::from_number(key.number()), Some(key));
-            assert_eq!(key.index(), index);
         }
         assert_eq!((ItemKey::Lifetime.number(), ItemKey::Component(7).number()), (1, 23));
     }

@@ -36,20 +36,18 @@ state! {
     /// The items that wait to be saved.
     #[derive(Clone, Copy, Debug)]
     pub struct Saving {
-        /// Items that changed since they were saved, one bit each by [`ItemKey::index`].
-        changed: u16 = Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
+        /// Items that changed since they were saved, one bit each by [`ItemKey::number`].
+        changed: u32 = Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
         /// Of these, the ones whose time has come.
-        due: u16,
+        due: u32,
         next: Instant = Instant::from_millis(FIRST.as_millis()),
         session_at: Instant,
     }
 }
 
-const _: () = assert!(ItemKey::COUNT <= 16);
-
 impl Saving {
-    const fn bit(key: ItemKey) -> u16 {
-        1 << key.index()
+    const fn bit(key: ItemKey) -> u32 {
+        1 << key.number()
     }
 
     /// The item differs from its saved form.

@@ -18,11 +18,10 @@ use crate::params::{Param, Params};
 use crate::power_draw::{Drawn, discharge_a, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{Instant, PAUSE, SILENT, Span};
+use crate::units::{Metres, Rpm};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
-/// Beyond these a value is garbage: no vehicle here reaches them.
-const RPM_MAX: f32 = 1e6;
-const HEIGHT_MAX_M: f32 = 100_000.0;
+/// Greater accelerations, m/s2 or g, are garbage: no vehicle here reaches them.
 const ACCELERATION_MAX: f32 = 10_000.0;
 /// The counters of the load factor's cycles, by bin.
 const LOAD_CYCLES: [UsageCounter; 7] = [
@@ -83,7 +82,7 @@ impl Usage {
                 }
             }
             Observation::GlobalPosition(global) if flight.airborne() => {
-                self.extend(UsageCounter::HeightMax, global.relative_altitude.0, HEIGHT_MAX_M);
+                self.extend(UsageCounter::HeightMax, global.relative_altitude.0, Metres::MAX);
             }
             Observation::Battery(_) | Observation::SystemStatus(_) if vehicle.armed() => {
                 self.take_battery(at, vehicle);
@@ -209,7 +208,7 @@ impl Usage {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE);
             if fresh && turns(vehicle, number) {
-                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(RPM_MAX));
+                let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(Rpm::MAX));
                 usage.seconds += step_s;
                 usage.revolutions += f64::from(rpm) * step_s / 60.0;
             }

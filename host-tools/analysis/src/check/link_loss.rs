@@ -23,7 +23,7 @@ use hums_core::motion::{climb_mps, ground_speed_mps, height_m, throttle};
 use hums_core::observation::{Air, Attitude, Imu, LandedState, Observation, VehicleKind};
 use hums_core::params::{Param, Params};
 use hums_core::time::{Instant, Span};
-use hums_core::vehicle::{LANDED_STATE_AGE, Vehicle};
+use hums_core::vehicle::Vehicle;
 
 use super::problem::IMPACT;
 use crate::source::told::Finding;
@@ -330,7 +330,7 @@ impl LinkLoss {
         let least_s = silence.least_s(lost_m.max(0.0), params.get(Param::MisSink), self.armed);
         let lasted = silence.again_at.unwrap_or(now).since(silence.from);
         let had_time = lasted.as_secs_f32() >= least_s;
-        let landed = vehicle.landed.within(now, LANDED_STATE_AGE) == Some(&LandedState::OnGround);
+        let landed = vehicle.landed.within(now, SILENT) == Some(&LandedState::OnGround);
         let part = throttle(now, vehicle);
         let is_off = !self.armed || landed || part.is_some_and(|part| part < IDLE_THROTTLE);
         let is_fast = ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > LEANS_MPS);
