@@ -8,10 +8,10 @@ use anyhow::{Context as _, Result, bail};
 use crate::repo::{self, BROWSER_TARGET};
 use crate::shell::Shell;
 
-/// Size of the page at most: it opens at once, also from a phone's storage.
+/// Opens at once, also from a phone's storage.
 pub(crate) const PAGE_BYTES_MAX: u64 = 6_000_000;
 
-/// The arguments of cargo that build the program.
+/// Of cargo.
 pub(crate) const BUILD: [&str; 6] = [
     "build",
     "--profile=browser",
@@ -21,7 +21,6 @@ pub(crate) const BUILD: [&str; 6] = [
     BROWSER_TARGET,
 ];
 
-/// The program in a build folder.
 pub(crate) fn program(target: &Path) -> PathBuf {
     target.join(BROWSER_TARGET).join("browser/hums-browser.wasm")
 }
@@ -31,7 +30,6 @@ pub(crate) fn build() -> Result<()> {
     Shell::cargo().args(BUILD).run()
 }
 
-/// Fails if the page is too large.
 pub(crate) fn check_size(page: &Path) -> Result<()> {
     let bytes = fs::metadata(page).with_context(|| page.display().to_string())?.len();
     if bytes > PAGE_BYTES_MAX {

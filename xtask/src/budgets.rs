@@ -1,7 +1,6 @@
 //! The firmware's size against `budgets.toml`.
 //!
-//! Flash is the programmed part (code, constants and the initial values of variables); RAM and CCM are the static
-//! variables in each memory, and the stack has the rest.
+//! Flash: code, constants, initial values; RAM and CCM: static variables; the stack has the rest.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,34 +15,33 @@ use serde::Deserialize;
 use crate::firmware::{self, Board};
 use crate::repo;
 
-/// The chip's memories: name, first address, one past the last, and the bytes for the program (`memory.x`): flash is the half
-/// of a program, CCM is without the stack.
+/// Name, first address, one past the last, bytes for the program (`memory.x`): half of the flash, CCM without the stack.
 const MEMORIES: [(&str, u64, u64, u64); 3] = [
     ("flash", 0x0800_0000, 0x0810_0000, 448 * 1024),
     ("ram", 0x2000_0000, 0x2002_0000, 128 * 1024),
     ("ccm", 0x1000_0000, 0x1001_0000, 48 * 1024),
 ];
-/// The stack: the rest of CCM.
+/// The rest of CCM.
 const STACK_BYTES: u64 = 16 * 1024;
 
 const FILE: &str = "budgets.toml";
-/// The table of usage stands between these lines.
+/// With the table of usage.
 const TABLE_FILE: &str = "ARCHITECTURE.md";
 const TABLE: [&str; 2] = ["<!-- taken: cargo xtask size --write -->\n", "<!-- end of taken -->\n"];
 
-/// One limit of `budgets.toml`, in bytes.
+/// Bytes.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Limit {
-    /// When the limit was set, or `--write` was given last.
+    /// When set, or at the last `--write`.
     pub(crate) taken: u64,
-    /// The rest; of a stack there is one rest for all urgencies.
+    /// One rest for all urgencies' stacks.
     free: Option<u64>,
     pub(crate) bytes_max: u64,
     pub(crate) reason: String,
 }
 
-/// One limit of `budgets.toml`, in cycles of the processor for each frame.
+/// Processor cycles for each frame.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Cycles {
@@ -52,7 +50,7 @@ pub(crate) struct Cycles {
     pub(crate) reason: String,
 }
 
-/// Limit of the processor's load at the fastest line, in percent, in the worst second.
+/// Percent in the worst second, at the fastest line.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Load {
@@ -62,7 +60,7 @@ pub(crate) struct Load {
     pub(crate) reason: String,
 }
 
-/// Limits of a folder's lines (`cargo xtask test --only lines`).
+/// Of a folder (`cargo xtask test --only lines`).
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Lines {
@@ -70,11 +68,10 @@ pub(crate) struct Lines {
     pub(crate) tests_max: usize,
 }
 
-/// All of `budgets.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Budgets {
-    /// Static memory, of every board.
+    /// Of every board.
     memory: BTreeMap<String, Limit>,
     /// By urgency.
     pub(crate) stack: BTreeMap<String, Limit>,
@@ -92,12 +89,12 @@ impl Budgets {
         toml::from_str(&text).with_context(|| format!("{}", path.display()))
     }
 
-    /// The stack's depth when every urgency interrupts the one below it at its deepest.
+    /// Every urgency interrupts the one below at its deepest.
     pub(crate) fn stack_bytes(&self) -> u64 {
         self.stack.values().map(|budget| budget.bytes_max).sum()
     }
 
-    /// Used and free memory, in KiB and percent.
+    /// KiB and percent.
     fn table(&self) -> String {
         let mut table = "\n| | of | taken | free | limit |\n|---|---|---|---|---|\n".to_owned();
         let kib = |bytes: u64| bytes as f64 / 1024.0;
@@ -118,8 +115,7 @@ impl Budgets {
     }
 }
 
-/// Builds for these boards, prints their usage and fails if one exceeds its budget. `write`: the first one's usage is
-/// written into the budgets and the table of ARCHITECTURE.md.
+/// Builds, prints usage, fails above a budget. `write`: the first board's usage goes into the budgets and ARCHITECTURE.md.
 pub(crate) fn check(boards: &[&Board], write: bool) -> Result<()> {
     let budgets = Budgets::read()?;
     let mut rows = Vec::new();
@@ -144,7 +140,7 @@ pub(crate) fn check(boards: &[&Board], write: bool) -> Result<()> {
     Ok(())
 }
 
-/// Writes the usage of each memory into the budgets, and the table that is made from them.
+/// And the table.
 fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
     let path = repo::root().join(FILE);
     let mut section = String::new();
@@ -170,7 +166,7 @@ fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
     Ok(())
 }
 
-/// The text before the table, the table, and the text after it.
+/// Before, the table, after.
 fn around_table(text: &str) -> Result<[&str; 3]> {
     let place = |mark: &str| text.find(mark).with_context(|| format!("{TABLE_FILE} has no {mark}"));
     let (from, to) = (place(TABLE[0])? + TABLE[0].len(), place(TABLE[1])?);
@@ -203,7 +199,7 @@ fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Li
         .collect()
 }
 
-/// How many bytes of each memory the image takes.
+/// Bytes by memory.
 fn sizes(elf: &[u8]) -> Result<BTreeMap<&'static str, u64>> {
     let file = ElfFile32::<Endianness>::parse(elf)?;
     let endian = file.endian();
@@ -257,7 +253,7 @@ mod tests {
         assert!(compare("matek", &BTreeMap::new(), &limits).is_err());
     }
 
-    /// A limit far above the usage is useless: it hides growth.
+    /// A high limit hides growth.
     #[test]
     fn each_limit_is_a_little_above_what_is_taken() {
         let budgets = Budgets::read().unwrap();

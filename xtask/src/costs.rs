@@ -1,5 +1,4 @@
-//! `cargo xtask costs`: time of the processor and stack for a recording at the fastest line, against `budgets.toml`.
-//! The image that is flashed runs on the model of its chip. All of it is modelled, not measured.
+//! `cargo xtask costs`: processor time and stack at the fastest line, against `budgets.toml`; modelled.
 
 use std::path::Path;
 
@@ -13,9 +12,9 @@ use crate::hums;
 use crate::repo;
 use crate::setup::{self, Need};
 
-/// The recording: PX4, whose frames compress the least.
+/// PX4: compresses the least.
 const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
-/// Names of the report's stages in the budgets; others are in the total only.
+/// In the budgets; others only count in total.
 const STAGES: [(&str, &str); 5] = [
     ("framer", "framer"),
     ("encode", "encode"),
@@ -24,14 +23,13 @@ const STAGES: [(&str, &str); 5] = [
     ("summary", "summary"),
 ];
 
-/// Builds, measures and compares.
 pub(crate) fn check() -> Result<()> {
     setup::require(&[Need::Linker, Need::FirmwareTarget])?;
     let image = firmware::build(firmware::default_board())?;
     check_built(&hums::build()?, &image)
 }
 
-/// Measures and compares, with `hums` and the firmware as they were built.
+/// With built programs.
 pub(crate) fn check_built(program: &Path, image: &Path) -> Result<()> {
     let budgets = Budgets::read()?;
     let report = record_at_full_rate(program, image, &repo::root().join(FLIGHT))?;

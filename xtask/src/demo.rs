@@ -1,4 +1,4 @@
-//! A recorded flight through the whole system, and its results.
+//! A flight through the whole system.
 
 use std::fs;
 use std::io::IsTerminal as _;
@@ -13,13 +13,13 @@ use crate::repo;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// A quadcopter's flight with faults that the monitor finds: vibration, satellites lost, GPS jammed, a battery that sags.
+/// Vibration, lost satellites, jammed GPS, a sagging battery.
 const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
 
-/// Lines of the verdict that are shown: with the rest of the demo's output a screen of 25 lines.
+/// With the demo's other output 25 lines.
 const VERDICT_LINES_MAX: usize = 12;
 
-/// `hums` did all it could, and there are losses to report.
+/// All done, with losses.
 const DONE_WITH_LOSSES: i32 = 3;
 
 #[derive(Debug, clap::Args)]
@@ -36,16 +36,15 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// As typed in the user's folder: the commands themselves run at the root.
+    /// As typed in the user's folder; commands run at the root.
     fn flight(&self) -> Result<PathBuf> {
         let own = || Ok(repo::root().join(FLIGHT));
         self.flight.as_ref().map_or_else(own, |path| Ok(std::path::absolute(path)?))
     }
 }
 
-/// In CI the demo must run the firmware, and end. Program and firmware are there already. The beginning of the
-/// shortest recording is enough: the step `chip` flies the demo's own flight, by the same program and image, and
-/// compares each frame.
+/// In CI it must run the firmware, and end. The shortest recording's beginning is enough: the step `chip` flies the demo's
+/// flight.
 pub(crate) fn as_test() -> Result<()> {
     const SHORT: &str = "tests/flights/px4_hil_quad_low.tlog";
     const BYTES: usize = 120_000;
@@ -75,7 +74,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     fly(options, image.as_deref(), start.elapsed())
 }
 
-/// Records the flight with the firmware in `image`, or on this PC without one, and shows the results.
+/// By the firmware in `image`, or on this PC.
 fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     let folder = repo::target().join("demo");
     if folder.exists() {
@@ -136,18 +135,18 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     Ok(())
 }
 
-/// The verdict, the vehicle and the worst finding: the first two paragraphs.
+/// Verdict, vehicle, worst finding: two paragraphs.
 fn shortened(verdict: &str) -> impl Iterator<Item = &str> {
     verdict.split("\n\n").take(2).flat_map(str::lines).take(VERDICT_LINES_MAX)
 }
 
-/// Runs the flight through a pipeline; returns its figures.
+/// Returns its figures.
 fn record(pipeline: Shell, flight: &Path, card: &Path, gs: &Path) -> Result<String> {
     let paths = [flight.as_os_str(), "--sd".as_ref(), card.as_os_str()];
     done(pipeline.arg("--json").args(paths).arg("--gs").arg(gs)).context("the recording failed")
 }
 
-/// The output of a command. Losses are reported and are no failure; nor is a recording that ends in the air.
+/// Losses, or an end in the air, are no failure.
 fn done(command: Shell) -> Result<String> {
     match command.output_and_code()? {
         (text, 0 | DONE_WITH_LOSSES) => Ok(text),

@@ -1,5 +1,5 @@
-//! The firmware as a `DfuSe` file, for the boot loader that each STM32 has in its system memory (ST's UM0391; suffix: USB
-//! DFU 1.1, appendix B). It names the address of each piece, so that the store between them is left alone.
+//! The firmware as a `DfuSe` file, for the boot loader that each STM32 has in its system memory (ST's UM0391; suffix: USB DFU
+//! 1.1, appendix B). Each piece has its address: the store stays.
 
 use crate::image::Piece;
 
@@ -14,10 +14,9 @@ const VENDOR: u16 = 0x0483;
 const PRODUCT: u16 = 0xDF11;
 /// Any release of the device.
 const DEVICE: u16 = 0xFFFF;
-/// That a suffix of this kind follows.
+/// A suffix of this kind follows.
 const DFUSE: u16 = 0x011A;
 
-/// All of the file.
 pub(crate) fn file(name: &str, pieces: &[Piece]) -> Vec<u8> {
     let elements: usize = pieces.iter().map(|piece| 8 + piece.bytes.len()).sum();
     let mut file = Vec::with_capacity(PREFIX_BYTES + TARGET_BYTES + elements + SUFFIX_BYTES);
@@ -49,7 +48,7 @@ pub(crate) fn file(name: &str, pieces: &[Piece]) -> Vec<u8> {
     file
 }
 
-/// CRC-32 as everywhere, without the inversion at its end.
+/// Without the final inversion.
 fn crc(bytes: &[u8]) -> u32 {
     bytes.iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg()))
@@ -92,7 +91,6 @@ mod tests {
         let suffix = &file[file.len() - SUFFIX_BYTES..];
         assert_eq!(&suffix[..12], b"\xFF\xFF\x11\xDF\x83\x04\x1A\x01UFD\x10");
         assert_eq!(word(&file, file.len() - 4), crc(&file[..file.len() - 4]));
-        // The check value of CRC-32 is CBF43926 with the inversion.
         assert_eq!(crc(b"123456789"), !0xCBF4_3926);
     }
 }

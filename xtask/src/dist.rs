@@ -1,9 +1,8 @@
-//! `cargo xtask dist`: the files of a release, and proof that every build gives the same.
+//! `cargo xtask dist`: a release's files, the same from every build.
 //!
-//! A release is built from a commit, in a clone of its own, so no stray file of the working copy gets into it. The
-//! firmware's flags and files are those of every build of it ([`firmware::flags`], [`firmware::files`]). Two builds
-//! in two places are equal byte by byte; `--check` shows it. It also runs the unit tests, and the program for Windows
-//! under Wine.
+//! Built from a commit in a clone: no stray file of the working copy. Flags and files are those of every build
+//! ([`firmware::flags`], [`firmware::files`]). `--check` compares two builds in two places, runs the unit tests, and the
+//! Windows program under Wine.
 
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -21,7 +20,7 @@ use crate::setup::{self, MAC_TARGET, Need, STATIC_TARGET, WINDOWS_TARGET};
 use crate::shell::Shell;
 use crate::wine::{self, Wine};
 
-/// Makes a release of the commit that is checked out, in `target/dist`; with `check` a second one elsewhere, and compares.
+/// The checked-out commit, in `target/dist`; `check`: a second one elsewhere, compared.
 pub(crate) fn run(check: bool) -> Result<()> {
     let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
     needs.push(Need::BrowserTarget);
@@ -29,9 +28,9 @@ pub(crate) fn run(check: bool) -> Result<()> {
     needs.extend(check.then_some(Need::Wine));
     setup::require(&needs)?;
     ensure_tool("cyclonedx", &[])?;
-    // It has little to do: building it without optimisation takes a third of the time.
+    // Unoptimised it builds in a third of the time.
     ensure_tool("deny", &["--debug"])?;
-    // `cargo xtask test` leaves out the board that none of its steps runs on.
+    // `cargo xtask test` leaves out one board.
     budgets::check(&hums_boards::all().iter().collect::<Vec<_>>(), false)?;
     for board in hums_boards::all() {
         firmware::lint(board)?;
@@ -59,7 +58,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     wine::try_out(&wine, &windows, &repo::root().join(FAULTY))?;
     let elsewhere = env::temp_dir().join(format!("hums-built-again-{}", std::process::id()));
     let again = Release::new(&commit, &elsewhere).and_then(|release| release.make());
-    // It has gigabytes of no further use.
+    // Gigabytes of no use.
     fs::remove_dir_all(&elsewhere).with_context(|| format!("cannot remove {}", elsewhere.display()))?;
     let again = again?;
     let different = differences(&files, &again);
@@ -71,10 +70,9 @@ pub(crate) fn run(check: bool) -> Result<()> {
     Ok(())
 }
 
-/// A file of the release: name and content.
+/// Name and content.
 pub(crate) type File = (String, Vec<u8>);
 
-/// A clone in which one release is built.
 struct Release {
     tree: PathBuf,
     commit: String,
@@ -104,7 +102,7 @@ impl Release {
         files.push(self.sbom("hums-firmware", "firmware/app", &[firmware::target()])?);
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
         let program = self.target().join(STATIC_TARGET).join("release/hums");
-        // The tests run a program that is built for tests. This is the one that is released.
+        // The released program, not the tests' build.
         check_findings(|flight| Shell::new(&program).args(["check", "--json"]).arg(flight), &self.tree)?;
         files.push(read("hums", &program)?);
         files.extend(for_shells(&program)?);
@@ -124,7 +122,6 @@ impl Release {
         Ok(files)
     }
 
-    /// The check in a browser.
     fn check_page(&self) -> Result<File> {
         let [command, arguments @ ..] = browser::BUILD;
         self.cargo(command, &arguments, hums_boards::DEFAULT)?;
@@ -151,20 +148,20 @@ impl Release {
             .env("CARGO_TARGET_DIR", self.target())
             .env("CARGO_ENCODED_RUSTFLAGS", &self.flags)
             .env(firmware::BOARD, board)
-            // The linker for Windows writes it instead of the time of day.
+            // In place of the time of day.
             .env("SOURCE_DATE_EPOCH", self.stamp()?)
             .args([command, "--locked"])
             .args(arguments)
             .run()
     }
 
-    /// When the commit was made, seconds since 1970.
+    /// Seconds since 1970.
     fn stamp(&self) -> Result<String> {
         let stamp = Shell::new("git").within(&self.tree).args(["log", "-1", "--format=%ct"]).output()?;
         Ok(stamp.trim().to_owned())
     }
 
-    /// The bill of materials of the one program in the package at `folder`, as `CycloneDX` has it: every crate that is built for it.
+    /// `CycloneDX` of the program in `folder`: every crate that it is built of.
     fn sbom<A: AsRef<std::ffi::OsStr>>(&self, name: &str, folder: &str, arguments: &[A]) -> Result<File> {
         let folder = self.tree.join(folder);
         Shell::cargo()
@@ -186,7 +183,7 @@ impl Release {
         Ok((format!("{name}.cdx.json"), text.into_bytes()))
     }
 
-    /// Information for a reproduction of the build.
+    /// For a reproduction.
     fn provenance(&self) -> Result<String> {
         let rustc = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
         let rustc = rustc.args(["--version", "--verbose"]).output()?;
@@ -194,10 +191,10 @@ impl Release {
     }
 }
 
-/// A flight with faults (`docs/usage.md`).
+/// Faults of `docs/usage.md`.
 const FAULTY: &str = "tests/flights/ap_quad_faults.tlog";
 
-/// Whether a program, as `check --json`, finds the faults of the flight with faults.
+/// By `check --json`.
 fn check_findings(program: impl Fn(&Path) -> Shell, tree: &Path) -> Result<()> {
     const FINDINGS: [&str; 3] = ["cell_voltage", "autopilot_state", "batt_state"];
     let (json, code) = program(&tree.join(FAULTY)).output_and_code()?;
@@ -212,13 +209,13 @@ fn check_findings(program: impl Fn(&Path) -> Shell, tree: &Path) -> Result<()> {
     Ok(())
 }
 
-/// No step of `cargo xtask test` builds for other systems: that would take minutes.
+/// `cargo xtask test` builds for no other system.
 fn lint_for(target: &str) -> Result<()> {
     let choice = ["--package=hums", "--lib", "--bins", "--target", target];
     Shell::cargo().arg("clippy").args(choice).args(["--", "-D", "warnings"]).run()
 }
 
-/// Completion scripts for shells, and pages of the manual, as the program makes them.
+/// As the program makes them.
 fn for_shells(program: &Path) -> Result<Vec<File>> {
     let made = |name: &str, arguments: &[&str]| -> Result<File> {
         Ok((name.to_owned(), Shell::new(program).args(arguments).output()?.into_bytes()))
@@ -230,7 +227,7 @@ fn for_shells(program: &Path) -> Result<Vec<File>> {
         files.push(made(name, &["completions", shell])?);
     }
     let (name, page) = made("hums.1", &["man"])?;
-    // The page of the whole program names those of its commands.
+    // Names its commands' pages.
     let text = String::from_utf8_lossy(&page).replace("\\-", "-");
     let commands = text.lines().filter_map(|line| line.strip_prefix("hums-")?.strip_suffix("(1)"));
     for command in commands.filter(|command| *command != "help") {
@@ -240,7 +237,7 @@ fn for_shells(program: &Path) -> Result<Vec<File>> {
     Ok(files)
 }
 
-/// The command `cargo NAME`, installed if it is missing.
+/// Installed if missing.
 fn ensure_tool(name: &str, options: &[&str]) -> Result<()> {
     if Shell::cargo().args([name, "--version"]).ask().is_some() {
         return Ok(());
@@ -250,16 +247,14 @@ fn ensure_tool(name: &str, options: &[&str]) -> Result<()> {
     Shell::cargo().args(["install", "--quiet", "--locked"]).args(options).arg(package).run()
 }
 
-/// `hums-onboard` depends on all other crates that fly. The target has no std, so a crate or dependency that needs
-/// std does not compile. `hums-app` takes no part: it turns further features on.
+/// The target has no std: `hums-onboard` and its crates must compile without. `hums-app` turns further features on: left out.
 fn without_std() -> Result<()> {
     firmware::cargo(firmware::default_board())?
         .args(["check", "--profile=firmware", "--target", FIRMWARE_TARGET, "--package=hums-onboard"])
         .run()
 }
 
-/// Licences, bans and sources of the dependencies are those of deny.toml. Advisories need a network, which may be
-/// missing, and appear at any time: they are reported, and never a failure.
+/// By deny.toml. Advisories need a network and appear at any time: no failure.
 fn dependencies() -> Result<()> {
     let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
     deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
@@ -298,7 +293,7 @@ fn write_all(folder: &Path, files: &[File]) -> Result<()> {
     Ok(())
 }
 
-/// As `sha256sum` writes it and `sha256sum --check` reads it.
+/// For `sha256sum --check`.
 pub(crate) fn sums(files: &[File]) -> String {
     files.iter().fold(String::new(), |mut text, (name, data)| {
         for byte in Sha256::digest(data) {
@@ -309,7 +304,7 @@ pub(crate) fn sums(files: &[File]) -> String {
     })
 }
 
-/// The names of files that differ.
+/// By name.
 fn differences(one: &[File], other: &[File]) -> Vec<String> {
     let missing = |from: &[File], file: &File| !from.contains(file);
     let mut names: Vec<String> =

@@ -12,7 +12,7 @@ const PROBE_RS: (&str, &str) =
     ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
 const DFU_UTIL: (&str, &str) = ("dfu-util", "apt-get install dfu-util (macOS: brew install dfu-util)");
 
-/// The chip of every board, as probe-rs calls it.
+/// For probe-rs.
 const CHIP: &str = "STM32F405RGTx";
 
 /// Arguments of `flash`.
@@ -26,7 +26,7 @@ pub(crate) struct Options {
     dfu: bool,
 }
 
-/// Builds the firmware and programs it. The board's store is kept.
+/// The store is kept.
 pub(crate) fn flash(options: &Options) -> Result<()> {
     setup::require(&[Need::Linker, Need::FirmwareTarget])?;
     let elf = firmware::build(options.board)?;
@@ -37,12 +37,12 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
         return load(&path).run();
     }
     require(PROBE_RS)?;
-    // Without --chip-erase it erases the sectors that the image has bytes in, and no others.
+    // Without --chip-erase only the image's sectors are erased.
     probe("download", &elf).run()?;
     Shell::new(PROBE_RS.0).args(["reset", "--chip", CHIP]).run()
 }
 
-/// Builds the firmware with its feature `log`, programs it and shows the log as it goes on.
+/// With the feature `log`, which it shows.
 pub(crate) fn attach(board: &Board) -> Result<()> {
     let elf = firmware::build_with_log(board)?;
     require(PROBE_RS)?;
@@ -53,7 +53,7 @@ fn probe(command: &str, elf: &PathBuf) -> Shell {
     Shell::new(PROBE_RS.0).args([command, "--chip", CHIP]).arg(elf)
 }
 
-/// The boot loader's alternate setting 0 is the flash; afterwards the firmware starts.
+/// Alternate setting 0 is the flash; then the firmware starts.
 fn load(file: &Path) -> Shell {
     Shell::new(DFU_UTIL.0)
         .args(["--device", "0483:df11", "--alt", "0", "--dfuse-address", ":leave", "--download"])

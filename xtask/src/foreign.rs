@@ -1,9 +1,7 @@
-//! `cargo xtask prove foreign`: programs that are not ours on the model of the chip, the second opinion on our
-//! reading of the manual.
+//! `cargo xtask prove foreign`: foreign programs on the chip's model, a second opinion on our reading of the manual.
 //!
-//! They are examples in packages of the registry, fetched and built here; the repository has only their names. The
-//! examples of embassy come from a checkout of its repository, if there is one. Each program's judge, and the
-//! behaviour by its source, is in `chip/stm32f405/examples/foreign`.
+//! Examples in registry packages, fetched and built; only their names are here. Embassy's come from a checkout, if any. Judges:
+//! `chip/stm32f405/examples/foreign`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +13,7 @@ use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// A package that brings programs.
+/// With programs.
 struct Package {
     name: &'static str,
     version: &'static str,
@@ -41,16 +39,16 @@ const PACKAGES: [Package; 3] = [
     },
 ];
 
-/// embassy's programs, by their name in `examples/stm32f4/src/bin`, and the tag of its repository that fits [`EMBASSY_MANIFEST`].
+/// In `examples/stm32f4/src/bin`, at the tag of [`EMBASSY_MANIFEST`].
 const EMBASSY: &[&str] = &["wdt", "flash", "usart_dma", "usart_buffered", "button_exti", "multiprio"];
 const EMBASSY_TAG: &str = "embassy-stm32-v0.6.0";
-/// Their dependencies: the packages of that tag, for an STM32F405.
+/// Of that tag, for an STM32F405.
 const EMBASSY_MANIFEST: &str = include_str!("../../chip/stm32f405/examples/foreign/embassy.toml");
 const EMBASSY_BUILD: &str = r#"fn main() {
     ["--nmagic", "-Tlink.x", "-Tdefmt.x"].map(|argument| println!("cargo:rustc-link-arg-bins={argument}"));
 }"#;
 
-/// Builds and judges them; `embassy` is the folder of a checkout of its repository.
+/// `embassy`: a checkout's folder.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     let embassy = match arguments {
         [] => None,
@@ -87,7 +85,6 @@ fn folder() -> PathBuf {
     repo::target().join("foreign")
 }
 
-/// A folder with nothing in it.
 fn empty(folder: &Path) -> Result<()> {
     if folder.exists() {
         fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", folder.display()))?;
@@ -95,7 +92,7 @@ fn empty(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
 }
 
-/// Fetches a package and gives a copy of its sources that builds by itself, its examples for any chip of the family.
+/// A copy that builds by itself, for any chip of the family.
 fn fetch(package: &Package) -> Result<PathBuf> {
     let Package { name, version, .. } = package;
     let asks = folder().join("asks");
@@ -121,7 +118,7 @@ fn fetch(package: &Package) -> Result<PathBuf> {
     Ok(to)
 }
 
-/// The manifest without its examples' wish for one chip of the family, as a workspace of its own.
+/// As a workspace of its own.
 fn for_any_chip(manifest: &str) -> Result<String> {
     let mut manifest: toml::Table = manifest.parse()?;
     let examples = manifest.get_mut("example").and_then(toml::Value::as_array_mut);
@@ -132,7 +129,6 @@ fn for_any_chip(manifest: &str) -> Result<String> {
     Ok(toml::to_string(&manifest)?)
 }
 
-/// A package of embassy's programs.
 fn embassys(sources: &Path) -> Result<PathBuf> {
     let to = folder().join("sources/embassy");
     empty(&to.join("src/bin"))?;
@@ -147,9 +143,9 @@ fn embassys(sources: &Path) -> Result<PathBuf> {
     Ok(to)
 }
 
-/// Builds a package in its own folder, so that its own settings of the linker count.
+/// In its own folder, for its linker settings.
 fn build<'a>(source: &Path, arguments: impl IntoIterator<Item = &'a str>) -> Result<()> {
-    // Warnings of a newer compiler about foreign sources do not count.
+    // Foreign sources' warnings do not count.
     let silent = format!("target.{FIRMWARE_TARGET}.rustflags=[\"-Awarnings\", \"--cap-lints=warn\"]");
     Shell::cargo()
         .args(["build", "--release", "--quiet", "--target", FIRMWARE_TARGET, "--config", &silent])
@@ -160,7 +156,7 @@ fn build<'a>(source: &Path, arguments: impl IntoIterator<Item = &'a str>) -> Res
         .run()
 }
 
-/// Keeps a program that was built: two packages may have one of the same name.
+/// Two packages may share a name.
 fn keep(built: &str, to: &Path) -> Result<()> {
     let from = folder().join("build").join(FIRMWARE_TARGET).join("release").join(built);
     fs::copy(&from, to).with_context(|| format!("cannot copy {}", from.display()))?;

@@ -1,4 +1,4 @@
-//! `cargo xtask fuzz`: the fuzz targets under libFuzzer, one after the other. `fuzz/src/lib.rs` describes them.
+//! `cargo xtask fuzz`: the targets of `fuzz/src/lib.rs` under libFuzzer.
 
 use std::fs;
 use std::path::Path;
@@ -8,21 +8,21 @@ use anyhow::{Context as _, Result, bail};
 use crate::repo;
 use crate::shell::Shell;
 
-/// The targets are the folders of the corpus: a test of `hums-fuzz` holds the one against the other.
+/// Folders are targets: a test of `hums-fuzz` compares them.
 const CORPUS: &str = "fuzz/corpus";
-/// libFuzzer's new inputs are kept here, outside of the repository.
+/// New inputs, outside of the repository.
 const FOUND: &str = "target/fuzz/found";
-/// The longest input, in bytes; each target's own limit is for the mutations on stable Rust.
+/// Bytes; targets' limits are for mutations on stable Rust.
 const BYTES_MAX: u32 = 16_384;
 
-/// Runs each target for that many seconds. Inputs that break one are in `fuzz/libfuzzer/artifacts`.
+/// Failing inputs: `fuzz/libfuzzer/artifacts`.
 pub(crate) fn run(seconds: u32) -> Result<()> {
     require(&["+nightly", "--version"], "a nightly compiler: rustup toolchain install nightly")?;
     require(&["fuzz", "--version"], "cargo-fuzz: cargo install cargo-fuzz")?;
     for target in targets(&repo::root().join(CORPUS))? {
         let found = repo::root().join(FOUND).join(&target);
         fs::create_dir_all(&found)?;
-        // An input may take ten seconds and 2 GiB at most: nothing is unbounded.
+        // Ten seconds and 2 GiB at most.
         cargo()
             .env("HUMS_FUZZ_TARGET", &target)
             .args(["+nightly", "fuzz", "run", "--fuzz-dir", "fuzz/libfuzzer", "any"])
@@ -36,7 +36,7 @@ pub(crate) fn run(seconds: u32) -> Result<()> {
     Ok(())
 }
 
-/// The names of the folders in the corpus, in order.
+/// In order.
 fn targets(corpus: &Path) -> Result<Vec<String>> {
     let context = || format!("{}: cannot be read", corpus.display());
     let entries = fs::read_dir(corpus).with_context(context)?;
@@ -46,7 +46,7 @@ fn targets(corpus: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// The `cargo` that understands `+nightly`: rustup's, not the one that runs this program.
+/// Rustup's, which understands `+nightly`.
 fn cargo() -> Shell {
     Shell::new("cargo")
 }

@@ -1,4 +1,4 @@
-//! `cargo xtask grafana`: the dashboards of each database, made of one description.
+//! `cargo xtask grafana`: each database's dashboards, of one description.
 
 use std::fs;
 
@@ -9,8 +9,7 @@ use crate::repo;
 #[path = "../../host-tools/grafana/resolve.rs"]
 mod resolve;
 
-/// Writes the dashboards into the folders of the databases, beside their data sources: `compose.yaml` takes them from
-/// there.
+/// Beside the data sources, for `compose.yaml`.
 pub(crate) fn write() -> Result<()> {
     let folder = repo::root().join("host-tools/grafana");
     for name in ["flight.json", "health.json"] {

@@ -1,4 +1,4 @@
-//! The parts of a firmware's ELF file, with their places in the flash.
+//! An ELF file's parts in the flash.
 
 use std::fmt::Write as _;
 
@@ -7,17 +7,17 @@ use object::Endianness;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 
-/// The store's two sectors (`firmware/app/src/boards/stm32f4/flash.rs`): nothing that programs the flash may touch them.
+/// Never touched by programming (`firmware/app/src/boards/stm32f4/flash.rs`).
 pub(crate) const STORE: std::ops::Range<u32> = 0x0800_4000..0x0800_C000;
 
-/// Bytes that lie one after the other in the flash.
+/// In a row.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
     pub(crate) address: u32,
     pub(crate) bytes: Vec<u8>,
 }
 
-/// The pieces of an ELF file in order; an error where one would overwrite the store.
+/// In order; an error over the store.
 pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
     let header = FileHeader32::<Endianness>::parse(elf).context("no ELF file")?;
     let endian = header.endian()?;
@@ -32,7 +32,7 @@ pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
     joined(pieces)
 }
 
-/// In order of address, with adjacent pieces joined.
+/// By address.
 fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     pieces.sort_by_key(|piece| piece.address);
     let mut joined: Vec<Piece> = Vec::new();
@@ -54,8 +54,7 @@ fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     Ok(joined)
 }
 
-/// All of the pieces as one, from the first address on. Gaps are filled as erased flash: programming this file, and
-/// not the pieces, empties the board's store.
+/// From the first address on; gaps are erased flash: this file empties the board's store.
 pub(crate) fn flat(pieces: &[Piece]) -> Vec<u8> {
     let mut flat = Vec::new();
     let Some(first) = pieces.first() else { return flat };
@@ -66,7 +65,7 @@ pub(crate) fn flat(pieces: &[Piece]) -> Vec<u8> {
     flat
 }
 
-/// The pieces as Intel HEX, which keeps the gap between them: for Betaflight Configurator and `STM32CubeProgrammer`.
+/// Intel HEX, with gaps: for Betaflight Configurator and `STM32CubeProgrammer`.
 pub(crate) fn hex(pieces: &[Piece]) -> Vec<u8> {
     let mut text = String::new();
     let mut upper = None;
@@ -78,7 +77,7 @@ pub(crate) fn hex(pieces: &[Piece]) -> Vec<u8> {
                 upper = Some(at >> 16);
                 record(&mut text, 0, 4, &((at >> 16) as u16).to_be_bytes());
             }
-            // No record crosses a line of 16 bytes, and so none a bank of 64 KiB.
+            // Within a line of 16 bytes, and so a bank of 64 KiB.
             let (line, behind) = rest.split_at(rest.len().min(16 - at as usize % 16));
             record(&mut text, at as u16, 0, line);
             (at, rest) = (at + line.len() as u32, behind);
@@ -88,7 +87,7 @@ pub(crate) fn hex(pieces: &[Piece]) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// A record: length, address, kind, bytes, and what makes the sum of all of them zero.
+/// Length, address, kind, bytes, check sum.
 fn record(text: &mut String, address: u16, kind: u8, bytes: &[u8]) {
     let [high, low] = address.to_be_bytes();
     let head = [bytes.len() as u8, high, low, kind];
@@ -106,7 +105,7 @@ fn record(text: &mut String, address: u16, kind: u8, bytes: &[u8]) {
 mod tests {
     use super::*;
 
-    /// The data record is the example of the format's article in Wikipedia.
+    /// Wikipedia's example.
     #[test]
     fn a_hex_file_has_each_address_and_the_gap() {
         let bytes = b"\x21\x46\x01\x36\x01\x21\x47\x01\x36\x00\x7E\xFE\x09\xD2\x19\x01".to_vec();

@@ -1,4 +1,4 @@
-//! Lines of Rust by folder, without blanks and comments, tests apart, against `budgets.toml`.
+//! Lines of Rust by folder against `budgets.toml`, without blanks and comments.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::budgets::Budgets;
 use crate::repo;
 use crate::shell::Shell;
 
-/// Counts each folder of the budgets, prints the counts and fails if one is over its limit.
+/// Prints the counts; fails over a limit.
 pub(crate) fn check() -> Result<()> {
     println!("{:<16} {:>7} {:>7}   {:>7} {:>7}", "folder", "code", "limit", "tests", "limit");
     let mut over = Vec::new();
@@ -33,7 +33,7 @@ pub(crate) fn check() -> Result<()> {
     if over.is_empty() { Ok(()) } else { bail!("over the limit of lines: {}", over.join(", ")) }
 }
 
-/// Lines of code and of tests. A module of tests is the last one of its file.
+/// Of code and tests, which are a file's last module.
 fn count(file: &str, text: &str) -> (usize, usize) {
     let is_of_tests = file.starts_with("tests/")
         || ["/tests/", "/benches/"].iter().any(|part| file.contains(part))

@@ -1,7 +1,7 @@
 //! `cargo xtask`: the tasks of this repository, from nothing but Rust and git.
 //!
-//! Each command first looks for its requirements ([`setup`]). It installs missing ones if it may. Otherwise it prints the
-//! commands to type, and does the rest of its work. Nothing here is needed to use `hums` itself.
+//! Commands look for requirements ([`setup`]), install missing ones if they may, or print what to type. Nothing here is needed
+//! to use `hums` itself.
 
 mod bench;
 mod browser;
@@ -156,7 +156,7 @@ impl Command {
     }
 }
 
-/// Writes the page of the boards, and their table into the README: from its head up to the next empty line.
+/// And the README's table: from its head to the next empty line.
 fn write_boards() -> Result<()> {
     let table = hums_boards::page::table("docs/boards.md");
     let path = repo::root().join("README.md");

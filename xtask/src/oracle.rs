@@ -1,5 +1,4 @@
-//! The independent reader of MAVLink: pymavlink in a virtual environment of its own. Its `mavgen` makes the dialect
-//! from the definitions of the firmware (the XML files of the `mavlink` crate).
+//! Pymavlink in its own environment. `mavgen` makes the dialect from the `mavlink` crate's XML files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,30 +9,29 @@ use cargo_metadata::MetadataCommand;
 use crate::repo;
 use crate::shell::Shell;
 
-/// The scripts and the pinned requirements.
+/// With pinned requirements.
 const FOLDER: &str = "tests/oracle";
 
 fn venv() -> PathBuf {
     repo::target().join("venv")
 }
 
-/// The interpreter that has pymavlink.
 pub(crate) fn python() -> PathBuf {
     venv().join("bin/python")
 }
 
-/// The dialect, a Python module.
+/// A Python module.
 pub(crate) fn dialect() -> PathBuf {
     repo::target().join("oracle/hums_dialect.py")
 }
 
-/// Makes the environment and the dialect unless they are there already.
+/// Unless there already.
 pub(crate) fn prepare() -> Result<()> {
     let [requirements, alone] =
         ["requirements.txt", "requirements-alone.txt"].map(|name| repo::root().join(FOLDER).join(name));
     let read = |path: &PathBuf| fs::read_to_string(path).with_context(|| format!("{}", path.display()));
     let wanted = read(&requirements)? + &read(&alone)?;
-    // The stamp is written last, so an interrupted installation is made anew.
+    // Written last: an interrupted installation is made anew.
     let stamp = venv().join("requirements.txt");
     if fs::read_to_string(&stamp).ok().as_deref() != Some(&wanted) {
         Shell::new("python3").args(["-m", "venv", "--clear"]).arg(venv()).run()?;
@@ -68,7 +66,7 @@ pub(crate) fn prepare() -> Result<()> {
     Ok(())
 }
 
-/// The root of the message definitions that the `mavlink` crate in `Cargo.lock` carries.
+/// In the `mavlink` crate of `Cargo.lock`.
 fn definitions() -> Result<PathBuf> {
     let metadata = MetadataCommand::new().current_dir(repo::root()).exec()?;
     let package = metadata.packages.iter().find(|package| package.name.as_str() == "mavlink");

@@ -1,5 +1,4 @@
-//! Builds for this PC: one choice of packages, features and profile, so that tests and campaigns share
-//! the compiled crates. Test programs are run directly, without asking cargo again.
+//! Builds for this PC: one choice for tests and campaigns. Test programs run without cargo.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -15,31 +14,28 @@ use crate::oracle;
 use crate::repo;
 use crate::shell::Shell;
 
-/// The choice. Without the firmware's binary: it turns on `defmt` in the crates that it shares with this PC.
+/// Without the firmware's binary, which turns on `defmt` in shared crates.
 pub(crate) const CHOICE: [&str; 4] = ["--workspace", "--exclude=hums-app", "--features", FEATURES];
 
-/// All of the end-to-end tests.
 const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases";
 
-/// The package of the end-to-end tests and of the campaigns.
 const END_TO_END: &str = "hums-tests";
 
-/// A program of tests.
 #[derive(Debug)]
 struct TestProgram {
     package: String,
-    /// Cargo's name of the target: the crate's name for its own tests.
+    /// The crate's name for its own tests.
     name: String,
-    /// From `tests/`, not from the sources.
+    /// From `tests/`.
     is_integration: bool,
     folder: PathBuf,
     path: PathBuf,
 }
 
-/// Those that [`build`] built.
+/// By [`build`].
 static PROGRAMS: OnceLock<Vec<TestProgram>> = OnceLock::new();
 
-/// Builds `hums`, the campaigns and all tests by one call of cargo; a warning is an error. Examples are linted only.
+/// `hums`, campaigns and tests by one call; a warning is an error. Examples are only linted.
 pub(crate) fn build() -> Result<()> {
     let cargo = Shell::cargo()
         .args(["test", "--no-run", "--message-format=json", "--lib", "--bins", "--tests"])
@@ -70,7 +66,7 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// The test programs among cargo's outputs.
+/// Among cargo's outputs.
 fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<TestProgram>> {
     let mut programs = Vec::new();
     for Artifact { package_id, target, profile, executable, .. } in artifacts {
@@ -92,7 +88,7 @@ fn programs() -> Result<&'static [TestProgram]> {
     PROGRAMS.get().map(Vec::as_slice).context("the tests are not built")
 }
 
-/// Runs the tests of each crate: all but the end-to-end ones.
+/// Without the end-to-end ones.
 pub(crate) fn unit_tests() -> Result<()> {
     for program in programs()?.iter().filter(|one| !(one.is_integration && one.package == END_TO_END)) {
         run(program, &[])?;
@@ -100,24 +96,22 @@ pub(crate) fn unit_tests() -> Result<()> {
     Ok(())
 }
 
-/// Runs the end-to-end tests that these arguments of the test runner choose, with all that they may use. The oracle is
-/// prepared before.
+/// Chosen by the runner's arguments; prepares the oracle.
 pub(crate) fn end_to_end(arguments: &[&str]) -> Result<()> {
     let program = programs()?.iter().find(|one| one.is_integration && one.package == END_TO_END);
     run(program.with_context(|| format!("{END_TO_END} has no tests"))?, arguments)
 }
 
-/// The formatting of all packages.
 pub(crate) fn check_format() -> Result<()> {
     Shell::cargo().args(["fmt", "--all", "--", "--check"]).run()
 }
 
-/// Lints all of it; a warning is an error.
+/// A warning is an error.
 pub(crate) fn lint() -> Result<()> {
     Shell::cargo().arg("clippy").args(CHOICE).args(["--all-targets", "--", "-D", "warnings"]).run()
 }
 
-/// Builds the documentation, in which a warning is an error. It has no examples to run.
+/// A warning is an error.
 pub(crate) fn document() -> Result<()> {
     Shell::cargo()
         .env("RUSTDOCFLAGS", "-D warnings")
@@ -126,7 +120,6 @@ pub(crate) fn document() -> Result<()> {
         .run()
 }
 
-/// The campaigns in their short form.
 pub(crate) fn short_campaigns() -> Result<()> {
     Shell::new(repo::target().join("debug/prove")).arg("--short").run()
 }

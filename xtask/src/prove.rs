@@ -1,8 +1,7 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
-//! The campaigns themselves are in the tests' crate; this builds them and their requirements. Four parts are separate
-//! from the campaigns: `diagnosis` judges labelled flights and writes `docs/diagnosis.md`; `chip` has the long tests on the model of the chip
-//! for want of time; `boards` runs the image of every board there; `foreign` judges that model by programs that are not ours.
+//! They are in the tests' crate; this builds them. Apart: `diagnosis` (labelled flights, `docs/diagnosis.md`), `chip` (long
+//! tests on the model), `boards` (every board's image), `foreign` (foreign programs on the model).
 
 use anyhow::Result;
 
@@ -13,23 +12,18 @@ use crate::pc;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// The campaigns' tools for cards.
+/// For cards.
 pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 
-/// The part that runs the image that is flashed.
 const CHIP: &str = "chip";
 
-/// The part that runs the image of every board.
 const BOARDS: &str = "boards";
 
-/// The part that judges the model of the chip.
 const FOREIGN: &str = "foreign";
 
-/// The part that looks at no card.
 const DIAGNOSIS: &str = "diagnosis";
 
-/// Runs the campaigns with these arguments: names, `--short`, `--seed N`, `--runs N`; or `diagnosis` with its own; or `chip`
-/// or `foreign` with theirs.
+/// Names, `--short`, `--seed N`, `--runs N`; `diagnosis`, `chip` and `foreign` have their own.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
         Some((CHIP, rest)) => return chip(&[firmware::default_board()], rest),
@@ -47,7 +41,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
     Shell::cargo().args(run).args(arguments).run()
 }
 
-/// The long tests, some of them or all, with the images of these boards.
+/// Some or all.
 fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
     setup::require(&needs)?;

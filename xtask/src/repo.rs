@@ -2,24 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-/// The triple of the firmware: a Cortex-M4 with its FPU.
+/// A Cortex-M4 with FPU.
 pub(crate) const FIRMWARE_TARGET: &str = "thumbv7em-none-eabihf";
 
-/// The triple of the check in a browser: WebAssembly with files.
+/// WebAssembly with files.
 pub(crate) const BROWSER_TARGET: &str = "wasm32-wasip1";
 
-/// The root of the repository.
 pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask is one folder below the root")
 }
 
-/// The build folder: cargo's own, wherever the user keeps it.
+/// Cargo's, or the user's.
 pub(crate) fn target() -> PathBuf {
     let chosen = std::env::var_os("CARGO_TARGET_DIR").filter(|dir| !dir.is_empty());
     chosen.map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
-/// A path as a person would type it from the root.
+/// As typed from the root.
 pub(crate) fn shown(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).display().to_string()
 }

@@ -1,7 +1,7 @@
-//! Requirements of the other commands: a table with purpose, search and installation of each.
+//! Requirements: purpose, search and installation.
 //!
-//! Rust's own parts come from `rustup`, the rest from `apt-get` as root or by a `sudo` that asks for no password.
-//! Otherwise, or with `HUMS_SETUP=never` in the environment, the command to type is printed.
+//! Rust's parts come from `rustup`, others from `apt-get` as root or by a `sudo` without password; otherwise, or with
+//! `HUMS_SETUP=never`, the command is printed.
 
 use std::collections::BTreeSet;
 use std::env;
@@ -14,17 +14,16 @@ use Source::{Component, Packages, Target};
 use crate::repo::{BROWSER_TARGET, FIRMWARE_TARGET};
 use crate::shell::{Shell, is_root};
 
-/// The target of a `hums` that needs no library of the machine it runs on.
+/// Needs no library of its machine.
 pub(crate) const STATIC_TARGET: &str =
     if cfg!(target_arch = "aarch64") { "aarch64-unknown-linux-musl" } else { "x86_64-unknown-linux-musl" };
 
-/// The target of the `hums` for Windows, which MinGW links.
+/// Linked by MinGW.
 pub(crate) const WINDOWS_TARGET: &str = "x86_64-pc-windows-gnu";
 
-/// The target of a `hums` for macOS, which nothing here links.
+/// Linked by nothing here.
 pub(crate) const MAC_TARGET: &str = "aarch64-apple-darwin";
 
-/// Something that a command needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
     Linker,
@@ -45,17 +44,16 @@ pub(crate) enum Need {
     Chromium,
 }
 
-/// How something is found and installed.
+/// Found and installed.
 enum Source {
-    /// A compilation target of `rustup`.
     Target(&'static str),
-    /// A component of `rustup`, which is there if this command of cargo runs.
+    /// Found by a command of cargo.
     Component(&'static str, &'static str),
-    /// Packages of Debian and Ubuntu, which are there if this line of `sh` succeeds.
+    /// Debian and Ubuntu, found by a line of `sh`.
     Packages(&'static str, &'static str),
 }
 
-/// Each need with its purpose.
+/// With purposes.
 const TABLE: [(Need, &str, Source); 16] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
@@ -79,7 +77,7 @@ const FIND_MINGW: &str = "command -v x86_64-w64-mingw32-gcc";
 const FIND_VENV: &str = "python3 -c 'import venv, ensurepip'";
 const FIND_CHROMIUM: &str = "command -v chromium && command -v chromedriver";
 const CHROMIUM: &str = "chromium chromium-driver fonts-dejavu-core";
-/// Debian keeps the program of its package `wine64` out of `PATH`.
+/// Debian keeps it out of `PATH`.
 const FIND_WINE: &str = "command -v wine64 || command -v wine || ls /usr/lib/wine/wine64";
 
 impl Need {
@@ -102,7 +100,7 @@ impl Need {
         }
     }
 
-    /// The line that installs it.
+    /// Of `sh`.
     fn install(self) -> String {
         match self.row().1 {
             Source::Target(target) => format!("rustup target add {target}"),
@@ -118,17 +116,16 @@ impl Need {
     }
 }
 
-/// The output of a line of `sh`; `None` if it fails. The system folders are looked at too: a user's `PATH` on Debian leaves them out.
+/// `None` if it fails; also looks at system folders, which Debian's users lack.
 fn sh(line: &str) -> Option<String> {
     Shell::new("sh").args(["-c", &format!("PATH=\"$PATH:/usr/sbin:/sbin\"; {line}")]).ask()
 }
 
-/// The path of Wine.
 pub(crate) fn find_wine() -> Option<PathBuf> {
     Some(PathBuf::from(sh(FIND_WINE)?.lines().next()?))
 }
 
-/// Requirements that are still missing after [`ensure`].
+/// Missing after [`ensure`].
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     missing: BTreeSet<Need>,
@@ -139,7 +136,6 @@ impl Outcome {
         !self.missing.contains(&need)
     }
 
-    /// An error if anything is missing.
     pub(crate) fn require_all(&self) -> Result<()> {
         if self.missing.is_empty() {
             return Ok(());
@@ -149,19 +145,19 @@ impl Outcome {
     }
 }
 
-/// [`ensure`]; then a missing tool is an error.
+/// A missing tool is an error.
 pub(crate) fn require(needs: &[Need]) -> Result<()> {
     ensure(needs, false).require_all()
 }
 
-/// Prints missing `needs` and installs them (never with `dry_run`). Gives those that are missing in the end.
+/// Prints and installs `needs` (not with `dry_run`). Returns the missing ones.
 pub(crate) fn ensure(needs: &[Need], dry_run: bool) -> Outcome {
     let mut missing: Vec<Need> = needs.iter().copied().filter(|need| !need.present()).collect();
     let install = !dry_run && env::var_os("HUMS_SETUP").is_none_or(|value| value != "never");
     for need in &missing {
         let (purpose, line) = (need.row().0, need.install());
         eprintln!("missing: {purpose}\n  {line}");
-        // Requirements that are still missing decide.
+        // What is still missing decides.
         if install && let Err(error) = Shell::new("sh").args(["-c", &line]).quiet().run() {
             eprintln!("warning: {error:#}");
         }

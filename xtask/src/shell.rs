@@ -1,4 +1,4 @@
-//! Running other programs: every command is shown before it runs, so that it can be typed by hand.
+//! Programs: each command is shown, to be typed by hand.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
 
-/// A command line with a readable form.
+/// In readable form.
 pub(crate) struct Shell {
     command: Command,
     shown: String,
@@ -21,14 +21,14 @@ impl Shell {
         Self { command, shown: program.to_string_lossy().into_owned() }
     }
 
-    /// The cargo that runs this xtask, so that the toolchain stays the one the user chose.
+    /// Runs this xtask: the user's toolchain.
     pub(crate) fn cargo() -> Self {
         let mut shell = Self::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         "cargo".clone_into(&mut shell.shown);
         shell
     }
 
-    /// In `folder`; elsewhere it is the root.
+    /// Instead of the root.
     pub(crate) fn within(mut self, folder: &Path) -> Self {
         self.command.current_dir(folder);
         self.shown = format!("cd {} && {}", quoted(&folder.to_string_lossy()), self.shown);
@@ -59,13 +59,13 @@ impl Shell {
         &self.shown
     }
 
-    /// Without its stdout, for programs with much output of little use.
+    /// Without stdout.
     pub(crate) fn quiet(mut self) -> Self {
         self.command.stdout(Stdio::null());
         self
     }
 
-    /// Runs it with our own stdout and stderr; a non-zero exit is an error.
+    /// A non-zero exit is an error.
     pub(crate) fn run(mut self) -> Result<()> {
         eprintln!("$ {}", self.shown);
         let status = self.command.status().with_context(|| format!("cannot run {}", self.shown))?;
@@ -75,8 +75,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Runs it and returns its stdout; stderr stays ours. Also the exit code, for programs such as
-    /// `hums decode` whose code 3 is a result.
+    /// Stdout, and the code: `hums decode`'s 3 is a result.
     pub(crate) fn output_and_code(mut self) -> Result<(String, i32)> {
         eprintln!("$ {}", self.shown);
         let output = self
@@ -88,7 +87,7 @@ impl Shell {
         Ok((String::from_utf8_lossy(&output.stdout).into_owned(), code))
     }
 
-    /// As [`Shell::output_and_code`]; a non-zero exit is an error.
+    /// A non-zero exit is an error.
     pub(crate) fn output(self) -> Result<String> {
         let shown = self.shown.clone();
         let (text, code) = self.output_and_code()?;
@@ -98,7 +97,7 @@ impl Shell {
         Ok(text)
     }
 
-    /// Asks quietly: `None` if it cannot be run or fails, otherwise stdout.
+    /// `None` if it fails.
     pub(crate) fn ask(mut self) -> Option<String> {
         let output = self.command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
@@ -110,8 +109,7 @@ pub(crate) fn is_root() -> bool {
     *ROOT.get_or_init(|| Shell::new("id").arg("-u").ask().is_some_and(|id| id.trim() == "0"))
 }
 
-/// Quotes a word that a shell would read differently. A control character (cargo's flags have some) becomes its
-/// number, so that a file with this output stays a text.
+/// For a shell; control characters (cargo's flags) become numbers.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("{word:?}") }

@@ -1,4 +1,4 @@
-//! Programs for Windows, run on Linux: under Wine, which is not Windows. Results there need not hold on Windows itself.
+//! Windows programs under Wine; Windows itself may differ.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,18 +9,18 @@ use crate::repo;
 use crate::setup::{WINDOWS_TARGET, find_wine};
 use crate::shell::Shell;
 
-/// The packages that do not run on Windows.
+/// Do not run on Windows.
 const ELSEWHERE: &str =
     "hums-app hums-core-tests hums-fuzz hums-maths hums-tests xtask cortex-m4-model stm32f405-model";
 
-/// Rust's library takes its random numbers from here; Wine has it from version 9 on.
+/// Random numbers of Rust's library; in Wine since version 9.
 const RANDOM_LIBRARY: &str = "bcryptprimitives.dll";
 const RANDOM_SOURCE: &str = "#include <windows.h>
 BOOLEAN NTAPI SystemFunction036(PVOID, ULONG);
 __declspec(dllexport) BOOL WINAPI ProcessPrng(PBYTE to, SIZE_T count) { return SystemFunction036(to, (ULONG)count); }
 ";
 
-/// Wine, with a Windows of its own in `target`.
+/// Its Windows is in `target`.
 pub(crate) struct Wine {
     program: PathBuf,
     prefix: PathBuf,
@@ -42,12 +42,11 @@ impl Wine {
         Ok(wine)
     }
 
-    /// A program for Windows.
     pub(crate) fn run(&self, program: &Path) -> Shell {
         self.shell(&self.program).arg(program)
     }
 
-    /// The unit tests of `hums` and of its crates.
+    /// `hums` and its crates.
     pub(crate) fn unit_tests(&self) -> Result<()> {
         let others = ELSEWHERE.split(' ').flat_map(|package| ["--exclude", package]);
         self.shell(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -59,12 +58,12 @@ impl Wine {
     }
 
     fn shell(&self, program: impl AsRef<std::ffi::OsStr>) -> Shell {
-        // Its own complaints concern windows, which are not used here.
+        // Its complaints concern unused windows.
         Shell::new(program).env("WINEPREFIX", &self.prefix).env("WINEDEBUG", "-all")
     }
 }
 
-/// Shows that a release's `hums.exe` reads a flight, makes a report and leaves both as they are when it is run again.
+/// Reads a flight and makes a report; a second run changes nothing.
 pub(crate) fn try_out(wine: &Wine, program: &Path, flight: &Path) -> Result<()> {
     let report = wine.prefix.join("report.html");
     let _ = fs::remove_file(&report);

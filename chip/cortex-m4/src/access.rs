@@ -1,4 +1,4 @@
-//! Loads and stores of the processor: alignment, bit-band aliases, the MPU, the processor's own registers, or the bus.
+//! Loads and stores: alignment, bit-band aliases, MPU, the processor's registers, or the bus.
 
 use crate::bus::{Bus, Fault, Size};
 use crate::exceptions::{BUS_FAULT, HARD_FAULT};
@@ -7,7 +7,6 @@ use crate::processor::Core;
 use crate::registers::{FORCED, IMPRECISERR};
 use crate::trap::Trap;
 
-/// The target of an access.
 enum Way {
     Bus,
     /// A bit of this word at this place.
@@ -16,7 +15,7 @@ enum Way {
 }
 
 impl Core {
-    /// A load of an instruction, extended as its width says.
+    /// Extended as its width says.
     #[inline(always)]
     pub(crate) fn load<B: Bus>(&mut self, bus: &mut B, address: u32, width: Width) -> Result<u32, Trap> {
         match width {
@@ -28,7 +27,6 @@ impl Core {
         }
     }
 
-    /// A store of an instruction.
     #[inline(always)]
     pub(crate) fn store<B: Bus>(
         &mut self,
@@ -44,7 +42,6 @@ impl Core {
         }
     }
 
-    /// A load that may be unaligned.
     #[inline(always)]
     pub(crate) fn read<B: Bus>(&mut self, bus: &mut B, address: u32, size: Size) -> Result<u32, Trap> {
         if address & (size.bytes() - 1) != 0 {
@@ -53,7 +50,6 @@ impl Core {
         self.read_aligned(bus, address, size)
     }
 
-    /// A store that may be unaligned.
     #[inline(always)]
     pub(crate) fn write<B: Bus>(
         &mut self,
@@ -68,7 +64,7 @@ impl Core {
         self.write_aligned(bus, address, size, value)
     }
 
-    /// A word that must be aligned: of a pair, of several, or exclusive.
+    /// Of a pair, of several, or exclusive.
     #[inline(always)]
     pub(crate) fn read_strict<B: Bus>(&mut self, bus: &mut B, address: u32, size: Size) -> Result<u32, Trap> {
         if address & (size.bytes() - 1) != 0 {
@@ -77,7 +73,6 @@ impl Core {
         self.read_aligned(bus, address, size)
     }
 
-    /// The same for a store.
     #[inline(always)]
     pub(crate) fn write_strict<B: Bus>(
         &mut self,
@@ -133,14 +128,13 @@ impl Core {
         }
     }
 
-    /// The bus changed something that its chip must look at.
     #[cold]
     fn attention(&mut self) {
         self.leave = true;
         self.deadline = 0;
     }
 
-    /// A refused store is told late, as the write buffer has it, unless ACTLR.DISDEFWBUF turns that off.
+    /// A refused store is reported late, by the write buffer, unless ACTLR.DISDEFWBUF is set.
     #[cold]
     fn refused_store(&mut self, address: u32) -> Result<(), Trap> {
         if self.control.actlr & 2 != 0 {
@@ -201,7 +195,7 @@ impl Core {
         if trapped || own(address) { Err(Trap::Unaligned) } else { Ok(()) }
     }
 
-    /// Which way an access goes, if it may.
+    /// Which way an access goes, if allowed.
     fn way(&self, address: u32, write: bool, privileged: bool) -> Result<Way, Trap> {
         if own(address) {
             return if privileged || self.control.user_may(address, write) {
@@ -222,7 +216,7 @@ impl Core {
         })
     }
 
-    /// An access that needs more than the bus.
+    /// Needs more than the bus.
     #[cold]
     #[inline(never)]
     pub(crate) fn read_slowly<B: Bus>(
@@ -286,7 +280,7 @@ pub(crate) fn own(address: u32) -> bool {
     address >> 20 == 0xE00 && address >> 12 != 0xE_0042
 }
 
-/// A bit-band alias is accessed by a byte, halfword or word that holds the bit.
+/// By a byte, halfword or word that holds the bit.
 fn align_bit(at: u32, bit: Option<u32>, size: Size) -> (u32, Option<u32>) {
     let low = at & (size.bytes() - 1);
     (at - low, bit.map(|bit| bit + 8 * low))

@@ -2,7 +2,7 @@
 
 use crate::op::Op;
 
-/// Halfwords that the cache holds at once: 256 KiB of code without a conflict.
+/// 256 KiB of code without a conflict.
 const ENTRIES: usize = 1 << 17;
 /// Entries are discarded by page.
 const PAGE_BITS: u32 = 8;
@@ -15,14 +15,14 @@ pub(crate) struct Entry {
     pub(crate) op: Op,
     /// 2 or 4 bytes.
     pub(crate) bytes: u8,
-    /// Cycles at the least, without wait states: see [`crate::timing`].
+    /// Without wait states: see [`crate::timing`].
     pub(crate) cycles: u8,
     pub(crate) writes: u8,
 }
 
 const EMPTY: Entry = Entry { tag: u32::MAX, op: Op::Undefined, bytes: 2, cycles: 1, writes: 0x1F };
 
-/// Decoded instructions by address, and the pages that hold any.
+/// With the pages that hold any.
 pub(crate) struct Cache {
     entries: Box<[Entry; ENTRIES]>,
     pages: Box<[u64; 1 << 9]>,
@@ -35,7 +35,7 @@ impl Default for Cache {
     }
 }
 
-/// A page's place among the bits: eight regions of half a gibibyte with a mebibyte each, so that flash and memory differ.
+/// Eight regions of half a gibibyte with a mebibyte each, so that flash and memory differ.
 #[inline]
 fn page(address: u32) -> (usize, u64) {
     let page = (address >> PAGE_BITS & 0xFFF) | address >> 29 << 12;
@@ -56,7 +56,7 @@ impl Cache {
         self.entries[(entry.tag >> 1) as usize & (ENTRIES - 1)] = entry;
     }
 
-    /// After a store of up to a word.
+    /// Up to a word.
     #[inline(always)]
     pub(crate) fn stored(&mut self, address: u32) {
         let (word, bit) = page(address);
@@ -65,7 +65,7 @@ impl Cache {
         }
     }
 
-    /// Discards the pages of these bytes, and an instruction that reaches into them from the page before.
+    /// Also an instruction that reaches into them from the page before.
     pub(crate) fn forget(&mut self, address: u32, bytes: u32) {
         let first = address >> PAGE_BITS;
         let last = address.saturating_add(bytes.max(1) - 1) >> PAGE_BITS;
@@ -82,7 +82,7 @@ impl Cache {
                     *entry = EMPTY;
                 }
             }
-            // Another region's page may share the bit, and the page's last instruction may reach into the next: bits stay set.
+            // Bits stay set: another region's page may share them.
         }
     }
 

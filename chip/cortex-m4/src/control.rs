@@ -1,8 +1,7 @@
 //! The system control space: SCB, NVIC, `SysTick`, MPU, FPU and debug registers, and the DWT's cycle counter.
 //!
-//! Addresses and reset values: `ARMv7-M` Architecture Reference Manual (DDI 0403E), chapters B3 and C1; Cortex-M4 TRM.
-//! Without a debugger: DHCSR shows none, FPB, ITM, TPIU and ETM are not there. An unmodelled access is reported
-//! ([`crate::Outcome::Unmodelled`]).
+//! Addresses and reset values: `ARMv7-M` Architecture Reference Manual (DDI 0403E), chapters B3 and C1; Cortex-M4 TRM. Without
+//! a debugger: no FPB, ITM, TPIU and ETM. An unmodelled access is [`crate::Outcome::Unmodelled`].
 
 use crate::bus::Size;
 use crate::exceptions::{BUS_FAULT, DEBUG_MONITOR, MEM_MANAGE, NMI, PENDSV, SVCALL, SYSTICK, USAGE_FAULT};
@@ -10,7 +9,7 @@ use crate::processor::{Core, slow_regions};
 use crate::registers::FPDSCR;
 use crate::trap::Trap;
 
-/// The identification registers from `0xE000_ED40` on: the processor's features.
+/// From `0xE000_ED40` on.
 const FEATURES: [u32; 13] = [
     0x0000_0030,
     0x0000_0200,
@@ -27,18 +26,17 @@ const FEATURES: [u32; 13] = [
     0x0131_0102,
 ];
 
-/// The Cortex-M4 r0p1 of the STM32F405.
 const CPUID: u32 = 0x410F_C241;
 
 impl Core {
-    /// A load from the private bus: bytes and halfwords are parts of a word's registers.
+    /// Bytes and halfwords are parts of a word's registers.
     pub(crate) fn read_own(&mut self, address: u32, size: Size) -> u32 {
         let word = self.read_register(address & !3);
         let shift = (address & 3) * 8;
         word >> shift & (u32::MAX >> (32 - 8 * size.bytes()))
     }
 
-    /// A store to it. Only priorities and fault status take less than a word.
+    /// Only priorities and fault status take less than a word.
     pub(crate) fn write_own(&mut self, address: u32, size: Size, value: u32) -> Result<(), Trap> {
         let at = address & !3;
         if size == Size::Word {

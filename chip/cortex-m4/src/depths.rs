@@ -1,21 +1,20 @@
-//! Stack depth of each exception, as a painted stack would show it, without a change of the program.
+//! Stack depth by exception, as a painted stack shows it.
 
-/// One that was entered and has not returned.
+/// Entered and not returned.
 #[derive(Clone, Copy, Debug)]
 struct Level {
     exception: u16,
-    /// The stack pointer before its frame.
+    /// Before its frame.
     begin: u32,
-    /// The lowest stack pointer of the interrupted code until then.
+    /// Of the interrupted code until then.
     interrupted: u32,
 }
 
-/// The main stack's use.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Depths {
     /// The lowest stack pointer of the running code.
     pub(crate) lowest: u32,
-    /// The stack pointer and [`Depths::lowest`] at an entry.
+    /// At an entry, with [`Depths::lowest`].
     entering: (u32, u32),
     /// Thread mode first.
     levels: Vec<Level>,
@@ -23,27 +22,26 @@ pub(crate) struct Depths {
 }
 
 impl Depths {
-    /// A reset with this stack pointer.
     pub(crate) fn begin(&mut self, stack: u32) {
         self.levels.clear();
         self.levels.push(Level { exception: 0, begin: stack, interrupted: stack });
         self.lowest = stack;
     }
 
-    /// An entry begins, with the stack pointer as it was before the frame.
+    /// `stack`: before the frame.
     pub(crate) fn interrupted(&mut self, stack: u32) {
         self.note();
         self.entering = (stack, self.lowest);
     }
 
-    /// The exception was chosen, and its frame is there.
+    /// Chosen, with its frame.
     pub(crate) fn entered(&mut self, exception: u16, stack: u32) {
         let (begin, interrupted) = self.entering;
         self.levels.push(Level { exception, begin, interrupted });
         self.lowest = stack;
     }
 
-    /// It returns; another one may take over its frame.
+    /// Another one may take over its frame.
     pub(crate) fn returned(&mut self) {
         self.note();
         if let Some(level) = self.levels.pop() {
@@ -51,12 +49,12 @@ impl Depths {
         }
     }
 
-    /// Returns to the interrupted code.
+    /// To the interrupted code.
     pub(crate) fn resumed(&mut self) {
         self.lowest = self.entering.1;
     }
 
-    /// The bytes of an exception's deepest.
+    /// Bytes at its deepest.
     pub(crate) fn of(&self, exception: u16) -> u32 {
         self.deepest.get(usize::from(exception)).copied().unwrap_or(0)
     }

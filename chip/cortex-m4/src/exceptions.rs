@@ -1,6 +1,6 @@
-//! Which exceptions are pending, active and enabled, and how urgent: the NVIC's and the system handlers' state.
+//! State of the NVIC and the system handlers.
 //!
-//! Exceptions have the architecture's numbers: 1 reset, 2 NMI, 3 `HardFault`, ..., 16 and on the interrupt lines.
+//! Numbers are the architecture's: 1 reset, 2 NMI, 3 `HardFault`, ..., 16 and on the interrupt lines.
 
 pub(crate) const NMI: u16 = 2;
 pub(crate) const HARD_FAULT: u16 = 3;
@@ -12,15 +12,14 @@ pub(crate) const DEBUG_MONITOR: u16 = 12;
 pub(crate) const PENDSV: u16 = 14;
 pub(crate) const SYSTICK: u16 = 15;
 
-/// Whether it is one of the four faults.
 pub(crate) fn is_fault(number: u16) -> bool {
     (HARD_FAULT..=USAGE_FAULT).contains(&number)
 }
 
-/// Below all: the priority of thread mode.
+/// Thread mode, below all.
 pub(crate) const THREAD: i16 = 256;
 
-/// A bit for each exception.
+/// A bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Set([u64; 4]);
 
@@ -58,7 +57,6 @@ impl Set {
     }
 }
 
-/// The state of all exceptions.
 #[derive(Clone, Debug)]
 pub(crate) struct Exceptions {
     lines: u16,
@@ -98,12 +96,11 @@ impl Exceptions {
         self.priority_bits
     }
 
-    /// Whether there is an interrupt with this exception's number.
     pub(crate) fn is_interrupt(&self, number: u16) -> bool {
         number >= 16 && number < 16 + self.lines
     }
 
-    /// Makes an exception pending; true if it was not.
+    /// True if it was not.
     pub(crate) fn pend(&mut self, number: u16) -> bool {
         if number >= 16 && !self.is_interrupt(number) {
             return false;
@@ -113,7 +110,7 @@ impl Exceptions {
         new
     }
 
-    /// Clears a pending exception, unless its line holds it.
+    /// Unless its line holds it.
     pub(crate) fn unpend(&mut self, number: u16) {
         self.pending.put(number, self.high.has(number) && !self.active.has(number));
     }
@@ -133,7 +130,7 @@ impl Exceptions {
         self.active.put(number, true);
     }
 
-    /// The handler returned: a line that is still high makes it pending again.
+    /// A line still high makes it pending again.
     pub(crate) fn deactivate(&mut self, number: u16) {
         self.active.put(number, false);
         if self.high.has(number) {
@@ -141,7 +138,7 @@ impl Exceptions {
         }
     }
 
-    /// The priority of an exception, all bits: -3 to 255.
+    /// All bits: -3 to 255.
     pub(crate) fn priority(&self, number: u16) -> i16 {
         match number {
             1 => -3,
@@ -155,7 +152,7 @@ impl Exceptions {
         self.priority[usize::from(number & 255)]
     }
 
-    /// Sets a priority; its lower bits are not implemented.
+    /// Lower bits are not implemented.
     pub(crate) fn set_priority(&mut self, number: u16, value: u8) {
         let configurable = (4..=6).contains(&number)
             || matches!(number, SVCALL | DEBUG_MONITOR | PENDSV | SYSTICK)
@@ -165,23 +162,23 @@ impl Exceptions {
         }
     }
 
-    /// The bits of a priority that are there.
+    /// Implemented bits.
     pub(crate) fn kept(&self, value: u8) -> u8 {
         value & (0xFFu16 << (8 - self.priority_bits)) as u8
     }
 
-    /// The part of a priority that pre-empts: its group.
+    /// Its group.
     pub(crate) fn grouped(&self, priority: i16) -> i16 {
         if priority < 0 { priority } else { priority & !((2 << self.group) - 1) }
     }
 
-    /// The most urgent group of those active; [`THREAD`] without.
+    /// [`THREAD`] without one.
     pub(crate) fn active_priority(&self) -> i16 {
         let grouped = self.active.iter().map(|number| self.grouped(self.priority(number)));
         grouped.min().unwrap_or(THREAD)
     }
 
-    /// The pending and enabled exception that comes first: by priority, then by number.
+    /// By priority, then number.
     pub(crate) fn first(&self) -> Option<u16> {
         let ready = self.pending.and(&self.enabled);
         if ready.is_empty() {

@@ -1,8 +1,8 @@
 //! Exceptions: faults and their escalation, entry with stacking (also of floating-point registers, late), return, tail-chaining.
 //!
 //! After the architecture's pseudocode (DDI 0403E, B1.5): `ExceptionEntry`, `PushStack`, `ExceptionTaken`, `ExceptionReturn`,
-//! `PopStack`, `PreserveFPState`. Entry has two halves, so that an interrupt that arrives while registers are stacked is taken
-//! first if it is more urgent (late arrival): [`Core::interrupt`] stacks, [`Core::enter`] chooses the vector.
+//! `PopStack`, `PreserveFPState`. Entry has two halves for late arrival: [`Core::interrupt`] stacks, then [`Core::enter`]
+//! chooses the vector.
 
 use crate::bus::{Bus, Size};
 use crate::exceptions::{BUS_FAULT, DEBUG_MONITOR, HARD_FAULT, MEM_MANAGE, NMI, SVCALL, USAGE_FAULT};
@@ -17,7 +17,7 @@ use crate::timing;
 use crate::trap::Trap;
 
 impl Core {
-    /// An instruction trapped: a fault's exception is taken, others are served.
+    /// A fault's exception is taken, others are served.
     #[cold]
     #[inline(never)]
     pub(crate) fn trapped<B: Bus>(&mut self, bus: &mut B, trap: Trap) -> Option<Outcome> {
@@ -56,7 +56,7 @@ impl Core {
         self.locked_up.then_some(Outcome::Lockup)
     }
 
-    /// The fault's status bits; the exception that it is.
+    /// Returns the exception.
     fn record(&mut self, trap: Trap) -> u16 {
         let control = &mut self.control;
         let (bits, number) = match trap {
@@ -92,7 +92,7 @@ impl Core {
         number
     }
 
-    /// A synchronous exception: taken at once, or escalated to `HardFault`, or the end.
+    /// Taken at once, or escalated to `HardFault`, or the end.
     fn raise<B: Bus>(&mut self, bus: &mut B, number: u16) {
         let priority = self.priority();
         let fits = self.exceptions.enabled.has(number)
@@ -113,7 +113,7 @@ impl Core {
         self.interrupt(bus, HARD_FAULT);
     }
 
-    /// A fault of an exception's own stacking: becomes pending, and is chosen when the vector is.
+    /// Of an exception's own stacking: becomes pending, chosen with the vector.
     fn derived(&mut self, number: u16, bits: u32) {
         self.control.cfsr |= bits;
         let fits = self.exceptions.enabled.has(number)
@@ -126,7 +126,7 @@ impl Core {
         }
     }
 
-    /// The first half of an entry: registers go to the stack.
+    /// First half of an entry: stacking.
     pub(crate) fn interrupt<B: Bus>(&mut self, bus: &mut B, _number: u16) {
         let mut exc_return = if self.ipsr != 0 {
             0xFFFF_FFF1
@@ -183,7 +183,7 @@ impl Core {
         words: &[u32],
         privileged: bool,
     ) -> Result<(), Trap> {
-        // Stacking is precise: a refused store is told now.
+        // Stacking is precise.
         let imprecise = self.control.cfsr & crate::registers::IMPRECISERR;
         let pending = self.exceptions.pending.has(BUS_FAULT);
         for (at, &word) in (frame..).step_by(4).zip(words) {
@@ -197,7 +197,7 @@ impl Core {
         Ok(())
     }
 
-    /// `UpdateFPCCR`: the place is kept free, and the registers follow when a handler first touches them.
+    /// `UpdateFPCCR`: space is reserved; registers follow when a handler touches them.
     fn prepare_lazily(&mut self, frame: u32) {
         self.control.fpcar = frame.wrapping_add(0x20) & !7;
         let priority = self.priority();
@@ -221,11 +221,11 @@ impl Core {
         self.fp_ready = false;
     }
 
-    /// The second half: the most urgent exception's vector.
+    /// Second half: the most urgent exception's vector.
     pub(crate) fn enter<B: Bus>(&mut self, bus: &mut B) {
         let Some(exc_return) = self.entering else { return };
         let Some(number) = self.exceptions.first() else {
-            // Taken back while the registers were stacked: nothing is left to enter, so that they are unstacked.
+            // Withdrawn during stacking: nothing is left to enter.
             self.entering = None;
             self.depths.resumed();
             self.unstack(bus, exc_return);
@@ -255,7 +255,7 @@ impl Core {
             self.thumb = handler & 1 == 1;
         } else {
             self.control.hfsr |= VECTTBL;
-            // The exception stays pending; the fault is taken in its place.
+            // The exception stays pending; the fault is taken.
             self.exceptions.active.put(number, false);
             self.exceptions.pend(number);
             if number == HARD_FAULT || number == NMI || self.priority() < 0 {
@@ -301,7 +301,7 @@ impl Core {
         }
     }
 
-    /// Whether an exception pre-empts the code to return to, so that nothing is unstacked.
+    /// Tail-chaining: it pre-empts the code to return to.
     fn due_after_return(&self, _value: u32) -> bool {
         self.due(self.priority()).is_some()
     }
@@ -314,7 +314,7 @@ impl Core {
         self.deadline = 0;
     }
 
-    /// A return that the architecture refuses: `UsageFault` INVPC, with the frame still on the stack.
+    /// Refused: `UsageFault` INVPC, with the frame still stacked.
     fn bad_return<B: Bus>(&mut self, _bus: &mut B, value: u32) {
         self.derived(USAGE_FAULT, INVPC);
         self.entering = Some(value | 0xF000_0000);
@@ -324,7 +324,7 @@ impl Core {
         }
     }
 
-    /// Registers come back from the stack that the return names.
+    /// From the stack that the return names.
     fn unstack<B: Bus>(&mut self, bus: &mut B, value: u32) {
         let to_thread = value & 8 != 0;
         let to_process = value & 4 != 0 && to_thread;
@@ -374,7 +374,7 @@ impl Core {
         self.branched = true;
         self.deadline = 0;
         if to_thread != (self.ipsr == 0) {
-            // The frame's mode is not the return's: the fault is stacked anew.
+            // The frame's mode is wrong: the fault is stacked anew.
             self.ipsr = if to_thread { 0 } else { self.ipsr };
             self.push_frame(bus);
             self.derived(USAGE_FAULT, INVPC);
@@ -397,7 +397,7 @@ impl Core {
 
     fn unstack_float<B: Bus>(&mut self, bus: &mut B, frame: u32, privileged: bool) -> Result<(), Trap> {
         if self.control.fpccr & LSPACT != 0 {
-            // They were never stored: the registers still hold them.
+            // Never stored: the registers hold them.
             self.control.fpccr &= !LSPACT;
             return Ok(());
         }
@@ -409,7 +409,7 @@ impl Core {
         Ok(())
     }
 
-    /// Prepares a floating-point instruction: access, saved state of the interrupted code, a context of its own.
+    /// Access, saved state of the interrupted code, a context of its own.
     #[cold]
     #[inline(never)]
     pub(crate) fn prepare_float<B: Bus>(&mut self, bus: &mut B) -> Result<(), Trap> {
@@ -436,7 +436,7 @@ impl Core {
             self.fpscr = self.fpscr & !FPDSCR | self.control.fpdscr & FPDSCR;
             self.fp_active = true;
         }
-        // Unprivileged access may differ: only a result for both is remembered.
+        // Remembered only if the same for unprivileged access.
         self.fp_ready = self.control.cpacr >> 20 & 3 == 3;
         Ok(())
     }

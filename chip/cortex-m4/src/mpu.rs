@@ -1,8 +1,8 @@
 //! The memory protection unit of `ARMv7-M` (`PMSAv7`) with eight regions, and the default memory map's places without code.
 //!
-//! With it on, instructions are decoded anew each time (the cache of decoded ones knows no permissions): slow, and right.
+//! With it on, instructions are decoded anew each time: the cache knows no permissions.
 
-/// A region's base and its attributes and size.
+/// Base; attributes and size.
 #[derive(Clone, Copy, Debug, Default)]
 struct Region {
     base: u32,
@@ -22,7 +22,7 @@ impl Mpu {
         self.control & 1 != 0
     }
 
-    /// A register by its offset from `0xE000_ED90`; `None` for other offsets.
+    /// From `0xE000_ED90`; `None` for other offsets.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         let region = self.regions[usize::from(self.number)];
         match offset {
@@ -36,7 +36,7 @@ impl Mpu {
         }
     }
 
-    /// The aliases look at the regions behind the numbered one, in its group of four.
+    /// Aliases are the next regions in its group of four.
     fn region(&self, offset: u32) -> Region {
         self.regions[self.alias(offset)]
     }
@@ -46,7 +46,7 @@ impl Mpu {
         if alias == 0 { usize::from(self.number) } else { usize::from(self.number & 4) + alias as usize }
     }
 
-    /// Writes a register; false for other offsets.
+    /// False for other offsets.
     pub(crate) fn write(&mut self, offset: u32, value: u32) -> bool {
         match offset {
             0 => {}
@@ -70,12 +70,12 @@ impl Mpu {
         true
     }
 
-    /// The attributes of the region that decides on an address: the highest that holds it.
+    /// The highest region with the address.
     fn deciding(&self, address: u32) -> Option<u32> {
         self.regions.iter().rev().find(|region| region.holds(address)).map(|region| region.attributes)
     }
 
-    /// Whether the unit stands aside: off, or in a fault's handler without HFNMIENA.
+    /// Off, or in a fault's handler without HFNMIENA.
     fn aside(&self, negative_priority: bool) -> bool {
         !self.is_on() || negative_priority && self.control & 2 == 0
     }

@@ -1,6 +1,6 @@
-//! The program status registers: flags, ITSTATE, the exception's number.
+//! Flags, ITSTATE, the exception's number.
 
-/// APSR: the flags of conditions, saturation, and of parallel additions.
+/// APSR: conditions, saturation, parallel additions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of the processor")]
 pub(crate) struct Flags {
@@ -45,7 +45,6 @@ impl Flags {
         self.ge = (apsr >> 16 & 15) as u8;
     }
 
-    /// Whether a condition of four bits holds.
     #[inline(always)]
     pub(crate) fn holds(self, condition: u8) -> bool {
         let base = match condition >> 1 {
@@ -62,12 +61,12 @@ impl Flags {
     }
 }
 
-/// EPSR with ITSTATE in its two places.
+/// With ITSTATE in its two places.
 pub(crate) fn epsr(it: u8, thumb: bool) -> u32 {
     u32::from(it & 3) << 25 | u32::from(it >> 2) << 10 | u32::from(thumb) << 24
 }
 
-/// ITSTATE of a program status word.
+/// Of a program status word.
 pub(crate) fn it_of(xpsr: u32) -> u8 {
     (xpsr >> 25 & 3) as u8 | (xpsr >> 8 & 0xFC) as u8
 }

@@ -1,6 +1,6 @@
-//! The registers of the system control space that only hold their written value, and their significant bits.
+//! Registers that only hold their written value.
 
-/// Bits of CFSR: its bytes are MMFSR, BFSR and the halfword UFSR.
+/// CFSR: MMFSR, BFSR and the halfword UFSR.
 pub(crate) const IACCVIOL: u32 = 1;
 pub(crate) const DACCVIOL: u32 = 1 << 1;
 pub(crate) const MUNSTKERR: u32 = 1 << 3;
@@ -39,13 +39,12 @@ pub(crate) const ASPEN: u32 = 1 << 31;
 pub(crate) const LSPEN: u32 = 1 << 30;
 pub(crate) const LSPACT: u32 = 1;
 
-/// The bits of FPSCR that are there.
+/// Implemented bits.
 pub(crate) const FPSCR: u32 = 0xF7C0_009F;
 
-/// The bits of FPDSCR, and of FPSCR that come from it.
+/// Also FPSCR's that come from it.
 pub(crate) const FPDSCR: u32 = 0x07C0_0000;
 
-/// The registers that only hold their written value.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Control {
     pub(crate) actlr: u32,
@@ -62,7 +61,7 @@ pub(crate) struct Control {
     pub(crate) fpdscr: u32,
     pub(crate) demcr: u32,
     pub(crate) dwt: u32,
-    /// Offset from the count of cycles to CYCCNT while it counts; else its value.
+    /// From cycles to CYCCNT while it counts; else its value.
     pub(crate) cyccnt: u32,
 }
 
@@ -89,12 +88,12 @@ impl Default for Control {
 }
 
 impl Control {
-    /// `DEMCR.MON_EN`: a breakpoint is for the debug monitor.
+    /// `DEMCR.MON_EN`: breakpoints go to the debug monitor.
     pub(crate) fn monitors(&self) -> bool {
         self.demcr >> 16 & 1 == 1
     }
 
-    /// Unprivileged access to the private bus: STIR, if CCR allows it.
+    /// STIR, if CCR allows it.
     pub(crate) fn user_may(&self, address: u32, write: bool) -> bool {
         address == 0xE000_EF00 && write && self.ccr & USERSETMPEND != 0
     }

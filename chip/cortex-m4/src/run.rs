@@ -1,4 +1,4 @@
-//! Running: one instruction after the other, and in between whatever else is due.
+//! Running: instructions, and whatever else is due.
 
 use crate::bus::Bus;
 use crate::cache::Entry;
@@ -9,7 +9,7 @@ use crate::timing;
 use crate::trap::Trap;
 
 impl Core {
-    /// One instruction, or one half of an exception's entry: the stacking, or the vector.
+    /// One instruction, or half of an exception's entry.
     pub fn step<B: Bus>(&mut self, bus: &mut B) -> Outcome {
         self.single = true;
         let outcome = self.run(bus, self.cycles + 1);
@@ -17,7 +17,7 @@ impl Core {
         outcome
     }
 
-    /// Steps until the count of cycles is at least `until`, or the bus asks for attention, or something stops it.
+    /// Until the cycle, attention of the bus, or a stop.
     pub fn run<B: Bus>(&mut self, bus: &mut B, until: u64) -> Outcome {
         self.until = until;
         self.deadline = 0;
@@ -65,7 +65,7 @@ impl Core {
         Ok(())
     }
 
-    /// Within an IT block: whether this instruction's condition holds. The state is the next instruction's then.
+    /// In an IT block: this instruction's condition; the state advances.
     #[inline]
     fn turn(&mut self) -> bool {
         let holds = self.flags.holds(self.it >> 4);
@@ -73,7 +73,7 @@ impl Core {
         holds
     }
 
-    /// Fetches and decodes; with the MPU on, nothing is kept.
+    /// With the MPU on, nothing is kept.
     #[cold]
     #[inline(never)]
     fn decode<B: Bus>(&mut self, bus: &mut B, tag: u32) -> Result<Entry, Trap> {
@@ -103,7 +103,7 @@ impl Core {
         bus.fetch(address).map_err(|_| Trap::FetchBus)
     }
 
-    /// Handles `SysTick`, exceptions, sleep and the end of the run between two instructions. Sets the next moment for it.
+    /// `SysTick`, exceptions, sleep and the run's end, between two instructions. Sets the next deadline.
     #[cold]
     #[inline(never)]
     fn attend<B: Bus>(&mut self, bus: &mut B) -> Option<Outcome> {
@@ -138,7 +138,7 @@ impl Core {
             }
         }
         if !self.thumb {
-            // The address does not give the instruction set's state: no decoded instruction may be used.
+            // The address lacks the instruction set's state: no cached instruction.
             self.it_now = self.it;
             let trap = self.decode(bus, self.pc).err().unwrap_or(Trap::InvalidState);
             return self.trapped(bus, trap).or_else(|| self.attend(bus));
@@ -147,13 +147,13 @@ impl Core {
         None
     }
 
-    /// The pending exception that pre-empts this priority.
+    /// Pre-empts this priority.
     pub(crate) fn due(&self, priority: i16) -> Option<u16> {
         let number = self.exceptions.first()?;
         (self.exceptions.grouped(self.exceptions.priority(number)) < priority).then_some(number)
     }
 
-    /// The execution priority: the active exceptions', raised by the masks.
+    /// Of the active exceptions, raised by the masks.
     pub(crate) fn priority(&self) -> i16 {
         let exceptions = &self.exceptions;
         let mut boosted = THREAD;
@@ -169,7 +169,7 @@ impl Core {
         boosted.min(exceptions.active_priority())
     }
 
-    /// Whether WFI or WFE is over without an exception being taken: PRIMASK does not keep WFI asleep.
+    /// Without an exception taken: PRIMASK does not keep WFI asleep.
     fn woken(&mut self) -> bool {
         match self.sleeping {
             Some(Sleep::Event) => core::mem::take(&mut self.event),

@@ -1,8 +1,7 @@
-//! Arithmetic of single precision, exact and rounded as `FPSCR` says, with its exception flags.
+//! Single precision, rounded as `FPSCR` says, with its flags; in integers, independent of the host.
 //!
-//! In integers, so that neither the host's rounding nor its treatment of NaN has a say. After the architecture's pseudocode
-//! (DDI 0403E, A2.5 and appendix D): `FPUnpack`, `FPProcessNaNs`, `FPRound` (tininess is found before rounding), `FPMulAdd`, ...
-//! All functions take and return bits, and set bits in `status`, which is FPSCR.
+//! After the architecture's pseudocode (DDI 0403E, A2.5 and appendix D): `FPUnpack`, `FPProcessNaNs`, `FPRound` (tininess is
+//! found before rounding), `FPMulAdd`, ... Functions take and return bits, and set bits of FPSCR in `status`.
 
 /// Bits of FPSCR.
 pub(crate) const IOC: u32 = 1;
@@ -33,7 +32,7 @@ impl Rounding {
         [Rounding::Nearest, Rounding::Up, Rounding::Down, Rounding::Zero][(status >> 22 & 3) as usize]
     }
 
-    /// Whether the discarded bits (the highest is `half`) move the magnitude away from zero.
+    /// Away from zero; the highest discarded bit is `half`.
     fn goes_up(self, negative: bool, odd: bool, cut: u64, half: u64) -> bool {
         match self {
             Rounding::Nearest => cut > half || cut == half && odd,
@@ -95,7 +94,7 @@ fn is_signaling(bits: u32) -> bool {
     is_nan(bits) && bits & QUIET == 0
 }
 
-/// The NaN that an operation on these gives: the first signaling one, or the first quiet one.
+/// The first signaling NaN, or the first quiet one.
 fn nan_of(operands: &[u32], status: &mut u32) -> Option<u32> {
     let signaling = operands.iter().copied().find(|&bits| is_signaling(bits));
     let nan = signaling.or_else(|| operands.iter().copied().find(|&bits| is_nan(bits)))?;
@@ -110,7 +109,7 @@ fn invalid(status: &mut u32) -> u32 {
     DEFAULT_NAN
 }
 
-/// A shift to the right with a sticky lowest bit.
+/// With a sticky lowest bit.
 fn jam(value: u128, by: u32) -> u128 {
     match by {
         0 => value,
@@ -129,7 +128,7 @@ struct Format {
 const SINGLE: Format = Format { exponent_bits: 8, fraction_bits: 23, minimum: -126 };
 const HALF: Format = Format { exponent_bits: 5, fraction_bits: 10, minimum: -14 };
 
-/// `FPRound`: `mantissa` x 2^`exponent`, not zero, whose lowest bit may stand for all below it.
+/// `FPRound` of `mantissa` x 2^`exponent`, not zero; the lowest bit may stand for all below.
 fn round(negative: bool, mantissa: u128, exponent: i32, rounding: Rounding, status: &mut u32) -> u32 {
     round_to(&SINGLE, negative, mantissa, exponent, rounding, status)
 }
@@ -200,14 +199,14 @@ fn round_to(
     sign_bit | biased << format.fraction_bits | kept & ((1 << format.fraction_bits) - 1)
 }
 
-/// The sum of two that are not zero; an exact zero is positive unless rounding is downward.
+/// Not zero; an exact zero is positive unless rounding is downward.
 fn sum(a: (bool, u128, i32), b: (bool, u128, i32), status: &mut u32) -> u32 {
     let (mut a, mut b) = (a, b);
     if a.2 < b.2 {
         core::mem::swap(&mut a, &mut b);
     }
     let small = jam(b.1, (a.2 - b.2) as u32);
-    // With its trace in the lowest bit, the smaller one has the exponent of the greater.
+    // The smaller one leaves a trace in the lowest bit.
     let (negative, mantissa) = if a.0 == b.0 {
         (a.0, a.1 + small)
     } else if a.1 >= small {
@@ -238,7 +237,7 @@ pub(crate) fn add(a: u32, b: u32, status: &mut u32) -> u32 {
     }
 }
 
-/// A number with room below it.
+/// With room below.
 fn wide(value: Unpacked, room: u32) -> (bool, u128, i32) {
     match value.number {
         Number::Finite { mantissa, exponent } => {
@@ -255,7 +254,7 @@ pub(crate) fn negate(a: u32) -> u32 {
 
 /// `FPSub`.
 pub(crate) fn subtract(a: u32, b: u32, status: &mut u32) -> u32 {
-    // A NaN keeps its sign: the second operand is negated only as a number.
+    // A NaN keeps its sign.
     if is_nan(b) { add(a, b, status) } else { add(a, negate(b), status) }
 }
 

@@ -1,4 +1,4 @@
-//! `SysTick`: computed from the count of cycles when somebody looks, so that it costs nothing in between.
+//! Computed from the cycles on demand.
 
 /// The timer.
 #[derive(Clone, Copy, Debug)]
@@ -8,11 +8,11 @@ pub(crate) struct SysTick {
     interrupts: bool,
     processor_clock: bool,
     reload: u32,
-    /// The counter's value at `since`, while enabled; else the value.
+    /// At `since`, while enabled.
     value: u32,
-    /// The moment of the last change by software, in cycles.
+    /// Last change by software, cycles.
     since: u64,
-    /// Zeros reached since then that were already told.
+    /// Zeros since then, already reported.
     told: u64,
     wrapped: bool,
     pub(crate) divider: u64,
@@ -40,14 +40,14 @@ impl SysTick {
         if self.processor_clock { cycles } else { cycles / self.divider }
     }
 
-    /// Ticks until the first zero, and the period after it.
+    /// Ticks to the first zero, and the period.
     fn course(&self) -> (u64, u64) {
         let period = u64::from(self.reload) + 1;
         let first = if self.value == 0 { period } else { u64::from(self.value) };
         (first, period)
     }
 
-    /// How often zero was reached since the last change by software.
+    /// Since the last change by software.
     fn zeros(&self, now: u64) -> u64 {
         let (first, period) = self.course();
         let ticks = self.ticks(now);
@@ -74,7 +74,7 @@ impl SysTick {
         if self.reload == 0 { 0 } else { ((period - (ticks - first) % period) % period) as u32 }
     }
 
-    /// The moment of the next zero that interrupts.
+    /// That interrupts.
     pub(crate) fn next_interrupt(&self) -> Option<u64> {
         if !self.enabled || !self.interrupts || self.reload == 0 && (self.value == 0 || self.told > 0) {
             return None;
@@ -85,7 +85,7 @@ impl SysTick {
         Some(self.since + cycles)
     }
 
-    /// Notes the zeros up to now; true if one of them interrupts.
+    /// True if one interrupts.
     pub(crate) fn update(&mut self, now: u64) -> bool {
         let zeros = self.zeros(now);
         let new = zeros > self.told;
@@ -94,14 +94,14 @@ impl SysTick {
         new && self.interrupts
     }
 
-    /// All that was until now is settled in `value`.
+    /// Into `value`.
     fn settle(&mut self, now: u64) {
         self.value = self.current(now);
         self.since = now;
         self.told = 0;
     }
 
-    /// A register by its offset from `0xE000_E010`. Reading the first clears COUNTFLAG.
+    /// From `0xE000_E010`; reading the first clears COUNTFLAG.
     pub(crate) fn read(&mut self, offset: u32, now: u64) -> u32 {
         match offset {
             0 => {
@@ -127,7 +127,7 @@ impl SysTick {
                 self.processor_clock = value & 4 != 0;
             }
             4 => {
-                // The period that runs goes to its end; the next has the new length.
+                // The running period ends first.
                 self.settle(now);
                 self.reload = value & 0x00FF_FFFF;
             }

@@ -1,4 +1,4 @@
-//! Cycles: how long an instruction takes with memory that never waits.
+//! Cycles of an instruction with memory that never waits.
 //!
 //! Source: Arm's Cortex-M4 Technical Reference Manual (DDI 0439), table 3-1 (instruction set summary), section 3.3.2
 //! (load/store timings) and table 7-1 (FPU instructions). Cycles that depend on more than the instruction are added
@@ -18,26 +18,25 @@
 
 use crate::op::{Float2, Float3, Op};
 
-/// Cycles for filling the pipeline anew behind a branch with its distance in the instruction.
+/// Branch with its distance in the instruction.
 pub(crate) const REFILL_NEAR: u64 = 2;
-/// The same if a register or memory gives the target.
+/// Target in a register or memory.
 pub(crate) const REFILL_FAR: u64 = 3;
-/// From the interrupt to the handler's first instruction, with memory that never waits.
+/// To the handler's first instruction.
 pub(crate) const ENTRY: u64 = 12;
-/// From the return to the first instruction of the interrupted code.
+/// To the interrupted code.
 pub(crate) const RETURN: u64 = 10;
-/// From one handler to the next without unstacking.
+/// Without unstacking.
 pub(crate) const TAIL_CHAIN: u64 = 6;
-/// Stacking the floating-point registers, at once or late.
+/// At once or late.
 pub(crate) const FLOAT_STATE: u64 = 17;
 
-/// Nothing that matters for the next instruction.
+/// Irrelevant for the next instruction.
 pub(crate) const NOTHING: u8 = 0x1F;
-/// The flag of a register that a load wrote.
+/// Written by a load.
 pub(crate) const LOADED: u8 = 0x20;
 
-/// The least number of cycles, and the written register, for which the next load or store may wait. A load of one register has
-/// the flag [`LOADED`].
+/// Least cycles, and the register that the next load or store may wait for. One load has [`LOADED`].
 pub(crate) fn of(op: Op) -> (u8, u8) {
     match op {
         Op::MovImmediate { d, .. }
@@ -94,7 +93,7 @@ fn float3(kind: Float3) -> u8 {
     }
 }
 
-/// Cycles of a division beyond the first two.
+/// Beyond the first two.
 pub(crate) fn division(n: u32, m: u32) -> u64 {
     let quotient_bits = (n.max(1).ilog2() + 1).saturating_sub(m.max(1).ilog2());
     if m == 0 || n < m { 0 } else { u64::from(quotient_bits.div_ceil(4) + 2).min(10) }

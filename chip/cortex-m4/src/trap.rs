@@ -1,23 +1,22 @@
-//! Why an instruction did not end as others do.
+//! Why an instruction did not end normally.
 
-/// An interruption of the flow by an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trap {
-    /// `UsageFault`s, by their bit of the upper half of CFSR.
+    /// `UsageFault`s, by bits of CFSR's upper half.
     Undefined,
     InvalidState,
     NoCoprocessor,
     Unaligned,
     DivideByZero,
-    /// A load or store that the bus refuses.
+    /// Refused by the bus.
     Bus(u32),
-    /// An instruction that the bus refuses.
+    /// Refused by the bus.
     FetchBus,
-    /// A load or store that the MPU refuses.
+    /// Refused by the MPU.
     Memory(u32),
-    /// An instruction fetch from a forbidden place.
+    /// From a forbidden place.
     FetchMemory,
-    /// The same two while the floating-point registers were stored late.
+    /// While floating-point registers were stored late.
     LazyBus,
     LazyMemory,
     /// SVC.

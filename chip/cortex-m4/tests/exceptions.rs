@@ -1,7 +1,7 @@
-//! Exceptions against QEMU: a program of scenarios prints its observations, there and on the model.
+//! Scenarios of exceptions against QEMU.
 use crate::common;
 
-/// Differences of QEMU from the architecture or the Cortex-M4, line by line: theirs, and ours.
+/// QEMU's differences: its line, and ours.
 ///
 /// SCR has three bits; feature registers are the Cortex-M4 TRM's; FPCCR bit 10 (UFRDY) is ARMv8-M's.
 const DIFFERENT: &[(&str, &str)] = &[

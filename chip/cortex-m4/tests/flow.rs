@@ -1,4 +1,4 @@
-//! The flow of exceptions without a counterpart in QEMU (cycles, paths): by the tables of the architecture's manual and the TRM.
+//! Cycles and paths without a counterpart in QEMU, by the manual's tables and the TRM.
 use crate::common;
 
 use common::Flat;
@@ -21,7 +21,7 @@ const PROGRAM: u32 = 0x1000;
 const HANDLERS: u32 = 0x2000;
 const STACK: u32 = 0x2000_8000;
 
-/// A processor at `PROGRAM` with all interrupts enabled; exception n's handler is at [`handler`] and returns at once.
+/// Exception n's handler is at [`handler`] and returns at once.
 struct Rig {
     core: Core,
     memory: Flat,
@@ -57,7 +57,6 @@ impl Rig {
         self.core.forget_code(address, bytes.len() as u32);
     }
 
-    /// Stores by the processor itself, before the program begins.
     fn set(&mut self, address: u32, value: u32) {
         let before = (self.core.register(0), self.core.register(1), self.core.register(15));
         self.code(0x3000, &[STR]);
@@ -94,7 +93,7 @@ impl Rig {
         self.core.step(&mut self.memory)
     }
 
-    /// Steps until the program counter is there; the cycles that it took.
+    /// Returns the cycles.
     fn until(&mut self, address: u32) -> u64 {
         let start = self.core.cycles();
         for _ in 0..200 {
@@ -140,7 +139,7 @@ fn an_interrupt_that_arrives_while_another_is_stacked_goes_first_if_it_is_more_u
         rig.priority(7, priority);
         rig.core.set_pending(5);
         let now = rig.core.cycles();
-        // The chip's event lies within the twelve cycles of stacking.
+        // Within the twelve cycles of stacking.
         assert_eq!(rig.core.run(&mut rig.memory, now + 4), Outcome::Ran);
         assert!(rig.core.cycles() > now + 4, "the registers are on the stack");
         rig.core.set_line(7, true);
@@ -162,7 +161,7 @@ fn a_line_that_stays_high_interrupts_again_and_one_that_fell_does_not() {
         rig.step();
     }
     rig.core.set_line(9, false);
-    // It was made pending as its handler returned.
+    // Made pending as its handler returned.
     rig.until(handler(25));
     rig.until(PROGRAM);
     rig.until(PROGRAM + 4);
@@ -195,7 +194,7 @@ fn a_fault_in_a_fault_is_the_end() {
 
 #[test]
 fn each_fault_has_its_bits_and_escalates_without_its_handler() {
-    /// Program, r1, bits of CFSR, handler if enabled, address told.
+    /// Program, r1, CFSR, handler if enabled, address.
     type Fault = (&'static [u16], u32, u32, u32, Option<u32>);
     const LDR_BAD: &[u16] = &[LDR];
     let cases: [(&str, Fault); 7] = [
@@ -243,7 +242,7 @@ fn a_refused_store_without_its_handler_is_a_hard_fault() {
     rig.until(handler(3));
     assert_eq!(rig.core.fault_status()[..2], [1 << 10, 1 << 30]);
     assert_eq!(rig.memory.word(rig.core.register(13) + 24), PROGRAM + 2);
-    // In its handler no other comes, and the processor is not locked up.
+    // Its handler is not locked up.
     let mut rig = Rig::new(&[UDF]);
     rig.core.set_register(1, 0x3000_0000);
     rig.code(handler(3), &[STR, NOP, STAY]);
@@ -274,14 +273,12 @@ fn a_fault_stops_before_its_handler_if_it_is_asked_to() {
             assert_eq!(rig.core.run(&mut rig.memory, 1_000), Outcome::Fault, "{name}: for ever");
         }
     }
-    // Without a fault the program goes on.
     let mut rig = Rig::new(&[SVC, NOP, STAY]);
     rig.core.stop_at_faults(true);
     rig.core.set_pending(5);
     rig.until(handler(21));
     rig.until(handler(11));
     rig.until(PROGRAM + 4);
-    // A stack that is nowhere.
     let mut rig = Rig::new(&[NOP, STAY]);
     rig.core.stop_at_faults(true);
     rig.core.set_register(13, 0x3000_8000);
@@ -294,7 +291,7 @@ fn a_fault_stops_before_its_handler_if_it_is_asked_to() {
 fn a_vector_that_cannot_be_read_is_a_hard_fault() {
     let mut rig = Rig::new(&[NOP, STAY]);
     let table: Vec<u8> = (0..16u32).flat_map(|number| (handler(number) | 1).to_le_bytes()).collect();
-    // At the end of a memory: of the table's words, those of the system's exceptions are there.
+    // At a memory's end, with the system exceptions' vectors.
     rig.memory.load(0x2040_0000 - 0x80, &table);
     rig.set(0xE000_ED08, 0x2040_0000 - 0x80);
     rig.core.set_pending(60);
@@ -307,7 +304,7 @@ fn sleep_ends_by_an_interrupt_even_a_masked_one_and_cycles_of_sleep_are_counted_
     let mut rig = Rig::new(&[WFI, NOP, STAY]);
     // DEMCR.TRCENA, DWT_CTRL.CYCCNTENA.
     rig.set(0xE000_EDFC, 1 << 24);
-    // The unit has no lock: opening it means nothing.
+    // The unit has no lock.
     rig.set(0xE000_1FB0, 0xC5AC_CE55);
     assert_eq!(rig.get(0xE000_1FB4), 0);
     rig.set(0xE000_1000, 1);
@@ -371,7 +368,7 @@ fn changed_code_is_decoded_anew() {
     rig.core.set_register(2, 0x2307);
     rig.until(0x2000_0106);
     assert_eq!(rig.core.register(3), 7);
-    // By another way than the processor's own stores.
+    // Not by the processor's stores.
     rig.memory.load(0x2000_0104, &0x2309u16.to_le_bytes());
     rig.core.set_register(15, 0x2000_0104);
     rig.step();
@@ -420,7 +417,7 @@ fn a_request_for_reset_is_told_and_reset_begins_anew() {
 
 #[test]
 fn instructions_take_the_cycles_of_the_table() {
-    // Name, code, r0 to r3, cycles of the code alone.
+    // Name, code, r0 to r3, cycles of the code.
     let cases: [(&str, &[u16], [u32; 4], u64); 17] = [
         ("add", &[0x1840], [1, 2, 0, 0], 1),
         ("branch", &[0xE000, NOP], [0; 4], 1 + 2),
@@ -449,7 +446,6 @@ fn instructions_take_the_cycles_of_the_table() {
         }
         rig.set(0xE000_ED14, 0x200);
         if name == "branch not taken" {
-            // Z is set.
             rig.code(0x3010, &[0x2400]);
             rig.core.set_register(15, 0x3010);
             rig.step();
@@ -458,7 +454,6 @@ fn instructions_take_the_cycles_of_the_table() {
         if name == "two loads, the second's base by the first" {
             rig.memory.load(0x2000_0000, &0x2000_0010u32.to_le_bytes());
         }
-        // The rest of `set` does not count.
         rig.code(PROGRAM - 2, &[NOP]);
         rig.core.set_register(15, PROGRAM - 2);
         rig.step();

@@ -27,7 +27,7 @@ impl Elf {
         core::str::from_utf8(&self.0[start..end]).unwrap_or("")
     }
 
-    /// By address: whether code begins there, or data.
+    /// Code or data from here on.
     fn marks(&self) -> BTreeMap<u32, bool> {
         let sections = self.sections();
         let mut marks = BTreeMap::new();

@@ -1,7 +1,7 @@
-//! A whole program, the same text from QEMU and from the model; and how fast the model is.
+//! A whole program against QEMU, and the model's speed.
 use crate::common;
 
-/// Interrupts at any moment, one in another, with handlers that change all that a handler may, leave no trace.
+/// At any moment, nested, with handlers that change all they may.
 #[test]
 fn a_program_does_not_notice_that_it_is_interrupted() {
     let folder = common::folder("interrupted");
@@ -29,7 +29,7 @@ fn a_program_does_not_notice_that_it_is_interrupted() {
     assert!(deepest > 0x400, "nested: {deepest:#x} bytes of stack");
 }
 
-/// Nanoseconds that this thread had a processor: others may be busy too.
+/// Others may be busy too.
 fn on_processor() -> u64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     text.split(' ').next().and_then(|number| number.parse().ok()).unwrap_or(0)

@@ -1,8 +1,8 @@
-//! Accesses: by the processor ([`Bus`]) and by DMA. Addresses, wait states and refusals.
+//! Accesses by the processor ([`Bus`]) and by DMA: addresses, wait states, refusals.
 //!
-//! Wait states: the memories have none; the flash's are [`crate::art`]'s. A read of the flash waits for the
-//! end of an erase or programming. A load from a device costs two clocks of its bus (RM0090, 2.1: the bridges
-//! synchronise), a buffered store none. Contention of the processor and DMA is not modelled.
+//! Wait states: the memories have none; the flash's are [`crate::art`]'s. Reads wait for an erase or programming. A
+//! load from a device costs two clocks of its bus (RM0090, 2.1: the bridges synchronise), a buffered store none.
+//! Contention of the processor and DMA is not modelled.
 
 use cortex_m4_model::{Bus, Fault, Size};
 
@@ -14,15 +14,14 @@ use crate::rcc::Bank;
 use crate::tim11::Input;
 use crate::time::Now;
 
-/// DCKCFGR of other chips: embassy reads it, and writes 0. It is reserved here, and harmless.
+/// Embassy reads other chips' DCKCFGR, and writes 0: reserved here, harmless.
 const RESERVED: u32 = 0x4002_388C;
 
-/// The target of an address.
 enum Place {
     Flash(u32),
     Sram(u32),
     Ccm(u32),
-    /// Numbers that the factory wrote.
+    /// Written by the factory.
     Factory,
     Device,
     Nothing,
@@ -47,7 +46,7 @@ fn place(address: u32) -> Place {
 }
 
 impl Chip {
-    /// The flash is read at this cycle: how long it keeps the reader waiting, as it is busy.
+    /// How long a busy flash keeps its reader, at this cycle.
     fn stall(&mut self, now: u64) -> u32 {
         let Some((end, (from, bytes))) = self.flash.finish() else { return 0 };
         self.changed.push((FLASH.0 + from, bytes));
@@ -80,7 +79,7 @@ impl Chip {
         lane(word, address, size)
     }
 
-    /// A device's register is read by the processor or by DMA.
+    /// By the processor or DMA.
     fn read_device(&mut self, address: u32, size: Size) -> u32 {
         let now = self.moment;
         let word = address & !3;
@@ -121,7 +120,7 @@ impl Chip {
         lane(value, address, size)
     }
 
-    /// A device's register is written by the processor or by DMA.
+    /// By the processor or DMA.
     fn write_device(&mut self, address: u32, size: Size, value: u32) -> Option<Unit> {
         let word = address & !3;
         let Some((unit, gate)) = map::unit_at(address) else {
@@ -354,8 +353,7 @@ impl Bus for Chip {
     }
 }
 
-/// Reach of DMA's ports: SRAM and devices by both, the flash to read, never CCM (RM0090, 2.1); DMA1's device port
-/// only APB1.
+/// SRAM and devices; the flash to read; never CCM (RM0090, 2.1); DMA1's device port only APB1.
 pub struct DmaPort<'a> {
     pub(crate) chip: &'a mut Chip,
     pub(crate) controller: usize,

@@ -1,9 +1,9 @@
 //! The flash accelerator's timing (RM0090, 3.4.2): 128-bit lines, 64 of them kept for instructions and 8 for data, and
 //! a line fetched ahead.
 //!
-//! * The line of the last read stays in the flash's own register, also with all caches off.
-//! * A miss costs the wait states. With prefetch the next line is read as soon as the flash is free; an early access waits for
-//!   the rest. Least recently used lines are replaced.
+//! * The last line stays in the flash's register, also with caches off.
+//! * A miss costs the wait states. Prefetch reads the next line when the flash is free; an early access waits for the rest.
+//!   Least recently used lines are replaced.
 //! * Data bus and instruction bus wait for each other only while the flash is busy.
 //! * **An erase leaves the data cache stale**, until it is emptied, which works only while it is off (3.5.2). A store into the
 //!   flash updates it.
@@ -16,23 +16,23 @@ use crate::memory::{FLASH, Memory};
 
 const INSTRUCTION_LINES: usize = 64;
 const DATA_LINES: usize = 8;
-/// Lines of the whole flash.
+/// Of the whole flash.
 const FLASH_LINES: usize = (FLASH.1 / LINE) as usize;
-/// Bytes of a line.
+/// Bytes.
 const LINE: u32 = 16;
 /// No line.
 const NONE: u32 = u32::MAX;
 
-/// A store of lines, the least recently used one first to go.
+/// Least recently used first to go.
 #[derive(Clone)]
 struct Lines<const N: usize> {
     /// The line in each place.
     kept: [u32; N],
-    /// For each line of the flash its place plus one; 0 outside the cache.
+    /// Place plus one; 0 outside the cache.
     place_of: Box<[u8]>,
-    /// The places in a ring, in the order in which they were used: the one before each, and the one behind it.
+    /// In order of use: the place before, and behind.
     ring: [(u8, u8); N],
-    /// The place that was used last; behind it is the one that is the first to go.
+    /// Used last; behind it the first to go.
     newest: u8,
 }
 
@@ -50,12 +50,11 @@ impl<const N: usize> Lines<N> {
         *self = Self::new();
     }
 
-    /// The place of a line.
     fn find(&self, line: u32) -> Option<usize> {
         self.place_of.get(line as usize).and_then(|place| (*place as usize).checked_sub(1))
     }
 
-    /// The place of a line that is used now.
+    /// Used now.
     fn used(&mut self, line: u32) -> Option<usize> {
         let place = self.find(line)?;
         let oldest = self.ring[self.newest as usize].1;
@@ -73,7 +72,7 @@ impl<const N: usize> Lines<N> {
         Some(place)
     }
 
-    /// Takes a line in; gives its place.
+    /// Returns its place.
     fn keep(&mut self, line: u32) -> usize {
         self.newest = self.ring[self.newest as usize].1;
         let oldest = self.newest as usize;
@@ -91,22 +90,22 @@ impl<const N: usize> Lines<N> {
 /// The accelerator.
 #[derive(Clone)]
 pub struct Art {
-    /// Wait states of the flash.
+    /// Of the flash.
     pub latency: u32,
-    /// The next line is fetched ahead.
+    /// Of the next line.
     pub prefetch: bool,
-    /// Which caches are on: for instructions, for data.
+    /// Instructions, data.
     on: (bool, bool),
     instructions: Lines<INSTRUCTION_LINES>,
     data: Lines<DATA_LINES>,
     held: [[u8; LINE as usize]; DATA_LINES],
-    /// The line that the instruction bus read last.
+    /// Read last by the instruction bus.
     line: u32,
-    /// The line that is fetched ahead, and when it is there.
+    /// And when it is there.
     ahead: (u32, u64),
-    /// Until when the flash is busy with a read.
+    /// With a read.
     busy: u64,
-    /// Lines that missed, and those that were asked for.
+    /// Missed lines, and requested ones.
     pub counts: (u64, u64),
 }
 
@@ -133,12 +132,12 @@ impl Art {
         }
     }
 
-    /// Switches the caches; their content stays.
+    /// Their content stays.
     pub fn set_caches(&mut self, instructions: bool, data: bool) {
         self.on = (instructions, data);
     }
 
-    /// Empties the caches that are off.
+    /// Only those that are off.
     pub fn reset_caches(&mut self, instructions: bool, data: bool) {
         if instructions && !self.on.0 {
             self.instructions.clear();
@@ -148,13 +147,13 @@ impl Art {
         }
     }
 
-    /// Whether an instruction's fetch at this offset needs the flash.
+    /// At this offset.
     pub fn needs_flash(&self, offset: u32, bytes: u32) -> bool {
         let kept = |line| line == self.line || self.on.0 && self.instructions.find(line).is_some();
         !kept(offset / LINE) || !kept((offset + bytes - 1) / LINE)
     }
 
-    /// The wait states of an instruction's fetch at this offset in the flash.
+    /// Wait states at this offset.
     #[inline]
     pub fn fetch(&mut self, offset: u32, bytes: u32, now: u64) -> u32 {
         let first = offset / LINE;
@@ -207,7 +206,7 @@ impl Art {
         }
     }
 
-    /// The data cache's content at this offset, fresh or stale.
+    /// Fresh or stale.
     #[inline]
     pub fn held(&mut self, offset: u32, size: Size) -> Option<u32> {
         if !self.on.1 {
@@ -221,7 +220,7 @@ impl Art {
         Some(u32::from_le_bytes(bytes))
     }
 
-    /// The wait states of a load at this offset that the data cache does not hold.
+    /// Wait states of a load that the data cache lacks.
     #[inline]
     pub fn load(&mut self, offset: u32, flash: &Memory, now: u64) -> u32 {
         let line = offset / LINE;
@@ -244,7 +243,7 @@ impl Art {
         }
     }
 
-    /// A store changed the flash at this offset, and the data cache with it.
+    /// The data cache changes with it.
     pub fn stored(&mut self, offset: u32, flash: &Memory) {
         let line = offset / LINE;
         if let Some(place) = self.data.find(line) {
@@ -257,7 +256,7 @@ impl Art {
 mod tests {
     use super::*;
 
-    /// Against a list of lines in the order of their use.
+    /// Against a list by use.
     #[test]
     fn the_least_recently_used_line_goes_first() {
         const PLACES: usize = 8;
@@ -278,7 +277,7 @@ mod tests {
         }
     }
 
-    /// Wait states of a loop of three lines, the first and the third time round, and of straight code.
+    /// A loop of three lines, first and third time, and straight code.
     fn waits(prefetch: bool, cache: bool) -> (u32, u32, u32) {
         let mut art = Art::new();
         art.latency = 5;
@@ -302,7 +301,7 @@ mod tests {
 
     #[test]
     fn lines_cost_what_the_manual_says() {
-        // Ten lines of straight code, eight halfwords each: with prefetch only the first one costs its wait states.
+        // Ten lines of eight halfwords: with prefetch only the first waits.
         assert_eq!(waits(false, false), (15, 15, 50));
         assert_eq!(waits(false, true), (15, 0, 50));
         let (first, third, straight) = waits(true, true);

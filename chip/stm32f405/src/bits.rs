@@ -1,11 +1,10 @@
-//! A device on pins that the program moves itself, as SPI in mode 0: it takes a bit at each rising edge of the clock, and its own
-//! bit is there for the program to read after that edge.
+//! A device on pins that the program moves, as SPI in mode 0: a bit at each rising edge, its own bit after that.
 
 use crate::gpio::{Gpio, Pin};
 use crate::spi::Wire;
 use crate::time::{Ps, SECOND};
 
-/// The pins of such a device.
+/// Of such a device.
 #[derive(Clone, Copy, Debug)]
 pub struct Pins {
     /// Clock.
@@ -25,11 +24,11 @@ pub struct Bits {
     pub wire: Box<dyn Wire>,
     is_selected: bool,
     is_high: bool,
-    /// The last rising edge.
+    /// Last rising edge.
     edge: Ps,
-    /// Time between the last two of a byte.
+    /// Between the byte's last two.
     bit: Ps,
-    /// Bits of the byte so far, and their number.
+    /// So far, and their number.
     taken: (u8, u8),
     answer: u8,
 }
@@ -41,7 +40,7 @@ impl Bits {
         Self { pins, wire, is_selected: false, is_high: false, edge, bit, taken: (0, 0), answer: 0xFF }
     }
 
-    /// The pins as they are at this moment. Gives the device's pin and its level, if that is new.
+    /// The pins now; returns the device's pin and level, if new.
     pub fn look(&mut self, gpio: &Gpio, ps: Ps) -> Option<(Pin, bool)> {
         let selected = gpio.pulls_low(self.pins.select);
         if selected != self.is_selected {

@@ -1,7 +1,7 @@
-//! The chip round the processor: its devices, their connections, and the next event.
+//! Devices, their connections, and the next event.
 //!
-//! A device is asked when the program reads it, and when its own next moment comes ([`Chip::happen`]). After either
-//! `Chip::settle` looks at its interrupt, at requests for DMA and at its next moment.
+//! A device is asked when read, and at its own next moment ([`Chip::happen`]); then `Chip::settle` looks at its interrupt, DMA
+//! requests and next moment.
 
 use std::collections::BTreeMap;
 
@@ -21,29 +21,29 @@ use crate::tim11::Tim11;
 use crate::time::{NEVER, Now, Timebase};
 use crate::usart::Usart;
 
-/// Reason of a stop: the program does something that is not modelled, or cannot work on the chip.
+/// Not modelled, or impossible on the chip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// A register that there is not, or that is not modelled, or bits of it: address, and the value if it was written.
+    /// Missing or not modelled, or bits of it: address, and a written value.
     Register(u32, Option<u32>),
-    /// An access of a width that is not modelled there: address, bytes.
+    /// Address, bytes.
     Width(u32, u32),
-    /// More hertz than the flash follows with its wait states.
+    /// Hertz, beyond the flash's wait states.
     FlashTooSlow(u32, u32),
-    /// A device's moment that does not pass: a fault of the model's.
+    /// Does not pass: the model's fault.
     StandsStill(usize),
 }
 
-/// Something odd that goes on all the same.
+/// Odd, and goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Note {
-    /// An access to a device without its clock: reads give 0, writes are lost.
+    /// Reads give 0, writes are lost.
     NoClock(u32),
-    /// A reserved register was read, or 0 was written to it.
+    /// Read, or written with 0.
     Reserved(u32),
 }
 
-/// Moments of devices, by their places in the schedule.
+/// By place in the schedule.
 const FLASH: usize = 0;
 const RCC: usize = 1;
 const IWDG: usize = 2;
@@ -60,7 +60,7 @@ pub struct Chip {
     pub time: Timebase,
     /// 128 KiB, by all.
     pub sram: Memory,
-    /// 64 KiB, by the processor alone.
+    /// 64 KiB, the processor's alone.
     pub ccm: Memory,
     /// The flash.
     pub flash: Flash,
@@ -74,7 +74,7 @@ pub struct Chip {
     pub gpio: Gpio,
     /// Lines of EXTI.
     pub exti: Exti,
-    /// Ports, as [`Unit::Usart`] counts them.
+    /// As [`Unit::Usart`] counts.
     pub usarts: [Usart; 6],
     /// Buses.
     pub spis: [Spi; 3],
@@ -90,24 +90,24 @@ pub struct Chip {
     pub rng: Rng,
     /// The CRC unit.
     pub crc: Crc,
-    /// The chip's own number, 96 bits.
+    /// 96 bits.
     pub uid: [u32; 3],
     /// `DBGMCU_IDCODE`.
     pub idcode: u32,
     /// `DBGMCU_CR` and the two freeze registers.
     pub dbgmcu: [u32; 3],
-    /// A device on pins that the program moves itself.
+    /// On pins that the program moves.
     pub bits: Option<Bits>,
-    /// The select pin of each bus.
+    /// By bus.
     pub selects: [Option<Pin>; 3],
-    /// Oddities, with their counts.
+    /// With counts.
     pub notes: BTreeMap<Note, u64>,
     pub(crate) clocks: Clocks,
     pub(crate) lines: u128,
     pub(crate) trouble: Option<Trouble>,
     pub(crate) attention: bool,
     pub(crate) wait: u32,
-    /// Memory that changed without a store of the processor.
+    /// Without a store of the processor.
     pub(crate) changed: Vec<(u32, u32)>,
     pub(crate) reset_by: Option<Cause>,
     pub(crate) event: bool,
@@ -116,14 +116,14 @@ pub struct Chip {
     selected: [bool; 3],
     deadlines: [u64; SLOTS],
     next: u64,
-    /// The processor runs until then without being asked.
+    /// Without asking the chip.
     pub(crate) until: u64,
-    /// When a copy from memory to memory ends.
+    /// Of copies from memory to memory.
     pub(crate) copies: [u64; 2],
 }
 
 impl Chip {
-    /// A chip that just got its power, with this crystal, low-speed oscillator, and random seed.
+    /// At power-on, with crystal, low-speed oscillator, random seed.
     pub fn new(hse_hz: u32, lsi_hz: u32, seed: u64) -> Self {
         let mut chip = Self {
             time: Timebase::new(16_000_000),
@@ -171,7 +171,7 @@ impl Chip {
         chip
     }
 
-    /// A reset of all but the processor.
+    /// All but the processor.
     pub fn reset(&mut self, cause: Cause, now: Now) {
         self.flash.reset(now.ps);
         let counts = self.art.counts;
@@ -205,17 +205,17 @@ impl Chip {
         }
     }
 
-    /// Whether the processor has no clock.
+    /// No clock for the processor.
     pub fn is_stopped(&self) -> bool {
         self.clocks.hclk == 0
     }
 
-    /// Discards unused wait states.
+    /// Unused ones.
     pub(crate) fn take_waits(&mut self) {
         self.wait = 0;
     }
 
-    /// The cycle of the next event.
+    /// Cycle of the next event.
     pub fn next(&self) -> u64 {
         self.next
     }
@@ -229,7 +229,7 @@ impl Chip {
         self.attention = true;
     }
 
-    /// The clock tree changed, or may have.
+    /// May have changed.
     pub fn apply_clocks(&mut self, now: Now) {
         let clocks = self.rcc.clocks(now.ps);
         if clocks != self.clocks {
@@ -238,7 +238,7 @@ impl Chip {
             }
             self.clocks = clocks;
             self.attention = true;
-            // Without a clock time goes on in steps of a microsecond.
+            // Steps of a microsecond.
             self.time.set(now, if clocks.hclk == 0 { 1_000_000 } else { clocks.hclk });
             let cycles = |hz: u32| u64::from(clocks.hclk.checked_div(hz).unwrap_or(1));
             for (number, usart) in self.usarts.iter_mut().enumerate() {
@@ -266,7 +266,7 @@ impl Chip {
         }
     }
 
-    /// When the device at this place of the schedule has its next moment.
+    /// The next moment at this place.
     fn schedule(&mut self, slot: usize) {
         let time = &self.time;
         let at = match slot {
@@ -286,7 +286,7 @@ impl Chip {
         }
     }
 
-    /// Handles events up to this cycle, each at its own moment; ends early at a reset.
+    /// Up to this cycle, each event at its moment; ends at a reset.
     pub fn happen(&mut self, until: u64) {
         while self.next <= until && self.reset_by.is_none() && self.trouble.is_none() {
             let at = self.next;
@@ -333,14 +333,14 @@ impl Chip {
         }
     }
 
-    /// After a device was asked or had its moment: DMA serves it, and then as [`Chip::refresh`].
+    /// DMA serves it, then [`Chip::refresh`].
     pub(crate) fn settle(&mut self, unit: Unit, now: Now) {
         self.moment = now;
         self.pump();
         self.refresh(unit, now);
     }
 
-    /// Looks at a device's next moment and its interrupt.
+    /// Next moment and interrupt.
     pub(crate) fn refresh(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Flash => self.schedule(FLASH),
@@ -365,7 +365,7 @@ impl Chip {
         self.look_at(unit, now);
     }
 
-    /// The interrupt lines of a device.
+    /// Of a device.
     pub(crate) fn look_at(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Flash => self.line(map::FLASH, self.flash.interrupts()),
@@ -403,7 +403,7 @@ impl Chip {
         }
     }
 
-    /// The lines of EXTI as they are now.
+    /// As they are now.
     pub fn look_at_lines(&mut self) {
         self.event |= self.exti.look(&self.gpio, self.pwr.is_low());
         self.attention |= self.event;
@@ -413,7 +413,7 @@ impl Chip {
         }
     }
 
-    /// Pins changed their use or level.
+    /// Use or level.
     pub fn pins_changed(&mut self, now: Now) {
         if let Some((pin, level)) = self.bits.as_mut().and_then(|bits| bits.look(&self.gpio, now.ps)) {
             self.gpio.drive(pin, Some(level));
@@ -439,7 +439,7 @@ impl Chip {
         self.look_at_lines();
     }
 
-    /// Characters were added to a port's line.
+    /// Added characters.
     pub fn line_changed(&mut self, number: usize) {
         self.schedule(USART + number);
     }

@@ -1,8 +1,8 @@
 //! DMA1 and DMA2 (RM0090, chapter 10): streams between a device and memory, or memory and memory. Normal, circular,
 //! double-buffered; direct or by the FIFO with packing; half, full and error flags.
 //!
-//! An item moves the moment a device asks: neither arbitration nor the bus's waits are modelled, and no burst. FIFO
-//! errors (`FEIF`) and direct mode errors are never set. Flow control by the device (SDIO) stops the machine.
+//! An item moves when a device asks: no arbitration, no bus waits, no burst. FIFO errors (`FEIF`) and direct mode
+//! errors are never set. Flow control by a device (SDIO) stops the machine.
 
 use std::ops::ControlFlow;
 
@@ -17,27 +17,27 @@ const MINC: u32 = 1 << 10;
 const PFCTRL: u32 = 1 << 5;
 const DBM: u32 = 1 << 18;
 const CT: u32 = 1 << 19;
-/// Flags of a stream, at its place in `LISR` and `HISR`.
+/// In `LISR` and `HISR`.
 const TEIF: u32 = 1 << 3;
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
-/// Position of a stream's flags.
+/// Of a stream's flags.
 const PLACES: [u32; 4] = [0, 6, 16, 22];
 
 /// A device's request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// A character was received by this port (0: USART1, 1: USART2, 2: USART3, 3: UART4, 4: UART5, 5: USART6).
+    /// Received (0: USART1, 1: USART2, 2: USART3, 3: UART4, 4: UART5, 5: USART6).
     UsartRx(u8),
-    /// This port takes a character.
+    /// Takes a character.
     UsartTx(u8),
-    /// A word was received by SPI1 to SPI3 (0 to 2).
+    /// Received by SPI1 to SPI3 (0 to 2).
     SpiRx(u8),
-    /// It takes a word.
+    /// Takes a word.
     SpiTx(u8),
 }
 
-/// Which device asks by this stream and channel (RM0090, tables 42 and 43), as far as it is modelled.
+/// By stream and channel (RM0090, tables 42 and 43), as far as modelled.
 pub fn request(dma: usize, stream: usize, channel: u32) -> Option<Request> {
     use Request::{SpiRx, SpiTx, UsartRx, UsartTx};
     Some(match (dma, channel, stream) {
@@ -63,9 +63,9 @@ pub fn request(dma: usize, stream: usize, channel: u32) -> Option<Request> {
     })
 }
 
-/// The memory and devices that DMA reads and writes.
+/// Memory and devices of DMA.
 pub trait Port {
-    /// A load; `None`: the bus refuses.
+    /// `None`: refused.
     fn load(&mut self, address: u32, size: Size) -> Option<u32>;
     /// A store.
     fn store(&mut self, address: u32, size: Size, value: u32) -> Option<()>;
@@ -88,7 +88,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// Which channel it listens to.
+    /// Its channel.
     pub fn channel(&self) -> u32 {
         self.cr >> 25 & 7
     }
@@ -122,7 +122,7 @@ impl Stream {
         }
     }
 
-    /// The program switches it off: the FIFO is flushed, which counts as a transfer's end.
+    /// Switched off: the flushed FIFO ends the transfer.
     fn end(&mut self, port: &mut impl Port) {
         self.flags |= if self.drain(port, true).is_break() { TEIF } else { 0 };
         self.flags |= TCIF;
@@ -161,7 +161,7 @@ impl Stream {
         ControlFlow::Continue(())
     }
 
-    /// Moves one item of the device's size. Break: the bus refused.
+    /// Of the device's size; break: the bus refused.
     fn item(&mut self, port: &mut impl Port) -> ControlFlow<()> {
         let refused = ControlFlow::Break(());
         let psize = Self::size(self.cr >> 11);
@@ -230,7 +230,7 @@ impl Stream {
 pub struct Dma {
     /// Its streams.
     pub streams: [Stream; 8],
-    /// Those that are on, one bit each.
+    /// A bit each.
     pub on: u8,
 }
 
@@ -246,12 +246,12 @@ impl Dma {
         Self { streams: [Stream { fcr: 0x21, ..Stream::default() }; 8], on: 0 }
     }
 
-    /// After a stream served a request.
+    /// Served a request.
     pub fn note(&mut self, stream: usize) {
         self.on = self.on & !(1 << stream) | u8::from(self.streams[stream].is_on()) << stream;
     }
 
-    /// The levels of the streams' interrupts, one bit each.
+    /// A bit each.
     pub fn interrupts(&self) -> u8 {
         (0..8).map(|stream| u8::from(self.streams[stream].interrupts()) << stream).sum()
     }
@@ -260,7 +260,7 @@ impl Dma {
         (0..4).map(|stream| self.streams[first + stream].flags << PLACES[stream]).sum()
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => self.flags(0),
@@ -282,7 +282,7 @@ impl Dma {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, port: &mut impl Port) -> Option<()> {
         match offset {
             0x00 | 0x04 => {}
@@ -327,7 +327,7 @@ impl Dma {
 mod tests {
     use super::*;
 
-    /// Memory from `0x2000_0000` on, and a device's register at `0x4000_0004` that counts.
+    /// From `0x2000_0000` on; a counting register at `0x4000_0004`.
     struct Board {
         memory: [u8; 64],
         device: u8,

@@ -1,6 +1,5 @@
-//! The flash and its controller (RM0090, chapter 3): wait states and caches are switched here ([`crate::art`] counts
-//! them). Erasing a sector and programming a word take the data sheet's time; a read of the flash waits. Errors are flagged. A
-//! power cut leaves a half-erased sector.
+//! The flash and its controller (RM0090, chapter 3); [`crate::art`] counts wait states. Erases and programming take the data
+//! sheet's time, and reads wait. Errors are flagged. A power cut leaves a half-erased sector.
 //!
 //! Not modelled: programming of option bytes (it stops the machine), read protection, the OTP area's writing.
 
@@ -25,21 +24,21 @@ const STRT: u32 = 1 << 16;
 const EOPIE: u32 = 1 << 24;
 const ERRIE: u32 = 1 << 25;
 const LOCK: u32 = 1 << 31;
-/// `OPTCR` as delivered: nothing protected.
+/// As delivered.
 const OPTCR: u32 = 0x0FFF_AAED;
 
-/// Milliseconds of an erase by x8, x16 and x32 (and x64, with its own supply): typical and longest; DS8626, table 40.
+/// By x8, x16 and x32 (x64 with its own supply), ms: typical and longest; DS8626, table 40.
 const ERASE_16K: [(u64, u64); 4] = [(400, 800), (300, 600), (250, 500), (230, 460)];
 const ERASE_64K: [(u64, u64); 4] = [(1_200, 2_400), (700, 1_400), (550, 1_100), (490, 980)];
 const ERASE_128K: [(u64, u64); 4] = [(2_000, 4_000), (1_300, 2_600), (1_000, 2_000), (875, 1_750)];
 const ERASE_ALL: [(u64, u64); 4] = [(16_000, 32_000), (11_000, 22_000), (8_000, 16_000), (6_900, 13_800)];
-/// A word is programmed in this time: typical and longest.
+/// Of a word: typical and longest.
 const PROGRAM: (Ps, Ps) = (16 * US, 100 * US);
 
-/// How fast the flash is.
+/// How fast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
-    /// The data sheet's typical times.
+    /// Typical.
     Typical,
     /// Its longest.
     Longest,
@@ -59,25 +58,25 @@ pub struct Flash {
     pub content: Memory,
     /// How fast it is.
     pub speed: Speed,
-    /// So many more words are refused as if they were protected.
+    /// Words still to be refused.
     pub refuses: u32,
     acr: u32,
     sr: u32,
     cr: u32,
     optcr: u32,
-    /// Keys taken of the two; `None`: a wrong one locks until the next reset.
+    /// `None`: a wrong one locks until a reset.
     keys: Option<u8>,
     option_keys: Option<u8>,
     work: Option<(Work, Ps, Ps)>,
-    /// The work that was finished ahead of its time for a processor that waits for it, with the content before.
+    /// Finished early for a waiting processor, with the content before.
     ahead: Option<(Work, Ps, Ps, Vec<u8>)>,
-    /// Erases and words programmed.
+    /// Erases and words.
     pub counts: (u64, u64),
-    /// Erases so far: sector's offset, start and length in picoseconds.
+    /// Sector's offset, start and length, ps.
     pub erases: Vec<(u32, Ps, Ps)>,
 }
 
-/// Start and length of a sector.
+/// Start and length.
 pub fn sector(number: u32) -> Option<(u32, u32)> {
     match number {
         0..=3 => Some((number * 0x4000, 0x4000)),
@@ -119,29 +118,29 @@ impl Flash {
         }
     }
 
-    /// A reset of the chip in mid-work, like a power cut.
+    /// Like a power cut in mid-work.
     pub fn reset(&mut self, now: Ps) {
         self.cut(now);
         (self.acr, self.sr, self.cr, self.optcr) = (0, 0, LOCK, OPTCR);
         (self.keys, self.option_keys) = (Some(0), Some(0));
     }
 
-    /// `ACR`, for the accelerator.
+    /// For the accelerator.
     pub fn acr(&self) -> u32 {
         self.acr
     }
 
-    /// Until when it answers no read.
+    /// Reads are answered then.
     pub fn busy_until(&self) -> Option<Ps> {
         self.work.map(|(_, _, end)| end)
     }
 
-    /// When its work is done.
+    /// Of its work.
     pub fn deadline(&self) -> Ps {
         self.busy_until().unwrap_or(NEVER)
     }
 
-    /// Its work is done, if this is its time. Gives the changed bytes: start and length.
+    /// Finishes work at its time; returns start and length of changed bytes.
     pub fn happen(&mut self, now: Ps) -> Option<(u32, u32)> {
         let (work, _, _) = self.work.take_if(|(_, _, end)| *end <= now)?;
         if self.cr & EOPIE != 0 {
@@ -157,8 +156,7 @@ impl Flash {
         }
     }
 
-    /// The processor waits for the end: gives when that is, and does the work now. A cut before that moment takes it
-    /// back.
+    /// Does the work now for a waiting processor; returns its end. An earlier cut takes it back.
     pub fn finish(&mut self) -> Option<(Ps, (u32, u32))> {
         let (work, begin, end) = self.work?;
         let (from, bytes) = match work {
@@ -171,7 +169,7 @@ impl Flash {
         Some((end, (from, bytes)))
     }
 
-    /// Power goes (or a reset comes) in the middle: bits are somewhere between.
+    /// By power or a reset: bits are somewhere between.
     pub fn cut(&mut self, now: Ps) {
         if let Some((work, begin, end, before)) = self.ahead.take().filter(|(_, _, end, _)| *end > now) {
             let (Work::Erase { from: at, .. } | Work::Program { at, .. }) = work;
@@ -205,7 +203,7 @@ impl Flash {
         }
     }
 
-    /// A store into the flash at this offset; it must not be busy. Gives false if the bus refuses.
+    /// Must not be busy; false if the bus refuses.
     pub fn program(&mut self, at: u32, size: Size, value: u32, now: Ps) {
         let width = 8 << (self.cr >> 8 & 3);
         let refused = std::mem::take(&mut self.refuses);
@@ -256,7 +254,7 @@ impl Flash {
         self.sr & EOP != 0 && self.cr & EOPIE != 0 || self.sr & ERRORS != 0 && self.cr & ERRIE != 0
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => self.acr,
@@ -268,7 +266,7 @@ impl Flash {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<()> {
         match offset {
             0x00 => self.acr = value & 0x1F07,

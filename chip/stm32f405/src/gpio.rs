@@ -1,12 +1,11 @@
 //! Pins: GPIO (RM0090, chapter 8), SYSCFG's choice of lines (chapter 9) and EXTI (chapter 12).
 //!
-//! Not modelled: the lock (`LCKR` can be written and reads back), analog levels, a pin that two drive against each
-//! other.
+//! Not modelled: the lock (`LCKR` reads back), analog levels, pins driven twice.
 
 /// Ports A to I.
 const PORTS: usize = 9;
 
-/// A pin: its port (0 is A) and its number.
+/// Port (0 is A) and number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pin(pub u8, pub u8);
 
@@ -25,7 +24,7 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// Pins driven from outside, and their levels.
+    /// From outside, with levels.
     driven: u32,
     level: u32,
 }
@@ -55,7 +54,7 @@ impl Port {
             3 => false,
             _ if drives => bit(self.odr),
             _ if bit(self.driven) => bit(self.level),
-            // An undriven pin without a pull reads as low here.
+            // Low without a pull.
             _ => self.pupdr >> (2 * pin) & 3 == 1,
         }
     }
@@ -79,7 +78,7 @@ impl Gpio {
         Self { ports: std::array::from_fn(Port::new) }
     }
 
-    /// A reset of the chip; the outside stays.
+    /// The outside stays.
     pub fn reset(&mut self) {
         for port in 0..PORTS {
             self.reset_port(port);
@@ -92,7 +91,7 @@ impl Gpio {
         self.ports[port] = Port { driven, level, ..Port::new(port) };
     }
 
-    /// A pin is driven from outside, or no more.
+    /// From outside, or no more.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         let port = &mut self.ports[pin.0 as usize];
         let bit = 1 << pin.1;
@@ -100,30 +99,30 @@ impl Gpio {
         port.level = port.level & !bit | if level == Some(true) { bit } else { 0 };
     }
 
-    /// The level at a pin.
+    /// At a pin.
     pub fn is_high(&self, pin: Pin) -> bool {
         self.ports[pin.0 as usize].is_high(pin.1)
     }
 
-    /// Whether the pin is an output and low, as it selects a card.
+    /// An output, low: selects a card.
     pub fn pulls_low(&self, pin: Pin) -> bool {
         let port = &self.ports[pin.0 as usize];
         port.mode(pin.1) == 1 && port.odr >> pin.1 & 1 == 0
     }
 
-    /// Whether the pin is pulled up by the chip.
+    /// By the chip.
     pub fn is_pulled_up(&self, pin: Pin) -> bool {
         self.ports[pin.0 as usize].pupdr >> (2 * pin.1) & 3 == 1
     }
 
-    /// Whether a device's alternate function has this pin.
+    /// By a device's alternate function.
     pub fn is_routed(&self, pin: Pin, function: u8) -> bool {
         let port = &self.ports[pin.0 as usize];
         port.mode(pin.1) == 2
             && port.afr[pin.1 as usize / 8] >> (4 * (pin.1 % 8)) & 0xF == u32::from(function)
     }
 
-    /// The levels of a port's pins.
+    /// Of a port's pins.
     pub fn levels(&self, port: usize) -> u32 {
         self.ports[port].levels()
     }
@@ -175,7 +174,7 @@ pub struct Exti {
     rtsr: u32,
     ftsr: u32,
     pr: u32,
-    /// The levels seen last, by line.
+    /// Last levels, by line.
     seen: u32,
     memrmp: u32,
     pmc: u32,
@@ -183,13 +182,12 @@ pub struct Exti {
 }
 
 impl Exti {
-    /// As after a reset, with the lines as they are.
+    /// With the lines as they are.
     pub fn reset(&mut self) {
         *self = Self { seen: self.seen, ..Self::default() };
     }
 
-    /// The lines' levels now: pins as chosen, line 16 the supply's detector. Gives whether an event went to the
-    /// processor (WFE).
+    /// Pins as chosen, line 16 the supply's detector. Returns whether an event went to the processor (WFE).
     pub fn look(&mut self, gpio: &Gpio, supply_low: bool) -> bool {
         let mut levels = u32::from(supply_low) << 16;
         for line in 0..16_u8 {
@@ -204,7 +202,7 @@ impl Exti {
         edges & self.emr != 0
     }
 
-    /// The lines that interrupt.
+    /// Interrupting lines.
     pub fn pending(&self) -> u32 {
         self.pr & self.imr
     }
@@ -248,7 +246,7 @@ impl Exti {
         })
     }
 
-    /// Writes SYSCFG's register; another memory at address 0 is not modelled.
+    /// Another memory at address 0 is not modelled.
     pub fn write_syscfg(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             0x00 if value & 3 == 0 => self.memrmp = 0,

@@ -1,5 +1,4 @@
-//! The flashed image: an ELF file, a `DfuSe` file (ST's UM0391) or a raw image for the flash's beginning. A
-//! truncated, damaged or foreign image is refused with a reason.
+//! The image: ELF, `DfuSe` (ST's UM0391) or raw for the flash's beginning.
 
 use std::fmt;
 
@@ -8,15 +7,15 @@ use crate::memory::{CCM, FLASH, SRAM};
 /// Why a file cannot be flashed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// The file is shorter than its header says: bytes present, bytes expected.
+    /// Bytes present, bytes expected.
     Truncated(usize, usize),
-    /// A checksum or a structure is wrong.
+    /// Checksum or structure.
     Damaged(&'static str),
     /// It is for another processor.
     OtherProcessor,
-    /// This piece lies outside the flash: address, bytes.
+    /// Address, bytes.
     Outside(u32, u32),
-    /// The vector table is not one of this chip's: initial stack pointer, reset vector.
+    /// Not this chip's: initial stack pointer, reset vector.
     Vectors(u32, u32),
     /// Nothing is in it.
     Empty,
@@ -42,7 +41,7 @@ impl fmt::Display for Refused {
 
 impl std::error::Error for Refused {}
 
-/// A function: its address, its size, its name.
+/// Address, size, name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Symbol {
     /// Its address.
@@ -56,14 +55,14 @@ pub struct Symbol {
 /// A program for the flash.
 #[derive(Clone, Debug, Default)]
 pub struct Image {
-    /// Its pieces, by addresses.
+    /// By address.
     pub pieces: Vec<(u32, Vec<u8>)>,
-    /// Its symbols by address, if the file has names.
+    /// By address, if the file has names.
     pub symbols: Vec<Symbol>,
 }
 
 impl Image {
-    /// Reads any of the three kinds of files.
+    /// Any kind of file.
     pub fn parse(file: &[u8]) -> Result<Self, Refused> {
         let mut image = if file.starts_with(b"\x7fELF") {
             elf(file)?
@@ -99,7 +98,7 @@ impl Image {
         if is_stack && stack % 4 == 0 && is_entry { Ok(()) } else { Err(Refused::Vectors(stack, entry)) }
     }
 
-    /// The symbol at an address, and how far behind its beginning.
+    /// And the distance from its beginning.
     pub fn symbol(&self, address: u32) -> Option<(&str, u32)> {
         let behind = self.symbols.partition_point(|symbol| symbol.address <= address);
         let symbol = self.symbols.get(behind.checked_sub(1)?)?;
@@ -107,14 +106,14 @@ impl Image {
             .then(|| (symbol.name.as_str(), address - symbol.address))
     }
 
-    /// Address of the symbol with this name, or with this text in its name.
+    /// By name, or part of it.
     pub fn find(&self, name: &str) -> Option<&Symbol> {
         let exact = self.symbols.iter().find(|symbol| symbol.name == name);
         exact.or_else(|| self.symbols.iter().find(|symbol| symbol.name.contains(name)))
     }
 }
 
-/// Numbers out of a file.
+/// From a file.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {
@@ -147,7 +146,7 @@ fn elf(file: &[u8]) -> Result<Image, Refused> {
         let at = headers + number * size;
         let (kind, offset, address, bytes) =
             (numbers.word(at)?, numbers.word(at + 4)?, numbers.word(at + 12)?, numbers.word(at + 16)?);
-        // A loaded segment and its load address: data begin in the flash.
+        // Data begin in the flash.
         if kind == 1 && bytes > 0 {
             image.pieces.push((address, numbers.bytes(offset as usize, bytes as usize)?.to_vec()));
         }
@@ -227,7 +226,7 @@ mod tests {
         file
     }
 
-    /// An ELF file with one piece and no symbols.
+    /// One piece, no symbols.
     fn elf_file(machine: u16, address: u32, bytes: &[u8]) -> Vec<u8> {
         let mut file = vec![0; 84];
         file[..7].copy_from_slice(b"\x7fELF\x01\x01\x01");

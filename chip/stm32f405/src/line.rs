@@ -1,4 +1,4 @@
-//! A line into a receiver: characters with their times, as a sender with a clock of its own puts them there.
+//! A line into a receiver: characters at the times of a sender's own clock.
 
 use std::collections::VecDeque;
 
@@ -9,18 +9,18 @@ use crate::time::{NEVER, Ps};
 pub enum Flaw {
     /// Nothing.
     None,
-    /// Its samples disagree: the noise flag, the byte as it is.
+    /// The noise flag, the byte right.
     Noise,
-    /// Its stop bit is low: the framing flag.
+    /// The framing flag.
     Framing,
 }
 
-/// A character on the line: a start bit, eight bits, a stop bit.
+/// Start bit, eight bits, stop bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Char {
-    /// When its start bit begins.
+    /// Of its start bit.
     pub start: Ps,
-    /// How long a bit is.
+    /// Bit length.
     pub bit: Ps,
     /// The byte.
     pub byte: u8,
@@ -29,7 +29,7 @@ pub struct Char {
 }
 
 impl Char {
-    /// When its stop bit ends.
+    /// Of its stop bit.
     pub fn end(&self) -> Ps {
         self.start + 10 * self.bit
     }
@@ -39,7 +39,7 @@ impl Char {
     }
 }
 
-/// A character as a receiver reads it.
+/// As a receiver reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
     /// The byte.
@@ -50,19 +50,19 @@ pub struct Seen {
     pub framing: bool,
 }
 
-/// A line, high between characters.
+/// High between characters.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
     chars: VecDeque<Char>,
 }
 
 impl Line {
-    /// Adds characters, each after the one before it.
+    /// One after the other.
     pub fn extend(&mut self, chars: impl IntoIterator<Item = Char>) {
         self.chars.extend(chars);
     }
 
-    /// Characters that are still to come or to be forgotten.
+    /// Still to come or to be forgotten.
     pub fn waiting(&self) -> usize {
         self.chars.len()
     }
@@ -74,7 +74,7 @@ impl Line {
         }
     }
 
-    /// The line's next falling edge at this moment or after it.
+    /// At this moment or after it.
     pub fn falls(&self, from: Ps) -> Ps {
         for char in &self.chars {
             if char.start >= from {
@@ -103,7 +103,7 @@ impl Line {
         true
     }
 
-    /// The character with its start bit at `edge`, as a receiver with bits of this length reads it; `None`: a glitch.
+    /// Read with bits of this length from its start bit; `None`: a glitch.
     pub fn sample(&self, edge: Ps, bit: Ps) -> Option<Seen> {
         let middle = |number: Ps| edge + number * bit + bit / 2;
         if self.is_high(middle(0)) {
@@ -120,7 +120,7 @@ impl Line {
     }
 }
 
-/// Characters of these bytes back to back from `start` on, and when the last one ends.
+/// Back to back from `start`; and the end.
 pub fn chars(bytes: &[u8], start: Ps, baud: f64) -> (Vec<Char>, Ps) {
     let bit = (1e12 / baud) as Ps;
     let char_at = |(index, byte): (usize, &u8)| Char {
@@ -136,7 +136,7 @@ pub fn chars(bytes: &[u8], start: Ps, baud: f64) -> (Vec<Char>, Ps) {
 mod tests {
     use super::*;
 
-    /// All bytes by a sender whose clock differs by so many per mille: how many come as they were sent.
+    /// Bytes received right from a sender off by so many per mille.
     fn right(permille: f64) -> usize {
         let bytes: Vec<u8> = (0..=255).collect();
         let (chars, _) = chars(&bytes, 1_000, 921_600.0 * (1.0 + permille / 1_000.0));
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_receiver_stands_a_sender_that_is_five_percent_off() {
-        // Ten bits, sampled in the middle: half a bit in nine and a half is 5.3 %.
+        // Sampled in the middle: half a bit in nine and a half is 5.3 %.
         for (permille, all) in [(0.0, true), (-40.0, true), (50.0, true), (-70.0, false), (70.0, false)] {
             assert_eq!(right(permille) == 256, all, "{permille}: {}", right(permille));
         }

@@ -1,8 +1,7 @@
-//! A board: the processor, the chip round it, its supply, its crystal, and its wired pins.
+//! A board: processor, chip, supply, crystal, wired pins.
 //!
-//! Time is the wires' ([`Ps`]): the machine runs until a moment. Then its driver reads the outputs, sets the
-//! inputs, may cut the power, and lets it run on. Runs are repeatable: the same image, seed and wires give the
-//! same run.
+//! It runs until a moment ([`Ps`]); then its driver reads outputs, sets inputs, may cut the power. The same
+//! image, seed and wires give the same run.
 
 use cortex_m4_model::{Core, Outcome};
 
@@ -18,17 +17,17 @@ use crate::report::Report;
 use crate::spi::Wire;
 use crate::time::{MS, Now, Ps, US};
 
-/// The chip waits this long after power before it starts (DS8626, table 20: 0.5 to 3 ms).
+/// After power (DS8626, table 20: 0.5 to 3 ms).
 const START: Ps = 1_500_000_000;
 
-/// The parts of a board.
+/// Parts of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// The crystal.
     pub hse_hz: u32,
-    /// The chip's low-speed oscillator: 17 to 47 kHz.
+    /// Low-speed oscillator: 17 to 47 kHz.
     pub lsi_hz: u32,
-    /// Seed of memory at power-on and of random numbers.
+    /// Of memory at power-on, and random numbers.
     pub seed: u64,
 }
 
@@ -39,7 +38,7 @@ impl Default for Board {
     }
 }
 
-/// A reset that was: when, and why.
+/// When, and why.
 pub type Reset = (Ps, Cause);
 
 /// A board with a program.
@@ -49,18 +48,18 @@ pub struct Machine {
     /// The chip round it.
     pub chip: Chip,
     image: Image,
-    /// The moment that the world outside has come to.
+    /// Of the world outside.
     now: Ps,
     is_off: bool,
     seed: u64,
     lines: u128,
     nmi: bool,
-    /// Resets so far, the first one by power.
+    /// The first one by power.
     pub resets: Vec<Reset>,
 }
 
 impl Machine {
-    /// A board whose flash holds this program and nothing else, with its power on.
+    /// Only this program in its flash; power on.
     pub fn new(image: Image, board: Board) -> Self {
         let mut chip = Chip::new(board.hse_hz, board.lsi_hz, board.seed);
         for (address, bytes) in &image.pieces {
@@ -87,7 +86,7 @@ impl Machine {
         &self.image
     }
 
-    /// The moment that the machine has come to.
+    /// Reached so far.
     pub fn now(&self) -> Ps {
         self.now
     }
@@ -96,7 +95,7 @@ impl Machine {
         Now { cycle: self.core.cycles(), ps: self.now }
     }
 
-    /// Runs until this moment. An error: it cannot go on.
+    /// An error: it cannot go on.
     pub fn run_until(&mut self, until: Ps) -> Result<(), Box<Report>> {
         loop {
             if self.is_off {
@@ -155,7 +154,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Hands the chip's signals to the processor.
+    /// To the processor.
     fn deliver(&mut self) -> Result<(), Box<Report>> {
         if !std::mem::take(&mut self.chip.attention) {
             return Ok(());
@@ -187,7 +186,7 @@ impl Machine {
         Ok(())
     }
 
-    /// A reset at this moment: the processor may have waited beyond it, for something that never came.
+    /// The processor may have waited beyond it.
     fn reset(&mut self, cause: Cause, at: Now) {
         let now = Now { cycle: self.core.cycles(), ps: at.ps.max(self.now) };
         self.resets.push((now.ps, cause));
@@ -202,7 +201,7 @@ impl Machine {
         self.lines = 0;
     }
 
-    /// Reason and place of the stop.
+    /// Of the stop.
     pub fn report(&self, reason: &str) -> Box<Report> {
         let registers = std::array::from_fn(|number| self.core.register(number as u8));
         let name =
@@ -220,14 +219,14 @@ impl Machine {
         })
     }
 
-    /// The reset pin goes low and high.
+    /// Low and high.
     pub fn reset_pin(&mut self) {
         if !self.is_off {
             self.reset(Cause::Pin, self.moment());
         }
     }
 
-    /// Power goes at once, in the middle of whatever is going on.
+    /// At once, amid any work.
     pub fn power_off(&mut self) {
         if self.is_off {
             return;
@@ -238,7 +237,7 @@ impl Machine {
         self.is_off = true;
     }
 
-    /// Power comes: memory holds anything, the flash its content.
+    /// Memory holds anything, the flash its content.
     pub fn power_on(&mut self) {
         if !self.is_off {
             return;
@@ -253,7 +252,7 @@ impl Machine {
         self.reset(Cause::Power, self.moment());
     }
 
-    /// The supply is so many millivolts from now on.
+    /// Millivolts.
     pub fn set_supply(&mut self, mv: u32) {
         let changes = self.chip.pwr.set_supply(mv);
         if changes && self.chip.pwr.is_off {
@@ -265,55 +264,55 @@ impl Machine {
         }
     }
 
-    /// The crystal swings or does not, from now on.
+    /// Swings or not.
     pub fn set_crystal(&mut self, alive: bool) {
         self.nmi |= self.chip.rcc.set_crystal(alive, self.now);
         self.chip.attention = true;
         self.chip.apply_clocks(self.moment());
     }
 
-    /// Drives a pin from outside, or lets it go.
+    /// From outside, or lets it go.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         self.chip.gpio.drive(pin, level);
         self.chip.look_at_lines();
     }
 
-    /// Puts bytes on a port's line from `start` on, and gives when the last one ends.
+    /// From `start`; returns the end.
     pub fn send(&mut self, port: usize, bytes: &[u8], start: Ps, baud: f64) -> Ps {
         let (chars, end) = chars(bytes, start, baud);
         self.send_chars(port, chars);
         end
     }
 
-    /// Puts characters on a port's line, each after those that are there.
+    /// After those that are there.
     pub fn send_chars(&mut self, port: usize, chars: Vec<Char>) {
         self.chip.usarts[port].line.extend(chars);
         self.chip.line_changed(port);
     }
 
-    /// Characters that a port sent since the last call, with the time of each end.
+    /// Since the last call, with each end.
     pub fn take_sent(&mut self, port: usize) -> Vec<(Ps, u8)> {
         std::mem::take(&mut self.chip.usarts[port].sent)
     }
 
-    /// Connects something to a bus, selected by this pin when it is low.
+    /// Selected by this pin when low.
     pub fn connect(&mut self, bus: usize, select: Pin, wire: Box<dyn Wire>) {
         self.chip.spis[bus].wire = wire;
         self.chip.selects[bus] = Some(select);
     }
 
-    /// Connects something to pins that the program moves itself.
+    /// On pins that the program moves.
     pub fn connect_pins(&mut self, pins: Pins, wire: Box<dyn Wire>) {
         self.chip.bits = Some(Bits::new(pins, wire));
     }
 
-    /// The other ends of all buses.
+    /// Other ends of buses.
     fn wires(&mut self) -> impl Iterator<Item = &mut Box<dyn Wire>> {
         let bits = self.chip.bits.iter_mut().map(|bits| &mut bits.wire);
         self.chip.spis.iter_mut().map(|spi| &mut spi.wire).chain(bits)
     }
 
-    /// Bytes of memory as a debugger sees them; fewer at the memory's end.
+    /// As a debugger sees them; fewer at the end.
     pub fn memory(&self, address: u32, bytes: u32) -> &[u8] {
         let memories = [(SRAM, &self.chip.sram), (CCM, &self.chip.ccm), (FLASH, &self.chip.flash.content)];
         let found = memories.into_iter().find(|((from, size), _)| (*from..from + size).contains(&address));
@@ -324,7 +323,7 @@ impl Machine {
         })
     }
 
-    /// Changes a byte of RAM, as a debugger or a flipped bit does.
+    /// Of RAM, as a debugger or a flipped bit.
     pub fn poke(&mut self, address: u32, change: impl Fn(u8) -> u8) {
         for ((from, size), memory) in [(SRAM, &mut self.chip.sram), (CCM, &mut self.chip.ccm)] {
             if (from..from + size).contains(&address) {
@@ -334,7 +333,7 @@ impl Machine {
         }
     }
 
-    /// Milliseconds since the model began, for texts.
+    /// Since the model began.
     pub fn ms(&self) -> u64 {
         self.now / MS
     }

@@ -1,5 +1,5 @@
-//! The map, as far as modelled: the devices' addresses and clock gates (RM0090, table 1 and 7.3), the interrupts'
-//! numbers (table 62), the pins' alternate functions (DS8626, table 9).
+//! Modelled devices' addresses and gates (RM0090, table 1 and 7.3), interrupts (table 62), alternate functions
+//! (DS8626, table 9).
 
 use crate::gpio::Pin;
 use crate::rcc::Bank;
@@ -27,25 +27,23 @@ pub enum Unit {
     Gpio(u8),
     /// The CRC unit.
     Crc,
-    /// Reset and clock control.
     Rcc,
     /// The flash's controller.
     Flash,
     /// DMA1 and DMA2: 0 and 1.
     Dma(u8),
-    /// The random number generator.
     Rng,
-    /// The debugger's identity device.
+    /// The debugger's identity.
     Dbgmcu,
 }
 
-/// A device's clock gate and reset.
+/// Clock and reset.
 pub type Gate = (Bank, u8);
 
 /// Ports of pins.
 const GPIO: u32 = 0x4002_0000;
 
-/// The device at this address, and its gate, if it has one.
+/// And its gate, if any.
 pub fn unit_at(address: u32) -> Option<(Unit, Option<Gate>)> {
     use Bank::{Ahb1, Ahb2, Apb1, Apb2};
     let (unit, gate) = match address & !0x3FF {
@@ -84,12 +82,12 @@ pub fn unit_at(address: u32) -> Option<(Unit, Option<Gate>)> {
     Some((unit, gate))
 }
 
-/// The device that a bit of a reset register resets.
+/// By a reset register's bit.
 pub fn unit_of(gate: Gate) -> Option<Unit> {
     BASES.into_iter().filter_map(unit_at).find(|(_, of)| *of == Some(gate)).map(|(unit, _)| unit)
 }
 
-/// Start of each device with a gate.
+/// Devices with a gate.
 const BASES: [u32; 30] = [
     0x4001_4800,
     0x4000_1800,
@@ -142,7 +140,7 @@ pub const SPI: [u16; 3] = [35, 36, 51];
 pub const TIM: [u16; 5] = [28, 29, 30, 50, 43];
 /// Of a controller's streams.
 pub const DMA: [[u16; 8]; 2] = [[11, 12, 13, 14, 15, 16, 17, 47], [56, 57, 58, 59, 60, 68, 69, 70]];
-/// Of groups of lines of EXTI.
+/// By groups of lines.
 pub const EXTI: [(u32, u16); 10] = [
     (1, 6),
     (1 << 1, 7),
@@ -160,7 +158,7 @@ const fn pin(port: char, number: u8) -> Pin {
     Pin(port as u8 - b'A', number)
 }
 
-/// A port's alternate function, the pins that can receive and those that can send.
+/// Alternate function, receiving pins, sending pins.
 pub const USART_PINS: [(u8, &[Pin], &[Pin]); 6] = [
     (7, &[pin('A', 10), pin('B', 7)], &[pin('A', 9), pin('B', 6)]),
     (7, &[pin('A', 3), pin('D', 6)], &[pin('A', 2), pin('D', 5)]),
@@ -170,7 +168,7 @@ pub const USART_PINS: [(u8, &[Pin], &[Pin]); 6] = [
     (8, &[pin('C', 7), pin('G', 9)], &[pin('C', 6), pin('G', 14)]),
 ];
 
-/// A bus's alternate function, and the pins of its clock, its output and its input.
+/// Alternate function; pins of clock, output, input.
 pub const SPI_PINS: [(u8, [&[Pin]; 3]); 3] = [
     (5, [&[pin('A', 5), pin('B', 3)], &[pin('A', 7), pin('B', 5)], &[pin('A', 6), pin('B', 4)]]),
     (5, [&[pin('B', 10), pin('B', 13)], &[pin('B', 15), pin('C', 3)], &[pin('B', 14), pin('C', 2)]]),

@@ -1,12 +1,12 @@
-//! The memories: flat arrays, little-endian as the processor.
+//! Memories: flat, little-endian.
 
 use cortex_m4_model::Size;
 
-/// Start and size of the main flash.
+/// Start and size.
 pub const FLASH: (u32, u32) = (0x0800_0000, 1024 * 1024);
-/// The core coupled memory: only the processor reaches it.
+/// Only the processor reaches it.
 pub const CCM: (u32, u32) = (0x1000_0000, 64 * 1024);
-/// SRAM1 and SRAM2, one behind the other.
+/// SRAM1 and SRAM2 in a row.
 pub const SRAM: (u32, u32) = (0x2000_0000, 128 * 1024);
 
 /// A memory.
@@ -16,12 +16,12 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// One of this size, filled with this byte.
+    /// Size and fill.
     pub fn new(bytes: u32, fill: u8) -> Self {
         Self { bytes: vec![fill; bytes as usize].into_boxed_slice() }
     }
 
-    /// A value at this offset; nothing beyond the end.
+    /// Nothing beyond the end.
     #[inline]
     pub fn get(&self, offset: u32, size: Size) -> Option<u32> {
         let at = offset as usize;
@@ -35,7 +35,7 @@ impl Memory {
         }
     }
 
-    /// Sets a value at this offset; `None` beyond the end.
+    /// `None` beyond the end.
     #[inline]
     pub fn set(&mut self, offset: u32, size: Size, value: u32) -> Option<()> {
         let at = offset as usize;
@@ -56,7 +56,7 @@ impl Memory {
     }
 }
 
-/// Content of memory at power-on: neither zeros nor the same each time.
+/// At power-on: neither zeros nor the same each time.
 pub fn garbage(bytes: &mut [u8], seed: u64) {
     let mut state = seed | 1;
     for byte in bytes {

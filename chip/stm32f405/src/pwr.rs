@@ -1,8 +1,7 @@
-//! Power control (RM0090, chapter 5): the supply's voltage detector, the backup domain's lock, the regulator's scale;
-//! and the supply itself with the reset at power-down. Not modelled: stop and standby (the machine stops if they are
-//! asked for: see `Machine`), the wake-up pin, BOR levels.
+//! Power control (RM0090, chapter 5): voltage detector, backup lock, regulator's scale, and the supply's reset. Not
+//! modelled: stop and standby (see `Machine`), the wake-up pin, BOR levels.
 
-/// The detector's levels in millivolts, rising and falling, typical (DS8626, table 20).
+/// Of the detector, mV, rising and falling, typical (DS8626, table 20).
 const LEVELS: [(u32, u32); 8] = [
     (2_140, 2_040),
     (2_300, 2_190),
@@ -13,7 +12,7 @@ const LEVELS: [(u32, u32); 8] = [
     (3_030, 2_930),
     (3_140, 3_030),
 ];
-/// Below this the chip is held in reset, above the second it starts (DS8626, table 20: PDR and POR).
+/// Held in reset below, started above (DS8626, table 20: PDR and POR).
 const RESET: (u32, u32) = (1_680, 1_720);
 
 /// Bits of `CR`.
@@ -27,9 +26,9 @@ pub struct Pwr {
     cr: u32,
     csr: u32,
     supply_mv: u32,
-    /// The detector's output: the supply is below the level.
+    /// Below the detector's level.
     is_low: bool,
-    /// Held in reset by the supply.
+    /// By the supply.
     pub is_off: bool,
 }
 
@@ -50,7 +49,7 @@ impl Pwr {
         *self = Self { supply_mv: self.supply_mv, is_off: self.is_off, ..Self::new() };
     }
 
-    /// The supply is this now. True: the reset by the supply begins or ends.
+    /// True: its reset begins or ends.
     pub fn set_supply(&mut self, mv: u32) -> bool {
         self.supply_mv = mv;
         self.detect();
@@ -65,17 +64,17 @@ impl Pwr {
         self.is_low = self.cr & PVDE != 0 && self.supply_mv < level;
     }
 
-    /// The detector's output, EXTI line 16: high while the supply is low.
+    /// EXTI line 16: high while low.
     pub fn is_low(&self) -> bool {
         self.is_low
     }
 
-    /// Whether the backup domain may be written.
+    /// Writable backup domain.
     pub fn is_backup_unlocked(&self) -> bool {
         self.cr & DBP != 0
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         match offset {
             0 => Some(self.cr),
@@ -85,7 +84,7 @@ impl Pwr {
         }
     }
 
-    /// Writes the register at this offset.
+    /// At this offset.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             // CWUF and CSBF read as 0. Other chips only: the overdrive of the F42x. (Bit 15, the upper one

@@ -1,5 +1,5 @@
-//! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405). It has oscillators with start times
-//! and failures, the PLL, prescalers, clock gates, resets of single devices, and causes of reset.
+//! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405). Oscillators start and fail; PLL,
+//! prescalers, gates, resets and their causes.
 //!
 //! Not modelled: interrupts of ready oscillators (an enabled one stops the machine), the clock outputs, spread
 //! spectrum, `PLLI2S`'s output.
@@ -26,14 +26,14 @@ const PLLON: u32 = 1 << 24;
 const PLLRDY: u32 = 1 << 25;
 const PLLI2SON: u32 = 1 << 26;
 const PLLI2SRDY: u32 = 1 << 27;
-/// `CIR`'s flag of the clock security system, and the bit that clears it.
+/// Flag of the clock security system, and its clearing bit.
 const CSSF: u32 = 1 << 7;
 const CSSC: u32 = 1 << 23;
 
-/// Why the chip was reset: bits of `CSR`.
+/// Bits of `CSR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Power came: POR, with the pin's and the brown-out's flag.
+    /// POR, with pin's and brown-out's flag.
     Power,
     /// The reset pin.
     Pin,
@@ -55,7 +55,7 @@ impl Cause {
     }
 }
 
-/// A bank of gates and resets: their place among the registers.
+/// Place among the registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bank {
     /// AHB1.
@@ -70,10 +70,10 @@ pub enum Bank {
     Apb2 = 5,
 }
 
-/// The clocks that there are, in hertz; 0: it stands still.
+/// Hertz; 0: stands still.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clocks {
-    /// The processor, the memories, DMA.
+    /// Processor, memories, DMA.
     pub hclk: u32,
     /// APB1 and APB2.
     pub pclk: [u32; 2],
@@ -97,9 +97,9 @@ pub struct Rcc {
     csr: u32,
     sscgr: u32,
     plli2scfgr: u32,
-    /// Since when each runs: HSI, HSE, PLL, PLLI2S, LSI, LSE.
+    /// HSI, HSE, PLL, PLLI2S, LSI, LSE.
     since: [Ps; 6],
-    /// The crystal: its rate, and whether it swings.
+    /// Rate, and whether it swings.
     hse_hz: u32,
     hse_alive: bool,
 }
@@ -112,7 +112,7 @@ const LSI: usize = 4;
 const LSE: usize = 5;
 
 impl Rcc {
-    /// After power came, with this crystal (or oscillator, as the firmware says).
+    /// At power-on, with this crystal (or oscillator).
     pub fn new(hse_hz: u32) -> Self {
         let mut rcc = Self {
             cr: 0,
@@ -134,7 +134,7 @@ impl Rcc {
         rcc
     }
 
-    /// A reset; only power takes the flags of the ones before it and the backup domain.
+    /// Only power clears earlier flags and the backup domain.
     pub fn reset(&mut self, cause: Cause, now: Ps) {
         let is_power = cause == Cause::Power;
         let (bdcr, csr) = if is_power { (0, 0) } else { (self.bdcr, self.csr) };
@@ -159,7 +159,7 @@ impl Rcc {
         }
     }
 
-    /// The crystal lives or dies. True: the clock security system saw it die (NMI).
+    /// True: the clock security system saw it die (NMI).
     pub fn set_crystal(&mut self, alive: bool, now: Ps) -> bool {
         self.hse_alive = alive;
         self.since[HSE] = if alive && self.cr & HSEON != 0 { now } else { NEVER };
@@ -178,18 +178,18 @@ impl Rcc {
         true
     }
 
-    /// Whether the clock security system's flag is set: the NMI stays pending.
+    /// Flagged: the NMI stays pending.
     pub fn has_failed(&self) -> bool {
         self.cir & CSSF != 0
     }
 
-    /// The watchdog forces the low-speed oscillator on (RM0090, 7.2.5).
+    /// By the watchdog (RM0090, 7.2.5).
     pub fn force_lsi(&mut self, now: Ps) {
         self.csr |= 1;
         self.since[LSI] = self.since[LSI].min(now);
     }
 
-    /// The crystal divided by `RTCPRE`, in millihertz; 0 without it.
+    /// Divided by `RTCPRE`, mHz; 0 without it.
     pub fn crystal_for_rtc_mhz(&self, now: Ps) -> u64 {
         let divider = self.cfgr >> 16 & 0x1F;
         if divider < 2 || !self.is_ready(HSE, now) {
@@ -228,7 +228,7 @@ impl Rcc {
         oscillator == HSI && self.since[HSI] == 0 || self.ready_at(oscillator) <= now
     }
 
-    /// The clock that the processor runs by changes as soon as the chosen one is ready.
+    /// The chosen clock takes over when ready.
     pub fn settle(&mut self, now: Ps) {
         let chosen = self.cfgr & 3;
         if self.cfgr >> 2 & 3 != chosen && chosen < 3 && self.is_ready(chosen as usize, now) {
@@ -236,13 +236,13 @@ impl Rcc {
         }
     }
 
-    /// When the clock that was chosen will be ready.
+    /// Of the chosen clock.
     pub fn deadline(&self) -> Ps {
         let chosen = self.cfgr & 3;
         if self.cfgr >> 2 & 3 == chosen || chosen == 3 { NEVER } else { self.ready_at(chosen as usize) }
     }
 
-    /// All clocks as they are now.
+    /// As they are now.
     pub fn clocks(&self, now: Ps) -> Clocks {
         let source = if self.pll_on_hse() { self.hse_hz } else { HSI_HZ };
         let m = (self.pllcfgr & 0x3F).max(1);
@@ -265,17 +265,17 @@ impl Rcc {
         }
     }
 
-    /// Whether a device has its clock.
+    /// The device's clock runs.
     pub fn is_on(&self, bank: Bank, bit: u8) -> bool {
         self.gates[bank as usize] >> bit & 1 == 1
     }
 
-    /// Whether a device is held in reset.
+    /// The device is held.
     pub fn is_held(&self, bank: Bank, bit: u8) -> bool {
         self.resets[bank as usize] >> bit & 1 == 1
     }
 
-    /// The register at this offset; `None`: there is none.
+    /// `None`: there is none.
     pub fn read(&self, offset: u32, now: Now) -> Option<u32> {
         let ready = |oscillator, bit| if self.is_ready(oscillator, now.ps) { bit } else { 0 };
         Some(match offset {
@@ -298,7 +298,7 @@ impl Rcc {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Now, backup_unlocked: bool) -> Option<()> {
         match offset {
             0x00 => self.write_cr(value, now.ps),
@@ -418,7 +418,7 @@ mod tests {
         }
     }
 
-    /// The way to 168 MHz from 8 MHz that every start of the F405 takes.
+    /// 168 MHz from 8 MHz, as the F405 starts.
     fn started(rcc: &mut Rcc) -> Option<Ps> {
         let mut now = 0;
         rcc.write(0x00, 0x83 | HSEON, at(now), false)?;

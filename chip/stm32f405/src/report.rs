@@ -1,4 +1,4 @@
-//! The report of a stopped machine: reason, registers, place, last instructions.
+//! A stopped machine: reason, registers, place, last instructions.
 
 use std::fmt;
 
@@ -20,7 +20,7 @@ impl fmt::Display for Trouble {
     }
 }
 
-/// The fault status of a fault at this place, in words (DDI 0403E, B3.2.15 and B3.2.16).
+/// In words (DDI 0403E, B3.2.15 and B3.2.16).
 pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
     let causes = [
         (cfsr & (1 | 1 << 8), format!("an instruction is wanted from {at:#010x}, where none may be")),
@@ -42,18 +42,18 @@ pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
     format!("a fault of the processor: {}", words.join(", "))
 }
 
-/// Why a machine stopped, and where.
+/// Why and where.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Why.
     pub reason: String,
-    /// Microseconds since the model began.
+    /// Since the model began.
     pub us: u64,
     /// R0 to R15.
     pub registers: [u32; 16],
-    /// The program counter's function; outside of any, with the last instruction's.
+    /// The function; outside of any, with the last instruction's.
     pub place: String,
-    /// The addresses of the last instructions, the newest last, each with its function.
+    /// The newest last, with functions.
     pub trace: Vec<(u32, String)>,
 }
 

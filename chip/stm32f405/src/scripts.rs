@@ -1,4 +1,4 @@
-//! Register scripts over several devices, as a program writes them, without a processor.
+//! Register scripts over several devices.
 
 use cortex_m4_model::{Bus, Size};
 
@@ -28,7 +28,7 @@ fn read(chip: &mut Chip, address: u32) -> u32 {
     chip.read(address, Size::Word, now).expect("something is there")
 }
 
-/// A port at 115,942 baud of 16 MHz, its reception a ring of eight bytes by DMA, its transmission four bytes.
+/// 115,942 baud of 16 MHz; DMA: a ring of eight bytes in, four bytes out.
 fn port(chip: &mut Chip) {
     for (address, value) in [
         (RCC + 0x30, 1 | 1 << 22 | 0x0010_0000),
@@ -59,7 +59,7 @@ fn characters_go_round_the_ring_and_tell_half_and_full() {
     port(&mut chip);
     chip.usarts[0].line.extend(chars(b"0123456789", 10 * US, 115_200.0).0);
     chip.line_changed(0);
-    // A character takes 87 us: the fourth is there after 357 us, the eighth after 704.
+    // 87 us a character: the fourth after 357 us, the eighth after 704.
     for (us, flags, left) in
         [(350, 0, 5), (360, 1 << 20, 4), (695, 1 << 20, 1), (705, 3 << 20, 8), (900, 3 << 20, 6)]
     {

@@ -1,4 +1,4 @@
-//! DMA at work: requests of devices are served as they come, copies from memory to memory when their time is over.
+//! DMA at work: requests at once, copies when their time is over.
 
 use crate::access::DmaPort;
 use crate::chip::Chip;
@@ -16,7 +16,7 @@ impl Chip {
         }
     }
 
-    /// DMA serves all who ask.
+    /// All requests.
     pub(crate) fn pump(&mut self) {
         while let Some((dma, stream)) = self.asking() {
             let mut served = self.dmas[dma].streams[stream];

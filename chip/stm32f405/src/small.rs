@@ -1,10 +1,8 @@
-//! Three small devices: the independent watchdog (RM0090, chapter 21), the random number generator (chapter 24), the
-//! CRC unit (chapter 4).
+//! Watchdog (RM0090, chapter 21), random numbers (chapter 24), CRC unit (chapter 4).
 
 use crate::time::{NEVER, Ps, SECOND, US};
 
-/// The independent watchdog. Its oscillator has 17 to 47 kHz, 32 typically (DS8626, table 36); once it runs only a
-/// reset stops it.
+/// The independent watchdog. 17 to 47 kHz, 32 typically (DS8626, table 36); only a reset stops it.
 #[derive(Clone)]
 pub struct Iwdg {
     /// The low-speed oscillator.
@@ -12,11 +10,11 @@ pub struct Iwdg {
     prescaler: u32,
     reload: u32,
     open: bool,
-    /// When the counter is at 0.
+    /// Counter at 0.
     bites: Ps,
-    /// Until when a new prescaler and a new reload are on their way.
+    /// New prescaler and reload take effect.
     updates: [Ps; 2],
-    /// The longest that was left at a feeding, and the shortest: how near it was.
+    /// Longest and shortest rest at a feeding.
     pub nearest: Ps,
 }
 
@@ -43,7 +41,7 @@ impl Iwdg {
         SECOND / u64::from(self.lsi_hz)
     }
 
-    /// When it resets the chip.
+    /// Of the reset.
     pub fn deadline(&self) -> Ps {
         self.bites
     }
@@ -53,7 +51,7 @@ impl Iwdg {
         self.bites != NEVER
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&self, offset: u32, now: Ps) -> Option<u32> {
         Some(match offset {
             0x00 => 0,
@@ -64,7 +62,7 @@ impl Iwdg {
         })
     }
 
-    /// Writes the register at this offset. True: it began to run.
+    /// True: it began to run.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<bool> {
         let clock = self.clock();
         match offset {
@@ -93,18 +91,18 @@ impl Iwdg {
     }
 }
 
-/// How the random number generator behaves.
+/// Behaviour of the generator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Randomness {
     /// It gives numbers.
     Good,
-    /// It never has one.
+    /// Never a number.
     Never,
-    /// It says that its seed is bad.
+    /// A bad seed.
     BadSeed,
 }
 
-/// The random number generator: a number each 40 periods of its clock.
+/// A number each 40 periods.
 #[derive(Clone)]
 pub struct Rng {
     /// How it behaves.
@@ -117,7 +115,7 @@ pub struct Rng {
 }
 
 impl Rng {
-    /// With this seed, so that a run can be repeated.
+    /// Seeded: repeatable.
     pub fn new(seed: u64) -> Self {
         Self { behaves: Randomness::Good, cr: 0, errors: 0, state: seed | 1, ready: NEVER, data: 0 }
     }
@@ -137,7 +135,7 @@ impl Rng {
         }
     }
 
-    /// When the next number is there, for who waits for its interrupt.
+    /// Of the next number.
     pub fn deadline(&self) -> Ps {
         if self.cr & 0xC == 0xC && self.behaves == Randomness::Good { self.ready } else { NEVER }
     }
@@ -147,7 +145,7 @@ impl Rng {
         self.cr & 8 != 0 && self.status(now, pll48) & 0x61 != 0
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&mut self, offset: u32, now: Ps, pll48: u32) -> Option<u32> {
         Some(match offset {
             0x00 => self.cr,
@@ -167,7 +165,7 @@ impl Rng {
         })
     }
 
-    /// Writes the register at this offset.
+    /// At this offset.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<()> {
         match offset {
             0x00 => {
@@ -187,7 +185,7 @@ impl Rng {
     }
 }
 
-/// The CRC unit: CRC-32 of words, most significant bit first, by 0x04C11DB7.
+/// CRC-32 of words, most significant bit first, 0x04C11DB7.
 #[derive(Clone)]
 pub struct Crc {
     sum: u32,
@@ -206,12 +204,12 @@ impl Crc {
         Self { sum: u32::MAX, idr: 0 }
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         [self.sum, self.idr, 0].get(offset as usize / 4).copied()
     }
 
-    /// Writes the register at this offset.
+    /// At this offset.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             0 => {

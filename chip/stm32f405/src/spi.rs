@@ -1,8 +1,8 @@
-//! SPI1 to SPI3 as master (RM0090, chapter 28): one word in transfer and one behind it, reception with overrun, the
-//! clock's divider, DMA requests, interrupts. The other end is a [`Wire`].
+//! SPI1 to SPI3 as master (RM0090, chapter 28): a word in transfer and one behind, overrun, divider, DMA, interrupts. The other
+//! end is a [`Wire`].
 //!
-//! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: they stop the machine. The card
-//! decides by time, so that a word is exchanged at its last clock.
+//! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: they stop the machine. A word is exchanged
+//! at its last clock: the card decides by time.
 
 use crate::time::{NEVER, Now, Timebase};
 
@@ -28,10 +28,10 @@ const BSY: u32 = 1 << 7;
 
 /// The other end of a bus.
 pub trait Wire {
-    /// A byte goes over the bus, its last clock at this moment in picoseconds, at this clock. Gives the answer.
+    /// Last clock at `ps`, at `hz`; returns the answer.
     fn exchange(&mut self, ps: u64, hz: u32, sent: u8) -> u8;
 
-    /// Its answer to the byte that is about to begin, whose end [`Wire::exchange`] tells: for a bus whose program reads each bit.
+    /// The answer to the byte that begins, for a program that reads each bit.
     fn begin(&mut self, _ps: u64, _hz: u32) -> u8 {
         0xFF
     }
@@ -66,11 +66,11 @@ pub struct Spi {
     overrun_read: bool,
     modf: bool,
     to_send: Option<u16>,
-    /// The word on its way, and the time of its last clock.
+    /// And its last clock.
     sending: Option<(u16, u64)>,
-    /// Processor cycles of a clock of the bus APB.
+    /// Of an APB clock.
     bus_cycles: u64,
-    /// Whether the pins are the bus's: clock, to the card, from it.
+    /// Clock, to the card, from it.
     pub routed: [bool; 3],
     /// The connected device.
     pub wire: Box<dyn Wire>,
@@ -106,14 +106,14 @@ impl Spi {
         }
     }
 
-    /// A reset; the outside stays.
+    /// The outside stays.
     pub fn reset(&mut self) {
         let wire = std::mem::replace(&mut self.wire, Box::new(Nobody));
         *self =
             Self { wire, routed: self.routed, bus_cycles: self.bus_cycles, words: self.words, ..Self::new() };
     }
 
-    /// The bus clock is the processor's by this from now on.
+    /// In processor cycles.
     pub fn set_clock(&mut self, bus_cycles: u64) {
         self.bus_cycles = bus_cycles.max(1);
     }
@@ -123,7 +123,7 @@ impl Spi {
         bits * (2 << (self.cr1 >> 3 & 7)) * self.bus_cycles
     }
 
-    /// Brings it to this moment.
+    /// To this moment.
     pub fn advance(&mut self, now: Now, time: &Timebase) {
         while let Some((word, end)) = self.sending.take_if(|(_, end)| *end <= now.cycle) {
             let received = self.exchange(word, time.ps(end), time.hz());
@@ -158,7 +158,7 @@ impl Spi {
         u16::from(high) << 8 | u16::from(byte(word as u8))
     }
 
-    /// When something happens that a program or DMA may wait for without asking.
+    /// Of events that are waited for without asking.
     pub fn deadline(&self) -> u64 {
         let asked = self.cr2 & (RXDMAEN | TXDMAEN | RXNEIE | TXEIE | ERRIE) != 0;
         self.sending.filter(|_| asked).map_or(NEVER, |(_, end)| end)
@@ -191,7 +191,7 @@ impl Spi {
             || self.cr2 & ERRIE != 0 && status & (OVR | MODF) != 0
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&mut self, offset: u32, now: Now, time: &Timebase) -> Option<u32> {
         self.advance(now, time);
         Some(match offset {
@@ -217,7 +217,7 @@ impl Spi {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Now, time: &Timebase) -> Option<()> {
         self.advance(now, time);
         match offset {

@@ -2,8 +2,8 @@
 //! and without its buffer, update, four compare channels, one pulse, interrupts. TIM2 and TIM5 have 32 bits; TIM12
 //! has two channels.
 //!
-//! Not modelled: counting down, capture, outputs, encoder, slave mode, DMA requests: they stop the
-//! machine. The counter is computed when it is asked for; an event stands for each flag only.
+//! Not modelled: counting down, capture, outputs, encoder, slave mode, DMA requests: they stop the machine. The
+//! counter is computed on demand; events only set flags.
 
 use crate::time::NEVER;
 
@@ -31,20 +31,20 @@ pub struct Tim {
     ccr: [u32; 4],
     dcr: u32,
     or: u32,
-    /// Active values of prescaler and reload.
+    /// Of prescaler and reload.
     psc_now: u32,
     arr_now: u32,
     max: u32,
     channels: u32,
-    /// Ticks of the timer's clock since the counter took its value, at this cycle.
+    /// Since the counter's value, at this cycle.
     ticks: u64,
     at: u64,
-    /// Processor cycles of a clock of the timer's.
+    /// Of the timer's clock.
     clock: u64,
 }
 
 impl Tim {
-    /// As after a reset, with so many bits and channels.
+    /// With bits and channels.
     pub fn new(bits: u32, channels: u32) -> Self {
         let max = u32::MAX >> (32 - bits);
         Self {
@@ -76,7 +76,7 @@ impl Tim {
             Self { clock: self.clock, at: now, ..Self::new(32 - self.max.leading_zeros(), self.channels) };
     }
 
-    /// The timer's clock is the processor's by this from now on.
+    /// In processor cycles.
     pub fn set_clock(&mut self, now: u64, clock: u64) {
         self.advance(now);
         self.clock = clock.max(1);
@@ -87,7 +87,7 @@ impl Tim {
         self.cr1 & CEN != 0
     }
 
-    /// Steps from this count until the counter is at that one, at least one.
+    /// At least one.
     fn steps_to(&self, value: u32) -> Option<u64> {
         let period = u64::from(self.arr_now) + 1;
         let (from, to) = (u64::from(self.cnt), u64::from(value));
@@ -104,12 +104,12 @@ impl Tim {
         Some(if to > from { to - from } else { period - from + to })
     }
 
-    /// Steps until the counter begins anew.
+    /// To the counter's restart.
     fn steps_to_update(&self) -> Option<u64> {
         self.steps_to(0)
     }
 
-    /// Brings it to this cycle.
+    /// To this cycle.
     pub fn advance(&mut self, now: u64) {
         let passed = now.saturating_sub(self.at) / self.clock;
         self.at += passed * self.clock;
@@ -171,7 +171,7 @@ impl Tim {
         }
     }
 
-    /// The cycle of the next flag that interrupts.
+    /// Of the next interrupt.
     pub fn deadline(&self) -> u64 {
         if !self.is_counting() {
             return NEVER;
@@ -184,7 +184,7 @@ impl Tim {
             }
         }
         let Some(steps) = next else { return NEVER };
-        // A flag that is there already changes nothing by coming again; the buffers change at an update.
+        // A set flag changes nothing again; buffers change at an update.
         let ticks = (steps * (u64::from(self.psc_now) + 1)).saturating_sub(self.ticks).max(1);
         self.at.saturating_add(ticks.saturating_mul(self.clock))
     }
@@ -194,12 +194,11 @@ impl Tim {
         self.sr & self.dier & 0x5F != 0
     }
 
-    /// The smaller ones lack registers.
     fn has(&self, offset: u32) -> bool {
         self.channels == 4 || !matches!(offset, 0x04 | 0x1C | 0x3C | 0x40 | 0x48 | 0x50)
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         self.advance(now);
         Some(match offset {
@@ -221,7 +220,7 @@ impl Tim {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<()> {
         self.advance(now);
         match offset {
@@ -269,7 +268,7 @@ impl Tim {
 mod tests {
     use super::*;
 
-    /// TIM2 as the time driver sets it up: 1 MHz of 84 MHz, 16 bits, at 168 MHz of the processor.
+    /// The time driver's TIM2: 1 MHz of 84 MHz, 16 bits, processor at 168 MHz.
     fn driver() -> Tim {
         let mut tim = Tim::new(32, 4);
         tim.set_clock(0, 2);

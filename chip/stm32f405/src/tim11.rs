@@ -1,25 +1,24 @@
-//! TIM11 (RM0090, chapter 19) as a meter of the crystal: its input is the crystal divided by `RTCPRE`, and it captures the count
-//! of its own clock at each eighth edge. Anything else that this timer can do stops the machine.
+//! TIM11 (RM0090, chapter 19) as a meter: captures at each eighth edge of the crystal divided by `RTCPRE`. Other uses stop the
+//! machine.
 
 use crate::time::{Ps, SECOND};
 
-/// Capture of the input itself, each eighth edge: `CC1S`, `IC1PSC`.
+/// `CC1S`, `IC1PSC`.
 const EACH_EIGHTH: u32 = 0b1101;
-/// The input is the crystal: `TI1_RMP`.
+/// `TI1_RMP`.
 const CRYSTAL: u32 = 2;
-/// Flag of a capture.
 const CC1IF: u32 = 1 << 1;
-/// Edges of a capture.
+/// Of a capture.
 const EDGES: u64 = 8;
 
-/// The timer's clocks at the moment of an access.
+/// At an access.
 #[derive(Clone, Copy, Debug)]
 pub struct Input {
     /// The moment.
     pub ps: Ps,
     /// The timer's clock.
     pub timer_hz: u32,
-    /// The crystal divided by `RTCPRE`, in millihertz; 0 without it.
+    /// Divided by `RTCPRE`, mHz; 0 without it.
     pub edges_mhz: u64,
 }
 
@@ -30,7 +29,7 @@ pub struct Tim11 {
     ccmr: u32,
     ccer: u32,
     or: u32,
-    /// Number of the last capture that was read.
+    /// Last one read.
     read: u64,
 }
 
@@ -40,7 +39,7 @@ impl Tim11 {
         *self = Self::default();
     }
 
-    /// Captures since the model began, and the time of the last one.
+    /// Since the model began, with the last one's time.
     fn captures(&self, input: Input) -> (u64, Ps) {
         let is_on = self.cr1 & self.ccer == 1 && self.ccmr == EACH_EIGHTH && self.or == CRYSTAL;
         if !is_on || input.edges_mhz == 0 {
@@ -50,7 +49,7 @@ impl Tim11 {
         (input.ps / period, input.ps / period * period)
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&mut self, offset: u32, input: Input) -> Option<u32> {
         let (number, at) = self.captures(input);
         Some(match offset {
@@ -74,7 +73,7 @@ impl Tim11 {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, input: Input) -> Option<()> {
         match offset {
             0x00 if value < 2 => self.cr1 = value,
@@ -83,7 +82,7 @@ impl Tim11 {
             0x50 if matches!(value, 0 | CRYSTAL) => self.or = value,
             _ => return None,
         }
-        // The first capture is one that comes after this.
+        // Only later captures count.
         self.read = self.captures(input).0.max(self.read);
         Some(())
     }

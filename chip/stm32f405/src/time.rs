@@ -1,47 +1,47 @@
 //! Time: the processor's cycles, and picoseconds since the model began.
 //!
-//! Devices on a bus clock count in cycles. Devices with their own clock (sender, watchdog, flash, card) count in
-//! picoseconds. A change of the clock tree moves the relation, never the past.
+//! Bus devices count in cycles, devices with their own clock (sender, watchdog, flash, card) in picoseconds. A change
+//! of the clock tree moves the relation, never the past.
 
-/// Picoseconds since the model began: 213 days fit.
+/// 213 days fit.
 pub type Ps = u64;
 
-/// Picoseconds of a microsecond.
+/// Picoseconds.
 pub const US: Ps = 1_000_000;
-/// Picoseconds of a millisecond.
+/// Picoseconds.
 pub const MS: Ps = 1_000 * US;
-/// Picoseconds of a second.
+/// Picoseconds.
 pub const SECOND: Ps = 1_000 * MS;
-/// A moment that never comes.
+/// Never.
 pub const NEVER: u64 = u64::MAX;
 
-/// A moment, both ways.
+/// Both ways.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Now {
-    /// The processor's count of cycles.
+    /// Processor cycles.
     pub cycle: u64,
     /// Picoseconds.
     pub ps: Ps,
 }
 
-/// The relation of cycles and picoseconds.
+/// Cycles and picoseconds.
 #[derive(Clone, Debug)]
 pub struct Timebase {
     hz: u32,
     base: Now,
-    /// Picoseconds a cycle, by 2^32.
+    /// By 2^32.
     ps_a_cycle: u64,
 }
 
 impl Timebase {
-    /// From cycle 0 at 0 s on, at this rate.
+    /// From cycle 0 at 0 s.
     pub fn new(hz: u32) -> Self {
         let mut time = Self { hz: 0, base: Now::default(), ps_a_cycle: 0 };
         time.set(Now::default(), hz);
         time
     }
 
-    /// From this moment on the processor runs at this rate.
+    /// From this moment on.
     pub fn set(&mut self, now: Now, hz: u32) {
         let hz = hz.max(1);
         self.base = now;
@@ -54,18 +54,18 @@ impl Timebase {
         self.hz
     }
 
-    /// When this cycle begins.
+    /// Start of this cycle.
     pub fn ps(&self, cycle: u64) -> Ps {
         let cycles = u128::from(cycle.saturating_sub(self.base.cycle));
         self.base.ps + ((cycles * u128::from(self.ps_a_cycle)) >> 32) as u64
     }
 
-    /// The moment at which this cycle begins.
+    /// Start of this cycle.
     pub fn at(&self, cycle: u64) -> Now {
         Now { cycle, ps: self.ps(cycle) }
     }
 
-    /// The first cycle that begins at this moment or after it.
+    /// Begins then or after.
     pub fn cycle(&self, ps: Ps) -> u64 {
         if ps == NEVER {
             return NEVER;

@@ -1,9 +1,8 @@
-//! A USART or UART in asynchronous mode (RM0090, chapter 30): reception with overrun, noise, framing and idle line;
-//! transmission; DMA requests and interrupts. The baud rate follows from divider and bus clock, and the
-//! sender has its own.
+//! A USART or UART in asynchronous mode (RM0090, chapter 30): overrun, noise, framing, idle line; DMA requests and
+//! interrupts. Divider and bus clock give the rate; the sender has its own.
 //!
 //! Not modelled: synchronous, smart card, infrared (`IrDA`), LIN, half duplex, hardware flow control, 9 bits, parity,
-//! break, mute mode: they stop the machine. The idle frame that TE sends first is left out.
+//! break, mute mode: they stop the machine. TE's first idle frame is left out.
 
 use crate::line::Line;
 use crate::time::{NEVER, Ps};
@@ -25,7 +24,7 @@ const TCIE: u32 = 1 << 6;
 const TXEIE: u32 = 1 << 7;
 const UE: u32 = 1 << 13;
 const OVER8: u32 = 1 << 15;
-/// The modelled bits of `CR1`, `CR2`, `CR3`.
+/// Modelled bits.
 const CR1_KNOWN: u32 = RE | TE | IDLEIE | RXNEIE | TCIE | TXEIE | 1 << 8 | UE | OVER8;
 const CR2_KNOWN: u32 = 0x3000;
 const CR3_KNOWN: u32 = EIE | DMAR | DMAT | 1 << 11;
@@ -39,15 +38,15 @@ const DMAT: u32 = 1 << 7;
 pub struct Counts {
     /// Characters received.
     pub received: u64,
-    /// Characters lost as the one before was not fetched.
+    /// Lost: the one before was not fetched.
     pub overruns: u64,
-    /// Characters with a low stop bit.
+    /// Low stop bits.
     pub framing: u64,
     /// Characters with noise.
     pub noise: u64,
-    /// Characters received while reception was off.
+    /// While reception was off.
     pub missed: u64,
-    /// Characters that had not gone out when the rate was changed or the port was switched off.
+    /// Not gone out at a change of rate or switching off.
     pub cut: u64,
 }
 
@@ -56,9 +55,9 @@ pub struct Counts {
 pub struct Usart {
     /// The input line.
     pub line: Line,
-    /// Sent characters, with the end of each stop bit.
+    /// With each stop bit's end.
     pub sent: Vec<(Ps, u8)>,
-    /// Whether its pins are the port's: reception, transmission.
+    /// Reception, transmission.
     pub routed: (bool, bool),
     /// The transmitter stands still.
     pub is_stuck: bool,
@@ -70,17 +69,17 @@ pub struct Usart {
     gtpr: u32,
     received: u8,
     to_send: Option<u8>,
-    /// The character on its way out, and its end.
+    /// And its end.
     sending: Option<(u8, Ps)>,
-    /// The receiver looks for a start bit from this moment on.
+    /// For the next start bit.
     free: Ps,
-    /// The start bit that is being followed, and when the character is there.
+    /// Start bit, and when the character is there.
     incoming: Option<(Ps, Ps)>,
-    /// When the line counts as idle, once a character came.
+    /// After a character.
     idle_at: Ps,
-    /// SR was read: the next read of DR clears its errors.
+    /// The next read of DR clears errors.
     sr_was_read: bool,
-    /// SR was read: the next write of DR clears TC. DMA's writes alone do not.
+    /// The next write of DR clears TC; DMA's writes alone do not.
     tc_was_read: bool,
     pclk: u32,
 }
@@ -116,7 +115,7 @@ impl Usart {
         }
     }
 
-    /// A reset; the line outside stays.
+    /// The line outside stays.
     pub fn reset(&mut self, now: Ps) {
         *self = Self {
             line: std::mem::take(&mut self.line),
@@ -130,12 +129,12 @@ impl Usart {
         };
     }
 
-    /// The bus clock is this from now on.
+    /// In hertz.
     pub fn set_clock(&mut self, pclk: u32) {
         self.pclk = pclk;
     }
 
-    /// How long a bit is; `None`: no rate is set.
+    /// `None`: no rate is set.
     fn bit(&self) -> Option<Ps> {
         let ticks = if self.cr[0] & OVER8 == 0 { self.brr } else { (self.brr >> 4) * 8 + (self.brr & 7) };
         (ticks > 0 && self.pclk > 0).then(|| u64::from(ticks) * 1_000_000_000_000 / u64::from(self.pclk))
@@ -150,7 +149,7 @@ impl Usart {
         self.cr[0] & (UE | RE) == UE | RE && self.routed.0
     }
 
-    /// When something happens next.
+    /// Of the next event.
     pub fn deadline(&self) -> Ps {
         let reception = match self.incoming {
             Some((_, done)) => done,
@@ -161,7 +160,7 @@ impl Usart {
             None => NEVER,
         };
         let sending = self.sending.map_or(NEVER, |(_, end)| if self.is_stuck { NEVER } else { end });
-        // A character before that takes the idle line away.
+        // Earlier characters take the idle line away.
         reception.min(sending).min(self.idle_at)
     }
 
@@ -202,7 +201,7 @@ impl Usart {
             }
             self.idle_at = NEVER;
         }
-        // Its clock became faster within a character: the samples up to now are over.
+        // A faster clock within a character: samples until now are over.
         if self.deadline() <= now {
             (self.incoming, self.idle_at, self.free) = (None, NEVER, now);
         }
@@ -255,7 +254,7 @@ impl Usart {
             || cr3 & EIE != 0 && cr3 & DMAR != 0 && sr & (FE | NF | ORE) != 0
     }
 
-    /// The register at this offset.
+    /// At this offset.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => {
@@ -276,7 +275,7 @@ impl Usart {
         })
     }
 
-    /// Writes the register at this offset; `None`: the register or the value is not modelled.
+    /// `None`: not modelled.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<()> {
         match offset {
             // Written to 0 these are cleared.
@@ -308,7 +307,7 @@ impl Usart {
         Some(())
     }
 
-    /// The character on its way out is lost.
+    /// Is lost.
     fn cut(&mut self) {
         if self.sending.take().is_some() {
             self.counts.cut += 1 + u64::from(self.to_send.take().is_some());
@@ -326,7 +325,7 @@ impl Usart {
         if self.sending.is_none() {
             self.send(byte, now);
         } else {
-            // One that waits already is lost, as the manual says.
+            // A waiting one is lost (manual).
             self.to_send = Some(byte);
             self.sr &= !TXE;
         }
@@ -338,7 +337,7 @@ mod tests {
     use super::*;
     use crate::line::{Flaw, chars};
 
-    /// A port of APB2 at 84 MHz and 921,600 baud.
+    /// APB2 at 84 MHz, 921,600 baud.
     fn port() -> Usart {
         let mut port = Usart::new();
         port.set_clock(84_000_000);

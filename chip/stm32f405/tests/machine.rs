@@ -1,4 +1,4 @@
-//! Small programs on the whole machine: their effects are measured from outside.
+//! Small programs, measured from outside.
 
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
@@ -10,18 +10,18 @@ use stm32f405_model::time::{MS, Ps, SECOND, US};
 const NOWHERE: [u16; 4] = [0x4800, 0x4700, 0x0001, 0x3000];
 /// `ldr r0, =0x40012000 (the ADC's status); ldr r1, [r0]; b .`
 const ADC: [u16; 6] = [0x4801, 0x6801, 0xE7FE, 0x0000, 0x2000, 0x4001];
-/// Starts the watchdog as it is after a reset, and waits.
+/// The watchdog as after a reset.
 const WATCHDOG: [u16; 8] = [0x4802, 0xF64C, 0x41CC, 0x6001, 0xE7FE, 0x0000, 0x3000, 0x4000];
-/// Unlocks the flash, erases sector 1 by x32, waits until it is not busy, and makes PC0 high.
+/// Erases sector 1 by x32, waits, makes PC0 high.
 const ERASE: [u16; 34] = [
     0x480B, 0x490C, 0x6041, 0x490C, 0x6041, 0xF240, 0x210A, 0x6101, 0xF441, 0x3180, 0x6101, 0x68C1, 0x03C9,
     0xD4FC, 0x4A07, 0xF04F, 0x0104, 0x6011, 0x4A06, 0xF04F, 0x0101, 0x6011, 0x6151, 0xE7FE, 0x3C00, 0x4002,
     0x0123, 0x4567, 0x89AB, 0xCDEF, 0x3830, 0x4002, 0x0800, 0x4002,
 ];
-/// When a program begins: power, and the chip's own start.
+/// Power, and the chip's start.
 const START: Ps = 1_500 * US;
 
-/// A machine with this program, sector 1 of its flash filled with zeros.
+/// Sector 1 is filled with zeros.
 fn machine(program: &[u16], board: Board) -> Machine {
     let mut flash = vec![0; 0x8000];
     flash[..4].copy_from_slice(&0x2000_1000_u32.to_le_bytes());

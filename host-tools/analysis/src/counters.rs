@@ -1,4 +1,4 @@
-//! The usage counters for people: with titles and units, motors and ranges apart.
+//! Usage counters for people: titles, units, motors and ranges apart.
 
 use std::collections::BTreeMap;
 
@@ -9,25 +9,25 @@ use serde::Serialize;
 
 use crate::names::counter_name;
 
-/// All counters of a session.
+/// Of a session.
 #[derive(Debug, Default, Serialize)]
 pub struct Counters {
-    /// Those of the vehicle.
+    /// Of the vehicle.
     pub plain: Vec<Plain>,
     /// By motor.
     pub motors: Vec<Motor>,
     /// By quantity.
     pub ranges: Vec<Ranges>,
-    /// A remark on the counters.
+    /// On the counters.
     pub remark: Option<&'static str>,
 }
 
-/// One of the vehicle.
+/// Of the vehicle.
 #[derive(Debug, Serialize)]
 pub struct Plain {
     /// For people.
     pub title: String,
-    /// The unit of its values; empty for a count.
+    /// Empty for a count.
     pub unit: &'static str,
     decimals: u8,
     /// In this session.
@@ -36,37 +36,37 @@ pub struct Plain {
     pub life: Option<f64>,
 }
 
-/// A motor: seconds and turns.
+/// Seconds and turns.
 #[derive(Debug, Default, Serialize)]
 pub struct Motor {
     /// From 0.
     pub number: u8,
-    /// How long it turned in this session, s.
+    /// In this session, s.
     pub run_time_s: Option<f64>,
-    /// How often it turned in this session.
+    /// In this session.
     pub revolutions: Option<f64>,
-    /// How long in its life, s.
+    /// In its life, s.
     pub life_run_time_s: Option<f64>,
-    /// How often in its life.
+    /// In its life.
     pub life_revolutions: Option<f64>,
 }
 
-/// The time of a quantity in its ranges.
+/// Time in ranges.
 #[derive(Debug, Serialize)]
 pub struct Ranges {
     /// The quantity's name.
     pub title: &'static str,
-    /// The unit of the ranges' ends.
+    /// Of the ranges' ends.
     pub unit: &'static str,
     /// Its ranges.
     pub bands: Vec<Band>,
 }
 
-/// From, to (`null` for an open range), seconds.
+/// From, to (`null`: open), seconds.
 pub type Band = (Option<f32>, Option<f32>, f64);
 
-/// Whether any message of the vehicle has a counter's quantity: otherwise its zero means unknown. Counters of motors,
-/// ranges and the past never show a zero.
+/// A message of the vehicle has the quantity: otherwise zero means unknown. Motors, ranges and the past never show a
+/// zero.
 pub fn is_told(name: &str, vehicle: &Vehicle) -> bool {
     use UsageCounter as U;
     let Some(counter) = UsageCounter::ALL.iter().find(|counter| counter.name() == name) else { return true };
@@ -89,13 +89,13 @@ pub fn is_told(name: &str, vehicle: &Vehicle) -> bool {
     }
 }
 
-/// Whether any message shows if the vehicle flies.
+/// By any message.
 pub fn tells_flight(vehicle: &Vehicle) -> bool {
     let Vehicle { landed, global, local, hud, .. } = vehicle;
     landed.get().is_some() || global.get().is_some() || local.get().is_some() || hud.get().is_some()
 }
 
-/// Title, unit and decimals of a counter of the vehicle.
+/// Title, unit, decimals.
 pub const fn about(counter: UsageCounter) -> (&'static str, &'static str, u8) {
     use UsageCounter as U;
     match counter {
@@ -160,10 +160,10 @@ fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
 }
 
 const FLIGHTS: &str = UsageCounter::Flights.name();
-/// Remark on a session that begins in a flight: the session before has counted that flight.
+/// The session before counted the flight.
 const BEGUN_BEFORE: &str = "it was in the air at its start: that flight is counted in the log before";
 
-/// The counters by their meaning. Counters unknown to this program keep their names.
+/// By meaning; unknown ones keep their names.
 pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Counters {
     let mut all = Counters::default();
     let number = |counter: UsageCounter| session.get(counter.name()).copied().unwrap_or(0.0);
@@ -174,7 +174,7 @@ pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Coun
         let Some(&value) = session.get(&name) else { continue };
         let lived = life.get(&name).copied();
         let (title, unit, decimals) = match meaning(number) {
-            // None in it, one landing: no contradiction.
+            // One landing: no contradiction.
             Some(CounterName::Vehicle(FLIGHTS)) if all.remark.is_some() => ("Take-offs".to_owned(), "", 0),
             Some(CounterName::Vehicle(name)) => of_vehicle(name),
             Some(CounterName::Figure(quantity)) => of_figure(quantity),

@@ -6,8 +6,6 @@
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
 //! * [`mod@reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON; [`manifest`]: the files of a reading
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
-//!
-//! It reads recordings through `hums_formats` only, and writes nothing but errors and the manifest.
 
 #![deny(
     clippy::print_stderr,

@@ -1,5 +1,4 @@
-//! Output of `hums info --json`. Names carry their units; times are seconds since the monitor's power-on or
-//! UTC.
+//! Output of `hums info --json`. Names carry units; times are since power-on or UTC.
 
 use hums_core::clock::Instant;
 use serde::Serialize;
@@ -21,17 +20,17 @@ pub struct ImageJson {
     damage: Vec<String>,
     lost_clusters: u64,
     found_by_scan: bool,
-    /// The blocks not searched; `null` if every block was.
+    /// `null`: every block was searched.
     not_looked_at: Option<String>,
 }
 
-/// The images of a run.
+/// Of a run.
 #[derive(Debug, Serialize)]
 pub struct ImagesJson {
     images: Vec<ImageJson>,
 }
 
-/// The images of a run as JSON.
+/// As JSON.
 pub fn images_json(images: &[logs::find::Image]) -> ImagesJson {
     let json = |image: &logs::find::Image| ImageJson {
         path: image.path.display().to_string(),
@@ -50,14 +49,14 @@ pub struct LogJson {
     /// `hums`, `tlog`, `raw`, `dataflash`, `ulog`.
     format: &'static str,
     files: Vec<String>,
-    /// As its sectors name it, hexadecimal.
+    /// By its sectors, hexadecimal.
     session: Option<String>,
     closed: bool,
-    /// The evidence of its end; `null` for a recording of another format, which has none.
+    /// `null` for another format.
     end: Option<EndJson>,
     start_utc: Option<String>,
     end_utc: Option<String>,
-    /// Seconds since the monitor's power-on.
+    /// Since power-on.
     start_s: Option<f64>,
     end_s: Option<f64>,
     duration_s: f64,
@@ -67,16 +66,16 @@ pub struct LogJson {
     frame_bytes: u64,
     records: u64,
     messages: Vec<MessageJson>,
-    /// Frames of ids beyond the list, without definitions here.
+    /// Beyond the list, without definitions here.
     frames_of_other_messages: u64,
     gaps_count: u64,
-    /// As far as they were counted.
+    /// As far as counted.
     frames_missing: u64,
-    /// Gaps with an unknown number of missing frames.
+    /// Unknown numbers.
     gaps_uncounted: u64,
     gaps: Vec<GapJson>,
     losses: Vec<LossJson>,
-    /// The checker of the vehicle's health: `board`; `hums` (this program, when it read the log); `nobody`.
+    /// `board`; `hums` (this program); `nobody`.
     checked_by: &'static str,
     checks_judged: Option<usize>,
     checks_all: Option<usize>,
@@ -95,11 +94,11 @@ pub struct LogJson {
     bytes_on_card: u64,
     sectors: u64,
     sectors_damaged: u64,
-    /// All blocks of its files.
+    /// Of its files.
     blocks: BlocksJson,
 }
 
-/// The vehicle of a recording.
+/// Of a recording.
 #[derive(Debug, Serialize)]
 pub struct VehicleJson {
     /// MAVLink system id.
@@ -110,7 +109,7 @@ pub struct VehicleJson {
     pub autopilot: String,
     /// For instance `quadrotor`.
     pub r#type: String,
-    /// Version of the autopilot's firmware.
+    /// The autopilot's version.
     pub firmware: Option<String>,
     /// Hexadecimal.
     pub uid: Option<String>,
@@ -118,7 +117,7 @@ pub struct VehicleJson {
 
 #[derive(Debug, Serialize)]
 struct MessageJson {
-    /// The id, for MAVLink messages.
+    /// For MAVLink messages.
     id: Option<u32>,
     name: String,
     verified: bool,
@@ -147,7 +146,7 @@ struct LossJson {
 #[derive(Debug, Serialize)]
 struct FlightJson {
     from_s: f64,
-    /// `null` if its landing is not in the log.
+    /// `null`: no landing in the log.
     to_s: Option<f64>,
 }
 
@@ -162,7 +161,7 @@ struct FindingJson {
     time_utc: Option<String>,
     /// `null` if the input stopped.
     value: Option<f32>,
-    /// The state in the value, if it is not a quantity.
+    /// If not a quantity.
     state: Option<&'static str>,
     limit: Option<f32>,
     unit: String,
@@ -176,7 +175,7 @@ struct ExceedanceJson {
     name: String,
     unit: String,
     session: CrossingsJson,
-    /// `null` without a known life.
+    /// `null` if unknown.
     lifetime: Option<CrossingsJson>,
 }
 
@@ -187,7 +186,7 @@ struct CrossingsJson {
     warning_s: f64,
     critical_s: f64,
     peak: Option<f32>,
-    /// The state in the peak, if it is not a quantity.
+    /// If not a quantity.
     state: Option<&'static str>,
 }
 
@@ -201,7 +200,7 @@ struct ComponentJson {
     status: &'static str,
     /// `null` without a limit.
     used_percent: Option<f32>,
-    /// That which it reaches first.
+    /// Reached first.
     limit: Option<String>,
     powered_s: f64,
     flight_s: f64,
@@ -257,7 +256,7 @@ pub fn finite(value: f32) -> Option<f32> {
 }
 
 impl LogJson {
-    /// A log that was read through.
+    /// Read through.
     pub fn new(log: &Overview) -> Self {
         let (summary, contents) = (&log.ending.summary, &log.contents);
         let utc = |at: Option<Instant>| at.and_then(|at| log.utc_us(at)).map(iso8601);
@@ -362,7 +361,7 @@ fn findings(log: &Overview) -> Vec<FindingJson> {
     log.contents.findings.iter().map(json).collect()
 }
 
-/// From the first to the last time of a log, in seconds; 0 if unknown.
+/// First to last time, seconds; 0 if unknown.
 pub fn duration_s(log: &Overview) -> f64 {
     match (log.ending.summary.first, log.ending.summary.last) {
         (Some(first), Some(last)) => last.since(first).as_micros() as f64 / 1e6,
@@ -370,7 +369,7 @@ pub fn duration_s(log: &Overview) -> f64 {
     }
 }
 
-/// The vehicle, if it was received.
+/// If received.
 pub fn vehicle(log: &Overview) -> Option<VehicleJson> {
     let vehicle = log.contents.vehicle?;
     let [major, minor, patch, _] = vehicle.firmware.to_be_bytes();

@@ -1,5 +1,5 @@
-//! The manifest of a reading: which files were read and made, by their SHA-256, and what was repaired or lost. One JSON file,
-//! so that others can prove later that they have the same files, with `sha256sum` or any other program.
+//! The manifest of a reading: files read and made, by SHA-256; repairs and losses. Others can prove later that they have the
+//! same files, with `sha256sum`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,13 +19,12 @@ use crate::printable::path as shown;
 use crate::soundness::Soundness;
 use crate::utc::iso8601;
 
-/// The object of a manifest.
 const SCHEMA: Schema = Schema::first("hums-manifest");
 
-/// A manifest in the making.
+/// In the making.
 #[derive(Debug, Default, Serialize)]
 pub struct Manifest {
-    /// This program and its commit.
+    /// And commit.
     program: &'static str,
     made_utc: String,
     inputs: Vec<FileJson>,
@@ -33,34 +32,34 @@ pub struct Manifest {
     logs: Vec<LogJson>,
 }
 
-/// A file and its content.
+/// With its content.
 #[derive(Debug, Serialize)]
 struct FileJson {
-    /// Its name, without this computer's folders above the folder that was named.
+    /// Without folders above the named one.
     file: String,
     bytes: u64,
     sha256: String,
 }
 
-/// A log, and what it lacks.
+/// And its losses.
 #[derive(Debug, Serialize)]
 struct LogJson {
     name: String,
-    /// As its sectors name it, hexadecimal; `null` for other recordings.
+    /// By its sectors, hexadecimal; `null` for other recordings.
     session: Option<String>,
-    /// These are `null` for other recordings.
+    /// `null` for other recordings.
     frames: Option<u64>,
     gaps: Option<u64>,
     frames_missing: Option<u64>,
     sectors_rebuilt: Option<u64>,
-    /// In a word; empty if it is whole.
+    /// A word; empty if whole.
     lacks: &'static str,
-    /// Why, and remarks, as sentences.
+    /// Sentences.
     faults: Vec<String>,
 }
 
 impl Manifest {
-    /// Adds a log that was read, with the remarks on it. Recordings of other programs have no ending.
+    /// With remarks; other programs' recordings have no ending.
     pub fn log(&mut self, name: &str, ending: Option<&Ending>, remarks: &[String]) {
         let summary = ending.map(|ending| &ending.summary);
         let faults = ending.map_or_else(Vec::new, Ending::faults);
@@ -76,10 +75,10 @@ impl Manifest {
         });
     }
 
-    /// Hashes all files, tells people of them, and writes the manifest. Outputs may be folders.
+    /// Hashes all files, and tells people. Outputs may be folders.
     ///
     /// # Errors
-    /// A file cannot be read, or the manifest not be written.
+    /// A file cannot be read or written.
     pub fn write(
         mut self,
         program: &'static str,
@@ -109,7 +108,7 @@ impl Manifest {
     }
 }
 
-/// All files below a folder, or the file itself, in the order of their names.
+/// Files below, or itself, by name.
 fn below(output: &Path) -> Result<Vec<FileJson>> {
     let mut files = Vec::new();
     let mut waiting = vec![output.to_owned()];
@@ -127,7 +126,7 @@ fn below(output: &Path) -> Result<Vec<FileJson>> {
     Ok(files)
 }
 
-/// A file's content, named from this folder on.
+/// Named from this folder on.
 fn hashed(path: &Path, from: Option<&Path>) -> Result<FileJson> {
     let context = || format!("{}: cannot be read", path.display());
     let bytes = fs::metadata(path).with_context(context)?.len();

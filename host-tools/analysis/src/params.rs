@@ -1,4 +1,4 @@
-//! `--params FILE`: parameters as ground stations keep them in files ([`hums_link::param_line`]).
+//! `--params FILE` ([`hums_link::param_line`]).
 
 use std::path::Path;
 
@@ -9,10 +9,10 @@ use hums_link::param_line::{self, Line};
 use crate::files::read_short;
 use crate::outcome::usage;
 
-/// A ground station's file of all parameters of a vehicle has some 40 KiB.
+/// A vehicle's file has some 40 KiB.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// The parameters of a file, in its order; none without a file.
+/// In order; none without a file.
 pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
     let bytes = read_short(path, BYTES_MAX).context("--params")?;
@@ -31,7 +31,7 @@ pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     Ok(params)
 }
 
-/// The parameter of a line, if any; `Err` gives the line's error.
+/// `Err`: the line's error.
 fn parameter(line: &str) -> Result<Option<(&'static ParamSpec, f32)>, String> {
     let (name, value) = match param_line::read(line) {
         Line::Nothing => return Ok(None),

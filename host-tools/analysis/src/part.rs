@@ -1,4 +1,4 @@
-//! Parts that wear: their names, and the limit that each reaches first.
+//! Worn parts: names, and the limit reached first.
 
 use std::fmt;
 
@@ -6,52 +6,51 @@ use hums_core::Monitor;
 use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
 use hums_core::health::Subsystem;
 
-/// The limits of a part, by its parameters: hours, flights, battery cycles, hours that its motor turned; 0 without a
-/// limit.
+/// Hours, flights, battery cycles, motor hours; 0 without a limit.
 pub type Limits = [f64; 4];
 
-/// How the names of their parameters end.
+/// Of their parameters.
 const ENDS: [&str; 4] = ["_HOURS", "_FLIGHTS", "_CYCLES", "_MOT_HOURS"];
 
-/// The place of a part, from 0, and which of its limits a parameter is: of `CMP1_FLIGHTS` 0 and 1.
+/// Place from 0, and limit: `CMP1_FLIGHTS` is 0 and 1.
 pub fn limit_of(parameter: &str) -> Option<(usize, usize)> {
     let (number, end) = parameter.strip_prefix("CMP")?.split_at_checked(1)?;
     let place = number.parse::<usize>().ok()?.checked_sub(1).filter(|place| *place < COMPONENTS_MAX)?;
     Some((place, ENDS.iter().position(|known| *known == end)?))
 }
 
-/// The name of a part: `motor 3`, with its operator's name.
+/// `motor 3`, with its operator's name.
 pub fn name(kind: &str, number: u8, given: &str) -> String {
     let number = if number == 0 { String::new() } else { format!(" {number}") };
     let given = if given.is_empty() { String::new() } else { format!(" \"{given}\"") };
     format!("{kind}{number}{given}")
 }
 
-/// The limit that a part reaches first.
+/// Reached first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// Use of the part so far, in the unit of the limit.
+    /// In the limit's unit.
     pub run: f64,
     /// The limit.
     pub limit: f64,
     /// Of both: `h`, `flights`, `cycles`.
     pub unit: &'static str,
-    /// How the hours count: `turning`; empty for other units.
+    /// `turning`; empty for other units.
     pub how: &'static str,
-    /// How the name of its parameter ends.
+    /// Of its parameter.
     pub end: &'static str,
 }
 
 impl fmt::Display for Limit {
-    /// The limit with its unit: `25 h turning`.
+    /// `25 h turning`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let space = if self.how.is_empty() { "" } else { " " };
-        // A parameter has single precision.
+        // Single precision.
         write!(f, "{} {}{space}{}", self.limit as f32, self.unit, self.how)
     }
 }
 
-/// The limit that a part reaches first; `None` where it has none.
+/// `None` without one.
 pub fn first_limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<Limit> {
     let is_powered = [Kind::Card, Kind::Other].iter().any(|of| of.name() == kind);
     let (run_s, how) =
@@ -68,7 +67,7 @@ pub fn first_limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<Lim
         .max_by(|one, other| (one.run / one.limit).total_cmp(&(other.run / other.limit)))
 }
 
-/// The most used part of a subsystem, as a check judges it: its name, and its limit.
+/// The most used, as a check judges it, and its limit.
 pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<String>)> {
     let used = |place: &usize| monitor.component_used_percent(*place).unwrap_or(f32::NEG_INFINITY);
     let mine = |place: &usize| {
@@ -77,7 +76,7 @@ pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<St
     of(monitor, (0..COMPONENTS_MAX).filter(mine).max_by(|one, other| used(one).total_cmp(&used(other)))?)
 }
 
-/// The name of a part, and the limit that it reaches first, by its place from 0.
+/// By place from 0.
 pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
     let part = monitor.components().get(place)?;
     let (figures, _) = monitor.component_figures(place)?;
@@ -94,12 +93,12 @@ pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
     Some((name(kind, part.number, part.name.as_str()), limit.map(|limit| limit.to_string())))
 }
 
-/// A due part in words: `motor 3 (limit 25 h turning)`.
+/// `motor 3 (limit 25 h turning)`.
 pub fn due_words((name, limit): &(String, Option<String>)) -> String {
     limit.as_ref().map_or_else(|| name.clone(), |limit| format!("{name} (limit {limit})"))
 }
 
-/// Whether a check reports that a part is due.
+/// By the check.
 pub fn is_due(check: &str) -> bool {
     check.ends_with("_due")
 }

@@ -1,10 +1,9 @@
-//! From a vehicle's observations to the quantities of the reference system. This is the only mapping, for the
-//! line protocol (`influx`) and for the four tables (`thesis`), for any autopilot.
+//! A vehicle's observations as quantities of the reference system. The only mapping, for the line protocol
+//! (`influx`) and the four tables (`thesis`).
 //!
-//! The quantities come from the same observation model as the firmware's health checks, so its scales and its
-//! "unknown" values hold here too. ESC values are from `ESC_STATUS` and `ESC_INFO` (PX4) or `ESC_TELEMETRY_*`
-//! (ArduPilot). The battery is from `BATTERY_STATUS` or, without it, `SYS_STATUS`, and so on. A value older
-//! than `AGE_MAX` does not count: better an empty cell than a stale number.
+//! Scales and "unknown" values are the firmware's. ESC values: `ESC_STATUS` and `ESC_INFO` (PX4) or
+//! `ESC_TELEMETRY_*` (ArduPilot); battery: `BATTERY_STATUS` or else `SYS_STATUS`. Older than `AGE_MAX`: an
+//! empty cell.
 
 use hums_core::clock::Instant;
 use hums_core::flight::Flight;
@@ -16,34 +15,34 @@ use hums_core::vehicle::{Motor, Vehicle};
 
 use crate::mavlink::values::Scalar;
 
-/// Slow streams come every 2 to 5 s.
+/// Slow streams: 2 to 5 s.
 const AGE_MAX: Span = Span::from_secs(10);
 
-/// Motors of the reference system's tables.
+/// In the tables.
 pub const MOTORS: usize = 4;
 
 /// One of the reference system's quantities. Motors count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Seconds since take-off; stays after landing until the next take-off. 0 before the first.
+    /// Seconds since take-off, kept after landing; 0 before the first.
     FlightTime,
-    /// Remaining charge of the battery, percent.
+    /// Percent.
     BatteryPercent,
     /// Battery voltage, V.
     BatteryVolts,
-    /// Temperature of the air at its sensor, degC.
+    /// At the air's sensor, degC.
     Temperature,
     /// Static pressure, hPa.
     Pressure,
-    /// Specific force forward, right or down (0, 1, 2), m/s2.
+    /// Forward, right or down (0, 1, 2), m/s2.
     Acceleration(usize),
-    /// Its length, m/s2.
+    /// m/s2.
     AccelerationModule,
-    /// Velocity north, east or down (0, 1, 2), m/s.
+    /// North, east or down (0, 1, 2), m/s.
     Velocity(usize),
-    /// Its length, m/s.
+    /// m/s.
     VelocityModule,
-    /// Speed over ground by the GNSS receiver, m/s.
+    /// Over ground, m/s.
     GnssSpeed,
     /// Above mean sea level, m.
     Altitude,
@@ -77,7 +76,7 @@ pub enum Quantity {
     EscTemperature(usize),
 }
 
-/// ESC quantities in the reference system.
+/// In order.
 const ESC: [fn(usize) -> Quantity; 6] = [
     Quantity::EscRpm,
     Quantity::EscVoltage,
@@ -88,7 +87,7 @@ const ESC: [fn(usize) -> Quantity; 6] = [
 ];
 
 impl Quantity {
-    /// The name of its field in the reference system's measurement `HUMS`; `None` without one.
+    /// In the measurement `HUMS`; `None` without one.
     pub fn field(self) -> Option<String> {
         let axis = |names: [&str; 3], axis: usize| names.get(axis).map(|name| (*name).to_owned());
         Some(match self {
@@ -121,12 +120,12 @@ impl Quantity {
     }
 }
 
-/// The vehicle as the reference system sees it, replayed from its observations.
+/// Replayed from observations.
 #[derive(Clone, Debug)]
 pub struct Reference {
     vehicle: Vehicle,
     flight: Flight,
-    /// Duration of the last complete flight.
+    /// Last complete flight.
     flown: Span,
     heard: Option<Instant>,
 }
@@ -148,7 +147,7 @@ impl Reference {
         }
     }
 
-    /// Takes an observation; `false` if it is not of the vehicle.
+    /// `false` if not the vehicle's.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
         if !self.vehicle.observe(at.into(), source, observation) {
             return false;
@@ -172,12 +171,12 @@ impl Reference {
         &self.vehicle
     }
 
-    /// Time of the vehicle's last message.
+    /// Last message.
     pub const fn heard(&self) -> Option<Instant> {
         self.heard
     }
 
-    /// The present value of a quantity.
+    /// Present value.
     pub fn value(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
         let now = time::Instant::from(now);
         let single = |value: f32| Some(Scalar::Single(value));
@@ -232,7 +231,7 @@ impl Reference {
         local.or_else(|| self.vehicle.global.within(now, AGE_MAX).map(|global| global.velocity))
     }
 
-    /// The first battery, or the battery in the autopilot's status.
+    /// The first one, or the autopilot's status.
     fn battery(&self, now: time::Instant, quantity: Quantity) -> Option<Scalar> {
         let battery = self.vehicle.batteries.first().and_then(|battery| battery.within(now, AGE_MAX));
         let system = || self.vehicle.system.within(now, AGE_MAX);
@@ -244,13 +243,13 @@ impl Reference {
         Some(Scalar::Single(percent(remaining?.0)))
     }
 
-    /// The fields of a motor's ESC, if its last message of that kind is recent enough.
+    /// If recent enough.
     fn esc(&self, now: time::Instant, motor: usize, at: fn(&Motor) -> Option<time::Instant>) -> Option<&Esc> {
         let motor = self.vehicle.motors.get(motor)?;
         at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
     }
 
-    /// The new quantities of an observation. A motor is `Some` if all of them are that motor's.
+    /// New quantities; `Some` motor if all are its.
     pub fn told_by(&self, observation: &Observation) -> Vec<(Option<usize>, Vec<Quantity>)> {
         let one = |quantities: &[Quantity]| vec![(None, quantities.to_vec())];
         let imu = [
@@ -309,7 +308,7 @@ impl Reference {
     }
 }
 
-/// A whole percentage, which the way through a fraction must not make 92.99999.
+/// Whole, not 92.99999.
 fn percent(fraction: f32) -> f32 {
     (fraction * 100.0).round()
 }
@@ -380,7 +379,7 @@ mod tests {
         }
         assert_eq!(times[50], Some(0.0), "on the ground");
         assert_eq!(times[300], Some(20.0), "in the air");
-        // A landing is believed after two seconds on the ground.
+        // After two seconds on the ground.
         assert_eq!(times[599], Some(32.0), "down again");
     }
 }

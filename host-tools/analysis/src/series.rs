@@ -1,30 +1,28 @@
-//! Quantities over time, sampled so that no extreme is lost. All share one row of equal intervals; each interval has
-//! the lowest and the highest value in the order of time. When the row is full, neighbours are joined and the
-//! intervals become twice as long. So memory and page are bounded for a flight of any length.
+//! Quantities over time, sampled so that no extreme is lost. All share one row of equal intervals, with the lowest and highest
+//! value in order of time. When full, neighbours are joined: bounded for any flight.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use hums_core::clock::Instant;
 
-/// Intervals at most: as many as a large screen has columns.
+/// A large screen's columns.
 const INTERVALS_MAX: usize = 2048;
-/// The first length of an interval.
+/// At first.
 const INTERVAL_MS: u64 = 50;
-/// Series at most: all that the model of a vehicle can fill.
+/// All that a vehicle's model can fill.
 const SERIES_MAX: usize = 256;
-/// Filled intervals of all series together: as many as 64 series have that are full, some 5 MiB. A flying vehicle fills some
-/// forty series.
+/// As 64 full series, some 5 MiB; a flying vehicle fills some forty.
 const FILLED_MAX: usize = 64 * INTERVALS_MAX;
 
-/// The row of intervals.
+/// Of intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
     start_ms: Option<u64>,
     interval_ms: u64,
 }
 
-/// One interval of one series.
+/// Of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extremes {
     low: f32,
@@ -34,7 +32,7 @@ struct Extremes {
 }
 
 impl Extremes {
-    /// With a later value.
+    /// Later value.
     fn with(self, value: f32) -> Self {
         if value < self.low {
             Self { low: value, rises: false, ..self }
@@ -45,7 +43,7 @@ impl Extremes {
         }
     }
 
-    /// Joins the values of a later interval.
+    /// Later interval.
     fn joined(self, later: Self) -> Self {
         let (first, second) = if later.rises { (later.low, later.high) } else { (later.high, later.low) };
         self.with(first).with(second)
@@ -55,16 +53,15 @@ impl Extremes {
 /// One quantity.
 #[derive(Clone, Debug, Default)]
 struct Series {
-    /// By interval, in their order; slow quantities fill few of them.
+    /// By interval; slow quantities fill few.
     values: Vec<(u16, Extremes)>,
-    /// The number of its last value among those of all series.
+    /// Number of its last value.
     last: u64,
 }
 
 impl Series {
-    /// Its values in these intervals.
     fn part(&self, intervals: RangeInclusive<u16>) -> Option<Part> {
-        // Most have nothing new at a look.
+        // Mostly nothing new.
         let (last, _) = self.values.last()?;
         if last < intervals.start() {
             return None;
@@ -79,11 +76,11 @@ impl Series {
         Some((numbers, some.iter().flat_map(|(_, extremes)| pair(extremes)).collect()))
     }
 
-    /// Takes a value; whether it is the first one in its interval.
+    /// Whether it is the interval's first.
     fn push(&mut self, interval: u16, value: f32) -> bool {
         let first = (interval, Extremes { low: value, high: value, rises: true });
         match self.values.last_mut() {
-            // Nearly all values come in the order of their time.
+            // Nearly all are in order.
             Some((last, extremes)) if *last == interval => *extremes = extremes.with(value),
             Some((last, _)) if *last > interval => {
                 match self.values.binary_search_by_key(&interval, |(number, _)| *number) {
@@ -107,22 +104,22 @@ impl Series {
     }
 }
 
-/// A line of a plot: the plot, and the line's number: a motor, a cell, an axis.
+/// Plot and number: a motor, a cell, an axis.
 pub type Line<P> = (P, u8);
 
-/// All series of a page, or of a live vehicle, by the plots that there are.
+/// By plot.
 #[derive(Clone, Debug)]
 pub struct Store<P> {
     grid: Grid,
     series: BTreeMap<Line<P>, Series>,
-    /// Intervals that have a value, of all series.
+    /// Of all series.
     filled: usize,
     series_max: usize,
-    /// Number of values in all series.
+    /// Of all series.
     taken: u64,
 }
 
-/// A part of a series: the numbers of intervals, and a pair of values in order for each.
+/// Intervals, and a pair of values each.
 pub type Part = (Vec<u16>, Vec<f32>);
 
 impl<P> Default for Store<P> {
@@ -132,7 +129,7 @@ impl<P> Default for Store<P> {
 }
 
 impl<P> Store<P> {
-    /// Room for this many series, which share one grid of intervals.
+    /// Sharing one grid.
     pub fn of(series_max: usize) -> Self {
         let grid = Grid { start_ms: None, interval_ms: INTERVAL_MS };
         Self { grid, series: BTreeMap::new(), filled: 0, series_max, taken: 0 }
@@ -140,7 +137,7 @@ impl<P> Store<P> {
 }
 
 impl<P: Copy + Ord> Store<P> {
-    /// Takes a value; NaN and infinities are skipped.
+    /// NaN and infinities are skipped.
     pub fn push(&mut self, at: Instant, line: Line<P>, value: f32) {
         if !value.is_finite() {
             return;
@@ -157,7 +154,7 @@ impl<P: Copy + Ord> Store<P> {
         self.filled += usize::from(series.push(interval, value));
     }
 
-    /// The interval of a time; makes room for it first. Times before the first one count to it.
+    /// Makes room; earlier times count to the first one.
     pub fn interval(&mut self, at: Instant) -> u16 {
         let start_ms = *self.grid.start_ms.get_or_insert(at.as_millis());
         let since_ms = at.as_millis().saturating_sub(start_ms);
@@ -167,7 +164,7 @@ impl<P: Copy + Ord> Store<P> {
         (since_ms / self.grid.interval_ms) as u16
     }
 
-    /// Joins neighbours: the intervals are twice as long from then on.
+    /// Doubles the intervals.
     fn join(&mut self) {
         self.grid.interval_ms = self.grid.interval_ms.saturating_mul(2);
         self.filled = 0;
@@ -186,23 +183,22 @@ impl<P: Copy + Ord> Store<P> {
         }
     }
 
-    /// The first interval's time and the intervals' length, milliseconds; `None` before the first value.
+    /// Start and length, ms; `None` before the first value.
     pub fn spacing_ms(&self) -> Option<(u64, u64)> {
         Some((self.grid.start_ms?, self.grid.interval_ms))
     }
 
-    /// Number of values in all series.
+    /// In all series.
     pub fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// The values of all series in these intervals, for those that have any.
+    /// Only series with values.
     pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (Line<P>, Part)> {
         self.series.iter().filter_map(move |(line, series)| Some((*line, series.part(intervals.clone())?)))
     }
 
-    /// The same for a reader that saw the first of these intervals when `seen` values were taken. That interval is
-    /// repeated only for series with a value since.
+    /// For a reader that saw the first interval at `seen` values: repeated only for series with a value since.
     pub fn news(&self, intervals: RangeInclusive<u16>, seen: u64) -> impl Iterator<Item = (Line<P>, Part)> {
         let (from, to) = intervals.into_inner();
         self.series.iter().filter_map(move |(line, series)| {
@@ -211,7 +207,7 @@ impl<P: Copy + Ord> Store<P> {
         })
     }
 
-    /// All lines that have a value, in their order.
+    /// With values, in order.
     pub fn lines(&self) -> impl Iterator<Item = Line<P>> {
         self.series.keys().copied()
     }
@@ -286,7 +282,7 @@ mod tests {
         store.push(at(0), (HEIGHT, 1), 3.0);
         let news: Vec<_> = store.news(0..=1, seen).collect();
         assert_eq!(news, [((HEIGHT, 1), (vec![0], vec![2.0, 3.0]))]);
-        // A recording's values exist before the first reader.
+        // Before the first reader.
         let seen = store.taken();
         store.push(at(1), (HEIGHT, 0), 4.0);
         let news: Vec<_> = store.news(0..=1, seen + 1).collect();

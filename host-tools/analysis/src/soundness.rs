@@ -1,28 +1,28 @@
-//! Whether a log has all that it should, in the same words for every command.
+//! Whether a log is whole, in the same words everywhere.
 
 use crate::ending::Ending;
 
-/// What a log lacks, the least first.
+/// The least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Soundness {
     /// Nothing.
     Whole,
-    /// Nothing: lost sectors were rebuilt from parity.
+    /// Rebuilt from parity: nothing.
     Repaired,
     /// Nothing but parity.
     Unprotected,
-    /// Perhaps its end, or an order that is proved.
+    /// Perhaps its end, or a proved order.
     NotProved,
-    /// Nothing: bytes of no frame are in it.
+    /// Nothing; bytes outside frames.
     NotFrames,
-    /// Something that its recorder did not write.
+    /// Not written by its recorder.
     Lossy,
-    /// Something that was in it.
+    /// Was in it.
     Damaged,
 }
 
 impl Soundness {
-    /// Of a log of ours.
+    /// Of a HUMS log.
     pub fn of(ending: &Ending) -> Self {
         let (summary, is_counted) = (&ending.summary, ending.aside().is_none());
         match () {
@@ -35,7 +35,7 @@ impl Soundness {
         }
     }
 
-    /// As a part of a sentence about the log; empty if it is whole.
+    /// A part of a sentence; empty if whole.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Whole => "",

@@ -1,23 +1,22 @@
-//! The display of a check's value: a quantity with its limit, or the name of a state.
+//! A check's value: a quantity with its limit, or a state.
 
 use hums_core::health::check_named;
 
 use crate::names::vocabulary;
 
-/// Counts that should be zero: a limit below one means "any", which is not shown.
+/// Should be zero: a limit below one means "any", and is not shown.
 const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
 
-/// A value for people.
+/// For people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shown {
-    /// The name of the state; `None` if unknown. Neither the number is for people, nor the limit, which lies between
-    /// two of them.
+    /// `None` if unknown; number and limit are not for people.
     State(Option<&'static str>),
-    /// A quantity, if it is known, and its limit, if it is meaningful.
+    /// If known; limit if meaningful.
     Quantity(Option<f32>, Option<f32>),
 }
 
-/// The shown value and limit of a check.
+/// Of a check.
 pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
     if check_named(check).is_some_and(|check| check.unit.is_flag()) {
         return Shown::State(name(check, value));
@@ -27,7 +26,7 @@ pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
     Shown::Quantity(finite(value), finite(limit).filter(|_| !says_nothing))
 }
 
-/// The state that a value of a check is; `None` for a check of a quantity.
+/// `None` for a quantity.
 pub fn name(check: &str, value: f32) -> Option<&'static str> {
     let names: &[&str] = match check {
         // MAV_STATE
@@ -57,31 +56,28 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
         // GPS_JAMMING_STATE, GPS_SPOOFING_STATE
         "gps_jamming" | "gps_spoofing" => &["unknown", "ok", "mitigated", "detected"],
         "autopilot_reboot" => &["no", "restarted"],
-        // The ranks that the check makes of MAV_BATTERY_CHARGE_STATE, of ESC_FAILURE_FLAGS, of the recorder.
+        // Ranks of MAV_BATTERY_CHARGE_STATE, ESC_FAILURE_FLAGS, the recorder.
         "batt_state" => &["normal", "low or unhealthy", "critical, emergency or failed"],
         "esc_failure" => &["no failure", "a failure", "motor stuck or ESC failed"],
         "recording" => &["recording", "not recording", "not recording while armed"],
         "compass_unused" => &["used", "not used"],
         "motor_off" => &["driven", "driven", "given next to nothing"],
-        // A number of faults.
         "batt_fault" if value >= 2.0 => return Some("several faults"),
         "batt_fault" => &["no fault", "one fault"],
         // `hums_core::cause::Urgency`
         alert if alert.ends_with("_alert") => &["over", "a warning", "critical"],
         _ => return None,
     };
-    // A number without a state.
     let place = (value >= 0.0 && value.fract() == 0.0).then_some(value as usize)?;
     names.get(place).copied()
 }
 
-/// The meaning of a check's alarm, as a sentence.
+/// Of an alarm, as a sentence.
 pub fn meaning(check: &str) -> &'static str {
     vocabulary(check).map_or("", |words| words.meaning)
 }
 
-/// Names of the bits of `MAV_SYS_STATUS_SENSOR`, from bit 0; empty for bits that are not sensors (the check `sensors`
-/// ignores those two).
+/// By bit of `MAV_SYS_STATUS_SENSOR`; empty for the two that `sensors` ignores.
 const SENSORS: [&str; 32] = [
     "gyroscope",
     "accelerometer",
@@ -117,7 +113,7 @@ const SENSORS: [&str; 32] = [
     "extended status",
 ];
 
-/// The names of these bits of `MAV_SYS_STATUS_SENSOR`.
+/// By bits of `MAV_SYS_STATUS_SENSOR`.
 pub fn sensors(bits: u32) -> impl Iterator<Item = &'static str> {
     (0..)
         .zip(SENSORS)

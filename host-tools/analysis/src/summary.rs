@@ -1,4 +1,4 @@
-//! The contents of a log, in one pass: for `info`, `verify` and `demo`.
+//! A log's contents, in one pass.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -31,22 +31,22 @@ use crate::source::recording::Format;
 use crate::source::told::Finding;
 use crate::utc::moment;
 
-/// Findings, gaps and losses that are kept one by one; beyond this they are only counted, so that memory is bounded.
+/// Kept one by one; further ones are counted: bounded memory.
 pub const LISTED_MAX: usize = 10_000;
 
-/// The airframe's life and the counters of a session are stored together within this.
+/// Life and session counters.
 const STORED_WITH: Span = Span::from_secs(5);
 
-/// From this time on, counts after the counters were stored are reported.
+/// After the store, reported.
 const COUNTED_LATE: Span = Span::from_secs(1);
 
-/// Checks with exceedances that are kept: four times those that there are, with all their instances.
+/// Four times the possible ones.
 const EXCEEDANCES_MAX: usize = 1_000;
 
-/// How the monitor started.
+/// Start of the monitor.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BootLine {
-    /// The product's version.
+    /// Built from.
     pub version: String,
     /// The commit it was built from.
     pub git: String,
@@ -58,19 +58,19 @@ pub struct BootLine {
     pub boots: u32,
 }
 
-/// How many checks had something to judge, of those that are meant for the vehicle.
+/// Of those for the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JudgedChecks {
     /// These had.
     pub judged: usize,
-    /// The number of those that concern the box, its card and its wire only.
+    /// Of box, card and wire only.
     pub of_box: usize,
     /// All.
     pub all: usize,
 }
 
 impl JudgedChecks {
-    /// Whether so few of the vehicle's checks were judged that no finding means nothing: fewer than one in ten.
+    /// Fewer than one in ten: no finding means nothing.
     pub const fn is_little(self) -> bool {
         self.judged.saturating_sub(self.of_box) * 10 < self.all
     }
@@ -82,29 +82,29 @@ impl Display for JudgedChecks {
     }
 }
 
-/// The vehicle's last state, if a recording ends in the air.
+/// Ended in the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EndsInAir {
     /// When.
     pub at: Instant,
-    /// Height above home, or above the local origin, m.
+    /// Above home or local origin, m.
     pub height_m: Option<f32>,
-    /// Climb rate, m/s; negative where it sank.
+    /// m/s; negative: sank.
     pub climb_mps: Option<f32>,
-    /// Speed over ground, m/s.
+    /// Over ground, m/s.
     pub speed_mps: Option<f32>,
-    /// The last position, degrees north and east.
+    /// Last, degrees north and east.
     pub place_deg: Option<(f64, f64)>,
 }
 
-/// A number that a sensor can have, in whatever unit: another one is damaged.
+/// A sensor's number in any unit: others are damaged.
 pub fn is_possible(value: &f32) -> bool {
     const IMPOSSIBLE: f32 = 1e9;
     value.abs() < IMPOSSIBLE
 }
 
 impl Display for EndsInAir {
-    /// As a sentence. A number that no sensor can have is left out.
+    /// A sentence, without impossible numbers.
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         let mut known = Vec::new();
         known.extend(self.height_m.filter(is_possible).map(|height_m| format!("{height_m:.1} m above home")));
@@ -121,124 +121,122 @@ impl Display for EndsInAir {
     }
 }
 
-/// Limits of a check that were crossed.
+/// Crossed limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExceedanceLine {
     /// In this session.
     pub session: Crossings,
     /// In the airframe's life.
     pub lifetime: Crossings,
-    /// The unit of the peaks.
+    /// Of the peaks.
     pub unit: String,
 }
 
 /// A flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlightLine {
-    /// Take-off, or when the vehicle was seen first.
+    /// Take-off, or first seen.
     pub from: Instant,
-    /// Landing, if it is in the log.
+    /// If in the log.
     pub to: Option<Instant>,
 }
 
-/// A part that wears.
+/// Wears.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComponentLine {
     /// Its kind.
     pub kind: &'static str,
-    /// Which of its kind, from 1; 0 is all.
+    /// From 1; 0 is all.
     pub number: u8,
-    /// The operator's name for it.
+    /// The operator's.
     pub name: String,
     /// Its serial number.
     pub serial: String,
     /// Green, yellow or red.
     pub status: &'static str,
-    /// The part of its life that is used.
+    /// Of its life.
     pub used_percent: f32,
     /// Its figures.
     pub figures: Figures,
-    /// How often it was replaced.
+    /// Replacements.
     pub replaced: u32,
 }
 
-/// Why a recording of another program is not whole, as a part of a sentence.
+/// A part of a sentence, for other programs' recordings.
 pub fn damaged_places(count: u64) -> String {
     format!("{} damaged or cut; hums check says where", are(count, "place"))
 }
 
-/// All that a log holds, counted.
+/// A log, counted.
 #[derive(Clone, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Contents {
-    /// Messages by their ids, or by their names where they have none.
+    /// By id, or name.
     pub messages: Vec<MessageCount>,
-    /// Frames of further messages, all unverified: the number of distinguished ids is limited.
+    /// Unverified: distinguished ids are limited.
     pub other_messages: Amount,
-    /// Records of the monitor's own.
+    /// Of the monitor.
     pub records: u64,
     /// The first boot record.
     pub boot: Option<BootLine>,
     /// The last vehicle record.
     pub vehicle: Option<Vehicle>,
-    /// UTC at power-on, microseconds since 1970.
+    /// At power-on, microseconds since 1970.
     pub epoch_us: Option<u64>,
-    /// Changes of level, in order, up to [`LISTED_MAX`].
+    /// In order, up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
-    /// How many there are.
+    /// All.
     pub findings_count: u64,
-    /// They were found by this program when it read the log, because its recorder ran no checks.
+    /// Its recorder ran no checks.
     pub checked_here: bool,
-    /// The number of judged checks, if it is known. For a log checked by its recorder it is known only if few kinds
-    /// of messages are in it.
+    /// If known: for a checking recorder only with few kinds of messages.
     pub judged: Option<JudgedChecks>,
-    /// The vehicle was in the air when it was first received.
+    /// At first reception.
     pub begins_in_air: bool,
-    /// Take-offs (`true`) and landings, in order, up to [`LISTED_MAX`].
+    /// `true`: take-off; in order, up to [`LISTED_MAX`].
     pub moves: Vec<(Instant, bool)>,
-    /// The last flight goes on at its end, in a recording that was judged here.
+    /// The last flight goes on, judged here.
     pub ends_in_air: Option<EndsInAir>,
-    /// Part of the time was not recorded: by the recorder's report, or by the evidence of another program's
-    /// recording.
+    /// Unrecorded time, by report or evidence.
     pub is_lossy: bool,
-    /// Seconds in the air before the log, by the box's first counters.
+    /// Before the log, by the box's first counters.
     pub flight_before_s: Option<f64>,
-    /// The latest values of the usage counters, and when they were so.
+    /// Latest values.
     pub usage: BTreeMap<String, f64>,
-    /// See [`Self::usage`]; `None` where this program counted them.
+    /// `None`: counted here.
     pub usage_at: Option<Instant>,
-    /// The log breaks off, and this program counted the usage on to its end.
+    /// Breaks off: counted on to its end.
     pub is_recounted: bool,
-    /// The airframe's life, as recorded last, and when that was.
+    /// Last recorded.
     pub lifetime: BTreeMap<String, f64>,
     /// See [`Self::lifetime`].
     pub lifetime_at: Option<Instant>,
-    /// Limits that were crossed, by check and instance, as recorded last.
+    /// By check and instance, last recorded.
     pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
-    /// Components by place, from 1, as recorded last.
+    /// By place, from 1, last recorded.
     pub components: BTreeMap<u8, ComponentLine>,
-    /// Limits of use of each part, by place from 0.
+    /// By place, from 0.
     pub part_limits: [part::Limits; COMPONENTS_MAX],
-    /// Losses by kind: count, first and last time.
+    /// Count, first and last time.
     pub losses: BTreeMap<&'static str, Loss>,
     /// The recorder's last statistics.
     pub stats: Option<Stats>,
-    /// Gaps, in order, up to [`LISTED_MAX`].
+    /// In order, up to [`LISTED_MAX`].
     pub gaps: Vec<Gap>,
-    /// For each of them its offset in the file and its cause, in a recording of another format.
+    /// Offset and cause, in another format.
     pub gap_words: Vec<(Option<u64>, String)>,
-    /// The reason why no vehicle was found, if this program judged the recording.
+    /// No vehicle, judged here.
     pub unheard: Option<String>,
-    /// Further remarks on the vehicles, as sentences.
+    /// Sentences.
     pub remarks: Vec<String>,
     /// Entries that are not frames.
     pub not_frames: u64,
-    /// Frames that were verified on board, whose checksum fails here.
+    /// Verified on board, wrong here.
     pub bad_frames: u64,
 }
 
 impl Contents {
-    /// Frames of all messages.
+    /// Of all messages.
     pub fn frames(&self) -> u64 {
         self.all_frames().count
     }
@@ -250,12 +248,12 @@ impl Contents {
         all
     }
 
-    /// Whether the recorder checked the vehicle's health: only such a recorder writes these records.
+    /// Only a checking recorder writes these records.
     pub fn is_checked(&self) -> bool {
         self.boot.is_some() || !self.usage.is_empty() || self.findings_count > 0
     }
 
-    /// The checker: `board`, `hums` (this program), `nobody`.
+    /// `board`, `hums` (this program), `nobody`.
     pub fn checked_by(&self) -> &'static str {
         match (self.checked_here, self.is_checked()) {
             (true, _) => "hums",
@@ -264,7 +262,7 @@ impl Contents {
         }
     }
 
-    /// Its flights, as the box recorded them or as this program saw them.
+    /// The box's, or as seen here.
     pub fn flights(&self) -> Vec<FlightLine> {
         let mut flights: Vec<FlightLine> = Vec::new();
         for (at, is_take_off) in &self.moves {
@@ -277,34 +275,34 @@ impl Contents {
         flights
     }
 
-    /// Bytes of all frames.
+    /// Of all frames.
     pub fn frame_bytes(&self) -> u64 {
         self.all_frames().bytes
     }
 
-    /// Bytes that the frames take in a tlog.
+    /// In a tlog.
     pub fn tlog_bytes(&self) -> u64 {
         self.frame_bytes() + 8 * self.frames()
     }
 
-    /// Whether little was judged without a finding: that is not good news.
+    /// Little judged, nothing found: no good news.
     pub fn is_little(&self) -> bool {
         self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(Finding::is_bad)
     }
 
-    /// The name of a part, and the limit that it reaches first, by its place from 1.
+    /// And its first limit; place from 1.
     pub fn part(&self, place: u8, line: &ComponentLine) -> (String, Option<String>) {
         let name = part::name(line.kind, line.number, &line.name);
         (name, self.first_limit(place, line).map(|limit| limit.to_string()))
     }
 
-    /// The limit that a part reaches first, by its place from 1.
+    /// Reached first; place from 1.
     pub fn first_limit(&self, place: u8, line: &ComponentLine) -> Option<part::Limit> {
         let limits = self.part_limits.get(usize::from(place).wrapping_sub(1)).copied().unwrap_or_default();
         part::first_limit(line.kind, &line.figures, &limits)
     }
 
-    /// The due part of a finding; `None` for another check.
+    /// `None` for another check.
     pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
         let of = |line: &ComponentLine| {
             let kind = Kind::ALL.into_iter().find(|kind| kind.name() == line.kind);
@@ -316,7 +314,7 @@ impl Contents {
         Some(self.part(*place, line))
     }
 
-    /// Whether the box reports that it did not record somewhere in a gap.
+    /// Reported by the box.
     pub fn did_not_record(&self, gap: &Gap) -> bool {
         let (from, to) = (gap.from.unwrap_or(Instant::ZERO), gap.to);
         let is_ok = |finding: &Finding| finding.level == Level::Ok;
@@ -326,7 +324,7 @@ impl Contents {
             || changes.any(|change| !is_ok(change) && change.at > from && to.is_none_or(|to| change.at <= to))
     }
 
-    /// Whether the airframe's life was stored before the counters of this session: it is without them.
+    /// Stored without this session.
     pub fn is_life_before(&self) -> bool {
         self.lifetime_at.zip(self.usage_at).is_some_and(|(life, usage)| usage.since(life) >= STORED_WITH)
     }
@@ -351,7 +349,7 @@ impl Contents {
                     self.findings.push(Finding::from(finding));
                 }
             }
-            // The counters at the start are those of the sessions before.
+            // Of the sessions before.
             Record::Usage(snapshot) if snapshot.moment != Moment::Start || self.usage.is_empty() => {
                 self.usage.extend(named(snapshot.iter()));
                 self.usage_at = Some(at);
@@ -372,7 +370,7 @@ impl Contents {
                 };
                 self.exceeded((record.check.to_owned(), record.instance), line);
             }
-            // A part that was replaced is not there any more; its successor is recorded after it.
+            // Its successor is recorded after it.
             Record::Component(record) if record.why != Why::Replaced => {
                 let line = ComponentLine {
                     kind: record.kind.name(),
@@ -413,7 +411,6 @@ impl Contents {
         }
     }
 
-    /// Adds the next part.
     fn add(&mut self, next: Self) {
         self.records += next.records;
         self.boot = self.boot.take().or(next.boot);
@@ -466,7 +463,7 @@ impl Collect for Contents {
     }
 
     fn held_bytes(&self) -> usize {
-        // Size of a tree's entry, with its texts on the heap.
+        // With texts on the heap.
         const ENTRY_BYTES: usize = 256;
         ENTRY_BYTES * (self.findings.len() + self.exceedances.len() + self.moves.len())
     }
@@ -486,16 +483,16 @@ impl Deliver<Self> for Contents {
     }
 }
 
-/// A log, read through.
+/// Read through.
 #[derive(Clone, Debug, Default)]
 pub struct Overview {
-    /// The reader's counts, and the proofs of completeness.
+    /// Counts and proofs.
     pub ending: Ending,
-    /// Its format; `None` for a HUMS log.
+    /// `None` for a HUMS log.
     pub format: Option<Format>,
-    /// Bytes of these files that are set aside for it.
+    /// Set aside for it.
     pub bytes_on_card: u64,
-    /// UTC by the clock of each part.
+    /// Of each part.
     pub epochs: Epochs,
     /// Its contents.
     pub contents: Contents,
@@ -508,19 +505,17 @@ impl HasEnding for Overview {
 }
 
 impl Overview {
-    /// Reads a log through. Only the record itself shows that frames are those of the monitor; see
-    /// [`Overview::verified`].
+    /// Only the record shows whose frames they are; see [`Overview::verified`].
     pub fn of(log: &Log) -> Result<Self> {
         Self::read(log, Want::default(), None)
     }
 
-    /// The same, and hands on the log's content in order: one reading for both. Of several vehicles it is the one
-    /// with this system id.
+    /// Hands on the content in order; of several vehicles this system id.
     pub fn told(log: &Log, system: Option<u8>, take: &mut Take<'_>) -> Result<Self> {
         Self::read(log, Want { system, ..Want::default() }, Some(take))
     }
 
-    /// Reads a log through and looks at every frame's own checksum again.
+    /// With every frame's checksum.
     pub fn verified(log: &Log) -> Result<Self> {
         Self::read(log, Want { frames: true, ..Want::default() }, None)
     }
@@ -542,13 +537,12 @@ impl Overview {
         Ok(Self { ending, format: None, epochs, bytes_on_card: log.bytes(), contents })
     }
 
-    /// Whether nothing was lost or damaged, and the log is proved to its end or at least to its last end mark. A recording
-    /// of another format has nothing that could prove its end.
+    /// No loss or damage, proved at least to the last end mark; another format has no proof.
     pub fn is_sound(&self) -> bool {
         self.faults().is_empty()
     }
 
-    /// Its losses, damage and missing proof.
+    /// Losses, damage, missing proof.
     pub fn soundness(&self) -> Soundness {
         match self.format {
             None => Soundness::of(&self.ending),
@@ -558,7 +552,7 @@ impl Overview {
         }
     }
 
-    /// Why it is not, as parts of sentences.
+    /// Parts of sentences.
     pub fn faults(&self) -> Vec<String> {
         match (self.format, self.ending.summary.gaps) {
             (None, _) => self.ending.faults(),
@@ -567,24 +561,23 @@ impl Overview {
         }
     }
 
-    /// UTC at this time, if known.
+    /// If known.
     pub fn utc_us(&self, at: Instant) -> Option<u64> {
         self.epochs.utc_us(at)
     }
 
-    /// Size of the log: its sectors, without the rest of the file.
+    /// Sectors, without the file's rest.
     pub fn log_bytes(&self) -> u64 {
         self.ending.summary.blocks.sectors * 512
     }
 
-    /// The size of the same frames as a tlog, divided by that of a HUMS log.
+    /// Tlog's size by the log's.
     pub fn ratio(&self) -> Option<f64> {
         let bytes = self.log_bytes();
         (self.format.is_none() && bytes > 0).then(|| self.contents.tlog_bytes() as f64 / bytes as f64)
     }
 
-    /// The time of the session's stored counters, if the vehicle was armed or in the air after that: they end there.
-    /// The counters are stored at a landing, which a log may lack that ends soon after a touchdown.
+    /// Stored counters' time, if armed or in the air after it: a log may end before a landing's store.
     pub fn counted_until(&self) -> Option<Instant> {
         let summary = &self.ending.summary;
         let flew = summary.marks.moved.is_some() || summary.marks.took_off == Some(true);
@@ -592,7 +585,7 @@ impl Overview {
         self.contents.usage_at.filter(|at| last.since(*at) >= COUNTED_LATE)
     }
 
-    /// The time up to which the counters count, as a sentence; `None` if they cover all.
+    /// A sentence; `None` if they cover all.
     pub fn counted_words(&self) -> Option<String> {
         let at = moment(self.counted_until()?);
         Some(if self.contents.is_recounted {
@@ -602,7 +595,7 @@ impl Overview {
         })
     }
 
-    /// Whether a group could not be read because this program is too old for it.
+    /// A group is too new.
     pub fn needs_newer_program(&self) -> bool {
         self.contents.gaps.iter().any(|gap| matches!(gap.cause, Cause::UnknownLayouts(_)))
     }

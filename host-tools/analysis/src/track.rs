@@ -1,14 +1,14 @@
-//! The track of a vehicle: bounded, as dense as its length allows.
+//! A track, bounded.
 
 use hums_core::clock::{Instant, Span};
 use hums_core::units::Position;
 
-/// Points at most: when it is full every second one goes.
+/// When full, every second one goes.
 const POINTS_MAX: usize = 4_096;
-/// The first distance between two.
+/// At first.
 const EVERY: Span = Span::from_millis(100);
 
-/// A place at a time.
+/// At a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// When.
@@ -17,11 +17,11 @@ pub struct Point {
     pub latitude_deg: f64,
     /// Degrees, east positive.
     pub longitude_deg: f64,
-    /// Height above home, if known.
+    /// Above home, if known.
     pub height_m: Option<f32>,
 }
 
-/// Places in order of time.
+/// In order.
 #[derive(Clone, Debug)]
 pub struct Track {
     points: Vec<Point>,
@@ -35,8 +35,7 @@ impl Default for Track {
 }
 
 impl Track {
-    /// Takes a place, the first of each interval. `true` where older points went, because it was full: the intervals are
-    /// twice as long from then on.
+    /// The first place of each interval. `true`: it was full, older points went, intervals doubled.
     pub fn push(&mut self, at: Instant, position: Position, height_m: Option<f32>) -> bool {
         if self.points.last().is_some_and(|last| at.since(last.at) < self.every) {
             return false;
@@ -55,7 +54,7 @@ impl Track {
         full
     }
 
-    /// The points, oldest first.
+    /// Oldest first.
     pub fn points(&self) -> &[Point] {
         &self.points
     }

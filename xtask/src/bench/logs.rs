@@ -1,12 +1,10 @@
-//! `cargo xtask bench logs`: the speed of `hums check` on logs of autopilots, beside the usual readers: pymavlink's
-//! `DFReader` for `DataFlash`, pyulog for `ULog`. Each reads every message of a log, on one core, one after the other
-//! in the same run; speeds depend on the machine, ratios hardly. The measure is the processor's time for the program,
-//! the system's part included. The best of some rounds counts: other load only makes a round slower.
+//! `cargo xtask bench logs`: `hums check` beside pymavlink's `DFReader` (`DataFlash`) and pyulog (`ULog`). One core,
+//! one after the other; speeds depend on the machine, ratios hardly. The program's processor time counts, the best of
+//! some rounds.
 //!
-//! Each log is repeated to 16 MB in one file, as `cat` joins it (each time is judged by itself). So the program's
-//! start, two milliseconds, is no part of a speed.
+//! Each log is repeated to 16 MB, as `cat` joins it: the start of two milliseconds does not count.
 //!
-//! Logs are those below the folders that `HUMS_LOGS` names (separated by colons), else those of `tests`.
+//! Logs: below the folders of `HUMS_LOGS` (colons between), else of `tests`.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -19,27 +17,25 @@ use super::tools::{files_below, folders, on_one_core, repeat, work_folder};
 use crate::hums;
 use crate::oracle;
 
-/// Target of `hums check`, in MB a second, on one core.
+/// MB a second, on one core.
 const ASKED_MB_S: f64 = 100.0;
-/// A log is repeated to this many bytes.
+/// Least bytes of a log.
 const BYTES_MIN: f64 = 16e6;
-/// Runs that are compared.
 const ROUNDS: usize = 5;
 
-/// Another reader of a log, as a program for Python; its first argument is the log.
+/// In Python; the first argument is the log.
 const DATAFLASH: &str = "import sys\n\
     from pymavlink import DFReader\n\
     log = DFReader.DFReader_binary(sys.argv[1])\n\
     while log.recv_msg() is not None: pass\n";
 const ULOG: &str = "import sys\nfrom pyulog import ULog\nULog(sys.argv[1])\n";
 
-/// Runs a program and prints the seconds of the processor that it took, and its code.
+/// Prints seconds of the processor, and the code.
 const TIMED: &str = "import resource, subprocess, sys\n\
     run = subprocess.run(sys.argv[1:], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)\n\
     used = resource.getrusage(resource.RUSAGE_CHILDREN)\n\
     print(used.ru_utime + used.ru_stime, run.returncode)\n";
 
-/// Measures and shows the speeds; checks the one with a target.
 pub(crate) fn run() -> Result<()> {
     println!("\nSpeed of hums check on one core, the best of {ROUNDS} rounds\n");
     let logs = logs()?;
@@ -58,7 +54,7 @@ pub(crate) fn run() -> Result<()> {
         let (mut ours, mut theirs) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..ROUNDS {
             let check = ["check".as_ref(), "--json".as_ref(), path.as_os_str()];
-            // 3 and 4: the log is damaged, or something was found.
+            // Damage, or findings.
             ours = ours.min(seconds(&python, program.as_os_str(), check, &[0, 3, 4])?);
             let read = ["-c".as_ref(), script.as_ref(), path.as_os_str()];
             theirs = theirs.min(seconds(&python, python.as_os_str(), read, &[0])?);
@@ -77,7 +73,6 @@ pub(crate) fn run() -> Result<()> {
     Ok(())
 }
 
-/// The logs, with their other readers.
 fn logs() -> Result<Vec<(PathBuf, &'static str)>> {
     let with = |reader, kinds: &[&str]| -> Result<Vec<_>> {
         let logs = files_below(&folders("HUMS_LOGS", false), kinds)?;
@@ -86,7 +81,7 @@ fn logs() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok([with(DATAFLASH, &[".bin", ".bin.gz"])?, with(ULOG, &[".ulg", ".ulg.gz"])?].concat())
 }
 
-/// The log without its compression, which is not measured.
+/// Compression is not measured.
 fn plain(log: &Path) -> Result<PathBuf> {
     if log.extension().is_none_or(|extension| extension != "gz") {
         return Ok(log.to_owned());
@@ -99,7 +94,7 @@ fn plain(log: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// How long a program keeps a processor busy, on one core; it must end with one of these codes.
+/// On one core; ends with one of these codes.
 fn seconds(python: &Path, program: &OsStr, words: [&OsStr; 3], codes: &[i32]) -> Result<f64> {
     let mut command = on_one_core(python.as_os_str(), true);
     command.args(["-c", TIMED]).arg(program).args(words).env("RAYON_NUM_THREADS", "1");

@@ -1,7 +1,7 @@
-//! `cargo xtask bench`: size and speed of the record, each figure beside its target.
+//! `cargo xtask bench`: the record's size and speed, beside targets.
 //!
-//! Recordings are those of `tests/flights` and below the folders that `HUMS_FLIGHTS` names (separated by colons). Sizes
-//! repeat to the digit, so they are checked; speeds depend on the machine, so they are only shown.
+//! Recordings: `tests/flights`, and below the folders of `HUMS_FLIGHTS` (colons between). Sizes repeat and are checked; speeds
+//! are only shown.
 
 mod logs;
 mod tools;
@@ -21,21 +21,21 @@ use crate::hums;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// How much smaller than the tlog a whole session is to be, as a geometric mean.
+/// Than the tlog, geometric mean of whole sessions.
 const SMALLER_MIN: f64 = 6.5;
-/// Smallest ratio of two sizes: the tlog by `xz -9e`, and the log.
+/// Tlog by `xz -9e`, and log.
 const SMALLER_THAN_XZ_MIN: f64 = 2.3;
-/// Bytes of MAVLink a second at 921,600 baud.
+/// At 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;
-/// How fast decoding is to be, as a part of the speed of `gzip -d`.
+/// Of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
-/// The line on which costs are counted: at a slower one, work by the clock is a larger part of each byte.
+/// On slower lines work by the clock is a larger part of each byte.
 const BAUD: &str = "921600";
-/// Least length of a count, in seconds of that line, so that a short recording shows more than its start.
+/// Of that line: a short recording shows only its start.
 const SECONDS_MIN: f64 = 10.0;
-/// Least input of a decoding, in bytes of tlog, so that the programs' starts hardly count.
+/// Bytes of tlog: starts hardly count.
 const DECODED_MIN: f64 = 8e6;
-/// Pairs of runs that are compared.
+/// Compared pairs.
 const ROUNDS: usize = 9;
 
 /// The measurements.
@@ -49,7 +49,7 @@ pub(crate) enum Bench {
     Logs,
 }
 
-/// Measures; an error if a checked figure misses its target.
+/// An error for a missed target.
 pub(crate) fn run(what: &[Bench]) -> Result<()> {
     setup::require(&[Need::Linker])?;
     let what = if what.is_empty() { Bench::value_variants() } else { what };
@@ -68,7 +68,7 @@ pub(crate) fn run(what: &[Bench]) -> Result<()> {
     if missed.is_empty() { Ok(()) } else { bail!("{}", missed.join("; ")) }
 }
 
-/// All recordings, in order of their names; the same one may lie in two of the folders.
+/// By name; two folders may have the same one.
 fn flights() -> Result<Vec<PathBuf>> {
     let mut flights = files_below(&folders("HUMS_FLIGHTS", true), &[".tlog", ".raw"])?;
     flights.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
@@ -76,7 +76,7 @@ fn flights() -> Result<Vec<PathBuf>> {
     Ok(flights)
 }
 
-/// Those that the means and the model of the chip take: tlogs that are not signed.
+/// Unsigned tlogs.
 fn unsigned(flights: &[PathBuf]) -> impl Iterator<Item = &PathBuf> {
     flights.iter().filter(|path| path.extension().is_some_and(|extension| extension == "tlog"))
 }
@@ -95,7 +95,7 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
     sizes_of_sessions(flights).and(logs)
 }
 
-/// Size of whole sessions: with every finding, snapshot, counter and statistic that the monitor makes of a recording.
+/// With every record that the monitor makes.
 fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("\nSizes of whole sessions, with all that the monitor records of them\n");
     let program = hums::build_release()?;
@@ -128,7 +128,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Decodes logs and unpacks the same tlogs, one after the other on one core, several times.
+/// One after the other on one core, several times.
 fn speed(flights: &[PathBuf]) -> Result<()> {
     println!("\nSpeed of decoding to tlog, median of {ROUNDS} rounds\n");
     let program = hums::build_release()?;
@@ -142,7 +142,7 @@ fn speed(flights: &[PathBuf]) -> Result<()> {
         let (log, zipped) = (folder.join("flight.hum"), folder.join("flight.tlog.gz"));
         let tlog = folder.join("long.tlog");
         repeat(flight, DECODED_MIN, &tlog)?;
-        // `decode` replaces nothing that is there.
+        // `decode` replaces nothing.
         let _ = fs::remove_file(&log);
         Shell::new(&program).args(["decode", "--format", "hum", "-o"]).arg(&log).arg(&tlog).output()?;
         let gzip = Command::new("gzip").arg("-c").arg(&tlog).stdout(File::create(&zipped)?).status();
@@ -198,8 +198,7 @@ fn seconds(mut command: Command) -> Result<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// Runs a recording through the firmware on the model of its chip, back to back at the fastest line: its report. `program` is
-/// `hums`, `image` the firmware.
+/// Back to back at the fastest line; returns the report.
 pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -> Result<Value> {
     let (card, input) = (work_folder()?.join("card.img"), work_folder()?.join("long.tlog"));
     let _ = fs::remove_file(&card);
@@ -208,7 +207,7 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
         .args(["sim", "--json", "--costs", "--firmware"])
         .arg(image)
         .arg(&input)
-        // On a small card the first segment alone takes 0.7 s.
+        // On a small card the first segment takes 0.7 s.
         .args(["--line-rate", BAUD, "--card-size", "4096", "--sd"])
         .arg(&card)
         .output_and_code()?;

@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result};
 
 use crate::repo;
 
-/// A program on the first core only, if `taskset` is installed.
+/// If `taskset` is installed.
 pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
     if !one || Command::new("taskset").arg("--version").output().is_err() {
         return Command::new(program);
@@ -20,13 +20,13 @@ pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
     command
 }
 
-/// The middle of some values, which are put in order.
+/// Sorts them.
 pub(super) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// The folders that a variable names, separated by colons: besides `tests/flights`, or instead of `tests`.
+/// Colons between: besides `tests/flights`, or instead of `tests`.
 pub(super) fn folders(variable: &str, besides: bool) -> Vec<PathBuf> {
     let named = env::var_os(variable).unwrap_or_default();
     let named = env::split_paths(&named).filter(|folder| !folder.as_os_str().is_empty());
@@ -37,7 +37,7 @@ pub(super) fn folders(variable: &str, besides: bool) -> Vec<PathBuf> {
     folders
 }
 
-/// The files in these folders and below them whose names end so.
+/// By the ends of names.
 pub(super) fn files_below(folders: &[PathBuf], ends: &[&str]) -> Result<Vec<PathBuf>> {
     let (mut waiting, mut files) = (folders.to_vec(), Vec::new());
     while let Some(folder) = waiting.pop() {
@@ -56,14 +56,13 @@ pub(super) fn files_below(folders: &[PathBuf], ends: &[&str]) -> Result<Vec<Path
     Ok(files)
 }
 
-/// Place of the measured files.
 pub(super) fn work_folder() -> Result<PathBuf> {
     let folder = repo::target().join("bench");
     fs::create_dir_all(&folder)?;
     Ok(folder)
 }
 
-/// A recording, repeated to that many bytes.
+/// At least this many bytes.
 pub(super) fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
     let tlog = fs::read(flight)?;
     let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;

@@ -1,7 +1,7 @@
-//! Everything that CI checks, as named steps that can be run alone.
+//! CI's checks as named steps.
 //!
-//! First come the steps of the build; then the lints run beside the tests. A table at the end has the seconds of each step, and
-//! the processor's time of all. A step whose tool is missing and cannot be installed is left out, and the run fails at its end.
+//! The build comes first; lints run beside the tests. A table has each step's seconds. A step without its tool is left out, and
+//! the run fails at its end.
 
 mod quick;
 mod steps;
@@ -33,14 +33,14 @@ fn names() -> PossibleValuesParser {
     PossibleValuesParser::new(STEPS.iter().map(|step| step.name))
 }
 
-/// Those named, in the order of the table, and those that they follow; all, if none is named.
+/// Named ones and those they follow, in order; all by default.
 fn chosen(only: &[String]) -> Vec<&'static Step> {
     let named = |step: &Step| only.is_empty() || only.iter().any(|name| name == step.name);
     let followed = |step: &Step| STEPS.iter().any(|other| named(other) && other.follows(step.name));
     STEPS.iter().filter(|step| named(step) || followed(step)).collect()
 }
 
-/// Runs the steps that are asked for; of those that run one after the other none follows one that failed.
+/// A failed step stops those after it.
 pub(crate) fn run(options: &Options) -> Result<()> {
     if options.list {
         for step in &STEPS {
@@ -85,7 +85,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     })
 }
 
-/// Runs it and prints how long it took, and the processor's time of all programs that were started.
+/// With the processor's time of started programs.
 fn timed(run: impl FnOnce() -> Result<()>) -> Result<()> {
     let (start, done) = (Instant::now(), run());
     println!("{:<16} {:>8.1}", "in all", start.elapsed().as_secs_f64());
@@ -95,10 +95,9 @@ fn timed(run: impl FnOnce() -> Result<()>) -> Result<()> {
     done
 }
 
-/// The result of a step.
 struct Row {
     step: &'static str,
-    /// None if a tool is missing.
+    /// None: a tool is missing.
     seconds: Option<f64>,
     failed: Option<Error>,
 }
@@ -122,10 +121,10 @@ fn one_after_the_other(steps: impl Iterator<Item = &'static Step>, there: &Outco
     rows
 }
 
-/// The time that the processor gave to children that have ended, and to theirs (proc(5): fields 16 and 17, in ticks of 10 ms).
+/// Of ended children and theirs (proc(5): fields 16 and 17, ticks of 10 ms).
 fn processor_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The second field is the program's name in brackets.
+    // The second field: a name in brackets.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks = |field: usize| fields.get(field)?.parse::<f64>().ok();
     Some((ticks(13)? + ticks(14)?) / 100.0)

@@ -1,4 +1,4 @@
-//! `cargo xtask test --quick`: the fast checks of a change, before all steps run.
+//! `cargo xtask test --quick`.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use crate::pc;
 use crate::repo;
 use crate::shell::Shell;
 
-/// The package that only cross-compiles.
+/// Only cross-compiled.
 const FIRMWARE: &str = "hums-app";
 
-/// Format of all, lints and unit tests of the packages that changed: since the last commit, or in it if nothing has changed since.
+/// Changed packages: since the last commit, or in it.
 pub(super) fn run() -> Result<()> {
     pc::check_format()?;
     let mut files =
@@ -38,7 +38,7 @@ pub(super) fn run() -> Result<()> {
     Shell::cargo().args(["test", "--quiet", "--lib", "--bins"]).args(&choice).run()
 }
 
-/// The package of a file: the one in the innermost folder.
+/// In the innermost folder.
 fn package<'a>(file: &Path, packages: &'a [Package]) -> Option<&'a str> {
     let holds = |package: &&Package| {
         package.manifest_path.parent().is_some_and(|folder| repo::root().join(file).starts_with(folder))

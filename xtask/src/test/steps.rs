@@ -24,7 +24,6 @@ use crate::setup::Need::{
 };
 use crate::shell::Shell;
 
-/// One step of checks.
 pub(super) struct Step {
     pub(super) stage: Stage,
     pub(super) name: &'static str,
@@ -44,7 +43,7 @@ impl Step {
         Self { stage, name, about, needs, run }
     }
 
-    /// Whether it uses results of the step `build`, `oracle` or `wasm`.
+    /// Uses results of the step `build`, `oracle` or `wasm`.
     pub(super) fn follows(&self, other: &str) -> bool {
         match other {
             "build" => self.stage != Build || self.name == "budgets",
@@ -55,7 +54,7 @@ impl Step {
     }
 }
 
-/// When a step runs. The compiler of the lints has one core busy while tests wait for links and browsers.
+/// Lints keep one core busy while tests wait for links and browsers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
     /// First.
@@ -66,7 +65,7 @@ pub(super) enum Stage {
     Test,
 }
 
-/// Each after those that it needs. `--list` and the table of seconds have this order.
+/// Each after its needs; `--list` and the table have this order.
 pub(super) const STEPS: [Step; 19] = [
     Step::new(Build, "fmt", "the formatting", &[Rustfmt], pc::check_format),
     Step::new(Build, "lines", "lines of code by folder, within budgets.toml", &[], lines::check),
@@ -118,14 +117,14 @@ fn lint() -> Result<()> {
     firmware::check_all()
 }
 
-/// As `host-tools/report/src/page/biome.json` has it. To format: `target/venv/bin/biome format --write` in that folder.
+/// By `host-tools/report/src/page/biome.json`. To format: `target/venv/bin/biome format --write` there.
 fn page() -> Result<()> {
     let biome = oracle::python().with_file_name("biome");
     let folder = repo::root().join("host-tools/report/src/page");
     Shell::new(biome).args(["ci", "--error-on-warnings", "--colors=off"]).within(&folder).run()
 }
 
-/// The tested files are the flashed ones: the sums are those of `cargo xtask dist` of the same sources.
+/// The flashed files, as of `cargo xtask dist`.
 fn chip() -> Result<()> {
     let board = firmware::default_board();
     let elf = firmware::image_of(board);
@@ -135,7 +134,7 @@ fn chip() -> Result<()> {
 }
 
 fn sim() -> Result<()> {
-    // Half of their time they wait: links are as slow as radios are.
+    // They wait half of the time: links are slow.
     let threads = (2 * std::thread::available_parallelism().map_or(1, usize::from)).to_string();
     pc::end_to_end(&[&["sim::", "--test-threads", &threads], further()].concat())
 }
@@ -149,7 +148,6 @@ fn answer() -> Result<()> {
 }
 
 fn live() -> Result<()> {
-    // There is also `browser::live`.
     pc::end_to_end(&["live::", "--skip", "browser::"])
 }
 
@@ -157,7 +155,7 @@ fn measure_costs() -> Result<()> {
     costs::check_built(&hums::program(), &firmware::image_of(firmware::default_board()))
 }
 
-/// The tests of further recordings are left out without such recordings. On the model of the chip they are for `cargo xtask prove`.
+/// Without further recordings; on the chip's model they are `cargo xtask prove`'s.
 fn further() -> &'static [&'static str] {
     let given = std::env::var_os("HUMS_FLIGHTS").is_some_and(|folder| !folder.is_empty());
     if given { &["--include-ignored"] } else { &[] }

@@ -1,4 +1,4 @@
-//! The instructions of 32 bits on registers alone: shifts, extensions, SIMD, multiplication and division.
+//! 32 bits, registers alone: shifts, extensions, SIMD, multiplication, division.
 
 use super::fields::{barred, field, reg};
 use crate::op::{Extend, Lanes, Long, Multiply, Op, Prefix, Shift, Unary};
@@ -62,7 +62,7 @@ fn unary_or_saturating(op1: u32, op2: u32, d: u8, n: u8, m: u8) -> Op {
     }
 }
 
-/// Multiplications with a result of 32 bits.
+/// A result of 32 bits.
 pub(super) fn multiply(a: u32, b: u32) -> Op {
     let (n, acc, d, m) = (reg(a, 0), reg(b, 12), reg(b, 8), reg(b, 0));
     let (op, low) = (field(a, 4, 3), field(b, 4, 2));
@@ -86,7 +86,7 @@ pub(super) fn multiply(a: u32, b: u32) -> Op {
     Op::Multiply { kind, d, n, m, a: acc }
 }
 
-/// Multiplications with a result of 64 bits, and divisions.
+/// A result of 64 bits, and divisions.
 pub(super) fn long(a: u32, b: u32) -> Op {
     let (n, low, high, m) = (reg(a, 0), reg(b, 12), reg(b, 8), reg(b, 0));
     let (op1, op2) = (field(a, 4, 3), field(b, 4, 4));

@@ -3,7 +3,7 @@
 use super::fields::{barred, field, reg};
 use crate::op::{Float2, Float3, Op};
 
-/// Any coprocessor's instruction; all but 10 and 11 are not there.
+/// All but coprocessors 10 and 11 are missing.
 pub(super) fn coprocessor(a: u32, b: u32) -> Op {
     if field(b, 9, 3) != 5 {
         // An M profile lacks Advanced SIMD.
@@ -36,7 +36,7 @@ fn memory(a: u32, b: u32, double: bool) -> Op {
     let (before, up, writeback, load) = (a & 0x100 != 0, a & 0x80 != 0, a & 0x20 != 0, a & 0x10 != 0);
     let n = reg(a, 0);
     let words = field(b, 0, 8);
-    // The even single register that a double one begins with; 16 to 31 of the doubles are not there.
+    // A double's even single register; doubles 16 to 31 are missing.
     let d = if double { reg(b, 12) * 2 } else { single(b, 12, a, 6) };
     if double && a & 0x40 != 0 {
         return Op::Undefined;
@@ -50,7 +50,7 @@ fn memory(a: u32, b: u32, double: bool) -> Op {
             false => Op::FloatStore { d, n, offset, double },
         };
     }
-    // FLDMX and FSTMX, with an odd count, move no more than their even count.
+    // FLDMX and FSTMX with an odd count move their even count.
     let count = if double { words as u8 & !1 } else { words as u8 };
     let fits = words != 0 && words <= 32 && u32::from(d) + u32::from(count) <= 32 && count != 0;
     let mode = matches!((before, up, writeback), (false, true, _) | (true, false, true));
@@ -130,7 +130,7 @@ fn expand(high: u8, low: u8) -> u32 {
     (byte & 0x80) << 24 | (exponent | byte >> 4 & 3) << 23 | (byte & 15) << 19
 }
 
-/// The operations of two registers: VMOV to VCVT.
+/// VMOV to VCVT.
 fn two(a: u32, b: u32, d: u8, m: u8) -> Op {
     let top = b & 0x80 != 0;
     let kind = match field(a, 0, 4) {

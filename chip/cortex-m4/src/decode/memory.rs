@@ -81,7 +81,7 @@ pub(super) fn double_or_exclusive(a: u32, b: u32) -> Op {
     }
 }
 
-/// How a load or store of one register finds its address.
+/// Of one register.
 enum Form {
     Offset(i32),
     Indexed(i16, Index),
@@ -89,7 +89,7 @@ enum Form {
     Unprivileged(u8),
 }
 
-/// The four forms with a base register; none is not an instruction.
+/// None is not an instruction.
 fn form(a: u32, b: u32) -> Option<Form> {
     if a & 0x80 != 0 {
         return Some(Form::Offset(field(b, 0, 12) as i32));
@@ -109,7 +109,6 @@ fn form(a: u32, b: u32) -> Option<Form> {
     }
 }
 
-/// STR, STRB, STRH in all forms.
 pub(super) fn store(a: u32, b: u32) -> Op {
     let (n, t) = (reg(a, 0), reg(b, 12));
     let width = match field(a, 5, 2) {
@@ -130,7 +129,7 @@ pub(super) fn store(a: u32, b: u32) -> Op {
     }
 }
 
-/// LDR, LDRB, LDRSB, LDRH, LDRSH in all forms, and the hints that stand in their place with `t` 15.
+/// In all forms, with the hints in their place (`t` 15).
 pub(super) fn load(place: Place, a: u32, b: u32, width: Width) -> Op {
     let (n, t) = (reg(a, 0), reg(b, 12));
     let width = match (width, a & 0x100 != 0) {

@@ -1,7 +1,7 @@
 //! From halfwords to an [`Op`]: the encodings of Thumb as ARMv7E-M has them (DDI 0403E, chapter A5).
 //!
-//! UNPREDICTABLE encodings are decoded as UNDEFINED if the test is cheap. No compiler makes them, and going on would hide a jump
-//! into data. Exceptions (such as a base in a list) are in [`crate`]'s documentation.
+//! UNPREDICTABLE encodings are UNDEFINED if the test is cheap: no compiler makes them, and going on would hide a jump into
+//! data. Exceptions are in [`crate`]'s documentation.
 
 mod dsp;
 mod fields;
@@ -14,25 +14,22 @@ pub(crate) use fields::Place;
 
 use crate::op::Op;
 
-/// Decodes the instruction at an address by its first two halfwords; one of 16 bits is in the first. Gives the operation and its length
-/// in bytes. `in_it`: inside of an IT block.
+/// Decodes the instruction at an address; one of 16 bits is in the first halfword. Returns operation and length, bytes.
+/// `in_it`: inside of an IT block.
 pub fn decode(address: u32, in_it: bool, halfwords: [u16; 2]) -> (Op, u32) {
     let place = Place { address, in_it };
     let [first, second] = halfwords;
     if is_wide(first) { (wide(place, first, second), 4) } else { (narrow(place, first), 2) }
 }
 
-/// Whether a halfword is the first of an instruction of 32 bits.
 pub(crate) fn is_wide(first: u16) -> bool {
     first >= 0xE800
 }
 
-/// An instruction of 16 bits.
 pub(crate) fn narrow(place: Place, halfword: u16) -> Op {
     narrow::decode(place, halfword)
 }
 
-/// An instruction of 32 bits, from its two halfwords.
 pub(crate) fn wide(place: Place, first: u16, second: u16) -> Op {
     let (a, b) = (u32::from(first), u32::from(second));
     match (a >> 11 & 3, a >> 4 & 0x7F) {

@@ -34,7 +34,6 @@ pub(super) fn decode(place: Place, halfword: u16) -> Op {
     }
 }
 
-/// A register of three bits.
 fn reg3(h: u32, low: u32) -> u8 {
     (h >> low & 7) as u8
 }
@@ -70,7 +69,7 @@ fn immediate(alu: Alu, flags: bool, d: u8, n: u8, value: u32) -> Op {
     }
 }
 
-/// `DecodeImmShift`: 0 bits to the right are 32, and a rotation by 0 is RRX.
+/// `DecodeImmShift`: 0 to the right is 32, rotation by 0 is RRX.
 pub(super) fn immediate_shift(kind: u32, amount: u32) -> (Shift, u8) {
     match (kind, amount) {
         (0, amount) => (Shift::Lsl, amount as u8),

@@ -4,8 +4,7 @@ use super::fields::{Place, barred, field, reg, sign_extend};
 use super::narrow::immediate_shift;
 use crate::op::{Alu, Op, Shift};
 
-/// The operation of the four bits that immediate and register forms share. With `d` 15 and flags it is a comparison,
-/// with `n` 15 a move.
+/// By the four bits of immediate and register forms. With `d` 15 and flags it is a comparison, with `n` 15 a move.
 fn alu(op: u32, d: u8, n: u8, flags: bool) -> Option<Alu> {
     let compares = d == 15 && flags;
     Some(match op {
@@ -29,7 +28,7 @@ fn alu(op: u32, d: u8, n: u8, flags: bool) -> Option<Alu> {
     })
 }
 
-/// Whether the architecture has this operation on these registers: the stack pointer only in sums, the program counter never.
+/// The stack pointer only in sums, the program counter never.
 fn allowed(alu: Alu, d: u8, n: u8) -> bool {
     let d_unused = matches!(alu, Alu::Tst | Alu::Teq | Alu::Cmn | Alu::Cmp);
     let n_unused = matches!(alu, Alu::Mov | Alu::Mvn);

@@ -1,9 +1,9 @@
-//! Data processing of two operands: sums, logic, shifts, and their flags.
+//! Sums, logic, shifts, and their flags.
 
 use crate::op::{Alu, Extend, Shift};
 use crate::processor::Core;
 
-/// `Shift_C`: the value and the carry out; by 0 nothing changes. Amounts are up to 255.
+/// `Shift_C`: value and carry; by 0 nothing changes. Amounts are up to 255.
 #[inline(always)]
 pub(crate) fn shift(value: u32, kind: Shift, amount: u8, carry: bool) -> (u32, bool) {
     if amount == 0 {
@@ -45,7 +45,7 @@ impl Core {
         self.flags.v = overflow;
     }
 
-    /// One of the sixteen operations; `carry` is the shifter's, for the logical ones.
+    /// `carry` is the shifter's, for the logical ones.
     #[inline(always)]
     pub(crate) fn alu(&mut self, alu: Alu, flags: bool, d: u8, x: u32, y: u32, carry: bool) {
         let c = self.flags.c;

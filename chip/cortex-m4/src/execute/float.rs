@@ -1,4 +1,4 @@
-//! The floating-point instructions: loads, stores, moves, and arithmetic by [`crate::softfloat`].
+//! Floating-point instructions; arithmetic is [`crate::softfloat`]'s.
 
 use crate::bus::{Bus, Size};
 use crate::op::{Float2, Float3, Op};
@@ -67,7 +67,6 @@ impl Core {
         Ok(())
     }
 
-    /// Between core and floating-point registers.
     fn float_transfer(&mut self, op: Op) {
         match op {
             Op::FloatFromCore { d, t } => self.set_float(d, self.get(t)),
@@ -87,7 +86,7 @@ impl Core {
         }
     }
 
-    /// The lowest address of several, and the base after them.
+    /// The lowest address, and the base after.
     fn range(&self, n: u8, count: u8, before: bool) -> (u32, u32) {
         let (base, bytes) = (self.get(n), u32::from(count) * 4);
         if before {

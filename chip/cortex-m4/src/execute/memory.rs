@@ -1,4 +1,4 @@
-//! Loads and stores of several registers, with write-back, exclusive and unprivileged ones, and branches by a table.
+//! Loads and stores of several registers, exclusive and unprivileged ones, branches by a table.
 
 use crate::bus::{Bus, Size};
 use crate::op::{Index, Op, Width};
@@ -20,7 +20,7 @@ impl Core {
         let bytes = 4 * list.count_ones();
         let mut address = if before { base.wrapping_sub(bytes) } else { base };
         let mut left = list & 0x7FFF;
-        // The base comes last: after a fault in the middle, the instruction can be done again.
+        // After a fault in the middle the instruction can be repeated.
         let mut new_base = None;
         while left != 0 {
             let register = left.trailing_zeros() as u8;
@@ -37,7 +37,7 @@ impl Core {
         }
         match target {
             Some(target) => {
-                // Code after the stack pointer's change looks at it.
+                // Code after a change looks at it.
                 self.r[13] &= !3;
                 self.exchange(target)
             }
@@ -70,7 +70,7 @@ impl Core {
         Ok(())
     }
 
-    /// Base and offset by the way of indexing: the address, and the base after it.
+    /// Address, and the base after it.
     fn indexed(&self, n: u8, offset: i16, index: Index) -> (u32, u32) {
         // The program counter as a base is aligned.
         let base = if n == 15 { self.get(15) & !3 } else { self.get(n) };
@@ -138,7 +138,7 @@ impl Core {
         Ok(())
     }
 
-    /// Loads and stores with the local monitor.
+    /// With the local monitor.
     fn execute_exclusive<B: Bus>(&mut self, bus: &mut B, op: Op) -> Result<(), Trap> {
         match op {
             Op::LoadExclusive { width, t, n, offset } => {
@@ -166,7 +166,7 @@ impl Core {
         Ok(())
     }
 
-    /// An access with the rights of unprivileged code.
+    /// With unprivileged rights.
     fn as_user<R>(&mut self, access: impl FnOnce(&mut Self) -> R) -> R {
         let (ipsr, unprivileged) = (self.ipsr, self.unprivileged);
         (self.ipsr, self.unprivileged) = (0, true);

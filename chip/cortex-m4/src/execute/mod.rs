@@ -1,6 +1,6 @@
-//! Execution: the operations of `ARMv7-M`'s manual, chapter A7, on the processor's state.
+//! Execution by `ARMv7-M`'s manual, chapter A7.
 //!
-//! The frequent ones are here or inlined here; the others are one call away, so that this stays small in the host's cache.
+//! Frequent operations are inlined here; others are a call away, so that this stays in the host's cache.
 
 mod alu;
 mod float;
@@ -26,7 +26,7 @@ impl Core {
         self.r[usize::from(register & 15)] = value;
     }
 
-    /// Executes one operation. On a trap, registers are as before it, but for those that a load of several has reached.
+    /// On a trap, registers are as before, but for those that a load of several has reached.
     #[inline(always)]
     pub(crate) fn execute<B: Bus>(&mut self, bus: &mut B, op: Op) -> Result<(), Trap> {
         match op {
@@ -63,7 +63,6 @@ impl Core {
         Ok(())
     }
 
-    /// Loads, stores and branches.
     #[inline(always)]
     fn execute_flow<B: Bus>(&mut self, bus: &mut B, op: Op) -> Result<(), Trap> {
         match op {
@@ -119,7 +118,6 @@ impl Core {
         Ok(())
     }
 
-    /// The less frequent ones.
     #[inline(never)]
     fn execute_others<B: Bus>(&mut self, bus: &mut B, op: Op) -> Result<(), Trap> {
         match op {
@@ -168,7 +166,6 @@ impl Core {
         }
     }
 
-    /// A branch within the program.
     #[inline(always)]
     pub(crate) fn jump(&mut self, target: u32, refill: u64) {
         self.next = target & !1;
@@ -176,7 +173,7 @@ impl Core {
         self.cycles += refill;
     }
 
-    /// A branch whose lowest bit is the instruction set, or which returns from an exception.
+    /// The lowest bit is the instruction set; or a return from an exception.
     #[inline(always)]
     pub(crate) fn exchange(&mut self, target: u32) -> Result<(), Trap> {
         self.jump(target, REFILL_FAR);
@@ -190,7 +187,7 @@ impl Core {
         Ok(())
     }
 
-    /// A load's register, which may be the program counter.
+    /// Perhaps the program counter.
     #[inline(always)]
     pub(crate) fn loaded(&mut self, register: u8, value: u32) -> Result<(), Trap> {
         if register == 15 {
@@ -200,8 +197,8 @@ impl Core {
         Ok(())
     }
 
-    /// The cycles of a load beyond the first. One more unless it is pipelined with a load before it; one more if its
-    /// base was computed just before.
+    /// The cycles of a load beyond the first. One more unless pipelined with a load before; one more if the base was computed
+    /// just before.
     #[inline(always)]
     pub(crate) fn wait_for(&mut self, n: u8) {
         self.cycles += u64::from(self.previous & LOADED == 0 || self.previous == LOADED | n);
@@ -215,7 +212,7 @@ impl Core {
         self.stall_for(if m == n { 16 } else { m });
     }
 
-    /// A base that was computed just before costs a cycle.
+    /// Costs a cycle if computed just before.
     #[inline(always)]
     pub(crate) fn stall_for(&mut self, n: u8) {
         self.cycles += u64::from(self.previous == n);

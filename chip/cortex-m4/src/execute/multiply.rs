@@ -1,4 +1,4 @@
-//! Multiplication, division, and operations on the bits of one register.
+//! Multiplication, division, and bits of one register.
 
 use crate::op::{Long, Multiply, Op, Unary};
 use crate::processor::Core;
@@ -10,7 +10,7 @@ fn half(value: u32, top: bool) -> i64 {
     i64::from(if top { (value >> 16) as i16 } else { value as i16 })
 }
 
-/// The products of the lower and the upper halves; exchanged, of the second's other halves.
+/// Of lower and upper halves; exchanged: of the second's other halves.
 fn products(n: u32, m: u32, exchange: bool) -> (i64, i64) {
     let m = if exchange { m.rotate_right(16) } else { m };
     (half(n, false) * half(m, false), half(n, true) * half(m, true))
@@ -75,7 +75,7 @@ impl Core {
         Ok(())
     }
 
-    /// Those with a result of 32 bits. Overflow of an addition sets Q.
+    /// A result of 32 bits; overflow of an addition sets Q.
     fn multiply(&mut self, kind: Multiply, n: u32, m: u32, a: u8) -> u32 {
         let addend = if a == 15 { 0 } else { self.get(a) };
         let signed = i64::from(addend as i32);
@@ -112,7 +112,7 @@ impl Core {
     }
 }
 
-/// Those with a result of 64 bits.
+/// A result of 64 bits.
 fn long(kind: Long, n: u32, m: u32, addend: u64) -> u64 {
     let signed = i64::from(n as i32).wrapping_mul(i64::from(m as i32)) as u64;
     let unsigned = u64::from(n) * u64::from(m);

@@ -1,10 +1,10 @@
-//! Saturation, and parallel arithmetic on the bytes and halves of registers.
+//! Saturation, and parallel arithmetic.
 
 use super::alu::shift;
 use crate::op::{Lanes, Op, Prefix};
 use crate::processor::Core;
 
-/// Into so many bits, signed or not; and whether it had to be changed.
+/// And whether it was changed.
 fn saturate(value: i64, signed: bool, bits: u8) -> (i64, bool) {
     let (low, high) =
         if signed { (-(1i64 << (bits - 1)), (1 << (bits - 1)) - 1) } else { (0, (1i64 << bits) - 1) };
@@ -62,7 +62,7 @@ impl Core {
     }
 }
 
-/// The result, and GE if the prefix sets it.
+/// And GE if the prefix sets it.
 fn parallel(prefix: Prefix, lanes: Lanes, n: u32, m: u32) -> (u32, Option<u8>) {
     let signed = matches!(prefix, Prefix::S | Prefix::Q | Prefix::Sh);
     let bytes = matches!(lanes, Lanes::Add8 | Lanes::Sub8);

@@ -1,8 +1,8 @@
-//! A decoded instruction: one variant an operation, with its registers and constants.
+//! A decoded instruction: a variant an operation, with registers and constants.
 //!
-//! The variants follow the pseudocode of the `ARMv7-M` Architecture Reference Manual (DDI 0403E, chapter A7). The
-//! decoder settles effects of the place (IT block, address): an [`Op`] belongs to one address. A register is its number, 0 to 15;
-//! reading 15 gives the address of the instruction and 4.
+//! After the `ARMv7-M` Architecture Reference Manual (DDI 0403E, chapter A7). Effects of the place (IT block, address) are
+//! settled: an [`Op`] belongs to one address. A register is its number, 0 to 15; reading 15 gives the address of the
+//! instruction and 4.
 #![allow(missing_docs, reason = "names of operations and operands are those of the architecture's manual")]
 
 mod operands;
@@ -43,7 +43,7 @@ pub enum Op {
         n: u8,
         m: u8,
     },
-    /// `carry`: the new flag of a logical operation that sets flags; `None` leaves it.
+    /// `carry`: a logical operation's new flag; `None` leaves it.
     Immediate {
         alu: Alu,
         flags: bool,

@@ -1,7 +1,7 @@
-//! Values of an operation's fields: kinds of sums and shifts, widths, rounding.
+//! Values of an operation's fields.
 #![allow(missing_docs, reason = "names of operations and operands are those of the architecture's manual")]
 
-/// The data-processing operations with two operands.
+/// Data processing with two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alu {
     And,
@@ -32,7 +32,7 @@ pub enum Shift {
     Rrx,
 }
 
-/// The unit of a load or store.
+/// A load's or store's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     Byte,
@@ -42,18 +42,18 @@ pub enum Width {
     SHalf,
 }
 
-/// When a load or store with an immediate offset changes its base.
+/// When an immediate offset changes the base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Index {
-    /// Base and offset are the address; the base stays.
+    /// Base and offset; the base stays.
     Offset,
-    /// The same, and the base becomes the address.
+    /// Base and offset; the base becomes the address.
     Pre,
-    /// The base is the address, and gets the offset afterwards.
+    /// The base; it gets the offset afterwards.
     Post,
 }
 
-/// The extensions of a byte or halfword.
+/// Of a byte or halfword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extend {
     Sxtb,
@@ -64,7 +64,7 @@ pub enum Extend {
     Uxtb16,
 }
 
-/// The lanes of a parallel addition or subtraction.
+/// Of a parallel addition or subtraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lanes {
     Add8,
@@ -75,7 +75,7 @@ pub enum Lanes {
     Sub16,
 }
 
-/// Overflow of a parallel addition or subtraction.
+/// Overflow of parallel additions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Prefix {
     S,
@@ -86,7 +86,7 @@ pub enum Prefix {
     Uh,
 }
 
-/// The bit and byte operations of one operand.
+/// Of one operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unary {
     Clz,
@@ -96,12 +96,12 @@ pub enum Unary {
     Revsh,
 }
 
-/// The multiplications of three or four operands, long ones apart.
+/// Of three or four operands, long ones apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiply {
     Mla,
     Mls,
-    /// SMLA and SMUL of halves: top of the first, top of the second.
+    /// Halves: top of the first, top of the second.
     Smlaxy {
         n_top: bool,
         m_top: bool,
@@ -124,7 +124,7 @@ pub enum Multiply {
     Usada8,
 }
 
-/// The multiplications with a result of 64 bits.
+/// A result of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Long {
     Smull,
@@ -137,7 +137,7 @@ pub enum Long {
     Smlsld { exchange: bool },
 }
 
-/// The floating-point operations of three registers.
+/// Of three registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Float3 {
     Vmla,
@@ -155,7 +155,7 @@ pub enum Float3 {
     Vfnms,
 }
 
-/// The floating-point operations of two registers.
+/// Of two registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Float2 {
     /// VMOV

@@ -1,4 +1,4 @@
-//! Shared by the comparisons with QEMU: programs are built, loaded, and run there and on the model.
+//! For comparisons with QEMU.
 #![allow(dead_code, unreachable_pub, reason = "each test program uses a part")]
 #![allow(clippy::panic, reason = "tests")]
 
@@ -6,13 +6,13 @@ use cortex_m4_model::{Bus, Core, Fault, Outcome, Size};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The memories of QEMU's mps2-an386 that programs use.
+/// Of QEMU's mps2-an386.
 pub const MEMORIES: [(u32, usize); 3] = [(0, 0x40_0000), (0x2000_0000, 0x40_0000), (0x2100_0000, 0x100_0000)];
 
-/// Flat memories, an error everywhere else. Without wait states, unless a test asks for them.
+/// Flat memories, errors elsewhere.
 pub struct Flat {
     pub memories: [Vec<u8>; 3],
-    /// Of each fetch, and of each load or store.
+    /// Of fetches; of loads and stores.
     pub waits: (u32, u32),
     /// A store here asks for attention.
     pub bell: Option<u32>,
@@ -86,14 +86,14 @@ impl Bus for Flat {
     }
 }
 
-/// A folder of this process for files between the programs.
+/// Of this process.
 pub fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("cortex-m4-model-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");
     folder
 }
 
-/// Builds `tests/programs/NAME.rs` for the processor; the ELF file.
+/// Returns the ELF file.
 pub fn build(name: &str, folder: &Path) -> PathBuf {
     let programs = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
     let elf = folder.join(format!("{name}.elf"));
@@ -118,7 +118,7 @@ pub fn build(name: &str, folder: &Path) -> PathBuf {
     elf
 }
 
-/// The parts of an ELF file that are loaded: address and bytes.
+/// Loaded parts: address and bytes.
 pub fn segments(elf: &Path) -> Vec<(u32, Vec<u8>)> {
     let file = std::fs::read(elf).expect("the program's file");
     let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("four bytes"));
@@ -134,7 +134,7 @@ pub fn segments(elf: &Path) -> Vec<(u32, Vec<u8>)> {
         .collect()
 }
 
-/// Runs a program in QEMU, with parts of memory given. Gives its output.
+/// With parts of memory; returns the output.
 pub fn qemu(elf: &Path, parts: &[(u32, &[u8])], folder: &Path) -> String {
     let mut command = Command::new("timeout");
     command.args(["20", "qemu-system-arm"]);
@@ -160,7 +160,7 @@ pub fn qemu(elf: &Path, parts: &[(u32, &[u8])], folder: &Path) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
 }
 
-/// A program in its memory, and the processor at its beginning.
+/// At its beginning.
 fn boot(elf: &Path, parts: &[(u32, &[u8])]) -> (Flat, Core) {
     let mut memory = Flat::default();
     for (address, bytes) in segments(elf) {
@@ -175,7 +175,7 @@ fn boot(elf: &Path, parts: &[(u32, &[u8])]) -> (Flat, Core) {
     (memory, core)
 }
 
-/// Serves a run's end; false at `SYS_EXIT`. The text of `SYS_WRITE0` is added.
+/// False at `SYS_EXIT`; adds the text of `SYS_WRITE0`.
 fn serve(core: &mut Core, memory: &mut Flat, outcome: Outcome, printed: &mut String) -> bool {
     match outcome {
         Outcome::Ran => {}
@@ -203,7 +203,7 @@ fn serve(core: &mut Core, memory: &mut Flat, outcome: Outcome, printed: &mut Str
     true
 }
 
-/// Runs a program on the model up to `SYS_EXIT`, for at most that many cycles. Gives its output, the memory, the processor.
+/// Up to `SYS_EXIT`, or `limit` cycles. Returns output, memory, processor.
 pub fn model(elf: &Path, parts: &[(u32, &[u8])], limit: u64) -> (String, Flat, Core) {
     let (mut memory, mut core) = boot(elf, parts);
     let mut printed = String::new();
@@ -216,8 +216,7 @@ pub fn model(elf: &Path, parts: &[(u32, &[u8])], limit: u64) -> (String, Flat, C
     }
 }
 
-/// Runs a program until it printed so many lines. Every now and then the caller does something to the processor, and says in how
-/// many cycles it does so again.
+/// Until so many lines were printed. `disturb` returns the cycles until its next call.
 pub fn interrupted(elf: &Path, lines: usize, mut disturb: impl FnMut(&mut Core) -> u64) -> String {
     let (mut memory, mut core) = boot(elf, &[]);
     let (mut printed, mut next) = (String::new(), 1000);

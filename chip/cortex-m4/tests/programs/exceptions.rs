@@ -1,8 +1,7 @@
-//! Exceptions, faults, masks, privilege, late floating-point state, sleep, MPU: each scenario prints its
-//! observations.
+//! Scenarios of exceptions: each prints its observations, which are compared between QEMU and the model.
 //!
-//! The text is compared between QEMU and the model. Every vector leads to `on_exception`. It prints number, return
-//! code and status, does the scenario's action for that number, and steps over the instruction of a fault.
+//! Every vector leads to `on_exception`: it prints number, return code and status, acts, and steps over a fault's
+//! instruction.
 #![no_std]
 #![no_main]
 

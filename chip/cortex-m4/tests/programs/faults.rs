@@ -1,4 +1,4 @@
-//! The scenarios of faults: each kind, escalation, and returns that are refused.
+//! Faults: kinds, escalation, refused returns.
 
 use crate::support::*;
 use crate::{mrs, msr, print};
@@ -35,7 +35,7 @@ pub fn faults() {
     put(0xE000_ED88, 0);
     unsafe { asm!("vmov {0}, s1", out(reg) _) };
     put(0xE000_ED88, 0x00F0_0000);
-    // In an IT block: the state is in the frame, and goes on.
+    // The IT state is in the frame.
     let mut value = 0u32;
     unsafe {
         asm!("cmp {0}, {0}", "itete eq", "ldreq {1}, [{1}]", "movne {0}, #1", "addeq {0}, #2", "addne {0}, #4",
@@ -45,7 +45,7 @@ pub fn faults() {
     bad_stack(5, 0x3000_1000);
 }
 
-/// A supervisor call with the process stack at a forbidden place: the fault of this number leads back.
+/// The process stack is at a forbidden place; the fault of this number leads back.
 pub fn bad_stack(number: u32, stack: u32) {
     let main = mrs!("msp");
     on(number, |_, exc_return| {
@@ -94,7 +94,7 @@ pub fn escalation() {
     on(16, |_, _| unsafe { asm!("svc #2") });
     priority(16, 0x80);
     pend(16);
-    // Breakpoints are the emulator's; a fault in NMI or HardFault would be the end.
+    // A fault in NMI or HardFault would be the end.
 }
 
 pub fn bad_returns() {
@@ -114,7 +114,7 @@ pub fn bad_returns() {
         unsafe {
             RESUME = code;
             let mut value = 7u32;
-            // Without floating-point state, so that the frames are small.
+            // Small frames.
             asm!("mrs {t}, control", "bic {t}, #4", "msr control, {t}", "isb", "svc #1", t = out(reg) _, inout("r0") value);
             print!("  r0 {value:x}\n\0");
         }

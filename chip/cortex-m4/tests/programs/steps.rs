@@ -1,7 +1,7 @@
 //! Runs instructions one by one: loads a state, jumps to the instruction, stores the state after it.
 //!
-//! Each test runs in thread mode on the process stack and ends by SVC or by a fault. Every exception comes to `handler`. It
-//! stores the registers and the scratch memory, builds a frame with the next test's state, and returns into it.
+//! Each test is in thread mode on the process stack, and ends by SVC or a fault. `handler` gets every exception: it stores
+//! registers and scratch memory, and returns into a frame with the next test's state.
 #![no_std]
 #![no_main]
 

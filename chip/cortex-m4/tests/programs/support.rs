@@ -1,4 +1,4 @@
-//! The base of the scenarios: text by semihosting, registers, and one handler for every vector.
+//! Text by semihosting, registers, one handler for every vector.
 
 use core::arch::{asm, global_asm};
 use core::fmt::Write;
@@ -142,7 +142,7 @@ pub struct Frame {
     pub xpsr: u32,
 }
 
-/// The action of a handler beside printing.
+/// Beside printing.
 pub type Action = fn(&mut Frame, &mut u32);
 pub static mut ACTIONS: [Option<Action>; 64] = [None; 64];
 pub static mut QUIET: bool = false;

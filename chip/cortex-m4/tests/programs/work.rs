@@ -1,4 +1,4 @@
-//! Work of several kinds, for speed and as a whole program: a checksum, a sort, floating point, text.
+//! A checksum, a sort, floating point, text.
 #![no_std]
 #![no_main]
 

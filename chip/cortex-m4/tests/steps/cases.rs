@@ -1,11 +1,11 @@
-//! The tests: an instruction or several, and a state in which they do no harm to the program that runs them.
+//! Instructions with a state in which they do no harm to the testing program.
 
 use super::random::Random;
 use super::{AT, SCRATCH, SLOT, SLOTS, STACK, patterns};
 use cortex_m4_model::decode;
 use cortex_m4_model::op::{Alu, Index, Op, Width};
 
-/// A test: its code in its slot, and the state that it begins with.
+/// Code in its slot, and initial state.
 #[derive(Clone)]
 pub(crate) struct Case {
     pub(crate) name: &'static str,
@@ -30,7 +30,7 @@ impl Case {
     }
 }
 
-/// Several instructions on registers alone, with IT blocks of up to four among them.
+/// On registers alone, with IT blocks of up to four.
 pub(crate) fn sequence(random: &mut Random, number: u32) -> Case {
     let slot = SLOTS + number * SLOT;
     let mut case = state(random, "sequence", Op::Nop, slot + AT);
@@ -101,7 +101,7 @@ fn on_registers_alone(op: Op) -> bool {
     }
 }
 
-/// A random state, at an instruction in a slot that is otherwise full of SVC.
+/// In a slot otherwise full of SVC.
 fn state(random: &mut Random, name: &'static str, op: Op, start: u32) -> Case {
     let mut case = Case {
         name,
@@ -117,7 +117,7 @@ fn state(random: &mut Random, name: &'static str, op: Op, start: u32) -> Case {
     case
 }
 
-/// One instruction, maybe conditional; none if it would do harm here.
+/// Perhaps conditional; none if harmful here.
 pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
     let (name, pattern) = random.of(patterns::PATTERNS);
     let bits = patterns::fill(pattern, random.next());
@@ -125,7 +125,7 @@ pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
         if pattern.len() > 20 { [(bits >> 16) as u16, bits as u16] } else { [bits as u16, 0xDF00] };
     let slot = SLOTS + number * SLOT;
     let in_it = random.one_in(4);
-    // A base program counter is aligned, so half of the instructions stand at unaligned places.
+    // Half of them unaligned, since a base program counter is aligned.
     let at = AT + 2 * random.below(2);
     let (op, _) = decode(slot + at, in_it, halfwords);
     let allowed_in_it = !matches!(op, Op::BranchIf { .. } | Op::BranchZero { .. } | Op::IfThen { .. });
@@ -144,7 +144,7 @@ pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
     prepare(random, &mut case, slot).then_some(case)
 }
 
-/// Gives registers the values that the operation needs to do no harm; false if it cannot be tested here.
+/// False if it cannot be tested here.
 fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     match case.op {
         // QEMU loads; the architecture has an unallocated hint here.
@@ -179,7 +179,7 @@ fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
         }
         Op::MoveToSpecial { special, .. } => special < 4,
         Op::IfThen { state } => {
-            // An SVC follows, executed or not: the slot is full of them, of 16 bits each.
+            // The slot is full of SVCs of 16 bits.
             state & 15 != 0
         }
         Op::MovImmediate { d: 13, .. }
@@ -191,7 +191,6 @@ fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
         | Op::Wfe
         | Op::Sev => false,
         Op::Float3 { d, n, m, .. } if random.one_in(2) => {
-            // Zeros, infinities and NaN against each other.
             for register in [d, n, m] {
                 case.s[usize::from(register)] = random.special();
             }
@@ -201,10 +200,10 @@ fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     }
 }
 
-/// Gives a load or store a base in the scratch memory.
+/// In the scratch memory.
 fn prepare_memory(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     let to_pc = to_pc(case.op);
-    // The program counter is loaded with a whole word: an address without memory.
+    // An address without memory.
     let target = |size: u32, random: &mut Random| {
         let at = SCRATCH + if to_pc { random.below(0x94) } else { random.below(0x158) };
         if random.one_in(4) && !to_pc { at } else { at & !(size - 1) }
@@ -243,7 +242,6 @@ fn prepare_memory(random: &mut Random, case: &mut Case, slot: u32) -> bool {
             let at = target(bytes(width), random) & !(bytes(width) - 1);
             let first = case.code.iter().position(|halfword| halfword >> 8 != 0xDF).unwrap_or(0);
             if random.one_in(2) && case.start == slot + 2 * first as u32 && case.code[first] >= 0xE800 {
-                // LDREX of the same place first.
                 let second = match width {
                     Width::Word => u16::from(d) << 12 | 0xF00 | (offset / 4),
                     Width::Half => u16::from(d) << 12 | 0xF5F,
@@ -289,7 +287,7 @@ fn bytes(width: Width) -> u32 {
     }
 }
 
-/// The base register's value for this address; the stack pointer stays if the address is good.
+/// The stack pointer stays if the address is good.
 fn base(case: &mut Case, n: u8, address: u32, offset: i32) -> bool {
     if n == 13 {
         return (0..0x3F0).contains(&offset) || (-0x100..0).contains(&offset) && !to_pc(case.op);
@@ -312,7 +310,7 @@ fn by_register(case: &mut Case, n: u8, m: u8, shift: u8, address: u32) -> bool {
     true
 }
 
-/// Into the slot, or to an empty address: QEMU's machine has its memories a second time behind them, and devices at `0x4000_0000`.
+/// In the slot, or empty: QEMU repeats its memories behind them, and has devices at `0x4000_0000`.
 fn good_target(target: u32, slot: u32) -> bool {
     let outside = matches!(target >> 28, 3 | 6..=13);
     // Not to itself, and not into its own second half.

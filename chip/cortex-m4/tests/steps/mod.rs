@@ -1,8 +1,7 @@
-//! Instruction by instruction against QEMU: random ones of every class, on edges of their operands.
+//! Random instructions of every class against QEMU, on edges of their operands.
 //!
-//! A batch is a program (`programs/steps.rs`) with some thousand states and instructions as data. It runs in QEMU and on the
-//! model; registers, flags, floating-point registers and status, fault status, return address and memory are compared after each.
-//! `CORTEX_BATCHES` is the number of batches (1), `CORTEX_SEED` the seed.
+//! A batch is a program (`programs/steps.rs`) with some thousand states and instructions as data. After each, registers, flags,
+//! fault status, return address and memory are compared. `CORTEX_BATCHES` is the number of batches (1), `CORTEX_SEED` the seed.
 mod cases;
 use crate::common;
 mod patterns;
@@ -12,11 +11,11 @@ use cases::{Case, generate, sequence};
 use random::Random;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Addresses of a batch's parts in QEMU's mps2-an386.
+/// In QEMU's mps2-an386.
 const TESTS: usize = 12_000;
 const SLOTS: u32 = 0x2100_1000;
 const SLOT: u32 = 64;
-/// Offset of an instruction in its slot: halfwords before it are for IT, or for LDREX before STREX.
+/// Halfwords before it are for IT, or LDREX before STREX.
 const AT: u32 = 24;
 const SCRATCH: u32 = 0x2029_0000;
 const SCRATCH_WORDS: usize = 96;
@@ -25,11 +24,11 @@ const PATTERN: u32 = 0x202A_0000;
 const INPUTS: u32 = 0x2120_0000;
 const OUTPUTS: u32 = 0x2160_0000;
 const POINTERS: u32 = 0x2028_0000;
-/// Words of a record that the program stores: r4 to r11, s0 to s31, the frame, six of status, the scratch memory.
+/// r4 to r11, s0 to s31, the frame, six of status, the scratch memory.
 const RECORD: usize = 8 + 32 + 8 + 6 + SCRATCH_WORDS_STORED;
 const SCRATCH_WORDS_STORED: usize = 96;
 
-/// The tests of a batch; there are some of every class.
+/// Some of every class.
 fn batch(seed: u64) -> Vec<Case> {
     let mut random = Random(seed | 1);
     let mut cases = Vec::new();
@@ -50,12 +49,12 @@ fn bytes_of(words: impl IntoIterator<Item = u32>) -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
-/// The memory that a batch needs beside the program.
+/// Beside the program.
 fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     let mut random = Random(seed ^ 0x5EED | 1);
     let mut pattern: Vec<u32> = (0..SCRATCH_WORDS)
         .map(|_| {
-            // An address without memory: odd, or a word's address.
+            // Odd, or a word's address.
             let word = random.next() & 0x0FFF_FFFF | random.of(&[3u32, 7, 9, 11]) << 28;
             if word & 1 == 1 { word } else { word & !3 }
         })
@@ -73,7 +72,6 @@ fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     ]
 }
 
-/// Names of a record's words.
 fn word_name(i: usize) -> String {
     const FRAME: [&str; 8] = ["r0", "r1", "r2", "r3", "r12", "lr", "pc", "xpsr"];
     const STATUS: [&str; 6] = ["psp", "fpscr", "ipsr", "cfsr", "exc_return", "hfsr"];

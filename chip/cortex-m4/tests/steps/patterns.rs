@@ -1,6 +1,6 @@
-//! The encodings, class by class, from the architecture's manual: 0 and 1 are fixed, all else is any bit.
+//! Encodings by class, from the manual: 0 and 1 are fixed.
 
-/// A name and its bits; letters show the fields, for the reader.
+/// Letters show fields for the reader.
 pub(crate) const PATTERNS: &[(&str, &str)] = &[
     ("shift add move", "00xxxxxx xxxxxxxx"),
     ("data processing 16", "010000xx xxxxxxxx"),
@@ -109,7 +109,7 @@ pub(crate) const PATTERNS: &[(&str, &str)] = &[
     ("no coprocessor", "11101110 xxxxxxxx xxxx00xx xxxxxxxx"),
 ];
 
-/// The pattern with these bits in its open places; 16 or 32 bits.
+/// 16 or 32 bits.
 pub(crate) fn fill(pattern: &str, random: u32) -> u32 {
     let bits = pattern.chars().filter(|letter| *letter != ' ');
     let mut random = random;

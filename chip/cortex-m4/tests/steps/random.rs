@@ -1,6 +1,6 @@
-//! Random numbers, and operands at the edges of an instruction's range.
+//! Random operands at the edges of an instruction's range.
 
-/// A small generator of random numbers (xorshift*), so that a seed gives the same tests for ever.
+/// Xorshift*: a seed gives the same tests for ever.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -23,7 +23,7 @@ impl Random {
         choices[self.below(choices.len() as u32) as usize]
     }
 
-    /// An integer operand: an edge as often as not.
+    /// An edge as often as not.
     pub(crate) fn operand(&mut self) -> u32 {
         const EDGES: [u32; 14] = [
             0,
@@ -49,7 +49,7 @@ impl Random {
         }
     }
 
-    /// A floating-point operand: zeros, infinities, NaN, denormals, whole numbers, limits of integers, or anything.
+    /// Zeros, infinities, NaN, denormals, whole numbers, limits of integers, or anything.
     pub(crate) fn float(&mut self) -> u32 {
         const EDGES: [u32; 24] = [
             0,
@@ -80,7 +80,7 @@ impl Random {
         let sign = self.next() & 0x8000_0000;
         sign | match self.below(8) {
             0..=2 => self.of(&EDGES),
-            // Near one, so that sums cancel and products round.
+            // Sums cancel, products round.
             3 => 0x3F80_0000 + (self.below(0x0180_0000) & self.next() | self.below(4)) - 0x0080_0000,
             4 => (self.below(70_000) as f32 / self.of(&[1.0f32, 2.0, 4.0, 3.0])).to_bits(),
             5 => self.below(0x0100_0000),
@@ -89,7 +89,7 @@ impl Random {
         }
     }
 
-    /// One of the floating-point operands that have rules of their own, or nearly one.
+    /// Has rules of its own, or nearly.
     pub(crate) fn special(&mut self) -> u32 {
         let sign = self.next() & 0x8000_0000;
         sign | self.of(&[

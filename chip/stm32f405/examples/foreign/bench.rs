@@ -1,4 +1,4 @@
-//! Shared by the judges of all programs.
+//! For all judges.
 
 use std::error::Error;
 
@@ -7,15 +7,13 @@ use stm32f405_model::machine::Machine;
 use stm32f405_model::spi::Wire;
 use stm32f405_model::time::{MS, Ps};
 
-/// Result of a judge: nothing, or the program's fault.
+/// Nothing, or the program's fault.
 pub(crate) type Outcome = Result<(), Box<dyn Error>>;
 
-/// Runs until this moment.
 pub(crate) fn run(machine: &mut Machine, until: Ps) -> Outcome {
     machine.run_until(until).map_err(|report| format!("{} in {}", report.reason, report.place).into())
 }
 
-/// True, or this fault.
 pub(crate) fn expect(good: bool, what: String) -> Outcome {
     if good { Ok(()) } else { Err(what.into()) }
 }
@@ -24,37 +22,36 @@ fn word(machine: &Machine, at: u32) -> u32 {
     machine.memory(at, 4).iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte))
 }
 
-/// The first up-channel of the program's RTT block: its buffer, the buffer's size, and the place of writing in it.
+/// RTT's first up-channel: buffer, size, place of writing.
 fn channel(machine: &Machine) -> Option<[u32; 3]> {
     let block = machine.image().find("_SEGGER_RTT")?.address;
-    // Behind 24 bytes of head, and the name.
+    // Behind 24 bytes and the name.
     Some([4, 8, 12].map(|at| word(machine, block + 24 + at)))
 }
 
-/// How many bytes of log were written.
+/// Bytes so far.
 pub(crate) fn logged(machine: &Machine) -> u32 {
     channel(machine).map_or(0, |[.., written]| written)
 }
 
-/// The log (a ring) since this place.
+/// A ring, since this place.
 pub(crate) fn logged_since(machine: &Machine, place: u32) -> Vec<u8> {
     let Some([buffer, ring, written]) = channel(machine) else { return Vec::new() };
     let bytes = (written + ring - place) % ring;
     (0..bytes).map(|at| machine.memory(buffer + (place + at) % ring, 1)[0]).collect()
 }
 
-/// The log, of a program that logs text.
+/// For programs that log text.
 pub(crate) fn log(machine: &Machine) -> String {
     let Some([buffer, _, written]) = channel(machine) else { return String::new() };
     String::from_utf8_lossy(machine.memory(buffer, written)).into_owned()
 }
 
-/// The text that a port has sent.
 pub(crate) fn text(sent: &[(Ps, u8)]) -> String {
     sent.iter().map(|(_, byte)| char::from(*byte)).collect()
 }
 
-/// Runs until this millisecond, and tells at which ones a pin changed, and its new level.
+/// Milliseconds and levels of a pin's changes.
 pub(crate) fn changes(
     machine: &mut Machine,
     pin: Pin,
@@ -73,19 +70,19 @@ pub(crate) fn changes(
     Ok(changes)
 }
 
-/// The milliseconds between changes.
+/// Milliseconds.
 pub(crate) fn pauses(changes: &[(u64, bool)]) -> Vec<u64> {
     changes.windows(2).map(|pair| pair[1].0 - pair[0].0).collect()
 }
 
-/// All of them are so many milliseconds, but for one.
+/// But for one.
 pub(crate) fn expect_pauses(changes: &[(u64, bool)], ms: u64, least: usize) -> Outcome {
     let pauses = pauses(changes);
     let good = pauses.len() >= least && pauses.iter().all(|pause| pause.abs_diff(ms) <= 1);
     expect(good, format!("it changed after {pauses:?} ms, and not each {ms} ms"))
 }
 
-/// Keeps the bytes of a bus, and its fastest clock.
+/// And its fastest clock.
 #[derive(Default)]
 pub(crate) struct Tap(pub(crate) std::rc::Rc<std::cell::RefCell<(Vec<u8>, u32)>>);
 

@@ -8,7 +8,7 @@ use stm32f405_model::time::{MS, SECOND};
 
 use crate::bench::{Outcome, changes, expect, log, run, text};
 
-/// A memory on a bus: it answers with its identity, and that it is not busy.
+/// Answers with its identity, and as not busy.
 #[derive(Default)]
 struct Memory {
     selected: bool,
@@ -39,7 +39,7 @@ impl Wire for Memory {
     }
 }
 
-/// Asks the memory on SPI1 for its identity, and logs it.
+/// Logs the SPI1 memory's identity.
 pub(crate) fn flash(machine: &mut Machine) -> Outcome {
     machine.connect(0, Pin(0, 15), Box::new(Memory::default()));
     run(machine, SECOND)?;
@@ -49,7 +49,7 @@ pub(crate) fn flash(machine: &mut Machine) -> Outcome {
     expect(hz == 168_000_000, format!("it runs at {hz} Hz"))
 }
 
-/// Echoes each byte at 115,200 baud, at 48 MHz of the internal oscillator by the PLL.
+/// 115,200 baud, 48 MHz of the internal oscillator by the PLL.
 pub(crate) fn serial_echo(machine: &mut Machine) -> Outcome {
     run(machine, 50 * MS)?;
     let sent = "The quick brown fox jumps over the lazy dog, back to back.".repeat(10);
@@ -61,7 +61,7 @@ pub(crate) fn serial_echo(machine: &mut Machine) -> Outcome {
     expect(hz == 48_000_000, format!("it runs at {hz} Hz"))
 }
 
-/// Lights four LEDs one after the other, each 0.5 s after the one before, and a second later turns them off likewise, at 168 MHz.
+/// Four LEDs, each 0.5 s after the one before; off likewise a second later; 168 MHz.
 pub(crate) fn gpio_hal_blinky(machine: &mut Machine) -> Outcome {
     // Orange, red, blue, green.
     const PINS: [Pin; 4] = [Pin(3, 13), Pin(3, 14), Pin(3, 15), Pin(3, 12)];

@@ -1,5 +1,5 @@
-//! Embassy's examples for the STM32F4: `examples/stm32f4/src/bin` of its repository, at the release of the
-//! `embassy-stm32` in use. They run on an STM32F405ZG with its default clocks, 16 MHz, and the time driver on TIM12.
+//! Embassy's examples for the STM32F4: `examples/stm32f4/src/bin` of its repository, at the release of the `embassy-stm32` in
+//! use. On an STM32F405ZG: 16 MHz, time driver on TIM12.
 
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::machine::Machine;
@@ -7,8 +7,7 @@ use stm32f405_model::time::{MS, SECOND};
 
 use crate::bench::{Outcome, expect, logged, logged_since, run, text};
 
-/// The LED on PB7 changes each 300 ms; the watchdog of 1 s is fed five times, each 600 ms, and resets a second after
-/// the last one.
+/// PB7 changes each 300 ms; the watchdog of 1 s is fed five times, each 600 ms, and resets a second later.
 pub(crate) fn wdt(machine: &mut Machine) -> Outcome {
     let mut changes = Vec::new();
     let mut was = false;
@@ -29,8 +28,7 @@ pub(crate) fn wdt(machine: &mut Machine) -> Outcome {
     )
 }
 
-/// Erases sector 5 and writes 32 numbers to its beginning. The next sectors do not exist on this chip: the HAL refuses, and it
-/// panics.
+/// Erases sector 5 and writes 32 numbers to its beginning. The next sectors do not exist: the HAL refuses, and it panics.
 pub(crate) fn flash(machine: &mut Machine) -> Outcome {
     const SECTOR: u32 = 0x0802_0000;
     run(machine, 10 * SECOND)?;
@@ -43,17 +41,17 @@ pub(crate) fn flash(machine: &mut Machine) -> Outcome {
     expect(rest.iter().all(|byte| *byte == 0xFF), "it is not erased".to_owned())
 }
 
-/// Tells by DMA at 115,200 baud, on and on, how often it has done so.
+/// By DMA at 115,200 baud, endlessly, with its count.
 pub(crate) fn usart_dma(machine: &mut Machine) -> Outcome {
     run(machine, SECOND)?;
     let said = text(&machine.take_sent(2));
     let wanted: Vec<String> = (0..700).map(|number| format!("Hello DMA World {number}!\r\n")).collect();
     expect(wanted.concat().starts_with(&said), "it says something else".to_owned())?;
-    // A character takes 86.8 us; between two lines it logs.
+    // 86.8 us a character; it logs between lines.
     expect((10_000..=11_521).contains(&said.len()), format!("{} characters", said.len()))
 }
 
-/// Receives by interrupts into a ring of 32 bytes, and logs each byte that came.
+/// Into a ring of 32 bytes, by interrupts; logs each byte.
 pub(crate) fn usart_buffered(machine: &mut Machine) -> Outcome {
     run(machine, 50 * MS)?;
     for number in 1..=100_u8 {
@@ -67,7 +65,7 @@ pub(crate) fn usart_buffered(machine: &mut Machine) -> Outcome {
     Ok(())
 }
 
-/// Logs each edge of PC13, and sleeps between them.
+/// PC13; sleeps in between.
 pub(crate) fn button_exti(machine: &mut Machine) -> Outcome {
     run(machine, 50 * MS)?;
     let mut counts = vec![logged(machine)];
@@ -81,7 +79,7 @@ pub(crate) fn button_exti(machine: &mut Machine) -> Outcome {
     expect(counts.windows(2).all(|pair| pair[1] > pair[0]) && slept > 0.8, "an edge was not seen".to_owned())
 }
 
-/// Three urgencies that interrupt each other: log goes on all the time.
+/// Three nested urgencies log all the time.
 pub(crate) fn multiprio(machine: &mut Machine) -> Outcome {
     let mut counts = Vec::new();
     for second in 1..=10 {

@@ -1,4 +1,4 @@
-//! Examples that the package `stm32f4xx-hal` brings.
+//! Examples of the package `stm32f4xx-hal`.
 
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::machine::Machine;
@@ -6,21 +6,21 @@ use stm32f405_model::time::{MS, Ps, SECOND};
 
 use crate::bench::{Outcome, Tap, changes, expect, expect_pauses, pauses, run, text};
 
-/// Ports by their number less one, and their rates as the sources set them.
+/// Number less one, and rate, by the sources.
 const USART1: usize = 0;
 const USART2: usize = 1;
 const FAST: f64 = 115_200.0;
 const SLOW: f64 = 9_600.0;
-/// The button, to ground, and the LED of most of them.
+/// To ground; the LED of most.
 const BUTTON: Pin = Pin(0, 0);
 const LED: Pin = Pin(2, 13);
 
-/// Echoes six bytes by DMA, both ways with interrupts, then six more by asking; after that nothing.
+/// Six bytes by DMA with interrupts, then six by polling.
 pub(crate) fn serial_dma(machine: &mut Machine) -> Outcome {
     let mut heard = Vec::new();
     for (round, sent) in (1..).zip([b"by DMA", b"by ask", b"no one"]) {
         run(machine, round * 50 * MS)?;
-        // In the second round each byte comes after the one before was taken.
+        // Each byte after the one before was taken.
         machine.send(USART2, sent, round * 50 * MS, FAST);
         run(machine, (round * 50 + 40) * MS)?;
         heard.push(text(&machine.take_sent(USART2)));
@@ -28,8 +28,8 @@ pub(crate) fn serial_dma(machine: &mut Machine) -> Outcome {
     expect(heard == ["by DMA", "by ask", ""], format!("it echoed {heard:?}"))
 }
 
-/// Receives into one of two buffers, by DMA through its FIFO; the line's silence ends it. (Its interrupt never clears
-/// that flag, so the buffers change again and again until the next byte: the choice is chance.)
+/// Into two buffers by DMA through its FIFO, until the line is silent. (Its interrupt never clears that flag: the
+/// buffers change until the next byte, by chance.)
 pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
     const TEXTS: [&[u8]; 3] = [b"the first of them", b"another one", b"a third text, longer than the first"];
     const SRAM: u32 = 0x2000_0000;
@@ -54,8 +54,8 @@ pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
     expect(counts == 0, format!("{counts} overruns"))
 }
 
-/// Sends 0 to 99 by DMA, at the HAL's choice for 3 MHz (16 MHz by four). Then it sends 1 to 100 by the interrupt of
-/// the first, and halts as it takes a buffer twice.
+/// 0 to 99 by DMA, at the HAL's choice for 3 MHz (16 MHz by four). Then 1 to 100 by interrupt; halts as it takes a
+/// buffer twice.
 pub(crate) fn spi_dma(machine: &mut Machine) -> Outcome {
     let tap = Tap::default();
     let heard = tap.0.clone();
@@ -67,7 +67,7 @@ pub(crate) fn spi_dma(machine: &mut Machine) -> Outcome {
     expect(*fastest == 4_000_000, format!("its clock has {fastest} Hz"))
 }
 
-/// Toggles the LED at each press of a button, by EXTI; the pull-up holds it high meanwhile.
+/// By EXTI; the pull-up holds the button high.
 pub(crate) fn rtic_button(machine: &mut Machine) -> Outcome {
     let mut seen = Vec::new();
     for press in 0..5 {
@@ -85,17 +85,17 @@ pub(crate) fn rtic_button(machine: &mut Machine) -> Outcome {
     expect(hz == 100_000_000, format!("it runs at {hz} Hz"))
 }
 
-/// Toggles the LED each second, by a queue of tasks on TIM3's compare and overflow.
+/// By tasks on TIM3's compare and overflow.
 pub(crate) fn rtic_tick(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, LED, 10_500)?;
     expect_pauses(&changes, 1_000, 8)
 }
 
-/// On for one second, off for three, by TIM5 in its one-pulse mode.
+/// TIM5's one-pulse mode.
 pub(crate) fn delay_timer_blinky(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, LED, 17_500)?;
     let pauses = pauses(&changes);
-    // The first change is the pin's becoming an output, at once or with the level.
+    // The pin becomes an output, at once or with the level.
     let good = changes.windows(2).all(|pair| {
         let wanted = if pair[0].1 { 1_000 } else { 3_000 };
         (pair[1].0 - pair[0].0).abs_diff(wanted) <= 2
@@ -103,20 +103,20 @@ pub(crate) fn delay_timer_blinky(machine: &mut Machine) -> Outcome {
     expect(good && pauses.len() >= 7, format!("it changed after {pauses:?} ms"))
 }
 
-/// Toggles the LED each second by TIM2's update.
+/// By TIM2's update.
 pub(crate) fn blinky_timer_irq(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, Pin(0, 5), 8_500)?;
-    // The first one is "off", before the timer begins.
+    // "Off" before the timer begins.
     expect_pauses(&changes[1..], 1_000, 6)
 }
 
-/// The same by `SysTick`, whose 24 bits do not reach a second.
+/// By `SysTick`, whose 24 bits do not reach a second.
 pub(crate) fn delay_syst_blinky(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, Pin(0, 5), 8_500)?;
     expect_pauses(&changes, 1_000, 6)
 }
 
-/// A shell at 115,200 baud, each byte by an interrupt: input is echoed, `status` prints the LED, the button turns it.
+/// 115,200 baud by interrupts: echo, `status` prints the LED, the button turns it.
 pub(crate) fn rtic_usart_shell(machine: &mut Machine) -> Outcome {
     let typed = |machine: &mut Machine, words: &str, at: Ps| -> Result<String, Box<dyn std::error::Error>> {
         for (number, byte) in (0..).zip(words.bytes()) {

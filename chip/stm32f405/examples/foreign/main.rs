@@ -1,6 +1,5 @@
-//! Programs that are not ours, on the model: `foreign FOLDER` runs each file of the folder, and tells whether it did what its source
-//! says, which stands in each judge's text. `cargo xtask prove foreign` builds them from the sources that their packages bring; nothing of
-//! theirs is in this repository.
+//! Foreign programs on the model: `foreign FOLDER` runs each file, and judges it by its source's text. `cargo xtask prove
+//! foreign` builds them from their packages.
 #![allow(clippy::print_stdout, reason = "a program's results")]
 
 mod bench;
@@ -16,7 +15,7 @@ use stm32f405_model::machine::{Board, Machine};
 
 use bench::Outcome;
 
-/// A program's name, the crystal that its source reckons with, and its judge.
+/// Name, crystal, judge.
 type Program = (&'static str, u32, fn(&mut Machine) -> Outcome);
 
 const MHZ: u32 = 1_000_000;
@@ -60,7 +59,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Judges all files of the folder, and gives how many failed.
+/// Returns the failed ones.
 fn judge(folder: &Path) -> std::io::Result<usize> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -81,7 +80,7 @@ fn judge(folder: &Path) -> std::io::Result<usize> {
     Ok(failed)
 }
 
-/// Judges one program, and gives the model's notes.
+/// Returns the model's notes.
 fn one(name: &str, bytes: &[u8]) -> Result<String, Box<dyn std::error::Error>> {
     let Some((_, hse_hz, check)) = PROGRAMS.iter().find(|(known, ..)| *known == name) else {
         return Err("nobody knows what it should do".into());

@@ -1,4 +1,4 @@
-//! The causes of a log's findings. The record of a finding does not name its cause.
+//! The causes of a log's findings.
 
 use std::collections::BTreeMap;
 
@@ -8,13 +8,13 @@ use hums_core::health::{Alarm, Level, root_cause};
 use super::problem::began;
 use crate::source::told::Finding;
 
-/// A check of a part that is not well.
+/// Not well now.
 struct Open<'a> {
     since: Instant,
     level: Level,
     check: &'a str,
     instance: u8,
-    /// Findings of the check without a cause yet.
+    /// Without a cause yet.
     unexplained: Vec<usize>,
 }
 
@@ -24,7 +24,7 @@ impl Open<'_> {
     }
 }
 
-/// The check that explains each finding; `None` without a cause. The findings are in order.
+/// The explaining check; `None` without a cause. Findings are in order.
 pub fn causes(findings: &[Finding]) -> Vec<Option<String>> {
     let mut causes = vec![None; findings.len()];
     let mut open: BTreeMap<(&str, u8), Open<'_>> = BTreeMap::new();
@@ -44,7 +44,7 @@ pub fn causes(findings: &[Finding]) -> Vec<Option<String>> {
         });
         one.level = level;
         one.unexplained.push(place);
-        // Also earlier alarms: the consequence may be seen first.
+        // The consequence may be seen first.
         let since = |one: &Open<'_>| {
             let others = open.values().map(|other| (other.since, other.check));
             began(one.check, one.since, others)
@@ -115,7 +115,7 @@ mod tests {
             finding(20, "ekf_test_ratio", "ok"),
             finding(30, "compass_heading", "warning"),
             finding(32, "clipping", "warning"),
-            // One second after the vehicle came to rest.
+            // A second after rest.
             finding(33, "impact", "critical"),
         ];
         let causes = causes(&findings);

@@ -1,58 +1,55 @@
-//! Whether it was known how many cells the battery has: without that its voltage raises no alarm.
+//! Whether the cell count was known: without it the voltage raises no alarm.
 
 use hums_core::clock::{Instant, Span};
 
 use super::judged::JudgedBy;
 use crate::utc::moment;
 
-/// If a recording begins in the air, the parameters with the cell count come within this time.
+/// After a recording's beginning in the air.
 const CELLS_COME: Span = Span::from_secs(2);
 
-/// The cell count of the main battery, as the recording reports it.
+/// Of the main battery, as reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cells {
-    /// The time in the air without a known cell count: from and to.
+    /// In the air: from and to.
     unknown: Option<(Instant, Instant)>,
-    /// The box reported that it did not know the cell count.
+    /// By the box's report.
     unknown_on_board: bool,
-    /// The box had no store, so it had no count from the last flight.
+    /// No count of the last flight.
     nothing_stored: bool,
 }
 
 impl Cells {
-    /// The box reports an unknown cell count.
     pub(super) const fn told_unknown(&mut self) {
         self.unknown_on_board = true;
     }
 
-    /// The box reported that its store is new.
     pub(super) const fn nothing_stored(&mut self) {
         self.nothing_stored = true;
     }
 
-    /// The vehicle is in the air and the cell count is unknown.
+    /// In the air, cell count unknown.
     pub(super) fn lack(&mut self, now: Instant) {
         let (from, _) = *self.unknown.get_or_insert((now, now));
         self.unknown = Some((from, now));
     }
 
-    /// Start of the time in the air with an unknown cell count, if the voltage raised no alarm for that
-    /// reason.
+    /// If the voltage raised no alarm for that reason.
     pub(super) fn unknown_since(&self, by: JudgedBy) -> Option<Instant> {
         self.unknown.filter(|_| self.are_unknown(by)).map(|(from, _)| from)
     }
 
-    /// Whether no alarm came from the voltage for that.
+    /// No voltage alarm for that reason.
     pub(super) fn are_unknown(&self, by: JudgedBy) -> bool {
         let lasts = || self.unknown.is_some_and(|(from, to)| to.since(from) >= CELLS_COME);
         match by {
-            // The board reports it after a wait; a log may end before.
+            // The board waits before its report; a log may end before.
             JudgedBy::Board => self.unknown_on_board || (self.nothing_stored && lasts()),
             JudgedBy::Here => lasts(),
         }
     }
 
-    /// The remark as a sentence; `None` without one.
+    /// A sentence; `None` without one.
     pub(super) fn words(&self, by: JudgedBy, begins_in_air: bool) -> Option<String> {
         if self.are_unknown(by) {
             let when = self

@@ -9,18 +9,18 @@ use crate::source::recording::Format;
 
 /// A recording, judged.
 pub struct Checked {
-    /// Name of the recording for people.
+    /// For people.
     pub name: String,
     /// Format of the recording.
     pub format: Format,
     /// The judgement.
     pub judged: Judged,
-    /// The evidence of its end, for a HUMS log.
+    /// For a HUMS log.
     pub ending: Option<Ending>,
 }
 
 impl Checked {
-    /// Losses, damage and missing proof of the log.
+    /// Losses, damage, missing proof.
     pub fn soundness(&self) -> Soundness {
         let judged = &self.judged;
         let read = match () {
@@ -32,21 +32,20 @@ impl Checked {
         self.ending.as_ref().map_or(Soundness::Whole, Soundness::of).max(read)
     }
 
-    /// How the run ended for this one.
     pub(super) fn outcome(&self) -> Outcome {
         let wrong = !self.judged.problems.is_empty();
-        // A recording with too little to judge is not damaged: the verdict reports it.
+        // The verdict reports too little to judge; it is no damage.
         let damaged = self.aside().is_none() && self.judged.damages > 0;
         let lossy = damaged || !self.faults().is_empty();
         Outcome::lossy(lossy).and(if wrong { Outcome::Findings } else { Outcome::Done })
     }
 
-    /// Faults of a HUMS log, as parts of sentences: see [`Ending::faults`].
+    /// Parts of sentences: see [`Ending::faults`].
     pub fn faults(&self) -> Vec<String> {
         self.ending.as_ref().map_or_else(Vec::new, Ending::faults)
     }
 
-    /// The kind of recording, if its losses do not count: see [`Ending::aside`].
+    /// If its losses do not count: see [`Ending::aside`].
     pub fn aside(&self) -> Option<String> {
         self.ending.as_ref().and_then(Ending::aside)
     }

@@ -1,48 +1,45 @@
 //! The monitor's time over a recording: it follows the recording's time and stops over each gap.
 //!
-//! The vehicle's state is unknown in a gap. So values do not age over it, debounces do not run, and the gap
-//! does not count as time in the air. After a gap of [`SETTLE`] or longer the checks pause for that time,
-//! until the first values have come.
+//! The vehicle's state is unknown in a gap. So values do not age, debounces do not run, and flight time does not count. After
+//! [`SETTLE`] or more the checks pause that long, for first values.
 
 use hums_core::clock::{Instant, Span};
 use hums_onboard::monitoring::TICK;
 
-/// Pause of the checks after a long gap: messages sent once a second have come again by then.
+/// Messages of once a second have come again.
 pub const SETTLE: Span = Span::from_secs(1);
 
-/// The recording's time and the monitor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
-    /// The recording's time of the next step; `None` before the first.
+    /// Of the next step; `None` before the first.
     next: Option<Instant>,
-    /// By how much the monitor's time is behind the recording's: the sum of the gaps.
+    /// Sum of the gaps.
     behind: Span,
-    /// The recording's time at the end of the latest gap.
+    /// Latest gap's, recording's time.
     gap_end: Instant,
-    /// The monitor's latest time.
+    /// Latest, monitor's time.
     reached: Instant,
 }
 
 impl Clock {
-    /// The recording's time of the next step. The first step is at `at` or up to one step later.
+    /// The first step is at `at` or up to one step later.
     pub(super) fn begin(&mut self, at: Instant) -> Instant {
         *self.next.get_or_insert(whole(at))
     }
 
-    /// The next step up to a time of the recording, if there is one more.
+    /// `None`: no step up to this time.
     pub(super) fn step(&mut self, to: Instant) -> Option<Instant> {
         let now = self.next.filter(|next| *next <= to)?;
         self.next = Some(now + TICK);
         Some(now)
     }
 
-    /// The next step is at this time, if that is later: both times go on.
+    /// If that is later; both times go on.
     pub(super) fn skip_to(&mut self, at: Instant) {
         self.next = self.next.max(Some(whole(at)));
     }
 
-    /// The recording has a gap between these two times, so the monitor's time stops. The time before it was
-    /// already stepped.
+    /// The monitor's time stops; the time before was stepped.
     pub(super) fn pause(&mut self, from: Instant, to: Instant) {
         let length = to.since(from.max(self.gap_end));
         let Some(next) = self.next.filter(|_| length > Span::ZERO) else { return };
@@ -51,37 +48,33 @@ impl Clock {
         self.next = Some(next.max(whole(to + if length >= SETTLE { SETTLE } else { TICK })));
     }
 
-    /// The monitor's time now.
     pub(super) const fn now(&self) -> Instant {
         self.reached
     }
 
-    /// The monitor's time at a time of the recording; it never falls.
+    /// Never falls.
     pub(super) fn monitor(&mut self, at: Instant) -> Instant {
         let behind = Instant::from_micros(at.as_micros().saturating_sub(self.behind.as_micros()));
         self.reached = self.reached.max(behind);
         self.reached
     }
 
-    /// The recording's time at the end of the latest gap.
     pub(super) const fn gap_end(&self) -> Instant {
         self.gap_end
     }
 
-    /// By how much the monitor's time is behind the recording's: the sum of the gaps until now.
+    /// Sum of the gaps until now.
     pub(super) const fn behind(&self) -> Span {
         self.behind
     }
 
-    /// The recording's time of an earlier time of the monitor, seen from `now` of the recording, which is `steps` of the
-    /// monitor. Gaps between the two are not counted.
+    /// `now` of the recording is `steps` of the monitor; gaps since are not counted.
     pub(super) fn recording(now: Instant, steps: Instant, earlier: Instant) -> Instant {
         Instant::from_micros(now.as_micros().saturating_sub(steps.since(earlier).as_micros()))
     }
 }
 
-/// The first whole step at a time or after it. Steps are at the same times whatever message a recording begins with, and
-/// whatever is damaged in it.
+/// At this time or after it. Whatever message a recording begins with.
 fn whole(at: Instant) -> Instant {
     Instant::from_micros(at.as_micros().div_ceil(TICK.as_micros()).saturating_mul(TICK.as_micros()))
 }

@@ -1,4 +1,4 @@
-//! Which checks had something to judge in a recording, and why the others had not.
+//! Judged checks, and why the others were not.
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -12,35 +12,30 @@ use super::judged::JudgedBy;
 use super::problem::Problem;
 use crate::counters::tells_flight;
 
-/// Checks of a receiver that the monitor leaves alone until the receiver has had a fix.
+/// Not judged until a receiver has had a fix.
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
-/// The check of a cell's voltage.
 const CELL_VOLTAGE: &str = "cell_voltage";
-/// Why checks of earlier flights and of worn parts are not judged.
+/// Of checks of earlier flights and worn parts.
 const UNTOLD: &str = "only earlier flights (--past) or a monitor on board tell";
-/// Why a check without a limit is not judged.
+/// Of checks without a limit.
 pub(super) const OFF: &str = "its limit is off";
-/// Period of the notes.
+/// Between notes.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
-/// Data that a check had to judge.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// It had a value.
     value: bool,
-    /// It had a level.
     level: bool,
 }
 
-/// Data that each check had to judge.
 #[derive(Debug)]
 pub(super) struct Coverage {
-    /// In the order of the checks.
+    /// By check.
     seen: Vec<Seen>,
     next: Instant,
 }
 
-/// Checks that had something to judge, and those that had not, with the reason.
+/// Judged ones; the others with the reason.
 pub(super) type Lists = (Vec<&'static str>, Vec<(&'static str, String)>);
 
 impl Coverage {
@@ -49,7 +44,7 @@ impl Coverage {
         Self { seen: vec![Seen::default(); VOCABULARY.len()], next: Instant::ZERO }
     }
 
-    /// Notes which checks have a value, and which have a level, now and then; `steps` is the monitor's own time.
+    /// Values and levels, now and then; `steps`: monitor's time.
     pub(super) fn note(
         &mut self,
         now: Instant,
@@ -76,8 +71,7 @@ impl Coverage {
         }
     }
 
-    /// Which checks had something to judge, and why the others had not. Checks that are made for another autopilot are in neither
-    /// list.
+    /// Checks for another autopilot are in neither list.
     pub(super) fn lists(&self, recording: &Recording<'_>) -> Lists {
         let (mut judged, mut not_judged) = (Vec::new(), Vec::new());
         let had_fix = checks().zip(&self.seen).any(|(check, seen)| check.name == "gps_fix" && seen.value);
@@ -95,18 +89,18 @@ impl Coverage {
     }
 }
 
-/// Facts about a recording at its end.
+/// At its end.
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
-    /// The recording was received over a link.
+    /// Received over a link.
     pub(super) is_of_link: bool,
-    /// The recording was taken on the monitor's own wire.
+    /// On the monitor's own wire.
     pub(super) on_the_wire: bool,
     /// Time armed.
     pub(super) armed: Span,
-    /// Why the arming state is unknown, if the recording does not report it.
+    /// If not reported.
     pub(super) arming: Option<&'a str>,
     /// It was in the air.
     pub(super) flew: bool,
@@ -119,7 +113,7 @@ pub(super) struct Recording<'a> {
 enum Verdict {
     Judged,
     NotJudged(String),
-    /// The check is for another autopilot, or for parts that are not registered.
+    /// Another autopilot's, or of parts that are not registered.
     NotMeant,
 }
 
@@ -131,7 +125,7 @@ impl Recording<'_> {
         let is_found = self.problems.iter().any(|problem| problem.check == check.name);
         if self.by == JudgedBy::Board && matches!(words.scope, Scope::Wire | Scope::Recorder | Scope::Stored)
         {
-            // The board had its own wire and card; its store is not in the log.
+            // The store is not in the log.
             return if words.scope == Scope::Stored && !seen.level {
                 Verdict::NotMeant
             } else {
@@ -139,7 +133,7 @@ impl Recording<'_> {
             };
         }
         match words.scope {
-            // An autopilot without alerts is neither good nor bad.
+            // Without alerts neither good nor bad.
             Scope::Said if is_found => return Verdict::Judged,
             Scope::Said => return Verdict::NotMeant,
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
@@ -165,7 +159,7 @@ impl Recording<'_> {
             if self.cells_unknown {
                 return not("how many cells the battery has is not known");
             }
-            // The box had it of its last flight.
+            // Stored by the box.
             if self.by == JudgedBy::Board && self.monitor.lacks_cells() {
                 return Verdict::Judged;
             }
@@ -189,7 +183,7 @@ impl Recording<'_> {
         }
     }
 
-    /// A receiver that never had a fix is not judged: it may not be in use. It is named.
+    /// Never had a fix: perhaps not in use, but named.
     fn why_no_fix(&self, needs: &str) -> String {
         let told = |gnss: &Gnss| gnss.satellites.is_some() || gnss.fix > 0;
         let receivers = self.monitor.vehicle().gnss.iter().zip(1_u8..);
@@ -202,7 +196,7 @@ impl Recording<'_> {
     }
 }
 
-/// Whether the limits are at the ends of their range, so that no value can cross them.
+/// At the ends of their range.
 fn is_off(check: &Check, params: &Params) -> bool {
     let off = |param: Param| {
         let (limit, spec) = (params.get(param), param.spec());

@@ -1,5 +1,4 @@
-//! Names for the parts of a check: which failsafe, which sensor. The monitor counts and compares; names are
-//! for people.
+//! Names of parts: which failsafe, which sensor.
 
 use std::collections::BTreeSet;
 
@@ -19,14 +18,12 @@ use crate::source::told::Finding;
 use crate::states;
 use crate::utc::moment;
 
-/// The check of the autopilot's own state.
 pub(super) const FAILSAFE: &str = "autopilot_state";
 
-/// The check of a GPS receiver's speed against its positions.
 const GPS_SPEED: &str = "gps_speed";
-/// A position so far from where the speed leads is a jump, m: more than a receiver strays in its seconds.
+/// m from where the speed leads: more than a receiver strays.
 const JUMP_M: f64 = 10.0;
-/// Fixes further apart are not compared. A jump is named up to this long before its finding.
+/// Between compared fixes, and from a jump to its finding.
 const NEAR: Span = Span::from_secs(20);
 
 /// The present states.
@@ -34,48 +31,48 @@ const NEAR: Span = Span::from_secs(20);
 pub(super) struct Details {
     failsafes: String,
     sensors: u32,
-    /// The sensors that the estimator's flags reject.
+    /// By the estimator's flags.
     doubted: Option<Causes>,
-    /// The autopilot's last text about each cause, and its time.
+    /// Last text by cause, with its time.
     said: [Option<(Instant, String)>; Cause::COUNT],
-    /// The last position of the first GPS receiver.
+    /// Of the first receiver.
     fix: Option<(Instant, Position)>,
-    /// The last jump of that, in metres, and its time.
+    /// Metres, and when.
     jump: Option<(Instant, f64)>,
-    /// Batteries that are followed, in the order in which they came: component and id.
+    /// In order of appearance: component and id.
     batteries: Vec<(u8, u8)>,
-    /// Those beyond them, up to [`BEYOND_MAX`].
+    /// Up to [`BEYOND_MAX`].
     beyond: BTreeSet<(u8, u8)>,
-    /// Autopilots in the order in which they came.
+    /// In order of appearance.
     autopilots: Vec<Heard>,
-    /// Remarks on the recordings before a joint.
+    /// Before a joint.
     earlier: Vec<String>,
-    /// The autopilots of those.
+    /// Before a joint.
     others: Vec<Heard>,
 }
 
-/// An autopilot that was received, as far as autopilots can be distinguished.
+/// Distinguishable by these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Heard {
     system: u8,
     /// `MAV_AUTOPILOT`
     autopilot: u8,
-    /// Its unique id, once reported.
+    /// Once reported.
     uid: u64,
 }
 
-/// `MAV_AUTOPILOT_INVALID`: the sender is not an autopilot.
+/// Not an autopilot.
 const NO_AUTOPILOT: u8 = 8;
 
-/// Maximum number of distinguished autopilots.
+/// Distinguished autopilots.
 const TOLD_APART_MAX: usize = 32;
-/// Maximum number of distinguished further batteries, beyond the followed ones: `ArduPilot` has 16.
+/// Beyond the followed ones: `ArduPilot` has 16.
 const BEYOND_MAX: usize = 1_024;
 
 impl Details {
-    /// Another recording begins; of the one before, this system was judged.
+    /// `judged`: the system of the one before.
     pub(super) fn begin_another(&mut self, judged: Option<u8>) {
-        /// Sentences that are kept.
+        /// Kept sentences.
         const KEPT_MAX: usize = 8;
         let mut earlier = self.of_parts(judged);
         earlier.truncate(KEPT_MAX);
@@ -83,8 +80,7 @@ impl Details {
         *self = Self { earlier, others, ..Self::default() };
     }
 
-    /// The autopilots of all recordings of a file, each once: an autopilot may report its identity in only
-    /// one of them.
+    /// Each once: the identity may be in one recording only.
     fn all_autopilots(&self) -> Vec<Heard> {
         let mut all = self.others.clone();
         for heard in &self.autopilots {
@@ -101,12 +97,12 @@ impl Details {
         all
     }
 
-    /// These failsafes are in force from here on.
+    /// In force from here on.
     pub(super) fn failsafes(&mut self, words: &str) {
         words.clone_into(&mut self.failsafes);
     }
 
-    /// Takes the vehicle's report of unhealthy sensors.
+    /// Reported as unhealthy.
     pub(super) fn sensors(&mut self, status: &SystemStatus) -> bool {
         let unhealthy = status.sensors.map(|sensors| sensors.unhealthy | sensors.lost);
         let is_new = unhealthy.filter(|unhealthy| *unhealthy != self.sensors);
@@ -114,13 +110,13 @@ impl Details {
         is_new.is_some()
     }
 
-    /// The estimator's flags name the sensors that it rejects.
+    /// Rejected by the estimator.
     pub(super) fn estimator(&mut self, estimator: &Estimator) -> bool {
         let doubted = Some(of_estimator(estimator, true, true));
         core::mem::replace(&mut self.doubted, doubted) != doubted
     }
 
-    /// Takes a text with an alert, or with its end; `false` for the latter.
+    /// `false` for an alert's end.
     pub(super) fn said(&mut self, at: Instant, alert: Alert, words: String) -> bool {
         let is_wrong = alert.urgency > Urgency::Over;
         if let Some(said) = self.said.get_mut(alert.cause as usize).filter(|_| is_wrong) {
@@ -129,7 +125,7 @@ impl Details {
         is_wrong
     }
 
-    /// A GPS receiver reports its position and speed.
+    /// With position and speed.
     pub(super) fn gnss(&mut self, at: Instant, gnss: &Gnss) {
         let Some(position) = gnss.position.filter(|_| gnss.instance == 0 && gnss.fix >= 3) else { return };
         let before = self.fix.replace((at, position)).filter(|(then, _)| at.since(*then) <= NEAR);
@@ -143,7 +139,6 @@ impl Details {
         }
     }
 
-    /// An autopilot reports its type.
     pub(super) fn heartbeat(&mut self, source: Source, heartbeat: &Heartbeat) {
         let (system, autopilot) = (source.system, heartbeat.autopilot_number);
         let is_new =
@@ -153,7 +148,6 @@ impl Details {
         }
     }
 
-    /// An autopilot reports its identity.
     pub(super) fn identity(&mut self, source: Source, identity: &AutopilotIdentity) {
         let uid = identity.uid;
         let mut same = self.autopilots.iter_mut().filter(|known| known.system == source.system).rev();
@@ -172,13 +166,13 @@ impl Details {
         }
     }
 
-    /// The systems whose autopilot sent heartbeats, each once.
+    /// By heartbeats, each once.
     pub(super) fn systems(&self) -> Vec<u8> {
         let systems: BTreeSet<u8> = self.autopilots.iter().map(|heard| heard.system).collect();
         systems.into_iter().collect()
     }
 
-    /// The remark on a recording of several vehicles: joined files, or a ground station of several.
+    /// Joined files, or a ground station of several vehicles.
     fn vehicles(&self, judged: Option<u8>) -> Option<String> {
         let first = self.autopilots.first()?;
         let how = match judged.filter(|_| self.autopilots.iter().any(|heard| heard.system != first.system)) {
@@ -192,7 +186,6 @@ impl Details {
             .then(|| format!("more than one vehicle is in it: {}; {how}", named(&self.autopilots)))
     }
 
-    /// The remark on joined recordings of different vehicles.
     fn vehicles_of_parts(&self) -> Option<String> {
         let all = self.all_autopilots();
         let is_new = self.autopilots.len() < 2 && !self.others.is_empty() && all.len() > 1;
@@ -202,7 +195,6 @@ impl Details {
         })
     }
 
-    /// A battery reports itself.
     pub(super) fn battery(&mut self, source: Source, id: u8) {
         let battery = (source.component, id);
         if self.batteries.contains(&battery) {
@@ -215,12 +207,11 @@ impl Details {
         }
     }
 
-    /// Further remarks on the vehicles, with the judged system, and on parts beyond the monitor's room.
+    /// On vehicles, and parts beyond the monitor's room.
     pub(super) fn remarks(&self, judged: Option<u8>) -> Vec<String> {
         self.of_parts(judged).into_iter().chain(self.vehicles_of_parts()).collect()
     }
 
-    /// The same of each recording of a file.
     fn of_parts(&self, judged: Option<u8>) -> Vec<String> {
         let mut remarks = self.earlier.clone();
         let new = self.vehicles(judged).into_iter().chain(not_followed(&self.beyond));
@@ -232,7 +223,7 @@ impl Details {
         remarks
     }
 
-    /// The cause of the autopilot's alert: its recent texts, and the sensors that it reports as unhealthy.
+    /// By recent texts and unhealthy sensors.
     fn tell_alert(&self, check: &str, problems: &mut Problems) {
         let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.name() == check) else { return };
         let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);
@@ -256,7 +247,7 @@ impl Details {
         }
     }
 
-    /// A check has changed its level or its part.
+    /// Changed its level or part.
     pub(super) fn tell(&self, check: &str, problems: &mut Problems) {
         if !problems.is_open(check) {
             return;
@@ -279,7 +270,7 @@ impl Details {
     }
 }
 
-/// The way between two places, m, on a sphere.
+/// m on a sphere.
 fn distance_m(one: Position, other: Position) -> f64 {
     const METRES_A_DEGREE: f64 = 111_195.0;
     let north = other.latitude_deg - one.latitude_deg;
@@ -287,9 +278,9 @@ fn distance_m(one: Position, other: Position) -> f64 {
     north.hypot(east * one.latitude_deg.to_radians().cos()) * METRES_A_DEGREE
 }
 
-/// That these batteries are not judged, as one sentence: `batteries 5 to 256 are not judged`.
+/// `batteries 5 to 256 are not judged`.
 fn not_followed(beyond: &BTreeSet<(u8, u8)>) -> Option<String> {
-    /// Ranges that are named.
+    /// Named ranges.
     const NAMED_MAX: usize = 8;
     let mut ranges: Vec<(u8, u16, u16)> = Vec::new();
     for (component, id) in beyond {
@@ -323,13 +314,12 @@ fn named(autopilots: &[Heard]) -> String {
     autopilots.iter().map(words).collect::<Vec<_>>().join(", ")
 }
 
-/// What an autopilot's log reports in words of its own: the check, and the value that the report stands for.
+/// The check, and the report's value.
 pub(super) const EMERGENCY: (&str, f32) = (FAILSAFE, 6.0); // MAV_STATE_EMERGENCY
-/// A restart of the autopilot after a fault of its processor.
+/// After a processor's fault.
 pub(super) const PROCESSOR_FAULT: (&str, f32) = ("processor_alert", Urgency::Critical as u8 as f32);
 
-/// The two findings of a critical report that is over at once: its begin and its end. None if the limit is above it.
-/// The monitor's debounce would miss such a short state.
+/// Begin and end of a report that is over at once; `None` below the limit. The debounce would miss it.
 pub(super) fn reported(at: Instant, (name, value): (&str, f32), params: &Params) -> Vec<Finding> {
     let limited = |check: &'static Check| Some((check, params.get(check.limits.critical?)));
     let found = checks().find(|check| check.name == name).and_then(limited);
@@ -386,7 +376,7 @@ mod tests {
         let subsystem = hums_core::health::Subsystem::Navigation;
         let finding = Finding { subsystem, check: check.to_owned(), ..change(0, Level::Warning, 1.0) };
         problems.take(&finding, hums_core::clock::Span::ZERO);
-        // Attitude and position; with PX4's glitch bit.
+        // With PX4's glitch bit.
         let estimator = |flags| Estimator { scale: EstimatorScale::TestRatio, flags, ..Estimator::default() };
         assert!(details.estimator(&estimator(0b1_1001)));
         details.tell(check, &mut problems);

@@ -1,4 +1,4 @@
-//! The flights of a recording: from take-off to landing, or to a mishap.
+//! Flights, to a landing or a mishap.
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -14,83 +14,79 @@ use crate::source::told::Finding;
 pub struct Flight {
     /// Take-off.
     pub from: Instant,
-    /// When it was in the air last.
+    /// Last time in the air.
     pub to: Instant,
-    /// Time in the air, without the stops on the ground and without the gaps of the recording.
+    /// Without stops and gaps.
     pub air: Span,
-    /// The vehicle was seen on the ground before. Otherwise it was first received in the air, and the start
-    /// of the flight is unknown.
+    /// Seen on the ground before; otherwise the start is unknown.
     pub took_off: bool,
     /// It landed.
     pub landed: bool,
-    /// It was disarmed in the air, at this height above home, m.
+    /// m above home, if disarmed in the air.
     pub disarmed_at_m: Option<f32>,
-    /// A mishap ended it: when the vehicle was down, or hit something.
+    /// Ended it.
     pub mishap: Option<Mishap>,
 }
 
-/// How a mishap ended a flight.
+/// How it ended a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mishap {
-    /// When it hit something first, or was down.
+    /// First hit, or when down.
     pub at: Instant,
     /// It hit something.
     pub is_impact: bool,
-    /// The last time the vehicle was received before a mishap in a radio gap.
+    /// Last reception, for a radio gap.
     pub unheard_from: Option<Instant>,
 }
 
-/// Flights as they come, up to [`LISTED_MAX`].
+/// Up to [`LISTED_MAX`].
 #[derive(Debug, Default)]
 pub(super) struct Flights {
     list: Vec<Flight>,
-    /// The last of them goes on.
+    /// The last goes on.
     open: bool,
-    /// The flight that ends next ends by a mishap.
+    /// The next end is a mishap.
     crashed: bool,
-    /// The recording was silent in it, and the vehicle has not been seen to fly since.
+    /// Silence; not seen to fly since.
     unseen: bool,
     silence: Option<Silence>,
-    /// Time since a possible landing: flight, if the flight goes on.
+    /// Since a possible landing; flight if it goes on.
     landing: Span,
-    /// The monitor's time of the last step.
+    /// Last step, monitor's time.
     stepped_at: Option<Instant>,
 }
 
-/// The vehicle was silent, and is not known to be still on its flight.
+/// Not known to be still on its flight.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
-    /// End of the flight when the vehicle was last received.
+    /// The flight's end, when last received.
     to: Instant,
     air: Span,
-    /// Time at which the vehicle was received again.
+    /// Received again.
     heard_since: Option<Instant>,
 }
 
-/// The longest time between two steps, also after a gap of the recording ([`SETTLE`]). The rest of a longer
-/// silence was left out.
+/// Between steps, also after a gap ([`SETTLE`]); longer silences are left out.
 const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
-/// The longest delay of an impact's finding: the vehicle must lie still first.
+/// Of an impact's finding: the vehicle must lie still.
 const FOUND_LATE: Span = Span::from_secs(5);
-/// Without a heartbeat for this long a vehicle is silent.
+/// Without a heartbeat.
 const SILENT: Span = Span::from_secs(5);
-/// A vehicle received in the air for this long is still on its flight: longer than a landing takes to be
-/// seen.
+/// In the air this long it is still on its flight: longer than a landing takes to be seen.
 const STILL_FLIES: Span = Span::from_secs(3);
 
 impl Flight {
-    /// When a mishap ended it in which it hit something, or in which it did not, in seconds.
+    /// Seconds; with an impact, or without.
     pub fn mishap_s(&self, is_impact: bool) -> Option<f64> {
         self.mishap.filter(|mishap| mishap.is_impact == is_impact).map(|mishap| mishap.at.as_secs_f64())
     }
 
-    /// Last time the vehicle was received before a mishap in a radio gap, in seconds.
+    /// Last reception before a radio gap's mishap.
     pub fn unheard_s(&self) -> Option<f64> {
         Some(self.mishap?.unheard_from?.as_secs_f64())
     }
 
-    /// Moves the impact that ended the flight to the time of the box's finding. Such an impact is reported
-    /// once.
+    /// Moves the flight's impact to the box's finding: one report.
     pub(super) fn was_hit<'a>(&mut self, mut found: impl Iterator<Item = &'a Finding>) {
         if let Some(Mishap { at, is_impact: true, .. }) = &mut self.mishap
             && let Some(finding) =
@@ -101,19 +97,19 @@ impl Flight {
     }
 }
 
-/// Whether the vehicle was first received in the air.
+/// First received in the air.
 pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
     flights.first().is_some_and(|flight| !flight.took_off)
 }
 
-/// Whether an open flight is in the air. A vehicle disarmed in the air still counts while it may fall.
+/// A disarmed vehicle counts while it may fall.
 pub(super) fn is_in_air(monitor: &Monitor) -> bool {
     let falls = || monitor.flight().is_open() && monitor.flight().is_unloaded();
     (monitor.flight().airborne() && monitor.vehicle().armed()) || monitor.flight().is_watched() || falls()
 }
 
 impl Flights {
-    /// The vehicle took off, or is seen to be in the air.
+    /// Or seen in the air.
     pub(super) fn take_off(&mut self, now: Instant, from: Instant, took_off: bool) {
         self.open = self.list.len() < LISTED_MAX;
         if self.open {
@@ -130,8 +126,8 @@ impl Flights {
         }
     }
 
-    /// The monitor made a step at `steps` of its own time, this long after the vehicle's last heartbeat.
-    /// Silence counts as flight once the vehicle is received again and still flies.
+    /// `steps`: monitor's time; silence since the last heartbeat. It is flight once the vehicle is received and still
+    /// flies.
     pub(super) fn step(&mut self, now: Instant, steps: Instant, since_heard: Span, monitor: &Monitor) {
         let passed = self.stepped_at.replace(steps).map_or(Span::ZERO, |before| steps.since(before));
         let Some(flight) = self.list.last_mut().filter(|_| self.open) else { return };
@@ -162,7 +158,7 @@ impl Flights {
         }
     }
 
-    /// Ends the flight. A silence counts only if the vehicle was seen to fly after it.
+    /// A silence counts only if a flight was seen after it.
     fn close(&mut self) {
         if let (Some(flight), Some(silence)) =
             (self.list.last_mut().filter(|_| self.open), self.silence.take())
@@ -172,12 +168,12 @@ impl Flights {
         (self.open, self.unseen, self.silence, self.landing) = (false, false, None, Span::ZERO);
     }
 
-    /// Which of the flights goes on.
+    /// Index.
     pub(super) fn going_on(&self) -> Option<usize> {
         self.list.len().checked_sub(1).filter(|_| self.open)
     }
 
-    /// The flight is over: it is back on the ground, or disarmed, or a mishap ended it.
+    /// On the ground, disarmed, or a mishap.
     pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);
         if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
@@ -186,19 +182,19 @@ impl Flights {
         self.close();
     }
 
-    /// Nobody knows whether it was disarmed in the air.
+    /// Unknown if in the air.
     pub(super) fn forget_disarming(&mut self) {
         for flight in &mut self.list {
             flight.disarmed_at_m = None;
         }
     }
 
-    /// The recording was silent. The landing is unknown until the vehicle is seen to fly on.
+    /// The landing is unknown until it flies on.
     pub(super) fn silent(&mut self, is_unseen: bool) {
         self.unseen = self.open && is_unseen;
     }
 
-    /// A mishap began or ended.
+    /// Began or ended.
     pub(super) fn mishap(
         &mut self,
         change: Change,
@@ -229,7 +225,7 @@ impl Flights {
         }
     }
 
-    /// The last flight ended in a silence that began then, by a mishap: it was no landing that was seen after it.
+    /// In the silence since then: no landing.
     pub(super) fn came_down(&mut self, at: Instant, is_impact: bool, from: Instant) {
         self.close();
         if let Some(flight) = self.list.last_mut() {
@@ -238,17 +234,16 @@ impl Flights {
         }
     }
 
-    /// A recording has ended, and perhaps another one begins.
+    /// Another may begin.
     pub(super) fn end_of_recording(&mut self, monitor: &Monitor) {
         if !is_in_air(monitor) {
-            // The vehicle is on the ground and still armed: the recording ends, and so does the flight.
+            // Still armed on the ground: the flight ends.
             self.landing();
         }
-        // The end of the flight was not seen.
         self.break_off();
     }
 
-    /// Another vehicle follows: the flight ended when this one was last received.
+    /// The flight ended at the last reception.
     pub(super) fn break_off(&mut self) {
         self.close();
         self.crashed = false;
@@ -256,7 +251,7 @@ impl Flights {
 
     pub(super) fn end(mut self, monitor: &Monitor) -> Vec<Flight> {
         self.end_of_recording(monitor);
-        // Its fall may go on after the recording.
+        // May go on after the recording.
         for flight in self.list.iter_mut().filter(|flight| flight.disarmed_at_m.is_some()) {
             flight.landed = false;
         }

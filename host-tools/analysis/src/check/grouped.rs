@@ -1,5 +1,4 @@
-//! Problems in the order in which people read them: parts of one check together, effects under their cause,
-//! the worst first.
+//! Problems for people: one check together, effects under their cause, the worst first.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -8,24 +7,24 @@ use hums_core::health::Level;
 
 use super::problem::{Problem, mishaps};
 
-/// A cause with its effects.
+/// With its effects.
 #[derive(Debug)]
 pub struct Group<'a> {
-    /// Problems of one check and one level, which differ only in the part; at least one.
+    /// One check and level; at least one.
     pub members: Vec<&'a Problem>,
-    /// The effects: the problems of each check and level, in order of time.
+    /// By check and level, in order of time.
     pub effects: Vec<Vec<&'a Problem>>,
-    /// The cause is a warning, and one of its effects became critical.
+    /// A warning with a critical effect.
     pub is_raised: bool,
 }
 
 impl<'a> Group<'a> {
-    /// The first of its problems.
+    /// Its first problem.
     pub fn first(&self) -> Option<&'a Problem> {
         self.members.first().copied()
     }
 
-    /// Whether the cause or an effect is critical.
+    /// The cause, or an effect.
     pub fn is_critical(&self) -> bool {
         self.is_raised || is_critical(&self.members)
     }
@@ -59,7 +58,7 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
         let leads = group.first().is_some_and(|problem| problem.leads_to(&mishaps));
         (Reverse(group.is_critical() || leads), group.first().map(|problem| problem.order(&mishaps)))
     });
-    // Only the first group of a check keeps the effects.
+    // The first group keeps the effects.
     let mut seen = BTreeSet::new();
     for group in &mut groups {
         if !seen.insert(check_of(&group.members)) {
@@ -69,18 +68,16 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
     groups
 }
 
-/// All of a check and level have one level.
+/// They have one level.
 pub(super) fn is_critical(problems: &[&Problem]) -> bool {
     problems.first().is_some_and(|first| first.level == Level::Critical)
 }
 
-/// The check of problems that are alike.
 fn check_of<'a>(alike: &[&'a Problem]) -> &'a str {
     alike.first().map_or("", |problem| &problem.check)
 }
 
-/// The check that explains all of these alike problems and has no cause itself; `None` if there is none in
-/// the list.
+/// Explains all and has no cause; `None` if not listed.
 fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
     let explains = |one: &[&'a Problem]| {
         let cause = one.first()?.because.as_deref()?;
@@ -88,7 +85,7 @@ fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
         all.iter().find(|other| of_all && check_of(other) == cause)
     };
     let mut cause = explains(one)?;
-    // No more steps than there are: a circle has no beginning.
+    // A circle has no beginning.
     for _ in all {
         match explains(cause) {
             Some(deeper) => cause = deeper,
@@ -98,7 +95,7 @@ fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
     None
 }
 
-/// Problems of one check and level together; in the order of the first of each.
+/// By check and level, in order of the first.
 fn alike(problems: &[Problem]) -> Vec<Vec<&Problem>> {
     let mut alike: Vec<Vec<&Problem>> = Vec::new();
     for problem in problems {

@@ -1,4 +1,4 @@
-//! `hums check --json`: one object a line for each log. Its names are a contract: `docs/check.md`.
+//! `hums check --json`: an object a line. Its names are a contract: `docs/check.md`.
 
 use hums_core::clock::Instant;
 use serde::Serialize;
@@ -14,7 +14,7 @@ use crate::source::told::Finding;
 use crate::states;
 use crate::utc::iso8601;
 
-/// The version of the object: it rises when a name goes or changes its meaning, not when one is added.
+/// Rises when a name goes or changes its meaning.
 const VERSION: u32 = 1;
 
 #[derive(Serialize)]
@@ -185,7 +185,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
     })
 }
 
-/// The object of a log that could not be read.
+/// Of an unreadable log.
 pub fn error(log: &str, error: &anyhow::Error) -> String {
     let object = ErrorJson { schema: SCHEMA, version: VERSION, log, error: format!("{error:#}") };
     serde_json::to_string(&object).unwrap_or_default()

@@ -1,9 +1,7 @@
-//! The board's monitor over a recording: the same checks, the same limits, the recording's own time.
+//! The board's monitor over a recording, stepped every 50 ms of its time.
 //!
-//! The monitor is stepped every 50 ms of the recording's time, at any sample rate: debounce and staleness
-//! follow the clock, not the number of samples. After a silence of `SILENCE_MAX` all values are stale and all
-//! debounces have run out, so the rest of the silence is left out. A gap of the recording is not a silence of
-//! the vehicle: the monitor's time stops over it (`super::clock`).
+//! So debounce and staleness follow the clock. The rest of a silence after `SILENCE_MAX` changes nothing, and is left out. A
+//! gap is not a silence: the monitor's time stops (`super::clock`).
 
 use std::collections::BTreeMap;
 
@@ -40,93 +38,92 @@ use crate::source::repairs::Repairs;
 use crate::source::told::{Finding, Told};
 use crate::summary::EndsInAir;
 
-/// Silence that is stepped through: longer than each debounce and each time after which a value is stale.
+/// Longer than each debounce and stale time.
 const SILENCE_MAX: Span = Span::from_secs(75);
 
-/// A silence of an armed vehicle is reported after this time: three heartbeats of a link, ...
+/// Reported after three heartbeats of a link ...
 const SILENT: Span = Span::from_secs(3);
-/// ... and for the autopilot's own log, whose slowest topics come once a second.
+/// ... and for an autopilot's log, with topics once a second.
 const NOT_WRITTEN: Span = Span::from_secs(2);
-/// A longer silence of a vehicle armed on the ground may hide a flight.
+/// Armed on the ground: may hide a flight.
 const HIDES_FLIGHT: Span = Span::from_secs(10);
-/// A vehicle in flight is seen to fly this long after the silence: longer than a landing takes to be seen.
+/// After a silence: longer than a landing takes to be seen.
 const SEEN: Span = Span::from_secs(3);
 
-/// The check of disarming in the air.
 const DISARMED: &str = "disarmed_in_air";
 
-/// The place at which a recording was received.
+/// Place of reception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heard {
-    /// Unknown place: checks of the wire are not judged.
+    /// Checks of the wire are not judged.
     #[default]
     Somewhere,
-    /// At the monitor's own place, the autopilot's telemetry port: silence and lost frames are those of its wire.
+    /// The telemetry port: silence and lost frames are the wire's.
     OnTheWire,
 }
 
-/// The source of each limit.
+/// Source of each limit.
 #[derive(Clone, Debug, Default)]
 pub struct Limits {
     params: Params,
-    /// Names that the user gave: they override the log's own values.
+    /// The user's, before the log's own.
     given: Vec<&'static str>,
 }
 
 impl Limits {
-    /// Limits given by the user. All others are the defaults, or the values in a HUMS log.
+    /// The user's limits; others are defaults, or a HUMS log's.
     pub fn new(given: &[(&'static hums_core::params::ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
-            // Name and range were checked when the file was read.
+            // Checked when read.
             let _ = limits.params.set(spec.name, *value);
             limits.given.push(spec.name);
         }
         limits
     }
 
-    /// Whether they are others than those that a log was judged with on board.
+    /// Others than on board.
     fn is_given(&self) -> bool {
         !self.given.is_empty()
     }
 }
 
-/// When the vehicle was last received, and whether it was in the air.
+/// And whether it was in the air.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     at: Instant,
     airborne: bool,
 }
 
-/// A silence whose meaning is still open.
+/// Its meaning is open.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
     to: Instant,
     airborne: bool,
-    /// Which of the gaps it is.
+    /// Index of the gap.
     gap: usize,
 }
 
-/// Judges a recording, item by item.
+/// Item by item.
 pub struct Judge {
     monitor: Box<Monitor>,
-    /// The monitor at the end of the last part of the file with an autopilot.
+    /// Of the file's last part with an autopilot.
     earlier: Option<Box<Monitor>>,
     limits: Limits,
     format: Format,
-    /// Sequence numbers of the frames, if the recording was taken on the monitor's wire.
+    /// On the monitor's wire.
     wire: Option<Sequences>,
     clock: Clock,
     first: Option<Instant>,
     last: Instant,
-    /// The last record of a box, which also writes during a silence of the vehicle.
+    /// A box also writes during a silence.
     recorded_to: Instant,
     last_heard: Option<Last>,
     silence: Option<Silence>,
     link_loss: LinkLoss,
     repairs: Repairs,
     coverage: Coverage,
-    /// Problems found by the monitor here and by the one on board.
+    /// Here, and on board.
     here: Problems,
     board: Problems,
     checked_on_board: bool,
@@ -141,15 +138,15 @@ pub struct Judge {
     damages: u64,
     losses: u64,
     restarts: u64,
-    /// When the clock began again: as many as are listed.
+    /// The listed ones.
     restarted: Vec<Instant>,
     joints: Vec<Instant>,
-    /// From here on the recording has no times.
+    /// No times from here on.
     no_times: Option<Instant>,
 }
 
 impl Judge {
-    /// Before the first item.
+    /// Before any item.
     pub fn new(limits: &Limits, format: Format) -> Self {
         Self {
             monitor: Box::new(Monitor::new(limits.params)),
@@ -186,34 +183,34 @@ impl Judge {
         }
     }
 
-    /// For a recording received at this place.
+    /// Received at this place.
     #[must_use]
     pub fn heard(self, heard: Heard) -> Self {
         Self { wire: (heard == Heard::OnTheWire).then(Sequences::new), ..self }
     }
 
-    /// Which flight the vehicle is in, counted from 0 as in [`Judged::flights`].
+    /// From 0, as in [`Judged::flights`].
     pub fn flight(&self) -> Option<usize> {
         self.flights.going_on()
     }
 
-    /// Flight state and phase at the last item.
+    /// At the last item.
     pub fn phase(&self) -> (&FlightState, Phase) {
         let flight = self.monitor.flight();
         (flight, flight.phase(self.clock.now().into(), self.monitor.vehicle()))
     }
 
-    /// The limits that hold now.
+    /// In force now.
     pub fn params(&self) -> &Params {
         self.monitor.params()
     }
 
-    /// From which figure on vibration counts as risen.
+    /// Risen from here on.
     pub fn vibration_limit(&self) -> Option<f32> {
         self.monitor.vibration_limit()
     }
 
-    /// Cell count of the single battery; 0 if unknown.
+    /// Of the single battery; 0 unknown.
     pub fn cell_count(&self) -> u8 {
         self.monitor.cell_count()
     }
@@ -290,8 +287,7 @@ impl Judge {
         }
     }
 
-    /// Takes a reception of the vehicle, perhaps after a silence that the recording does not report itself. A HUMS
-    /// log comes from the autopilot's wire, whose silence has its own check, unless it was packed on a PC.
+    /// Perhaps after an unreported silence. A HUMS log's wire has its own check, unless packed on a PC.
     fn hear(&mut self, at: Instant) {
         let (armed, airborne) = (self.monitor.vehicle().armed(), self.monitor.flight().airborne());
         let before = self.last_heard.replace(Last { at, airborne });
@@ -317,7 +313,7 @@ impl Judge {
         let (to, cause) = (Some(at), Why::Lost);
         let gap = Gap { from: Some(from), to, cause, place: None, bytes: 0, words, own: None };
         if is_own {
-            // The logger paused; the vehicle was not silent.
+            // The logger paused.
             self.gap(&gap);
         } else {
             self.holes.silence(from, at);
@@ -326,7 +322,7 @@ impl Judge {
         }
     }
 
-    /// Keeps a silence, listed as this gap, until its meaning is known.
+    /// Until its meaning is known.
     fn doubt(&mut self, gap: Option<usize>, to: Instant, airborne: bool, length: Span) {
         self.settle();
         let hides =
@@ -337,11 +333,10 @@ impl Judge {
         }
     }
 
-    /// Decides whether the vehicle flew on after a silence. If it did not, the end of its flight is missing
-    /// from the recording, which counts as damage.
+    /// Whether it flew on after a silence; if not, the flight's end is missing: damage.
     fn settle(&mut self) {
         let Some(Silence { airborne, gap, .. }) = self.silence.take() else { return };
-        // A vehicle that was disarmed meanwhile and may fall, or that reports on-ground, does not fly.
+        // A disarmed vehicle that may fall, or one on-ground, does not fly.
         let vehicle = self.monitor.vehicle();
         let flies = vehicle.armed()
             && vehicle.landed.get() != Some(&LandedState::OnGround)
@@ -355,7 +350,6 @@ impl Judge {
         }
     }
 
-    /// The system id that is judged.
     fn system(&self) -> Option<u8> {
         self.monitor.vehicle().source.map(|source| source.system)
     }
@@ -364,7 +358,6 @@ impl Judge {
         self.monitor.vehicle().source == Some(source)
     }
 
-    /// Takes the vehicle's report of unhealthy sensors.
     fn sensors(&mut self, source: Source, status: &SystemStatus) {
         if self.is_vehicle(source) && self.details.sensors(status) {
             for cause in Cause::ALL {
@@ -373,7 +366,7 @@ impl Judge {
         }
     }
 
-    /// The estimator reports the sensors that it rejects.
+    /// Rejected by the estimator.
     fn doubts(&mut self, source: Source, estimator: &Estimator) {
         if self.is_vehicle(source) && self.details.estimator(estimator) {
             self.tell(Cause::Gnss.name());
@@ -381,14 +374,13 @@ impl Judge {
         }
     }
 
-    /// Takes a text with an alert.
     fn said(&mut self, at: Instant, source: Source, alert: Alert, words: String) {
         if self.is_vehicle(source) && self.details.said(at, alert, words) {
             self.tell(alert.cause.name());
         }
     }
 
-    /// Names the parts of an open check, in the findings made here and in those of the board.
+    /// Found here and on board.
     fn tell(&mut self, check: &str) {
         self.details.tell(check, &mut self.here);
         self.details.tell(check, &mut self.board);
@@ -397,7 +389,7 @@ impl Judge {
     fn told(&mut self, told: &Told) {
         match told {
             Told::Parameter { name, value, .. } if !self.limits.given.contains(&name.as_str()) => {
-                // A value out of range or an unknown parameter changes nothing.
+                // Unknown or out of range: no change.
                 let _ = self.monitor.params_mut().set(name, *value);
             }
             Told::Finding(finding) => {
@@ -415,8 +407,7 @@ impl Judge {
         }
     }
 
-    /// Start of a finding of a box. The box finds an impact after the vehicle lies still; the shock is in its
-    /// recording.
+    /// The shock is before the box's finding, which waits until the vehicle lies still.
     fn hit_at(&mut self, finding: &Finding) -> Instant {
         const LIES_STILL: Span = Span::from_secs(5);
         if !is_hit(finding) {
@@ -429,9 +420,8 @@ impl Judge {
         if is_its { Clock::recording(finding.at, steps, hit_at).min(finding.at) } else { finding.at }
     }
 
-    /// The autopilot's clock began again: another power-on in the same recording. The earlier flight is over,
-    /// because no other clock of an autopilot's log or of raw frames measures the time between. A restart of
-    /// the box in the air, or a clock set by the ground station, ends no flight.
+    /// Another power-on in an autopilot's log or raw frames. No clock measures the time between: the flight is over. A box's
+    /// restart, or a set clock, ends no flight.
     fn restart(&mut self, at: Instant) {
         self.restarts += 1;
         if self.restarted.len() < LISTED_MAX {
@@ -443,8 +433,7 @@ impl Judge {
         }
     }
 
-    /// A recording or a power-on ended when the vehicle was last received, and so did its flight. Another one
-    /// begins here. The time between belongs to neither, and the first values come before it is judged.
+    /// Its flight ended at the last reception; the time between belongs to neither, and first values come first.
     fn leave_off(&mut self, at: Instant) {
         if self.first.is_some() {
             self.advance(self.last);
@@ -455,8 +444,7 @@ impl Judge {
         self.clock.skip_to(at + SETTLE);
     }
 
-    /// Another recording was joined, of another day or another vehicle. It is judged by itself, once all its
-    /// values have come. Earlier findings and counts stay.
+    /// Another day or vehicle, judged by itself. Earlier findings and counts stay.
     fn joint(&mut self, at: Instant) {
         self.leave_off(at);
         self.here.break_off(self.last, self.clock.behind());
@@ -474,7 +462,7 @@ impl Judge {
         self.monitor.begin_another_recording();
     }
 
-    /// Something is over at the moment of its report: the autopilot stops its motors, or its processor restarts.
+    /// Over at its report: motors stop, or the processor restarts.
     fn reported(&mut self, at: Instant, about: About, words: &str) {
         let is_emergency = about == About::Emergency;
         let what = if is_emergency { details::EMERGENCY } else { details::PROCESSOR_FAULT };
@@ -490,14 +478,14 @@ impl Judge {
     }
 
     fn gap(&mut self, gap: &Gap) {
-        // One that begins before the last observation is a count over the whole recording.
+        // Begins before the last observation: a count over the recording.
         if let (Some(from), Some(to)) = (gap.from.filter(|from| *from >= self.last), gap.to)
             && self.first.is_some()
         {
             self.advance(from);
             let (airborne, length) = (self.monitor.flight().airborne(), to.since(from));
             if to.since(from) >= SETTLE {
-                // Items up to the gap count: a landing, a disarming.
+                // A landing or disarming counts.
                 self.tick(from);
             }
             self.clock.pause(from, to);
@@ -514,7 +502,7 @@ impl Judge {
         self.list(gap);
     }
 
-    /// Counts a gap; its place in the list, if that has room.
+    /// Its place in the list, if there is room.
     fn list(&mut self, gap: &Gap) -> Option<usize> {
         self.damages += u64::from(gap.cause.is_damage());
         self.losses += u64::from(gap.cause == Why::Lost);
@@ -526,7 +514,6 @@ impl Judge {
         Some(place)
     }
 
-    /// Steps the monitor up to a time.
     fn advance(&mut self, to: Instant) {
         self.first.get_or_insert(to);
         self.last = self.last.max(to);
@@ -552,7 +539,7 @@ impl Judge {
             .tick(steps.into(), &link, &recorder, &mut |finding| found.push(Finding::new(steps, finding)));
         for finding in found {
             if is_of(&finding.check, self.format, self.wire.is_some()) {
-                // A vehicle is seen to lie still seconds after an impact.
+                // Seen seconds after an impact.
                 let hit_at = if is_hit(&finding) { of(self.monitor.flight().hit_at()) } else { finding.at };
                 let at = Clock::recording(now, steps, hit_at.min(finding.at));
                 self.here.take(&Finding { at, ..finding.clone() }, self.clock.behind());
@@ -595,8 +582,7 @@ impl Judge {
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 
-    /// The vehicle came down in a radio gap. The board does not look for that, so the finding is made only
-    /// here.
+    /// In a radio gap, found only here.
     fn came_down(&mut self, now: Instant, steps: Instant, level: Level, verdict: Verdict) {
         let recording = |at| Clock::recording(now, steps, Instant::of(at, steps));
         let (at, from) = (recording(verdict.at), verdict.from.map(recording));
@@ -612,13 +598,13 @@ impl Judge {
         }
     }
 
-    /// Frame loss of the vehicle's link, if known.
+    /// Of the vehicle's link, if known.
     fn link(&mut self, steps: Instant) -> LinkReading {
         let source = self.monitor.vehicle().source;
         self.wire.as_mut().map_or_else(LinkReading::default, |wire| wire.reading(steps, source))
     }
 
-    /// If arming is guessed from the throttle, closing the throttle in the air does not disarm.
+    /// Guessed arming: a closed throttle does not disarm.
     fn distrust_disarming(&mut self) {
         if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
             self.here.drop_checks(|check| check == DISARMED);
@@ -626,7 +612,7 @@ impl Judge {
         }
     }
 
-    /// Takes the worst values from the monitor's exceedances.
+    /// From the exceedances.
     fn peaks(&mut self, at: Instant) {
         let steps = self.clock.monitor(at);
         for exceedance in self.monitor.exceedances().iter(steps.into()) {
@@ -636,14 +622,13 @@ impl Judge {
         }
     }
 
-    /// Which parts are due.
     fn parts_due(&mut self) {
         for problems in [&mut self.here, &mut self.board] {
             problems.name_parts(|subsystem| part::due(&self.monitor, subsystem));
         }
     }
 
-    /// How the vehicle was when the recording ended in the air.
+    /// In the air.
     fn ends_in_air(&mut self) -> Option<EndsInAir> {
         self.flights.going_on().filter(|_| is_in_air(&self.monitor))?;
         let steps = self.clock.monitor(self.last).into();
@@ -657,7 +642,7 @@ impl Judge {
         })
     }
 
-    /// Further remarks on the recording, as sentences.
+    /// Sentences.
     fn remarks(&mut self, by: JudgedBy, flights: &[Flight]) -> Vec<String> {
         let (of_cells, of_vehicles) =
             (self.cells.words(by, begin_in_air(flights)), self.details.remarks(self.system()));
@@ -666,7 +651,7 @@ impl Judge {
         remarks.chain(of_file.into_iter().flatten()).collect()
     }
 
-    /// Steps to the last item, which counts: a landing, a disarming.
+    /// A landing or disarming counts.
     fn step_to_end(&mut self) {
         if self.first.is_some() {
             self.advance(self.last);
@@ -679,7 +664,7 @@ impl Judge {
         }
     }
 
-    /// The recording has ended.
+    /// The judgement.
     pub fn end(mut self) -> Judged {
         self.step_to_end();
         self.settle();
@@ -697,7 +682,7 @@ impl Judge {
         let by =
             if self.checked_on_board && !self.limits.is_given() { JudgedBy::Board } else { JudgedBy::Here };
         if !self.checked_on_board && self.wire.is_none() {
-            // The place of reception is unknown: a packed recording may come from a ground station.
+            // A packed recording may be a ground station's.
             self.here.drop_checks(|check| vocabulary(check).is_some_and(|words| words.scope == Scope::Wire));
         }
         if by == JudgedBy::Board {
@@ -713,7 +698,7 @@ impl Judge {
         problems.end(end, behind);
         let findings_count = problems.findings_count;
         let mut findings = std::mem::take(&mut problems.findings);
-        // An impact is reported after the vehicle lies still.
+        // Impacts come after the vehicle lies still.
         findings.sort_by_key(|finding| finding.at);
         let worst_first = problems.worst_first();
         let (judged, not_judged) = self.coverage.lists(&Recording {
@@ -756,14 +741,14 @@ impl Judge {
     }
 }
 
-/// Last known position: by the estimator, or else by the first receiver.
+/// Estimator's, or first receiver's.
 fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
     let estimated = vehicle.global.get().and_then(|global| global.position);
     let received = || vehicle.gnss.first()?.get()?.position;
     estimated.or_else(received).map(|position| (position.latitude_deg, position.longitude_deg))
 }
 
-/// Time armed by the usage counters: without gaps.
+/// By usage: without gaps.
 fn armed(monitor: &Monitor) -> Span {
     let mut seconds = 0.0;
     monitor.for_each_counter(|number, value| {
@@ -771,11 +756,11 @@ fn armed(monitor: &Monitor) -> Span {
             seconds = value;
         }
     });
-    // Its sum is not exact.
+    // Not exact.
     Span::from_millis((seconds * 100.0).round() as u64 * 10)
 }
 
-/// That recordings were joined, as a sentence.
+/// A sentence.
 fn joined(joints: &[Instant]) -> Option<String> {
     const NAMED: usize = 3;
     let named: Vec<String> =
@@ -790,13 +775,11 @@ fn joined(joints: &[Instant]) -> Option<String> {
     })
 }
 
-/// Whether it is an impact.
 fn is_hit(finding: &Finding) -> bool {
     finding.check == IMPACT && matches!(finding.level, Level::Warning | Level::Critical)
 }
 
-/// Whether a check applies to a recording of this format that is judged here. One recording shows neither earlier flights nor worn
-/// parts.
+/// One recording shows neither earlier flights nor worn parts.
 fn is_of(check: &str, format: Format, on_the_wire: bool) -> bool {
     let scope = vocabulary(check).map(|words| words.scope);
     !matches!(scope, Some(Scope::Recorder | Scope::Stored))

@@ -1,4 +1,4 @@
-//! The judgement of a recording.
+//! A recording's judgement.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,19 +17,19 @@ use crate::source::item::{About, Cause, Gap};
 use crate::source::told::Finding;
 use crate::summary::{EndsInAir, JudgedChecks};
 
-/// The verdict if only few checks had data.
+/// Few checks had data.
 pub const TOO_LITTLE: &str = "too_little";
 
 /// Who judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JudgedBy {
-    /// The monitor on board: its findings are in the log.
+    /// Findings are in the log.
     Board,
     /// This program.
     Here,
 }
 
-/// Times without data of the vehicle, from and to: up to [`LISTED_MAX`].
+/// From and to: up to [`LISTED_MAX`].
 #[derive(Clone, Debug, Default)]
 pub struct Holes {
     pauses: Vec<(Instant, Instant)>,
@@ -37,27 +37,26 @@ pub struct Holes {
 }
 
 impl Holes {
-    /// The recording reports the hole: time stops over it.
+    /// Reported: time stops.
     pub(super) fn pause(&mut self, from: Instant, to: Instant) {
         if self.pauses.len() < LISTED_MAX {
             self.pauses.push((from, to));
         }
     }
 
-    /// The vehicle was silent, as far as is known.
+    /// As far as known.
     pub(super) fn silence(&mut self, from: Instant, to: Instant) {
         if self.silences.len() < LISTED_MAX {
             self.silences.push((from, to));
         }
     }
 
-    /// Whether this span is exactly one of the holes. Any other gap is a moment, or a count over much of the
-    /// recording.
+    /// Exactly one of the holes; other gaps are moments or counts.
     pub fn is_one(&self, span: &(Instant, Instant)) -> bool {
         self.pauses.contains(span) || self.silences.contains(span)
     }
 
-    /// The missing part of this span.
+    /// Missing part.
     pub fn within(&self, from: Instant, to: Instant) -> Span {
         let parts = self.pauses.iter().map(|(begin, end)| (*end).min(to).since((*begin).max(from)));
         parts.fold(Span::ZERO, |sum, part| sum + part)
@@ -69,74 +68,74 @@ impl Holes {
 pub struct Judged {
     /// Who judged.
     pub by: JudgedBy,
-    /// The monitor at the end: the vehicle, its usage, its exceedances.
+    /// Vehicle, usage, exceedances at the end.
     pub monitor: Box<Monitor>,
-    /// Facts besides, the last of each kind.
+    /// The last of each kind.
     pub facts: BTreeMap<About, String>,
-    /// UTC of each part of the recording.
+    /// Of each part.
     pub epochs: Epochs,
-    /// The first and the last time.
+    /// First and last time.
     pub span: Option<(Instant, Instant)>,
     /// Time armed.
     pub armed: Span,
     /// Flights, in order.
     pub flights: Vec<Flight>,
-    /// The last of them goes on at the recording's end.
+    /// The last flight goes on.
     pub ends_in_air: Option<EndsInAir>,
-    /// Changes of level, in order, up to [`super::problem::LISTED_MAX`].
+    /// In order, up to [`super::problem::LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// Number of findings.
     pub findings_count: u64,
-    /// The problems, worst first.
+    /// Worst first.
     pub problems: Vec<Problem>,
-    /// Checks that had something to judge.
+    /// With something to judge.
     pub judged: Vec<&'static str>,
-    /// Checks that had not, with the reason. Checks that are made for another autopilot are in neither list.
+    /// With the reason; checks for another autopilot are in neither list.
     pub not_judged: Vec<(&'static str, String)>,
-    /// Its flights and changes of parts, for trends over flights.
+    /// Flights and changes of parts, for trends.
     pub episodes: Vec<Episode>,
-    /// The systems whose autopilot sent heartbeats, in order of their ids.
+    /// By heartbeats, in order of ids.
     pub systems: Vec<u8>,
-    /// Further limits of the judgement, as sentences.
+    /// Sentences.
     pub remarks: Vec<String>,
-    /// Start of the time in the air with an unknown cell count, so that no voltage raised an alarm.
+    /// In the air: no voltage alarm.
     pub cells_unknown: Option<Instant>,
-    /// The gaps, in order, up to [`super::problem::LISTED_MAX`].
+    /// In order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
-    /// The times without data.
+    /// Without data.
     pub holes: Holes,
-    /// Number of gaps that are damage.
+    /// Damage.
     pub damages: u64,
-    /// Number of gaps that the recorder lost while it recorded.
+    /// Lost by the recorder.
     pub losses: u64,
-    /// Number of restarts of the recording's clock.
+    /// Of the recording's clock.
     pub restarts: u64,
-    /// The recording has no times from its beginning, so nothing was judged.
+    /// No times at all: nothing judged.
     pub is_timeless: bool,
 }
 
 impl Judged {
-    /// The vehicle, as it was known at the end.
+    /// At the end.
     pub fn vehicle(&self) -> &Vehicle {
         self.monitor.vehicle()
     }
 
-    /// Whether the vehicle was first received in the air.
+    /// First received in the air.
     pub fn begins_in_air(&self) -> bool {
         begin_in_air(&self.flights)
     }
 
-    /// Whether the recorder reports a loss, or the recording shows one.
+    /// Reported, or shown by the recording.
     pub fn is_lossy(&self) -> bool {
         self.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
     }
 
-    /// Time in the air, in all flights together.
+    /// In all flights.
     pub fn flown(&self) -> Span {
         self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
     }
 
-    /// Judges its flights against earlier ones, and learns from them.
+    /// Against earlier flights; learns from them.
     pub fn judge_trends(&mut self, past: &mut Baselines) {
         if self.is_timeless {
             return;
@@ -161,7 +160,7 @@ impl Judged {
         self.findings_count += trends.findings_count;
         let trends = trends.worst_first();
         for problem in &trends {
-            // A check of the box that is a trend too has the worse of both levels.
+            // The box's check that is a trend too has the worse level.
             let is_same = |of: &Problem| (&of.check, of.instance) == (&problem.check, problem.instance);
             let is_worse = |of: &Problem| rank(of.level) >= rank(problem.level);
             if !self.problems.iter().any(|of| is_same(of) && is_worse(of)) {
@@ -172,7 +171,7 @@ impl Judged {
         worst_first(&mut self.problems);
     }
 
-    /// Why the vehicle is unknown, as words in its place; `None` if an autopilot was received.
+    /// Words in its place; `None` with an autopilot.
     pub fn unheard(&self) -> Option<String> {
         match (self.vehicle().source, self.vehicle().heartbeat.get()) {
             (None, _) => Some("none was heard".to_owned()),
@@ -184,7 +183,7 @@ impl Judged {
         }
     }
 
-    /// Number of checks with data.
+    /// With data.
     pub fn checks(&self) -> JudgedChecks {
         let is_of_box = |check: &&&str| {
             vocabulary(check)
@@ -195,8 +194,7 @@ impl Judged {
         JudgedChecks { judged, of_box, all: judged + lacking.count() }
     }
 
-    /// Whether a check that was not judged could have been, with more data: it needs neither a box nor earlier
-    /// flights nor an engine, and has a limit.
+    /// With more data: no box, earlier flights or engine needed, and a limit.
     fn could_apply(&self, check: &str, why: &str) -> bool {
         let is_of_engine =
             |check: &str| check_named(check).is_some_and(|check| check.subsystem == Subsystem::Engine);
@@ -206,12 +204,12 @@ impl Judged {
         !is_of_box && why != OFF && (!is_of_engine(check) || has_engine())
     }
 
-    /// Whether too few checks had data for a clean result to mean anything.
+    /// Too little for a clean result.
     pub fn is_little(&self) -> bool {
         self.checks().is_little()
     }
 
-    /// The verdict for scripts and tables: the worst level. With too little to judge it is not `ok`.
+    /// The worst level, for scripts; too little is not `ok`.
     pub fn verdict(&self) -> &'static str {
         match self.worst() {
             None => "unknown",
@@ -220,7 +218,7 @@ impl Judged {
         }
     }
 
-    /// The worst level found; `None` if nothing could be judged.
+    /// `None` if nothing could be judged.
     pub fn worst(&self) -> Option<Level> {
         match self.problems.first() {
             Some(problem) => Some(problem.level),

@@ -1,8 +1,8 @@
-//! Crashes in a radio gap, and vehicles that fall when first received: forensics after the flight.
+//! Crashes in a radio gap, and vehicles that fall when first received: no pilot can act, so the box does not
+//! judge them.
 //!
-//! A pilot cannot act on them, so the box does not judge them. The vehicle was received in the air, was
-//! silent for [`SILENT`], and is received again. Within [`SHOWS`] after that, one of these signs for
-//! [`SIGN_LASTS`] shows a crash. Fixed-wing vehicles are not judged.
+//! In the air, silent for [`SILENT`], received again: within [`SHOWS`] one of these signs for [`SIGN_LASTS`]
+//! shows a crash. Fixed-wing vehicles are not judged.
 //!
 //! | sign | found as |
 //! |---|---|
@@ -10,8 +10,8 @@
 //! | more than [`CAME_DOWN_M`] lower and slow, with full throttle near the ground or on its side | `impact` |
 //! | as low and slow, landed or disarmed earlier than any landing takes | `impact` |
 //!
-//! A vehicle may be disarmed when first received. If it then sinks faster than `MIS_SINK` by its speed and by
-//! the air pressure, it was disarmed in the air.
+//! Disarmed when first received, and sinking faster than `MIS_SINK` by speed and air pressure: disarmed in
+//! the air.
 
 use std::collections::VecDeque;
 
@@ -28,57 +28,56 @@ use hums_core::vehicle::Vehicle;
 use super::problem::IMPACT;
 use crate::source::told::Finding;
 
-/// The shortest silence that can hide a fall.
+/// May hide a fall.
 const SILENT: Span = Span::from_secs(5);
-/// Attitude is known within this time after the vehicle is received again. A disarmed and restarted vehicle
-/// reports its forces later.
+/// Attitude after reception; a disarmed, restarted vehicle reports forces later.
 const SHOWS: Span = Span::from_millis(2_400);
 const STARTS: Span = Span::from_secs(20);
-/// Values from before the silence are replaced by then.
+/// Old values are replaced.
 const SETTLED: Span = Span::from_secs(1);
 const SIGN_LASTS: Span = Span::from_millis(500);
-/// Minimum loss of height, m.
+/// Lost height, m.
 const CAME_DOWN_M: f32 = 3.0;
-/// No higher than the place of take-off, m above home.
+/// m above home.
 const NEAR_GROUND_M: f32 = 2.0;
 /// Slow: m/s, rad/s.
 const STILL_MPS: f32 = 1.0;
 const STILL_RADPS: f32 = 0.3;
-/// A multicopter faster than this leans in flight and is not on its side, m/s.
+/// m/s: faster, it leans in flight.
 const LEANS_MPS: f32 = 12.0;
 const TILTED_RAD: f32 = 0.785;
-/// Gravity on the underside beyond this, g, means that a multicopter lies on its back.
+/// g on the underside: on its back.
 const ON_BACK_G: f32 = 0.5;
 const IDLE_THROTTLE: f32 = 0.1;
 const FULL_THROTTLE: f32 = 0.9;
-/// Older values are not used.
+/// Of used values.
 const FRESH: Span = Span::from_secs(2);
-/// A receiver at rest keeps its height within this, m.
+/// m: a receiver's height at rest.
 const STANDS_M: f32 = 3.0;
-/// A falling vehicle sinks faster than this, m/s.
+/// Sink, m/s.
 const FALLING_MPS: f32 = 2.5;
-/// Pressure change of a metre at sea level. At 4,000 m it is 35 % too much, so a fall there must be deeper.
+/// A metre at sea level; at 4,000 m 35 % too much, so a fall must be deeper.
 const HPA_PER_METRE: f32 = 0.12;
-/// A vehicle is judged for this long after it is first received.
+/// After first reception.
 const FIRST: Span = Span::from_secs(10);
-/// Sinks are kept for this long.
+/// Of kept sinks.
 const WINDOW: Span = Span::from_millis(900);
 
-/// How the vehicle came down.
+/// How it came down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Verdict {
-    /// The check that finds it.
+    /// Found by this check.
     pub check: &'static str,
-    /// The value in its unit; `None` if it was not measured.
+    /// `None` if not measured.
     value: Option<f32>,
-    /// Time of the finding; for an impact the time at which the vehicle is received again.
+    /// For an impact, the next reception.
     pub at: Instant,
-    /// Last time the vehicle was received before it.
+    /// Last reception before.
     pub from: Option<Instant>,
 }
 
 impl Verdict {
-    /// As a finding; `None` if its check is off.
+    /// `None` if its check is off.
     pub(super) fn finding(&self, at: clock::Instant, level: Level, params: &Params) -> Option<Finding> {
         let check = checks().find(|check| check.name == self.check)?;
         let limit = check.limits.critical.map(|limit| params.get(limit)).filter(|limit| limit.is_finite())?;
@@ -96,25 +95,24 @@ impl Verdict {
     }
 }
 
-/// A silence of the vehicle in the air.
+/// In the air.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
-    /// Last time the vehicle was received, less the losses of the recording, because the monitor's time stops
-    /// over them.
+    /// Last reception, less lost spans, over which time stops.
     from: Instant,
     last_heard_at: Instant,
     again_at: Option<Instant>,
-    /// Time at which forces and position are received again, if the vehicle reports them.
+    /// Forces and position again.
     state_at: Option<Instant>,
-    /// It did something else than a wreck then, last.
+    /// Last act of no wreck.
     no_sign_at: Instant,
     altitude_m: Option<f32>,
     sink_mps: f32,
 }
 
 impl Silence {
-    /// The shortest time for a regular landing, s. The vehicle descends at the fastest rate that can be set,
-    /// and slower in the last metres. The autopilot then waits a second before it disarms.
+    /// Of a regular landing, s: the fastest settable descent, slower in the last metres, and a second before
+    /// disarming.
     fn least_s(&self, lost_m: f32, limit_mps: f32, armed: bool) -> f32 {
         const SEES_S: f32 = 1.0;
         const LAST_M: f32 = 5.0;
@@ -128,36 +126,34 @@ impl Silence {
     }
 }
 
-/// Follows a vehicle for radio gaps.
 #[derive(Debug, Default)]
 pub(super) struct LinkLoss {
     heard_at: Instant,
     armed: bool,
-    /// The vehicle was level while armed, so it is not a tail-sitter.
+    /// Level while armed: no tail-sitter.
     stood: bool,
     first_at: Option<Instant>,
-    /// The vehicle has flown since it was first received, or was received for [`FIRST`].
+    /// Has flown, or received for [`FIRST`].
     is_known: bool,
-    /// A finding stays until the vehicle is armed again.
+    /// Until armed again.
     found: Option<Verdict>,
     silence: Option<Silence>,
-    /// Sinks, and pressures in hPa, of the last seconds.
+    /// Of the last seconds, pressures in hPa.
     sinks: VecDeque<(Instant, f32)>,
     pressures: VecDeque<(Instant, f32)>,
-    /// The pressure was another one last.
+    /// Last other pressure.
     changed_at: Option<Instant>,
     rate: f32,
     from_above_g: f32,
-    /// Start of the receiver's rest, and its altitude.
+    /// At rest, with altitude.
     stands_since: Option<Instant>,
     stands_at_m: f32,
 }
 
 impl LinkLoss {
-    /// Takes an observation that the monitor took.
     pub(super) fn observe(&mut self, at: Instant, observation: &Observation, vehicle: &Vehicle) {
         match observation {
-            // A radio, a battery or an engine may be received without the autopilot.
+            // Received without the autopilot.
             Observation::TelemetryRadio(_)
             | Observation::Battery(_)
             | Observation::Escs(_)
@@ -203,7 +199,7 @@ impl LinkLoss {
         push(&mut self.pressures, FRESH, at, hpa);
     }
 
-    /// The recording lost this span, and the monitor's time stopped over it.
+    /// Lost span: the monitor's time stopped.
     pub(super) fn lose(&mut self, span: Span, monitor: &Monitor, in_mishap: bool) {
         if span >= SILENT && self.silence.is_none() {
             self.begin(self.heard_at - span, monitor, in_mishap);
@@ -224,7 +220,7 @@ impl LinkLoss {
         }
     }
 
-    /// One step, after the monitor's: how it came down, as an alarm that begins, or ends.
+    /// After the monitor's step: an alarm that begins or ends.
     pub(super) fn step(
         &mut self,
         now: Instant,
@@ -313,7 +309,7 @@ impl LinkLoss {
         None
     }
 
-    /// A sign of a crash, and its value.
+    /// And its value.
     fn sign(
         &self,
         now: Instant,
@@ -324,7 +320,7 @@ impl LinkLoss {
         if vehicle.hovers(now) != Some(true) {
             return None;
         }
-        // Above sea level: a disarmed vehicle may set a new home.
+        // A disarmed vehicle may set a new home.
         let altitude_m = vehicle.global.within(now, FRESH).map(|global| global.altitude.0);
         let lost_m = silence.altitude_m.zip(altitude_m).map_or(0.0, |(before_m, now_m)| before_m - now_m);
         let least_s = silence.least_s(lost_m.max(0.0), params.get(Param::MisSink), self.armed);
@@ -346,12 +342,10 @@ impl LinkLoss {
             && (self.lies(now, vehicle) || near_ground)
             && part.is_some_and(|part| part >= FULL_THROTTLE);
         let fell = !has_pilots_throttle(vehicle) && is_off && !had_time;
-        // Nobody felt the shock.
         (slow && lost_m > CAME_DOWN_M && (in_vain || fell)).then_some((IMPACT, None))
     }
 
-    /// Whether the vehicle lies on its side, by an attitude that the sensors do not contradict, or on its
-    /// back.
+    /// By an attitude that no sensor contradicts, or on its back.
     fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let tilts = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD;
         let is_tilted =
@@ -369,21 +363,21 @@ impl LinkLoss {
         self.stands_since = self.stands_since.or(slow.map(|_| now));
     }
 
-    /// Whether the receiver has stood for a second, and the pressure does not rise as in a fall.
+    /// For a second, without a fall's rising pressure.
     fn rests(&self, now: Instant) -> bool {
         self.stands_since.is_some_and(|since| now.since(since) >= SETTLED)
             && self.is_sinking(now, FALLING_MPS) == Some(false)
     }
 
-    /// The greatest sink of the last moments.
+    /// In the last moments.
     fn sink_mps(&self, now: Instant) -> f32 {
         let recent = self.sinks.iter().filter(|(at, _)| now.since(*at) <= FRESH);
         recent.fold(0.0, |greatest: f32, (_, sink_mps)| greatest.max(*sink_mps))
     }
 
-    /// Whether the pressure rises at the rate of this sink; `None` if it is unknown, or never changes.
+    /// `None` if unknown, or constant.
     fn is_sinking(&self, now: Instant, sink_mps: f32) -> Option<bool> {
-        /// The sink may have begun within the last second; wind and propellers cause changes of this size.
+        /// The sink may be young; wind and propellers do as much.
         const PART_S: f32 = 0.3;
         const NOISE_M: f32 = 0.8;
         let (at, now_hpa) = *self.pressures.back()?;
@@ -394,7 +388,7 @@ impl LinkLoss {
     }
 }
 
-/// Appends a value and drops values older than `span`.
+/// Drops values older than `span`.
 fn push(values: &mut VecDeque<(Instant, f32)>, span: Span, at: Instant, value: f32) {
     values.push_back((at, value));
     while values.front().is_some_and(|(then, _)| at.since(*then) > span) {

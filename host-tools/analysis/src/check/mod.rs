@@ -1,8 +1,7 @@
-//! `hums check`: the problems of a flight, from any log.
+//! `hums check`: a flight's problems, from any log.
 //!
-//! [`judge`] runs the monitor of the board over the stream of a recording. [`problem`] puts its findings
-//! together, [`flights`] its flights. [`judged`](mod@judged) is the judgement, which [`text`] and [`json`]
-//! print.
+//! [`judge`] runs the board's monitor over the stream; [`problem`] joins findings, [`flights`] the flights.
+//! [`judged`](mod@judged) is printed by [`text`] and [`json`].
 
 pub mod causes;
 mod cells;
@@ -50,9 +49,9 @@ use text::Table;
 /// The request of `hums check`.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
-    /// Recordings, logs, cards, or directories with such.
+    /// Recordings, logs, cards, directories.
     pub inputs: &'a [PathBuf],
-    /// A file of limits.
+    /// Limits.
     pub params: Option<&'a Path>,
     /// Earlier flights.
     pub past: &'a [PathBuf],
@@ -60,9 +59,9 @@ pub struct Request<'a> {
     pub session: Option<&'a str>,
     /// Only this vehicle.
     pub system: Option<u8>,
-    /// Look at every block of an image.
+    /// Every block of an image.
     pub salvage: bool,
-    /// List the checks that were not judged.
+    /// Lists unjudged checks.
     pub verbose: bool,
     /// Print JSON.
     pub json: bool,
@@ -73,7 +72,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
     run_showing(args, |_| Ok(()))
 }
 
-/// Runs `hums check`, and shows each log to `show` before it is printed.
+/// `show` gets each log before it is printed.
 pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<()>) -> Result<Outcome> {
     let past = Past::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
     let (found, mut failed) = logs(args)?;
@@ -84,7 +83,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     let many = found.places.len() > 1 && wanted.is_none();
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = EndResolver::new(sessions_of(&found.places));
-    // A log next to the wanted one shows how it ends.
+    // The next log shows how this one ends.
     let is_beside = |of: &str| wanted.as_ref().is_some_and(|wanted| wanted != of);
     let mut series = Series::after(&past);
     let mut done = |Told { name, of, checked }: Told| match series.judge(checked) {
@@ -155,8 +154,7 @@ fn told(past: &Past, place: &Place, shows: bool) -> Told {
     Told { name: place.title.clone(), of: place.name.clone(), checked: read }
 }
 
-/// The recording of a link with several vehicles, once for each of them; empty otherwise. Each vehicle has findings and flights
-/// of its own. Standard input is read once, so one of its vehicles is judged.
+/// A link's recording, once for each of several vehicles; empty for one. Of standard input, read once, one is judged.
 fn vehicles(place: &Place, told: &Told) -> Vec<Place> {
     let Ok(checked) = &told.checked else { return Vec::new() };
     let systems = &checked.judged.systems;
@@ -165,14 +163,13 @@ fn vehicles(place: &Place, told: &Told) -> Vec<Place> {
     if is_apart { systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
 }
 
-/// The given logs, and the number of inputs without a log. With `--json` such an input has an object too, and
-/// the others are judged.
+/// And the number of inputs without a log; with `--json` these have an object too.
 fn logs(args: &Request<'_>) -> Result<(Found, usize)> {
     let error = match find(args.inputs, args.salvage) {
         Ok(found) => return Ok((found, 0)),
         Err(error) => error,
     };
-    // The error object of a wrong command line would look like an object of an input.
+    // Would look like an input's object.
     if !args.json || error.is::<Usage>() {
         return Err(error);
     }
@@ -188,7 +185,7 @@ fn logs(args: &Request<'_>) -> Result<(Found, usize)> {
     Ok((find(&good, args.salvage)?, args.inputs.len() - good.len()))
 }
 
-/// A recording that was judged, or why it was not.
+/// Or why it was not judged.
 struct Told {
     name: String,
     /// The name of its place.
@@ -202,7 +199,7 @@ impl HasEnding for Told {
     }
 }
 
-/// Judges one recording, as `hums check` does.
+/// As in `hums check`.
 pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked> {
     overview::judge(place, limits, heard, false).map(|read| checked(place, read))
 }

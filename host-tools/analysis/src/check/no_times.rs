@@ -1,4 +1,4 @@
-//! The part of a judgement that remains if the recording's clock stopped: everything before that place.
+//! A stopped clock: only the judgement before it remains.
 
 use hums_core::clock::{Instant, Span};
 
@@ -6,12 +6,11 @@ use super::clock::SETTLE;
 use super::judged::Judged;
 use crate::source::item::Cause;
 
-/// Reason for an unjudged check if the recording has no times at all.
+/// No check is judged.
 const WHY: &str = "the recording has no times";
 
 impl Judged {
-    /// Removes the results from a place without times up to the next joint. Also removes the results of an
-    /// unknown vehicle.
+    /// Removes results from there to the next joint, and those of an unknown vehicle.
     pub(super) fn what_is_known(
         self,
         no_times: Option<Instant>,
@@ -23,7 +22,7 @@ impl Judged {
         self.forget(from, next, restarts).forget_unheard()
     }
 
-    /// Removes all results between these two times, which are invalid, and everything with a duration.
+    /// Also everything with a duration.
     fn forget(mut self, from: Instant, to: Option<Instant>, restarts: &[Instant]) -> Self {
         let is_out = |at: Instant| at >= from && to.is_none_or(|to| at < to);
         self.restarts -= restarts.iter().filter(|at| is_out(**at)).count() as u64;
@@ -38,7 +37,7 @@ impl Judged {
             flight.air = flight.air.min(from.since(flight.from));
         }
         self.ends_in_air = self.ends_in_air.filter(|end| !is_out(end.at));
-        // A silence by such a clock has no known length.
+        // No known length.
         let (mut damages, mut losses) = (0, 0);
         self.gaps.retain(|gap| {
             let of_time = gap.place.is_none() && matches!(gap.cause, Cause::Lost | Cause::Silent);
@@ -65,7 +64,6 @@ impl Judged {
         self
     }
 
-    /// Removes the results of an unknown vehicle.
     fn forget_unheard(mut self) -> Self {
         if self.worst().is_none() {
             (self.findings, self.findings_count) = (Vec::new(), 0);

@@ -1,7 +1,6 @@
-//! The contents of a recording with the monitor's findings: for `info`, `report` and other views of findings.
+//! A recording's contents with findings, for `info` and `report`.
 //!
-//! A HUMS log has the findings of the monitor on board. Recordings without a monitor are packed recordings and the
-//! logs of autopilots and ground stations. They are checked here when they are read: "not checked" is not "good".
+//! A HUMS log has those of the board; others are checked when read: "not checked" is not "good".
 
 use std::collections::BTreeSet;
 
@@ -26,14 +25,14 @@ use crate::source::item::{Gap, Item, Summary, Want};
 use crate::source::recording::{Format, Place};
 use crate::summary::{Contents, ExceedanceLine, Overview};
 
-/// A log with fewer kinds of messages may have too little in it to be judged, though a recorder that checks wrote it.
+/// Fewer kinds of messages may be too little to judge, though the recorder checks.
 const FEW_KINDS: usize = 16;
-/// Delay between first reception and a known flight state, s.
+/// Flight state after first reception, s.
 const SEEN_LATE_S: f64 = 3.0;
-/// Items between two looks at how far the reading is.
+/// Between looks at progress.
 const LOOK_EVERY: u32 = 4_096;
 
-/// A recording that was read through and judged.
+/// Read and judged.
 pub(super) struct Read {
     /// Format of the recording.
     pub(super) format: Format,
@@ -41,11 +40,11 @@ pub(super) struct Read {
     pub(super) judged: Judged,
     /// Summary of the data read.
     pub(super) summary: Summary,
-    /// Bytes of the file that were read.
+    /// Of the file.
     taken: u64,
 }
 
-/// Judges a recording; `shows` how far it is.
+/// `shows`: progress.
 pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
@@ -64,11 +63,11 @@ pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -
     Ok(Read { format, judged: judge.end(), summary, taken: progress.taken() })
 }
 
-/// Reads a recording once. The monitor here checks it if no monitor did.
+/// Checked here if no monitor did.
 pub fn overview(place: &Place) -> Result<Overview> {
     let limits = Limits::default();
     if let Some(log) = place.own() {
-        // If a log begins with the record of a start, a monitor ran, and the log is not judged here.
+        // A monitor ran: not judged here.
         let has_start = has_start(log);
         let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
         let mut overview = match &mut here {
@@ -81,7 +80,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
         overview.ending.name.clone_from(&place.name);
         let contents = &overview.contents;
         let (is_checked, is_little) = (contents.is_checked(), contents.messages.len() < FEW_KINDS);
-        // A box may end its log in order while the vehicle flies.
+        // A box may end its log in flight.
         let marks = &overview.ending.summary.marks;
         let breaks_off = marks.moved.is_some() || marks.took_off == Some(true);
         if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
@@ -132,7 +131,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
     })
 }
 
-/// An error if the requested system is not in the recording; it lists those that are.
+/// Lists the systems that are there.
 pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
     let Some(wanted) = place.system.filter(|_| !heard) else { return Ok(()) };
     let mut systems = BTreeSet::new();
@@ -151,15 +150,14 @@ pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
     Err(usage(format!("--system {wanted}: no autopilot of this system is in {}{there}", place.title)))
 }
 
-/// Adds the number of judged checks. Removes counters without a source.
+/// Number of judged checks; removes counters without a source.
 fn look(contents: &mut Contents, judged: &Judged) {
     contents.judged = Some(judged.checks());
     let vehicle = judged.vehicle();
     contents.usage.retain(|name, _| is_told(name, vehicle));
 }
 
-/// Marks a log that ends in the air or while the vehicle is armed. The box counted only until its last store;
-/// the counters go on to the end here.
+/// Ends in the air, or armed: counters go on from the box's last store to the end.
 fn go_on(overview: &mut Overview, judged: &Judged) {
     let is_whole = overview.ending.summary.first_number == Some(0);
     let is_stored = overview.counted_until().is_some();
@@ -172,21 +170,21 @@ fn go_on(overview: &mut Overview, judged: &Judged) {
     for (name, value) in counters(judged) {
         let is_least = name == UsageCounter::VoltageMin.name();
         let stored = contents.usage.entry(name).or_insert(value);
-        // The box also counted while it lost frames, which are not in the log.
+        // Counted also during lost frames.
         *stored = if is_least { stored.min(value) } else { stored.max(value) };
     }
 }
 
-/// The counters of the monitor here.
+/// The monitor's here.
 fn counters(judged: &Judged) -> Vec<(String, f64)> {
-    // A vehicle that was first received in the air counted as on the ground until its flight was seen.
+    // On the ground until its flight was seen.
     let begins_in_air = judged.begins_in_air();
     let monitor = &judged.monitor;
     let mut counters = Vec::new();
     monitor.for_each_counter(|number, value| {
         let name = counter_name(number);
         let seen_late = begins_in_air && name == UsageCounter::Ground.name() && value < SEEN_LATE_S;
-        // One value for the time in the air everywhere.
+        // The same time in the air everywhere.
         let value =
             if name == UsageCounter::Flight.name() { judged.flown().as_micros() as f64 / 1e6 } else { value };
         if is_told(&name, monitor.vehicle()) && !seen_late {
@@ -196,7 +194,7 @@ fn counters(judged: &Judged) -> Vec<(String, f64)> {
     counters
 }
 
-/// Adds the judgement of the monitor here.
+/// The monitor's here.
 fn fill(contents: &mut Contents, judged: Judged) {
     contents.unheard = judged.unheard();
     contents.judged = Some(judged.checks());
@@ -211,7 +209,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.vehicle = vehicle(&monitor);
     contents.checked_here = contents.vehicle.is_some() && is_judged;
     if !contents.checked_here {
-        // Without an autopilot or times, the counters would be zeros that look like measurements.
+        // Zeros would look like measurements.
         return;
     }
     contents.findings_count = findings_count;
@@ -229,7 +227,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     }
 }
 
-/// Take-offs and landings of these flights; a mishap ends a flight as a landing does.
+/// A mishap ends a flight like a landing.
 fn moves(flights: &[Flight]) -> Vec<(Instant, bool)> {
     let of = |flight: &Flight| {
         let ended = flight.landed || flight.mishap.is_some();
@@ -238,7 +236,7 @@ fn moves(flights: &[Flight]) -> Vec<(Instant, bool)> {
     flights.iter().flat_map(of).collect()
 }
 
-/// The vehicle that a monitor received; `None` without one.
+/// `None` without one.
 pub(super) fn vehicle(monitor: &Monitor) -> Option<Vehicle> {
     let vehicle = monitor.vehicle();
     let (source, heartbeat) = vehicle.source.zip(vehicle.heartbeat.get())?;

@@ -1,4 +1,4 @@
-//! `--past`: a vehicle's baselines, from recordings of its earlier flights.
+//! `--past`: baselines from earlier flights.
 
 use std::path::PathBuf;
 
@@ -16,18 +16,18 @@ use crate::outcome::usage;
 use crate::source::find::find;
 use crate::source::recording::{Format, Place};
 
-/// The basis of `hums check`: limits, and the earlier flights of one vehicle.
+/// Limits, and a vehicle's earlier flights.
 pub(super) struct Past {
     limits: Limits,
-    /// The vehicle's baselines, if there are earlier flights.
+    /// With earlier flights.
     taught: Option<(Baselines, Option<Vehicle>)>,
 }
 
 impl Past {
-    /// These limits, with the baselines from recordings of earlier flights.
+    /// With baselines of earlier flights.
     ///
     /// # Errors
-    /// A usage error if the recordings are of different vehicles.
+    /// A usage error for different vehicles.
     pub(super) fn of(limits: Limits, past: &[PathBuf], system: Option<u8>) -> Result<Self> {
         if past.is_empty() {
             return Ok(Self { limits, taught: None });
@@ -43,8 +43,7 @@ impl Past {
         Ok(Self { limits, taught: Some(taught) })
     }
 
-    /// Judges a recording; `shows` turns progress on. The trends of another vehicle are not judged, and a message
-    /// reports it.
+    /// `shows`: progress; another vehicle's trends are not judged, with a message.
     pub(super) fn judge(&self, place: &Place, heard: Heard, shows: bool) -> Result<Read> {
         let mut read = overview::judge(place, &self.limits, heard, shows)?;
         let Some((baselines, past)) = &self.taught else { return Ok(read) };
@@ -60,20 +59,19 @@ impl Past {
     }
 }
 
-/// The logs of boxes one after the other: each is judged against those before it of the same vehicle.
+/// Boxes' logs, each judged against earlier ones of its vehicle.
 pub(super) struct Series {
-    /// Earlier flights were named: these count alone.
+    /// Named ones count alone.
     past_is_given: bool,
     vehicles: Vec<(Vehicle, Baselines)>,
 }
 
 impl Series {
-    /// Before the first log.
     pub(super) const fn after(past: &Past) -> Self {
         Self { past_is_given: past.taught.is_some(), vehicles: Vec::new() }
     }
 
-    /// Judges the trends of the next log.
+    /// Of the next log.
     pub(super) fn judge(&mut self, checked: Result<Checked>) -> Result<Checked> {
         let mut checked = checked?;
         let is_of_box = checked.format == Format::Hums && !self.past_is_given;
@@ -91,15 +89,15 @@ impl Series {
     }
 }
 
-/// The baselines after the flights of these recordings, in their order.
+/// After these recordings, in order.
 ///
 /// # Errors
-/// A usage error if they are of different vehicles.
+/// A usage error for different vehicles.
 pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
     learnt(limits, places).map(|(baselines, _)| baselines)
 }
 
-/// The same, with the vehicle if known.
+/// With the vehicle, if known.
 fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
     let (mut baselines, mut first) = (Baselines::default(), None::<(&str, Vehicle)>);
     for place in places {
@@ -120,16 +118,15 @@ fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicl
     Ok((baselines, first.map(|(_, vehicle)| vehicle)))
 }
 
-/// The vehicle of a flight, if known. A DataFlash log does not have the system id.
+/// A DataFlash log lacks the system id.
 fn vehicle(judged: &Judged, format: Format) -> Option<Vehicle> {
     let vehicle = overview::vehicle(&judged.monitor)?;
     let system = if format == Format::DataFlash { 0 } else { vehicle.system };
     Some(Vehicle { system, ..vehicle })
 }
 
-/// Whether two recordings are certainly of two vehicles. They differ in the autopilot's unique id if both
-/// report it, otherwise in the system id. They also differ in the kind of vehicle, because an autopilot may
-/// have been moved to another airframe.
+/// Certainly two vehicles: another unique id if known, otherwise another system id, or another kind: an autopilot may
+/// have been moved.
 fn are_two(one: &Vehicle, other: &Vehicle) -> bool {
     let airframe = |of: &Vehicle| Airframe { system: of.system, uid: of.uid };
     let differ = |one: u8, other: u8| one != 0 && other != 0 && one != other;
@@ -138,14 +135,14 @@ fn are_two(one: &Vehicle, other: &Vehicle) -> bool {
         || differ(one.autopilot, other.autopilot)
 }
 
-/// A recording without the vehicle's id may be followed by one with it, which counts from then on.
+/// An id in a later recording counts from then on.
 const fn learn_uid(vehicle: &mut Vehicle, own: Vehicle) {
     if vehicle.uid == 0 {
         *vehicle = own;
     }
 }
 
-/// The vehicle as a part of a sentence.
+/// A part of a sentence.
 fn words(of: &Vehicle) -> String {
     let system = if of.system == 0 { String::new() } else { format!("system {}, ", of.system) };
     let id = if of.uid == 0 { String::new() } else { format!(", uid {:016x}", of.uid) };

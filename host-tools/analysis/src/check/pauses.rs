@@ -1,4 +1,4 @@
-//! An autopilot that stops logging for a while: missing entries are not events of the vehicle.
+//! Pauses of an autopilot's logging are no events of the vehicle.
 
 #[path = "../../../formats/src/source/dataflash/tests/writer.rs"]
 #[allow(dead_code, reason = "a writer for the tests of the reader, too")]
@@ -10,8 +10,7 @@ use crate::source::item::Want;
 use crate::source::recording::Format;
 use writer::Writer;
 
-/// An armed copter in these tenths of seconds, with four ESCs that report ten times a second; `silent` ones
-/// do not report.
+/// Tenths of seconds; four ESCs, `silent` ones excepted, ten times a second.
 fn fly(log: &mut Writer, tenths: std::ops::Range<u64>, silent: bool) {
     for tenth in tenths {
         let time = (tenth * 100_000).to_le_bytes();
@@ -27,7 +26,7 @@ fn fly(log: &mut Writer, tenths: std::ops::Range<u64>, silent: bool) {
     }
 }
 
-/// Number of silences of an ESC, by `hums check`.
+/// By `hums check`.
 fn silences(log: &Writer) -> usize {
     let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
     let want = Want { observations: true, ..Want::default() };

@@ -1,4 +1,4 @@
-//! Problems: the level changes of one check and one part put together.
+//! Level changes of one check and part, together.
 
 use std::collections::BTreeMap;
 
@@ -9,54 +9,53 @@ use crate::part;
 use crate::source::told::Finding;
 use crate::utc::moment;
 
-/// Maximum number of listed findings, flights and gaps; further ones are only counted.
+/// Further ones are counted.
 pub const LISTED_MAX: usize = 10_000;
-/// Maximum number of parts followed: there are 140 of them, and a log may name any.
+/// Of 140 possible ones; a log may name any.
 const FOLLOWED_MAX: usize = 1_000;
 
-/// The check of an impact.
 pub(super) const IMPACT: &str = "impact";
-/// A box finds an impact after the vehicle has been still for this time.
+/// Before a box finds an impact.
 const LIES_STILL: Span = Span::from_secs(1);
 
-/// Maximum number of names of parts: there are 32 sensors.
+/// There are 32 sensors.
 const DETAILS_MAX: usize = 32;
 
-/// One check of one part that was at a warning or worse.
+/// One check and part, at a warning or worse.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// The part of the vehicle.
+    /// Of the vehicle.
     pub subsystem: Subsystem,
-    /// The check's stable name.
+    /// Stable name.
     pub check: String,
-    /// Which one of several, from 0.
+    /// From 0.
     pub instance: u8,
     /// The worst level.
     pub level: Level,
-    /// When it had that level first.
+    /// First at that level.
     pub at: Instant,
-    /// Number of changes from good to a warning or worse.
+    /// Changes from good.
     pub times: u32,
-    /// Time at a warning or worse, in all, without the recording's gaps.
+    /// At a warning or worse, without gaps.
     pub lasted: Span,
-    /// It was still so at the end.
+    /// At the end too.
     pub lasting: bool,
-    /// The worst value that is known.
+    /// Worst known.
     pub value: f32,
-    /// The limit of the worst level.
+    /// Of the worst level.
     pub limit: f32,
-    /// The unit of both.
+    /// Of both.
     pub unit: String,
-    /// Names of the parts, if the check covers several: failsafes, sensors.
+    /// Failsafes, sensors.
     pub details: Vec<String>,
-    /// For a mishap in a radio gap, the last time the vehicle was received before it.
+    /// Last reception, for a radio gap's mishap.
     pub unheard_from: Option<Instant>,
-    /// Its cause: a check whose alarm was as bad at the time of each finding.
+    /// Check with as bad an alarm at each finding.
     pub because: Option<String>,
 }
 
 impl Problem {
-    /// Order within a level: a mishap and its precursors first, parts that are due last, otherwise by time.
+    /// Within a level: mishap and precursors first, due parts last, otherwise by time.
     pub(super) fn order(&self, mishaps: &[Instant]) -> (bool, bool, Instant) {
         (!self.is_mishap() && !self.leads_to(mishaps), part::is_due(&self.check), self.at)
     }
@@ -65,23 +64,23 @@ impl Problem {
         self.subsystem == Subsystem::Mishap && self.level == Level::Critical
     }
 
-    /// Whether it concerns propulsion or attitude and began shortly before one of the mishaps.
+    /// Propulsion or attitude, shortly before a mishap.
     pub(super) fn leads_to(&self, mishaps: &[Instant]) -> bool {
         let is_of_flight = matches!(self.subsystem, Subsystem::Propulsion | Subsystem::Attitude);
         is_of_flight && mishaps.iter().any(|at| self.at <= *at && at.since(self.at) <= LEADS)
     }
 }
 
-/// A precursor begins at most this long before a mishap.
+/// From a precursor to a mishap.
 const LEADS: Span = Span::from_secs(10);
 
-/// Start of each mishap; for one in a radio gap the last time the vehicle was received.
+/// For a radio gap, the last reception.
 pub(super) fn mishaps(problems: &[Problem]) -> Vec<Instant> {
     let mishaps = problems.iter().filter(|problem| problem.is_mishap());
     mishaps.map(|problem| problem.unheard_from.unwrap_or(problem.at)).collect()
 }
 
-/// Rank of a level as a problem; stale means unknown and does not count.
+/// Stale means unknown.
 pub(super) const fn rank(level: Level) -> u8 {
     match level {
         Level::Critical => 2,
@@ -90,12 +89,12 @@ pub(super) const fn rank(level: Level) -> u8 {
     }
 }
 
-/// The side of a check's limits that is bad.
+/// The bad one.
 pub(super) fn side(check: &str) -> Side {
     checks().find(|known| known.name == check).map_or(Side::Above, |check| check.limits.side)
 }
 
-/// The worse of two values; a `NaN` is ignored.
+/// Ignores `NaN`.
 fn worse(known: f32, value: f32, check: &str) -> f32 {
     match side(check) {
         Side::Above => known.max(value),
@@ -103,44 +102,41 @@ fn worse(known: f32, value: f32, check: &str) -> f32 {
     }
 }
 
-/// A value, or `NaN` for an impact in a radio gap. The monitor reports such an impact with the least value
-/// beyond the limit.
+/// `NaN` for an impact in a radio gap, which the monitor reports just beyond the limit.
 fn measured(check: &str, value: f32, limit: f32) -> f32 {
     let is_least = check == IMPACT && value.to_bits() == limit.next_up().to_bits();
     if is_least { f32::NAN } else { value }
 }
 
-/// Since when, and the sum of the recording's gaps until then.
+/// With the sum of gaps until then.
 type Since = (Instant, Span);
 
-/// Puts changes of level together.
+/// Joins changes of level.
 #[derive(Debug, Default)]
 pub(super) struct Problems {
-    /// The changes, up to [`LISTED_MAX`].
+    /// Up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// Number of findings.
     pub findings_count: u64,
     /// By check and part.
     open: BTreeMap<(String, u8), OpenProblem>,
-    /// A box found them, when it did ([`began`]).
+    /// Found by a box, perhaps late ([`began`]).
     of_box: bool,
 }
 
-/// One check of one part.
 #[derive(Debug)]
 struct OpenProblem {
     problem: Problem,
-    /// Since when it is wrong again, with the sum of the gaps until then.
+    /// Wrong again, with the sum of gaps.
     since: Option<Since>,
     /// Its level now.
     level: Level,
-    /// Now without a cause; once without a cause.
+    /// Now, and once.
     unexplained: bool,
     alone: bool,
 }
 
 impl OpenProblem {
-    /// It is so no more.
     fn end(&mut self, at: Instant, gaps: Span) {
         if let Some(since) = self.since.take() {
             self.problem.lasted = self.problem.lasted + lasted(since, at, gaps);
@@ -150,12 +146,12 @@ impl OpenProblem {
 }
 
 impl Problems {
-    /// Problems found by a box.
+    /// Found by a box.
     pub(super) fn of_box() -> Self {
         Self { of_box: true, ..Self::default() }
     }
 
-    /// Takes the next change; `gaps` is the sum of the recording's gaps until then.
+    /// `gaps`: sum until then.
     pub(super) fn take(&mut self, finding: &Finding, gaps: Span) {
         let value = measured(&finding.check, finding.value, finding.limit);
         let finding = &Finding { value, ..finding.clone() };
@@ -210,8 +206,7 @@ impl Problems {
         }
     }
 
-    /// Looks for the cause of the open problems, also among later ones, since the consequence may be seen
-    /// first.
+    /// Of open problems, also among later ones: the consequence may come first.
     fn explain(&mut self) {
         let open = || {
             self.open
@@ -235,7 +230,7 @@ impl Problems {
             let Problem { check, instance, .. } = &followed.problem;
             let effect = Alarm::of(check, *instance, followed.level, since.into());
             if let Some(cause) = effect.and_then(|effect| root_cause(&effect, alarms.iter().copied())) {
-                // The cause of the alarm that first had the worst level counts.
+                // Of the first alarm at the worst level.
                 if followed.problem.because.is_none() || followed.problem.at >= since {
                     followed.problem.because = Some(cause.check.name.to_owned());
                 }
@@ -244,19 +239,17 @@ impl Problems {
         }
     }
 
-    /// The worst value of a part, which may exceed the values at its changes.
+    /// May exceed the values at changes.
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
         if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, measured(check, value, problem.limit), check);
         }
     }
 
-    /// Whether it is wrong now.
     pub(super) fn is_open(&self, check: &str) -> bool {
         self.open.get(&(check.to_owned(), 0)).is_some_and(|followed| followed.since.is_some())
     }
 
-    /// Whether a mishap goes on.
     pub(super) fn is_in_mishap(&self) -> bool {
         self.open.values().any(|followed| {
             let OpenProblem { problem, since, level, .. } = followed;
@@ -264,12 +257,12 @@ impl Problems {
         })
     }
 
-    /// Since when it is wrong, while it is.
+    /// While it is wrong.
     pub(super) fn open_since(&self, check: &str) -> Option<Instant> {
         self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))
     }
 
-    /// Adds the name of a part to an open check.
+    /// To an open check.
     pub(super) fn detail(&mut self, check: &str, name: &str) {
         let known = self.open.get_mut(&(check.to_owned(), 0)).filter(|followed| followed.since.is_some());
         let Some(OpenProblem { problem, .. }) = known else { return };
@@ -278,7 +271,7 @@ impl Problems {
         }
     }
 
-    /// A mishap of this check was in a radio gap, between two times.
+    /// Between two times.
     pub(super) fn unheard(&mut self, check: &str, from: Instant, to: Instant) {
         self.detail(check, &format!("not heard, between {} and {}", moment(from), moment(to)));
         if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
@@ -286,7 +279,7 @@ impl Problems {
         }
     }
 
-    /// Names the part of each check that reports a part as due.
+    /// Due parts.
     pub(super) fn name_parts(&mut self, due: impl Fn(Subsystem) -> Option<(String, Option<String>)>) {
         for OpenProblem { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check))
         {
@@ -294,7 +287,6 @@ impl Problems {
         }
     }
 
-    /// Removes some checks with all their findings.
     pub(super) fn drop_checks(&mut self, out: impl Fn(&str) -> bool) {
         let before = self.findings.len();
         self.findings.retain(|finding| !out(&finding.check));
@@ -302,7 +294,7 @@ impl Problems {
         self.open.retain(|(check, _), _| !out(check));
     }
 
-    /// The open problems end; the real end is unknown.
+    /// The real end is unknown.
     pub(super) fn break_off(&mut self, at: Instant, gaps: Span) {
         self.open.values_mut().for_each(|followed| followed.end(at, gaps));
     }
@@ -315,7 +307,7 @@ impl Problems {
         }
     }
 
-    /// The problems, worst first, and within a level by [`Problem::order`].
+    /// By [`Problem::order`] within a level.
     pub(super) fn worst_first(self) -> Vec<Problem> {
         let mut problems: Vec<_> = self
             .open
@@ -330,13 +322,13 @@ impl Problems {
     }
 }
 
-/// Sorts problems: the worst first, and of the same level by [`Problem::order`].
+/// By [`Problem::order`] within a level.
 pub(super) fn worst_first(problems: &mut [Problem]) {
     let mishaps = mishaps(problems);
     problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(&mishaps)));
 }
 
-/// The problems from a log's findings, worst first. The findings are by a box or by this program.
+/// Worst first; findings of a box, or of this program.
 pub fn problems(findings: &[Finding], of_box: bool) -> Vec<Problem> {
     let mut problems = if of_box { Problems::of_box() } else { Problems::default() };
     for finding in findings {
@@ -345,8 +337,7 @@ pub fn problems(findings: &[Finding], of_box: bool) -> Vec<Problem> {
     problems.worst_first()
 }
 
-/// Start of a problem that a box found at this time, while others are `open` since theirs. In an ongoing
-/// mishap it finds an impact at once.
+/// Of a problem that a box found then, with other `open` ones. In a mishap it finds an impact at once.
 pub fn began<'a>(
     check: &str,
     found_at: Instant,
@@ -360,7 +351,7 @@ pub fn began<'a>(
     }
 }
 
-/// From a time, with the sum of the gaps until then, to another.
+/// Without gaps.
 fn lasted((from, before): Since, at: Instant, gaps: Span) -> Span {
     let between = gaps.as_micros().saturating_sub(before.as_micros());
     Span::from_micros(at.since(from).as_micros().saturating_sub(between))
@@ -370,7 +361,7 @@ fn lasted((from, before): Since, at: Instant, gaps: Span) -> Span {
 pub(super) mod tests {
     use super::*;
 
-    /// The change of a battery's cell voltage to a level.
+    /// Of a battery's cell voltage.
     pub(in crate::check) fn change(at_s: u64, level: Level, value: f32) -> Finding {
         Finding {
             at: Instant::from_millis(at_s * 1000),

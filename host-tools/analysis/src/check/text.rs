@@ -1,6 +1,6 @@
-//! Text output of `hums check`: a screen for one log; a line for each of many, and a table of them all.
+//! Output of `hums check`: a screen for one log, lines and a table for many.
 //!
-//! Writing to a `String` cannot fail; the results of `write!` are dropped on purpose in all of this.
+//! Writing to a `String` cannot fail: results of `write!` are dropped.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -27,17 +27,17 @@ use crate::states::{Shown, meaning, shown};
 use crate::summary::is_possible;
 use crate::utc::{clock, iso8601, moment};
 
-/// Problems that are shown with their words; the rest gets a line.
+/// In words; the rest is one line.
 const SHOWN_MAX: usize = 6;
-/// Reasons and places that are shown; `--json` has them all.
+/// `--json` has them all.
 const LINES_MAX: usize = 8;
 
-/// Details in the verdict.
+/// In the verdict.
 const HEADLINE_DETAILS_MAX: usize = 2;
-/// Name of the worst level, at the beginning of a line.
+/// Of a line's beginning.
 const CRITICAL: &str = "CRITICAL";
 
-/// One log, as a screen; `verbose`: with the checks that were not judged.
+/// `verbose`: with unjudged checks.
 pub fn screen(checked: &Checked, verbose: bool) -> String {
     let judged = &checked.judged;
     let mut text = format!("{}: {}{}\n", word(&checked.name), word(&verdict(judged)), but(checked));
@@ -64,12 +64,12 @@ pub fn screen(checked: &Checked, verbose: bool) -> String {
     text
 }
 
-/// One log of many, as a line.
+/// Of many.
 pub fn line(checked: &Checked) -> String {
     let judged = &checked.judged;
     let level = match (judged.verdict(), checked.soundness()) {
         ("too_little", _) => "little",
-        // A damaged log without problems is not all right.
+        // Damage without problems.
         ("ok", Soundness::Damaged) => "damaged",
         ("ok", Soundness::NotProved) => "unproved",
         (verdict, _) => verdict,
@@ -95,7 +95,7 @@ pub fn line(checked: &Checked) -> String {
         .to_owned()
 }
 
-/// Limits of the verdict: the end of its line.
+/// The end of the verdict's line.
 fn but(checked: &Checked) -> String {
     let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
     match checked.soundness() {
@@ -106,16 +106,15 @@ fn but(checked: &Checked) -> String {
     }
 }
 
-/// Many logs, added up.
+/// Added up.
 #[derive(Debug, Default)]
 pub struct Table {
     levels: BTreeMap<&'static str, u64>,
-    /// Logs by their findings.
+    /// By findings.
     checks: BTreeMap<String, (u64, u64)>,
     logs: u64,
-    /// Logs that lack something.
     unsound: BTreeMap<Soundness, u64>,
-    /// Logs that hold a session of another one.
+    /// Another log's session.
     copies: u64,
     little: u64,
     flown_us: u64,
@@ -148,7 +147,7 @@ impl Table {
         }
     }
 
-    /// The table; this many further logs could not be read.
+    /// `failed`: unreadable logs.
     pub fn text(&self, failed: usize) -> String {
         let count = |level: &str| self.levels.get(level).copied().unwrap_or(0);
         let mut text = format!(
@@ -215,7 +214,7 @@ fn vehicle(judged: &Judged) -> String {
     text
 }
 
-/// A version as people write it.
+/// As people write it.
 pub(super) fn firmware(version: u32) -> Option<String> {
     let [major, minor, patch, _] = version.to_be_bytes();
     (version != 0).then(|| format!("{major}.{minor}.{patch}"))
@@ -223,7 +222,7 @@ pub(super) fn firmware(version: u32) -> Option<String> {
 
 fn when(checked: &Checked) -> String {
     let (judged, format) = (&checked.judged, checked.format);
-    // A HUMS log continues while the vehicle is not received.
+    // A HUMS log continues without the vehicle.
     let of_log = checked.ending.as_ref().and_then(|ending| ending.summary.first.zip(ending.summary.last));
     let Some((first, last)) = judged.span.map(|span| of_log.unwrap_or(span)) else {
         return "nothing of a vehicle is in it".to_owned();
@@ -272,7 +271,7 @@ fn in_air(judged: &Judged) -> String {
     told.map_or(text.clone(), |told| format!("{text} ({told})"))
 }
 
-/// The unseen parts of flights, and any other end of the last one.
+/// Unseen parts, and any other end of the last one.
 fn not_seen(flights: &[Flight]) -> String {
     let last = flights.last();
     let ended = match last {
@@ -307,7 +306,7 @@ fn not_seen(flights: &[Flight]) -> String {
     text
 }
 
-/// The verdict, as a sentence: the worst finding with its time, and what it means for the next flight.
+/// A sentence: the worst finding, its time, its meaning for the next flight.
 pub fn verdict(judged: &Judged) -> String {
     let counted = |level, one: &str| {
         let count = judged.problems.iter().filter(|problem| problem.level == level).count();
@@ -338,7 +337,7 @@ pub fn verdict(judged: &Judged) -> String {
     format!("{}; {what} ({counts})", headline(&judged.problems))
 }
 
-/// The first of the findings, with its value and time.
+/// With value and time.
 fn headline(problems: &[Problem]) -> String {
     let groups = grouped(problems);
     let Some((group, first)) = groups.first().and_then(|group| Some((group, group.first()?))) else {
@@ -366,10 +365,10 @@ fn problems(text: &mut String, problems: &[Problem]) {
         for effect in &group.effects {
             let Some(of_it) = effect.first() else { continue };
             let (at, level) = (moment(of_it.at), level_of(is_critical(effect)));
-            // A consequence may be recognised before its cause.
+            // A consequence may come first.
             let when = if of_it.at < first.at { "seen earlier," } else { "then" };
             let _ = writeln!(text, "                      {when} {at}  {level}: {}", word(&sentence(effect)));
-            // The side effects of a missing card have no meaning of their own.
+            // Side effects of a missing card mean nothing.
             if place < SHOWN_MAX && first.subsystem != Subsystem::Recorder {
                 let _ = writeln!(text, "                              {}", meaning(&of_it.check));
                 if group.is_raised && is_critical(effect) {
@@ -390,12 +389,12 @@ const fn level_of(is_critical: bool) -> &'static str {
     if is_critical { CRITICAL } else { "warning" }
 }
 
-/// The recommended action, as a sentence.
+/// A sentence.
 fn action(problem: &Problem) -> &'static str {
     vocabulary(&problem.check).map_or("", |words| words.action)
 }
 
-/// The problem with the worst value; the first of several, or if the values are unknown.
+/// The first of several, or of unknown ones.
 fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     let is_worse = |one: &Problem, than: &Problem| match side(&one.check) {
         _ if than.value.is_nan() => !one.value.is_nan(),
@@ -405,7 +404,7 @@ fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     group.iter().copied().reduce(|worst, one| if is_worse(one, worst) { one } else { worst })
 }
 
-/// The fault of these parts in a pilot's words: `battery 1 cell low`.
+/// A pilot's words: `battery 1 cell low`.
 fn alarm(group: &[&Problem]) -> String {
     let Some(first) = group.first() else { return String::new() };
     let numbers: Vec<String> =
@@ -413,24 +412,24 @@ fn alarm(group: &[&Problem]) -> String {
     words_of_alarm(&first.check).replacen('#', &numbers.join(", "), 1)
 }
 
-/// The fault of any part: `battery cell low`.
+/// Any part: `battery cell low`.
 fn kind_of_alarm(check: &str) -> String {
     words_of_alarm(check).replacen(" #", "", 1)
 }
 
-/// The fault that a check finds; `#` stands for the part.
+/// `#` stands for the part.
 fn words_of_alarm(check: &str) -> &str {
     let alarm = vocabulary(check).map_or(check, |words| words.said.alarm);
     alarm.split_once('|').map_or(alarm, |(fault, _)| fault)
 }
 
-/// The first of the details, in parentheses.
+/// In parentheses.
 fn details(problem: &Problem, max: usize) -> String {
     let details: Vec<&str> = problem.details.iter().take(max).map(String::as_str).collect();
     if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
 }
 
-/// The worst value of a quantity with its unit, and the limit with its unit.
+/// With units and the limit.
 fn value(problem: &Problem) -> Option<(String, Option<String>)> {
     let Shown::Quantity(value, limit) = shown(&problem.check, problem.value, problem.limit) else {
         return None;
@@ -443,7 +442,7 @@ fn value(problem: &Problem) -> Option<(String, Option<String>)> {
     Some((value, limit.map(|limit| format!("{}{unit}", short(limit)))))
 }
 
-/// The problem: the fault, the parts, the worst value, its limit, its duration.
+/// Fault, parts, worst value, limit, duration.
 fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
     let mut text = alarm(group);
@@ -455,7 +454,7 @@ fn sentence(group: &[&Problem]) -> String {
     if let Some(limit) = limit.flatten().filter(|_| first.details.is_empty()) {
         let _ = write!(text, " (limit {limit})");
     }
-    // A mishap is a moment: its level stays until the next arming.
+    // A mishap is a moment, though its level stays.
     let is_moment = first.subsystem == Subsystem::Mishap;
     if (first.lasted > Span::ZERO || first.lasting) && !is_moment {
         let _ = write!(text, ", for {}", clock(first.lasted));
@@ -470,7 +469,7 @@ fn sentence(group: &[&Problem]) -> String {
     text
 }
 
-/// A check's name for people.
+/// For people.
 fn name(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }
@@ -531,14 +530,14 @@ fn damage(text: &mut String, judged: &Judged) {
     }
 }
 
-/// Order of places, worst first: damage before losses. Then counts over the whole recording, which have no
-/// bytes (wrong checksums, wrong times, a clock that stops). Then single places, the longest first.
+/// Worst first: damage before losses, then counts over the recording, without bytes (wrong checksums, wrong
+/// times, a stopped clock), then single places, the longest first.
 fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
     let lasts = gap.from.zip(gap.to).map_or(Span::ZERO, |(from, to)| to.since(from));
     (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
 }
 
-/// With as many digits as a limit has; a damaged value is shown as such.
+/// As many digits as a limit; damage shows.
 fn short(value: f32) -> String {
     if !is_possible(&value) {
         return format!("{value:.0e}");

@@ -1,25 +1,21 @@
-//! Trends: the figures of a flight against those of the vehicle's earlier flights.
+//! Trends: a flight's figures ([`hums_core::figures`]) against the vehicle's earlier flights.
 //!
-//! A monitor gives one figure of each quantity for a flight ([`hums_core::figures`]). Here they make baselines. The
-//! first [`FLIGHTS_MIN`] flights make one, and each later flight moves it by a tenth of the difference. A flight
-//! beyond the warning's limit does not move it, so a fault never becomes normal.
+//! The first [`FLIGHTS_MIN`] flights make a baseline; each later one moves it by a tenth of the difference. Beyond the
+//! warning's limit it does not, so a fault never becomes normal.
 //!
-//! A baseline has the mean of the figures and their spread. A departure counts if only one unchanged flight in
-//! `TRD_FALSE` departs further, by Student's t distribution. The figures are normal with unknown mean and spread, the
-//! spread with a conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2 and 3.3). The test of one figure is the
-//! likelihood ratio test for a changed mean, so its rate of false alarms can be set. (Lehmann and Romano, Testing
-//! Statistical Hypotheses, 5.2.)
+//! A baseline has mean and spread. A departure counts if only one unchanged flight in `TRD_FALSE` departs further, by Student's
+//! t distribution. Figures are normal with unknown mean and spread (conjugate prior; Gelman et al., Bayesian Data Analysis, 3.2
+//! and 3.3). The likelihood ratio test of a changed mean has a settable rate of false alarms (Lehmann and Romano, Testing
+//! Statistical Hypotheses, 5.2).
 //!
 //! # Heavier, or less thrust
-//! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman,
-//! Principles of Helicopter Aerodynamics, 2.4). With a shorter propeller blade, a weak motor or a weak ESC, throttle
-//! rises for the same thrust and power does not. So if throttle rose, the logarithm of power is compared with the
-//! logarithm of the thrust at this throttle. From `WEIGHT_EXPONENT` times on, half way between both, the cause is
-//! weight. Propellers of a real quadrotor cut by 10 to 25 mm have 0.5 to 1.1.
+//! A heavier vehicle asks all its rotors for more thrust T, and these take power as T^1.5 (actuator disk; Leishman, Principles
+//! of Helicopter Aerodynamics, 2.4). A shorter blade, a weak motor or ESC raises throttle for the same thrust, and not power.
+//! So the logarithm of power is compared with that of the thrust at this throttle: from `WEIGHT_EXPONENT` times on, half way
+//! between both, the cause is weight. Real propellers cut by 10 to 25 mm have 0.5 to 1.1.
 //!
 //! # Better than before
-//! Wear never makes a vehicle hover with less, or a battery resist less and hold more. A flight that is better beyond
-//! its reach begins a new baseline: a part was changed.
+//! Wear never improves hover or battery: a flight better beyond its reach begins a new baseline, because a part was changed.
 
 use hums_blackbox::Record;
 use hums_blackbox::record::Why;
@@ -35,18 +31,18 @@ use hums_onboard::monitoring::PARTS_CHANGED;
 use super::problem::Problem;
 use crate::source::told::Finding;
 
-/// Flights that make a baseline; before, nothing is compared.
+/// Before, nothing is compared.
 pub const FLIGHTS_MIN: u16 = 3;
-/// Weight of a flight in a baseline of many.
+/// In a baseline of many flights.
 const WEIGHT: f32 = 0.1;
-/// As many flights as a baseline remembers.
+/// Remembered flights.
 const REMEMBERED: u16 = 10;
-/// The prior spread of a quantity counts as this many flights.
+/// The prior spread's weight, flights.
 const PRIOR_FLIGHTS: f32 = 8.0;
 /// See above.
 const WEIGHT_EXPONENT: f32 = 1.25;
 
-/// The trend that explains another one of the same recording: a motor, or else less thrust, takes more throttle and power.
+/// A motor, or less thrust, takes more throttle and power.
 pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
     let causes: &[&str] = match effect.check.as_str() {
         "throttle_trend" => &["motor_trend"],
@@ -58,7 +54,7 @@ pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
     causes.iter().find(is_cause).map(|cause| (*cause).to_owned())
 }
 
-/// Whether a record reports the change of a part that a figure depends on.
+/// A part that a figure depends on was changed.
 pub(super) fn is_change(record: &Record<'_>) -> bool {
     match record {
         Record::Component(part) => part.why == Why::Replaced && part.kind != Kind::Card,
@@ -67,7 +63,7 @@ pub(super) fn is_change(record: &Record<'_>) -> bool {
     }
 }
 
-/// Which way a quantity goes when something is wrong.
+/// Direction of a fault.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Bad {
     Up,
@@ -75,18 +71,18 @@ enum Bad {
     Either,
 }
 
-/// How a quantity is compared.
+/// Rules of a comparison.
 struct Terms {
     check: &'static str,
     part: u8,
     subsystem: Subsystem,
     bad: Bad,
-    /// It is percents of the others: a departure is a difference, and not a part of the baseline.
+    /// Percents of the others: a departure is a difference.
     is_share: bool,
-    /// How far flights differ where nothing changed: as a part of the baseline, of a share in percents. Hover throttle, power and
-    /// outputs as in real flights of one quadrotor, at one place and day.
+    /// Of unchanged flights: a part of the baseline, of a share in percents. Hover figures are from real flights of one
+    /// quadrotor, at one place and day.
     prior: f32,
-    /// A flight beyond this limit teaches nothing.
+    /// Beyond it a flight teaches nothing.
     warn: Param,
     critical: Param,
 }
@@ -119,28 +115,28 @@ fn terms(quantity: Quantity) -> Terms {
     Terms { check, part, subsystem, bad, is_share, prior, warn, critical }
 }
 
-/// An event of a recording's trends, in order.
+/// In order.
 #[derive(Clone, Debug)]
 pub enum Episode {
     /// A flight.
     Flown(Box<Flown>),
-    /// A part was changed: earlier flights are no measure for later ones.
+    /// Earlier flights are no measure.
     Changed,
 }
 
-/// The figures of one flight.
+/// One flight's.
 #[derive(Clone, Debug)]
 pub struct Flown {
-    /// When it landed, or the recording ended.
+    /// Landing, or the recording's end.
     at: Instant,
     landed: bool,
     figures: [Option<f32>; Quantity::COUNT],
-    /// The throttle stands for thrust, and not for its root.
+    /// Throttle is thrust, not its root.
     is_linear_in_thrust: bool,
 }
 
 impl Flown {
-    /// The flight that a monitor saw, at its landing or at the end of the recording.
+    /// At the landing or the recording's end.
     pub fn of(at: Instant, landed: bool, monitor: &Monitor) -> Self {
         let autopilot = monitor.vehicle().heartbeat.get().map(|heartbeat| heartbeat.autopilot);
         let mut figures = [None; Quantity::COUNT];
@@ -155,14 +151,14 @@ impl Flown {
     }
 }
 
-/// The normal value of one quantity.
+/// Of one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Baseline {
     /// In the quantity's unit.
     value: f32,
-    /// Mean square distance of the flights' figures from it.
+    /// Mean square distance.
     variance: f32,
-    /// Flights that it was learned from; it holds from [`FLIGHTS_MIN`] on.
+    /// Holds from [`FLIGHTS_MIN`] on.
     flights: u16,
 }
 
@@ -177,23 +173,22 @@ impl Baseline {
         self.flights = self.flights.saturating_add(1);
     }
 
-    /// Mean distance of an unchanged flight's figure from the baseline; `prior` is the usual spread of such a quantity.
+    /// Of an unchanged flight; `prior`: usual spread.
     fn spread(&self, prior: f32) -> f32 {
         let flights = f32::from(self.flights.clamp(1, REMEMBERED));
         let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance;
         (squares / (PRIOR_FLIGHTS + flights) * (1.0 + 1.0 / flights)).sqrt()
     }
 
-    /// The distance from the baseline, either way, that one unchanged flight in `rarely` exceeds.
+    /// Either way, exceeded by one unchanged flight in `rarely`.
     fn reach(&self, prior: f32, rarely: f32) -> f32 {
         let flights = f32::from(self.flights.clamp(1, REMEMBERED));
         self.spread(prior) * student_t(rarely, PRIOR_FLIGHTS + flights - 1.0)
     }
 }
 
-/// The value that a Student's t of these degrees of freedom (8 and more) exceeds, in either direction, once in
-/// `rarely`. The normal quantile is 26.2.23 and its expansion 26.7.5 of Abramowitz and Stegun, Handbook of
-/// Mathematical Functions. Within 1 % for one in 20 to one in 100,000.
+/// Student's t of these degrees of freedom (8 and more), exceeded either way once in `rarely`. 26.2.23 and 26.7.5 of Abramowitz
+/// and Stegun, Handbook of Mathematical Functions. Within 1 % for one in 20 to one in 100,000.
 fn student_t(rarely: f32, degrees: f32) -> f32 {
     let root = (2.0 * (2.0 * rarely).ln()).sqrt();
     let above = 2.515_517 + root * (0.802_853 + root * 0.010_328);
@@ -210,7 +205,7 @@ fn student_t(rarely: f32, degrees: f32) -> f32 {
     normal * (1.0 + more)
 }
 
-/// The normal figures of a vehicle.
+/// A vehicle's normal figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baselines([Baseline; Quantity::COUNT]);
 
@@ -221,31 +216,31 @@ impl Default for Baselines {
 }
 
 impl Baselines {
-    /// The most flights that any baseline was learned from.
+    /// Of any baseline.
     pub fn flights(&self) -> u16 {
         self.0.iter().map(|baseline| baseline.flights).max().unwrap_or(0)
     }
 
-    /// The normal figure of a quantity, once enough flights made it.
+    /// Once enough flights made it.
     pub fn known(&self, quantity: Quantity) -> Option<f32> {
         let Baseline { value, flights, .. } = self.0[quantity.index()];
         (flights >= FLIGHTS_MIN).then_some(value)
     }
 
-    /// How far a flight is from the baseline of a quantity.
+    /// From the baseline.
     fn off(&self, quantity: Quantity, flown: &Flown) -> Option<f32> {
         Some(flown.figure(quantity)? - self.known(quantity)?)
     }
 
-    /// Whether a departure is rare among unchanged flights.
+    /// Rare among unchanged flights.
     fn exceeds(&self, quantity: Quantity, off: f32, params: &Params) -> bool {
         let (baseline, Terms { is_share, prior, .. }) = (self.0[quantity.index()], terms(quantity));
         let prior = if is_share { prior } else { prior * baseline.value };
         off.abs() > baseline.reach(prior, params.get(Param::TrdFalse))
     }
 
-    /// How far a quantity is from its baseline, the way that is bad: percent of it; of a motor against the others,
-    /// percent of these. It is 0 within the reach of an unchanged flight. `None` without a baseline or a figure.
+    /// The bad way, percent of the baseline; a motor's share: of the others. 0 within an unchanged flight's reach. `None`
+    /// without a baseline or a figure.
     fn departure(&self, quantity: Quantity, flown: &Flown, params: &Params) -> Option<f32> {
         let off = self.off(quantity, flown)?;
         let Terms { bad, is_share, .. } = terms(quantity);
@@ -261,8 +256,7 @@ impl Baselines {
         Some(off.abs() / whole * 100.0)
     }
 
-    /// How much heavier the vehicle hovers than before, percent; 0 where it is not, or where it has less thrust. `None` where that is
-    /// not known.
+    /// Percent; 0 if it is not, or has less thrust. `None` if unknown.
     fn heavier(&self, flown: &Flown, params: &Params) -> Option<f32> {
         let throttle = self.departure(Quantity::HoverThrottle, flown, params)?;
         let ratio =
@@ -273,7 +267,7 @@ impl Baselines {
         Some(if throttle > 0.0 && is_weight { (thrust - 1.0) * 100.0 } else { 0.0 })
     }
 
-    /// Learns from a flight: nothing from a quantity beyond its warning's limit, anew from one that became better.
+    /// Nothing beyond the warning's limit; anew after an improvement.
     fn learn(&mut self, flown: &Flown, params: &Params) {
         let before = self.clone();
         for quantity in Quantity::all() {
@@ -293,7 +287,7 @@ impl Baselines {
         }
     }
 
-    /// The departure of each trend check in a flight, with the terms of its quantity.
+    /// With the quantity's terms.
     fn departures(&self, flown: &Flown, params: &Params) -> Vec<(Terms, f32)> {
         let heavier = self.heavier(flown, params);
         let mut all: Vec<(Terms, f32)> = Vec::new();
@@ -302,7 +296,7 @@ impl Baselines {
             let terms = terms(quantity);
             let takes_more = matches!(quantity, Quantity::HoverThrottle | Quantity::HoverPower);
             let is_weight = takes_more && heavier.is_some_and(|percent| percent > 0.0);
-            // A motor's output is its figure only if no ESC reports its speed.
+            // Only if no ESC reports the speed.
             let is_told = all.iter().any(|(known, _)| (known.check, known.part) == (terms.check, terms.part));
             if !is_told {
                 all.push((terms, if is_weight { 0.0 } else { departure }));
@@ -315,7 +309,7 @@ impl Baselines {
         all
     }
 
-    /// Judges a flight, and then learns from it: findings, and the checks that had a figure to compare.
+    /// Findings, and the checks with a figure; then learns.
     pub fn judge(&mut self, flown: &Flown, params: &Params) -> (Vec<Finding>, Vec<&'static str>) {
         let departures = self.departures(flown, params);
         let judged = departures.iter().map(|(terms, _)| terms.check).collect();
@@ -366,7 +360,7 @@ mod tests {
         Flown { at: Instant::ZERO, landed: true, figures, is_linear_in_thrust }
     }
 
-    /// A past of five flights at 0.4 of throttle and 160 W, and a flight.
+    /// Five flights at 0.4 throttle and 160 W, then one.
     fn hovered(throttle: f32, power_w: f32, is_linear_in_thrust: bool) -> (Flown, Baselines) {
         let quantities = [Quantity::HoverThrottle, Quantity::HoverPower];
         let past = learnt(5, &[(quantities[0], 0.4), (quantities[1], 160.0)]);
@@ -401,7 +395,7 @@ mod tests {
 
     #[test]
     fn one_flight_in_as_many_as_are_asked_for_goes_beyond() {
-        // Two-sided points of Student's t, by integration of its density.
+        // Two-sided points, by integration.
         for (rarely, degrees, known) in [
             (20.0, 10.0, 2.228),
             (100.0, 10.0, 3.169),
@@ -442,7 +436,7 @@ mod tests {
 
     #[test]
     fn a_heavier_vehicle_is_told_from_one_with_less_thrust() {
-        // A tenth more weight: throttle by as much where it is linear in thrust, by its root elsewhere, and power by its 1.5th power.
+        // A tenth more weight: throttle linear in thrust or by its root, power by its 1.5th power.
         let power_w = 160.0 * 1.1_f32.powf(1.5);
         let mut cases = vec![
             (0.44, power_w, true, 10.0),
@@ -450,7 +444,7 @@ mod tests {
             (0.40, 160.0, true, 0.0),
             (0.36, 140.0, true, 0.0),
         ];
-        // Propellers of a real quadrotor cut by 25, 20 and 10 mm.
+        // Real propellers cut by 25, 20 and 10 mm.
         let cut = [(1.10, 1.06), (1.20, 1.18), (1.17, 1.18)];
         cases.extend(cut.map(|(throttle, power)| (0.4 * throttle, 160.0 * power, true, 0.0)));
         for (throttle, power_w, is_linear, percent) in cases {
@@ -468,7 +462,7 @@ mod tests {
         for (throttle, power_w, flights) in [
             (0.41, 160.0, (6, 6)),
             (0.60, 160.0, (5, 6)),
-            // New propellers, or less to carry; and more power than before.
+            // New propellers, or less to carry; and more power.
             (0.36, 190.0, (1, 5)),
             (0.398, 161.0, (6, 6)),
         ] {

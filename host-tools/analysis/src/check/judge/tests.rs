@@ -14,7 +14,7 @@ use super::*;
 use crate::check::flights::Flight;
 use crate::source::item::hand_said;
 
-/// A record that only a monitor with checks writes.
+/// Only a monitor with checks writes it.
 const CHECKED: Record<'_> = Record::Usage(Usage::new(Moment::Start, &[]));
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
@@ -29,7 +29,7 @@ fn battery(remaining: f32) -> Observation {
     Observation::Battery(Battery { voltage, remaining, ..Battery::default() })
 }
 
-/// Heartbeats and battery levels at this rate per second, from this second to that.
+/// Heartbeats and battery levels.
 fn fly(judge: &mut Judge, from_s: u64, to_s: u64, per_s: u64, remaining: f32) {
     for tick in from_s * per_s..to_s * per_s {
         let at = Instant::from_micros(tick * 1_000_000 / per_s);
@@ -103,12 +103,12 @@ fn each_check_is_judged_or_says_why_not() {
     assert_eq!(named, VOCABULARY.iter().chain(&WORDS).filter(meant).count());
 }
 
-/// A flight at 30 m that is disarmed at 20 s, and falls or stays.
+/// At 30 m, disarmed at 20 s; falls or stays.
 fn disarmed_high(falls: bool) -> Judged {
     disarmed_high_with(falls, None)
 }
 
-/// The same, for a log with this source of its arming.
+/// With this source of arming.
 fn disarmed_high_with(falls: bool, arming: Option<&str>) -> Judged {
     use crate::source::item::Fact;
     use hums_core::observation::GlobalPosition;
@@ -143,7 +143,7 @@ fn a_vehicle_that_falls_after_it_is_disarmed_did_not_land() {
     assert_eq!((flight.landed, flight.disarmed_at_m), (true, None), "it stands on a hill");
 }
 
-/// Half-second steps in which the autopilot reports its armed and landed states.
+/// Armed and landed states.
 fn half_seconds(judge: &mut Judge, from_ms: u64, to_ms: u64, armed: bool, landed: LandedState) {
     for at_ms in (from_ms..to_ms).step_by(500) {
         let at = Instant::from_millis(at_ms);
@@ -185,7 +185,7 @@ fn a_vehicle_that_is_in_the_air_when_it_is_heard_first_did_not_take_off() {
     assert!(!took_off(0));
 }
 
-/// Nine or ten volts in the air may be of two cells or of three.
+/// Nine or ten volts: two cells or three.
 #[test]
 fn cells_that_nothing_tells_in_the_air_are_said_and_no_check_of_their_voltage_counts_as_judged() {
     let judged = |named: bool, on_board: bool| {
@@ -218,7 +218,7 @@ fn cells_that_nothing_tells_in_the_air_are_said_and_no_check_of_their_voltage_co
     );
 }
 
-/// A check of the box itself: only its record has the worst value.
+/// Only the box's record has it.
 #[test]
 fn the_worst_value_of_a_check_of_the_box_is_that_of_its_record() {
     use hums_blackbox::record::Exceedance;
@@ -386,7 +386,7 @@ fn silence_is_flight_where_the_vehicle_flies_when_it_is_heard_again() {
         (true, LandedState::OnGround, 30, 35),
         (false, LandedState::OnGround, 30, 35),
         (false, LandedState::OnGround, 600, 35),
-        // Longer than is stepped through.
+        // Longer than stepped.
         (true, LandedState::InAir, 600, 120),
     ] {
         let mut judge = Judge::new(&Limits::default(), Format::Tlog);
@@ -422,7 +422,7 @@ fn a_recording_that_was_joined_on_is_judged_by_itself() {
             }
         };
         flight(&mut judge, 0);
-        // With the ESCs of another vehicle, their reports would be missing.
+        // Another vehicle's ESCs would be missing.
         escs(&mut judge, if findings == 0 { 50_000 } else { 60_000 }, 60_000);
         judge.item(Instant::from_millis(60_000), joint);
         flight(&mut judge, 60_000);
@@ -490,8 +490,7 @@ fn nothing_of_a_vehicle_is_no_good_news() {
     assert!(judged.judged.is_empty(), "{:?}", judged.judged);
 }
 
-/// Heartbeats at 10 Hz. After 20 s this many in a hundred are lost on the wire, and all of them from 40 to 48
-/// s.
+/// 10 Hz; after 20 s lost percents, and all from 40 to 48 s.
 fn link_faults(heard: Heard) -> Judged {
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::{Frame, messages};
@@ -576,7 +575,7 @@ fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is
             judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
         }
         escs(&mut judge, 30_000, 40_000);
-        // A loss count over the whole recording, reported at its end, is not a pause.
+        // A count at the end is no pause.
         let whole = Gap { from: Some(Instant::ZERO), to: Some(Instant::from_millis(39_900)), ..gap };
         judge.item(Instant::from_millis(39_900), Item::Gap(&whole));
         let judged = judge.end();
@@ -630,7 +629,7 @@ fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
     }
 }
 
-/// Twenty seconds of an armed vehicle, and this at the tenth.
+/// Armed for twenty seconds; this at the tenth.
 fn armed_and_told(format: Format, item: Item<'_>) -> Judged {
     let mut judge = Judge::new(&Limits::default(), format);
     for tick in 0..200_u64 {
@@ -664,11 +663,11 @@ fn a_finding_names_the_text_or_the_event_that_raised_it_whatever_the_words_of_it
         let names: Vec<_> = judged.problems.iter().flat_map(|problem| &problem.details).collect();
         assert_eq!(names, Vec::from_iter(named), "{:?}", judged.problems);
         assert_eq!(judged.problems.len(), usize::from(named.is_some()), "{:?}", judged.problems);
-        // A check without an alert does not count as judged.
+        // Without an alert not judged.
         let alerts = judged.judged.iter().filter(|check| check.ends_with("_alert"));
         assert_eq!(alerts.copied().collect::<Vec<_>>(), Vec::from_iter(named.map(|_| "battery_alert")));
     }
-    // A text that is not marked as an alert raises none, at any severity.
+    // At any severity.
     let silent = Text { source: AUTOPILOT, severity: 0, words: "Battery failsafe", alert: None };
     assert!(armed_and_told(Format::Tlog, Item::Text(silent)).problems.is_empty());
 }
@@ -700,8 +699,7 @@ fn what_the_board_found_is_named_too() {
     );
 }
 
-/// Result of a silence of this many seconds in the air, with the given vehicle state after it: landed
-/// flights, causes of gaps, damages.
+/// Vehicle state after it: landed flights, causes of gaps, damages.
 fn silent_in_air(
     format: Format,
     silence_ms: u64,

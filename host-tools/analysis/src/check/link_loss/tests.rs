@@ -23,7 +23,7 @@ const ROTORS: [(Autopilot, VehicleKind, u8); 3] = [
     (Autopilot::Px4, VehicleKind::Vtol, 22),
 ];
 
-/// The state that a script changes from [`AT_MS`] on.
+/// Changed by a script from [`AT_MS`] on.
 struct State {
     quad: Quad,
     heard: bool,
@@ -54,8 +54,7 @@ impl State {
     }
 }
 
-/// A hover at 20 m until the end of a minute. The recording lost the given span at [`AT_MS`]; the script gets
-/// the time since then.
+/// A minute's hover at 20 m; a span is lost at [`AT_MS`]. The script gets the time since.
 fn judge(
     (autopilot, kind, type_number): (Autopilot, VehicleKind, u8),
     (begin_ms, lost): (u64, Span),
@@ -94,7 +93,7 @@ fn judge(
         if !state.heard {
             continue;
         }
-        // No sensor repeats one value for ever.
+        // No sensor repeats a value for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.02;
         let force = if state.lies { [9.8, 0.0, -0.5 - noise] } else { [0.0, 0.0, -9.8 - noise] };
         let rates = Some([state.rate, 0.02, 0.0].map(RadiansPerSecond));
@@ -127,7 +126,7 @@ fn judge(
     judge.end()
 }
 
-/// The mishaps found; the number of flights, of landings, and of mishaps in a radio gap.
+/// Mishaps; flights, landings, mishaps in a radio gap.
 fn told(judged: &Judged) -> (Vec<&str>, [usize; 3]) {
     let mishaps = judged.problems.iter().filter(|problem| problem.is_mishap());
     let count =
@@ -150,7 +149,6 @@ fn what_came_down_in_a_silence_is_told_from_what_landed_and_from_what_flies_on()
         }
     };
     let crash = |check| (vec![check], [1, 0, 1]);
-    // Nobody saw the landing.
     let landing = || (vec![], [1, 0, 0]);
     let cases: [(&str, u64, After, (Vec<&str>, [usize; 3])); 11] = [
         ("lies over", 6_000, |_, state| state.lie(), crash("overturned")),
