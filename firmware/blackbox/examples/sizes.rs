@@ -4,9 +4,8 @@
 //! cargo run --release -p hums-blackbox --example sizes -- tests/flights/*
 //! ```
 //! Each log begins with the records that a session has (boot, clock, vehicle) and has statistics every 10 s. It is
-//! read back and compared with the recording frame by frame; a difference ends the program. Signed recordings are
-//! shown but not counted: a signature is random. A file that is not a tlog is read as the raw bytes of a line of
-//! 57,600 baud. `--quick` leaves xz out. Exit codes: 0, or 1 where a mean is below its target.
+//! read back and compared frame by frame; a difference ends the program. A file that is not a tlog is read as the raw
+//! bytes of a line of 57,600 baud. `--quick` leaves xz out. Exit codes: 0, or 1 where a mean is below its target.
 
 #[path = "../tests/common/card.rs"]
 mod card;
@@ -23,12 +22,12 @@ use hums_core::clock::Instant;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// How much smaller than the tlog a log is to be, as a geometric mean.
+/// Tlog's size by the log's, geometric mean.
 const RATIO_MIN: f64 = 6.5;
-/// How much smaller than `xz -9e` makes the tlog.
+/// `xz -9e` of the tlog by the log.
 const AGAINST_XZ_MIN: f64 = 2.3;
 
-/// A recording's frame: microseconds since 1970, and the frame.
+/// Microseconds since 1970, and the frame.
 type Frame<'a> = (u64, &'a [u8]);
 
 fn main() -> Result<ExitCode> {
@@ -99,7 +98,6 @@ fn tlog_of_line(line: &[u8]) -> Vec<u8> {
     tlog
 }
 
-/// The length of the frame that begins here.
 fn frame_len(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [0xfe, len, ..] => Some(usize::from(len) + 8),
@@ -143,7 +141,6 @@ fn pack(frames: &[Frame<'_>]) -> Result<Vec<u8>> {
     Ok(card.0.iter().flat_map(|sector| *sector.bytes()).collect())
 }
 
-/// Whether the checksum matches our definition.
 fn checks(frame: &[u8]) -> bool {
     let (id, payload_at) = match *frame {
         [0xfe, _, _, _, _, id, ..] => (u32::from(id), 6),

@@ -1,12 +1,11 @@
-//! Assembler: puts the blocks of a medium in order as sectors. It checks each block, drops stale ones, selects among copies of a
-//! sector, and reports missing sectors.
+//! Assembler: puts the blocks of a medium in order as sectors. It drops stale blocks, selects among copies of a sector, and
+//! reports missing sectors.
 //!
-//! The recorder writes partial copies of an unfinished sector alternately to its own block and the next one. So several copies of
-//! one number may be adjacent. The fullest one counts, so one sector is held back.
+//! The recorder writes partial copies of an unfinished sector alternately to its own block and the next one. So the fullest of
+//! adjacent copies counts, and one sector is held back.
 //!
 //! A card may also misplace a page. So a jump ahead is accepted only if the next [`PAGE_SECTORS`] sectors continue from it. If
-//! the skipped numbers follow after all, the sectors ahead of them are dropped as misplaced. A misplaced page thus costs no more
-//! than a missing one.
+//! the skipped numbers follow after all, the sectors ahead of them are dropped as misplaced.
 
 use heapless::Deque;
 
@@ -39,7 +38,7 @@ pub struct BlockCounts {
     pub unsound: u64,
     /// Parity sectors of this session, sound or not; those of others are stale.
     pub parity: u64,
-    /// Sectors rebuilt from parity, also counted by their kind. The rebuilding code sets this.
+    /// Sectors rebuilt from parity, also counted by their kind.
     pub repaired: u64,
     /// All zeros.
     pub empty: u64,
@@ -47,14 +46,14 @@ pub struct BlockCounts {
     pub erased: u64,
     /// Any other block, for example a sector of another format version.
     pub foreign: u64,
-    /// Sound sectors of an older format version, which this build does not read, also counted as foreign.
+    /// Duplicates, or misplaced sectors, of this session.
     pub older_version: u64,
-    /// The same of a newer one, or sealed ones.
+    /// Wrong checksum, apparently of this session: torn or damaged.
     pub newer_version: u64,
 }
 
 impl BlockCounts {
-    /// Counts since `before`.
+    /// Of another session, left from an earlier file.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
         Self {
@@ -76,20 +75,20 @@ impl BlockCounts {
     }
 }
 
-/// A sector in order.
+/// A wrong checksum, apparently of an older session or of none.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Its header.
+    /// Of this session, sound or not.
     pub header: Header,
-    /// The sector.
+    /// Rebuilt from parity, also counted by their kind.
     pub sector: Sector,
-    /// Numbers missing before this sector.
+    /// Any other block, for example of another format version.
     pub missing: u32,
-    /// Invalid or misplaced blocks between the previous sector and this one.
+    /// Of an older format version, which this build does not read, also counted as foreign.
     pub damaged: u32,
 }
 
-/// Orders the sectors of one session. After each block, [`Self::next`] returns the sectors known to be in order.
+/// Of a newer version, or sealed.
 #[derive(Debug, Default)]
 pub struct Assembler {
     session: Option<u32>,
@@ -105,12 +104,10 @@ pub struct Assembler {
     ended: bool,
     first_number: Option<u32>,
     last_number: Option<u32>,
-    /// Invalid blocks since the last sector.
     bad_blocks: u32,
-    /// Those apparently of this session.
+    /// Apparently of this session.
     bad_own: u32,
     counts: BlockCounts,
-    /// The counts at the last sector.
     at_last: BlockCounts,
 }
 
@@ -169,7 +166,7 @@ impl Assembler {
         self.counts.blocks += 1;
     }
 
-    /// The next sector in order, the fullest of its number; `None`: feed the next block.
+    /// The fullest of its number; `None`: feed the next block.
     #[expect(clippy::should_implement_trait, reason = "it goes on after `None`")]
     pub fn next(&mut self) -> Option<Step> {
         loop {
@@ -199,7 +196,6 @@ impl Assembler {
         self.believed = true;
     }
 
-    /// A valid sector of this session.
     fn place(&mut self, mut step: Step) {
         let number = step.header.number;
         let last = self.held.as_ref().map(|held| held.header.number).or(self.last_number);
@@ -215,7 +211,6 @@ impl Assembler {
         }
     }
 
-    /// A number that is a duplicate or too low.
     fn behind(&mut self, step: &Step, last: u32) {
         let number = step.header.number;
         let before_all = self.first_number.is_none_or(|first| number < first);
@@ -270,7 +265,6 @@ impl Assembler {
         self.believed = self.ahead.is_full();
     }
 
-    /// The sectors ahead are misplaced.
     fn drop_ahead(&mut self) {
         while let Some(step) = self.ahead.pop_front() {
             self.counts.misplaced += 1;
@@ -278,7 +272,6 @@ impl Assembler {
         }
     }
 
-    /// The latest sector so far.
     const fn reached(&mut self) {
         self.bad_own = 0;
         self.at_last = self.counts;
@@ -319,8 +312,8 @@ impl Assembler {
         self.session
     }
 
-    /// Whether a block that fails its check was a sector of this session. It was, if it names the session or the next
-    /// number, or if only one bit of its first two bytes is wrong.
+    /// Whether a block that fails its check was of this session: it names the session or the next number, or one bit of its
+    /// first two bytes is wrong.
     fn is_own(&self, block: &[u8; SECTOR_BYTES]) -> bool {
         let Some(session) = self.session else { return true };
         let sector = Sector::from_bytes(*block);

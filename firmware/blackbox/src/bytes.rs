@@ -1,7 +1,6 @@
 //! Little-endian fields out of byte slices, and copies between them, bounded at both ends.
 
-/// Copies `from` to the start of `to`, as far as there is room. Few bytes are copied in pieces of fixed sizes: less work
-/// than a call of `memcpy`, which the compiler makes of anything plainer.
+/// Copies `from` to the start of `to`, as far as there is room. Pieces of fixed sizes: less work than a call of `memcpy`.
 #[inline]
 pub(crate) fn copy_few(from: &[u8], to: &mut [u8]) {
     if from.len() >= 64 {
@@ -18,7 +17,6 @@ pub(crate) fn copy_few(from: &[u8], to: &mut [u8]) {
     copy_piece::<1>(rest);
 }
 
-/// Copies `N` bytes if there are that many, and returns the rest.
 #[inline]
 fn copy_piece<'f, 't, const N: usize>((from, to): (&'f [u8], &'t mut [u8])) -> (&'f [u8], &'t mut [u8]) {
     if from.len() < N || to.len() < N {

@@ -1,14 +1,13 @@
-//! Chained check of a session's received entries. A reader computes it again from the decoded entries.
+//! Chained check of a session's received entries.
 //!
-//! Each entry has a CRC-32C of its time, kind, length and bytes, independent of the codec. So a recorder with changed
-//! memory cannot write a wrong frame that passes as correct. The values are chained from the session's first entry to
-//! its last. Each group begins with the value before it; each sector has the one after the last entry that it
-//! completes. So the value in a session's last sector covers all of it.
+//! Each entry has a CRC-32C of its time, kind, length and bytes, independent of the codec, which a reader computes
+//! again. So a recorder with changed memory cannot write a wrong frame that passes as correct. The values are chained
+//! from the session's first entry to its last. Each group begins with the value before it; each sector has the one
+//! after the last entry that it completes. So the value in a session's last sector covers all of it.
 
 use crate::codec::{Entry, Kind};
 use crate::crc::{Crc32c, crc32c};
 
-/// Value of one received entry.
 pub(crate) fn value_of(entry: &Entry<'_>) -> u32 {
     let kind = match entry.kind {
         Kind::Frame { verified } => u8::from(verified),

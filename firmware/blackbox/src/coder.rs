@@ -32,7 +32,7 @@ const fn cut(low: u32, range: u32) -> Option<u32> {
     }
 }
 
-/// Output buffer of the encoder for one entry.
+/// For one entry.
 pub(crate) struct Scratch<const N: usize> {
     bytes: [u8; N],
     len: usize,
@@ -68,7 +68,6 @@ impl<const N: usize> Scratch<N> {
     }
 }
 
-/// The writing end's interval.
 #[derive(Clone, Copy)]
 pub(crate) struct Encoder {
     low: u32,
@@ -112,10 +111,9 @@ impl Encoder {
     }
 }
 
-/// One end of the coder. Writer and reader run the same code over it. The writer codes the given value; the reader ignores it and
+/// Writer and reader run the same code over an end of the coder. The writer codes the given value; the reader ignores it and
 /// returns the decoded one.
 pub(crate) trait Coder {
-    /// Whether this end writes.
     const WRITES: bool;
 
     /// A symbol below 16.
@@ -141,7 +139,6 @@ pub(crate) trait Coder {
     }
 }
 
-/// The writing end of the coder.
 pub(crate) struct Writing<'a, const N: usize> {
     pub(crate) encoder: &'a mut Encoder,
     pub(crate) out: &'a mut Scratch<N>,
@@ -183,7 +180,7 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-/// The reading end of the coder, with its user's extra memory.
+/// With its user's extra memory.
 pub(crate) struct Reading<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],
@@ -267,7 +264,6 @@ impl Decoder {
         (self.range as u16, self.offset)
     }
 
-    /// Removes the symbol that `part` found.
     #[inline]
     pub(crate) fn take(&mut self, start: u32, size: u32, input: &[u8]) {
         let below = self.range.wrapping_mul(start);

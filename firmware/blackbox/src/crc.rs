@@ -26,7 +26,6 @@ const fn tables() -> [[u32; 256]; 4] {
     tables
 }
 
-/// A CRC-32C in the making.
 pub(crate) struct Crc32c(u32);
 
 impl Crc32c {
@@ -86,7 +85,7 @@ mod sse42 {
     const YES: u8 = 1;
     const NO: u8 = 2;
 
-    /// The check after these bytes; `None` if the processor lacks it.
+    /// `None` if the processor lacks the instruction.
     #[inline]
     pub(super) fn add(crc: u32, bytes: &[u8]) -> Option<u32> {
         let has = match HAS.load(Ordering::Relaxed) {
@@ -113,7 +112,6 @@ mod sse42 {
     }
 }
 
-/// The CRC-32C of all bytes given.
 pub(crate) fn crc32c(bytes: &[u8]) -> u32 {
     let mut crc = Crc32c::new();
     crc.add(bytes);

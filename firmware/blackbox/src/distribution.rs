@@ -2,7 +2,6 @@
 
 mod at_once;
 
-/// Symbols of a distribution.
 pub(crate) const SYMBOLS: usize = 16;
 
 /// Bits of a distribution's probabilities.
@@ -17,7 +16,6 @@ pub(crate) const PROBABILITY_BITS: u32 = 16;
 #[repr(align(4))]
 pub(crate) struct Cdf([u16; SYMBOLS]);
 
-/// Offset of the use count.
 const USES: usize = SYMBOLS - 1;
 
 /// How often a distribution is used until it adapts no more slowly.
@@ -34,7 +32,6 @@ const SPEEDS: [u8; USES_MAX as usize] = [1, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 
 const SPEED_LAST: u32 = 5;
 const _: () = assert!(USES_MAX >> SPEED_LAST == 0);
 
-/// Highest probability of the first symbol: upper limit of the first place.
 const SURE: u16 = 0xf800;
 
 /// The gains of places in a step towards a symbol, two places in a word.
@@ -43,7 +40,7 @@ type Gains = [u32; SYMBOLS / 2];
 /// Gains by speed (from 1 on) and symbol.
 static GAINS: [[Gains; SYMBOLS]; SPEED_LAST as usize] = gains();
 
-/// The gain of the places above the symbol at this speed, beside the gain of every place.
+/// Of the places above the symbol, beside every place's gain.
 const fn reach(speed: u32) -> u16 {
     (u16::MAX >> speed) - SYMBOLS as u16
 }
@@ -92,7 +89,6 @@ impl Cdf {
         Self(places)
     }
 
-    /// The same distribution, ready to adapt quickly.
     pub(crate) fn renewed(mut self) -> Self {
         self.0[USES] = self.0[USES].min(USES_RENEWED);
         self
@@ -159,7 +155,7 @@ const fn rates() -> [i16; 16] {
     rates
 }
 
-/// A binary probability that adapts likewise: bits 4..=15 that the bit is one, bits 0..=3 the uses.
+/// Bits 4..=15: that the bit is one; bits 0..=3: the uses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell(u16);
 

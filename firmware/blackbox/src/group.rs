@@ -16,16 +16,16 @@ use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, Sector};
 pub enum Entry<'a> {
     /// A frame as it was received.
     Frame {
-        /// When, on the monitor's clock; whole milliseconds.
+        /// On the monitor's clock; whole milliseconds.
         at: Instant,
-        /// The frame, from its magic byte to its checksum or signature.
+        /// From magic byte to checksum or signature.
         bytes: &'a [u8],
         /// The checksum matches the monitor's definition.
         verified: bool,
     },
     /// A record of the monitor's own.
     Record {
-        /// When, on the monitor's clock; whole milliseconds.
+        /// On the monitor's clock; whole milliseconds.
         at: Instant,
         /// The record.
         record: Record<'a>,
@@ -35,13 +35,13 @@ pub enum Entry<'a> {
 /// An entry without a frame's bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline<'a> {
-    /// A frame whose bytes were not put together.
+    /// Its bytes were not put together.
     Frame {
-        /// When, on the monitor's clock; whole milliseconds.
+        /// On the monitor's clock; whole milliseconds.
         at: Instant,
         /// Its message id.
         id: u32,
-        /// Its length, from its magic byte to its checksum or signature.
+        /// From magic byte to checksum or signature.
         bytes: usize,
         /// The checksum matches the monitor's definition.
         verified: bool,
@@ -86,7 +86,6 @@ pub struct GroupDecoder {
     decoder: Decoder,
     input: [u8; GROUP_SECTORS * BODY_BYTES],
     filled: usize,
-    /// The last sector taken.
     last: Option<Header>,
     /// Entries that the sectors taken complete and that were not given out yet.
     due: u32,
@@ -100,7 +99,6 @@ pub struct GroupDecoder {
     layouts: Option<(u32, Layouts)>,
     entry: [u8; ENTRY_BYTES_MAX],
     decoded: Decoded,
-    /// The decoded frame among the last ones, if it is not assembled yet.
     apart: Option<usize>,
 }
 
@@ -111,7 +109,7 @@ impl Default for GroupDecoder {
 }
 
 impl GroupDecoder {
-    /// A decoder that waits for a group.
+    /// Waits for a group.
     #[expect(clippy::large_stack_arrays, reason = "it is boxed by whoever makes one")]
     pub fn new() -> Self {
         Self {
@@ -134,8 +132,7 @@ impl GroupDecoder {
         }
     }
 
-    /// Takes the next sector of the group, checked by `Header::read`; one that starts a group drops the rest of the
-    /// previous one.
+    /// Checked by `Header::read`; one that starts a group drops the rest of the previous one.
     pub fn push(&mut self, header: &Header, sector: &Sector) -> Result<(), GroupError> {
         if header.starts_group() {
             self.begin(header, sector)?;
@@ -209,7 +206,6 @@ impl GroupDecoder {
         Some(Ok(Outline::Whole(self.entry())))
     }
 
-    /// Decodes the next entry, which `entry` returns.
     pub(crate) fn advance(&mut self) -> Option<Result<(), GroupError>> {
         let last = self.last?;
         if core::mem::take(&mut self.is_unchecked) {
@@ -242,7 +238,6 @@ impl GroupDecoder {
         }
     }
 
-    /// The entry that `advance` decoded.
     pub(crate) fn entry(&mut self) -> Entry<'_> {
         if let Some(frame) = self.apart.take().and_then(|index| self.last_frames.get_mut(index)) {
             frame.assemble(self.recall.seed, &mut self.entry);
@@ -261,12 +256,11 @@ impl GroupDecoder {
         }
     }
 
-    /// Frames returned from this group so far.
+    /// Returned from this group so far.
     pub const fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Drops the rest of the group.
     pub(crate) fn abandon(&mut self) {
         self.last = None;
     }

@@ -15,7 +15,7 @@ use hums_dialect::{Kind, Message, Role};
 
 use crate::crc::Crc32c;
 
-/// Layout tables of builds that wrote logs, newest last.
+/// Of builds that wrote logs, newest last.
 static STORED: [&[u8]; 1] = [NEWEST];
 
 const NEWEST: &[u8] = include_bytes!("../layouts/table-1.bin");
@@ -25,7 +25,7 @@ const MESSAGE_HEAD_BYTES: usize = 6;
 /// The hash of this build's table: a constant, so that no flip of memory makes all groups of a session wrong.
 pub(crate) const CURRENT: u32 = Crc32c::of_constant(NEWEST);
 
-/// Gives the stored form of this build's table, piece by piece.
+/// Piece by piece.
 pub fn store(mut out: impl FnMut(&[u8])) {
     for message in hums_dialect::messages() {
         let [low, middle, high, _] = message.id.to_le_bytes();
@@ -39,13 +39,11 @@ pub fn store(mut out: impl FnMut(&[u8])) {
 /// A layout table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Layouts {
-    /// That of this build.
     Current,
-    /// One in stored form.
     Stored(&'static [u8]),
 }
 
-/// The place of a message's layout in a table, small enough for each slot.
+/// Small enough for each slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place(u16);
 
@@ -58,7 +56,7 @@ pub(crate) enum Layout {
 }
 
 impl Layouts {
-    /// The table with this hash, if this build has it.
+    /// If this build has it.
     pub(crate) fn by_hash(hash: u32) -> Option<Self> {
         if hash == CURRENT {
             return Some(Self::Current);
@@ -66,7 +64,6 @@ impl Layouts {
         STORED.iter().find(|table| hash_of(table) == hash).map(|table| Self::Stored(table))
     }
 
-    /// The place of a message in the table.
     pub(crate) fn find(self, id: u32) -> Option<Place> {
         let place = match self {
             Self::Current => hums_dialect::messages().binary_search_by_key(&id, |message| message.id).ok()?,
@@ -75,7 +72,6 @@ impl Layouts {
         u16::try_from(place).ok().map(Place)
     }
 
-    /// The layout at a place that `find` gave.
     pub(crate) fn at(self, place: Place) -> Option<Layout> {
         let place = usize::from(place.0);
         match self {
@@ -103,7 +99,6 @@ fn find_stored(table: &'static [u8], id: u32) -> Option<usize> {
 }
 
 impl Layout {
-    /// The seed of the frame's checksum.
     pub(crate) fn crc_extra(self) -> u8 {
         match self {
             Self::Current(message) => message.crc_extra,

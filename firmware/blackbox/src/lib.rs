@@ -38,7 +38,7 @@ pub use record::Record;
 pub use sector::{BODY_BYTES, GROUP_SECTORS, Header, NotASector, SECTOR_BYTES, Sector, VERSION};
 pub use writer::{Counters, ENTRY_SECTORS_MAX, Full, SectorSink, Writer};
 
-/// The codec's state at most, bytes: three quarters of the STM32F405's core-coupled memory.
+/// Bytes: three quarters of the STM32F405's core-coupled memory.
 pub const WRITER_BYTES_MAX: usize = 48 * 1024;
 
 const _: () = assert!(size_of::<Writer>() <= WRITER_BYTES_MAX);

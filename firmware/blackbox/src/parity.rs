@@ -84,14 +84,14 @@ impl Sum {
     }
 }
 
-/// Header of a parity sector.
+/// A parity sector's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parity {
     /// Which sum it is.
     pub sum: Sum,
     /// The session whose sectors it covers.
     pub session: u32,
-    /// The number of the last sector that it covers. The others are every eighth before it, to the stretch's beginning.
+    /// The number of the last sector that it covers. The others are every eighth before it, to the stretch's start.
     pub last: u32,
 }
 
@@ -123,7 +123,6 @@ pub struct Column {
 struct Held {
     /// The last number that it covers.
     last: u32,
-    /// Sum as on the card.
     block: [u8; SECTOR_BYTES],
     /// Sum of the taken sectors; the latest one has the factor 1.
     taken: [u8; SECTOR_BYTES],
@@ -161,9 +160,9 @@ impl Column {
         }
     }
 
-    /// Whether the sums agree with the sectors and with each other, as far as this is known. `lost` are the numbers
-    /// of missing sectors, ascending, at least three if there are more. A sum without missing sectors must equal the
-    /// sum of the others. A single missing sector must be the same by either sum.
+    /// Whether the sums agree with the sectors and each other, as far as known. `lost` are the numbers of missing sectors,
+    /// ascending, at least three if there are more. A sum without missing sectors must equal the sum of the others. A single
+    /// missing sector must be the same by either sum.
     pub fn agrees(&self, lost: &[u32]) -> bool {
         let of = |index: usize| {
             let (sum, last, rest) = self.held(index)?;
@@ -246,7 +245,6 @@ impl Column {
 }
 
 impl Held {
-    /// Takes a sector, if it is covered.
     fn take(&mut self, sum: Sum, number: u32, bytes: &[u8; SECTOR_BYTES]) {
         let Some(left) = rows(self.last, number) else { return };
         let before = self.rows.map_or(0, |rows| rows.saturating_sub(left));
@@ -297,7 +295,6 @@ fn add(to: &mut [u8; SECTOR_BYTES], from: &[u8; SECTOR_BYTES], weight: u8) {
     }
 }
 
-/// Whether the rest of a sum is zero.
 fn is_zero(rest: &[u8; SECTOR_BYTES]) -> bool {
     PARTS.into_iter().all(|part| rest[part].iter().all(|byte| *byte == 0))
 }
@@ -311,7 +308,6 @@ fn double(block: &mut [u8; SECTOR_BYTES]) {
     }
 }
 
-/// The product in GF(256).
 const fn product(a: u8, b: u8) -> u8 {
     let (mut a, mut b, mut product) = (a, b, 0);
     while b != 0 {

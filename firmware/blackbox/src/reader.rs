@@ -20,31 +20,30 @@ use crate::sector::{Header, SECTOR_BYTES};
 pub enum Item<'a> {
     /// A frame.
     Frame {
-        /// Time of reception on the monitor's clock, whole milliseconds.
+        /// Reception on the monitor's clock, whole milliseconds.
         at: Instant,
-        /// The same in UTC, microseconds since 1970, if known.
+        /// UTC, microseconds since 1970, if known.
         utc_micros: Option<u64>,
-        /// The frame, bit for bit.
+        /// Bit for bit.
         bytes: &'a [u8],
         /// The checksum matches the monitor's definition.
         verified: bool,
     },
     /// A record of the monitor's own.
     Record {
-        /// Time on the monitor's clock, whole milliseconds.
+        /// On the monitor's clock, whole milliseconds.
         at: Instant,
-        /// The same in UTC, microseconds since 1970, if known.
+        /// UTC, microseconds since 1970, if known.
         utc_micros: Option<u64>,
         /// The record.
         record: Record<'a>,
     },
     /// A missing part.
     Gap(Gap),
-    /// End of the input.
     End(Summary),
 }
 
-/// Cause of a gap.
+/// Why a part is unreadable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
     /// Missing sectors: never written, overwritten or lost.
@@ -62,7 +61,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// The name that reports use.
+    /// For reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Missing => "missing",
@@ -111,7 +110,7 @@ pub struct Summary {
     pub gaps: u64,
     /// Frames known to be missing.
     pub frames_missing: u64,
-    /// Counts of the blocks.
+    /// Blocks by kind.
     pub blocks: BlockCounts,
 }
 
@@ -177,8 +176,8 @@ impl LogReader {
         }
     }
 
-    /// UTC at power-on, microseconds since 1970, as an earlier pass found it (`epoch_micros`): back-dates the items
-    /// before the first clock record.
+    /// UTC at power-on, microseconds since 1970, of an earlier pass (`epoch_micros`): back-dates items before the first clock
+    /// record.
     pub const fn set_epoch_micros(&mut self, epoch_micros: Option<u64>) {
         self.epoch_micros = epoch_micros;
     }
@@ -188,7 +187,7 @@ impl LogReader {
         self.epoch_micros
     }
 
-    /// Takes the next block. Before each block, call `next` until it returns `None`: entries not fetched are lost.
+    /// Before each block, call `next` until it returns `None`: entries not fetched are lost.
     pub fn feed(&mut self, block: &[u8; SECTOR_BYTES]) {
         self.assembler.feed(block);
     }
@@ -246,7 +245,6 @@ impl LogReader {
         Item::Gap(gap)
     }
 
-    /// The open gap; opens one if there is none.
     fn open(&mut self, cause: Cause) -> &mut Gap {
         self.decoder.abandon();
         self.open_gap.get_or_insert(Gap {
@@ -283,7 +281,6 @@ impl LogReader {
         gap.frames = Some(gap.frames.unwrap_or(0).saturating_add(u32::from(header.frames)));
     }
 
-    /// Starts a group, which ends an open gap.
     fn started(&mut self) {
         let Preamble { start_ms, frames_before, epoch_micros, .. } = self.decoder.preamble();
         let missing = self.frames_expected.map(|expected| frames_before.wrapping_sub(expected));

@@ -37,7 +37,7 @@ const CRC_AT: usize = SECTOR_BYTES - 4;
 const MAGIC: u8 = b'H';
 /// Byte 1, with the format version.
 const PLAIN: u8 = 0xb0;
-/// The same of a sector that is sealed by means that this format does not have yet.
+/// Sealed by means that this format does not have yet.
 const SEALED: u8 = 0xa0;
 const PARTIAL: u8 = 0x40;
 const CLOSED: u8 = 0x80;
@@ -66,19 +66,18 @@ impl Sector {
         Self { bytes: [0; SECTOR_BYTES] }
     }
 
-    /// From bytes as they were written or read; `Header::read` checks them.
+    /// `Header::read` checks them.
     pub const fn from_bytes(bytes: [u8; SECTOR_BYTES]) -> Self {
         Self { bytes }
     }
 
-    /// Names the session and sets the check: the last step before the sector is written.
+    /// The last step before it is written.
     pub fn seal(&mut self, session: u32) {
         self.bytes[7..11].copy_from_slice(&session.to_le_bytes());
         let crc = crc32c(&self.bytes[..CRC_AT]);
         self.bytes[CRC_AT..].copy_from_slice(&crc.to_le_bytes());
     }
 
-    /// A sector rebuilt from parity.
     pub(crate) fn made_again(bytes: &[u8; SECTOR_BYTES], session: u32, number: u32) -> Self {
         let mut sector = Self { bytes: *bytes };
         (sector.bytes[0], sector.bytes[1]) = (MAGIC, PLAIN | VERSION);
@@ -92,47 +91,46 @@ impl Sector {
         &self.bytes
     }
 
-    /// Whether it is a copy of a sector in progress, which a later one with its number supersedes.
+    /// In progress: a later one with its number supersedes it.
     pub const fn is_partial(&self) -> bool {
         self.bytes[2] & PARTIAL != 0
     }
 
-    /// Whether it is the last one of a log that ended in order.
+    /// The last one of a log that ended in order.
     pub const fn is_closed(&self) -> bool {
         self.bytes[2] & CLOSED != 0
     }
 
-    /// Makes it a copy of a sector in progress, or the sector itself; to be sealed after that.
+    /// To be sealed after that.
     pub const fn set_partial(&mut self, partial: bool) {
         self.bytes[2] = self.bytes[2] & !PARTIAL | if partial { PARTIAL } else { 0 };
     }
 
-    /// Whether a group, and with it a place where reading can start, begins here.
+    /// Reading can start here.
     pub const fn starts_group(&self) -> bool {
         self.bytes[2] & SINCE_FIRST == 0
     }
 
-    /// The sector's number in its session, from 0.
+    /// In its session, from 0.
     pub fn number(&self) -> u32 {
         self.u32_at(11)
     }
 
-    /// The session that it names; 0 before it is sealed.
+    /// 0 before it is sealed.
     pub fn session(&self) -> u32 {
         self.u32_at(7)
     }
 
-    /// Frames completed in this sector.
+    /// Completed in it.
     pub fn frames(&self) -> u16 {
         u16::from_le_bytes([self.bytes[5], self.bytes[6]])
     }
 
-    /// Preamble of the group that begins in it; `None` where none begins.
+    /// `None` if no group begins.
     pub fn preamble(&self) -> Option<Preamble> {
         Preamble::read(self.body()).filter(|_| self.starts_group())
     }
 
-    /// The body; `Header::body_bytes` gives its used part.
     pub(crate) fn body(&self) -> &[u8] {
         &self.bytes[BODY_AT..CRC_AT]
     }
@@ -164,12 +162,12 @@ impl Sector {
     }
 }
 
-/// Header of a sector.
+/// Of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Which session: sectors of another one are left over from an earlier file.
+    /// Others are left over from an earlier file.
     pub session: u32,
-    /// The sector's number in its session, from 0.
+    /// In its session, from 0.
     pub number: u32,
     /// How many sectors after the first one of its group it is: 0 to 63.
     pub since_first: u8,
@@ -187,7 +185,7 @@ pub struct Header {
     pub check: u32,
 }
 
-/// Reason for rejecting a block.
+/// Why a block is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotASector {
     /// All zeros: space that was set aside and not written yet.
@@ -247,17 +245,17 @@ impl Header {
         })
     }
 
-    /// Whether a group begins here.
+    /// Begins here.
     pub const fn starts_group(&self) -> bool {
         self.since_first == 0
     }
 
-    /// The number of the sector that began the group.
+    /// The sector that began the group.
     pub const fn group(&self) -> u32 {
         self.number.wrapping_sub(self.since_first as u32)
     }
 
-    /// Entries completed in it.
+    /// Completed in it.
     pub const fn entries(&self) -> u32 {
         self.frames as u32 + self.records as u32
     }

@@ -28,11 +28,11 @@ const BODY_CLOSED_MIN: usize = BODY_BYTES + 1 - FLUSH_MAX;
 pub trait SectorSink {
     /// Number of sectors that it can take now.
     fn room(&self) -> usize;
-    /// Takes a sector; called at most `room` times. The sector is not sealed yet.
+    /// Called at most `room` times; not sealed yet.
     fn put(&mut self, sector: &Sector);
 }
 
-/// A refused entry; the writer's state is unchanged.
+/// The writer is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Full {
     /// The sink has no room for it.
@@ -74,7 +74,6 @@ pub struct Writer {
     coder: Encoder,
     scratch: Out,
     sector: Sector,
-    /// Of the sector in progress.
     header: Header,
     /// Entries that ended too close to the end of the sector before: the next one completes them.
     ended: Ended,
@@ -83,7 +82,7 @@ pub struct Writer {
     /// Its value at the end of the previous group.
     chain_before: u32,
     in_group: bool,
-    /// The sector in progress has an entry that no copy of it has.
+    /// An entry that no copy has.
     changed: bool,
     last_ms: u64,
     epoch_micros: Option<u64>,
@@ -135,8 +134,7 @@ impl Writer {
     }
 
     /// Adds a frame as it was received. `verified`: its checksum matched our definition; it is not checked again. If memory
-    /// changed since, the frame would decode with the correct checksum instead of the received one. A reader detects this and
-    /// rejects the frame.
+    /// changed since, the frame decodes with the correct checksum, and a reader rejects it.
     pub fn frame(
         &mut self,
         at: Instant,
@@ -154,7 +152,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Adds a record of the monitor's own.
+    /// Of the monitor.
     pub fn record(
         &mut self,
         at: Instant,
@@ -181,7 +179,7 @@ impl Writer {
     }
 
     /// A copy of the sector in progress that decodes up to the last entry; `false` if the sector has no entry that is not in a
-    /// full sector or an earlier copy. The full sector, with the same number, supersedes the copy.
+    /// full sector or an earlier copy. The full sector supersedes it.
     pub fn partial(&mut self, out: &mut Sector) -> bool {
         if !core::mem::take(&mut self.changed) {
             return false;
@@ -255,8 +253,7 @@ impl Writer {
         }
     }
 
-    /// Encodes an entry of this value in the chain and adds its bytes; `false` (the model is then spoilt, the stream is not) where the group
-    /// has no room for it or its code is too long.
+    /// `value`: in the chain; `false` (the model is spoilt, the stream is not): no room in the group, or too long a code.
     fn append(&mut self, entry: &Entry<'_>, value: u32, plain: bool, sink: &mut impl SectorSink) -> bool {
         let Some(len) = self.encode(entry, plain) else { return false };
         let mut done = self.add(0, len);
@@ -278,7 +275,6 @@ impl Writer {
         true
     }
 
-    /// Encodes an entry; returns its length, or `None` if the group has no place for it.
     // Apart from `append`, which is compiled with the sink's crate, and for size there.
     #[inline(never)]
     fn encode(&mut self, entry: &Entry<'_>, plain: bool) -> Option<usize> {
@@ -313,7 +309,6 @@ impl Writer {
         end
     }
 
-    /// An entry is complete in the sector in which the decoder finds all bytes that it reads for it.
     fn count(&mut self, kind: Kind) {
         let complete = self.header.body_bytes + LOOKAHEAD <= BODY_CLOSED_MIN;
         match (kind, complete) {
@@ -367,7 +362,7 @@ impl Writer {
         true
     }
 
-    /// Adds the bytes that end the coder's stream and completes all entries.
+    /// Completes all entries.
     fn end_stream(&self, header: &mut Header, sector: &mut Sector) {
         let (bytes, len) = self.coder.flush();
         let at = header.body_bytes;
@@ -381,7 +376,6 @@ impl Writer {
         sector.set_header(header);
     }
 
-    /// Gives the sector in progress away and starts the next one.
     fn next_sector(&mut self, sink: &mut impl SectorSink) {
         self.sector.set_header(&self.header);
         sink.put(&self.sector);
@@ -401,7 +395,7 @@ impl Writer {
 mod tests {
     use super::*;
 
-    /// Whether each sector starts a group.
+    /// By sector.
     struct Starts(Vec<bool>);
 
     impl SectorSink for Starts {

@@ -38,7 +38,7 @@ fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
     }
 }
 
-/// Writes the frames, reads them back, compares; returns the size of the log.
+/// Returns the size of the log.
 fn round_trip(frames: &[Frame]) -> usize {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
     for (at, bytes, verified) in frames {
@@ -59,16 +59,15 @@ impl Random {
     }
 }
 
-/// How rough a link is.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     messages: usize,
-    /// Rate of odd frames, one in this many; 0: none.
+    /// One in this many; 0: none.
     odd_one_in: usize,
     signed: bool,
 }
 
-/// A stream as a link carries it: messages of the dialect whose fields wander, both versions, some signed, some odd.
+/// Messages of the dialect whose fields wander, both versions, some signed, some odd.
 fn stream(seed: u64, count: usize, link: Link) -> Vec<Frame> {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let all = hums_dialect::messages();
@@ -152,7 +151,7 @@ fn a_rough_link_comes_back() {
     round_trip(&stream(8, 20_000, Link { messages: 60, odd_one_in: 5, signed: false }));
 }
 
-/// Reads outlines only, with every seventh entry in full. Returns each frame's time, id, length and verification.
+/// Every seventh entry in full. Returns time, id, length and verification.
 fn outlines(sectors: &[Sector]) -> Vec<(u64, u32, usize, bool)> {
     let id = |bytes: &[u8]| match *bytes {
         [0xfe, _, _, _, _, id, ..] => u32::from(id),

@@ -12,7 +12,6 @@ use proptest::prelude::*;
 
 const SESSION: u32 = 0xfeed_0001;
 
-/// A queue of sectors with a limit.
 struct Queue {
     sectors: Vec<Sector>,
     capacity: usize,
@@ -35,7 +34,7 @@ fn queue() -> Queue {
 
 type Frame = (u64, Vec<u8>, bool);
 
-/// Frames of a made-up stream: `seed` varies the bytes.
+/// `seed` varies the bytes.
 fn frames(count: usize, seed: u32) -> Vec<Frame> {
     let mut state = seed | 1;
     let mut random = move || {
@@ -52,7 +51,7 @@ fn frames(count: usize, seed: u32) -> Vec<Frame> {
         .collect()
 }
 
-/// Bytes that may by chance be taken for a frame, whose checksum then is not one that was found right.
+/// A frame by chance, whose checksum is not right.
 fn may_be_a_frame(bytes: &[u8]) -> bool {
     matches!(bytes, [0xfd | 0xfe, ..])
 }
@@ -106,7 +105,6 @@ fn bytes(sectors: &[Sector]) -> Vec<[u8; 512]> {
     sectors.iter().map(|sector| *sector.bytes()).collect()
 }
 
-/// Whether `part` is `whole` with some of it left out.
 fn is_subsequence(part: &[Frame], whole: &[Frame]) -> bool {
     let mut whole = whole.iter();
     part.iter().all(|frame| whole.any(|other| other == frame))
@@ -285,11 +283,9 @@ fn records_stand_among_frames_and_restart_begins_a_group() {
 /// A card that misplaces a page.
 #[derive(Clone, Copy, Debug)]
 enum Misplaced {
-    /// Two pages are exchanged.
     Swapped,
-    /// A page is also in the place of another one.
     Copied,
-    /// A page is there twice, and later ones are moved back.
+    /// Twice, later ones moved back.
     Inserted,
 }
 
@@ -429,7 +425,7 @@ proptest! {
     }
 }
 
-/// Heartbeats in three groups, and how many sectors each has; `change` changes each frame before the writer gets it.
+/// In three groups, with their sectors; `change` comes before the writer.
 fn three_groups(change: impl Fn(usize, &mut Vec<u8>)) -> (Vec<Sector>, Vec<Frame>) {
     let (mut writer, mut queue, mut frames) = (Box::new(Writer::new()), queue(), Vec::new());
     for index in 0..1_500_u64 {
@@ -449,7 +445,7 @@ fn three_groups(change: impl Fn(usize, &mut Vec<u8>)) -> (Vec<Sector>, Vec<Frame
     (queue.sectors, frames)
 }
 
-/// Frames that are given out though they never came, and the most that a sector completes.
+/// Never sent, and the most that a sector completes.
 fn strangers(log: &Log, frames: &[Frame], sectors: &[Sector]) -> (usize, usize) {
     let most = sectors.iter().map(|sector| usize::from(sector.frames())).max().unwrap_or(0);
     let came: HashSet<&Frame> = frames.iter().collect();

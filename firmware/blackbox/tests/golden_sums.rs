@@ -15,7 +15,7 @@ use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use kinds::{Entry, entries};
 
-/// The log of batches of entries, each in groups of its own.
+/// Batches in groups of their own.
 fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
     for batch in batches {
@@ -36,7 +36,7 @@ fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     card.0.iter().flat_map(|sector| *sector.bytes()).collect()
 }
 
-/// The log reads back as written: for the writer times only advance.
+/// For the writer times only advance.
 fn reads_back(log: &[u8], batches: &[Vec<Entry>]) {
     let (mut expected, mut latest) = (batches.iter().flatten(), 0);
     let mut reader = Box::new(LogReader::new());
@@ -81,7 +81,6 @@ fn sum_of(name: &'static str, batches: &[Vec<Entry>]) -> Sum {
 
 const CHANGED: &str = "the coded form has changed: that is a new version of the format";
 
-/// The frames of our definitions among a line's bytes, as 57,600 baud carry them.
 fn frames_of_line(line: &[u8]) -> Vec<Frame> {
     const MICROS_PER_BYTE: usize = 10_000_000 / 57_600;
     let (mut frames, mut at) = (Vec::new(), 0);
@@ -96,7 +95,6 @@ fn frames_of_line(line: &[u8]) -> Vec<Frame> {
     frames
 }
 
-/// The repository's own recordings.
 const RECORDINGS: [Sum; 4] = [
     ("ap_quad_guided.tlog", 346_112, 0x8222_db8b),
     ("ap_quad_faults.tlog", 466_432, 0xcd33_7f91),
@@ -119,7 +117,7 @@ fn recordings_are_coded_as_they_always_were() {
     assert_eq!(found, RECORDINGS, "{CHANGED}");
 }
 
-/// All messages of the dialect, in batches: messages of a batch, its entries, and one odd frame in this many.
+/// Messages of a batch, entries, one odd frame in this many.
 const MADE_UP: [(usize, usize, usize, Sum); 3] = [
     (16, 1_000, 0, ("calm", 427_008, 0xf89c_525e)),
     (20, 1_000, 6, ("rough", 411_648, 0x4b56_d140)),

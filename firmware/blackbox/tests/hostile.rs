@@ -1,5 +1,5 @@
-//! The checks of the fuzz targets (`fuzz/`), on a few thousand generated inputs, always the same: noise, and a real
-//! log with bytes changed, moved, cut and doubled.
+//! The fuzz targets' checks (`fuzz/`) on some thousand repeatable inputs: noise, and a log changed, moved, cut and
+//! doubled.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]
 
@@ -20,7 +20,6 @@ impl Random {
         (0..len).map(|_| (self.next() >> 24) as u8).collect()
     }
 
-    /// A copy of some of the bytes, with a few of many kinds of damage.
     fn damaged(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
         for _ in 0..=self.below(8) {
@@ -49,7 +48,6 @@ fn golden() -> Vec<u8> {
     std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/mixed-3.log")).expect("the golden file")
 }
 
-/// The coded stream of the golden file's first group.
 fn stream() -> Vec<u8> {
     let log = golden();
     let blocks = log.as_chunks::<SECTOR_BYTES>().0.iter().take(GROUP_SECTORS);

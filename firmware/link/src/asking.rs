@@ -9,9 +9,9 @@
 //! commands gets `REQUEST_DATA_STREAM` for whole groups.
 //!
 //! ArduPilot warns its pilot ("no message" of that number) if an interval is requested for an unsupported message. It
-//! refuses `REQUEST_MESSAGE` silently (`GCS_Common.cpp`, 4.1 to 4.6). So one message is requested first, and the
-//! interval only if that message is supported. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no
-//! interval of its own.
+//! refuses `REQUEST_MESSAGE` silently (`GCS_Common.cpp`, 4.1 to 4.6), so a message is requested first, and its
+//! interval only if supported. `ESC_TELEMETRY_5_TO_8` comes with `ESC_TELEMETRY_1_TO_4`, and has no interval of its
+//! own.
 //!
 //! Parameters are requested after the messages, once or twice each after first contact or a reboot. The autopilot
 //! does not answer a request for an unknown parameter, so silence proves nothing.
@@ -36,7 +36,7 @@ pub const SHARE: u32 = 50;
 const ANSWER: Span = Span::from_secs(1);
 /// Repeats of an unanswered command.
 const TRIES: u8 = 3;
-/// After this many unanswered commands in a row the autopilot counts as one that does not answer.
+/// Unanswered commands in a row: it does not answer any.
 const DEAF: u8 = 6;
 /// Most doublings of the interval: 10 s, 20 s ... 10.5 min.
 const PATIENCE_MAX: u8 = 6;
@@ -55,7 +55,6 @@ const UNSUPPORTED: u8 = 3;
 /// As above.
 const IN_PROGRESS: u8 = 5;
 
-/// Autopilots that send a message.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum By {
     Both,
@@ -63,10 +62,10 @@ enum By {
     ArduPilot,
 }
 
-/// Id, senders, rate in Hz, bytes of a frame.
+/// Id, senders, Hz, bytes.
 type Wanted = (u32, By, u8, u8);
 
-/// Messages that the checks need, most important first.
+/// Most important first.
 const WANTED: [Wanted; 34] = [
     (1, By::Both, 5, 43),            // SYS_STATUS
     (30, By::Both, 10, 40),          // ATTITUDE
@@ -107,7 +106,6 @@ const WANTED: [Wanted; 34] = [
 /// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.
 const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
 
-/// Whether an autopilot has a message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Has {
     /// Unknown.
@@ -175,7 +173,7 @@ impl Default for Asking {
     }
 }
 
-/// Current state of the vehicle.
+/// Of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     /// The autopilot.
@@ -184,9 +182,9 @@ pub struct Known {
     pub autopilot: Autopilot,
     /// Number of reboots.
     pub reboots: u32,
-    /// Whether `AUTOPILOT_VERSION` was received.
+    /// `AUTOPILOT_VERSION` was received.
     pub identified: bool,
-    /// The port's line rate.
+    /// Line rate.
     pub baud: u32,
 }
 
@@ -208,12 +206,12 @@ impl Asking {
         }
     }
 
-    /// Recipient of the requests.
+    /// Of the requests.
     pub fn of(&self) -> Option<Source> {
         self.vehicle.map(|(source, _)| source)
     }
 
-    /// Whether all parameters were requested, and each request was answered or timed out.
+    /// And each was answered or timed out.
     pub fn has_parameters(&self, known: &Known) -> bool {
         known.autopilot != Autopilot::Other
             && self.of() == Some(known.source)
@@ -221,7 +219,7 @@ impl Asking {
             && self.parameter(known).is_none()
     }
 
-    /// Processes a frame of the vehicle.
+    /// Of the vehicle.
     pub fn seen(&mut self, id: u32) {
         if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {
             let message = &mut self.messages[index];
@@ -229,7 +227,7 @@ impl Asking {
         }
     }
 
-    /// Processes a received parameter value.
+    /// A received value.
     pub fn told(&mut self, name: &str) {
         if let Some(place) = cells::known(name) {
             self.parameters &= !(1 << place);
@@ -239,7 +237,7 @@ impl Asking {
         }
     }
 
-    /// Processes an answer to a command.
+    /// Answer to a command.
     pub fn answered(&mut self, command: u16, result: u8) {
         let Some(asked) = self.asked else { return };
         let (expected, message) = match asked.what {
@@ -365,7 +363,7 @@ impl Asking {
         }
     }
 
-    /// The next request. An autopilot without intervals gets parameter requests only.
+    /// Without intervals: parameters only.
     fn next(&self, known: &Known) -> Option<What> {
         let commands = || {
             if self.identity.due {

@@ -1,4 +1,4 @@
-//! Our own frames: system id of the vehicle we ride on, component 191 (`MAV_COMP_ID_ONBOARD_COMPUTER`), MAVLink 2.
+//! Our frames: the vehicle's system id, component 191 (`MAV_COMP_ID_ONBOARD_COMPUTER`), MAVLink 2.
 
 use hums_core::clock::Instant;
 use hums_dialect::crc;
@@ -28,12 +28,12 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// Before the vehicle's system id is known.
+    /// Without the vehicle's system id.
     pub const fn new() -> Self {
         Self::of(SYSTEM_DEFAULT, COMPONENT)
     }
 
-    /// For frames of another component: a ground station's, in tools and tests.
+    /// Another component's: a ground station's, in tools and tests.
     pub const fn of(system: u8, component: u8) -> Self {
         Self { system, component, sequence: 0 }
     }
@@ -48,17 +48,17 @@ impl Encoder {
         self.system
     }
 
-    /// The sequence number of the next frame.
+    /// Of the next frame.
     pub const fn set_sequence(&mut self, sequence: u8) {
         self.sequence = sequence;
     }
 
-    /// The bytes of the frame that carries `packet`, without a signature.
+    /// Without a signature.
     pub fn frame_len(&self, packet: &Packet) -> usize {
         HEADER_V2_BYTES + packet.payload().len() + CHECKSUM_BYTES
     }
 
-    /// The frame of `packet`; empty for a message without a definition.
+    /// Empty for a message without a definition.
     pub fn frame<'a>(&mut self, out: &'a mut [u8; FRAME_BYTES_MAX], packet: &Packet) -> &'a [u8] {
         let len = self.put(out, packet, 0);
         out.get(..len).unwrap_or_default()

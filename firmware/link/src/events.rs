@@ -31,7 +31,7 @@ struct Missing {
     tries: u8,
 }
 
-/// The events of one autopilot.
+/// Of one autopilot.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Events {
     /// The next number.
@@ -46,7 +46,7 @@ impl Events {
         Self { next: None, missing: None, asked_at: None }
     }
 
-    /// A frame of the autopilot that we ask.
+    /// From the asked autopilot.
     pub fn heard(&mut self, id: u32, payload: &[u8]) {
         let fields = Fields(payload);
         match id {
@@ -65,7 +65,7 @@ impl Events {
         }
     }
 
-    /// To be called at every tick; `send` gets at most one message, and returns whether it was sent.
+    /// Every tick; `send` gets at most one message, and returns whether it was sent.
     pub fn tick(&mut self, now: Instant, of: Source, send: &mut impl FnMut(&Packet) -> bool) {
         if self.asked_at.is_some_and(|at| now.since(at) < ANSWER) {
             return;
@@ -97,7 +97,6 @@ impl Events {
         self.next = Some(number.wrapping_add(1));
     }
 
-    /// All before this number have been sent.
     fn expect(&mut self, next: u16) {
         let Some(known) = self.next.replace(next) else { return };
         match next.wrapping_sub(known) {
@@ -111,7 +110,6 @@ impl Events {
         }
     }
 
-    /// Older events are lost.
     fn refused(&mut self, oldest: u16) {
         let Some(missing) = &mut self.missing else { return };
         let is_later = |one: u16, than: u16| one.wrapping_sub(than).wrapping_sub(1) < u16::MAX / 2;

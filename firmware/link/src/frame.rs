@@ -9,7 +9,7 @@ use hums_dialect::wire::{
 
 use crate::packet::Fields;
 
-/// Result of the checksum test.
+/// Of the checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Check {
     /// Correct with our definition of the message.
@@ -41,7 +41,6 @@ pub(crate) enum NoHeader {
 }
 
 impl Header {
-    /// Reads a header from the first bytes of a candidate.
     #[inline]
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, NoHeader> {
         match *bytes {
@@ -81,19 +80,16 @@ impl Header {
         }
     }
 
-    /// Offset of the payload.
     #[inline]
     pub(crate) const fn payload_at(&self) -> usize {
         if self.version == 1 { HEADER_V1_BYTES } else { HEADER_V2_BYTES }
     }
 
-    /// Offset of the checksum.
     #[inline]
     pub(crate) const fn checksum_at(&self) -> usize {
         self.payload_at() + self.payload_len as usize
     }
 
-    /// All bytes of the frame.
     #[inline]
     pub(crate) const fn frame_len(&self) -> usize {
         self.checksum_at() + CHECKSUM_BYTES + if self.signed { SIGNATURE_BYTES } else { 0 }
@@ -109,13 +105,13 @@ pub(crate) fn checksums(header: &Header, bytes: &[u8]) -> Option<(u16, u16)> {
     Some((computed, sent))
 }
 
-/// A complete received frame.
+/// Complete and received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     header: Header,
     bytes: &'a [u8],
     check: Check,
-    /// Index of the message in the dialect's table, if the checksum is correct.
+    /// In the dialect's table, if the checksum is correct.
     message: Option<u16>,
 }
 
@@ -145,7 +141,7 @@ impl<'a> Frame<'a> {
         Some(Self { header, bytes, check, message })
     }
 
-    /// A frame that the framer found and checked, from the queue that it was put in with its [`Self::message`]: not looked up again.
+    /// Found and checked by the framer, with its [`Self::message`]: not looked up again.
     pub fn from_queue(bytes: &'a [u8], message: Option<u16>) -> Option<Self> {
         let header = Header::read(bytes).ok().filter(|header| header.frame_len() == bytes.len())?;
         Some(Self::from_parts(header, bytes, message))
@@ -159,7 +155,7 @@ impl<'a> Frame<'a> {
         Self { header, bytes, check, message }
     }
 
-    /// Index of the message in the dialect's table; `None` if the checksum does not match our definition.
+    /// In the dialect's table; `None` if the checksum does not match our definition.
     #[inline]
     pub const fn message(&self) -> Option<u16> {
         self.message
@@ -171,13 +167,13 @@ impl<'a> Frame<'a> {
         self.header.id
     }
 
-    /// System id of the sender.
+    /// Of the sender.
     #[inline]
     pub const fn system(&self) -> u8 {
         self.header.system
     }
 
-    /// Component id of the sender.
+    /// Of the sender.
     #[inline]
     pub const fn component(&self) -> u8 {
         self.header.component
@@ -229,13 +225,13 @@ impl<'a> Frame<'a> {
         self.bytes.get(self.header.payload_at()..self.header.checksum_at()).unwrap_or_default()
     }
 
-    /// All bytes of the frame.
+    /// Of the frame.
     #[inline]
     pub const fn bytes(&self) -> &'a [u8] {
         self.bytes
     }
 
-    /// Result of the checksum test.
+    /// Of the checksum.
     #[inline]
     pub const fn check(&self) -> Check {
         self.check

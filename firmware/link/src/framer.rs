@@ -53,13 +53,11 @@ pub struct FramerCounts {
     pub bytes_not_frames: u64,
 }
 
-/// Finds the frames in a line's bytes. See the module's description.
+/// Finds frames in a line's bytes (see the module).
 #[derive(Debug)]
 pub struct Framer {
     buffer: [u8; BUFFER],
-    /// The first byte held.
     start: usize,
-    /// After the last byte held.
     end: usize,
     /// The first candidate cannot be decided with fewer bytes than this.
     needed: usize,
@@ -75,7 +73,6 @@ pub struct Framer {
 const _: () = assert!(size_of::<Framer>() <= 1_280);
 const _: () = assert!(BUFFER > FRAME_BYTES_MAX + 1, "a decided candidate must always make room");
 
-/// Decision about the first bytes held.
 enum Verdict {
     /// A frame, and its message if the checksum is ours.
     Frame(Header, Option<u16>),
@@ -108,7 +105,7 @@ impl Framer {
         }
     }
 
-    /// Takes received bytes and calls `sink` with every completed frame, in order.
+    /// Calls `sink` with every completed frame, in order.
     pub fn push(&mut self, bytes: &[u8], sink: &mut impl FnMut(Frame<'_>)) {
         self.counts.bytes = self.counts.bytes.wrapping_add(bytes.len() as u64);
         let mut rest = bytes;
@@ -183,7 +180,7 @@ impl Framer {
         }
     }
 
-    /// Decides the first candidate. With `idle` no more bytes are expected.
+    /// With `idle` no more bytes are expected.
     fn judge(&mut self, idle: bool) -> Verdict {
         let held = &self.buffer[self.start..self.end];
         match held.iter().position(|&byte| is_start(byte)) {
@@ -277,7 +274,6 @@ const fn is_start(byte: u8) -> bool {
     byte == START_V1 || byte == START_V2
 }
 
-/// Comparison of a header with our definitions.
 #[derive(Clone, Copy)]
 enum Known {
     /// There is a message of this id, and the payload may have this length.

@@ -29,7 +29,7 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&Algorithm {
     residue: 0,
 });
 
-/// The checksum of a whole file that is known when the program is built.
+/// Known when the program is built.
 pub const fn checksum_of(file: &[u8]) -> u32 {
     CRC.checksum(file)
 }
@@ -127,7 +127,7 @@ pub struct Reply {
     pub session: u8,
     /// The operation that is answered.
     pub opcode: u8,
-    /// Offset of the data; for a checksum, the number of bytes that it covers.
+    /// For a checksum, the number of covered bytes.
     pub offset: u32,
     /// The last one of a burst.
     pub complete: bool,

@@ -19,12 +19,11 @@ const BYTES_MAX: usize = 2 * TEXT_BYTES_MAX;
 /// The autopilot, and a companion computer that talks at the same time.
 const SENDERS_MAX: usize = 2;
 
-/// One part of a text.
 struct Part<'a> {
     severity: u8,
-    /// Common to all parts of a text of one sender; 0 for a text in one message.
+    /// 0 for a text in one message.
     id: u16,
-    /// Its place among the parts, from 0.
+    /// Among the parts, from 0.
     sequence: u8,
     words: &'a [u8],
 }
@@ -38,7 +37,7 @@ impl<'a> Part<'a> {
         Some(Self { severity: fields.u8(0), id: fields.u16(51), sequence: fields.u8(53), words })
     }
 
-    /// Whether no further part follows: its text ends before the field does.
+    /// Its text ends before the field does.
     const fn is_last(&self) -> bool {
         self.id == 0 || self.words.len() < TEXT_BYTES_MAX
     }
@@ -51,7 +50,7 @@ pub(crate) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
     if is_whole { alert::of_text(Some(part.severity), part.words) } else { None }
 }
 
-/// A text that still lacks its last part.
+/// Lacks its last part.
 #[derive(Clone, Debug)]
 struct Open {
     at: time::Instant,
@@ -72,7 +71,7 @@ impl LongTexts {
         Self([const { None }; SENDERS_MAX])
     }
 
-    /// Takes each frame; gives the alerts of texts that are complete now.
+    /// Gives the alerts of complete texts.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, give: &mut impl FnMut(Source, Alert)) {
         let at = time::Instant::from(at);
         for open in &mut self.0 {
@@ -99,7 +98,7 @@ impl LongTexts {
     }
 }
 
-/// Gives the alert of an open text if no further part comes to it.
+/// If no further part comes.
 fn complete(
     open: &mut Option<Open>,
     give: &mut impl FnMut(Source, Alert),
@@ -120,7 +119,7 @@ mod tests {
     use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::packet::Packet;
 
-    /// The causes given for parts: time in ms, sender, id, number of the part, words.
+    /// Time in ms, sender, id, part, words.
     fn causes(parts: &[(u64, u8, u16, u8, &str)]) -> Vec<Cause> {
         let (mut long, mut causes) = (LongTexts::new(), Vec::new());
         for (ms, system, id, sequence, words) in parts {

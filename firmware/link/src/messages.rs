@@ -91,9 +91,9 @@ pub struct ComputerStatus {
 pub struct LinkStatus {
     /// Line rate, baud.
     pub baud: u32,
-    /// Sent, bytes per second.
+    /// Bytes per second.
     pub tx: Option<u32>,
-    /// Received, bytes per second.
+    /// Bytes per second.
     pub rx: Option<u32>,
 }
 
@@ -163,7 +163,7 @@ pub fn file_transfer(system: u8, component: u8, payload: &[u8]) -> Packet {
     Packet::new(110).u8(1, system).u8(2, component).bytes(3, payload)
 }
 
-/// Whether a target includes us: our component, our whole system, or all systems.
+/// Our component, our system, or all.
 pub const fn concerns_us(target: (u8, u8), system: u8) -> bool {
     (target.0 == system || target.0 == 0) && (target.1 == COMPONENT || target.1 == 0)
 }

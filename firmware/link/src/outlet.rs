@@ -22,9 +22,9 @@ use crate::signing::Seal;
 
 /// Longest backlog of the line at which a frame other than a finding is accepted.
 pub const BACKLOG: Span = Span::from_millis(50);
-/// The same for findings, which come in bursts. It limits the size of the queue.
+/// Findings come in bursts. It limits the size of the queue.
 const BACKLOG_FINDINGS: Span = Span::from_millis(300);
-/// The same for forwarded frames, so that longer frames find the line free enough.
+/// Longer frames find the line free enough.
 const BACKLOG_FORWARD: Span = Span::from_millis(25);
 /// Bytes of findings that may wait beside everything else: eleven texts, signed.
 pub const FINDINGS: u32 = 11 * 92;
@@ -50,10 +50,9 @@ pub enum Class {
     Bulk,
 }
 
-/// A part of the budget, filled evenly.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
-    /// Bytes times microseconds a second.
+    /// Times microseconds a second.
     level: u64,
     at: Instant,
 }
@@ -61,7 +60,7 @@ struct Bucket {
 impl Bucket {
     const FULL: Self = Self { level: u64::MAX, at: Instant::ZERO };
 
-    /// Fill level, bytes; the capacity is one second of `bytes_per_s`.
+    /// Bytes; the capacity is one second of `bytes_per_s`.
     fn refresh(&mut self, now: Instant, bytes_per_s: u32) -> u32 {
         const UNIT: u64 = 1_000_000;
         let most = u64::from(bytes_per_s) * UNIT;
@@ -80,7 +79,6 @@ impl Bucket {
 #[derive(Clone, Copy, Debug)]
 struct Window {
     slots: [u16; Self::SLOTS],
-    /// The latest slot that is in use.
     newest: u64,
 }
 
@@ -119,12 +117,12 @@ impl Window {
     }
 }
 
-/// One port's way out.
+/// Of one port.
 #[derive(Clone, Debug)]
 pub struct Outlet {
     /// Makes our frames.
     pub encoder: Encoder,
-    /// Signs our frames, if signing is on.
+    /// If signing is on.
     pub seal: Option<Seal>,
     window: Window,
     events: Bucket,
@@ -182,12 +180,11 @@ impl Outlet {
         self.baud
     }
 
-    /// The budget in bytes a second.
+    /// Bytes a second.
     pub const fn budget(&self) -> u32 {
         self.budget
     }
 
-    /// Up to where a class may fill a second.
     fn mark(&self, class: Class) -> u32 {
         let budget = self.budget;
         let (reserve, own) =
@@ -199,12 +196,11 @@ impl Outlet {
         }
     }
 
-    /// Whether a frame of `bytes` may go now.
+    /// Now.
     pub fn fits(&mut self, now: Instant, class: Class, bytes: usize) -> bool {
         self.fits_besides(now, class, bytes, 0)
     }
 
-    /// The same, with room for `more` bytes in the same second.
     pub(crate) fn fits_besides(&mut self, now: Instant, class: Class, bytes: usize, more: usize) -> bool {
         let start = self.free_at.max(now);
         let busy = start.since(now);
@@ -255,7 +251,7 @@ impl Outlet {
         ((line as u32).min(self.mark(Class::Bulk) / 5 * 3 / 2) as usize).min(FRAME_BYTES_MAX)
     }
 
-    /// Sends a frame unaltered, if it may go now.
+    /// Unaltered, if it may go now.
     pub fn pass(&mut self, now: Instant, class: Class, frame: &[u8], out: &mut impl FnMut(&[u8])) -> bool {
         if !self.fits(now, class, frame.len()) {
             return false;
@@ -272,7 +268,7 @@ impl Outlet {
         true
     }
 
-    /// Sends a message of ours, if it may go now.
+    /// If it may go now.
     pub fn send(&mut self, now: Instant, class: Class, packet: &Packet, out: &mut impl FnMut(&[u8])) -> bool {
         // Signing is work: not for a frame that will not go.
         let tail = if self.seal.is_some() { SIGNATURE_BYTES } else { 0 };
@@ -298,7 +294,7 @@ impl Outlet {
 mod tests {
     use super::*;
 
-    /// Whether no window of a second holds more than `budget`, by the beginning of each frame and by its end.
+    /// By each frame's beginning and end.
     fn assert_budget(sent: &[(u64, usize)], budget: u32, baud: u32) {
         let mut free_us = 0;
         let mut spans = Vec::new();

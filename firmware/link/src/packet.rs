@@ -1,12 +1,11 @@
-//! Payloads field by field, for reading and for sending. Offsets are those of the wire (larger fields first,
-//! extensions after them), beside the one function for the message.
+//! Payloads field by field, at the wire's offsets (larger fields first, extensions after them).
 //!
 //! This does not use the structures of the `mavlink` crate's generator: those reject an unknown enumeration number,
 //! and an unknown command needs an answer too.
 
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 
-/// A payload as sent: the part that MAVLink 2 left out at its end reads as zero.
+/// The part that MAVLink 2 left out reads as zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Fields<'a>(pub &'a [u8]);
 
@@ -72,7 +71,7 @@ impl Packet {
         Self { id, len: 0, payload: [0; PAYLOAD_BYTES_MAX] }
     }
 
-    /// Sets bytes; bytes beyond the longest payload are dropped.
+    /// Bytes beyond the longest payload are dropped.
     #[inline(never)]
     pub fn bytes(mut self, at: usize, bytes: &[u8]) -> Self {
         for (index, byte) in bytes.iter().enumerate() {

@@ -8,7 +8,7 @@
 //!
 //! `#` begins a comment.
 
-/// Our MAVLink component, as `QGroundControl`'s files name it.
+/// As `QGroundControl`'s files name it.
 const COMPONENT: &str = "191";
 
 /// Content of a line.
@@ -16,7 +16,7 @@ const COMPONENT: &str = "191";
 pub enum Line<'a> {
     /// Nothing for us.
     Nothing,
-    /// A parameter's name, and its value as text.
+    /// Name, and value as text.
     Set(&'a str, &'a str),
     /// Nothing that can be understood.
     Wrong,

@@ -9,7 +9,7 @@ use crate::signing::Key;
 /// Most waiting answers. Further requests are dropped; the sender repeats them.
 const REPLIES_MAX: usize = 12;
 
-/// Port of origin or destination.
+/// Of origin or destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Port {
@@ -51,7 +51,7 @@ pub enum Request<'a> {
     Key(Key, u64),
 }
 
-/// A request and its target.
+/// With its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked<'a> {
     /// System and component; 0 is all.
@@ -127,7 +127,7 @@ pub enum Reply {
     Keyed(bool),
 }
 
-/// Answers in line, and lists of parameters under way.
+/// And lists of parameters.
 #[derive(Clone, Debug, Default)]
 pub struct Replies {
     line: Deque<(Port, Reply), REPLIES_MAX>,
@@ -149,7 +149,7 @@ impl Replies {
         Self { line: Deque::new(), lists: [List { next: 0, left: 0 }; 2], dropped: 0 }
     }
 
-    /// Queues an answer once; a full queue drops it.
+    /// Once; a full queue drops it.
     pub fn push(&mut self, port: Port, reply: Reply) {
         if !self.line.iter().any(|waiting| *waiting == (port, reply))
             && self.line.push_back((port, reply)).is_err()
@@ -158,7 +158,7 @@ impl Replies {
         }
     }
 
-    /// Begins a list of `count` parameters.
+    /// Of `count` parameters.
     pub fn list(&mut self, port: Port, count: u16) {
         let list = &mut self.lists[port as usize];
         if list.left == 0 {
@@ -167,12 +167,12 @@ impl Replies {
         list.left = count;
     }
 
-    /// The next queued answer.
+    /// In the queue.
     pub fn first(&self) -> Option<(Port, Reply)> {
         self.line.front().copied()
     }
 
-    /// It was sent; or, `sent` false, goes to the end of the line so that a full port does not hold up the other.
+    /// Sent; or, `sent` false, goes to the end of the line: a full port does not hold up the other.
     pub fn done(&mut self, sent: bool) {
         if let Some(reply) = self.line.pop_front()
             && !sent
@@ -192,20 +192,20 @@ impl Replies {
         self.line.is_empty()
     }
 
-    /// The parameter that a list of this port has next.
+    /// Next in this port's list.
     pub fn listed(&self, port: Port) -> Option<u16> {
         let list = self.lists[port as usize];
         (list.left > 0).then_some(list.next)
     }
 
-    /// It was sent; there are `count` in all.
+    /// Sent; `count` in all.
     pub fn listed_done(&mut self, port: Port, count: u16) {
         let list = &mut self.lists[port as usize];
         list.left = list.left.saturating_sub(1);
         list.next = if list.next + 1 < count { list.next + 1 } else { 0 };
     }
 
-    /// Requests dropped because the queue was full.
+    /// The queue was full.
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }

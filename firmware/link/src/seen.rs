@@ -10,7 +10,6 @@ const EXTRAS: usize = 64;
 /// A free place in the table of extras. Id `0xff_ffff` of system 255 looks the same, and is always "seen once".
 const FREE: u32 = u32::MAX;
 
-/// Knowledge about the `crc_extra` of a (system, id) pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extra {
     /// Never seen.
@@ -23,7 +22,6 @@ pub(crate) enum Extra {
     Full,
 }
 
-/// See the module's description.
 #[derive(Debug)]
 pub(crate) struct Seen {
     systems: [u8; SYSTEMS],
@@ -49,7 +47,7 @@ impl Seen {
         }
     }
 
-    /// The message at `index` of the dialect's table came from `system` with a right checksum.
+    /// With a right checksum.
     pub(crate) fn verified(&mut self, system: u8, index: usize) {
         let place = self.place_of(system).unwrap_or_else(|| {
             let used = usize::from(self.systems_used);
@@ -64,15 +62,13 @@ impl Seen {
         }
     }
 
-    /// Whether the message at `index` came from `system` with a valid checksum. For a system without a place of its
-    /// own: whether any in the shared last place sent it.
+    /// With a valid checksum. In the shared last place: by any of its systems.
     pub(crate) fn was_verified(&self, system: u8, index: usize) -> bool {
         // The last place is empty until a system has it.
         let place = self.place_of(system).unwrap_or(SYSTEMS - 1);
         self.verified[place].get(index / 32).is_none_or(|word| word & (1 << (index % 32)) != 0)
     }
 
-    /// Knowledge about the extra that `system` uses for `id`.
     pub(crate) fn extra(&self, system: u8, id: u32) -> Extra {
         match self.keys.iter().position(|&key| key == key_of(system, id)) {
             Some(at) if self.confirmed & (1 << at) != 0 => Extra::Confirmed(self.extras[at]),
@@ -82,8 +78,7 @@ impl Seen {
         }
     }
 
-    /// Remembers that `system` used `extra` for `id`. A pair seen once may be chance: in a full table it gives way to
-    /// a new one, or to another extra of its own.
+    /// A pair seen once may be chance: in a full table it gives way.
     pub(crate) fn learn(&mut self, system: u8, id: u32, extra: u8) {
         let key = key_of(system, id);
         let known = self.keys.iter().position(|&other| other == key);

@@ -34,7 +34,6 @@ struct Sender {
 }
 
 impl Sender {
-    /// Clears the seconds that passed since the newest one.
     fn advance(&mut self, now_s: u32) {
         let passed = now_s.saturating_sub(self.newest_s).min(WINDOW_SECS as u32);
         for second in 0..passed {
@@ -54,7 +53,7 @@ impl Sender {
     }
 }
 
-/// The sequence numbers of all senders on a link.
+/// Of all senders on a link.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sequences {
     senders: [Option<Sender>; SENDERS_MAX],
@@ -66,7 +65,7 @@ impl Sequences {
         Self { senders: [None; SENDERS_MAX] }
     }
 
-    /// Takes a frame; how many frames of its sender were lost right before it.
+    /// Returns the frames lost right before it.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>) -> u8 {
         let source = frame.source();
         let now_s = seconds(at);
@@ -80,7 +79,7 @@ impl Sequences {
         lost
     }
 
-    /// The lost part of one sender's frames in the last ten seconds.
+    /// In the last ten seconds.
     pub fn reading(&mut self, now: Instant, source: Option<Source>) -> LinkReading {
         let now_s = seconds(now);
         let sender = self.senders.iter_mut().flatten().find(|sender| Some(sender.source) == source);
@@ -95,7 +94,7 @@ impl Sequences {
     }
 }
 
-/// Whole seconds since power-on; 136 years fit.
+/// Since power-on; 136 years fit.
 fn seconds(at: Instant) -> u32 {
     (at.as_micros() / Span::from_secs(1).as_micros()) as u32
 }

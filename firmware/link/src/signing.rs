@@ -91,7 +91,6 @@ pub const fn stamp(utc_micros: u64) -> u64 {
 /// Our own time as stamps count it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
-    /// The stamp of power-on.
     begin: u64,
     /// A date far ahead that has to last: its stamp of power-on, and the time of its first arrival.
     jump: Option<(u64, Instant)>,
@@ -104,7 +103,7 @@ impl Clock {
         if stamp < STAMP_MAX { stamp } else { STAMP_MAX }
     }
 
-    /// Time reported by the autopilot; `false` where it is too far ahead to be believed yet.
+    /// `false`: too far ahead to be believed yet.
     pub fn hear_utc(&mut self, at: Instant, stamp: u64) -> bool {
         let begin = stamp.min(STAMP_MAX).saturating_sub(at.as_micros() / 10);
         if begin > self.begin.saturating_add(JUMP) {
@@ -140,7 +139,7 @@ pub struct Seal {
     key: Key,
     /// Tells this way from our others.
     link: u8,
-    /// Our time, updated by the caller.
+    /// Updated by the caller.
     pub clock: Clock,
     last: u64,
 }
@@ -156,12 +155,12 @@ impl Seal {
         self.last
     }
 
-    /// Whether it is made of this key.
+    /// Made of this key.
     pub fn is_of(&self, key: &Key) -> bool {
         self.key == *key
     }
 
-    /// The signature of `frame`, which ends with its checksum and has the signed flag.
+    /// `frame` ends with its checksum and has the signed flag.
     pub fn sign(&mut self, now: Instant, frame: &[u8]) -> [u8; SIGNATURE_BYTES] {
         self.last = (self.last + 1).max(self.clock.now(now)).min(STAMP_MAX);
         let mut tail = [0; SIGNATURE_BYTES];
@@ -186,7 +185,6 @@ pub enum Verdict {
     Replayed,
 }
 
-/// The last stamp of a sender.
 #[derive(Clone, Copy, Debug, Default)]
 struct Stream {
     last: u64,
@@ -226,7 +224,7 @@ impl Times {
     }
 }
 
-/// The key, and the history of its use.
+/// And the history of its use.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Signing {
     key: Option<Key>,
@@ -248,12 +246,12 @@ impl Signing {
         }
     }
 
-    /// The key, if there is one.
+    /// If there is one.
     pub const fn key(&self) -> Option<&Key> {
         self.key.as_ref()
     }
 
-    /// Takes the stored state. To be called at power-on.
+    /// At power-on: the stored state.
     pub fn restore(&mut self, key: Option<Key>, times: Times) {
         self.key = key.filter(|key| !key.is_none());
         self.floor = times.accepted;
@@ -273,7 +271,7 @@ impl Signing {
         self.clock.is_at_least(now, stamp);
     }
 
-    /// Judges a frame, and remembers its stamp if it is good. Without a key every frame counts as unsigned.
+    /// Remembers a good frame's stamp. Without a key every frame counts as unsigned.
     pub fn judge(&mut self, now: Instant, frame: &Frame<'_>) -> Verdict {
         let Some((key, tail)) = self.key.zip(frame.signature()) else { return Verdict::Unsigned };
         let (signed, [link, stamp @ .., _, _, _, _, _, _]) = tail;
@@ -304,7 +302,7 @@ impl Signing {
         Verdict::Good
     }
 
-    /// The stamp of the latest frame that was good.
+    /// Of the latest good frame.
     pub fn latest(&self) -> u64 {
         self.streams.iter().map(|stream| stream.last).fold(self.floor, u64::max)
     }

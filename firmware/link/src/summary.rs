@@ -58,9 +58,7 @@ const FORWARDED: &[(u32, u16)] = &[
 ];
 /// Our values, which alternate with forwarded messages.
 const VALUES: usize = FORWARDED.len();
-/// All levels together.
 const STATE: usize = VALUES + 1;
-/// `ONBOARD_COMPUTER_STATUS`.
 const COMPUTER: usize = STATE + 1;
 const TURNS: usize = COMPUTER + 1;
 const VALUES_MS: u16 = 700;
@@ -82,7 +80,6 @@ const STARVED: u32 = 4;
 const GONE: u32 = 3;
 const GONE_MS: u32 = 3_000;
 
-/// Schedule of a message.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
     /// Milliseconds since power-on, modulo 2^32, as `seen_ms`.
@@ -106,7 +103,7 @@ impl Turn {
         self.known && now_ms.wrapping_sub(self.seen_ms) <= (interval_ms * GONE).max(GONE_MS)
     }
 
-    /// Its turn was taken: the next one is an interval later, in step with the ones before where that is possible.
+    /// The next one is an interval later, in step with those before if possible.
     fn took(&mut self, now_ms: u32, interval_ms: u32) {
         let late = now_ms.wrapping_sub(self.due_ms);
         let in_step = late < interval_ms / 2 || late > u32::MAX - interval_ms / 2;
@@ -123,7 +120,7 @@ const fn interval_ms(index: usize) -> u32 {
     }) as u32
 }
 
-/// State of the box.
+/// The box's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnFigures {
     /// Processor load of the last second, percent; 0 if not measured.
@@ -134,16 +131,16 @@ pub struct OwnFigures {
     pub queue_percent: f32,
     /// Longest call of the card, seconds.
     pub stall_s: f32,
-    /// Content of `ONBOARD_COMPUTER_STATUS`.
+    /// For `ONBOARD_COMPUTER_STATUS`.
     pub computer: ComputerStatus,
 }
 
 /// The summary stream.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// The port's way out, which answers share with the stream.
+    /// Shared by answers and stream.
     pub outlet: Outlet,
-    /// Whether the vehicle's frames are forwarded: not where the autopilot itself carries the stream.
+    /// Not if the autopilot carries the stream.
     pub forwards: bool,
     /// The box's own status.
     pub own: OwnFigures,
@@ -158,7 +155,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Before the first frame.
+    /// Before any frame.
     pub fn new(params: &Params) -> Self {
         Self {
             outlet: Outlet::new(
@@ -178,7 +175,7 @@ impl Summary {
         }
     }
 
-    /// Forwards a frame of the vehicle if it is its turn and within the budget.
+    /// If it is its turn and within the budget.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, out: &mut impl FnMut(&[u8])) {
         // Heartbeats of the vehicle's other components (gimbal, camera) must not take the autopilot's turn.
         let ours = |vehicle: Source| {
@@ -203,7 +200,6 @@ impl Summary {
         }
     }
 
-    /// It is there, or would be.
     fn announce(&mut self, index: usize, now_ms: u32, bytes: usize) {
         let turn = &mut self.turns[index];
         if !turn.known {
@@ -240,7 +236,7 @@ impl Summary {
         self.outlet.fits_besides(now, class, bytes, first.1)
     }
 
-    /// Sends a finding to the pilot (`telling.rs`), now or as soon as the budget and its event allow.
+    /// Now or as soon as budget and event allow (`telling.rs`).
     pub fn finding(&mut self, now: Instant, finding: &Finding, out: &mut impl FnMut(&[u8])) {
         // The waiting text is out of date.
         self.waiting.retain(|other| (other.check, other.instance) != (finding.check, finding.instance));
@@ -336,13 +332,13 @@ impl Summary {
         }
     }
 
-    /// Findings that were dropped for more urgent ones.
+    /// For more urgent ones.
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }
 }
 
-/// Our heartbeat as the vehicle is.
+/// As the vehicle is.
 pub fn heartbeat(monitor: &Monitor) -> Packet {
     messages::heartbeat(match monitor.health().overall() {
         Level::Critical => 5,
@@ -351,7 +347,6 @@ pub fn heartbeat(monitor: &Monitor) -> Packet {
     })
 }
 
-/// A value that is sent in turn.
 #[derive(Clone, Copy)]
 enum Told {
     /// A part's level: 0 ok, 1 advisory, 2 warning, 3 critical, 4 stale.
@@ -365,7 +360,7 @@ enum Told {
 /// The overall level, on the scale of [`Told::Level`]: every other value, before each of [`VALUES_TOLD`].
 const OVERALL: &str = "HUMS_LEVEL";
 
-/// Values sent in turn, with the names under which a ground station plots them.
+/// With a ground station's names.
 const VALUES_TOLD: [(&str, Told); 17] = [
     ("L_POWER", Told::Level(Subsystem::Power)),
     ("L_PROPULS", Told::Level(Subsystem::Propulsion)),
@@ -386,7 +381,6 @@ const VALUES_TOLD: [(&str, Told); 17] = [
     ("SD_STALL_S", Told::Own(|own| own.stall_s)),
 ];
 
-/// The value at this position of the round.
 fn value(now: Instant, monitor: &Monitor, own: &OwnFigures, turn: usize) -> Packet {
     let (name, value) = match VALUES_TOLD.get(turn / 2).filter(|_| turn % 2 == 1) {
         None => (OVERALL, f32::from(monitor.health().overall() as u8)),
@@ -406,7 +400,7 @@ pub fn state(monitor: &Monitor) -> i32 {
     levels.enumerate().fold(0, |sum, (index, level)| sum | level << (3 * index))
 }
 
-/// Severity of a finding's text, or `None` if the pilot does not need it.
+/// `None` if the pilot does not need it.
 fn severity(finding: &Finding) -> Option<Severity> {
     match (finding.level, finding.previous) {
         (Level::Critical, _) => Some(Severity::Critical),
@@ -429,7 +423,6 @@ fn urgency(finding: &Finding) -> u8 {
 
 /// Text of a finding for the pilot: part, fault, value and, if critical, the action: `HUMS: battery 1 low: 6.8 %, LAND NOW`. The
 /// end of a finding repeats its name: `HUMS: over: battery 1 low`.
-// Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 pub fn text(finding: &Finding) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;

@@ -36,7 +36,6 @@ const MISHAP_MAX: u8 = 2;
 /// Open alarms with stored details.
 const OPEN_MAX: usize = 16;
 
-/// Decision about a waiting finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
     /// It is sent now.
@@ -52,7 +51,6 @@ const fn family(part: Subsystem) -> Subsystem {
     if matches!(part, Subsystem::Attitude) { Subsystem::Propulsion } else { part }
 }
 
-/// Reports of one family.
 #[derive(Clone, Copy, Debug)]
 struct Event {
     /// When its first text went, in milliseconds modulo 2^32.
@@ -95,7 +93,7 @@ impl Telling {
         }
     }
 
-    /// Whether a pilot should get it, now or later.
+    /// Now or later.
     pub(crate) fn is_news(&mut self, finding: &Finding) -> bool {
         let Some(key) = key(finding) else { return finding.because.is_empty() };
         match finding.level {
@@ -114,14 +112,12 @@ impl Telling {
         }
     }
 
-    /// Whether a sent alarm explains it: a dead sensor agrees with others by chance.
     fn is_explained(&self, finding: &Finding) -> bool {
         let Some(check) = health::check_named(finding.check) else { return false };
         let mut open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
         open.any(|cause| health::explains(cause, check))
     }
 
-    /// The decision on a finding now.
     pub(crate) fn fate(&mut self, now: Instant, finding: &Finding) -> Fate {
         let event = &self.events[family(finding.subsystem) as usize];
         let is_mishap = finding.subsystem == Subsystem::Mishap;
@@ -184,32 +180,30 @@ impl Telling {
     }
 }
 
-/// Milliseconds since a moment that is known modulo 2^32.
+/// `at_ms`: modulo 2^32.
 const fn since(now: Instant, at_ms: u32) -> u64 {
     (now.as_millis() as u32).wrapping_sub(at_ms) as u64
 }
 
-/// The number of a check in the tables.
+/// In the tables.
 fn number(check: &str) -> Option<u8> {
     Some(health::checks().position(|known| known.name == check)? as u8)
 }
 
-/// The number of a finding's check, and its instance.
+/// And its instance.
 fn key(finding: &Finding) -> Option<(u8, u8)> {
     Some((number(finding.check)?, finding.instance))
 }
 
-/// Action that a critical finding demands of this vehicle; empty if none.
+/// Empty if none.
 pub(crate) fn order(finding: &Finding) -> &'static str {
     health::said(finding.ordering()).map_or("", |said| said.advice)
 }
 
-/// The part that a check is of, by its number.
 fn part(number: u8) -> Option<Subsystem> {
     Some(health::checks().nth(usize::from(number))?.subsystem)
 }
 
-/// Action that a critical finding demands of the pilot.
 fn advice(number: u8) -> &'static str {
     let check = health::checks().nth(usize::from(number));
     check.and_then(|check| health::said(check.name)).map_or("", |said| said.advice)

@@ -1,11 +1,11 @@
-//! `STATUSTEXT`: a text that a ground station shows, or speaks, to the pilot.
+//! `STATUSTEXT`: shown or spoken to the pilot.
 
 use core::fmt::{self, Write as _};
 
-/// Bytes of text in one message.
+/// In one message.
 pub use hums_core::protect::TEXT_BYTES_MAX;
 
-/// How urgent a text is (`MAV_SEVERITY`).
+/// `MAV_SEVERITY`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Severity {

@@ -1,12 +1,10 @@
-//! The checks of the framer's fuzz target (`fuzz/`), on a few thousand generated inputs, always the same: noise with
-//! start bytes, and changed frames.
+//! The framer's fuzz checks (`fuzz/`) on some thousand repeatable inputs: noise with start bytes, changed frames.
 
 #![allow(unreachable_pub, reason = "the files are those of another crate")]
 
 #[path = "../../../fuzz/src/framer.rs"]
 mod framer;
 
-/// A small generator of numbers (xorshift).
 struct Random(u64);
 
 impl Random {
@@ -18,7 +16,7 @@ impl Random {
     }
 }
 
-/// A heartbeat of version 1 with a right checksum.
+/// Version 1, right checksum.
 const HEARTBEAT: [u8; 17] = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
 
 #[test]

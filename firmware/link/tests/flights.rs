@@ -1,8 +1,7 @@
-//! The monitor over recorded flights: its findings, and its usage figures against an independent computation.
+//! The monitor over recorded flights: findings, and usage against pymavlink's computation of the same messages.
 //!
-//! The expected figures were computed with pymavlink from the recordings' own messages. Flight time comes from the
-//! height above the place of arming, landing from `EXTENDED_SYS_STATE` if sent. Distance is the sum of the speeds of
-//! `GLOBAL_POSITION_INT`. Charge and energy come from `BATTERY_STATUS` (or `SYS_STATUS`, or `ESC_STATUS`) by
+//! Flight time comes from the height above the place of arming, landing from `EXTENDED_SYS_STATE` if sent. Distance is the sum
+//! of the speeds of `GLOBAL_POSITION_INT`. Charge and energy come from `BATTERY_STATUS` (or `SYS_STATUS`, or `ESC_STATUS`) by
 //! trapezoids.
 
 use crate::common;
@@ -17,14 +16,13 @@ use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
 
-/// Results of the monitor for a recording.
 struct Outcome {
     monitor: Monitor,
     findings: Vec<Finding>,
 }
 
 impl Outcome {
-    /// Second, check and level of each finding at least as bad as a warning.
+    /// At least a warning: second, check, level.
     fn alarms(&self) -> Vec<(f64, &'static str, Level)> {
         let bad = |finding: &&Finding| matches!(finding.level, Level::Warning | Level::Critical);
         let entry = |finding: &Finding| (finding.at.as_millis() as f64 / 1e3, finding.check, finding.level);
@@ -32,7 +30,7 @@ impl Outcome {
     }
 }
 
-/// Feeds a recording frame by frame at its own times, with a tick every 50 ms.
+/// At its own times, with a tick every 50 ms.
 fn watch(recording: &Recording) -> Outcome {
     let mut framer = Framer::new();
     let mut sequences = Sequences::new();

@@ -6,7 +6,7 @@ use common::{Random, crc32, excerpt, flight};
 use hums_link::{Check, Frame, Framer};
 use std::collections::HashSet;
 
-/// All frames of `bytes`, in pieces of `piece` bytes; then the line ends.
+/// In pieces of `piece` bytes; then the line ends.
 fn frames_in_pieces(bytes: &[u8], piece: usize) -> (Vec<(Vec<u8>, Check)>, Framer) {
     let mut framer = Framer::new();
     let mut frames = Vec::new();
@@ -48,7 +48,7 @@ fn excerpts_come_through_whole_however_the_bytes_are_cut() {
     }
 }
 
-/// File, frames of our definitions, frames of other definitions, crc32 of all; pymavlink agrees on all.
+/// File, frames of our definitions, of others, crc32 of all; as pymavlink.
 const FLIGHTS: [(&str, usize, usize, u32); 9] = [
     ("ap_quad_faults.tlog", 77_633, 0, 0x4159_f976),
     ("ap_quad_guided.tlog", 57_874, 0, 0xe20a_0b8e),
@@ -74,7 +74,7 @@ fn whole_flights_come_through_bit_for_bit() {
     }
 }
 
-/// Damages each byte with probability `1 / one_in`; returns which ones.
+/// Probability `1 / one_in`; returns the damaged ones.
 fn with_noise(bytes: &[u8], one_in: u64, random: &mut Random) -> (Vec<u8>, Vec<bool>) {
     bytes
         .iter()
@@ -85,8 +85,7 @@ fn with_noise(bytes: &[u8], one_in: u64, random: &mut Random) -> (Vec<u8>, Vec<b
         .unzip()
 }
 
-/// Every undamaged frame of the recording survives noise; returns the numbers of damaged frames and of additional
-/// ones.
+/// Returns damaged frames and additional ones.
 fn survives_noise(name: &str, bytes: &[u8], bounds: &[(usize, usize)], seed: u64) -> (usize, usize) {
     let mut random = Random(seed);
     let (noisy, hits) = with_noise(bytes, 1_000, &mut random);
@@ -149,7 +148,7 @@ fn under_noise_every_undamaged_frame_of_whole_flights_survives() {
     }
 }
 
-/// The frames of a raw recording, found by the (undamaged) framer.
+/// Found by the (undamaged) framer.
 fn bounds_of_raw(bytes: &[u8]) -> Vec<(usize, usize)> {
     let (frames, _) = frames_in_pieces(bytes, 4_096);
     let mut at = 0;
@@ -164,7 +163,7 @@ fn bounds_of_raw(bytes: &[u8]) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// A frame of version 2 with any id, checked with `extra`.
+/// Checked with `extra`.
 fn frame_v2(id: u32, sequence: u8, payload: &[u8], extra: u8) -> Vec<u8> {
     let [id0, id1, id2, _] = id.to_le_bytes();
     let mut frame = vec![0xfd, payload.len() as u8, 0, 0, sequence, 1, 1, id0, id1, id2];
@@ -174,7 +173,7 @@ fn frame_v2(id: u32, sequence: u8, payload: &[u8], extra: u8) -> Vec<u8> {
     frame
 }
 
-/// The checksum, bit by bit: independent of the table under test.
+/// Bit by bit.
 fn mcrf4xx(bytes: impl Iterator<Item = u8>) -> u16 {
     bytes.fold(0xffff_u16, |mut crc, byte| {
         crc ^= u16::from(byte);

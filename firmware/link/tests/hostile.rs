@@ -14,13 +14,11 @@ use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
 use proptest::prelude::*;
 
-/// The messages that become observations.
 const USED: &[u32] = &[
     0, 1, 2, 24, 26, 27, 29, 30, 32, 33, 42, 46, 65, 74, 77, 105, 109, 116, 124, 125, 129, 137, 143, 147,
     148, 193, 225, 226, 230, 241, 245, 253, 264, 290, 291, 339, 373, 441, 11_030, 11_039,
 ];
 
-/// A frame of version 2 with a right checksum, from the vehicle.
 fn frame(id: u32, sequence: u8, payload: &[u8]) -> Vec<u8> {
     let [id0, id1, id2, _] = id.to_le_bytes();
     let mut bytes = vec![0xfd, payload.len() as u8, 0, 0, sequence, 1, 1, id0, id1, id2];
@@ -41,7 +39,7 @@ fn heartbeat(armed: bool, autopilot: u8) -> Vec<u8> {
     vec![0, 0, 0, 0, 2, autopilot, if armed { 0x81 } else { 1 }, 4, 3]
 }
 
-/// Payloads that hurt: NaN, infinities, the ends of every integer, and anything at all.
+/// NaN, infinities, ends of integers, and anything.
 fn payload() -> impl Strategy<Value = Vec<u8>> {
     let repeated =
         |pattern: [u8; 4]| (0..=64_usize).prop_map(move |words| pattern.repeat(words)[..].to_vec());
@@ -63,7 +61,6 @@ fn payload() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// Parameters anywhere in their ranges.
 fn params(settings: &[(usize, f32)]) -> Params {
     let mut params = Params::defaults();
     for (index, place) in settings {
@@ -75,7 +72,7 @@ fn params(settings: &[(usize, f32)]) -> Params {
     params
 }
 
-/// Every output of the monitor, as the firmware takes it after each tick.
+/// As the firmware takes it after each tick.
 fn look(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
         // A figure may be negative: a motor slower than the others.
@@ -127,7 +124,7 @@ proptest! {
         let mut monitor = Monitor::new(params(&settings));
         for (number, stored) in &items {
             if let Some(key) = ItemKey::from_number(number % 25) {
-                // Refused or taken: either must do.
+                // Either is right.
                 let mut stored = stored.clone();
                 if let Some(version) = stored.first_mut() {
                     *version = (*version).max(1);

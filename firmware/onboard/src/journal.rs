@@ -1,5 +1,4 @@
-//! The record's writing end for the whole monitor task: it takes frames and records, and counts losses for lack of
-//! room. With it the subjects of most records: the monitor and the card's state.
+//! The record's writing end for the monitor task: frames, records, and losses for lack of room.
 
 use core::fmt::{Arguments, Write as _};
 
@@ -25,11 +24,10 @@ const HEARTBEAT_AGE_MAX: Span = Span::from_secs(3);
 /// The author of an action: MAVLink system and component id; 0, 0 is the monitor itself.
 pub(crate) type By = (u8, u8);
 
-/// The writer, and its losses.
 pub(crate) struct Journal<'a> {
     writer: &'a mut Writer,
     losses: Losses,
-    /// Frames lost because the sector queue was full.
+    /// The sector queue was full.
     refused: u64,
 }
 
@@ -38,7 +36,7 @@ impl<'a> Journal<'a> {
         Self { writer, losses: Losses::new(), refused: 0 }
     }
 
-    /// Writes a frame, unless only the reserve for records is left.
+    /// Unless only the reserve for records is left.
     pub(crate) fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, sectors: &mut SectorsIn) {
         if self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
@@ -46,7 +44,7 @@ impl<'a> Journal<'a> {
         }
     }
 
-    /// Writes a record, if need be from the reserve; whether there was room. Otherwise it is counted as lost.
+    /// If need be from the reserve; without room it counts as lost.
     pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
         let written = sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
         if !written {
@@ -55,31 +53,29 @@ impl<'a> Journal<'a> {
         written
     }
 
-    /// Writes an end mark; whether there was room. It is never counted as lost: it can be written later.
+    /// Without room never lost: it can be written later.
     pub(crate) fn mark(&mut self, now: Instant, why: Resting, sectors: &mut SectorsIn) -> bool {
         sectors.with_reserve(|sink| self.writer.mark(now, why, sink)).is_ok()
     }
 
-    /// Records an action over a link; the text is cut after 50 characters.
+    /// Text is cut after 50 characters.
     pub(crate) fn by_hand(&mut self, now: Instant, what: Arguments<'_>, sectors: &mut SectorsIn) {
         let mut text = Text::default();
-        // Cut where it is full.
         let _ = text.write_fmt(what);
         self.record(now, &Record::Event(Event { number: BY_HAND, text: text.as_str() }), sectors);
     }
 
-    /// Counts a loss, to be recorded.
+    /// To be recorded.
     pub(crate) fn lose(&mut self, now: Instant, what: Lost, count: u64) {
         self.lose_since(now, now, what, count);
     }
 
-    /// Counts a loss that may have begun at `since`, to be recorded.
+    /// May have begun at `since`.
     pub(crate) fn lose_since(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
         self.losses.count(since, now, what, count);
     }
 
-    /// Records losses whose window is over, or, at the end, all.
-    // Own stack frame (ARCHITECTURE.md, Memory).
+    /// Whose window is over, or, at the end, all.
     #[inline(never)]
     pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;
@@ -88,7 +84,7 @@ impl<'a> Journal<'a> {
         losses.flush(now, all, &mut write);
     }
 
-    /// Frames that found no room.
+    /// Without room.
     pub(crate) const fn refused(&self) -> u64 {
         self.refused
     }
@@ -103,7 +99,7 @@ impl<'a> Journal<'a> {
         self.writer
     }
 
-    /// Gives storage a copy of the sector in progress, if the queue has room and the sector has a new entry.
+    /// If the queue has room and the sector a new entry.
     #[inline(never)]
     pub(crate) fn partial(&mut self, sectors: &mut SectorsIn) {
         let mut copy = Sector::zeroed();
@@ -113,17 +109,16 @@ impl<'a> Journal<'a> {
     }
 }
 
-/// The monitor's knowledge with its record.
 pub(crate) struct Logbook<'a> {
     /// Lent, like the writer: both are too large to be moved over the firmware's stack.
     pub(crate) monitor: &'a mut Monitor,
     pub(crate) journal: Journal<'a>,
     pub(crate) card: &'a CardStatus,
-    /// The cause of this start.
+    /// Of this start.
     pub(crate) cause: ResetCause,
 }
 
-/// Whether motors may turn, by the vehicle's heartbeats since this start.
+/// By the vehicle's heartbeats since this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Arming {
     /// No heartbeat within the last 3 s, and none before with armed.
@@ -134,7 +129,6 @@ pub(crate) enum Arming {
 }
 
 impl Logbook<'_> {
-    /// Whether motors may turn.
     pub(crate) fn arming(&self, now: Instant) -> Arming {
         let heartbeat = &self.monitor.vehicle().heartbeat;
         match (heartbeat.get(), heartbeat.within(now.into(), HEARTBEAT_AGE_MAX)) {

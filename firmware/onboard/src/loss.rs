@@ -3,14 +3,14 @@
 use hums_blackbox::record::{Loss, Lost};
 use hums_core::clock::{Instant, Span};
 
-/// Losses of one kind within this long are one record.
+/// Of one kind, in one record.
 const WINDOW: Span = Span::from_secs(1);
 
-/// The kinds of loss that the pipeline can have.
+/// Possible in the pipeline.
 pub(crate) const KINDS: [Lost; 6] =
     [Lost::UartOverrun, Lost::NotFrames, Lost::DamagedFrames, Lost::QueueFull, Lost::Card, Lost::Records];
 
-/// One open record a kind.
+/// One of each kind.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Losses {
     open: [Option<Loss>; KINDS.len()],
@@ -21,7 +21,7 @@ impl Losses {
         Self { open: [None; KINDS.len()] }
     }
 
-    /// Counts a loss that was noticed at `now`, and may have begun at `since`.
+    /// Noticed at `now`, begun at `since` at the earliest.
     #[inline(never)]
     pub(crate) fn count(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
         let Some(slot) = KINDS.iter().position(|kind| *kind == what).filter(|_| count > 0) else { return };

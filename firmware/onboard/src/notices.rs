@@ -22,20 +22,16 @@ const UNKNOWN_MAX: Span = Span::from_secs(5);
 /// `MAV_SEVERITY` of texts that a pilot need not see, and of milder ones.
 const INFO: u8 = 6;
 
-/// A text that is still to be sent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Notice {
     /// `MAV_SEVERITY` and the text.
     Text(u8, &'static str),
-    /// A step of the protective action.
     Protection(Step),
-    /// A mishap began or ended.
     Mishap(Report),
-    /// The monitor restarted: the cause, and the task, if known.
+    /// With the cause, and the task if known.
     Restarted(&'static str, Option<&'static str>),
 }
 
-/// Texts that are still to be sent.
 #[derive(Clone, Debug)]
 pub(crate) struct Notices(heapless::Vec<Notice, WAITING_MAX>);
 
@@ -44,12 +40,12 @@ impl Notices {
         Self(heapless::Vec::new())
     }
 
-    /// Adds a text; if the queue is full, only the record has it.
+    /// If the queue is full, only the record has it.
     pub(crate) fn push(&mut self, notice: Notice) {
         let _ = self.0.push(notice);
     }
 
-    /// Records a text of ours, and sends it to the ground station; `severity` is a `MAV_SEVERITY`.
+    /// `severity` is a `MAV_SEVERITY`.
     pub(crate) fn note(
         &mut self,
         now: Instant,
@@ -64,7 +60,7 @@ impl Notices {
         }
     }
 
-    /// Adds a text of the protective action or of a mishap, before all others.
+    /// Of the protective action or a mishap, before all others.
     pub(crate) fn announce(&mut self, notice: Notice) {
         let Self(notices) = self;
         let is_text = |notice: &Notice| !matches!(notice, Notice::Protection(_) | Notice::Mishap(_));
@@ -77,7 +73,7 @@ impl Notices {
         let _ = notices.insert(place, notice);
     }
 
-    /// Sends waiting texts as far as the budget allows. Our system is unknown before the vehicle is known.
+    /// As far as the budget allows; our system is unknown before the vehicle is.
     #[inline(never)]
     pub(crate) fn tell(&mut self, now: Instant, is_known: bool, outlet: &mut Outlet, gs: &mut GsIn) {
         while let Some(notice) = self.0.first() {

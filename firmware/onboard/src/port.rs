@@ -1,11 +1,11 @@
 //! Counters of reception for the monitor: plain atomics, so that neither side ever waits.
 //!
-//! They have 32 bits, which this processor reads at once. The monitor adds up the differences in 64 bits. A
-//! difference is right if it is read more often than once in 2^32 bytes (13 hours at 921,600 baud).
+//! They have 32 bits, read at once; the monitor adds up differences in 64 bits. A difference is right if it
+//! is read more often than once in 2^32 bytes (13 hours at 921,600 baud).
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Counters of the autopilot's port since power-on, each modulo 2^32.
+/// Since power-on, modulo 2^32.
 #[derive(Debug, Default)]
 pub struct PortStatus {
     bytes: AtomicU32,
@@ -23,13 +23,13 @@ pub struct PortStatus {
 pub struct PortReading {
     /// Bytes received.
     pub bytes: u32,
-    /// Bytes that belong to no frame.
+    /// In no frame.
     pub bytes_not_frames: u32,
     /// Frames of known shape with a wrong checksum; their bytes count as bytes outside frames.
     pub damaged: u32,
     /// Frames found.
     pub frames: u32,
-    /// Frames that found the frame queue full.
+    /// The frame queue was full.
     pub frames_lost: u32,
     /// Times that bytes were lost before reception fetched them.
     pub overrun: u32,
@@ -64,7 +64,7 @@ impl PortStatus {
         }
     }
 
-    /// The most bytes that waited in the frame queue at once.
+    /// In the frame queue at once.
     pub fn queue_bytes_max(&self) -> u32 {
         self.queue_bytes_max.load(Ordering::Relaxed)
     }
@@ -73,7 +73,7 @@ impl PortStatus {
         self.queue_bytes_max.store(bytes, Ordering::Relaxed);
     }
 
-    /// All counters; each is valid by itself, but they may be of different moments.
+    /// Each is valid by itself, perhaps of another moment.
     pub fn read(&self) -> PortReading {
         PortReading {
             bytes: self.bytes.load(Ordering::Relaxed),
@@ -93,13 +93,13 @@ impl PortStatus {
         self.frames_lost.store(reading.frames_lost, Ordering::Relaxed);
     }
 
-    /// Counts a loss of bytes before reception fetched them, within this time in ms.
+    /// Within this time in ms.
     pub fn count_overrun(&self, blind_ms: u32) {
         self.blind_ms.fetch_add(blind_ms, Ordering::Relaxed);
         self.overrun.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Milliseconds in which bytes may have been lost, modulo 2^32.
+    /// Modulo 2^32.
     pub(crate) fn blind_ms(&self) -> u32 {
         self.blind_ms.load(Ordering::Relaxed)
     }

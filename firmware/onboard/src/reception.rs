@@ -13,7 +13,7 @@ use crate::queues::FramesIn;
 /// After this silence a begun frame will not be finished: [`Reception::idle`] is due.
 pub const SILENCE: Span = Span::from_millis(20);
 
-/// The autopilot port's framer, and its losses.
+/// With its losses.
 pub struct Reception<'a> {
     framer: Framer,
     status: &'a PortStatus,
@@ -21,19 +21,19 @@ pub struct Reception<'a> {
 }
 
 impl<'a> Reception<'a> {
-    /// Before the first byte.
+    /// Before any byte.
     pub const fn new(status: &'a PortStatus) -> Self {
         Self { framer: Framer::new(), status, frames_lost: 0 }
     }
 
-    /// Takes bytes received by `now`; each completed frame is queued with that time.
+    /// Received by `now`, which each completed frame gets.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8], frames: &mut FramesIn) {
         let Self { framer, frames_lost, .. } = self;
         framer.push(bytes, &mut |frame| queue(now, &frame, frames, frames_lost));
         self.publish(frames);
     }
 
-    /// The line has been silent (or has ended): decides about bytes that wait for more.
+    /// Silent or ended: decides about bytes that wait for more.
     pub fn idle(&mut self, now: Instant, frames: &mut FramesIn) {
         let Self { framer, frames_lost, .. } = self;
         framer.idle(&mut |frame| queue(now, &frame, frames, frames_lost));

@@ -17,7 +17,7 @@ const CLOCK_STEP_MICROS: u64 = 1_000_000;
 const GATHERED: usize = 16;
 const _: () = assert!(GATHERED <= USAGE_ENTRIES_MAX && GATHERED <= LIFETIME_ENTRIES_MAX);
 
-/// Counters that gather for a record: a full one is written.
+/// A full one is written.
 struct Counters(heapless::Vec<(u8, f32), GATHERED>);
 
 impl Counters {
@@ -41,7 +41,7 @@ impl Counters {
     }
 }
 
-/// The last recorded state of data that is recorded again after a change or after a time.
+/// Recorded again after a change or after a time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Recorded {
     vehicle: VehicleRecord,
@@ -112,12 +112,11 @@ impl Recorded {
         }
     }
 
-    /// Time of the last usage record.
     pub(crate) const fn usage_at(&self) -> Instant {
         self.usage_at
     }
 
-    /// All usage again, for a new file.
+    /// For a new file.
     pub(crate) fn usage_anew(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.usage_at = Instant::ZERO;
         self.usage(now, Moment::Periodic, book, sectors);
@@ -144,8 +143,6 @@ impl Recorded {
         exceedances(now, moment, since, book, sectors);
     }
 }
-
-// Own stack frame (ARCHITECTURE.md, Memory).
 
 #[inline(never)]
 fn session(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
@@ -196,8 +193,7 @@ fn component(now: Instant, place: usize, why: Why, book: &mut Logbook<'_>, secto
     journal.record(now, &Record::Component(record), sectors);
 }
 
-/// Replaces a component (place from 0), and records the old one with its figures. `false` if there is no such
-/// component.
+/// Place from 0; records the old one; `false` if there is none.
 pub(crate) fn replace_component(
     now: Instant,
     place: usize,

@@ -1,6 +1,6 @@
 //! Causes of a start.
 
-/// The cause of a start.
+/// Why the firmware started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power came.

@@ -12,7 +12,7 @@ use crate::shelf::Server;
 /// How soon to call again after [`Service::NoCard`].
 pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 
-/// The result of one call.
+/// Of one call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Service {
     /// It wrote, formatted or searched: call again at once.
@@ -23,18 +23,18 @@ pub enum Service {
     NoCard,
 }
 
-/// The recorder with the reading end of its queue.
+/// With the reading end of its queue.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
 }
 
 impl<'a, D: CardDevice> Storage<'a, D> {
-    /// For the card in `device`; see [`Recorder::new`].
+    /// See [`Recorder::new`].
     pub const fn new(device: D, status: &'a CardStatus, held: &'a Buffers, entropy: u32) -> Self {
         Self { recorder: Recorder::new(device, status, held, entropy) }
     }
 
-    /// Writes waiting sectors with at most one command.
+    /// At most one command.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
         if self.recorder.format(now) {
             return Service::Wrote;
@@ -49,18 +49,17 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         }
     }
 
-    /// Answers one request about the logs on the card, if there is one; whether there was. To be called only if
-    /// [`Self::service`] found nothing to write.
+    /// About the logs on the card; whether there was one. Only if [`Self::service`] found nothing to write.
     pub fn serve(&mut self, shelf: &mut Server<'_>) -> bool {
         shelf.serve(&mut self.recorder)
     }
 
-    /// Ends the session after the last sector: the card can be pulled.
+    /// After the last sector: the card can be pulled.
     pub fn finish(&mut self) {
         self.recorder.finish();
     }
 
-    /// The recorder, for stored logs and for the card.
+    /// For stored logs and the card.
     pub const fn recorder(&mut self) -> &mut Recorder<'a, D> {
         &mut self.recorder
     }

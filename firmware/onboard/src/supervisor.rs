@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::spi::SERVICE_MAX;
 
-/// The tasks that must report.
+/// Must report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
     /// Bytes to frames; it loops at least when the line is silent.
@@ -25,7 +25,7 @@ impl Task {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Reception, Self::Monitor, Self::Downlink, Self::Storage];
 
-    /// As the log names it.
+    /// In the log.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reception => "reception",
@@ -48,7 +48,7 @@ impl Task {
 // A second for its own work.
 const _: () = assert!(Task::Storage.silence_max().as_millis() > SERVICE_MAX.as_millis() + 1_000);
 
-/// The last report of each task. One static, shared by all tasks.
+/// One static, shared by all tasks.
 #[derive(Debug, Default)]
 pub struct Supervisor {
     /// Milliseconds since power-on, modulo 2^32: differences stay right for 49 days of silence.
@@ -56,7 +56,7 @@ pub struct Supervisor {
 }
 
 impl Supervisor {
-    /// All tasks count as having reported at power-on.
+    /// All count as having reported at power-on.
     pub const fn new() -> Self {
         Self { reported_ms: [const { AtomicU32::new(0) }; Task::ALL.len()] }
     }
@@ -66,7 +66,7 @@ impl Supervisor {
         self.slot(task).store(now.as_millis() as u32, Ordering::Relaxed);
     }
 
-    /// The first task that has been silent for too long; `None` when all is well and the watchdog may be fed.
+    /// `None`: the watchdog may be fed.
     pub fn silent(&self, now: Instant) -> Option<Task> {
         let now_ms = now.as_millis() as u32;
         Task::ALL.into_iter().find(|task| {

@@ -13,7 +13,7 @@ use crate::queues::UplinkIn;
 /// After this silence a begun frame will not be finished: [`Uplink::idle`] is due.
 pub const SILENCE: Span = Span::from_millis(100);
 
-/// The ground station port's framer.
+/// Ground station's port.
 #[derive(Debug)]
 pub struct Uplink {
     framer: Framer,
@@ -27,24 +27,24 @@ impl Default for Uplink {
 }
 
 impl Uplink {
-    /// Before the first byte.
+    /// Before any byte.
     pub const fn new() -> Self {
         Self { framer: Framer::new(), frames_lost: 0 }
     }
 
-    /// Takes bytes received by `now`; each completed frame is queued with that time.
+    /// Received by `now`, which each completed frame gets.
     pub fn bytes(&mut self, now: Instant, bytes: &[u8], frames: &mut UplinkIn) {
         let Self { framer, frames_lost } = self;
         framer.push(bytes, &mut |frame| queue(now, &frame, frames, frames_lost));
     }
 
-    /// The line has been silent: decides about bytes that wait for more.
+    /// Silent: decides about bytes that wait for more.
     pub fn idle(&mut self, now: Instant, frames: &mut UplinkIn) {
         let Self { framer, frames_lost } = self;
         framer.idle(&mut |frame| queue(now, &frame, frames, frames_lost));
     }
 
-    /// Frames that found the queue full, modulo 2^32.
+    /// The queue was full; modulo 2^32.
     pub const fn frames_lost(&self) -> u32 {
         self.frames_lost
     }

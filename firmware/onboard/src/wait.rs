@@ -25,7 +25,7 @@ mod tests {
 
     use super::*;
 
-    /// A device that is ready after 5 ms, polled until `end_ms`, with `away_ms` from each poll to the next.
+    /// Ready after 5 ms; `away_ms` from each poll to the next.
     fn polled(end_ms: u64, away_ms: u64) -> (Option<u64>, u64) {
         let (now_ms, polls) = (Cell::new(0), Cell::new(0));
         let done = until(

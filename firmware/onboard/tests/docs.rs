@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hums_link::text::TEXT_BYTES_MAX;
 
-/// Every string of the firmware's sources that begins with our name, without tests.
+/// Begins with our name, without tests.
 fn texts(folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("readable").flatten() {
         let path = entry.path();
@@ -20,7 +20,7 @@ fn texts(folder: &Path, found: &mut Vec<String>) {
     }
 }
 
-/// Every text that a pilot may read, without our name.
+/// Without our name.
 fn all_texts() -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut found = Vec::new();
@@ -46,7 +46,6 @@ fn every_text_that_a_pilot_may_read_is_in_the_runbook() {
     // The card's have a document of their own.
     let known = read("runbook.md") + &read("cards.md").replace("| ", "card: ");
     for text in all_texts() {
-        // The text between the placeholders.
         let pieces = text.split('{').map(|piece| piece.rsplit('}').next().unwrap_or_default().trim());
         for piece in pieces.filter(|piece| piece.chars().filter(char::is_ascii_alphabetic).count() > 3) {
             let piece = piece.trim_matches([':', '(', ',', ' ']);

@@ -22,7 +22,7 @@ use hums_link::framer::Framer;
 use hums_link::sequence::Sequences;
 use hums_onboard::monitoring::TICK;
 
-/// Bytes of a tlog's time before each frame: microseconds since 1970, big-endian.
+/// Microseconds since 1970, big-endian.
 const TIME_BYTES: usize = 8;
 /// A longer step of the recorder's clock does not count as time of the flight, milliseconds.
 const STEP_MAX_MS: u64 = 60_000;
@@ -88,7 +88,7 @@ fn judge_all(recordings: &[PathBuf]) -> String {
     recordings.iter().map(|path| judge(path)).collect()
 }
 
-/// The findings and events of one recording. Seconds count from its first frame.
+/// Seconds since its first frame.
 fn judge(path: &Path) -> String {
     let mut box_of = BoxUnderTest::new();
     let name = path.file_name().expect("a recording has a name").to_string_lossy();
@@ -109,7 +109,7 @@ fn read(path: &Path) -> Vec<u8> {
     plain
 }
 
-/// The frames of a tlog, each with its time in microseconds since the first one. Time never goes back.
+/// Microseconds since the first one; never back.
 fn frames(tlog: &[u8]) -> Vec<(u64, &[u8])> {
     let (mut frames, mut rest, mut now_us, mut before) = (Vec::new(), tlog, 0, None);
     while let Some((time, after)) = rest.split_first_chunk::<TIME_BYTES>() {
@@ -125,7 +125,7 @@ fn frames(tlog: &[u8]) -> Vec<(u64, &[u8])> {
     frames
 }
 
-/// The length of the MAVLink frame that begins here, by its header.
+/// By its header.
 fn frame_length(bytes: &[u8]) -> Option<usize> {
     match bytes {
         [0xFE, length, ..] => Some(8 + usize::from(*length)),
@@ -134,7 +134,6 @@ fn frame_length(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// The monitor behind the parser, and what it found.
 struct BoxUnderTest {
     framer: Framer,
     sequences: Sequences,

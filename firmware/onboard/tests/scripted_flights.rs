@@ -19,18 +19,18 @@ use hums_onboard::monitoring::TICK;
 /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`
 const RETURN: Request = Request { command: 20, confirmation: 0 };
 
-/// All results of a flight, with times in seconds since its first frame.
+/// Seconds since its first frame.
 struct Outcome {
     findings: Vec<(f32, Finding)>,
     happenings: Vec<(f32, Happening)>,
     requests: Vec<(f32, Request)>,
-    /// The state at the end of the recording, and its time.
+    /// With its time.
     monitor: Box<Monitor>,
     end: Instant,
 }
 
 impl Outcome {
-    /// When a critical or warning text of this check was first sent to the ground, from `from_s` on.
+    /// Critical or warning, from `from_s` on.
     fn reported_s(&self, check: &str, from_s: f32) -> Option<f32> {
         let is_alarm = |finding: &Finding| {
             finding.check == check
@@ -43,7 +43,7 @@ impl Outcome {
             .map(|(at_s, _)| *at_s)
     }
 
-    /// When the check first changed to this level.
+    /// First time.
     fn changed_s(&self, check: &str, level: Level) -> Option<f32> {
         let mut of_check = self.findings.iter().filter(|(_, finding)| finding.check == check);
         of_check.find(|(_, finding)| finding.level == level).map(|(at_s, _)| *at_s)
@@ -72,14 +72,14 @@ impl Outcome {
         self.happenings.iter().filter(|(_, happening)| announced(happening)).count()
     }
 
-    /// How long a check was critical or a warning in this session, in seconds.
+    /// Critical or a warning, in this session.
     fn exceeded_s(&self, check: &str) -> f32 {
         let of_check = self.monitor.exceedances().iter(self.end.into()).filter(|it| it.check.name == check);
         of_check.map(|it| (it.session.warning_tenths + it.session.critical_tenths) as f32 / 10.0).sum()
     }
 }
 
-/// The frames of a ground station's log, with microseconds since the first one.
+/// Microseconds since the first one.
 fn frames(tlog: &[u8]) -> Vec<(u64, &[u8])> {
     let (mut frames, mut rest) = (Vec::new(), tlog);
     while let Some((time, tail)) = rest.split_first_chunk::<8>() {
@@ -127,7 +127,7 @@ fn fly(name: &str) -> Outcome {
     Outcome { findings, happenings, requests, monitor, end: tick_at }
 }
 
-/// Whether the monitor judges the flight as the README says.
+/// As the README says.
 fn is_right(name: &str, it: &Outcome) -> bool {
     match name {
         "d1_ok" | "d1_one" | "d1_all" => {

@@ -31,7 +31,6 @@ const UNCHAINED_MAX: usize = 8;
 /// If logs have all of the card but this part, the oldest one is overwritten before all of the FAT was searched.
 const UNSEARCHED: u32 = 64;
 
-/// The place of a directory entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     block: u32,
@@ -39,18 +38,18 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Of the entry with this index in the directory, in this block of the card.
+    /// By index, in this block of the card.
     pub(crate) const fn of(block: u32, index: u32) -> Self {
         Self { block, offset: (index % BLOCK_ENTRIES) as u16 * ENTRY_BYTES as u16 }
     }
 }
 
-/// One log segment in the card's root directory.
+/// In the card's root directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogEntry {
     /// Its name.
     pub name: LogName,
-    /// The file's length in bytes: the allocated size, not the written one.
+    /// Allocated, not written.
     pub bytes: u32,
     /// It was erased over a link ([`Card::hide_logs`]): no longer offered, and kept until its room is needed.
     pub hidden: bool,
@@ -66,14 +65,14 @@ pub struct LogEntry {
 pub struct Segment {
     /// Its name.
     pub name: LogName,
-    /// The file's length in bytes.
+    /// In bytes.
     pub bytes: u32,
     chain: ClusterChain,
     place: Place,
 }
 
 impl Segment {
-    /// The segment of a directory entry.
+    /// Of a directory entry.
     pub const fn of(entry: &LogEntry) -> Self {
         Self {
             name: entry.name,
@@ -89,7 +88,7 @@ impl Segment {
     }
 }
 
-/// A card whose first partition is FAT32, with at most one segment open.
+/// FAT32 in the first partition, at most one segment open.
 pub struct Card<'a, D> {
     volume: Volume<'a, D>,
     directory: Directory,
@@ -100,7 +99,7 @@ pub struct Card<'a, D> {
 }
 
 impl<'a, D: CardDevice> Card<'a, D> {
-    /// Checks and opens a card. On failure the device comes back with the reason.
+    /// On failure the device comes back with the reason.
     pub fn mount(
         device: D,
         status: &'a CardStatus,
@@ -121,20 +120,18 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// Walks over the directory. Without a free cluster in the information sector, the clusters behind all logs are
-    /// searched first.
+    /// Walks over the directory. Without a free cluster in the information sector, the clusters behind all logs come first.
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
         let mut parity = self.buffers.parity.borrow_mut();
         self.directory.learn(&self.volume, parity.lend(), self.free.next())?;
         self.free.begin(&self.volume, self.directory.claimed_end())
     }
 
-    /// Gives the device back.
     pub(crate) fn unmount(self) -> D {
         self.volume.into_device()
     }
 
-    /// The device, for accesses besides files.
+    /// For accesses besides files.
     pub const fn device(&self) -> &D {
         self.volume.device()
     }
@@ -144,7 +141,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         &self.volume.layout
     }
 
-    /// Looks through the next blocks of the directory.
     fn look_on(&mut self, buffer: &mut [Block]) -> Result<(), CardError<D::Error>> {
         let changed = self.directory.look_on(&self.volume, buffer, self.free.next());
         // After an error too: chains may have been repaired before it.
@@ -174,7 +170,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// Calls `each` for every log segment of the root directory, in directory order.
+    /// In directory order.
     pub fn logs(&self, mut each: impl FnMut(LogEntry)) -> Result<(), CardError<D::Error>> {
         self.walk(0, &mut |slot| {
             if let Some(entry) = slot.log().filter(|entry| entry.bytes > 0) {
@@ -185,7 +181,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Shows `each` the directory's entries from this one on; returns the entry after the last one shown.
+    /// From this entry on; returns the entry after the last shown one.
     #[inline(never)]
     fn walk(
         &self,
@@ -217,7 +213,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(found)
     }
 
-    /// The log of this name, unless it is hidden.
+    /// Unless it is hidden.
     pub fn shown_log(&self, name: LogName) -> Result<Option<LogEntry>, CardError<D::Error>> {
         Ok(self.find(name)?.filter(|entry| !entry.hidden))
     }
@@ -231,12 +227,11 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(found)
     }
 
-    /// The number of shown logs, and a number that changes with their names.
+    /// And a number that changes with their names.
     pub const fn shown(&self) -> (u16, u32) {
         (self.directory.shown, self.directory.names)
     }
 
-    /// The newest logs, the newest first.
     pub(crate) const fn newest(&self) -> &Newest {
         &self.directory.newest
     }
@@ -318,7 +313,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// Finds blocks of the FAT with this many free clusters that no log claims.
+    /// Claimed by no log.
     fn find_free(&mut self, wanted: u32) -> Result<Range<u32>, CardError<D::Error>> {
         let found = self.free.find(&self.volume, wanted)?;
         if !self.directory.is_verified(&found) {
@@ -328,7 +323,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(found)
     }
 
-    /// Gives the directory another cluster, of entries that were never used.
+    /// Entries never used.
     fn lengthen_directory(&mut self) -> Result<(), CardError<D::Error>> {
         let last = self.directory.last_cluster();
         let found = self.find_free(1)?;
@@ -346,7 +341,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.link(last, cluster)
     }
 
-    /// Whether a segment's clusters are chained to its end. One with a lost part of the FAT cannot be overwritten.
+    /// One with a lost part of the FAT cannot be overwritten.
     fn is_chained(&self, entry: &LogEntry) -> Result<bool, CardError<D::Error>> {
         let mut segment = Segment::of(entry);
         let last = segment.blocks().saturating_sub(1);
@@ -412,7 +407,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(!is_end)
     }
 
-    /// Dates the open segment in one block write. It stays open.
+    /// In one block write; it stays open.
     pub(crate) fn date_open(&mut self) -> Result<(), CardError<D::Error>> {
         let Segment { name, place, .. } = self.open.ok_or(CardError::NotOpen)?;
         let date = self.status.fat_date();
@@ -438,7 +433,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.write_metadata(&block, place.block)
     }
 
-    /// Whether no file has the entry at this place.
+    /// By any file.
     #[inline(never)]
     fn is_unused(&self, place: Place) -> Result<bool, CardError<D::Error>> {
         let mut block = [[0; BLOCK_BYTES]];
@@ -446,7 +441,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(block[0].get(usize::from(place.offset)..).is_some_and(is_unused))
     }
 
-    /// Finds an existing segment.
+    /// By name.
     pub fn segment(&self, name: LogName) -> Result<Segment, CardError<D::Error>> {
         Ok(Segment::of(&self.find(name)?.ok_or(CardError::NotFound)?))
     }
@@ -460,19 +455,19 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Some((Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes))
     }
 
-    /// Opens an existing segment for writing in place.
+    /// For writing in place.
     pub fn open(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;
         self.open = Some(self.segment(name)?);
         Ok(())
     }
 
-    /// The open segment's name.
+    /// The segment's name.
     pub fn open_name(&self) -> Option<LogName> {
         self.open.as_ref().map(|open| open.name)
     }
 
-    /// Whole blocks of the open segment.
+    /// Whole ones of the open segment.
     pub fn open_blocks(&self) -> u32 {
         self.open.as_ref().map_or(0, Segment::blocks)
     }
@@ -489,7 +484,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(blocks.len())
     }
 
-    /// Reads one block of a segment.
+    /// Of a segment.
     pub fn read(
         &self,
         segment: &mut Segment,
@@ -523,7 +518,7 @@ fn is_unused(entry: &[u8]) -> bool {
     matches!(entry.first(), Some(&(NEVER_USED | DELETED)))
 }
 
-/// The dates when the file was made and written: the same.
+/// Both the same.
 fn set_date(entry: &mut Entry, date: [u8; 4]) {
     for at in [MADE, WRITTEN] {
         entry[at..at + 4].copy_from_slice(&date);

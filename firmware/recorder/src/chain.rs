@@ -7,20 +7,17 @@ use crate::CardDevice;
 use crate::card::CardError;
 use crate::volume::{ENTRIES, Volume, entry};
 
-/// A chain of clusters, with the row of it that was used last.
+/// With the row used last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ClusterChain {
     first: u32,
-    /// Clusters of the file before the known row.
     before: u32,
-    /// The row's first cluster.
+    /// First of the row.
     cluster: u32,
-    /// Its length in clusters.
     length: u32,
 }
 
 impl ClusterChain {
-    /// The chain that begins at this cluster.
     pub(crate) const fn new(first: u32) -> Self {
         Self { first, before: 0, cluster: first, length: 1 }
     }
@@ -70,7 +67,7 @@ impl ClusterChain {
         Ok(self.length > before)
     }
 
-    /// Goes on to the next row; `false` if this is the last.
+    /// `false`: this is the last.
     fn next_row<D: CardDevice>(&mut self, volume: &Volume<'_, D>) -> Result<bool, CardError<D::Error>> {
         let next = volume.entry(self.last())?;
         if !volume.is_cluster(next) {
@@ -80,7 +77,7 @@ impl ClusterChain {
         Ok(true)
     }
 
-    /// The row's last cluster; after [`Self::locate`] found the chain's end, the chain's last one.
+    /// After [`Self::locate`] found the end, the chain's last one.
     pub(crate) const fn last(&self) -> u32 {
         self.cluster + self.length - 1
     }

@@ -62,10 +62,8 @@ pub(crate) type Entry = [u8; ENTRY_BYTES];
 /// The file of parameters, as an entry has its name.
 const SETTINGS: &[u8; LogName::SHORT_BYTES] = b"PARAMS  TXT";
 
-/// The newest logs of a card, the newest first.
 pub(crate) type Newest = Vec<LogEntry, NEWEST_MAX>;
 
-/// The known state of the root directory.
 pub(crate) struct Directory {
     root: ClusterChain,
     /// The newest names below the last session number. A folder has the length 0.
@@ -83,10 +81,10 @@ pub(crate) struct Directory {
     /// Clusters that logs have. Each counts at most the clusters of the longest segment, since its entry may be
     /// wrong.
     pub(crate) clusters: u32,
-    /// Logs that are not hidden, and a sum over their names.
+    /// Not hidden, and a sum over their names.
     pub(crate) shown: u16,
     pub(crate) names: u32,
-    /// First cluster and length of the file of parameters.
+    /// Of the file of parameters.
     pub(crate) settings: Option<(u32, u32)>,
     /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
@@ -196,7 +194,7 @@ impl Directory {
         (!self.oldest.is_empty()).then(|| self.oldest.remove(0))
     }
 
-    /// Whether logs besides the known ones may be overwritten.
+    /// Besides the known ones.
     pub(crate) const fn has_more(&self) -> bool {
         self.next > 0 || self.has_more
     }
@@ -250,7 +248,7 @@ impl Directory {
         let _ = self.newest.insert(place, entry);
     }
 
-    /// Adds a shown log; removing it changes the sum of names in the same way.
+    /// Removing it changes the sum of names in the same way.
     fn show(&mut self, name: LogName) {
         self.shown = self.shown.saturating_add(1);
         self.names ^= hash(name);
@@ -264,7 +262,6 @@ impl Directory {
         self.names ^= hash(name);
     }
 
-    /// Adds a new log with its clusters.
     pub(crate) fn add(&mut self, entry: LogEntry, clusters: u32) {
         self.note_newest(entry);
         self.show(entry.name);
@@ -272,7 +269,6 @@ impl Directory {
         self.clusters = self.clusters.saturating_add(clusters);
     }
 
-    /// The log `old` was overwritten by `new`.
     pub(crate) fn replace(&mut self, old: &LogEntry, new: LogEntry) {
         self.newest.retain(|entry| entry.name != old.name);
         if let Some(place) = self.oldest.iter().position(|entry| entry.name == old.name) {
@@ -316,7 +312,7 @@ impl Directory {
         self.claimed_end
     }
 
-    /// The place of a new entry: block and offset; `None`: the directory needs another cluster.
+    /// Block and offset; `None`: the directory needs another cluster.
     pub(crate) fn place_for_new<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -331,23 +327,21 @@ impl Directory {
         self.deleted.pop().is_some()
     }
 
-    /// Takes the place of a new entry.
     pub(crate) fn take_place(&mut self) {
         if self.deleted.pop().is_none() {
             self.end += 1;
         }
     }
 
-    /// The last cluster of a full directory.
+    /// Of a full directory.
     pub(crate) const fn last_cluster(&self) -> u32 {
         self.root.last()
     }
 }
 
-/// Whether a walk goes on.
 type Step<E> = Result<ControlFlow<()>, CardError<E>>;
 
-/// A place in the directory with what is there.
+/// With what is there.
 pub(crate) struct Slot<'b> {
     pub(crate) index: u32,
     pub(crate) place: Place,
@@ -377,12 +371,10 @@ impl Slot<'_> {
         self.bytes.starts_with(short) && self.bytes[ATTRIBUTES] & NO_FILE == 0
     }
 
-    /// The file's length in bytes.
     pub(crate) fn bytes(&self) -> u32 {
         self.bytes.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes))
     }
 
-    /// The file's first cluster.
     pub(crate) fn first(&self) -> u32 {
         let half = |at: usize| u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]]) as u32;
         (half(CLUSTER_HIGH) << 16 | half(CLUSTER_LOW)) & 0x0FFF_FFFF
@@ -422,7 +414,6 @@ pub(crate) fn walk<D: CardDevice>(
     Err(CardError::Damaged)
 }
 
-/// Clusters for this many bytes.
 pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
     bytes.div_ceil(volume.layout.cluster_blocks * BLOCK_BYTES as u32)
 }

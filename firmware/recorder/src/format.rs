@@ -21,7 +21,7 @@ const ENTRIES: u32 = 128;
 pub const BLOCKS_MIN: u32 =
     PARTITION_START + RESERVED_BLOCKS + FAT32_CLUSTERS_MIN.div_ceil(ENTRIES - 1) + FAT32_CLUSTERS_MIN;
 
-/// Why a card was not formatted.
+/// Of formatting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FormatError<E> {
     /// The card did not take a block.
@@ -50,7 +50,7 @@ pub fn format<D: CardDevice>(device: &D, volume_id: u32) -> Result<(), FormatErr
     Ok(())
 }
 
-/// A card that is being formatted, one command at a step: the FAT of a large card is tens of megabytes.
+/// One command at a step: a large card's FAT is tens of megabytes.
 ///
 /// The partition table is cleared first and written last, so that a cut in between leaves an unformatted card, and
 /// not a damaged volume.
@@ -60,7 +60,6 @@ pub struct Formatting {
     plan: Option<Plan>,
 }
 
-/// The places of all structures.
 #[derive(Clone, Copy, Debug)]
 struct Plan {
     volume_id: u32,
@@ -70,11 +69,10 @@ struct Plan {
     /// The next block to be cleared, of those before `end`.
     next: u32,
     end: u32,
-    /// Number of written [`STRUCTURES`].
     structures: usize,
 }
 
-/// The first block of the FAT.
+/// Of the FAT.
 const FAT_START: u32 = PARTITION_START + RESERVED_BLOCKS;
 type Make = fn(&Plan) -> Block;
 /// The blocks that are written after the FAT and the root directory are cleared, in this order.
@@ -100,12 +98,12 @@ impl Plan {
 }
 
 impl Formatting {
-    /// A card before the first step.
+    /// Before any step.
     pub const fn new(volume_id: u32) -> Self {
         Self { volume_id, plan: None }
     }
 
-    /// Does one step; whether it was the last one.
+    /// Whether it was the last one.
     pub fn step<D: CardDevice>(&mut self, device: &D) -> Result<bool, FormatError<D::Error>> {
         let Some(plan) = &mut self.plan else {
             let card_blocks = device.num_blocks().map_err(FormatError::Device)?;
@@ -132,7 +130,6 @@ impl Formatting {
 }
 
 /// Clears blocks, [`CLEAR_BLOCKS`] at most.
-// Not inlined, to keep the caller's stack frame small.
 #[inline(never)]
 fn clear<D: CardDevice>(device: &D, at: u32, count: u32) -> Result<(), FormatError<D::Error>> {
     let zeros = [[0; BLOCK_BYTES]; CLEAR_BLOCKS as usize];

@@ -20,17 +20,16 @@ const FREE_COUNT: usize = 488;
 /// Signatures of the information sector (Microsoft's FAT specification 1.03, `FSInfo`), and their offsets.
 const SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (508, 0xAA55_0000)];
 
-/// The search for free clusters, which goes on from segment to segment, and the count of all of them.
+/// Goes on from segment to segment; counts all of them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FreeSearch {
-    /// The FAT block to look at next.
     next: u32,
     /// FAT blocks searched since enough clusters were found, and free clusters in the last of them.
     searched: u32,
     found: u32,
-    /// The first FAT block of these.
+    /// The first of these.
     first: u32,
-    /// Clusters of a search that goes on; 0: none.
+    /// Of a search that goes on; 0: none.
     wanted: u32,
     /// This many clusters are not free. Only another computer frees clusters.
     too_many: u32,
@@ -40,7 +39,7 @@ pub(crate) struct FreeSearch {
 }
 
 impl FreeSearch {
-    /// A search that begins at the cluster that the information sector names.
+    /// From the information sector's cluster on.
     pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Self {
         let mut block = [[0; BLOCK_BYTES]];
         // An unreadable sector counts as an unsigned one.
@@ -66,7 +65,6 @@ impl FreeSearch {
         Ok(())
     }
 
-    /// The FAT block at which the search goes on.
     pub(crate) const fn next(&self) -> u32 {
         self.next
     }
@@ -183,7 +181,7 @@ pub(crate) fn chain_free<D: CardDevice>(
     Ok((next, last))
 }
 
-/// Frees the clusters of a chain, from its first one on.
+/// From its first one on.
 pub(crate) fn free_chain<D: CardDevice>(
     volume: &Volume<'_, D>,
     first: u32,
@@ -204,7 +202,7 @@ pub(crate) fn free_chain<D: CardDevice>(
 }
 
 /// Chains the free clusters of one block of the FAT, at most `most`, to `next`; returns the last and the first one.
-// Not inlined: two functions with a block each must not share a stack frame.
+// Two blocks must not share a stack frame.
 #[inline(never)]
 fn chain_in_block<D: CardDevice>(
     volume: &Volume<'_, D>,
@@ -230,7 +228,6 @@ fn chain_in_block<D: CardDevice>(
     Ok((last, first))
 }
 
-/// Free clusters in one block of the FAT.
 #[inline(never)]
 fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u32, CardError<D::Error>> {
     let [block] = volume.read_fat(index)?;

@@ -17,14 +17,14 @@ const FAT32_TYPES: [u8; 2] = [0x0B, 0x0C];
 /// MBR partition type of exFAT, and of NTFS.
 pub(crate) const EXFAT_TYPE: u8 = 0x07;
 
-/// A FAT32 volume in the first partition of a card. Block numbers are absolute.
+/// In the first partition of a card; block numbers are absolute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// The volume's first block.
+    /// Of the volume.
     pub start: u32,
     /// The information sector (free cluster hint).
     pub info: u32,
-    /// The first FAT's first block.
+    /// Of the first FAT.
     pub fat_start: u32,
     /// Blocks of one FAT with entries of clusters.
     pub fat_blocks: u32,
@@ -36,15 +36,15 @@ pub struct Layout {
     pub data_start: u32,
     /// Blocks of a cluster: a power of two, 1 to 128.
     pub cluster_blocks: u32,
-    /// The number of clusters; they are numbered from 2.
+    /// Numbered from 2.
     pub clusters: u32,
-    /// The root directory's first cluster.
+    /// First one of the root directory.
     pub root: u32,
-    /// The number that formatting gave the volume.
+    /// By formatting.
     pub volume_id: u32,
 }
 
-/// Reasons why a card cannot be used. It is reported, and never formatted unasked.
+/// Reported, never formatted unasked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayoutError<E> {
     /// The card did not answer.
@@ -76,7 +76,7 @@ impl<E> fmt::Display for LayoutError<E> {
 }
 
 impl Layout {
-    /// Reads and checks a card's first partition.
+    /// Of the first partition.
     pub fn read<D: CardDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
         let card_blocks = device.num_blocks().map_err(LayoutError::Device)?;
         let mut block = [[0; BLOCK_BYTES]];
@@ -144,23 +144,22 @@ impl Layout {
         })
     }
 
-    /// Whether a block belongs to a cluster.
+    /// In a cluster.
     pub const fn is_data(&self, block: u32) -> bool {
         block >= self.data_start && block - self.data_start < self.clusters * self.cluster_blocks
     }
 
-    /// Bytes that files and directories can hold.
+    /// For files and directories.
     pub const fn data_bytes(&self) -> u64 {
         self.clusters as u64 * self.cluster_blocks as u64 * BLOCK_BYTES as u64
     }
 
-    /// The end of the card's blocks that this volume uses.
+    /// Of the used blocks.
     pub const fn end(&self) -> u32 {
         self.data_start + self.clusters * self.cluster_blocks
     }
 }
 
-/// The first partition's first block and length.
 fn partition<E>(mbr: &Block) -> Result<(u32, u32), LayoutError<E>> {
     let entry = &mbr[446..462];
     let word = |at: usize| u32::from_le_bytes([entry[at], entry[at + 1], entry[at + 2], entry[at + 3]]);

@@ -40,7 +40,7 @@ pub use status::{CardState, CardStatus};
 
 use hums_core::clock::Instant;
 
-/// The consequence of a card error for recording.
+/// For recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// No card answers, or another one does.
@@ -61,16 +61,16 @@ pub type Block = [u8; BLOCK_BYTES];
 
 /// A card: a device of blocks that can start over, as after it was pulled and put back.
 pub trait CardDevice {
-    /// Why an access failed.
+    /// Of an access.
     type Error: core::fmt::Debug;
 
-    /// Reads blocks that lie in a row, from this one on.
+    /// In a row, from this one on.
     fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), Self::Error>;
 
-    /// Writes blocks that lie in a row, from this one on.
+    /// In a row, from this one on.
     fn write(&self, blocks: &[Block], start: u32) -> Result<(), Self::Error>;
 
-    /// How many blocks the card has.
+    /// Of the card.
     fn num_blocks(&self) -> Result<u32, Self::Error>;
 
     /// Drops the card's identity: the next access identifies any card.
@@ -82,12 +82,12 @@ pub trait CardDevice {
     /// A service begins: all waits until the next call together have a limit.
     fn begin_service(&self) {}
 
-    /// The clock for timing the card's commands.
+    /// For timing commands.
     fn now(&self) -> Instant {
         Instant::ZERO
     }
 
-    /// Accesses that the device itself repeated since the last call.
+    /// Repeated since the last call.
     fn take_retries(&self) -> u32 {
         0
     }
@@ -97,7 +97,7 @@ pub trait CardDevice {
         false
     }
 
-    /// The consequence of an error.
+    /// Of an error.
     fn trouble(_error: &Self::Error) -> Trouble {
         Trouble::Refusing
     }

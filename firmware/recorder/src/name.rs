@@ -3,10 +3,9 @@
 
 use core::fmt;
 
-/// The extension of log files.
 pub(crate) const EXTENSION: &str = "HUM";
 
-/// The name of one segment of a log.
+/// Of a log's segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LogName {
     /// The session's number on this card, 1 to [`LogName::SESSION_MAX`]; counts up with each power-on.
@@ -20,7 +19,7 @@ impl LogName {
     pub const SESSION_MAX: u32 = 99_999;
     /// The largest segment number of a session; the session goes on under the next session number.
     pub const SEGMENT_MAX: u32 = 99;
-    /// Bytes of a short name as a directory entry holds it.
+    /// As in a directory entry.
     pub const SHORT_BYTES: usize = 11;
 
     /// The next name within the session; `None` when the numbers are used up.
@@ -41,7 +40,7 @@ impl LogName {
         }
     }
 
-    /// The name as a directory entry holds it, without the dot.
+    /// In a directory entry, without the dot.
     pub fn short(self) -> [u8; Self::SHORT_BYTES] {
         let mut short = *b"00000_00HUM";
         let digits = |value: u32, place: u32| b'0' + (value / 10_u32.pow(place) % 10) as u8;
@@ -53,7 +52,7 @@ impl LogName {
         short
     }
 
-    /// Reads a directory entry's name; `None` for a foreign file.
+    /// `None` for a foreign file.
     pub fn from_short(base: &[u8], extension: &[u8]) -> Option<Self> {
         let (session, segment) = match base {
             [session @ .., b'_', tens, units] if session.len() == 5 => (session, [*tens, *units]),

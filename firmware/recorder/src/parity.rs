@@ -9,13 +9,13 @@ use hums_core::clock::{Instant, Span};
 /// cannot be rebuilt without it.
 const EVERY: Span = Span::from_secs(10);
 
-/// The sums of a stretch, in the blocks in which they are written.
+/// In the blocks in which they are written.
 pub(crate) struct Parity {
     blocks: [Block; PARITY_SECTORS as usize],
     /// Sectors in each column so far, missing ones included.
     rows: [u8; COLUMNS],
     stretch: u32,
-    /// Time of the first sector since the sums were written.
+    /// Since the sums were written.
     since: Option<Instant>,
 }
 
@@ -49,12 +49,11 @@ impl Parity {
         (self.stretch, self.since) = (stretch, None);
     }
 
-    /// The number of the stretch in the file.
     pub(crate) const fn stretch(&self) -> u32 {
         self.stretch
     }
 
-    /// Adds a sector that was written at this block of the file.
+    /// Written at this block of the file.
     pub(crate) fn add(&mut self, now: Instant, at: u32, sector: &[u8; SECTOR_BYTES]) {
         let index = (at % STRETCH_SECTORS) as usize;
         let (row, column) = ((index / COLUMNS) as u8, index % COLUMNS);
@@ -70,7 +69,6 @@ impl Parity {
         self.since.get_or_insert(now);
     }
 
-    /// The block of the file behind the last written sector.
     pub(crate) fn end(&self) -> u32 {
         let of = |(column, rows): (u32, u8)| {
             rows.checked_sub(1).map(|row| u32::from(row) * COLUMNS as u32 + column + 1)
@@ -79,12 +77,11 @@ impl Parity {
         self.stretch.wrapping_mul(STRETCH_SECTORS).wrapping_add(in_stretch)
     }
 
-    /// Whether there is anything to write.
     pub(crate) const fn is_due(&self) -> bool {
         self.since.is_some()
     }
 
-    /// Whether it has waited for long enough without a full stretch.
+    /// Without a full stretch.
     pub(crate) fn is_overdue(&self, now: Instant) -> bool {
         self.since.is_some_and(|since| now.since(since) >= EVERY)
     }

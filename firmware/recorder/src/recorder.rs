@@ -39,7 +39,7 @@ const RETRY: Span = Span::from_secs(1);
 /// needs a new segment once in 100,000 sectors. The device bounds the time of all tries together.
 const WRITE_TRIES: u32 = 8;
 
-/// Reasons for a delay.
+/// Why to wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotYet {
     /// The search for room goes on: call again at once.
@@ -48,14 +48,14 @@ pub enum NotYet {
     Later,
 }
 
-/// The segment in work.
+/// In work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InWork {
     /// Its name.
     pub name: LogName,
-    /// The session number in the seal of its sectors.
+    /// In its sectors.
     pub session: u32,
-    /// The number of its first sector; 0 if it has none.
+    /// 0 without sectors.
     pub first: u32,
     /// Blocks of finished sectors, from the first one on. Copies of the sector in progress, behind them, are still
     /// overwritten.
@@ -110,7 +110,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// Looks for a card if there is none, at most once a second, and opens a session on it.
+    /// At most once a second; opens a session on it.
     fn ready(&mut self, now: Instant) -> Result<(), NotYet> {
         self.begin_service();
         if !self.socket.is_mounted() {
@@ -202,7 +202,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// Ends the session: nothing more is written, and the card can be pulled.
+    /// The card can be pulled.
     pub fn finish(&mut self) {
         self.finished = true;
         self.write_parity();
@@ -212,29 +212,28 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.release();
     }
 
-    /// The segment in work.
     fn open_segment(&self) -> Option<Log> {
         self.segments.log.filter(|_| self.socket.is_mounted() && self.segments.is_open)
     }
 
-    /// The name of the segment in work.
+    /// In work.
     pub fn log_name(&self) -> Option<LogName> {
         self.open_segment().map(|log| log.name)
     }
 
-    /// The finished part of the segment in work. Data behind it is old.
+    /// Finished part; data behind it is old.
     pub fn in_work(&self) -> Option<InWork> {
         let log = self.open_segment()?;
         let blocks = log.base.map_or(0, |_| self.buffers.parity.borrow().end());
         Some(InWork { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }
 
-    /// The card, for serving stored logs; `None` while there is none.
+    /// For stored logs; `None` without one.
     pub const fn card(&mut self) -> Option<&mut Card<'a, D>> {
         self.socket.card()
     }
 
-    /// Gives the device back, with its card.
+    /// With its card.
     pub fn into_device(self) -> Option<D> {
         self.socket.into_device()
     }
@@ -264,7 +263,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.begin_service();
     }
 
-    /// Writes the first waiting sector, and those behind it that follow directly; returns their number.
+    /// With those that follow directly; returns their number.
     fn try_write(
         &mut self,
         now: Instant,
@@ -307,7 +306,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(written)
     }
 
-    /// Begins the parity of the next sector's stretch.
     fn begin_stretch(&mut self, stretch: u32) {
         if self.buffers.parity.borrow().stretch() != stretch {
             self.write_parity();
@@ -364,7 +362,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         written.map(|_| ())
     }
 
-    /// Whether this sector begins a new segment.
     fn must_move(&mut self, sector: &Sector) -> Result<bool, CardError<D::Error>> {
         let Some(Log { base: Some(base), .. }) = self.segments.log else { return Ok(false) };
         let blocks = data_blocks(self.mounted()?.open_blocks());
@@ -377,7 +374,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(at > 0 && !fits && sector.starts_group())
     }
 
-    /// Opens a segment on a card just mounted.
+    /// Just mounted.
     fn begin(&mut self) -> Result<(), CardError<D::Error>> {
         let card = self.socket.card().ok_or(CardError::NotOpen)?;
         let begun = self.segments.begin(card);
@@ -386,7 +383,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(())
     }
 
-    /// Leaves the open segment for the next one, a short one after a refused sector.
+    /// A short one after a refused sector.
     fn next_segment(&mut self, is_short: bool) -> Result<(), CardError<D::Error>> {
         self.write_parity();
         let next = self.segments.next(is_short, self.socket.card().ok_or(CardError::NotOpen)?);

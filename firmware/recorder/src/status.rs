@@ -46,7 +46,7 @@ impl CardState {
         matches!(self, Self::Foreign | Self::ExFat | Self::Unpartitioned | Self::Damaged)
     }
 
-    /// The state of a stored number.
+    /// Unknown numbers included.
     pub const fn from_number(number: u8) -> Self {
         match number {
             1 => Self::Recording,
@@ -103,41 +103,40 @@ pub struct CardStatus {
     before_check: AtomicU32,
 }
 
-/// The room on a card.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counted {
-    /// The share for logs, in thousandths.
+    /// For logs, thousandths.
     pub(crate) permille: u32,
     /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,
-    /// Total space, in MiB.
+    /// Reading of [`CardStatus`].
     pub(crate) total_mib: u32,
 }
 
 /// A reading of [`CardStatus`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardReading {
-    /// The state of the card.
+    /// Of the card.
     pub state: CardState,
-    /// The session's number on this card; 0 before there is one.
+    /// On this card; 0 before there is one.
     pub session: u32,
-    /// Segments begun in this session.
+    /// In this session.
     pub segments: u32,
-    /// Segments of earlier sessions that were overwritten because the card is full.
+    /// Of earlier sessions: the card is full.
     pub segments_overwritten: u32,
-    /// Blocks of 512 bytes of log data that the card took.
+    /// 512 bytes each, taken by the card.
     pub blocks_written: u32,
     /// Write commands for them: fewer, because waiting sectors are written together.
     pub writes: u32,
-    /// Writes that failed, retries included.
+    /// Retries included.
     pub write_errors: u32,
-    /// Frames in sectors that could not be written.
+    /// In unwritten sectors.
     pub frames_lost: u32,
-    /// Sectors that could not be written.
+    /// Unwritten.
     pub sectors_lost: u32,
-    /// The longest time that the card took for one command, in milliseconds.
+    /// Longest command, ms.
     pub stall_ms_max: u32,
-    /// The serial number of the volume that was opened last.
+    /// Of the volume opened last.
     pub volume: u32,
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
@@ -153,7 +152,7 @@ impl Default for CardStatus {
 }
 
 impl CardStatus {
-    /// Before the card was looked at.
+    /// Not looked at yet.
     pub const fn new() -> Self {
         Self {
             state: AtomicU8::new(CardState::Unknown as u8),
@@ -186,7 +185,7 @@ impl CardStatus {
         }
     }
 
-    /// All figures; each is valid by itself, but they may be of different moments.
+    /// Each is valid by itself, perhaps of another moment.
     pub fn read(&self) -> CardReading {
         CardReading {
             state: CardState::from_number(self.state.load(Ordering::Relaxed)),
@@ -214,7 +213,7 @@ impl CardStatus {
         self.state.store(state as u8, Ordering::Relaxed);
     }
 
-    /// Sets the serial number of the opened volume.
+    /// Of the opened volume.
     pub fn set_volume(&self, volume: u32) {
         self.volume.store(volume, Ordering::Relaxed);
     }
@@ -239,7 +238,7 @@ impl CardStatus {
         self.frames_lost.fetch_add(frames, Ordering::Relaxed);
     }
 
-    /// Sets the room on the card; `None`: not counted.
+    /// `None`: not counted.
     pub(crate) fn set_room(&self, room: Option<Counted>) {
         let room = room.unwrap_or(Counted { permille: UNCOUNTED, used_mib: 0, total_mib: 0 });
         self.used_mib.store(room.used_mib, Ordering::Relaxed);
@@ -247,7 +246,6 @@ impl CardStatus {
         self.room.store(room.permille, Ordering::Relaxed);
     }
 
-    /// A service of the card begins: a number of commands, one after the other.
     pub(crate) fn begin_service(&self) {
         self.longest_ms.store(0, Ordering::Relaxed);
     }
@@ -282,12 +280,12 @@ impl CardStatus {
         Span::from_millis(u64::from(ms))
     }
 
-    /// Requests a new group, so that the next data is readable without earlier sectors.
+    /// The next data is readable without earlier sectors.
     pub fn want_group(&self) {
         self.group_wanted.store(true, Ordering::Release);
     }
 
-    /// Whether a new group was requested since the last call.
+    /// Since the last call.
     pub fn take_group_wanted(&self) -> bool {
         self.group_wanted.swap(false, Ordering::Acquire)
     }
@@ -297,12 +295,10 @@ impl CardStatus {
         self.format_wanted.store(true, Ordering::Release);
     }
 
-    /// Whether that was requested since the last call.
     pub(crate) fn take_format_wanted(&self) -> bool {
         self.format_wanted.swap(false, Ordering::Acquire)
     }
 
-    /// Sets the previous session on the present card.
     pub(crate) fn set_before(&self, before: &Before) {
         self.before_found.store(before.found as u8, Ordering::Relaxed);
         self.before_number.store(before.number, Ordering::Relaxed);
@@ -326,7 +322,7 @@ impl CardStatus {
         })
     }
 
-    /// Sets the date for directory entries, in seconds since 1970 UTC.
+    /// For directory entries, seconds since 1970 UTC.
     pub fn set_utc_secs(&self, utc_secs: u32) {
         self.fat_time.store(utc_secs, Ordering::Relaxed);
     }
@@ -336,7 +332,6 @@ impl CardStatus {
         fat_date(self.fat_time.load(Ordering::Relaxed))
     }
 
-    /// Whether the date is known.
     pub(crate) fn is_utc_known(&self) -> bool {
         self.fat_time.load(Ordering::Relaxed) != 0
     }

@@ -14,7 +14,6 @@ pub(crate) const ENTRIES: u32 = 128;
 /// The FAT entry of the last cluster of a chain.
 pub(crate) const END_OF_CHAIN: u32 = 0x0FFF_FFFF;
 
-/// A FAT32 volume: the card, and the place of everything on it.
 pub(crate) struct Volume<'a, D> {
     device: D,
     status: &'a CardStatus,
@@ -30,22 +29,19 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         &self.device
     }
 
-    /// Gives the card back.
     pub(crate) fn into_device(self) -> D {
         self.device
     }
 
-    /// Reads blocks that lie in a row.
     pub(crate) fn read(&self, blocks: &mut [Block], at: u32) -> Result<(), CardError<D::Error>> {
         self.command(|device| device.read(blocks, at))
     }
 
-    /// Writes blocks that lie in a row.
     pub(crate) fn write(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
         self.command(|device| device.write(blocks, at))
     }
 
-    /// Writes blocks of the file system, up to [`METADATA_TRIES`] times.
+    /// Up to [`METADATA_TRIES`] times.
     pub(crate) fn write_metadata(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
         let mut written = self.write(blocks, at);
         for _ in 1..METADATA_TRIES {
@@ -70,13 +66,13 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         Ok(block)
     }
 
-    /// Writes one block of the FAT into each of its copies.
+    /// In each copy of the FAT.
     pub(crate) fn write_fat(&self, block: &[Block; 1], index: u32) -> Result<(), CardError<D::Error>> {
         let Layout { fat_start, fat_stride, fat_copies, .. } = self.layout;
         (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_stride + index))
     }
 
-    /// Changes the FAT entry of one cluster.
+    /// Of one cluster.
     #[inline(never)]
     pub(crate) fn link(&self, cluster: u32, next: u32) -> Result<(), CardError<D::Error>> {
         let mut block = self.read_fat(cluster / ENTRIES)?;
@@ -84,18 +80,18 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         self.write_fat(&block, cluster / ENTRIES)
     }
 
-    /// The FAT entry of one cluster.
+    /// Of one cluster.
     #[inline(never)]
     pub(crate) fn entry(&self, cluster: u32) -> Result<u32, CardError<D::Error>> {
         Ok(entry(&self.read_fat(cluster / ENTRIES)?[0], cluster))
     }
 
-    /// Whether a cluster of this number exists.
+    /// Exists on the card.
     pub(crate) const fn is_cluster(&self, cluster: u32) -> bool {
         cluster >= 2 && cluster - 2 < self.layout.clusters
     }
 
-    /// The first block of a cluster.
+    /// Of a cluster.
     pub(crate) const fn block_of(&self, cluster: u32) -> u32 {
         self.layout.data_start + (cluster - 2) * self.layout.cluster_blocks
     }
@@ -107,14 +103,14 @@ impl<'a, D: CardDevice> Volume<'a, D> {
     }
 }
 
-/// The FAT entry of a cluster, from its block of the FAT.
+/// From its block of the FAT.
 pub(crate) fn entry(block: &Block, cluster: u32) -> u32 {
     let at = (cluster % ENTRIES * 4) as usize;
     let entry = block.get(at..at + 4).and_then(|entry| entry.try_into().ok());
     entry.map_or(0, u32::from_le_bytes) & 0x0FFF_FFFF
 }
 
-/// Changes the FAT entry of a cluster in its block of the FAT. The upper four bits are reserved and stay.
+/// In its block of the FAT; the upper four bits are reserved and stay.
 pub(crate) fn set_entry(block: &mut Block, cluster: u32, value: u32) {
     let at = (cluster % ENTRIES * 4) as usize;
     if let Some(entry) = block.get_mut(at..).and_then(|entries| entries.first_chunk_mut()) {

@@ -21,7 +21,7 @@ fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
     logs
 }
 
-/// Makes a segment, with as many calls as the search for room takes.
+/// As many calls as the search takes.
 fn create(card: &mut Card<'_, MemCard>, name: LogName, bytes: u32) -> Result<(), CardError<Broken>> {
     loop {
         match card.create(name, bytes) {
@@ -307,17 +307,15 @@ fn a_card_too_small_for_fat32_is_not_formatted() {
 /// The first block of the FAT after formatting.
 const FAT_START: u32 = 2048 + 32;
 
-/// Changes one block of a card.
 fn change(device: &MemCard, at: u32, change: impl FnOnce(&mut [u8; 512])) {
     change(device.blocks.borrow_mut().entry(at).or_insert([0; 512]));
 }
 
-/// Erases the information sector's hint.
 fn forget_hint(device: &MemCard) {
     change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
 }
 
-/// The search for room begins at this cluster.
+/// From this cluster on.
 fn set_hint(device: &MemCard, cluster: u32) {
     change(device, 2048 + 1, |info| info[492..496].copy_from_slice(&cluster.to_le_bytes()));
 }
@@ -486,7 +484,7 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
     card.read(&mut segment, last, &mut [0; BLOCK_BYTES]).expect("its chain ends with it");
 }
 
-/// A card on which another computer deleted these of 21 logs, all before the last one's clusters.
+/// Of 21 logs, before the last one's clusters.
 fn with_deleted(is_deleted: impl Fn(u32) -> bool) -> MemCard {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();

@@ -27,7 +27,7 @@ impl SectorSink for Sink {
     }
 }
 
-/// Sectors of a generated recording: `count` frames of 100 bytes that do not compress.
+/// `count` frames of 100 bytes that do not compress.
 fn sectors(count: u32) -> Vec<Sector> {
     let (mut sink, mut writer) = (Sink(Vec::new()), Box::new(Writer::new()));
     let mut state = 1_u32;
@@ -44,7 +44,6 @@ fn sectors(count: u32) -> Vec<Sector> {
     sink.0
 }
 
-/// Lets the recorder write a sector.
 fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sector) -> Result<usize, NotYet> {
     let mut waiting = [*sector.bytes()];
     loop {
@@ -55,7 +54,7 @@ fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sect
     }
 }
 
-/// Lets the recorder write the waiting sectors, with few commands.
+/// With few commands.
 fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
     let mut blocks: Vec<Block> = sectors.iter().map(|sector| *sector.bytes()).collect();
     let mut waiting = blocks.as_mut_slice();
@@ -65,7 +64,7 @@ fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
     }
 }
 
-/// The sectors of one session that a card holds: (number, place) in the order of segments and blocks.
+/// (Number, place) in order.
 fn stored(device: &MemCard) -> Vec<(LogName, u32, Header)> {
     let status = CardStatus::new();
     let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
@@ -165,7 +164,6 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
     assert_eq!(status.read().frames_lost, lost);
 }
 
-/// A slot whose card can be exchanged.
 #[derive(Clone)]
 struct Slot(Rc<RefCell<MemCard>>);
 
@@ -296,7 +294,6 @@ fn a_torn_whole_sector_never_takes_the_newest_copy_with_it() {
     }
 }
 
-/// Sectors that waited for a busy card are written with few commands.
 #[test]
 fn sectors_that_wait_together_are_written_together() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -557,7 +554,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     assert!(begun > 8 && fuller_copies > 0, "{begun} writes to begin files, {fuller_copies} fuller copies");
 }
 
-/// Records several files, with occasional copies of the sector in progress; returns the session.
+/// With copies of the sector in progress; returns the session.
 fn record_files(device: &MemCard) -> u32 {
     let status = leaked();
     let mut recorder = Recorder::new(device.clone(), status, held(), 99);
@@ -639,7 +636,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
 }
 
-/// The previous session as a recorder finds it at its next start; the card stays unchanged.
+/// At its next start; the card stays unchanged.
 fn found_at_next_start(device: &MemCard) -> Before {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();

@@ -3,10 +3,10 @@
 /// Longest name of a parameter, as in `PARAM_VALUE`.
 pub const NAME_BYTES_MAX: usize = 16;
 
-/// The longest value that [`param_value`] makes.
+/// Of [`param_value`].
 pub const PARAM_BYTES_MAX: usize = 1 + NAME_BYTES_MAX + 4;
 
-/// Key of an item. Numbers are stored and never change meaning.
+/// Numbers never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key(u32);
 
@@ -19,12 +19,12 @@ impl Key {
     /// Mount count, four bytes.
     pub(crate) const MOUNTS: Self = Self(Self::OWN);
 
-    /// Key of an item by its number, which its owner never changes.
+    /// By number, which its owner never changes.
     pub const fn item(number: u8) -> Self {
         Self(number as u32)
     }
 
-    /// Key of a parameter by its name, so that a reordered table still finds it.
+    /// By name: a reordered table still finds it.
     pub const fn param(name: &str) -> Self {
         // FNV-1a (draft-eastlake-fnv, 32 bits). The value holds the name itself.
         let mut hash: u32 = 0x811C_9DC5;
@@ -36,12 +36,12 @@ impl Key {
         Self(hash | Self::PARAM)
     }
 
-    /// The number of an item; `None` for a parameter.
+    /// `None` for a parameter.
     pub const fn number(self) -> Option<u8> {
         if self.0 <= u8::MAX as u32 { Some(self.0 as u8) } else { None }
     }
 
-    /// Whether it is a parameter's.
+    /// Of a parameter.
     pub const fn is_param(self) -> bool {
         self.0 & Self::PARAM != 0
     }
@@ -51,18 +51,17 @@ impl Key {
         self.0
     }
 
-    /// The key of any stored form.
+    /// Of any stored form.
     pub const fn from_stored(key: u32) -> Self {
         Self(key)
     }
 
-    /// Whether the key is reserved for the store.
     pub(crate) const fn is_own(self) -> bool {
         self.0 & (Self::PARAM | Self::OWN) == Self::OWN
     }
 }
 
-/// A parameter as a stored value: the bytes and their count. `None` if the name is longer than [`NAME_BYTES_MAX`].
+/// Bytes and count; `None` if the name is longer than [`NAME_BYTES_MAX`].
 pub fn param_value(name: &str, value: f32) -> Option<([u8; PARAM_BYTES_MAX], usize)> {
     let mut bytes = [0; PARAM_BYTES_MAX];
     let (length, rest) = bytes.split_first_mut()?;
@@ -72,7 +71,7 @@ pub fn param_value(name: &str, value: f32) -> Option<([u8; PARAM_BYTES_MAX], usi
     Some((bytes, 1 + name.len() + 4))
 }
 
-/// Name and value of a stored parameter; `None` if the bytes are not a parameter.
+/// `None` if the bytes are not a parameter.
 pub fn param(stored: &[u8]) -> Option<(&str, f32)> {
     let (length, rest) = stored.split_first()?;
     let (name, value) = rest.split_at_checked(usize::from(*length))?;

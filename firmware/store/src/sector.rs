@@ -61,33 +61,28 @@ pub(crate) struct Header {
     pub(crate) superseded_by: Option<u16>,
 }
 
-/// Location of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Item {
     pub(crate) at: usize,
     pub(crate) key: Key,
-    /// Length of the value, bytes.
     pub(crate) length: usize,
 }
 
 impl Item {
-    /// Offset of the value.
     pub(crate) const fn value_at(&self) -> usize {
         self.at + 2 * WORD
     }
 
-    /// Bytes of the item in the flash.
+    /// In the flash.
     pub(crate) const fn bytes(&self) -> usize {
         ITEM_BYTES + self.length.next_multiple_of(WORD)
     }
 
-    /// Offset of the next item.
     pub(crate) const fn end(&self) -> usize {
         self.at + self.bytes()
     }
 }
 
-/// Result of an item's checksum test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Check {
     Whole,
@@ -96,7 +91,6 @@ pub(crate) enum Check {
     Damaged,
 }
 
-/// Result of a scan of a sector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Content {
     /// Complete items.
@@ -107,16 +101,15 @@ pub(crate) struct Content {
     pub(crate) end: usize,
 }
 
-/// One of the two sectors of `F`.
 pub(crate) struct Sector<'f, F> {
     flash: &'f mut F,
     start: usize,
-    /// Upper limit of the items.
+    /// Of the items.
     end: usize,
 }
 
 impl<'f, F: NorFlash> Sector<'f, F> {
-    /// The first sector, or the second one, up to this offset.
+    /// First or second sector, up to this offset.
     pub(crate) const fn new(flash: &'f mut F, index: usize, end: usize) -> Self {
         const {
             assert!(F::WRITE_SIZE == WORD && F::READ_SIZE == 1, "the layout is made for words of four bytes");
@@ -146,14 +139,13 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(Header { generation, is_complete, superseded_by: decoded(self.word(SUPERSEDED_AT)?) })
     }
 
-    /// Erases the sector and writes a new header.
+    /// With a new header.
     pub(crate) fn begin(&mut self, generation: u16) -> Result<(), F::Error> {
         self.flash.erase(self.start as u32, (self.start + F::ERASE_SIZE) as u32)?;
         self.write_word(GENERATION_AT, coded(generation))?;
         self.write_word(0, MAGIC)
     }
 
-    /// Marks the sector as complete.
     pub(crate) fn complete(&mut self) -> Result<(), F::Error> {
         self.write_word(COMPLETE_AT, COMPLETE)
     }
@@ -166,7 +158,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(())
     }
 
-    /// Writes an item at this offset. The caller checks that it fits.
+    /// The caller checks that it fits.
     pub(crate) fn append(&mut self, at: usize, key: Key, value: &[u8]) -> Result<(), F::Error> {
         let mut crc = Crc::new();
         for (place, word) in [coded(value.len() as u16), key.stored()].into_iter().enumerate() {
@@ -181,7 +173,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         self.write_word(at + 2 * WORD + value.len().next_multiple_of(WORD), crc.check())
     }
 
-    /// The item at this offset, complete or not.
+    /// Complete or not.
     fn item(&mut self, at: usize) -> Result<Option<Item>, F::Error> {
         if at + ITEM_BYTES > self.end {
             return Ok(None);
@@ -217,7 +209,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(true)
     }
 
-    /// The next complete item from this offset.
+    /// From this offset on.
     pub(crate) fn next(&mut self, mut at: usize) -> Result<Option<Item>, F::Error> {
         while at + ITEM_BYTES <= self.end {
             match self.item(at)? {
@@ -228,7 +220,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(None)
     }
 
-    /// Whether this is the last complete item of its key.
+    /// Of its key.
     pub(crate) fn is_newest(&mut self, item: &Item) -> Result<bool, F::Error> {
         let mut at = item.end();
         while let Some(later) = self.next(at)? {

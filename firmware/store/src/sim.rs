@@ -43,17 +43,17 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         &self.bytes
     }
 
-    /// Words written and sectors erased so far.
+    /// Words and erases so far.
     pub const fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// Sectors erased so far.
+    /// So far.
     pub const fn erases(&self) -> u64 {
         self.erases
     }
 
-    /// Cuts power in the middle of the `steps`-th step from now, counted from 1. `seed` decides the result of that step.
+    /// Cuts in the middle of the `steps`-th step, from 1; `seed` decides its result.
     pub const fn cut_after(&mut self, steps: u64, seed: u64) {
         self.cut_at = Some(self.steps + steps);
         self.random ^= seed.wrapping_mul(0x2545_F491_4F6C_DD1D) | 1;
@@ -64,12 +64,12 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         self.is_dead
     }
 
-    /// Restores power; the contents stay as the cut left them.
+    /// Contents stay as the cut left them.
     pub const fn revive(&mut self) {
         (self.is_dead, self.cut_at) = (false, None);
     }
 
-    /// Counts a step; `true` if power is cut in it.
+    /// `true` if power is cut in it.
     fn step(&mut self) -> bool {
         self.steps += 1;
         self.is_dead = self.cut_at.is_some_and(|at| self.steps >= at);

@@ -10,7 +10,7 @@ pub const VALUE_BYTES_MAX: usize = 512;
 
 type Outcome<T, F> = Result<T, Error<<F as ErrorType>::Error>>;
 
-/// Error of a save or a read.
+/// Of a save or a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error<E> {
     /// An erase is needed and not allowed now. Nothing changed.
@@ -29,7 +29,7 @@ impl<E> From<E> for Error<E> {
     }
 }
 
-/// Result of a save.
+/// Of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
     /// The value was stored already.
@@ -38,7 +38,7 @@ pub enum Saved {
     Written,
 }
 
-/// State of the flash at a start.
+/// At a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// An intact store.
@@ -51,10 +51,10 @@ pub enum Found {
     Unreadable,
 }
 
-/// Store of items in flash `F` of exactly two sectors.
+/// In flash `F` of exactly two sectors.
 pub struct Store<F: NorFlash> {
     flash: F,
-    /// The active sector, its generation and the offset of the next item.
+    /// Its generation, and the next item's offset.
     in_use: usize,
     generation: u16,
     end: usize,
@@ -122,7 +122,6 @@ impl<F: NorFlash> Store<F> {
         Sector::new(&mut self.flash, index, F::ERASE_SIZE)
     }
 
-    /// The written part of the active sector.
     const fn current(&mut self) -> Sector<'_, F> {
         Sector::new(&mut self.flash, self.in_use, self.end)
     }
@@ -153,7 +152,6 @@ impl<F: NorFlash> Store<F> {
         Ok(Some(item.length))
     }
 
-    /// The newest item of this key.
     fn find(&mut self, key: Key) -> Outcome<Option<Item>, F> {
         let (mut found, mut at) = (None, HEADER_BYTES);
         while let Some(item) = self.current().next(at)? {
@@ -165,7 +163,7 @@ impl<F: NorFlash> Store<F> {
         Ok(found)
     }
 
-    /// Stores a value. After an error the old value is still stored.
+    /// After an error the old value is still stored.
     pub fn save(&mut self, key: Key, value: &[u8]) -> Outcome<Saved, F> {
         if value.len() > VALUE_BYTES_MAX {
             return Err(Error::TooLong);
@@ -196,7 +194,7 @@ impl<F: NorFlash> Store<F> {
         F::ERASE_SIZE.saturating_sub(self.end)
     }
 
-    /// Number of mounts since the store was created, this one included.
+    /// Since its creation, this one included.
     pub fn mounts(&mut self) -> Outcome<u32, F> {
         let mut mounts = [0; 4];
         self.get(Key::MOUNTS, &mut mounts)?;
@@ -212,7 +210,6 @@ impl<F: NorFlash> Store<F> {
         self.turn().map(|()| true)
     }
 
-    /// Bytes of all live items.
     fn live_bytes(&mut self) -> Outcome<usize, F> {
         let (mut bytes, mut at) = (0, HEADER_BYTES);
         while let Some(item) = self.current().next(at)? {
@@ -222,7 +219,7 @@ impl<F: NorFlash> Store<F> {
         Ok(bytes)
     }
 
-    /// Copies all live items into the other sector and makes it the active one.
+    /// Makes it the active one.
     fn turn(&mut self) -> Outcome<(), F> {
         let (from, to) = (self.in_use, 1 - self.in_use);
         let generation = self.generation.saturating_add(1);

@@ -210,7 +210,6 @@ fn flash_that_does_not_work_is_told() {
     assert_eq!(Store::mount(&mut flash).map(|_| ()), Err(Error::Flash(NorFlashErrorKind::Other)));
 }
 
-/// Offset of the last occurrence of these bytes.
 fn last_of(bytes: &[u8], wanted: &[u8]) -> usize {
     bytes.windows(wanted.len()).rposition(|window| window == wanted).expect("it is there")
 }

@@ -19,7 +19,6 @@ pub(super) struct Body {
     pub(super) common: Common,
 }
 
-/// Shared state of the elements.
 pub(super) struct Common {
     pub(super) distributions: Distributions,
     pub(super) texts: Texts,
@@ -106,7 +105,7 @@ impl Body {
         Some(end)
     }
 
-    /// Whether all quiet elements are unchanged: one bit for all of them.
+    /// One bit for all of them.
     #[inline(never)]
     fn calm<C: Coder>(&mut self, coder: &mut C, slot: &mut Slot, frame: &mut Frame) -> Option<bool> {
         let same = C::WRITES && self.stays(slot, frame)?;
@@ -115,7 +114,6 @@ impl Body {
         Some(same)
     }
 
-    /// Whether the frame has unchanged quiet elements.
     fn stays(&self, slot: &Slot, frame: &mut Frame) -> Option<bool> {
         let mut rest = self.elements.list.get(elements_in(slot))?;
         while let Some((element, after)) = rest.split_first()
@@ -165,19 +163,17 @@ impl Body {
             end = usize::from(element.end);
             rest = after;
         }
-        // Bytes beyond the layout are not stored.
         (is_kept && (frame.len <= end || slot.length == Length::Trimmed)).then_some(())
     }
 }
 
-/// The last value of an element.
 enum Last<'a> {
     Number(u64),
     Bytes(&'a [u8]),
 }
 
 impl Common {
-    /// The last value of an element, with the elements `after` it; `None` unless it was stored.
+    /// With the elements `after` it; `None` unless it was stored.
     #[inline]
     fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
         Some(match element.what() {
@@ -190,7 +186,7 @@ impl Common {
         })
     }
 
-    /// One element of a frame; `after` are those after it.
+    /// `after`: the elements after it.
     #[inline]
     fn element<C: Coder>(
         &mut self,
@@ -275,7 +271,7 @@ fn word(place: &[u8; 8]) -> u32 {
     u32::from_le_bytes([place[0], place[1], place[2], place[3]])
 }
 
-/// A value of 1, 2, 4 or 8 bytes in its place; the writer has it there already.
+/// The writer has it there already.
 #[inline]
 fn put<C: Coder>(place: &mut [u8; 8], value: u64, size: usize) {
     let bytes = value.to_le_bytes();

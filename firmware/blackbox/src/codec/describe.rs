@@ -12,7 +12,6 @@ use crate::layouts::{FieldLayout, Layout, Place};
 /// Arrays of this many bytes or more are data, not numbers.
 const DATA_BYTES: u8 = 16;
 
-/// Offset and size of a message's instance field.
 pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     let mut offset = 0;
     for index in 0.. {
@@ -25,7 +24,7 @@ pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     None
 }
 
-/// How the elements of a field are coded, how many there are and how many bytes each has.
+/// Coding, number and bytes of a field's elements.
 fn elements_of(field: FieldLayout) -> (What, u8, u8) {
     let whole = |what| (what, 1, field.size() as u8);
     if field.role == Role::Instance && field.size() <= INSTANCE_BYTES {
@@ -73,7 +72,6 @@ impl Body {
         slot
     }
 
-    /// Sets up the elements of a layout.
     fn prepare(&mut self, id: u32, layout: Layout, first: usize) {
         let (mut at, mut end, mut index) = (first, 0, 0);
         while let Some(field) = layout.field(index) {

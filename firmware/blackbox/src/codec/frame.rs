@@ -58,12 +58,10 @@ impl Frame {
         self.v2 && self.incompat & INCOMPAT_SIGNED != 0
     }
 
-    /// Nothing in the payload, as a frame to be read begins.
     pub(crate) fn clear(&mut self) {
         self.clear_payload(0);
     }
 
-    /// Clears bytes of an earlier frame beyond the first `len` of the payload.
     fn clear_payload(&mut self, len: usize) {
         if len < self.used
             && let Some(beyond) = self.payload.get_mut(len..self.used)
@@ -74,7 +72,7 @@ impl Frame {
         self.used = self.payload.len();
     }
 
-    /// Takes a frame apart; `None` where the bytes are not exactly one.
+    /// `None` unless the bytes are exactly one frame.
     pub(crate) fn parse(&mut self, bytes: &[u8]) -> Option<()> {
         let frame = self;
         let rest;
@@ -109,7 +107,6 @@ impl Frame {
         Some(())
     }
 
-    /// Its length when put together.
     pub(crate) fn bytes(&self) -> usize {
         let head = if self.v2 { HEADER_V2_BYTES } else { HEADER_V1_BYTES };
         head + self.len.min(PAYLOAD_BYTES_MAX)
@@ -117,7 +114,7 @@ impl Frame {
             + if self.signed() { SIGNATURE_BYTES } else { 0 }
     }
 
-    /// Puts a frame together that was read, with the checksum that this seed makes, or with its own.
+    /// With this seed's checksum, or with its own.
     pub(crate) fn assemble(&mut self, seed: Option<u8>, out: &mut [u8; ENTRY_BYTES_MAX]) {
         if let Some(seed) = seed {
             self.checksum = crc::step(self.checksum_before_seed(), seed);
@@ -161,7 +158,7 @@ impl Frame {
         crc::update(crc::update(crc::START, head), payload)
     }
 
-    /// Whether the payload ends as a MAVLink 2 sender ends it: not with a zero, unless that is all there is.
+    /// A MAVLink 2 sender's payload does not end with a zero, unless that is all there is.
     #[inline]
     pub(crate) fn is_trimmed(&self) -> bool {
         match self.len {

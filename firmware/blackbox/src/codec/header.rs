@@ -1,4 +1,4 @@
-//! A frame's header, length and checksum: as expected in nearly every frame. And its signature.
+//! A frame's header, length, checksum and signature: as expected in nearly every frame.
 
 use hums_dialect::crc;
 use hums_dialect::wire::SIGNATURE_BYTES;
@@ -9,7 +9,6 @@ use super::slots::{Length, Sender, Slot};
 use crate::coder::Coder;
 use crate::distribution::Cdf;
 
-/// How a frame's header was coded.
 const AS_EXPECTED: usize = 0;
 /// The frame before again.
 pub(super) const REPEATED: usize = 1;
@@ -30,7 +29,6 @@ pub(super) struct Headers {
     signatures: Cdf,
 }
 
-/// Decoded header of a frame.
 pub(super) struct Plan {
     pub(super) header: usize,
     pub(super) length: Option<usize>,
@@ -56,19 +54,18 @@ impl Headers {
         self.signatures = Cdf::FLAT;
     }
 
-    /// Whether the header of the last frame was not as expected.
+    /// The last frame's header was unexpected.
     #[inline]
     pub(super) const fn is_rough(&self) -> bool {
         self.last != AS_EXPECTED as u8
     }
 
-    /// Whether a frame to be written has the expected header, length and checksum.
+    /// Header, length and checksum.
     #[inline]
     pub(super) fn is_expected(slot: &Slot, sender: &Sender, frame: &Frame, verified: bool) -> bool {
         frame.sequence == sender.sequence && is_usual(slot, frame, verified)
     }
 
-    /// Header, flags, length and checksum as expected.
     #[inline]
     pub(super) fn expected<C: Coder>(
         &mut self,
@@ -85,7 +82,7 @@ impl Headers {
         Plan { header: AS_EXPECTED, length: None, checksum: None }
     }
 
-    /// Header, flags, length and checksum, as far as they are unexpected.
+    /// As far as unexpected.
     #[inline(never)]
     pub(super) fn code<C: Coder>(
         &mut self,
@@ -178,7 +175,7 @@ fn take_flags(slot: &Slot, frame: &mut Frame) {
     }
 }
 
-/// Whether a frame is as its slot expects, except for its sequence number.
+/// Except for its sequence number.
 fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
     // The checksum of a verified frame matched our definition. If it no longer matches, memory has changed; the chain reveals
     // this to readers.
@@ -193,7 +190,6 @@ fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
         && (trusted || checks(slot, frame))
 }
 
-/// Whether the checksum matches the slot's seed.
 fn checks(slot: &Slot, frame: &Frame) -> bool {
     crc::step(frame.checksum_before_seed(), slot.seed) == frame.checksum
 }

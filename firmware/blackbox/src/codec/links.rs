@@ -171,7 +171,6 @@ pub(super) fn row_of(id: u32, offset: usize) -> u8 {
     found.map_or(0, |index| index as u8 + 1)
 }
 
-/// The last values of the quantities.
 pub(super) struct Registers([u32; REGISTERS]);
 
 impl Registers {

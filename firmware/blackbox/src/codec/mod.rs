@@ -43,7 +43,6 @@ pub(crate) enum Kind {
     Record,
 }
 
-/// An entry for the writer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Entry<'a> {
     pub(crate) kind: Kind,
@@ -51,7 +50,6 @@ pub(crate) struct Entry<'a> {
     pub(crate) bytes: &'a [u8],
 }
 
-/// An entry read: its bytes are in the buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decoded {
     pub(crate) kind: Kind,
@@ -65,7 +63,7 @@ pub(crate) struct Corrupt;
 
 pub(crate) type Out = Scratch<CODED_BYTES_MAX>;
 
-/// The common knowledge of writer and reader about the group so far.
+/// Common to writer and reader, about the group so far.
 pub(crate) struct Model {
     layouts: Layouts,
     last_ms: u64,
@@ -80,7 +78,7 @@ pub(crate) struct Model {
 const TIME: Cdf = Cdf::from_sizes([40, 10, 6, 4, 4, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 1]);
 
 impl Model {
-    /// All zeros, so that the board needs no image of it in flash: good from the first [`Self::reset`] on.
+    /// The board needs no image of it in flash: good from the first [`Self::reset`] on.
     pub(crate) const fn new() -> Self {
         Self {
             layouts: Layouts::Current,
@@ -93,7 +91,7 @@ impl Model {
         }
     }
 
-    /// Starts afresh, at a group's start.
+    /// At a group's start.
     pub(crate) fn reset(&mut self, at_ms: u64, layouts: Layouts) {
         self.layouts = layouts;
         self.last_ms = at_ms;
@@ -104,7 +102,7 @@ impl Model {
         self.times = TIME;
     }
 
-    /// Writes an entry. `plain`: uncoded, because the model makes it too long.
+    /// `plain`: uncoded, because the model makes it too long.
     pub(crate) fn encode(
         &mut self,
         entry: &Entry<'_>,
@@ -158,7 +156,6 @@ impl Model {
         Ok((Decoded { kind: Kind::Frame { verified }, at_ms, len: frame.bytes() }, Some(index)))
     }
 
-    /// Whether the header of a frame to be written is as its slot lets expect.
     #[inline]
     fn is_expected(&self, next: Next, frame: &Frame, verified: bool) -> bool {
         let Next::Slot(slot) = next else { return false };
@@ -245,7 +242,7 @@ impl Model {
         Some(self.last_ms)
     }
 
-    /// A frame of a slot. Gives whether it is verified, and its time.
+    /// Returns whether it is verified, and its time.
     fn frame<C: End>(
         &mut self,
         coder: &mut C,

@@ -7,7 +7,6 @@ use crate::coder::{Coder, Reading, Writing};
 /// No payload, and so no limit.
 const NONE: u16 = u16::MAX;
 
-/// The last payloads of all slots.
 pub(crate) struct Recall {
     /// The slot of the frame that is read.
     slot: usize,
@@ -26,7 +25,6 @@ impl Recall {
         self.limits = [NONE; SLOTS];
     }
 
-    /// Begins a frame of this slot.
     pub(super) fn turn_to(&mut self, slot: usize) {
         self.slot = slot;
     }

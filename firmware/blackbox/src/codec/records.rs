@@ -14,14 +14,13 @@ const KINDS: usize = 16;
 /// Stored numbers of a record: its shape, its length, and the first words. Statistics have 24.
 const KEPT: usize = 26;
 
-/// Distributions of the words' classes: each word's of each kind, as far as they go round.
+/// Each word's of each kind, as far as they go round.
 const CONTEXTS: usize = 16;
 
 /// The beginning of a record: uncoded bytes, its kind, or a kind that is spelled out.
 const RAW: usize = 0;
 const OTHER_KIND: usize = 15;
 
-/// State for the records of a group.
 pub(super) struct Records {
     kinds: Cdf,
     kept: [[u32; KEPT]; KINDS],

@@ -12,10 +12,9 @@ pub(crate) const SLOTS: usize = 112;
 /// Senders (system, component) at most.
 pub(crate) const SENDERS: usize = 16;
 
-/// The longest instance field: a name of 10 characters.
+/// A name of 10 characters.
 pub(crate) const INSTANCE_BYTES: usize = 10;
 
-/// The identity of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Key {
     pub(crate) id: u32,
@@ -37,7 +36,7 @@ pub(crate) enum Length {
 pub(crate) struct Slot {
     pub(crate) key: Key,
     pub(crate) layout: Option<Place>,
-    /// Its first element, and how many there are.
+    /// First element, and their number.
     pub(crate) elements: u16,
     pub(crate) elements_count: u8,
     /// The distribution of the times before its frames; 0: none yet.
@@ -52,7 +51,6 @@ pub(crate) struct Slot {
     pub(crate) length: Length,
     /// Payload bytes that the layout describes.
     pub(crate) described: u8,
-    /// How the header of its last frame was coded.
     pub(crate) header: u8,
     /// Offset and size of the instance field; 0 where there is none.
     pub(crate) instance_at: u8,
@@ -238,7 +236,6 @@ impl Slots {
         Some(used as u8)
     }
 
-    /// How many slots there are.
     pub(crate) fn used(&self) -> usize {
         usize::from(self.used)
     }
@@ -248,7 +245,7 @@ impl Slots {
         usize::from(self.used) < SLOTS
     }
 
-    /// The slot of this frame, if it is one of those guessed: spares most frames the search.
+    /// One of the guessed slots: spares most frames the search.
     #[inline]
     pub(crate) fn find_guessed(&self, frame: &Frame) -> Option<u8> {
         let (first, second, _) = self.guesses;
@@ -258,7 +255,7 @@ impl Slots {
         self.is_of(second, frame).then_some(second)
     }
 
-    /// Whether the frame is one of this slot (or of none that there is).
+    /// Or of no slot.
     #[inline]
     fn is_of(&self, slot: u8, frame: &Frame) -> bool {
         let Some(slot) = self.list.get(usize::from(slot)) else { return false };
@@ -351,7 +348,6 @@ impl Slots {
         (slot < self.used).then_some((Next::Slot(slot), expected))
     }
 
-    /// Remembers that this slot came.
     pub(crate) fn passed(&mut self, slot: u8) {
         let (three, two) = self.places;
         let three = &mut self.order_3[usize::from(three) % ORDER_3];

@@ -7,12 +7,12 @@ use crate::distribution::{Cdf, Cell};
 /// Rows, hashed without check: a distribution of four bits each.
 const ROWS: usize = 64;
 
-/// How many bytes in a row were as in the text before, as far as it matters.
+/// Bytes in a row as in the text before.
 const MATCHES: usize = 8;
 
 pub(crate) struct TextModel {
     rows: [Cdf; ROWS],
-    /// Whether a byte is as in the text before.
+    /// As in the text before.
     same: [Cell; MATCHES],
 }
 

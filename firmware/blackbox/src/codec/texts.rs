@@ -13,7 +13,6 @@ const TEXT_BYTES_MAX: usize = 255;
 /// A text that is not stored.
 const NOT_KEPT: u32 = u32::MAX;
 
-/// The last texts, and how texts change.
 pub(super) struct Texts {
     pub(super) model: TextModel,
     kept: [u8; TEXT_BYTES],
@@ -99,7 +98,6 @@ impl Texts {
     }
 }
 
-/// Location of an element's last text.
 fn range_of(element: &Element) -> Option<core::ops::Range<usize>> {
     let at = usize::try_from(element.aux).ok()?;
     Some(at..at.checked_add(element.size())?)

@@ -6,8 +6,7 @@
 use super::Cdf;
 
 impl Cdf {
-    /// The symbol at a place among parts of this width, with its start and its size. Used by the reader, which does not know the
-    /// symbol before. Moves towards it as `adapt` does.
+    /// The symbol at a place among parts of this width, with start and size; adapts.
     #[inline]
     pub(crate) fn read(&mut self, width: u16, offset: u32) -> (usize, u32, u32) {
         #[cfg(target_arch = "x86_64")]
@@ -24,7 +23,7 @@ impl Cdf {
         }
     }
 
-    /// The same for the mean of this distribution and another one; both adapt.
+    /// For the mean of two distributions; both adapt.
     #[inline]
     pub(crate) fn read_between(&mut self, other: &mut Self, width: u16, offset: u32) -> (usize, u32, u32) {
         #[cfg(target_arch = "x86_64")]
@@ -43,7 +42,7 @@ impl Cdf {
     }
 }
 
-/// The symbol at a place among parts of this width, each beginning at `part_of`.
+/// Each part begins at `part_of`.
 #[cfg(not(target_arch = "x86_64"))]
 fn find(width: u16, offset: u32, part_of: impl Fn(usize) -> (u32, u32)) -> usize {
     let part = (offset / u32::from(width)).min(u32::from(u16::MAX));

@@ -20,7 +20,7 @@ pub enum Found {
 }
 
 impl Found {
-    /// The one of a stored number; later ones are unknown.
+    /// Unknown for later ones.
     pub const fn from_number(number: u8) -> Self {
         match number {
             1 => Self::Nothing,
@@ -31,7 +31,7 @@ impl Found {
         }
     }
 
-    /// The name that reports use.
+    /// For reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unknown => "unknown",
@@ -43,26 +43,26 @@ impl Found {
     }
 }
 
-/// The session that was recorded on this card before this one, as the recorder found it when it opened the card. With it
-/// the end of an earlier log is known, and that something is missing there is seen.
+/// The session recorded before this one, as found when the card was opened. It shows the end of an earlier log, and what is
+/// missing there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Before {
     /// The result of the search.
     pub found: Found,
-    /// Its number on the card, which its files' names begin with.
+    /// Beginning of its files' names.
     pub number: u32,
-    /// The session that its sectors name.
+    /// Named by its sectors.
     pub session: u32,
-    /// The number of its last sector and one: as many sectors as it has, if it is whole from its beginning on.
+    /// Number of its last sector and one.
     pub sectors: u32,
     /// Its frames, modulo 2^32.
     pub frames: u32,
-    /// The check of all its entries, as its last sector has it: known where its frames are.
+    /// Over all its entries; known together with its frames.
     pub check: u32,
 }
 
 impl Before {
-    /// End of the previous session, if found.
+    /// If found.
     pub const fn has_end(&self) -> bool {
         matches!(self.found, Found::Sectors | Found::Frames)
     }
@@ -71,13 +71,13 @@ impl Before {
 /// The monitor started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Boot<'a> {
-    /// The product's version, for instance `0.1.0`.
+    /// `0.1.0`.
     pub version: &'a str,
-    /// The commit it was built from.
+    /// Built from it.
     pub git: &'a str,
     /// The board's name.
     pub board: &'a str,
-    /// The reset cause register, or 0.
+    /// 0 if unknown.
     pub reset: u32,
     /// The name of the cause.
     pub reset_name: &'a str,
@@ -126,7 +126,7 @@ pub struct Fault<'a> {
     pub kind: u8,
     /// The task that ran.
     pub task: &'a str,
-    /// File and line, or the function.
+    /// File and line, or function.
     pub place: &'a str,
     /// r0-r3, r12, lr, pc, xpsr, then CFSR, HFSR, MMFAR, BFAR.
     pub registers: [u32; 12],

@@ -8,28 +8,28 @@ use super::stored::{Fields, Sink};
 /// A check changed its level: `hums_core::health::Finding` with texts of any lifetime.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FindingRecord<'a> {
-    /// When, after the debounce.
+    /// After the debounce.
     pub at: Instant,
-    /// The part of the vehicle.
+    /// Of the vehicle.
     pub subsystem: Subsystem,
-    /// The check's stable name.
+    /// Stable name.
     pub check: &'a str,
-    /// The number of the part, if there are several.
+    /// If there are several.
     pub instance: u8,
     /// The new level.
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// The value that decided, in `unit`.
+    /// Decided, in `unit`.
     pub value: f32,
-    /// The limit that it crossed, in `unit`.
+    /// Crossed, in `unit`.
     pub limit: f32,
     /// The unit of both.
     pub unit: &'a str,
 }
 
 impl FindingRecord<'static> {
-    /// From the monitor's own one, found at about `now`.
+    /// Found at about `now`.
     pub fn new(now: Instant, finding: &Finding) -> Self {
         Self {
             at: Instant::of(finding.at, now),
@@ -52,7 +52,7 @@ impl<'a> FindingRecord<'a> {
         sink.u8(self.level as u8).u8(self.previous as u8).name(self.unit);
     }
 
-    /// `None` where its subsystem or a level is one that this reader does not know.
+    /// `None` for an unknown subsystem or level.
     pub(super) fn read(fields: &mut Fields<'a>) -> Option<Self> {
         Some(Self {
             at: fields.instant(),

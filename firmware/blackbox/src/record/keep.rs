@@ -2,16 +2,16 @@
 
 use super::stored::{Fields, Sink};
 
-/// The range of stored sectors. While a vehicle recorded by arming is disarmed, only the latest part is stored. Every
-/// group of that time has this record, also the group in which it ends. A reader that misses sectors from `from` up
-/// to this record knows that they are missing on purpose.
+/// The range of stored sectors: of a disarmed vehicle recorded by arming only the latest part. Every group of that
+/// time has this record, also the group in which it ends. A reader knows that sectors missing from `from` up to this
+/// record are missing on purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Keep {
     /// From here on everything is stored; otherwise only the latest part, until a record with `all`.
     pub all: bool,
-    /// The first sector number of the part that is, or was until now, stored only briefly.
+    /// Start of the part that is, or was, stored only briefly.
     pub from: u32,
-    /// Minimum length of the stored part, in seconds.
+    /// Of the stored part.
     pub seconds: u32,
 }
 

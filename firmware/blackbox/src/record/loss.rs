@@ -4,7 +4,7 @@ use hums_core::clock::Instant;
 
 use super::stored::{Fields, Sink};
 
-/// The kind of a loss. The numbers are stored.
+/// The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Lost {
@@ -30,7 +30,7 @@ pub enum Lost {
 }
 
 impl Lost {
-    /// The name that reports use.
+    /// For reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::UartOverrun => "uart_overrun",
@@ -65,7 +65,7 @@ impl Lost {
 pub struct Loss {
     /// Kind and cause.
     pub what: Lost,
-    /// How many bytes, frames, sectors or records.
+    /// Bytes, frames, sectors or records.
     pub count: u64,
     /// The first one.
     pub from: Instant,
@@ -91,7 +91,7 @@ impl Loss {
 /// The numbers that the first version had: always stored. Later ones are stored if they are not zero.
 const STATS_MIN: usize = 12;
 
-/// The struct with its numbers in stored order, each named once. A further number goes to the end.
+/// A struct with its numbers in stored order; a further one goes to the end.
 macro_rules! statistics {
     ($($(#[$doc:meta])+ $name:ident,)+) => {
         /// The recorder's statistics since power-on.
@@ -112,7 +112,7 @@ macro_rules! statistics {
             }
 
             pub(super) fn read(fields: &mut Fields<'_>) -> Self {
-                // Fields are read in the order in which they are written here.
+                // Fields are read in the order of writing.
                 Self { $($name: fields.u64(),)+ }
             }
         }
@@ -154,7 +154,7 @@ statistics! {
     gs_queue_bytes_capacity,
     /// Processor load of the last second, thousandths; 0 if not measured.
     cpu_permille,
-    /// The same in the worst second.
+    /// In the worst second.
     cpu_permille_max,
     /// The deepest the stack was, bytes.
     stack_bytes_max,

@@ -1,4 +1,4 @@
-//! End marks: moments up to which a log is known to be whole, written when no data is expected for a while.
+//! End marks, written when no data is expected for a while.
 
 use super::stored::{Fields, Sink};
 
@@ -9,12 +9,11 @@ pub enum Resting {
     Disarmed = 1,
     /// The vehicle landed.
     Landed = 2,
-    /// A mishap began, or ended with the vehicle down.
     Mishap = 3,
 }
 
 impl Resting {
-    /// The name that reports use.
+    /// For reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Disarmed => "disarmed",
@@ -23,7 +22,7 @@ impl Resting {
         }
     }
 
-    /// The event, in a sentence.
+    /// A sentence.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Disarmed => "disarming",
@@ -33,17 +32,17 @@ impl Resting {
     }
 }
 
-/// An end mark. Its sector is written to the card immediately. A log without a gap up to a mark is complete up to
-/// that mark. The end of the log after its last mark is unproven.
+/// Its sector is written to the card immediately. Without a gap, a log is complete up to it; the end behind the last
+/// mark is unproven.
 ///
-/// The sector that completes it has the check of all entries of the session up to it.
+/// The sector that completes it has the check of all entries up to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark {
     /// Why it was written.
     pub why: Resting,
-    /// The number of the sector that was in progress: the mark begins in it or in the one after it.
+    /// In progress: the mark begins in it or in the next one.
     pub sector: u32,
-    /// Frames of the session before the mark, modulo 2^32.
+    /// Of the session, modulo 2^32.
     pub frames: u32,
 }
 
@@ -52,7 +51,7 @@ impl Mark {
         sink.head(18).u32(self.sector).u32(self.frames).u8(self.why as u8);
     }
 
-    /// `None` for a reason that this reader does not know.
+    /// `None` for an unknown reason.
     pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
         let why = match fields.u8() {
             1 => Resting::Disarmed,

@@ -37,7 +37,7 @@ const _: () = assert!(HEAD_BYTES + 7 * 4 + 4 * (1 + NAME_BYTES_MAX) + 13 <= RECO
 const _: () =
     assert!(HEAD_BYTES + 12 * 4 + 1 + 2 * (1 + NAME_BYTES_MAX) + 1 + TEXT_BYTES_MAX <= RECORD_BYTES_MAX);
 
-/// One record of the monitor itself. The numbers of the kinds are stored and never change meaning.
+/// One record; numbers of kinds never change meaning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Record<'a> {
@@ -77,7 +77,7 @@ pub enum Record<'a> {
     Protection(Protection),
     /// Kind 18: the log is whole up to here.
     Mark(Mark),
-    /// A kind that this reader does not know.
+    /// Unknown to this reader.
     Unknown {
         /// The stored kind.
         kind: u8,
@@ -101,7 +101,7 @@ impl fmt::Display for TooLong {
 impl core::error::Error for TooLong {}
 
 impl<'a> Record<'a> {
-    /// Writes the stored form; returns its length.
+    /// Returns its length.
     pub fn store(&self, out: &mut [u8; RECORD_BYTES_MAX]) -> Result<usize, TooLong> {
         let mut sink = Sink::new(out);
         match self {
@@ -130,7 +130,7 @@ impl<'a> Record<'a> {
         sink.len().ok_or(TooLong)
     }
 
-    /// Reads the stored form. Missing bytes read as zeros and empty texts; an unknown record reads as `Unknown`.
+    /// Missing bytes read as zeros and empty texts; an unknown record is `Unknown`.
     pub fn read(stored: &'a [u8]) -> Self {
         let (Shape { kind, version, .. }, mut fields) = Fields::new(stored);
         let fields = &mut fields;

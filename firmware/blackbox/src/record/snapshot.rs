@@ -23,11 +23,11 @@ pub struct Snapshot<'a> {
     pub check: &'a str,
     /// The finding's instance.
     pub instance: u8,
-    /// The part of the vehicle, which decides the columns.
+    /// Decides the columns.
     pub subsystem: Subsystem,
-    /// `false`: before the finding; `true`: after it.
+    /// Before or after the finding.
     pub after: bool,
-    /// The time of the first sample.
+    /// Of the first sample.
     pub first: Instant,
     /// Between two samples.
     pub interval: Span,
@@ -39,7 +39,7 @@ pub struct Snapshot<'a> {
 }
 
 impl<'a> Snapshot<'a> {
-    /// To be written; `values` is room for its values. It was taken at about `now`.
+    /// `values`: room; taken at about `now`.
     pub fn new(now: Instant, of: &hums_core::snapshot::Snapshot<'_>, values: &'a mut SnapshotValues) -> Self {
         let SnapshotValues { bytes, .. } = values;
         let (mut length, mut last) = (0, [0; COLUMNS_MAX]);
@@ -62,7 +62,7 @@ impl<'a> Snapshot<'a> {
         }
     }
 
-    /// Each value with its time and its column's name; `None` for a column that this reader does not know.
+    /// With time and column's name; `None` for an unknown column.
     pub fn iter(&self) -> impl Iterator<Item = (Instant, Option<&'static str>, f32)> + 'a {
         let Self { first, interval, width, subsystem, values, .. } = *self;
         let width = usize::from(width).clamp(1, COLUMNS_MAX);
@@ -86,7 +86,7 @@ impl<'a> Snapshot<'a> {
         sink.bytes(&(self.interval.as_millis() as u16).to_le_bytes()).u8(self.width);
     }
 
-    /// `None` where its subsystem is one that this reader does not know.
+    /// `None` for an unknown subsystem.
     pub(super) fn read(fields: &mut Fields<'a>) -> Option<Self> {
         Some(Self {
             at: fields.instant(),
@@ -113,7 +113,7 @@ impl PartialEq for Snapshot<'_> {
     }
 }
 
-/// Room for the values of a snapshot.
+/// For a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct SnapshotValues {
     bytes: [u8; VALUES_MAX],
@@ -128,7 +128,7 @@ impl Default for SnapshotValues {
 /// A step of the protective action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
-    /// Action requested of the autopilot.
+    /// Requested of the autopilot.
     pub action: Action,
     /// The stage.
     pub stage: Stage,
@@ -149,7 +149,7 @@ impl Protection {
         sink.bytes(&self.command.to_le_bytes());
     }
 
-    /// `None` where its action or stage is one that this reader does not know.
+    /// `None` for an unknown action or stage.
     pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
         Some(Self {
             action: Action::from_number(fields.u8())?,

@@ -25,7 +25,7 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// The shape and the length of the bytes after the numbers; `None` where not all of the numbers are there.
+    /// With the bytes after the numbers; `None` unless all numbers are there.
     pub(crate) fn read(stored: &[u8]) -> Option<(Self, usize)> {
         let [kind, version, words, halves] = *stored.first_chunk()?;
         let shape = Self { kind, version, words, halves };
@@ -37,18 +37,16 @@ impl Shape {
         2 * (self.version >> 4) as usize
     }
 
-    /// Offset of the numbers of 2 bytes.
     pub(crate) const fn halves_at(self) -> usize {
         HEAD_BYTES + 4 * self.words as usize
     }
 
-    /// Offset of the bytes.
     pub(crate) const fn bytes_at(self) -> usize {
         self.halves_at() + 2 * self.halves as usize
     }
 }
 
-/// Reads the numbers and the bytes of a record, each in their order; beyond the end there are zeros and empty texts.
+/// Numbers and bytes, each in order; zeros and empty texts beyond the end.
 pub(crate) struct Fields<'a> {
     words: Bytes<'a>,
     halves: &'a [u8],
@@ -95,12 +93,10 @@ impl<'a> Fields<'a> {
         Instant::from_micros(self.u64())
     }
 
-    /// All words that were not read yet.
     pub(crate) fn words(&mut self) -> &'a [u8] {
         self.words.bytes(usize::MAX)
     }
 
-    /// All numbers of 2 bytes.
     pub(crate) const fn halves(&self) -> &'a [u8] {
         self.halves
     }
@@ -113,7 +109,6 @@ impl<'a> Fields<'a> {
         self.bytes.array()
     }
 
-    /// All bytes that were not read yet.
     pub(crate) fn bytes(&mut self) -> &'a [u8] {
         self.bytes.bytes(usize::MAX)
     }
@@ -123,8 +118,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Writes a record: first the words, times before others, then the halves, then the bytes. Remembers when there was
-/// too much.
+/// Words (times first), halves, then bytes. Remembers an overflow.
 pub(crate) struct Sink<'a> {
     out: &'a mut [u8],
     len: usize,
@@ -135,12 +129,11 @@ impl<'a> Sink<'a> {
         Self { out, len: 0 }
     }
 
-    /// The bytes written, or `None` where they did not fit.
+    /// `None` if they did not fit.
     pub(crate) fn len(&self) -> Option<usize> {
         (self.len <= self.out.len()).then_some(self.len)
     }
 
-    /// A record's kind, in its version 1.
     pub(crate) fn head(&mut self, kind: u8) -> &mut Self {
         self.bytes(&[kind, VERSION, 0, 0])
     }
@@ -210,7 +203,6 @@ impl<'a> Sink<'a> {
         self.u8(end as u8).bytes(&text.as_bytes()[..end])
     }
 
-    /// A count of the head.
     fn counted(&self, place: usize) -> u8 {
         self.out.get(place).copied().unwrap_or_default()
     }
@@ -237,7 +229,7 @@ mod tests {
         let (shape, mut fields) = Fields::new(&stored[..len]);
         assert_eq!((shape.kind, shape.version, shape.times()), (7, 0x11, 2));
         assert_eq!(Shape::read(&stored[..len]), Some((shape, 5)));
-        // In another order than they were written in.
+        // Read in another order than written.
         assert_eq!((fields.u8(), fields.text(), fields.text()), (1, "abc", ""));
         assert_eq!((fields.instant(), fields.u32(), fields.f64(), fields.u32()), (at, 9, -1.5, 0));
         assert_eq!(fields.halves(), [3, 0, 4, 0]);

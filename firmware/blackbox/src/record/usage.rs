@@ -3,7 +3,7 @@
 use super::stored::{Fields, HEAD_BYTES, Sink};
 use crate::limits::RECORD_BYTES_MAX;
 
-/// When a usage snapshot was taken. The numbers are stored.
+/// The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Moment {
@@ -16,11 +16,11 @@ pub enum Moment {
     End = 2,
 }
 
-/// Entries of a usage record at most: its head, moment and entries fit `RECORD_BYTES_MAX` whatever their numbers are.
+/// Head, moment and entries fit `RECORD_BYTES_MAX` whatever the numbers are.
 pub const USAGE_ENTRIES_MAX: usize = 84;
 const _: () = assert!(HEAD_BYTES + 1 + USAGE_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
 
-/// Entries of a lifetime record at most.
+/// Of a lifetime record.
 pub const LIFETIME_ENTRIES_MAX: usize = 80;
 const _: () = assert!(HEAD_BYTES + 4 * 4 + 2 + LIFETIME_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
 
@@ -31,7 +31,7 @@ const ENTRY_BYTES: usize = 4 + 2;
 /// takes the latest value of each counter.
 #[derive(Clone, Copy, Debug)]
 pub struct Usage<'a> {
-    /// When it was taken.
+    /// See [`Moment`].
     pub moment: Moment,
     entries: Entries<'a>,
 }
@@ -39,15 +39,15 @@ pub struct Usage<'a> {
 /// The airframe's life at one moment, this session included: up to `LIFETIME_ENTRIES_MAX` counters, then another record.
 #[derive(Clone, Copy, Debug)]
 pub struct Lifetime<'a> {
-    /// When it was taken.
+    /// See [`Moment`].
     pub moment: Moment,
-    /// MAVLink system id of the airframe, 0 unknown.
+    /// MAVLink id of the airframe, 0 unknown.
     pub system: u8,
-    /// The autopilot's unique id, 0 unknown.
+    /// Of the autopilot, 0 unknown.
     pub uid: u64,
-    /// Power-ons of the monitor.
+    /// Of the monitor.
     pub boots: u32,
-    /// Power-ons in which the airframe was heard.
+    /// With the airframe.
     pub sessions: u32,
     entries: Entries<'a>,
 }
@@ -117,7 +117,7 @@ impl Moment {
         }
     }
 
-    /// The name that reports use.
+    /// For reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Start => "start",
@@ -128,12 +128,12 @@ impl Moment {
 }
 
 impl<'a> Usage<'a> {
-    /// A snapshot to be written: counter numbers with their values.
+    /// Numbers with values, to be written.
     pub const fn new(moment: Moment, entries: &'a [(u8, f32)]) -> Self {
         Self { moment, entries: Entries::List(entries) }
     }
 
-    /// Counter numbers with their values.
+    /// Numbers with values.
     pub fn iter(&self) -> impl Iterator<Item = (u8, f32)> + 'a {
         self.entries.iter(USAGE_ENTRIES_MAX)
     }
@@ -149,7 +149,7 @@ impl<'a> Usage<'a> {
 }
 
 impl<'a> Lifetime<'a> {
-    /// To be written: counter numbers with their values.
+    /// Numbers with values, to be written.
     pub const fn new(moment: Moment, life: &hums_core::lifetime::Lifetime, entries: &'a [(u8, f32)]) -> Self {
         let hums_core::lifetime::Lifetime { airframe, boots, sessions, .. } = *life;
         Self {
@@ -162,7 +162,7 @@ impl<'a> Lifetime<'a> {
         }
     }
 
-    /// Counter numbers with their values.
+    /// Numbers with values.
     pub fn iter(&self) -> impl Iterator<Item = (u8, f32)> + 'a {
         self.entries.iter(LIFETIME_ENTRIES_MAX)
     }

@@ -46,9 +46,9 @@ pub struct Parameter<'a> {
     pub name: &'a str,
     /// Its value; integers are exact up to 2^53.
     pub value: f64,
-    /// `false`: part of the table as it stood at the start; `true`: it was changed just now.
+    /// `false`: the table at the start; `true`: just now.
     pub changed: bool,
-    /// Who changed it: MAVLink system and component id; 0, 0 for the monitor itself.
+    /// MAVLink system and component id; 0, 0 for the monitor.
     pub by: (u8, u8),
 }
 
@@ -73,7 +73,7 @@ impl<'a> Parameter<'a> {
 pub struct Clock {
     /// The monitor's clock.
     pub boot: Instant,
-    /// UTC at that moment, microseconds since 1970.
+    /// Microseconds since 1970.
     pub utc_micros: u64,
     /// The source of UTC: 0 unknown, 1 `SYSTEM_TIME`, 2 the recording's own times, 3 GNSS.
     pub source: u8,

@@ -9,17 +9,17 @@ use super::stored::{Fields, Sink};
 /// Limits of one check that were crossed: of the session and of the airframe's life.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Exceedance<'a> {
-    /// When it was taken.
+    /// See [`Moment`].
     pub moment: Moment,
-    /// The check's stable name.
+    /// Stable name.
     pub check: &'a str,
-    /// The number of the part, if there are several.
+    /// If there are several.
     pub instance: u8,
-    /// The unit of the peaks.
+    /// Of the peaks.
     pub unit: &'a str,
     /// In this session.
     pub session: Crossings,
-    /// In the airframe's life, this session included.
+    /// This session included.
     pub lifetime: Crossings,
 }
 
@@ -60,7 +60,7 @@ impl<'a> Exceedance<'a> {
     }
 }
 
-/// Why a component is recorded. The numbers are stored.
+/// The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Why {
@@ -76,7 +76,7 @@ pub enum Why {
 }
 
 impl Why {
-    /// The name that reports use.
+    /// For reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Start => "start",
@@ -99,7 +99,7 @@ impl Why {
 /// A part that wears, with its figures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Component<'a> {
-    /// Why it is recorded.
+    /// Reason.
     pub why: Why,
     /// Its place, from 0.
     pub place: u8,
@@ -109,19 +109,19 @@ pub struct Component<'a> {
     pub number: u8,
     /// Green, yellow or red.
     pub status: Status,
-    /// How often the part in this place was replaced.
+    /// In this place.
     pub replaced: u32,
-    /// Operator's name of the component.
+    /// The operator's.
     pub name: &'a str,
     /// Its serial number.
     pub serial: &'a str,
     /// Accumulated use.
     pub figures: Figures,
-    /// The part of its life that is used, percent; NaN where it has no limit.
+    /// Percent; NaN without a limit.
     pub used_percent: f32,
-    /// Who replaced or named it: MAVLink system and component id; 0, 0 for the monitor itself.
+    /// MAVLink system and component id; 0, 0 for the monitor.
     pub by: (u8, u8),
-    /// Serial number of the new part after a replacement.
+    /// After a replacement.
     pub new_serial: &'a str,
 }
 

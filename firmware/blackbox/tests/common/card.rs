@@ -2,7 +2,6 @@
 
 use hums_blackbox::{Sector, SectorSink};
 
-/// The sectors written, sealed.
 #[derive(Default)]
 pub(crate) struct Card(pub(crate) Vec<Sector>);
 

@@ -1,6 +1,6 @@
-//! Frames of recordings, taken apart without the code under test.
+//! Recorded frames, without the code under test.
 
-/// A frame: milliseconds since the first one, its bytes, and whether its checksum matches our definition.
+/// Milliseconds since the first one, bytes, and whether the checksum matches.
 pub(crate) type Frame = (u64, Vec<u8>, bool);
 
 /// CRC-16/MCRF4XX over the bytes and the seed.
@@ -13,7 +13,6 @@ pub(crate) fn checksum(bytes: &[u8], seed: u8) -> u16 {
     })
 }
 
-/// Whether the checksum matches our definition.
 pub(crate) fn checks(frame: &[u8]) -> bool {
     let (id, payload_at) = match *frame {
         [0xfe, _, _, _, _, id, ..] => (u32::from(id), 6),
@@ -26,7 +25,6 @@ pub(crate) fn checks(frame: &[u8]) -> bool {
     hums_dialect::message(id).is_some_and(|message| found == checksum(&frame[1..end], message.crc_extra))
 }
 
-/// The length of the frame that begins here.
 pub(crate) fn frame_len(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [0xfe, len, ..] => Some(usize::from(len) + 8),
@@ -35,7 +33,6 @@ pub(crate) fn frame_len(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// The frames of a ground station's log.
 pub(crate) fn frames_of(tlog: &[u8]) -> Vec<Frame> {
     let (mut frames, mut rest, mut start, mut latest) = (Vec::new(), tlog, None, 0);
     while let Some((time, tail)) = rest.split_first_chunk::<8>() {

@@ -1,14 +1,13 @@
-//! A generated stream that reaches every part of the codec's model. It has every message of the dialect with every
-//! pattern of values, both versions of MAVLink, signed frames, and every kind of odd frame.
+//! A generated stream that reaches every part of the codec's model. Every message with every pattern of values, both
+//! versions, signed frames, every odd kind.
 //!
-//! The stream is part of the golden sums: it never changes either.
+//! Part of the golden sums: it never changes.
 
 use hums_dialect::{Kind, Message, Role};
 
 use crate::common::Random;
 use crate::frames::{checks, checksum};
 
-/// An entry: milliseconds, and a frame with its verification, or a stored record.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Entry {
     Frame(u64, Vec<u8>, bool),
@@ -46,7 +45,6 @@ const HABITS: [Habit; 12] = [
     Habit::Shared,
 ];
 
-/// One element of a field.
 struct Element {
     kind: Kind,
     role: Role,
@@ -56,7 +54,6 @@ struct Element {
     text: Vec<u8>,
 }
 
-/// State shared by all sources.
 struct World {
     at_ms: u64,
     clock_us: u64,
@@ -131,7 +128,6 @@ impl Element {
     }
 }
 
-/// Who sends one message, and how.
 struct Source {
     message: &'static Message,
     v1: bool,
@@ -173,7 +169,7 @@ impl Source {
 /// Ways in which a frame is odd.
 const ODDITIES: usize = 13;
 
-/// One frame; `odd` below `ODDITIES` selects the oddity.
+/// `odd` below `ODDITIES` selects the oddity.
 fn frame(
     source: &mut Source,
     sequence: u8,
@@ -218,7 +214,7 @@ fn frame(
     (bytes, verified)
 }
 
-/// A record of some shape with numbers that stay or jump, as its stored bytes.
+/// Numbers stay or jump.
 fn record(index: usize, random: &mut Random) -> Vec<u8> {
     let (words, halves) = (random.below(20), random.below(10));
     let calm = random.below(3) > 0;

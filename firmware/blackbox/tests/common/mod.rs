@@ -1,6 +1,6 @@
 //! Shared parts of the tests.
 
-/// A small generator of numbers (xorshift), so that streams are repeatable.
+/// Xorshift: repeatable.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -12,7 +12,7 @@ impl Random {
         self.0
     }
 
-    /// A number below `limit`; 0 where there is none.
+    /// 0 for no limit.
     pub(crate) fn below(&mut self, limit: usize) -> usize {
         (self.next() >> 16) as usize % limit.max(1)
     }

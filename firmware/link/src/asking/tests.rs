@@ -1,11 +1,10 @@
 use super::*;
 use crate::packet::Fields;
 
-/// An autopilot by script.
 #[derive(Default)]
 struct Script {
     autopilot: Autopilot,
-    /// Messages sent: id and rate in Hz.
+    /// Id and rate in Hz.
     streams: Vec<(u32, u32)>,
     /// Unsupported messages.
     unknown: Vec<u32>,
@@ -23,7 +22,7 @@ struct Script {
     parameters: Vec<&'static str>,
     /// Requested parameters, and the times.
     parameters_asked: Vec<(u64, String)>,
-    /// Received requests: time in ms, command (or stream with the highest bit), first parameter.
+    /// Time in ms, command (or stream with the highest bit), first parameter.
     asked: Vec<(u64, u16, u32)>,
 }
 
@@ -35,7 +34,6 @@ impl Script {
     fn run(&mut self, asking: &mut Asking, from_s: u64, to_s: u64) {
         for now_ms in (from_s * 1_000..to_s * 1_000).step_by(50) {
             for (id, hz) in &self.streams {
-                // So many a second, spread over it.
                 let count = |ms: u64| ms * u64::from(*hz) / 1_000;
                 (count(now_ms)..count(now_ms + 50)).for_each(|_| asking.seen(*id));
             }

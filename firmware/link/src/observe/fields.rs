@@ -5,7 +5,7 @@ use hums_core::units::{Amperes, Fraction, Volts};
 use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{MavlinkVersion, MessageData};
 
-/// Decodes a payload. `enumerations` are the offsets of the enumeration bytes; a number unknown to us is read as zero.
+/// `enumerations`: offsets; an unknown number is read as zero.
 pub(super) fn read<M: MessageData>(payload: &[u8], enumerations: &[usize]) -> Option<M> {
     if let Ok(message) = M::deser(MavlinkVersion::V2, payload) {
         return Some(message);
@@ -18,7 +18,7 @@ pub(super) fn read<M: MessageData>(payload: &[u8], enumerations: &[usize]) -> Op
     M::deser(MavlinkVersion::V2, &bytes).ok()
 }
 
-/// A value that is unknown where it is `unknown`.
+/// `unknown` stands for none.
 pub(super) fn unless<T: PartialEq + Copy>(value: T, unknown: T) -> Option<T> {
     (value != unknown).then_some(value)
 }

@@ -1,8 +1,8 @@
-//! Decoder from frames to observations in SI units. One function per message, with the pitfalls of that message.
+//! Decoder from frames to observations in SI units. One function per message, with its pitfalls.
 //!
-//! The structures come from the `mavlink` crate's generator, one per message, so only the used ones are linked. Their decoders
-//! reject a message with an unknown enumeration number. A newer sender's HEARTBEAT must not be lost for that, so such fields are
-//! set to zero and the rest is read.
+//! One generated structure of the `mavlink` crate per message: only used ones are linked. Their decoders reject a message with
+//! an unknown enumeration number. A newer sender's HEARTBEAT must not be lost for that, so such fields are set to zero and the
+//! rest is read.
 
 mod fields;
 mod motion;

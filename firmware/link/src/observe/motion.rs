@@ -60,7 +60,6 @@ const fn milliseconds(us: u64) -> Option<NonZeroU32> {
 }
 
 pub(super) fn gnss(payload: &[u8]) -> Option<Gnss> {
-    /// Offset of the fix type, the only enumeration.
     const FIX: usize = 28;
     let gps = read::<ap::GPS_RAW_INT_DATA>(payload, &[FIX])?;
     let fix = Fields(payload).u8(FIX);
@@ -170,7 +169,6 @@ pub(super) fn highres_imu(payload: &[u8]) -> Option<(Imu, Air)> {
     Some((sensor, Air { instance: imu.id, pressure, temperature }))
 }
 
-/// The second and the third have the fields of the first.
 pub(super) fn air(id: u32, payload: &[u8]) -> Option<Air> {
     let pressure = read::<ap::SCALED_PRESSURE_DATA>(payload, &[])?;
     let instance = match id {
@@ -187,7 +185,6 @@ pub(super) fn air(id: u32, payload: &[u8]) -> Option<Air> {
 
 /// Eight outputs in the message of old, the others in its extension; 65535 is none.
 pub(super) fn outputs(payload: &[u8]) -> Outputs {
-    /// Offset of the ninth output.
     const EXTENSION: usize = 21;
     let pulse = |output: usize| {
         let at = if output < 8 { 4 + 2 * output } else { EXTENSION + 2 * (output - 8) };

@@ -1,4 +1,4 @@
-//! The traps, one by one. Payloads are built by the typed encoders.
+//! The traps, one by one.
 use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::observation::{
     Autopilot, CellVoltage, EstimatorScale, LandedState, Observation, SystemTime, VehicleKind, VtolState,
@@ -17,7 +17,7 @@ use crate::packet::Packet;
 /// `commander_failsafe_enter_hold` of PX4's event definitions.
 const FAILSAFE_HOLD: u32 = 13_704_694;
 
-/// Message as sent: MAVLink 2, zeros at the end left out.
+/// MAVLink 2, zeros at the end left out.
 fn said<M: MessageData>(message: &M) -> Option<Observation> {
     let mut bytes = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut bytes);

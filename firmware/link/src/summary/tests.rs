@@ -21,7 +21,6 @@ fn finding(level: Level) -> Finding {
     }
 }
 
-/// The same of another check.
 fn of(check: &'static str, level: Level) -> Finding {
     Finding { check, ..finding(level) }
 }
@@ -32,7 +31,6 @@ fn params(budget: f32) -> Params {
     params
 }
 
-/// A frame of the vehicle, `bytes` long.
 fn frame(id: u32, bytes: usize) -> Vec<u8> {
     let mut buffer = [0; FRAME_BYTES_MAX];
     let packet = Packet::new(id).bytes(0, &vec![1; bytes - 12]);
@@ -41,7 +39,7 @@ fn frame(id: u32, bytes: usize) -> Vec<u8> {
     frame
 }
 
-/// The messages of a summary, with each of `streams` (id, bytes, interval in ms) coming with jitter.
+/// Each of `streams` (id, bytes, interval in ms) comes with jitter.
 fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u32, usize)> {
     let params = params(budget);
     let mut summary = Summary::new(&params);
@@ -110,7 +108,6 @@ fn a_finding_is_told_in_the_words_of_a_pilot_and_fits() {
     assert_eq!(told(Finding { check: "of_later", ..motor }), "HUMS: of_later");
 }
 
-/// The quantity of the value, no number without a unit, and the action of a pilot in flight.
 #[test]
 fn a_value_says_what_it_is_of_or_is_not_told() {
     let told = |check, value, level| {
@@ -263,10 +260,10 @@ fn the_state_holds_every_subsystem() {
     assert!(VALUES_TOLD.iter().all(|(name, _)| name.len() <= 10));
 }
 
-/// A finding at these tenths of a second: check, instance, level, previous level.
+/// Tenths of a second: check, instance, level, previous level.
 type Comes = (u64, &'static str, u8, Level, Level);
 
-/// Sent findings: time in tenths of a second, and the text after our name.
+/// Tenths of a second, and the text after our name.
 fn told(findings: &[Comes]) -> Vec<(u64, String)> {
     told_because(findings, "")
 }
@@ -275,7 +272,7 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
     told_where(findings, because, |_| Orders::Own)
 }
 
-/// Texts sent if some checks have the orders of others.
+/// If some checks have the orders of others.
 fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Orders) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());

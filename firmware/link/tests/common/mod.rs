@@ -3,13 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-/// Excerpts that live beside the tests.
+/// Beside the tests.
 pub fn excerpt(name: &str) -> Recording {
     Recording::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name))
 }
 
-/// A whole flight: of the folder that the environment variable `HUMS_FLIGHTS` names, or of the repository; `None` for
-/// those that are in neither.
+/// In the folder of `HUMS_FLIGHTS`, or in the repository; `None` in neither.
 pub fn flight(name: &str) -> Option<Recording> {
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/flights");
     let folders = std::env::var_os("HUMS_FLIGHTS").map(PathBuf::from).into_iter().chain([repository]);
@@ -17,7 +16,7 @@ pub fn flight(name: &str) -> Option<Recording> {
     Some(Recording::read(&paths.find(|path| path.exists())?))
 }
 
-/// The bytes of the line, and for a tlog where each frame begins and when it came.
+/// With a tlog's frames: beginning and time.
 pub struct Recording {
     pub bytes: Vec<u8>,
     /// Start, length, microseconds since 1970; empty for a raw recording.
@@ -52,7 +51,7 @@ impl Recording {
     }
 }
 
-/// CRC-32 as zlib computes it, bit by bit.
+/// As zlib does, bit by bit.
 pub fn crc32(mut crc: u32, bytes: &[u8]) -> u32 {
     crc = !crc;
     for byte in bytes {
@@ -64,7 +63,7 @@ pub fn crc32(mut crc: u32, bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// A small deterministic generator (splitmix64).
+/// Splitmix64.
 pub struct Random(pub u64);
 
 impl Random {

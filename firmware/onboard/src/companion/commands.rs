@@ -49,7 +49,6 @@ pub(crate) const DENIED: u8 = 2;
 const UNSUPPORTED: u8 = 3;
 const FAILED: u8 = 4;
 
-/// The characters in params 2 to 7 of a command: three in each, as a whole number of 24 bits, which single precision holds exactly.
 fn characters(params: &[f32; 7]) -> [u8; 18] {
     let mut text = [0; 18];
     for (characters, value) in text.chunks_exact_mut(3).zip(params.iter().skip(1)) {
@@ -58,17 +57,16 @@ fn characters(params: &[f32; 7]) -> [u8; 18] {
     text
 }
 
-/// Whether a command only requests a message, and changes nothing.
+/// Changes nothing.
 pub(crate) const fn only_asks(command: u16) -> bool {
     matches!(command, MESSAGE | PROTOCOL | CAPABILITIES | PREFLIGHT)
 }
 
-/// Waiting answers, and the state that commands change.
 #[derive(Clone, Debug)]
 pub(crate) struct Commands {
     pub(crate) replies: Replies,
     limits: [Limiter; 2],
-    /// Recording is stopped by command.
+    /// From this port now.
     stopped: bool,
 }
 
@@ -77,17 +75,16 @@ impl Commands {
         Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false }
     }
 
-    /// Whether a change from this port is allowed now.
     pub(crate) fn allows(&mut self, now: Instant, port: Port) -> bool {
         self.limits[port as usize].allows(now)
     }
 
-    /// Whether recording is stopped by command.
+    /// By command.
     pub(crate) const fn stopped(&self) -> bool {
         self.stopped
     }
 
-    /// Executes a command; returns its `MAV_RESULT`.
+    /// Returns its `MAV_RESULT`.
     pub(crate) fn command(
         &mut self,
         now: Instant,
@@ -200,21 +197,17 @@ fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn)
             book.card.want_format();
             ACCEPTED
         }
-        // It was requested already, and the answer was lost.
         CardState::Formatting => ACCEPTED,
         CardState::Recording | CardState::Finished | CardState::Full => DENIED,
         _ => FAILED,
     }
 }
 
-/// The first finding against a flight.
 fn preflight(monitor: &Monitor) -> Option<(&'static str, u8)> {
     let bad = |level| matches!(level, Level::Warning | Level::Critical);
     monitor.health().levels().find(|(_, _, level)| bad(*level)).map(|(check, part, _)| (check.name, part))
 }
 
-/// The text of a finding against a flight.
-// Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn not_ready(check: &str, part: u8) -> Text {
     match health::said(check) {
@@ -223,7 +216,6 @@ fn not_ready(check: &str, part: u8) -> Text {
     }
 }
 
-/// A waiting answer as a message.
 pub(crate) fn packet(now: Instant, reply: Reply, monitor: &Monitor, identity: &Boot<'_>) -> Packet {
     match reply {
         Reply::Param(index) => match monitor.params().iter().nth(usize::from(index)) {

@@ -5,18 +5,18 @@ use hums_link::request::Port;
 
 use crate::journal::By;
 
-/// An asker, and the port of the answer.
+/// And the port of the answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asker {
     pub(crate) port: Port,
     pub(crate) by: By,
 }
 
-/// Settings and commands that a port may send at once, and each second.
+/// Of a port at once, and each second.
 const REQUESTS_MAX: u32 = 20;
 const REQUESTS_PER_S: u32 = 5;
 
-/// A limit at once, and a limit each second.
+/// At once, and each second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limiter {
     left: u32,

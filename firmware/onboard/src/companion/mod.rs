@@ -1,9 +1,9 @@
 //! The monitor as a companion: its requests to the autopilot, and its answers to others.
 //!
-//! It is a part of the monitor task. A request comes as a frame from the frame queue (the autopilot's port) or from
-//! the uplink queue (the ground station's own port). The answer goes out at the same port, within its budget.
+//! A part of the monitor task. A request comes as a frame from the frame queue (the autopilot's port) or from the
+//! uplink queue (the ground station's own port). The answer goes out at the same port, within its budget.
 //!
-//! A request can change settings, stop recording and ask for data, and nothing else. A flood of requests is cut by
+//! Requests change settings, stop recording and ask for data, and nothing else. A flood of requests is cut by
 //! [`limiter`] and by the short queue of answers.
 
 mod commands;
@@ -51,10 +51,8 @@ const HEARTBEAT: Span = Span::from_secs(1);
 /// The monitor itself: no answer is expected.
 const NOBODY: Asker = Asker { port: Port::Gs, by: (0, 0) };
 
-/// The monitor task's state of its conversations.
 #[derive(Clone, Debug)]
 pub(crate) struct Companion {
-    /// The autopilot port's outlet.
     outlet: Outlet,
     asking: Asking,
     events: Events,
@@ -62,7 +60,7 @@ pub(crate) struct Companion {
     heartbeat_at: Option<Instant>,
     library: Library,
     secure: Secure,
-    /// The protective action's request to the autopilot, until it is sent.
+    /// Until it is sent.
     protect: Option<protect::Request>,
     pass: Pass,
     settings: Settings,
@@ -88,38 +86,37 @@ impl Companion {
         }
     }
 
-    /// The current rate of the autopilot's port.
+    /// Current.
     pub(crate) const fn baud(&self) -> u32 {
         self.outlet.baud()
     }
 
-    /// Whether recording is stopped by command.
     pub(crate) const fn stopped(&self) -> bool {
         self.commands.stopped()
     }
 
-    /// Frames of others that were lost for lack of room.
+    /// For lack of room.
     pub(crate) const fn passed_lost(&self) -> u32 {
         self.pass.lost
     }
 
-    /// Requests that were refused for their signature.
+    /// For their signature.
     pub(crate) const fn requests_refused(&self) -> u32 {
         self.secure.refused
     }
 
-    /// Takes the signing key out of the store: see [`secure`].
+    /// From the store: see [`secure`].
     pub(crate) fn restore<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         self.secure.restore(store_writer);
     }
 
-    /// Hands over items of the signing key that are due.
+    /// Of the signing key.
     pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) {
         let seals = [&summary.outlet.seal, &self.outlet.seal];
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
     }
 
-    /// A frame of the ground station's own port.
+    /// At the ground station's own port.
     pub(crate) fn uplink(
         &mut self,
         now: Instant,
@@ -134,7 +131,7 @@ impl Companion {
         self.pass.up(now, frame, book.monitor, &mut ways);
     }
 
-    /// Takes a frame of the autopilot's port: an answer to us, a request, or data.
+    /// An answer to us, a request, or data.
     pub(crate) fn heard(
         &mut self,
         now: Instant,
@@ -164,7 +161,7 @@ impl Companion {
         self.pass_down(now, frame, book, summary, gs);
     }
 
-    /// A frame of the autopilot's port is passed on to the ground station, if it should be.
+    /// From the autopilot's port to the ground station, if it should be.
     pub(crate) fn pass_down(
         &mut self,
         now: Instant,
@@ -233,7 +230,6 @@ impl Companion {
         }
     }
 
-    /// Requests for parameters and logs.
     fn asked_for_data(
         &mut self,
         now: Instant,
@@ -387,7 +383,7 @@ impl Companion {
         }
     }
 
-    /// Sends waiting answers as far as possible.
+    /// As far as possible.
     pub(crate) fn answer(
         &mut self,
         now: Instant,

@@ -34,12 +34,11 @@ const ANSWERS: [u32; 13] = [22, 49, 118, 120, 191, 192, 259, 300, 322, 395, 397,
 /// Time between two frames of unknown definitions.
 const UNKNOWN: Span = Span::from_secs(1);
 
-/// Frames passed and lost.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pass {
-    /// Lost frames of others.
+    /// Of others.
     pub(super) lost: u32,
-    /// Last time of a frame of an unknown definition.
+    /// Of an unknown definition.
     unknown_at: Option<Instant>,
 }
 
@@ -48,7 +47,7 @@ impl Pass {
         Self { lost: 0, unknown_at: None }
     }
 
-    /// A frame of the ground station's port, to the autopilot.
+    /// From the ground station's port to the autopilot.
     pub(crate) fn up(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
         let Some(vehicle) = monitor.vehicle().source else { return };
         let of = (frame.system(), frame.component());
@@ -64,7 +63,7 @@ impl Pass {
         self.lost = self.lost.saturating_add(u32::from(!sent));
     }
 
-    /// A frame of the autopilot's port, to the ground station.
+    /// From the autopilot's port to the ground station.
     pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
         if !is_on(monitor, ways) || frame.id() == secure::SETUP {
             return;

@@ -51,7 +51,7 @@ const SAVE_SCARCE: Span = Span::from_secs(60);
 /// Link ids: summary stream and answers at the ground station's port, and frames to the autopilot.
 const LINKS: [u8; 2] = [0, 1];
 
-/// The current guard of a port: 0 to 2.
+/// 0 to 2.
 fn guard(params: &Params, port: Port) -> u8 {
     params.get(match port {
         Port::Gs => Param::GsSign,
@@ -59,12 +59,11 @@ fn guard(params: &Params, port: Port) -> u8 {
     }) as u8
 }
 
-/// Whether a port may bring a key.
+/// May bring a key.
 pub(crate) fn is_trusted(params: &Params, port: Port) -> bool {
     params.get(Param::SignPort) as u8 == port as u8 + 1
 }
 
-/// The authorisation of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trust {
     /// No signature is required.
@@ -75,7 +74,6 @@ pub(crate) enum Trust {
     Refused,
 }
 
-/// The monitor's part of signing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Secure {
     signing: Signing,
@@ -89,7 +87,7 @@ pub(crate) struct Secure {
     last: u64,
     /// A key was set together with the time: both outlets begin anew.
     reseal: bool,
-    /// Requests that were refused for their signature.
+    /// For their signature.
     pub(super) refused: u32,
 }
 
@@ -108,7 +106,7 @@ impl Secure {
         }
     }
 
-    /// Reads key and times from the store. At power-on, before the first frame is sent.
+    /// At power-on, before the first frame is sent.
     pub(crate) fn restore<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         let mut bytes = [0; KEY_BYTES];
         let key = (store_writer.item(ITEM_KEY, &mut bytes) == KEY_BYTES).then_some(Key(bytes));
@@ -124,7 +122,7 @@ impl Secure {
         self.signing.restore(key, self.times);
     }
 
-    /// Hands over items that are due, at every tick and at the end. `last` is the highest stamp of our signatures.
+    /// At every tick and at the end. `last` is the highest stamp of our signatures.
     pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
         let Self { signing, times, key_due, times_due, saved_at, scarce, .. } = self;
         let has_room = handover.room() == Room::Enough;
@@ -153,7 +151,7 @@ impl Secure {
         }
     }
 
-    /// The authorisation by a frame's signature on this port.
+    /// By a frame's signature on this port.
     pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
         let guard = guard(params, port);
         if guard == 0 || self.signing.key().is_none() {
@@ -192,7 +190,7 @@ impl Secure {
         }
     }
 
-    /// Takes a key from a trusted port.
+    /// From a trusted port.
     pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp > 0 || self.signing.key() != Some(&key) {
             (self.last, self.reseal) = (0, true);

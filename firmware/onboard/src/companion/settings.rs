@@ -61,12 +61,12 @@ impl Settings {
         }
     }
 
-    /// Whether the card's answers are for this file.
+    /// For this file.
     pub(crate) const fn is_reading(&self) -> bool {
         matches!(self.state, State::Reading(_))
     }
 
-    /// A byte of the file; `true` at the end of a line.
+    /// `true` at the end of a line.
     fn take(&mut self, byte: u8) -> bool {
         if byte != b'\n' {
             let comment = self.line.contains(&b'#');
@@ -75,7 +75,7 @@ impl Settings {
         byte == b'\n'
     }
 
-    /// Continues reading, one piece a tick.
+    /// One piece a tick.
     pub(crate) fn tick(
         &mut self,
         now: Instant,
@@ -110,7 +110,7 @@ impl Settings {
         }
     }
 
-    /// Takes the piece from this offset on, if it has come; whether it was the last one.
+    /// If it has come; whether it was the last one.
     fn read_on(
         &mut self,
         now: Instant,
@@ -154,7 +154,6 @@ impl Settings {
         true
     }
 
-    /// Sets the parameter of a line.
     fn line(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.number = self.number.saturating_add(1);
         let (number, is_cut) = (self.number, core::mem::take(&mut self.is_cut));

@@ -1,4 +1,4 @@
-//! The ways out: each port's outlet, which decides what may go when, with the queue behind it.
+//! Each port's outlet, which decides what may go when, with its queue.
 
 use hums_core::clock::Instant;
 use hums_link::outlet::{Class, Outlet};
@@ -7,7 +7,7 @@ use hums_link::request::Port;
 
 use crate::queues::GsIn;
 
-/// Both ports' ways out, lent for one call.
+/// Lent for one call.
 pub(crate) struct Ways<'w, 'q> {
     pub(crate) gs: &'w mut Outlet,
     pub(crate) autopilot: &'w mut Outlet,
@@ -15,7 +15,7 @@ pub(crate) struct Ways<'w, 'q> {
 }
 
 impl Ways<'_, '_> {
-    /// Sends a message of ours, if its port's budget allows.
+    /// If its port's budget allows.
     pub(crate) fn send(&mut self, now: Instant, port: Port, class: Class, packet: &Packet) -> bool {
         let Self { gs, autopilot, queues } = self;
         match port {
@@ -24,7 +24,7 @@ impl Ways<'_, '_> {
         }
     }
 
-    /// Passes a frame of another system on, likewise.
+    /// If its port's budget allows.
     pub(crate) fn pass(&mut self, now: Instant, port: Port, class: Class, frame: &[u8]) -> bool {
         let Self { gs, autopilot, queues } = self;
         match port {
@@ -33,7 +33,7 @@ impl Ways<'_, '_> {
         }
     }
 
-    /// The longest bulk frame that a port's budget lets through.
+    /// By a port's budget.
     pub(crate) fn bulk_frame_max(&self, port: Port) -> usize {
         match port {
             Port::Gs => self.gs.bulk_frame_max(),

@@ -13,11 +13,9 @@ const QUIET: Span = Span::from_secs(5);
 /// `MAV_SEVERITY`
 const WARNING: u8 = 4;
 const NOTICE: u8 = 5;
-/// Numbers of the events.
 const CARD_IN: u8 = 6;
 const CARD_OUT: u8 = 7;
 
-/// The last reported state of the card.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CardNotices {
     told: CardState,

@@ -24,13 +24,13 @@ const START: Span = Span::from_secs(3);
 /// Load of the processor; zeros if nothing measures it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Machine {
-    /// Busy time of the processor in the last second, thousandths.
+    /// Busy in the last second, thousandths.
     pub cpu_permille: u16,
-    /// The same in the worst second.
+    /// Busy in the worst second, thousandths.
     pub cpu_permille_max: u16,
-    /// The deepest use of the stack, bytes.
+    /// Deepest use, bytes.
     pub stack_bytes_max: u32,
-    /// The size of the stack, bytes.
+    /// Size, bytes.
     pub stack_bytes: u32,
 }
 
@@ -55,10 +55,10 @@ pub(super) struct Figures<'a> {
     rates: Rates,
 }
 
-/// Rates of the ports, bytes a second, over [`RATES`].
+/// Bytes a second, over [`RATES`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Rates {
-    /// Time of the last count, in milliseconds modulo 2^32, and the counts.
+    /// Last count, milliseconds modulo 2^32, and the counts.
     at_ms: u32,
     counts: [u32; 2],
     /// Input from the autopilot, and output at the ground station's port.
@@ -116,7 +116,6 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// Figures for the record.
     pub(super) fn stats(
         &self,
         card: &CardStatus,
@@ -155,7 +154,7 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// Figures for the checks. `stopped`: recording is stopped by command.
+    /// `stopped`: by command.
     pub(super) fn recorder(
         &self,
         now: Instant,
@@ -182,7 +181,7 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// Adds counts since the last tick, and passes losses on to be recorded.
+    /// Since the last tick; passes losses on.
     pub(super) fn count(
         &mut self,
         now: Instant,

@@ -1,5 +1,4 @@
-//! Events for the record: take-off and landing, phases of flight, mishaps, snapshots around critical findings, the
-//! protective action.
+//! Events for the record.
 
 use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
 use hums_core::clock::Instant;
@@ -14,9 +13,9 @@ use crate::records::Recorded;
 
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
-/// The text of the event after a change of propellers, battery or payload.
+/// Of a change of propellers, battery or payload.
 pub const PARTS_CHANGED: &str = "baselines anew";
-/// The text about a battery with an unknown number of cells.
+/// An unknown number of cells.
 pub const CELLS_UNKNOWN: &str = "HUMS: cells not known, set BAT_CELLS";
 /// The number of the event that marks a critical finding. The others are in [`record`].
 pub(super) const CRITICAL: u8 = 8;

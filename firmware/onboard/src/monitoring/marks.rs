@@ -15,7 +15,6 @@ use crate::queues::SectorsIn;
 /// Minimum time between two marks. An earlier one waits, and is dropped if the vehicle moves meanwhile.
 const APART: Span = Span::from_secs(1);
 
-/// The mark to write, and its progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marks {
     due: Option<Resting>,
@@ -39,12 +38,12 @@ impl Marks {
         (self.due, self.at) = (Some(why), None);
     }
 
-    /// The vehicle is armed or takes off: an earlier mark is outdated.
+    /// Armed or takes off: an earlier mark is outdated.
     pub(super) const fn moves(&mut self) {
         self.due = None;
     }
 
-    /// Writes the due mark after all other records of the moment, and gives its sector to storage.
+    /// After all other records of the moment; gives its sector to storage.
     pub(super) fn tick(&mut self, now: Instant, journal: &mut Journal<'_>, sectors: &mut SectorsIn) {
         if let Some(why) = self.due
             && self.at.is_none_or(|at| now.since(at) >= APART)

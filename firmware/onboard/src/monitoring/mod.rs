@@ -1,8 +1,7 @@
 //! The monitor task's body: frames from the queue into the record, the checks and the summary stream.
 //!
-//! It is less urgent than reception, whose frames wait up to 16 ms for it, and more urgent than tasks that wait for a
-//! device. One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] does
-//! the periodic work every 50 ms.
+//! One call of [`Monitoring::drain`] takes one frame through the whole pipeline; [`Monitoring::tick`] does the
+//! periodic work every 50 ms.
 
 mod card_notices;
 mod figures;
@@ -38,23 +37,22 @@ use happenings::CRITICAL;
 pub use happenings::{CELLS_UNKNOWN, PARTS_CHANGED};
 use marks::Marks;
 
-/// How often [`Monitoring::tick`] is to be called.
+/// Between calls of [`Monitoring::tick`].
 pub const TICK: Span = Span::from_millis(monitor::TICK.as_millis());
 /// Maximum time until a sector in progress is given to storage. With the tick's 50 ms a power cut costs less than 200
 /// ms, even at a low rate.
 const PARTIAL: Span = Span::from_millis(150);
-/// How often the recorder's statistics are recorded.
+/// Of the recorder's statistics.
 const STATS: Span = Span::from_secs(10);
-/// How often usage is recorded.
+/// Of usage.
 const USAGE: Span = Span::from_secs(60);
 
-/// The `MAV_SEVERITY` of a restart after a fault.
+/// Of a restart after a fault.
 const FAULT_SEVERITY: u8 = 4;
 
-/// The steps of a frame, in order.
+/// In order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Encoding into the record.
     Encode {
         /// Its arrival time.
         at: Instant,
@@ -78,7 +76,7 @@ pub struct Monitoring<'a> {
     recorded: Recorded,
     notices: Notices,
     card_notices: CardNotices,
-    /// Files of storage at the last tick.
+    /// At the last tick.
     files: u32,
     figures: Figures<'a>,
     marks: Marks,
@@ -87,8 +85,7 @@ pub struct Monitoring<'a> {
 }
 
 impl<'a> Monitoring<'a> {
-    /// Before the first frame. `identity` is the board's own data: the first record of each file. `cause` is the
-    /// cause of this start.
+    /// `identity`: the board's own data, the first record of each file; `cause`: of this start.
     pub fn new(
         monitor: &'a mut Monitor,
         writer: &'a mut Writer,
@@ -115,13 +112,13 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// Writes the head of a log: the recorder's identity, and every parameter that is not at its default.
+    /// The recorder's identity, and every parameter that is not at its default.
     pub fn start(&mut self, now: Instant, sectors: &mut SectorsIn) {
         self.recorded.heading(now, &self.identity, &mut self.book, sectors);
         self.recorded.usage(now, Moment::Start, &mut self.book, sectors);
     }
 
-    /// Begins each further file of the log with the same head.
+    /// With the log's head.
     fn head_file(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Self { book, recorded, identity, files, .. } = self;
         let before = core::mem::replace(files, book.card.read().segments);
@@ -131,8 +128,7 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// Reports the previous session on a card that was opened, in a second boot record and in the boot record of each
-    /// further file.
+    /// In a second boot record, and in that of each further file.
     #[inline(never)]
     fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Some(before) = self.book.card.take_before() else { return };
@@ -160,7 +156,7 @@ impl<'a> Monitoring<'a> {
         self.drain_in_steps(frames, sectors, gs, &mut |_| {})
     }
 
-    /// As [`Self::drain`], with a call at the beginning of each step, for measurements.
+    /// As [`Self::drain`], with a call at each step, for measurements.
     pub fn drain_in_steps(
         &mut self,
         frames: &mut FramesOut,
@@ -204,7 +200,6 @@ impl<'a> Monitoring<'a> {
         summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
     }
 
-    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn observe(&mut self, at: Instant, frame: &Frame<'_>) {
         self.sequences.frame(at, frame);
@@ -217,7 +212,7 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// Takes one frame of the ground station from its queue; `false` if there is none.
+    /// `false` if there is none.
     pub fn uplink(
         &mut self,
         now: Instant,
@@ -238,7 +233,7 @@ impl<'a> Monitoring<'a> {
         })
     }
 
-    /// Periodic work, every [`TICK`]. Each finding is recorded, sent to the GS, and given to `findings`.
+    /// Every [`TICK`]; findings are recorded, sent, and given to `findings`.
     pub fn tick(
         &mut self,
         now: Instant,
@@ -277,8 +272,6 @@ impl<'a> Monitoring<'a> {
         self.talk(now, sectors, gs);
     }
 
-    /// Periodic work at the ports.
-    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
         let Self { book, summary, companion, notices, figures, identity, .. } = self;
@@ -306,37 +299,36 @@ impl<'a> Monitoring<'a> {
         self.book.monitor
     }
 
-    /// The monitor, to restore, save and set its values.
+    /// To restore, save and set values.
     pub const fn monitor_mut(&mut self) -> &mut Monitor {
         self.book.monitor
     }
 
-    /// The current line rates in baud: of the ground station's port and of the autopilot's.
+    /// Ground station's port, autopilot's port, baud.
     pub const fn bauds(&self) -> (u32, u32) {
         (self.summary.outlet.baud(), self.companion.baud())
     }
 
-    /// Sets the machine's current figures: recorded with the others, and sent to the ground station.
+    /// Recorded with the others, and sent.
     pub const fn set_machine(&mut self, machine: Machine) {
         self.figures.machine = machine;
     }
 
-    /// The pipeline's figures since power-on.
+    /// Since power-on.
     pub fn stats(&self, gs: &GsIn) -> Stats {
         self.figures.stats(self.book.card, &self.book.journal, &self.companion, gs)
     }
 
-    /// Reads the signing key and its times from the store. At power-on, before the first frame is sent.
+    /// At power-on, before the first frame is sent.
     pub fn restore_signing<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         self.companion.restore(store_writer);
     }
 
-    /// Hands over due items of the signing key and its times, at every tick and at the end.
+    /// At every tick and at the end.
     pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) {
         self.companion.save(now, &self.summary, handover);
     }
 
-    // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
     fn check(
         &mut self,
@@ -368,7 +360,7 @@ impl<'a> Monitoring<'a> {
     }
 }
 
-/// The cause of a restart, in words for a pilot.
+/// For a pilot.
 fn restart_words(fault: &Fault<'_>) -> &'static str {
     match fault.kind {
         1 => "panic",

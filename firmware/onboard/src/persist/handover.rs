@@ -18,18 +18,18 @@ pub const QUIET: Span = Span::from_secs(5);
 /// Disarmed on the ground for this long: a nearly full store may be erased despite the autopilot's stream.
 pub const GROUNDED: Span = Span::from_secs(10);
 
-/// The monitor task's side of the store: items to save, and texts about them.
+/// Saves the monitor's items.
 pub struct Handover<'a> {
     items: MailboxIn<'a>,
     status: &'a StoreStatus,
     told: StoreReading,
     frames: u32,
     frames_at: Instant,
-    /// Last time that the vehicle was armed, flew, or was not known to be disarmed.
+    /// Armed, flying, or not known to be disarmed.
     active_at: Instant,
 }
 
-/// A text about the store, for the record and the ground.
+/// For the record and the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct News {
     /// `MAV_SEVERITY`.
@@ -66,14 +66,13 @@ impl<'a> Handover<'a> {
         self.put_items(now, monitor);
     }
 
-    /// At the end of a session: hands over all changes; `false` if it must be called again after the store's writer
-    /// took an item.
+    /// `false`: call again after the store's writer took an item.
     pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         monitor.save_all();
         self.put_params(monitor.params_mut()) && self.put_items(now, monitor)
     }
 
-    /// The next text about the store.
+    /// About the store.
     pub fn news(&mut self) -> Option<News> {
         let now = self.status.read();
         let Self { told, .. } = self;
@@ -109,17 +108,16 @@ impl<'a> Handover<'a> {
         None
     }
 
-    /// Whether the store has room to spare.
     pub(crate) fn room(&self) -> Room {
         self.status.read().room
     }
 
-    /// Hands over another owner's item; `false` if there was no room.
+    /// Of another owner; `false` without room.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
         self.items.put(key, value)
     }
 
-    /// Hands over each parameter that was set; `false` if one found no room.
+    /// Set ones; `false` without room.
     fn put_params(&mut self, params: &mut Params) -> bool {
         while let Some((index, spec, value)) = params.unsaved() {
             if let Some((bytes, length)) = param_value(spec.name, value)
@@ -132,7 +130,7 @@ impl<'a> Handover<'a> {
         true
     }
 
-    /// Hands over each item that is due; `false` if one found no room.
+    /// `false` without room.
     fn put_items(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         while let Some(key) = monitor.save_due(now.into(), self.status.read().room) {
             let mut bytes = [0; ITEM_BYTES_MAX];

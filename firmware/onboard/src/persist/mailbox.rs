@@ -5,7 +5,7 @@ use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use hums_core::lifetime::ITEM_BYTES_MAX;
 use hums_store::{Key, VALUE_BYTES_MAX};
 
-/// Bytes before an item's value: its key.
+/// Its key.
 const KEY_BYTES: usize = 4;
 /// The longest item, and the queue's own two bytes.
 const PLACE_BYTES: usize = KEY_BYTES + ITEM_BYTES_MAX + 2;
@@ -41,7 +41,7 @@ impl Mailbox {
 pub struct MailboxIn<'a>(FramedProducer<&'a Queue>);
 
 impl MailboxIn<'_> {
-    /// Hands an item over; `false` if there is no room for it now.
+    /// `false` without room.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
         let length = KEY_BYTES + value.len();
         let Ok(mut grant) = self.0.grant(length as u16) else { return false };
@@ -56,11 +56,11 @@ impl MailboxIn<'_> {
     }
 }
 
-/// The store writer's end.
+/// For the store writer.
 pub struct MailboxOut<'a>(FramedConsumer<&'a Queue>);
 
 impl MailboxOut<'_> {
-    /// Shows the oldest item to `take`, which returns whether it is finished; `None` if there is none.
+    /// `take` returns whether it is finished; `None` if there is none.
     pub(crate) fn oldest<R>(&mut self, take: impl FnOnce(Key, &[u8]) -> (R, bool)) -> Option<R> {
         let grant = self.0.read().ok()?;
         let Some((key, value)) = grant.split_first_chunk::<KEY_BYTES>() else {

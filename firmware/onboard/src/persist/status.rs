@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use hums_core::lifetime::Room;
 
-/// The state of the store.
+/// Of the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StoreState {
@@ -35,7 +35,7 @@ pub enum Calm {
     Silent = 2,
 }
 
-/// Status of the store's writer for the monitor, and back: atomics, so that neither waits.
+/// Of the writer for the monitor, and back.
 #[derive(Debug, Default)]
 pub struct StoreStatus {
     state: AtomicU8,
@@ -51,19 +51,19 @@ pub struct StoreStatus {
 /// A reading of [`StoreStatus`]; counters since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StoreReading {
-    /// The store's state at the start.
+    /// At the start.
     pub state: StoreState,
-    /// Items that were unreadable at the start, plus one if the flash was damaged.
+    /// At the start, plus one if the flash was damaged.
     pub unreadable: u32,
     /// Items saved.
     pub saved: u32,
-    /// Items that had to wait because an erase was not allowed.
+    /// Waited: no erase was allowed.
     pub refused: u32,
-    /// Items that could not be saved.
+    /// Could not be saved.
     pub failed: u32,
     /// Erases while the autopilot talked: frames were lost with each.
     pub erased: u32,
-    /// Whether there is room to spare.
+    /// To spare.
     pub room: Room,
 }
 
@@ -82,7 +82,7 @@ impl StoreStatus {
         }
     }
 
-    /// All fields; each is valid by itself.
+    /// Each is valid by itself.
     pub fn read(&self) -> StoreReading {
         StoreReading {
             state: match self.state.load(Ordering::Relaxed) {
@@ -101,7 +101,7 @@ impl StoreStatus {
         }
     }
 
-    /// The cost of an erase now, by the vehicle's state.
+    /// By the vehicle's state.
     pub fn calm(&self) -> Calm {
         match self.calm.load(Ordering::Relaxed) {
             1 => Calm::Grounded,

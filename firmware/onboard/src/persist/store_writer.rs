@@ -1,4 +1,4 @@
-//! The storage task's side: the store and its saves.
+//! The storage task's side of the store.
 
 use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
@@ -10,7 +10,7 @@ use hums_store::{Error, Found, Key, Store, param};
 use super::mailbox::MailboxOut;
 use super::status::{Calm, StoreState, StoreStatus, count};
 
-/// Minimum free part of a sector before a flight.
+/// Of a sector, before a flight.
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with a smaller free part is erased on the ground even while the autopilot talks.
 const SCARCE: (usize, usize) = (1, 4);
@@ -21,25 +21,24 @@ pub(crate) const SIGNED_MAX: u8 = 4;
 const LANDING: usize = Exceedances::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
 const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
-/// The result of one call of [`StoreWriter::service`].
+/// Of [`StoreWriter::service`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
     /// An item was taken: another may wait.
     Took,
-    /// There is nothing to do.
     Idle,
     /// The oldest item waits until an erase is allowed.
     Waits,
 }
 
-/// The storage task's side: the store and its saves.
+/// Saves items in the store.
 pub struct StoreWriter<'a, F: NorFlash> {
     store: Option<Store<F>>,
     items: MailboxOut<'a>,
     pub(crate) status: &'a StoreStatus,
-    /// The oldest item has been counted as waiting.
+    /// Of the oldest item.
     waits: bool,
-    /// The work of this calm time is done.
+    /// In this calm time.
     turned: bool,
     /// Less than [`SCARCE`] of the sector in use is free.
     scarce: bool,
@@ -102,13 +101,13 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         self.look_for_room();
     }
 
-    /// Another owner's stored item, by its number; returns its length, 0 if there is none.
+    /// Of another owner, by number; returns its length, 0 if there is none.
     pub fn item(&mut self, number: u8, out: &mut [u8]) -> usize {
         let got = self.store.as_mut().map(|store| store.get(Key::item(number), out));
         got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
-    /// Mounts of the store since it was made; 0 without a store.
+    /// Since it was made; 0 without a store.
     pub fn mounts(&mut self) -> u32 {
         self.store.as_mut().and_then(|store| store.mounts().ok()).unwrap_or(0)
     }
@@ -159,7 +158,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         kept
     }
 
-    /// Reports to the monitor whether there is more than the reserve.
+    /// More than the reserve.
     fn look_for_room(&mut self) {
         if let Some(store) = &self.store {
             let room = store.room();
@@ -169,7 +168,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
     }
 }
 
-/// Saves an item once more after an error of the flash, at another place.
+/// At another place, after an error of the flash.
 fn again<F: NorFlash>(
     store: &mut Store<F>,
     error: Error<F::Error>,
@@ -179,7 +178,7 @@ fn again<F: NorFlash>(
     if matches!(error, Error::Flash(_)) { store.save(key, value) } else { Err(error) }
 }
 
-/// `false` if the item is unreadable. Unknown items are ignored.
+/// `false` if unreadable; unknown items are ignored.
 fn restore(monitor: &mut Monitor, key: Key, value: &[u8]) -> bool {
     if key.is_param() {
         return match param(value).map(|(name, value)| monitor.params_mut().set(name, value)) {

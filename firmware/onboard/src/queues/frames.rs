@@ -13,16 +13,16 @@ use super::level::Level;
 pub(super) const STAMP_BYTES: usize = 10;
 const UNKNOWN: u16 = u16::MAX;
 
-/// The frame queue's writing end.
+/// Writing end.
 pub struct FramesIn<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(
     pub(super) FramedProducer<&'a Churrasco<BYTES>>,
     pub(super) &'a Level,
 );
-/// The uplink queue's writing end.
+/// Writing end.
 pub type UplinkIn<'a> = FramesIn<'a, UPLINK_QUEUE_BYTES>;
 
 impl<const BYTES: usize> FramesIn<'_, BYTES> {
-    /// Queues a frame; `false` if there is no room for it.
+    /// `false` without room.
     pub fn put(&mut self, at_micros: u64, frame: &Frame<'_>) -> bool {
         let bytes = frame.bytes();
         let len = STAMP_BYTES + bytes.len();
@@ -36,22 +36,22 @@ impl<const BYTES: usize> FramesIn<'_, BYTES> {
         true
     }
 
-    /// The most bytes that waited at once.
+    /// At once.
     pub fn bytes_max(&self) -> u32 {
         self.1.max()
     }
 }
 
-/// The frame queue's reading end.
+/// Reading end.
 pub struct FramesOut<'a, const BYTES: usize = FRAME_QUEUE_BYTES>(
     pub(super) FramedConsumer<&'a Churrasco<BYTES>>,
     pub(super) &'a Level,
 );
-/// The uplink queue's reading end.
+/// Reading end.
 pub type UplinkOut<'a> = FramesOut<'a, UPLINK_QUEUE_BYTES>;
 
 impl<const BYTES: usize> FramesOut<'_, BYTES> {
-    /// Hands the oldest frame to `take` (time in microseconds, message, bytes); `false` if there is none.
+    /// Time in microseconds, message, bytes; `false` if there is none.
     pub fn take(&mut self, take: impl FnOnce(u64, Option<u16>, &[u8])) -> bool {
         let Ok(grant) = self.0.read() else { return false };
         if let Some((at, rest)) = grant.split_first_chunk()

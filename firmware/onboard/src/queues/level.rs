@@ -18,14 +18,12 @@ impl Level {
         Self { bytes: AtomicU32::new(0), bytes_max: AtomicU32::new(0) }
     }
 
-    /// A frame of this length is put in.
     pub(super) fn rise(&self, bytes: usize) {
         let bytes = (HEAD_BYTES + bytes) as u32;
         let before = self.bytes.fetch_add(bytes, Ordering::Relaxed);
         self.bytes_max.fetch_max(before.wrapping_add(bytes), Ordering::Relaxed);
     }
 
-    /// A frame of this length is taken out.
     pub(super) fn fall(&self, bytes: usize) {
         self.bytes.fetch_sub((HEAD_BYTES + bytes) as u32, Ordering::Relaxed);
     }

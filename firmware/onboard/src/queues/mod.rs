@@ -36,7 +36,7 @@ type GsQueue = Churrasco<GS_QUEUE_BYTES>;
 type UplinkQueue = Churrasco<UPLINK_QUEUE_BYTES>;
 type AutopilotQueue = Churrasco<AUTOPILOT_QUEUE_BYTES>;
 
-/// All queues of the firmware; one static.
+/// One static.
 pub struct Queues {
     frames: FrameQueue,
     gs: GsQueue,
@@ -47,7 +47,7 @@ pub struct Queues {
     levels: [Level; 4],
 }
 
-/// The ends of all queues, each for one task.
+/// Each for one task.
 pub struct Ends<'a> {
     /// For reception.
     pub frames_in: FramesIn<'a>,
@@ -67,7 +67,7 @@ pub struct Ends<'a> {
     pub uplink_out: UplinkOut<'a>,
     /// For storage.
     pub shelf: Server<'a>,
-    /// For the task that sends to the autopilot.
+    /// For requests to the autopilot.
     pub autopilot_out: AutopilotOut<'a>,
 }
 
@@ -91,7 +91,7 @@ impl Queues {
         }
     }
 
-    /// Hands out the ends, once.
+    /// Once.
     pub fn split(&mut self) -> Ends<'_> {
         let (sectors_in, sectors_out) = self.sectors.split(SECTOR_RESERVE);
         let (reader, shelf) = self.shelf.split();
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// Puts in a frame of these bytes, the first ones replaced by a MAVLink 1 header.
+    /// The first ones are a MAVLink 1 header.
     fn put<const BYTES: usize>(frames: &mut FramesIn, at_micros: u64, mut bytes: [u8; BYTES]) -> bool {
         bytes[..6].copy_from_slice(&[0xFE, BYTES as u8 - 8, 0, 1, 1, 255]);
         frames.put(at_micros, &Frame::parse(&bytes).expect("a frame"))

@@ -8,12 +8,12 @@ use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES};
 use super::level::Level;
 use crate::shelf::Reader;
 
-/// The monitor's ends: both ports, and the logs on the card.
+/// Both ports, and the logs on the card.
 pub struct GsIn<'a> {
     pub(super) gs: PortIn<'a, GS_QUEUE_BYTES>,
     /// To the autopilot.
     pub autopilot: PortIn<'a, AUTOPILOT_QUEUE_BYTES>,
-    /// To storage and back: the logs on the card.
+    /// The logs on the card.
     pub shelf: Reader<'a>,
     pub(super) route: SummaryRoute,
 }
@@ -30,12 +30,12 @@ pub enum SummaryRoute {
 }
 
 impl GsIn<'_> {
-    /// Queues a frame for the GS, or counts it as lost.
+    /// Or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         self.gs.put(frame);
     }
 
-    /// Queues a frame of the summary stream on its way.
+    /// Of the summary stream.
     pub fn tell(&mut self, frame: &[u8]) {
         match self.route {
             SummaryRoute::Nobody => {}
@@ -44,38 +44,38 @@ impl GsIn<'_> {
         }
     }
 
-    /// The way of the summary stream.
+    /// Of the summary stream.
     pub const fn route(&self) -> SummaryRoute {
         self.route
     }
 
-    /// Sets the way of the summary stream.
+    /// Of the summary stream.
     pub const fn set_route(&mut self, route: SummaryRoute) {
         self.route = route;
     }
 
-    /// Frames queued since power-on.
+    /// Since power-on.
     pub const fn frames(&self) -> u64 {
         self.gs.frames
     }
 
-    /// Bytes queued since power-on.
+    /// Since power-on.
     pub const fn bytes(&self) -> u64 {
         self.gs.bytes
     }
 
-    /// Frames that found the queue full.
+    /// The queue was full.
     pub const fn lost(&self) -> u64 {
         self.gs.lost
     }
 
-    /// The most bytes that waited for the GS port at once.
+    /// Waited at once.
     pub fn bytes_max(&self) -> u32 {
         self.gs.level.max()
     }
 }
 
-/// The writing end of a port's queue, with its counters.
+/// With its counters.
 pub struct PortIn<'a, const BYTES: usize> {
     queue: FramedProducer<&'a Churrasco<BYTES>>,
     level: &'a Level,
@@ -89,7 +89,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         Self { queue, level, frames: 0, bytes: 0, lost: 0 }
     }
 
-    /// Queues a frame, or counts it as lost.
+    /// Or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         let len = frame.len() as u16;
         let Ok(mut grant) = self.queue.grant(len) else {
@@ -103,29 +103,29 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         self.bytes += frame.len() as u64;
     }
 
-    /// Frames queued since power-on.
+    /// Since power-on.
     pub const fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Frames that found the queue full.
+    /// The queue was full.
     pub const fn lost(&self) -> u64 {
         self.lost
     }
 }
 
-/// The reading end of a port's queue.
+/// Of a port.
 pub struct PortOut<'a, const BYTES: usize>(
     pub(super) FramedConsumer<&'a Churrasco<BYTES>>,
     pub(super) &'a Level,
 );
-/// The GS queue's reading end.
+/// Reading end.
 pub type GsOut<'a> = PortOut<'a, GS_QUEUE_BYTES>;
-/// The autopilot queue's reading end.
+/// Reading end.
 pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
 
 impl<const BYTES: usize> PortOut<'_, BYTES> {
-    /// Copies the oldest frame into `out` and removes it; returns its length, or `None` if there is none.
+    /// Removes it; returns its length, `None` if there is none.
     pub fn take(&mut self, out: &mut [u8; FRAME_BYTES_MAX]) -> Option<usize> {
         let grant = self.0.read().ok()?;
         let len = grant.len().min(out.len());
@@ -135,7 +135,7 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         Some(len)
     }
 
-    /// Lends the oldest frame in place to `send`, and removes it; `false` if there is none.
+    /// In place; then removes it; `false` if there is none.
     pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8])) -> bool {
         let Ok(grant) = self.0.read() else { return false };
         send(&grant).await;

@@ -12,7 +12,7 @@ use super::capacities::SECTOR_QUEUE_SECTORS;
 // The queue keeps one place empty to tell full from empty.
 type Queue = Churrasco<{ (SECTOR_QUEUE_SECTORS + 1) * SECTOR_BYTES }>;
 
-/// Sectors on their way to storage, which writes them to the card from where they lie.
+/// Written to the card from where they lie.
 pub(super) struct SectorQueue {
     queue: Queue,
     len: AtomicUsize,
@@ -32,7 +32,7 @@ impl SectorQueue {
     }
 }
 
-/// The sector queue's writing end: refuses frames while only the reserve is left.
+/// Refuses frames while only the reserve is left.
 pub struct SectorsIn<'a> {
     queue: StreamProducer<&'a Queue>,
     len: &'a AtomicUsize,
@@ -41,7 +41,7 @@ pub struct SectorsIn<'a> {
 }
 
 impl SectorsIn<'_> {
-    /// Lends the reserve too, for records.
+    /// For records.
     pub(crate) fn with_reserve<R>(&mut self, write: impl FnOnce(&mut Self) -> R) -> R {
         let reserve = core::mem::replace(&mut self.reserve, 0);
         let result = write(self);
@@ -54,12 +54,12 @@ impl SectorsIn<'_> {
         self.len() == 0
     }
 
-    /// Sectors waiting, with those that are being written.
+    /// With those being written.
     pub fn len(&self) -> usize {
         self.len.load(Ordering::Acquire)
     }
 
-    /// The most sectors that waited at once.
+    /// At once.
     pub const fn deepest(&self) -> usize {
         self.deepest
     }
@@ -82,7 +82,7 @@ impl SectorSink for SectorsIn<'_> {
     }
 }
 
-/// The sector queue's reading end.
+/// Reading end.
 pub struct SectorsOut<'a> {
     queue: StreamConsumer<&'a Queue>,
     len: &'a AtomicUsize,

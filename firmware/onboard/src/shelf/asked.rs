@@ -4,14 +4,14 @@ use hums_recorder::LogName;
 
 /// Bytes of a log in one answer.
 pub const DATA_MAX: usize = 240;
-/// Bytes of an answer's head.
+/// Of an answer.
 pub(super) const HEAD: usize = 36;
 /// The identity of a log, independent of the card's directory: another log of the same name differs in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogId {
     /// Its name.
     pub name: LogName,
-    /// The session of its first sector, a random number; 0 if unreadable.
+    /// Of its first sector, random; 0 if unreadable.
     pub session: u32,
     /// Its first sector's number in the session.
     pub first: u32,
@@ -22,7 +22,7 @@ impl LogId {
     pub const NONE: Self = Self { name: LogName { session: 0, segment: 0 }, session: 0, first: 0 };
 }
 
-/// The requested part of a log.
+/// Of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// Its length.
@@ -51,7 +51,7 @@ pub enum Which {
 /// A request; the ticket comes back with the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Want {
-    /// Distinguishes answers to this request from answers to earlier ones.
+    /// Tells answers from earlier ones.
     pub ticket: u16,
     /// The log.
     pub which: Which,
@@ -73,18 +73,18 @@ const FOUND: u16 = 0;
 const ABSENT: u16 = 1;
 const UNREAD: u16 = 2;
 
-/// The head of storage's answer.
+/// Head of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// The request's ticket.
     pub ticket: u16,
-    /// The number of logs; 0 also without a card, and if the directory was unreadable.
+    /// 0 also without a card, and if the directory was unreadable.
     pub count: u16,
     /// Whether the log was found.
     pub found: Result<(), NoLog>,
     /// The log's identity.
     pub log: LogId,
-    /// The log's length in bytes.
+    /// In bytes.
     pub bytes: u32,
     /// Time of its last write by its directory entry, in seconds since 1970 UTC; 0: unknown.
     pub utc_secs: u32,
@@ -95,7 +95,6 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// An answer for a log that does not exist.
     pub(super) const fn none(ticket: u16) -> Self {
         let found = Err(NoLog::Absent);
         Self { ticket, count: 0, found, log: LogId::NONE, bytes: 0, utc_secs: 0, offset: 0, directory: 0 }

@@ -34,7 +34,7 @@ pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
 /// Blocks of a checksum at a call: some 5 ms of a card on SPI, as a small answer takes.
 const SUM_BLOCKS: u32 = 4;
 
-/// Both queues; part of the firmware's one static.
+/// Part of the firmware's one static.
 pub struct Shelf {
     wants: spsc::Queue<Want, 3>,
     answers: Churrasco<ANSWER_BYTES>,
@@ -70,12 +70,12 @@ pub struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Sends a request; `false` while there is no room.
+    /// `false` without room.
     pub fn want(&mut self, want: Want) -> bool {
         self.wants.enqueue(want).is_ok()
     }
 
-    /// Shows the oldest answer, if there is one; it is removed if `look` returns `true`.
+    /// Removed if `look` returns `true`.
     pub fn answer(&mut self, look: impl FnOnce(&Answer, &[u8]) -> bool) -> bool {
         let Ok(grant) = self.answers.read() else { return false };
         let done = match grant.split_first_chunk::<HEAD>() {
@@ -93,11 +93,9 @@ impl Reader<'_> {
 pub struct Server<'a> {
     wants: spsc::Consumer<'a, Want>,
     answers: FramedProducer<&'a Churrasco<ANSWER_BYTES>>,
-    /// The log that was read last.
     last: Option<Found>,
-    /// A checksum in progress.
     sum: Option<Sum>,
-    /// The log that was found last by its place in the list.
+    /// Found last, by place.
     listed: Listed,
     /// An erase in progress, a block of the directory at a call: its next entry.
     erases: Option<u32>,
@@ -112,7 +110,6 @@ struct Listed {
     entry: u32,
 }
 
-/// A log, and its place.
 #[derive(Clone, Copy)]
 struct Found {
     answer: Answer,
@@ -128,12 +125,11 @@ struct Sum {
 }
 
 impl Server<'_> {
-    /// Whether a request waits.
+    /// Of the monitor.
     pub fn is_wanted(&self) -> bool {
         self.erases.is_some() || self.sum.is_some() || self.wants.ready()
     }
 
-    /// Answers a request for `PARAMS.TXT` with this text.
     #[cfg(test)]
     pub(crate) fn serve_text(&mut self, text: &[u8]) {
         let Some(Want { ticket, which: Which::Settings, what: What::Data(offset) }) = self.wants.dequeue()
@@ -149,7 +145,7 @@ impl Server<'_> {
         grant.commit((HEAD + data.len()) as u16);
     }
 
-    /// Does a part of a request, if there is one and room for its answer; whether there was.
+    /// If there is room for its answer; whether there was one.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         if let Some(entry) = self.erases {
             self.last = None;
@@ -167,7 +163,7 @@ impl Server<'_> {
         }
     }
 
-    /// Answers one request, or begins its checksum.
+    /// Or begins its checksum.
     fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
         let _ = self.wants.dequeue();
@@ -206,7 +202,7 @@ impl Server<'_> {
         true
     }
 
-    /// Continues a checksum, if there is one; sends its answer at the end.
+    /// Sends its answer at the end.
     fn add<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
             return false;
@@ -248,13 +244,13 @@ fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Opti
     more.is_ok_and(|more| more).then_some(entry + BLOCK_BYTES as u32 / 32)
 }
 
-/// The result of a search: the answer, and the segment if the log exists.
+/// With the segment if the log exists.
 struct Looked {
     answer: Answer,
     segment: Option<Segment>,
 }
 
-/// Finds the requested log, in the directory unless it is the last one.
+/// In the directory unless it is the last one.
 fn find<D: CardDevice>(
     recorder: &mut Recorder<'_, D>,
     want: &Want,
@@ -303,7 +299,7 @@ fn find<D: CardDevice>(
     Looked { answer, segment: Some(segment) }
 }
 
-/// The log at this place of the list; the search starts at the previous result if the directory is the same.
+/// Starts at the previous result if the directory is the same.
 fn at_place<D: CardDevice>(
     card: &Card<'_, D>,
     place: u16,
@@ -320,7 +316,7 @@ fn at_place<D: CardDevice>(
     Ok(found.map(|(_, log)| log))
 }
 
-/// Copies bytes from the answer's offset on; returns their number.
+/// From the answer's offset on; returns their number.
 fn copy<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, answer: &Answer, to: &mut [u8]) -> usize {
     let end = answer.offset.saturating_add(to.len().min(DATA_MAX) as u32).min(answer.bytes);
     let mut done = 0;

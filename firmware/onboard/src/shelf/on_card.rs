@@ -51,12 +51,12 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         &self.block
     }
 
-    /// The number of blocks for sectors.
+    /// For sectors.
     const fn limit(&self) -> u32 {
         data_blocks(self.segment.blocks())
     }
 
-    /// The session and the number of the segment's first sector, by the first readable one.
+    /// By the first readable one.
     fn begin(&mut self) -> Option<(u32, u32)> {
         let limit = self.limit();
         let far = (LOST_MAX..limit).step_by(LOST_MAX as usize);
@@ -66,7 +66,7 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         })
     }
 
-    /// Recorded blocks of the session, from the sector with this number on.
+    /// Of the session, from this number on.
     fn recorded(&mut self, session: u32, first: u32) -> u32 {
         let limit = self.limit();
         let mut end = self.covered(session, first).max(1);
@@ -108,14 +108,14 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
     }
 }
 
-/// Whether the segment still holds this log; `None` if the card does not answer.
+/// `None` if the card does not answer.
 pub(super) fn holds<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, log: &LogId) -> Option<bool> {
     let mut blocks = Blocks::of(card, segment);
     let begin = blocks.begin().or((!blocks.has_lost).then_some((0, 0)))?;
     Some(begin == (log.session, log.first))
 }
 
-/// The identity of a segment's log, and its recorded blocks; `None` if the card does not answer.
+/// With recorded blocks; `None` if the card does not answer.
 pub(super) fn measure<D: CardDevice>(
     card: &Card<'_, D>,
     segment: &mut Segment,
@@ -130,7 +130,7 @@ pub(super) fn measure<D: CardDevice>(
     (!blocks.is_gone).then_some((LogId { name, session, first }, recorded))
 }
 
-/// The same for the log in work: its finished part. Earlier data in the file is excluded.
+/// The log in work: its finished part, without earlier data.
 pub(super) fn in_work(log: &InWork) -> (LogId, u32) {
     let InWork { name, session, first, blocks } = *log;
     let log = if blocks > 0 { LogId { name, session, first } } else { LogId { name, ..LogId::NONE } };

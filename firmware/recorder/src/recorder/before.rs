@@ -59,7 +59,6 @@ fn end_of<D: CardDevice>(
     };
     let Some((mut last, mut header)) = begin else { return Ok(None) };
     let session = header.session;
-    // The number of the segment's first sector.
     let base = header.number.wrapping_sub(last);
     let mut end = data_blocks(reader.segment.blocks());
     while last + 1 < end {
@@ -83,20 +82,19 @@ fn end_of<D: CardDevice>(
     }))
 }
 
-/// The first sound sector of a segment.
 fn first<D: CardDevice>(card: &Card<'_, D>, entry: &LogEntry) -> Result<Option<Header>, CardError<D::Error>> {
     let mut segment = Segment::of(entry);
     let mut reader = Reader { card, segment: &mut segment, block: [0; BLOCK_BYTES] };
     Ok(reader.probe(0, |_| true)?.map(|(_, header)| header))
 }
 
-/// Whether a sector's number comes after another one's, modulo 2^32.
+/// Modulo 2^32.
 const fn is_later(number: u32, than: u32) -> bool {
     let ahead = number.wrapping_sub(than);
     ahead > 0 && ahead < 1 << 31
 }
 
-/// Reads a segment's blocks one by one.
+/// One by one.
 struct Reader<'r, 'a, D: CardDevice> {
     card: &'r Card<'a, D>,
     segment: &'r mut Segment,
@@ -104,13 +102,12 @@ struct Reader<'r, 'a, D: CardDevice> {
 }
 
 impl<D: CardDevice> Reader<'_, '_, D> {
-    /// The sector in this block, if there is one.
     fn header(&mut self, at: u32) -> Result<Option<Header>, CardError<D::Error>> {
         self.card.read(self.segment, at, &mut self.block)?;
         Ok(Header::read(&self.block).ok())
     }
 
-    /// The first sound sector from this block on that fits.
+    /// From this block on.
     fn probe(
         &mut self,
         from: u32,

@@ -16,11 +16,11 @@ const SEGMENTS_MIN: u64 = 16;
 /// Bytes of a segment after a refused write: 30 s of a full line (921,600 baud).
 const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
 
-/// The session's log on the present card.
+/// On the present card.
 #[derive(Clone, Copy)]
 pub(super) struct Log {
     pub(super) name: LogName,
-    /// The session number in the seal of its sectors.
+    /// In its sectors.
     pub(super) session: u32,
     volume_id: u32,
     /// The sector number at block 0 of the open segment; `None` before the first sector.
@@ -40,13 +40,12 @@ pub(super) enum NewestCopy {
     Further,
 }
 
-/// The session's segments on the present card.
 pub(super) struct Segments<'a> {
     status: &'a CardStatus,
-    /// Any number that differs from one power-on to the next.
+    /// Differs from power-on to power-on.
     entropy: u32,
     pub(super) log: Option<Log>,
-    /// The present card has a segment of it.
+    /// On the present card.
     pub(super) is_open: bool,
     /// The newest segments on the card from before the session, until they were read.
     earlier: Newest,
@@ -59,7 +58,7 @@ impl<'a> Segments<'a> {
         Self { status, entropy, log: None, is_open: false, earlier: Newest::new(), is_dated: false }
     }
 
-    /// A number for a card that is formatted now.
+    /// For a card that is formatted now.
     pub(super) const fn volume_id(&self, now: Instant) -> u32 {
         mix(self.entropy, now.as_micros() as u32)
     }
@@ -124,7 +123,6 @@ impl<'a> Segments<'a> {
         }
     }
 
-    /// Whether the open segment has a sector.
     pub(super) fn has_sector(&self) -> bool {
         self.log.is_some_and(|log| log.base.is_some())
     }
@@ -140,7 +138,6 @@ impl<'a> Segments<'a> {
         self.open(log.name.next_segment().ok_or(CardError::Full)?, is_short, card)
     }
 
-    /// Makes a segment, or overwrites the oldest log on a full card.
     fn open<D: CardDevice>(
         &mut self,
         name: LogName,

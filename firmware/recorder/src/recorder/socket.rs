@@ -1,4 +1,4 @@
-//! The card slot: a device without a usable card, a mounted card, or a card that is being formatted.
+//! The card's slot.
 
 use super::Buffers;
 use crate::CardDevice;
@@ -11,10 +11,9 @@ use crate::status::CardStatus;
     reason = "one of these exists, in a static: its largest variant is the budget"
 )]
 pub(super) enum Socket<'a, D: CardDevice> {
-    /// The device, while no usable card is in it.
+    /// Without a usable card.
     Waiting(D),
     Mounted(Card<'a, D>),
-    /// A card that is being formatted.
     Formatting(D, Formatting),
     /// Only while the value is replaced.
     Moving,
@@ -66,7 +65,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         true
     }
 
-    /// Formats a little further; whether it is done, and `None` if no card is being formatted.
+    /// Whether it is done; `None` if nothing is being formatted.
     pub(super) fn format(&mut self) -> Option<Result<bool, FormatError<D::Error>>> {
         let Self::Formatting(device, formatting) = self else { return None };
         let done = formatting.step(device);
@@ -78,7 +77,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         Some(done)
     }
 
-    /// Tells the device that a service of storage begins: its time limit starts anew.
+    /// Its time limit starts anew.
     pub(super) fn begin_service(&self) {
         match self {
             Self::Waiting(device) | Self::Formatting(device, _) => device.begin_service(),
@@ -87,7 +86,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         }
     }
 
-    /// Repetitions by the device since the last call.
+    /// By the device, since the last call.
     pub(super) fn take_retries(&self) -> u32 {
         match self {
             Self::Mounted(card) => card.device().take_retries(),

@@ -5,7 +5,7 @@ use crate::layout::{EXFAT_TYPE, LayoutError};
 use crate::status::CardState;
 use crate::{CardDevice, Trouble};
 
-/// The reported state of a card with this error.
+/// For the pilot.
 pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
     match error {
         CardError::Device(error) => match D::trouble(error) {
@@ -22,7 +22,7 @@ pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
     }
 }
 
-/// Whether a refused sector may still be written to this card now, if need be to a new segment.
+/// On this card, if need be in a new segment.
 pub(super) fn may_work_elsewhere<D: CardDevice>(error: &CardError<D::Error>) -> bool {
     match error {
         CardError::Full | CardError::Searching => false,

@@ -26,7 +26,6 @@ pub(super) fn crc16(bytes: &[u8]) -> u16 {
 mod tests {
     use super::*;
 
-    /// The specification's own examples.
     #[test]
     fn checksums_are_those_of_the_specification() {
         assert_eq!(crc7(&[0x40, 0, 0, 0, 0]), 0x95, "CMD0");

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::Trouble;
 
-/// Why an access failed.
+/// Of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpiError {
     /// The board's bus failed.
@@ -36,12 +36,12 @@ pub enum SpiError {
 }
 
 impl SpiError {
-    /// Whether the same access may work a moment later.
+    /// A moment later.
     pub(super) const fn is_passing(self) -> bool {
         matches!(self, Self::NoAnswer | Self::Refused(_) | Self::NoData | Self::Token(_) | Self::Damaged)
     }
 
-    /// Whether the card must be identified again before the next access.
+    /// Before the next access.
     pub(super) const fn has_lost_card(self) -> bool {
         const IDLE: u8 = 1;
         match self {
@@ -56,7 +56,7 @@ impl SpiError {
         }
     }
 
-    /// The consequence for recording.
+    /// For recording.
     pub const fn trouble(self) -> Trouble {
         match self {
             Self::NoAnswer | Self::Changed => Trouble::Gone,

@@ -38,9 +38,9 @@ const WAKE: [u8; 10] = [0xFF; 10];
 /// An identified card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
-    /// The card's unique identity (CID register).
+    /// CID register.
     pub(super) cid: [u8; 16],
-    /// Its number of blocks, and whether they may be written.
+    /// Number of blocks, and whether they may be written.
     pub(super) csd: Csd,
     /// Blocks are addressed by their first byte: cards up to 2 GB.
     pub(super) by_bytes: bool,

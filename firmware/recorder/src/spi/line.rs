@@ -24,10 +24,9 @@ const APP: u8 = 55;
 /// Bits of the second byte of a status: locked, and write protected (7.3.2.3).
 const STATUS_LOCKED: u8 = 0x01 | 0x20;
 
-/// The bus, with the common time limit of all waits.
 pub(super) struct Line<P> {
     pub(super) port: P,
-    /// The time limit of the present service.
+    /// Of the present service.
     pub(super) deadline: Option<Instant>,
     /// Blocks carry checksums that count.
     pub(super) checks: bool,
@@ -60,7 +59,7 @@ impl<P: Port> Line<P> {
         Ok(byte[0])
     }
 
-    /// Repeats `step` until it returns a value; fails with `late` after `limit`.
+    /// `late` after `limit`.
     pub(super) fn within<T>(
         &mut self,
         limit: Span,
@@ -82,7 +81,6 @@ impl<P: Port> Line<P> {
         }
     }
 
-    /// Waits until the card is ready.
     pub(super) fn ready(&mut self, limit: Span) -> Result<(), SpiError> {
         self.within(limit, SpiError::Busy, |line| {
             // Several at a time: the last one counts.
@@ -92,7 +90,7 @@ impl<P: Port> Line<P> {
         })
     }
 
-    /// Sends a command without waiting for the card; the first byte of its answer.
+    /// Does not wait for the card; returns the first byte of the answer.
     pub(super) fn command_now(&mut self, command: u8, argument: u32) -> Result<u8, SpiError> {
         let [a, b, c, d] = argument.to_be_bytes();
         let mut frame = [0x40 | command, a, b, c, d, 0];
@@ -111,13 +109,13 @@ impl<P: Port> Line<P> {
         Err(SpiError::NoAnswer)
     }
 
-    /// As [`Self::command_now`], once the card is ready.
+    /// Once the card is ready.
     pub(super) fn command(&mut self, command: u8, argument: u32) -> Result<u8, SpiError> {
         self.ready(BUSY_MAX)?;
         self.command_now(command, argument)
     }
 
-    /// A command of an identified card, which must take it.
+    /// Must be taken.
     pub(super) fn must(&mut self, command: u8, argument: u32) -> Result<(), SpiError> {
         match self.command(command, argument)? {
             0 => Ok(()),
@@ -125,13 +123,12 @@ impl<P: Port> Line<P> {
         }
     }
 
-    /// An application command; its answer.
+    /// Returns its answer.
     pub(super) fn app_command(&mut self, command: u8, argument: u32) -> Result<u8, SpiError> {
         self.command(APP, 0)?;
         self.command(command, argument)
     }
 
-    /// Receives one block, of any length.
     pub(super) fn receive(&mut self, block: &mut [u8]) -> Result<(), SpiError> {
         let token = self.within(DATA_MAX, SpiError::NoData, |line| {
             Ok(Some(line.byte()?).filter(|token| *token != 0xFF))

@@ -33,7 +33,7 @@ use line::{Line, TOKEN_MANY, TOKEN_ONE};
 
 /// Time limit of all waits of one service together. Storage must report in every 10 s.
 pub const SERVICE_MAX: Span = Span::from_secs(8);
-/// Tries of an access whose failure may be temporary.
+/// Of a failure that may be temporary.
 pub const TRIES: u32 = 3;
 
 const READ: u8 = 17;
@@ -51,14 +51,14 @@ struct Inner<P> {
     line: Line<P>,
     /// `None`: the card must be identified before it is used.
     card: Option<Identity>,
-    /// The identity of the last card.
+    /// Of the last card.
     cid: Option<[u8; 16]>,
-    /// Repeated accesses since the last call.
+    /// Since the last call.
     retries: u32,
 }
 
 impl<P: Port> SpiCard<P> {
-    /// The card at this port; it is looked for at the first access.
+    /// Looked for at the first access.
     pub const fn new(port: P) -> Self {
         let line = Line { port, deadline: None, checks: false, busy_times: 0 };
         Self { inner: RefCell::new(Inner { line, card: None, cid: None, retries: 0 }) }
@@ -66,7 +66,6 @@ impl<P: Port> SpiCard<P> {
 }
 
 impl<P: Port> Inner<P> {
-    /// The card, identified if it is not.
     fn card(&mut self) -> Result<Identity, SpiError> {
         if let Some(card) = self.card {
             return Ok(card);
@@ -80,7 +79,6 @@ impl<P: Port> Inner<P> {
         Ok(card)
     }
 
-    /// Accesses the card, with repetitions if these may help.
     fn access<T>(
         &mut self,
         mut act: impl FnMut(&mut Line<P>, &Identity) -> Result<T, SpiError>,
@@ -120,7 +118,6 @@ fn read<P: Port>(line: &mut Line<P>, address: u32, blocks: &mut [Block]) -> Resu
     }
     line.must(READ_MANY, address)?;
     let received = blocks.iter_mut().try_for_each(|block| line.receive(block));
-    // The first error counts.
     let stopped = line.stop_reading();
     received.and(stopped)
 }
@@ -150,7 +147,6 @@ fn give_many<P: Port>(line: &mut Line<P>, address: u32, blocks: &[Block]) -> Res
     match blocks.iter().try_for_each(|block| line.give(TOKEN_MANY, block)) {
         Ok(()) => line.stop(),
         Err(error) => {
-            // The first error counts.
             let _ = line.abort();
             Err(error)
         }

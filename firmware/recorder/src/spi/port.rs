@@ -1,8 +1,8 @@
-//! The driver's needs of a board: a bus, a select pin and a clock.
+//! The driver's needs of a board.
 
 use hums_core::clock::Instant;
 
-/// The speed of the bus.
+/// Of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// At most 400 kHz, which every card takes before identification (SD specification, 4.2.1).
@@ -17,18 +17,18 @@ pub struct PortFailed;
 
 /// A board's SPI port to a card: mode 0, most significant bit first, input pulled up.
 pub trait Port {
-    /// Drives the select pin: low when `selected`.
+    /// Low when `selected`.
     fn select(&mut self, selected: bool);
 
-    /// Sends these bytes, and replaces them by the received ones.
+    /// Replaces bytes by the received ones.
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed>;
 
-    /// Sends these bytes and drops the received ones.
+    /// Drops received bytes.
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed>;
 
     /// Sets the bus's speed.
     fn set_clock(&mut self, clock: Clock);
 
-    /// The time for the driver's limits.
+    /// For the driver's limits.
     fn now(&self) -> Instant;
 }

@@ -1,6 +1,6 @@
 //! The card's own data: the CSD (SD specification, 5.3).
 
-/// The relevant fields of the CSD.
+/// Relevant fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Csd {
     /// Blocks of 512 bytes.

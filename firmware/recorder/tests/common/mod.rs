@@ -8,7 +8,7 @@ use std::rc::Rc;
 use hums_recorder::format::format;
 use hums_recorder::{Block, Buffers, CardDevice};
 
-/// Blocks of a mebibyte.
+/// Of a mebibyte.
 pub const MIB_BLOCKS: u32 = 2048;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use super::Element;
 use crate::coder::Coder;
 use crate::distribution::{Cdf, SYMBOLS};
 
-/// Distributions of elements and of times at most.
+/// For elements and times.
 const BLOCKS: usize = 432;
 
 /// Kinds whose elements behave alike: integers of 1, 2 and 4 bytes, floats, decimal floats, random floats, times, computed floats.
@@ -18,13 +18,12 @@ pub(super) const RANDOM_FLOAT: usize = 5;
 pub(super) const TIME: usize = 6;
 pub(super) const COMPUTED: usize = 7;
 
-/// Which of the distributions by the class before a kind has; random and computed floats have none.
+/// Random and computed floats have none.
 const AFTER: [usize; KINDS] = [0, 0, 0, 1, 2, NONE, 3, NONE];
 const NONE: usize = usize::MAX;
 
 const CALM: Cdf = Cdf::from_sizes([600, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20]);
 
-/// The distributions of classes.
 pub(crate) struct Distributions {
     blocks: [Cdf; BLOCKS],
     used: u16,
@@ -71,7 +70,7 @@ impl Distributions {
         self.blocks.get_mut(usize::from(number).wrapping_sub(1))
     }
 
-    /// Codes a class with the element's distribution. An element without one gets one at its first change.
+    /// An element without a distribution gets one at its first change.
     #[expect(clippy::inline_always, reason = "so that each use has its kind as a constant")]
     #[inline(always)]
     pub(super) fn class<C: Coder>(
@@ -113,7 +112,7 @@ impl Distributions {
         symbol
     }
 
-    /// The same for a value that may be the first one.
+    /// For a value that may be the first one.
     #[inline]
     pub(super) fn class_or_first<C: Coder>(
         &mut self,

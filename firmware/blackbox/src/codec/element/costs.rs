@@ -3,10 +3,9 @@
 /// Predictions that are weighed.
 pub(super) const PREDICTIONS: usize = 6;
 
-/// Initial cost of a prediction.
 const UNKNOWN: u8 = 100;
 
-/// Costs of up to six predictions: four in a word, which are charged in one step, and two more.
+/// Four in a word, which are charged in one step, and two more.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Costs {
     /// Bytes, to keep the element small.
@@ -24,13 +23,12 @@ impl Costs {
         u32::from_le_bytes(self.first)
     }
 
-    /// The cost of one of the first four.
     #[inline]
     pub(super) const fn of(self, prediction: usize) -> u32 {
         self.word() >> (8 * prediction) & 0xff
     }
 
-    /// The first one with the least cost among the first `COUNT`, and that cost.
+    /// The first one of the first `COUNT`, and its cost.
     #[inline]
     pub(super) fn cheapest<const COUNT: usize>(self) -> (usize, u32) {
         let mut best = (0, self.of(0));
@@ -44,7 +42,7 @@ impl Costs {
         best
     }
 
-    /// Adds the errors of the first four: each cost first falls by an eighth.
+    /// Each cost first falls by an eighth.
     #[inline]
     pub(super) fn charge(&mut self, errors: [i32; 4]) {
         // Adds four bytes at once. All sums stay below 256, so intermediate carries cancel.
@@ -57,7 +55,7 @@ impl Costs {
         self.first = sum.to_le_bytes();
     }
 
-    /// The same where all were off by as much.
+    /// All were off by as much.
     #[inline]
     pub(super) fn charge_all(&mut self, error: i32) {
         let word = self.word();
@@ -65,7 +63,6 @@ impl Costs {
         self.first = (word - eighths + length(error) * 0x0101_0101).to_le_bytes();
     }
 
-    /// Adds the error of one of the other two.
     #[inline]
     pub(super) fn charge_more(&mut self, prediction: usize, error: i32) {
         if let Some(cost) = self.more.get_mut(prediction.wrapping_sub(4)) {

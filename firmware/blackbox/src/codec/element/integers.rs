@@ -12,7 +12,6 @@ const LINKED: usize = 3;
 const AS_LINK: usize = 4;
 
 impl Distributions {
-    /// Codes the value's bits.
     #[inline(never)]
     pub(crate) fn integer<C: Coder>(
         &mut self,

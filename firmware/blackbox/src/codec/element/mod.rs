@@ -21,7 +21,6 @@ pub(crate) const ELEMENTS: usize = 544;
 /// An element that has not changed for 8 frames is quiet: one of these bits of the count is set.
 const QUIET: u8 = 0x38;
 
-/// How an element is coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum What {
@@ -63,26 +62,24 @@ impl What {
         }
     }
 
-    /// Whether it takes two elements.
     pub(crate) const fn is_wide(self) -> bool {
         matches!(self, Self::Wide | Self::WideTime)
     }
 }
 
-/// State of one element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Element {
     /// The last value's bits; of a 64-bit element the lower half.
     pub(crate) last: u32,
     /// The last difference.
     step: i32,
-    /// The clock at the last value, or the linked number's bits; for a text, the place of its copy.
+    /// Clock at the last value, or the linked number's bits; for a text, the place of its copy.
     pub(crate) aux: u32,
     costs: Costs,
     /// Its own distribution, and the one for its other mode; 0: none yet.
     block: u16,
     other: u16,
-    /// Its coding, a [`What`].
+    /// A [`What`].
     kind: u8,
     /// For a text or instance its bytes; for a number its row in the table of links.
     detail: u8,
@@ -138,32 +135,28 @@ impl Element {
         }
     }
 
-    /// How it is coded.
     #[inline]
     pub(crate) const fn what(&self) -> What {
         What::of(self.kind)
     }
 
-    /// Whether it has a last value.
     #[inline]
     pub(crate) const fn known(&self) -> bool {
         self.quiet & KNOWN != 0
     }
 
-    /// Whether it has not changed for long.
     #[inline]
     pub(crate) const fn is_quiet(&self) -> bool {
         self.quiet & QUIET != 0
     }
 
-    /// The bits of a quiet element: one is set if the element is quiet. `any_quiet` reads them or-ed for many
-    /// elements.
+    /// `any_quiet` reads them or-ed for many elements.
     #[inline]
     pub(crate) const fn quiet_bits(&self) -> u8 {
         self.quiet
     }
 
-    /// Whether one of the elements was quiet whose bits were or-ed.
+    /// `bits`: or-ed for many elements.
     #[inline]
     pub(crate) const fn any_quiet(bits: u8) -> bool {
         bits & QUIET != 0
@@ -221,7 +214,6 @@ impl Element {
         self.decimal = self.decimal & !DECIMALS | decimals;
     }
 
-    /// The class of the last difference.
     #[inline]
     fn class(&self) -> usize {
         usize::from((self.decimal & CLASS) >> CLASS_AT)
@@ -233,7 +225,6 @@ impl Element {
     }
 }
 
-/// State of the frame.
 pub(crate) struct Context {
     /// Milliseconds since the last frame of this slot.
     pub(crate) elapsed_ms: u32,
@@ -247,7 +238,6 @@ pub(crate) struct Context {
     pub(crate) link: Option<(f32, bool)>,
 }
 
-/// The elements of a group, in the order in which slots claimed them.
 pub(crate) struct Elements {
     pub(crate) list: [Element; ELEMENTS],
     used: u16,
@@ -262,7 +252,6 @@ impl Elements {
         self.used = 0;
     }
 
-    /// Room for `count` elements.
     pub(crate) fn claim(&mut self, count: usize) -> Option<u16> {
         let first = self.used;
         if usize::from(first) + count > ELEMENTS {
@@ -277,7 +266,7 @@ impl Elements {
 mod tests {
     use super::*;
 
-    /// A flipped kind must still be a valid kind, because the image jumps by it.
+    /// The image jumps by it.
     #[test]
     fn whatever_memory_holds_is_a_kind() {
         for kind in 0..=u8::MAX {

@@ -11,7 +11,6 @@ pub(crate) fn integer_class(magnitude: u32) -> usize {
     ((32 - magnitude.leading_zeros()) as usize).min(ESCAPE)
 }
 
-/// Sign and lower bits of an integer difference.
 #[inline]
 pub(crate) fn integer_rest<C: Coder>(coder: &mut C, class: usize, difference: i32) -> i32 {
     match class {
@@ -33,7 +32,7 @@ pub(crate) fn integer_rest<C: Coder>(coder: &mut C, class: usize, difference: i3
     }
 }
 
-/// Sign and `bits` lower bits below a leading one.
+/// Below a leading one.
 #[inline(never)]
 fn signed_rest<C: Coder>(coder: &mut C, difference: i32, bits: u32) -> i32 {
     let magnitude = difference.unsigned_abs();
@@ -61,7 +60,6 @@ pub(super) fn float_class(magnitude: u32) -> usize {
     usize::from(CLASSES[(32 - magnitude.leading_zeros()) as usize])
 }
 
-/// Sign and lower bits of a float's difference.
 #[inline]
 pub(super) fn float_rest<C: Coder>(coder: &mut C, class: usize, difference: i32) -> i32 {
     let magnitude = difference.unsigned_abs();

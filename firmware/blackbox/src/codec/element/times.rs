@@ -17,7 +17,6 @@ const BY_CLOCK: usize = 3;
 const SAME_CLOCK: usize = 4;
 
 impl Distributions {
-    /// A time of 4 bytes.
     #[inline(never)]
     pub(crate) fn time<C: Coder>(
         &mut self,

@@ -7,10 +7,9 @@
 
 use hums_link::ftp;
 
-/// The address of the general file, as sent in `COMPONENT_METADATA`.
+/// Sent in `COMPONENT_METADATA`.
 pub(in crate::companion) const GENERAL_URI: &str = "mftp://[;comp=191]/general.json";
 
-/// A file of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::companion) enum BuiltinFile {
     /// The list of the others (`COMP_METADATA_TYPE_GENERAL`).
@@ -20,7 +19,7 @@ pub(in crate::companion) enum BuiltinFile {
 }
 
 impl BuiltinFile {
-    /// The file of this name, with or without the directory before it.
+    /// With or without the directory before it.
     pub(super) fn named(path: &str) -> Option<Self> {
         match path.strip_prefix('/').unwrap_or(path) {
             "general.json" => Some(Self::General),
@@ -37,7 +36,7 @@ impl BuiltinFile {
         }
     }
 
-    /// Its checksum, by which a ground station recognises a known version.
+    /// A ground station recognises a known version by it.
     pub(in crate::companion) const fn crc(self) -> u32 {
         const GENERAL: u32 = ftp::checksum_of(BuiltinFile::General.bytes());
         const PARAMETERS: u32 = ftp::checksum_of(BuiltinFile::Parameters.bytes());

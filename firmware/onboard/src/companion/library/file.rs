@@ -21,13 +21,10 @@ const BURST_BYTES: u32 = 64 * ftp::DATA_MAX as u32;
 /// The open file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Open {
-    /// A log on the card.
     Log(LogId),
-    /// A file of the firmware's own.
     Builtin(BuiltinFile),
 }
 
-/// An answer in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Job {
     reply: ftp::Reply,
@@ -36,24 +33,34 @@ pub(super) struct Job {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// An answer that needs nothing from the card.
+    /// Needs nothing from the card.
     Say(Option<Error>),
-    /// One entry of the directory, by place.
+    /// By place.
     List(u16),
-    /// A log to open.
     Open(LogName),
-    /// An answer that is a number: the length or the checksum of a file that the firmware holds.
+    /// Length or checksum of a file that the firmware holds.
     Number(u32),
-    /// Bytes of the open file from the reply's offset on, `size` of them in each message.
-    Read { of: Open, size: u8 },
-    /// The same, message after message; `left` bytes of the burst remain.
-    Burst { of: Open, size: u8, left: u32 },
-    /// The checksum of the file's first `bytes`; 0 is all.
-    Checksum { name: LogName, bytes: u32, sum: Option<u32> },
+    /// From the reply's offset on, `size` in each message.
+    Read {
+        of: Open,
+        size: u8,
+    },
+    /// Message after message; `left` bytes of the burst remain.
+    Burst {
+        of: Open,
+        size: u8,
+        left: u32,
+    },
+    /// Of the first `bytes`; 0 is all.
+    Checksum {
+        name: LogName,
+        bytes: u32,
+        sum: Option<u32>,
+    },
 }
 
 impl Job {
-    /// The answer to a client's request, with this file open.
+    /// With this file open.
     pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<Open>) -> Self {
         let mut reply = ftp::Reply::to(asked);
         let kind = match asked.operation {
@@ -182,7 +189,7 @@ impl Job {
                 step
             }
             (Kind::Read { .. } | Kind::Burst { .. }, Some((answer, data))) => {
-                // Without the part that was sent before the port was full.
+                // Sent before the port was full.
                 let rest = data.get(reply.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
                 self.read(answer.bytes, rest, &mut buffer, out)
             }
@@ -195,7 +202,6 @@ impl Job {
                 let rest = bytes.get(self.reply.offset as usize..).unwrap_or_default();
                 self.read(bytes.len() as u32, rest, &mut buffer, out)
             }
-            // A request to the card without an answer.
             (_, None) => Step::Done,
         }
     }
@@ -256,7 +262,7 @@ impl Job {
     }
 }
 
-/// `/00042_07.HUM`, with or without a directory before it.
+/// `/00042_07.HUM`, with or without a directory.
 fn name(path: &str) -> Option<LogName> {
     let (base, extension) = path.rsplit('/').next()?.split_once('.')?;
     LogName::from_short(base.as_bytes(), extension.as_bytes())

@@ -14,23 +14,22 @@ use crate::shelf::{Answer, LogId, NoLog, What, Which};
 /// Bytes in one `LOG_DATA`.
 const DATA_BYTES: usize = 90;
 
-/// The memory of lists and downloads, so that a number keeps its log.
+/// A number keeps its log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Places {
-    /// Number of the directory when the list began.
+    /// When the list began.
     listed: Option<u32>,
     download: Option<Download>,
-    /// A refusal was reported since.
+    /// A refusal, since then.
     told: bool,
 }
 
-/// The download that was begun last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Download {
     id: u16,
     /// `None` once the log is gone.
     log: Option<LogId>,
-    /// The list of the number.
+    /// Of the number.
     listed: Option<u32>,
 }
 
@@ -44,7 +43,7 @@ impl Places {
         self.download = None;
     }
 
-    /// The log to read, with this many bytes read before; `None`: it is gone.
+    /// With this many bytes read before; `None`: it is gone.
     fn wanted(&self, id: u16, offset: u32) -> Option<Which> {
         let place = Which::At(id.saturating_sub(1));
         match self.download.filter(|download| download.id == id) {
@@ -74,17 +73,17 @@ impl Places {
     }
 }
 
-/// A list in progress: entries by place, from 0.
+/// By place, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct List {
     next: u16,
     last: u16,
-    /// The card could not read one, which is left out.
+    /// The card could not read one.
     lacks: bool,
 }
 
 impl List {
-    /// Entries with numbers from `first` to `last`.
+    /// Numbers from `first` to `last`.
     pub(super) fn new(first: u16, last: u16) -> Self {
         Self { next: first.saturating_sub(1), last: last.saturating_sub(1), lacks: false }
     }
@@ -93,7 +92,7 @@ impl List {
         (Which::At(self.next), What::Length)
     }
 
-    /// The end of the list, with a report if a log was left out.
+    /// With a report if a log was left out.
     const fn end(&self) -> Step {
         if self.lacks { Step::End(Reply::LogsUnread) } else { Step::Done }
     }
@@ -131,7 +130,6 @@ impl List {
     }
 }
 
-/// Requested bytes of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Data {
     id: u16,
@@ -141,7 +139,7 @@ pub(super) struct Data {
 }
 
 impl Data {
-    /// `None` if there is nothing to read.
+    /// `None`: nothing to read.
     pub(super) fn new(id: u16, offset: u32, count: u32, places: &Places) -> Option<Self> {
         let which = places.wanted(id, offset)?;
         Some(Self { id, which, offset, end: offset.saturating_add(count) })
@@ -184,7 +182,7 @@ impl Data {
     }
 
     fn send(&mut self, answer: &Answer, data: &[u8], out: &mut Out<'_, '_, '_>) -> Step {
-        // Without the part that was sent before the port was full.
+        // Sent before the port was full.
         let mut rest = data.get(self.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
         loop {
             let wanted = (self.end.saturating_sub(self.offset) as usize).min(DATA_BYTES);

@@ -1,9 +1,8 @@
 //! Logs for download: `LOG_REQUEST_LIST`, `LOG_REQUEST_DATA` as ground stations speak them ([`log`]), and MAVLink FTP
 //! (`file`), which also has the files that the firmware holds itself ([`builtin`]).
 //!
-//! One conversation at a time: a new request ends the previous one. No client can fill a memory here: if a request or
-//! its answer is lost, the client asks again, from any offset. All data goes out in the class `Bulk`, in the rest of
-//! the port's budget.
+//! One conversation at a time: a client whose request or answer is lost asks again, from any offset. All data goes
+//! out in the class `Bulk`, in the rest of the port's budget.
 //!
 //! ```text
 //! question -> job -> what it wants of the card -> storage's answer -> messages -> what it wants next, or the end
@@ -33,13 +32,11 @@ const LOOKS_MAX: usize = 64;
 pub(crate) struct Library {
     job: Option<Job>,
     ticket: u16,
-    /// The next part has been requested.
     asked: bool,
     /// Earlier logs are to be erased.
     pub(crate) erases: bool,
-    /// The meaning of log numbers.
     places: Places,
-    /// The file that is open over FTP.
+    /// Over FTP.
     open: Option<Open>,
 }
 
@@ -66,7 +63,7 @@ impl Kind {
     }
 }
 
-/// An answer of the card, as a copy, because sending needs all queues.
+/// A copy: sending needs all queues.
 type Answered = (Answer, heapless::Vec<u8, DATA_MAX>);
 
 impl Library {
@@ -74,7 +71,7 @@ impl Library {
         Self { job: None, ticket: 0, asked: false, erases: false, places: Places::new(), open: None }
     }
 
-    /// The number of a new request. An answer to the previous one is no longer awaited.
+    /// An earlier answer is no longer awaited.
     pub(crate) const fn next_ticket(&mut self) -> u16 {
         self.ticket = self.ticket.wrapping_add(1);
         self.asked = false;
@@ -86,7 +83,7 @@ impl Library {
         self.next_ticket();
     }
 
-    /// Takes a request; `false` unless it is about logs.
+    /// `false` unless it is about logs.
     pub(crate) fn asked(&mut self, asker: Asker, request: &Request<'_>) -> bool {
         match *request {
             Request::LogList(first, last) => self.begin(asker, Kind::List(log::List::new(first, last))),
@@ -115,8 +112,7 @@ impl Library {
         self.begin(asker, Kind::File(file));
     }
 
-    /// Continues the conversation as far as the card's answers and the port's budget allow; returns a report of its
-    /// end.
+    /// As far as answers and budget allow; returns a report of its end.
     pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();
@@ -150,11 +146,10 @@ impl Library {
         None
     }
 
-    /// The answer to a request, if it has come, which stays in the queue; sends the request if that is still to do.
+    /// Stays in the queue; sends the request if still to do.
     fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
         let ticket = self.ticket;
         let mut seen = None;
-        // Answers to earlier requests are dropped.
         while seen.is_none()
             && ways.queues.shelf.answer(|answer, data| {
                 if answer.ticket == ticket {
@@ -173,14 +168,12 @@ impl Library {
         seen
     }
 
-    /// Sends an answer's content.
     fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut Out<'_, '_, '_>) -> Step {
         let answer = answered.map(|(answer, data)| (answer, data.as_slice()));
         match (&mut job.kind, answer) {
             (Kind::List(list), Some((answer, _))) => list.step(answer, &mut self.places, out),
             (Kind::Data(data), Some(answer)) => data.step(answer, &mut self.places, out),
             (Kind::File(file), answer) => file.step(answer, &mut self.open, out),
-            // Both need the card.
             (Kind::List(_) | Kind::Data(_), None) => Step::Done,
         }
     }

@@ -1,4 +1,4 @@
-//! The result of one look at an answer of the card, and the way to the asker.
+//! The result of a look at the card's answer, and the way to the asker.
 
 use hums_core::clock::Instant;
 use hums_link::messages;
@@ -9,7 +9,6 @@ use hums_link::request::Reply;
 use super::super::limiter::Asker;
 use super::super::ways::Ways;
 
-/// The result of one look at an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// The port is full: the same again later.
@@ -24,10 +23,9 @@ pub(super) enum Step {
 
 /// Bytes that an FTP message adds to its data, signed: frame, target, head.
 const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
-/// The least data that is worth such a message.
+/// Worth a message.
 const FTP_DATA_MIN: usize = 20;
 
-/// The way to the asker.
 pub(super) struct Out<'o, 'w, 'q> {
     pub(super) now: Instant,
     pub(super) asker: Asker,
@@ -35,18 +33,18 @@ pub(super) struct Out<'o, 'w, 'q> {
 }
 
 impl Out<'_, '_, '_> {
-    /// Sends a message; `then` if it was sent.
+    /// `then` if it was sent.
     pub(super) fn say(&mut self, packet: &Packet, then: Step) -> Step {
         if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { Step::Wait }
     }
 
-    /// Sends the payload of an FTP message; `then` if it was sent.
+    /// `then` if it was sent.
     pub(super) fn file(&mut self, payload: &[u8], then: Step) -> Step {
         let (system, component) = self.asker.by;
         self.say(&messages::file_transfer(system, component, payload), then)
     }
 
-    /// The most data that an FTP message may have at this port.
+    /// At this port.
     pub(super) fn file_data_max(&self) -> usize {
         self.ways.bulk_frame_max(self.asker.port).saturating_sub(FTP_FRAME).max(FTP_DATA_MIN)
     }

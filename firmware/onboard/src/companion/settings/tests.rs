@@ -1,4 +1,4 @@
-//! `PARAMS.TXT` and settings over a link, with a vehicle of known and unknown state.
+//! With a vehicle of known and unknown state.
 
 use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
@@ -14,7 +14,6 @@ use crate::monitoring::TICK;
 use crate::queues::Queues;
 use crate::{Monitoring, PortStatus, ResetCause};
 
-/// An event at one second.
 #[derive(Clone, Copy, Debug)]
 enum Comes {
     Heartbeat {
@@ -48,7 +47,7 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
     run_with(&text(), cause, ticks_an_answer, comes)
 }
 
-/// The same with this text in the file, on a card that answers every `ticks_an_answer`.
+/// On a card that answers every `ticks_an_answer`.
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let is = |params: &Params, param, value: f32| params.get(param).to_bits() == value.to_bits();
     after(text, cause, ticks_an_answer, comes, |monitor| {
@@ -58,7 +57,6 @@ fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, 
     })
 }
 
-/// What the monitor knows after it.
 fn after<T>(
     text: &str,
     cause: ResetCause,
