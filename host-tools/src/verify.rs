@@ -124,7 +124,7 @@ impl Totals {
         self.made_again + self.unprotected > 0
     }
 
-    /// On all logs.
+    /// The verdict on all logs that were read.
     fn words(&self, has_passed_over: bool) -> String {
         let all = self.without_earlier.is_none() && !has_passed_over;
         let words = match (self.worst, self.is_damage(), all) {
@@ -344,7 +344,7 @@ fn weakened(log: &Overview) -> Vec<Check> {
     vec![intact, check("sectors protected", written, ending.unprotected(), words)]
 }
 
-/// Of end and place.
+/// The checks of a log's end and place.
 fn ends(log: &Overview) -> [Check; 7] {
     let ending = &log.ending;
     let summary = &ending.summary;

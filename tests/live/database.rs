@@ -53,7 +53,7 @@ impl Database {
         )
     }
 
-    /// With its data, at its previous port.
+    /// Starts it with its data, at its previous port.
     pub(crate) fn again(&mut self) {
         let start = Instant::now();
         while !self.runs() {

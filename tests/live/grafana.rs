@@ -248,7 +248,7 @@ impl Points {
     }
 }
 
-/// In quotes after each `before`.
+/// The texts in quotes after each of these.
 fn quoted<'a>(query: &'a str, before: &str) -> Vec<&'a str> {
     query.match_indices(before).map(|(at, _)| query[at + before.len()..].split('"').next().unwrap()).collect()
 }

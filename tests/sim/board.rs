@@ -23,7 +23,7 @@ impl Board {
         Self::start_in(tempfile::tempdir().unwrap(), flags)
     }
 
-    /// With the card in `dir`, if there is one.
+    /// On the card in `dir`, if there is one.
     pub(crate) fn start_in(dir: TempDir, flags: &[&str]) -> Self {
         Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
     }
@@ -82,7 +82,7 @@ pub(crate) fn pulled_log(folder: &Path, number: &str) -> PathBuf {
     all[0].clone()
 }
 
-/// Of several boxes and cards.
+/// All of them, of several boxes and cards.
 pub(crate) fn pulled_logs(folder: &Path, number: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().file_name());
     let names = entries.map(|name| name.into_string().unwrap());

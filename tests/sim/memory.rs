@@ -24,7 +24,7 @@ fn run<A: AsRef<std::ffi::OsStr>>(arguments: &[A]) -> Outcome {
     child::run(&mut command, LIMIT).expect_code(&[0, 1, 2, 3, 4])
 }
 
-/// With nearly no input, KiB.
+/// Memory of a run with nearly no input, KiB.
 fn empty_run(dir: &Path) -> u64 {
     let log = hostile::heartbeats(dir, 10);
     // It ended before it was measured.

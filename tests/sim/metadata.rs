@@ -24,7 +24,7 @@ fn folder() -> PathBuf {
     root().join("firmware/onboard/metadata")
 }
 
-/// Not 0.30000001 for 0.3.
+/// A number in common form: not 0.30000001 for 0.3.
 fn number(value: f32) -> Value {
     serde_json::from_str(&value.to_string()).unwrap()
 }

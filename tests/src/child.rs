@@ -15,9 +15,9 @@ const POLL_FIRST: Duration = Duration::from_micros(300);
 pub struct Outcome {
     /// The exit code; `None` if a signal ended it.
     pub code: Option<i32>,
-    /// On stdout.
+    /// Its output on stdout.
     pub stdout: Vec<u8>,
-    /// On stderr.
+    /// Its output on stderr.
     pub stderr: String,
     /// KiB of resident memory, polled every 5 ms, at first more often.
     pub memory_kib_max: u64,

@@ -69,7 +69,7 @@ pub struct Found {
     pub is_tlog: bool,
     /// Verified frames.
     pub frames: u64,
-    /// By message id.
+    /// The same per message id.
     pub frames_by_id: BTreeMap<u32, u64>,
     /// Bytes outside frames and, in a tlog, outside their times.
     pub bytes_other: u64,

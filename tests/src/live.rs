@@ -19,7 +19,7 @@ impl Drop for Running {
 }
 
 impl Running {
-    /// By name: `INT`.
+    /// Sends it a signal by name, for instance `INT`.
     pub fn signal(&self, name: &str) {
         let status = Command::new("kill").arg(format!("-{name}")).arg(self.0.id().to_string()).status();
         assert!(status.unwrap().success(), "no such process");
@@ -53,7 +53,7 @@ impl Running {
     }
 }
 
-/// With the printed address.
+/// `hums live`, and the address that it printed.
 #[derive(Debug)]
 pub struct Live {
     /// The program.
@@ -64,13 +64,13 @@ pub struct Live {
 }
 
 impl Live {
-    /// At a free port.
+    /// Starts it with these arguments, at a free port.
     #[track_caller]
     pub fn start(arguments: &[&str]) -> Self {
         Self::start_at(crate::program::path(), arguments)
     }
 
-    /// As [`Self::start`], with this program.
+    /// As [`Self::start`], with the program at this path.
     #[track_caller]
     pub fn start_at(program: &Path, arguments: &[&str]) -> Self {
         Self::attempt_at(program, arguments).unwrap_or_else(|words| panic!("no address: {words}"))

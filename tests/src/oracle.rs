@@ -127,7 +127,7 @@ impl LivePage {
         json(&answer.unwrap_or_else(|| panic!("the browser's script has ended at {what}")))
     }
 
-    /// In a window of this size.
+    /// Opens an address, in a window of this size.
     #[track_caller]
     pub fn open(&mut self, url: &str, scheme: &str, width: u32, height: u32) {
         // Another fragment alone would not reload the page.
@@ -153,7 +153,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "read" }))
     }
 
-    /// Until a script's result is true.
+    /// Waits until a script returns something true.
     #[track_caller]
     pub fn wait(&mut self, script: &str, limit_s: u32) -> Value {
         self.ask(&serde_json::json!({ "do": "wait", "script": script, "limit_s": limit_s }))
@@ -223,7 +223,7 @@ pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&manifest_text(files))
 }
 
-/// As a file.
+/// The same as a file.
 pub fn manifest_text(files: &[PathBuf]) -> String {
     ask("manifest.py", files)
 }
@@ -253,12 +253,12 @@ pub fn pack(text: &Path, into: &Path) {
     run("metadata.py", &["pack".into(), text.to_owned(), into.to_owned()]);
 }
 
-/// By Python's xz.
+/// The content of a packed file, by Python's xz.
 pub fn unpack(file: &Path) -> String {
     run("metadata.py", &["unpack".into(), file.to_owned()])
 }
 
-/// As Mission Planner reads it.
+/// Mission Planner's reading of its file of descriptions.
 pub fn descriptions(file: &Path) -> Value {
     json(&run("metadata.py", &["words".into(), file.to_owned()]))
 }

@@ -63,7 +63,7 @@ pub fn browser() -> PathBuf {
     path
 }
 
-/// Not yet run.
+/// `hums` with these arguments, not yet run.
 pub fn command<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {
     let mut command = Command::new(path());
     command.args(arguments);
@@ -84,7 +84,7 @@ pub enum Machine {
     Chip,
 }
 
-/// In a folder of its own.
+/// A finished recording, in a folder of its own.
 #[derive(Debug)]
 pub struct Recording {
     dir: TempDir,
@@ -93,7 +93,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// With further flags; any result.
+    /// Records `input` with these further flags, with any result.
     #[track_caller]
     pub fn attempt(machine: Machine, input: &Path, flags: &[&str]) -> Self {
         let dir = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ impl Recording {
         self.dir.path().join("gs.bin")
     }
 
-    /// From `--json`.
+    /// The object that `--json` printed.
     pub fn json(&self) -> Value {
         let text = self.outcome.text();
         serde_json::from_str(&text)

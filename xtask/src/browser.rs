@@ -11,7 +11,7 @@ use crate::shell::Shell;
 /// Opens at once, also from a phone's storage.
 pub(crate) const PAGE_BYTES_MAX: u64 = 6_000_000;
 
-/// Of cargo.
+/// The arguments of cargo that build the program.
 pub(crate) const BUILD: [&str; 6] = [
     "build",
     "--profile=browser",

@@ -25,7 +25,7 @@ const MEMORIES: [(&str, u64, u64, u64); 3] = [
 const STACK_BYTES: u64 = 16 * 1024;
 
 const FILE: &str = "budgets.toml";
-/// With the table of usage.
+/// The table of usage stands between these lines.
 const TABLE_FILE: &str = "ARCHITECTURE.md";
 const TABLE: [&str; 2] = ["<!-- taken: cargo xtask size --write -->\n", "<!-- end of taken -->\n"];
 
@@ -71,7 +71,7 @@ pub(crate) struct Lines {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Budgets {
-    /// Of every board.
+    /// Static memory, of every board.
     memory: BTreeMap<String, Limit>,
     /// By urgency.
     pub(crate) stack: BTreeMap<String, Limit>,

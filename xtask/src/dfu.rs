@@ -48,7 +48,7 @@ pub(crate) fn file(name: &str, pieces: &[Piece]) -> Vec<u8> {
     file
 }
 
-/// Without the final inversion.
+/// CRC-32 as everywhere, without the inversion at its end.
 fn crc(bytes: &[u8]) -> u32 {
     bytes.iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg()))

@@ -183,7 +183,7 @@ impl Release {
         Ok((format!("{name}.cdx.json"), text.into_bytes()))
     }
 
-    /// For a reproduction.
+    /// Information for a reproduction of the build.
     fn provenance(&self) -> Result<String> {
         let rustc = Shell::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()));
         let rustc = rustc.args(["--version", "--verbose"]).output()?;
@@ -304,7 +304,7 @@ pub(crate) fn sums(files: &[File]) -> String {
     })
 }
 
-/// By name.
+/// The names of files that differ.
 fn differences(one: &[File], other: &[File]) -> Vec<String> {
     let missing = |from: &[File], file: &File| !from.contains(file);
     let mut names: Vec<String> =

@@ -13,7 +13,7 @@ use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// With programs.
+/// A package that brings programs.
 struct Package {
     name: &'static str,
     version: &'static str,

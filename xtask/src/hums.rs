@@ -13,7 +13,7 @@ pub(crate) fn build() -> Result<PathBuf> {
     Ok(program())
 }
 
-/// After [`build`].
+/// The program's path after [`build`].
 pub(crate) fn program() -> PathBuf {
     repo::target().join("debug/hums")
 }

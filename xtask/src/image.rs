@@ -32,7 +32,7 @@ pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
     joined(pieces)
 }
 
-/// By address.
+/// In order of address, with adjacent pieces joined.
 fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     pieces.sort_by_key(|piece| piece.address);
     let mut joined: Vec<Piece> = Vec::new();

@@ -9,7 +9,7 @@ use cargo_metadata::MetadataCommand;
 use crate::repo;
 use crate::shell::Shell;
 
-/// With pinned requirements.
+/// The scripts and the pinned requirements.
 const FOLDER: &str = "tests/oracle";
 
 fn venv() -> PathBuf {

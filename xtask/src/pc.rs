@@ -26,13 +26,13 @@ struct TestProgram {
     package: String,
     /// The crate's name for its own tests.
     name: String,
-    /// From `tests/`.
+    /// From `tests/`, not from the sources.
     is_integration: bool,
     folder: PathBuf,
     path: PathBuf,
 }
 
-/// By [`build`].
+/// Those that [`build`] built.
 static PROGRAMS: OnceLock<Vec<TestProgram>> = OnceLock::new();
 
 /// `hums`, campaigns and tests by one call; a warning is an error. Examples are only linted.
@@ -66,7 +66,7 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// Among cargo's outputs.
+/// The test programs among cargo's outputs.
 fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<TestProgram>> {
     let mut programs = Vec::new();
     for Artifact { package_id, target, profile, executable, .. } in artifacts {

@@ -12,7 +12,7 @@ use crate::pc;
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// For cards.
+/// The campaigns' tools for cards.
 pub(crate) const NEEDS: &[Need] = &[Need::Dosfstools];
 
 const CHIP: &str = "chip";

@@ -53,7 +53,7 @@ enum Source {
     Packages(&'static str, &'static str),
 }
 
-/// With purposes.
+/// Each need with its purpose.
 const TABLE: [(Need, &str, Source); 16] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
@@ -100,7 +100,7 @@ impl Need {
         }
     }
 
-    /// Of `sh`.
+    /// The line that installs it.
     fn install(self) -> String {
         match self.row().1 {
             Source::Target(target) => format!("rustup target add {target}"),

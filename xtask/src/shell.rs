@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use anyhow::{Context as _, Result, bail};
 
-/// In readable form.
+/// A command line with a readable form.
 pub(crate) struct Shell {
     command: Command,
     shown: String,

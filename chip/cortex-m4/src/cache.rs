@@ -56,7 +56,7 @@ impl Cache {
         self.entries[(entry.tag >> 1) as usize & (ENTRIES - 1)] = entry;
     }
 
-    /// Up to a word.
+    /// After a store of up to a word.
     #[inline(always)]
     pub(crate) fn stored(&mut self, address: u32) {
         let (word, bit) = page(address);

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug)]
 struct Level {
     exception: u16,
-    /// Before its frame.
+    /// The stack pointer before its frame.
     begin: u32,
     /// Of the interrupted code until then.
     interrupted: u32,
@@ -14,7 +14,7 @@ struct Level {
 pub(crate) struct Depths {
     /// The lowest stack pointer of the running code.
     pub(crate) lowest: u32,
-    /// At an entry, with [`Depths::lowest`].
+    /// The stack pointer and [`Depths::lowest`] at an entry.
     entering: (u32, u32),
     /// Thread mode first.
     levels: Vec<Level>,
@@ -49,7 +49,7 @@ impl Depths {
         }
     }
 
-    /// To the interrupted code.
+    /// Returns to the interrupted code.
     pub(crate) fn resumed(&mut self) {
         self.lowest = self.entering.1;
     }

@@ -39,11 +39,11 @@ pub enum Outcome {
 pub struct Core {
     /// Registers 0 to 14; 13 is the stack pointer in use. 15 is the executed instruction's address and 4.
     pub(crate) r: [u32; 16],
-    /// Not in use.
+    /// The stack pointer that is not in use.
     pub(crate) other_sp: u32,
     /// Next, or executed now.
     pub(crate) pc: u32,
-    /// After the executed instruction.
+    /// The address after the executed instruction.
     pub(crate) next: u32,
     pub(crate) flags: Flags,
     /// Of the next instruction, and of the executed one.
@@ -193,7 +193,7 @@ impl Core {
         self.cycles
     }
 
-    /// Since it was made.
+    /// Instructions since it was made.
     pub fn instructions(&self) -> u64 {
         self.traced
     }
@@ -209,7 +209,7 @@ impl Core {
         self.depths.of(exception)
     }
 
-    /// In WFI or WFE.
+    /// Whether WFI or WFE waits.
     pub fn is_sleeping(&self) -> bool {
         self.sleeping.is_some()
     }
@@ -241,7 +241,7 @@ impl Core {
         }
     }
 
-    /// By a pulse.
+    /// An interrupt by a pulse.
     pub fn set_pending(&mut self, interrupt: u16) {
         if self.exceptions.pend(interrupt + 16) {
             self.pended();
@@ -269,7 +269,7 @@ impl Core {
         self.deadline = 0;
     }
 
-    /// Behind a breakpoint.
+    /// Goes on behind a breakpoint.
     pub fn skip(&mut self) {
         self.pc = self.pc.wrapping_add(2);
     }

@@ -61,12 +61,12 @@ impl Flags {
     }
 }
 
-/// With ITSTATE in its two places.
+/// EPSR with ITSTATE in its two places.
 pub(crate) fn epsr(it: u8, thumb: bool) -> u32 {
     u32::from(it & 3) << 25 | u32::from(it >> 2) << 10 | u32::from(thumb) << 24
 }
 
-/// Of a program status word.
+/// ITSTATE of a program status word.
 pub(crate) fn it_of(xpsr: u32) -> u8 {
     (xpsr >> 25 & 3) as u8 | (xpsr >> 8 & 0xFC) as u8
 }

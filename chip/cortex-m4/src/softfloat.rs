@@ -237,7 +237,7 @@ pub(crate) fn add(a: u32, b: u32, status: &mut u32) -> u32 {
     }
 }
 
-/// With room below.
+/// A number with room below it.
 fn wide(value: Unpacked, room: u32) -> (bool, u128, i32) {
     match value.number {
         Number::Finite { mantissa, exponent } => {

@@ -26,9 +26,9 @@ pub(crate) const REFILL_FAR: u64 = 3;
 pub(crate) const ENTRY: u64 = 12;
 /// To the interrupted code.
 pub(crate) const RETURN: u64 = 10;
-/// Without unstacking.
+/// From one handler to the next without unstacking.
 pub(crate) const TAIL_CHAIN: u64 = 6;
-/// At once or late.
+/// Stacking the floating-point registers, at once or late.
 pub(crate) const FLOAT_STATE: u64 = 17;
 
 /// Irrelevant for the next instruction.
@@ -93,7 +93,7 @@ fn float3(kind: Float3) -> u8 {
     }
 }
 
-/// Beyond the first two.
+/// Cycles of a division beyond the first two.
 pub(crate) fn division(n: u32, m: u32) -> u64 {
     let quotient_bits = (n.max(1).ilog2() + 1).saturating_sub(m.max(1).ilog2());
     if m == 0 || n < m { 0 } else { u64::from(quotient_bits.div_ceil(4) + 2).min(10) }

@@ -14,7 +14,7 @@ pub(crate) enum Trap {
     FetchBus,
     /// Refused by the MPU.
     Memory(u32),
-    /// From a forbidden place.
+    /// An instruction fetch from a forbidden place.
     FetchMemory,
     /// While floating-point registers were stored late.
     LazyBus,

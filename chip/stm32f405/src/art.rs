@@ -16,7 +16,7 @@ use crate::memory::{FLASH, Memory};
 
 const INSTRUCTION_LINES: usize = 64;
 const DATA_LINES: usize = 8;
-/// Of the whole flash.
+/// Lines of the whole flash.
 const FLASH_LINES: usize = (FLASH.1 / LINE) as usize;
 /// Bytes.
 const LINE: u32 = 16;
@@ -90,9 +90,9 @@ impl<const N: usize> Lines<N> {
 /// The accelerator.
 #[derive(Clone)]
 pub struct Art {
-    /// Of the flash.
+    /// Wait states of the flash.
     pub latency: u32,
-    /// Of the next line.
+    /// The next line is fetched ahead.
     pub prefetch: bool,
     /// Instructions, data.
     on: (bool, bool),
@@ -103,7 +103,7 @@ pub struct Art {
     line: u32,
     /// And when it is there.
     ahead: (u32, u64),
-    /// With a read.
+    /// Until when the flash is busy with a read.
     busy: u64,
     /// Missed lines, and requested ones.
     pub counts: (u64, u64),
@@ -137,7 +137,7 @@ impl Art {
         self.on = (instructions, data);
     }
 
-    /// Only those that are off.
+    /// Empties the caches that are off.
     pub fn reset_caches(&mut self, instructions: bool, data: bool) {
         if instructions && !self.on.0 {
             self.instructions.clear();

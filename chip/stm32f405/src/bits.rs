@@ -4,7 +4,7 @@ use crate::gpio::{Gpio, Pin};
 use crate::spi::Wire;
 use crate::time::{Ps, SECOND};
 
-/// Of such a device.
+/// The pins of such a device.
 #[derive(Clone, Copy, Debug)]
 pub struct Pins {
     /// Clock.
@@ -26,7 +26,7 @@ pub struct Bits {
     is_high: bool,
     /// Last rising edge.
     edge: Ps,
-    /// Between the byte's last two.
+    /// Time between the last two of a byte.
     bit: Ps,
     /// So far, and their number.
     taken: (u8, u8),

@@ -43,7 +43,7 @@ pub enum Note {
     Reserved(u32),
 }
 
-/// By place in the schedule.
+/// Moments of devices, by their places in the schedule.
 const FLASH: usize = 0;
 const RCC: usize = 1;
 const IWDG: usize = 2;
@@ -74,7 +74,7 @@ pub struct Chip {
     pub gpio: Gpio,
     /// Lines of EXTI.
     pub exti: Exti,
-    /// As [`Unit::Usart`] counts.
+    /// Ports, as [`Unit::Usart`] counts them.
     pub usarts: [Usart; 6],
     /// Buses.
     pub spis: [Spi; 3],
@@ -96,18 +96,18 @@ pub struct Chip {
     pub idcode: u32,
     /// `DBGMCU_CR` and the two freeze registers.
     pub dbgmcu: [u32; 3],
-    /// On pins that the program moves.
+    /// A device on pins that the program moves itself.
     pub bits: Option<Bits>,
-    /// By bus.
+    /// The select pin of each bus.
     pub selects: [Option<Pin>; 3],
-    /// With counts.
+    /// Oddities, with their counts.
     pub notes: BTreeMap<Note, u64>,
     pub(crate) clocks: Clocks,
     pub(crate) lines: u128,
     pub(crate) trouble: Option<Trouble>,
     pub(crate) attention: bool,
     pub(crate) wait: u32,
-    /// Without a store of the processor.
+    /// Memory that changed without a store of the processor.
     pub(crate) changed: Vec<(u32, u32)>,
     pub(crate) reset_by: Option<Cause>,
     pub(crate) event: bool,
@@ -116,9 +116,9 @@ pub struct Chip {
     selected: [bool; 3],
     deadlines: [u64; SLOTS],
     next: u64,
-    /// Without asking the chip.
+    /// The processor runs until then without being asked.
     pub(crate) until: u64,
-    /// Of copies from memory to memory.
+    /// When a copy from memory to memory ends.
     pub(crate) copies: [u64; 2],
 }
 
@@ -365,7 +365,7 @@ impl Chip {
         self.look_at(unit, now);
     }
 
-    /// Of a device.
+    /// The interrupt lines of a device.
     pub(crate) fn look_at(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Flash => self.line(map::FLASH, self.flash.interrupts()),
@@ -403,7 +403,7 @@ impl Chip {
         }
     }
 
-    /// As they are now.
+    /// The lines of EXTI as they are now.
     pub fn look_at_lines(&mut self) {
         self.event |= self.exti.look(&self.gpio, self.pwr.is_low());
         self.attention |= self.event;

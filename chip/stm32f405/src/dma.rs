@@ -21,7 +21,7 @@ const CT: u32 = 1 << 19;
 const TEIF: u32 = 1 << 3;
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
-/// Of a stream's flags.
+/// Position of a stream's flags.
 const PLACES: [u32; 4] = [0, 6, 16, 22];
 
 /// A device's request.
@@ -260,7 +260,7 @@ impl Dma {
         (0..4).map(|stream| self.streams[first + stream].flags << PLACES[stream]).sum()
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => self.flags(0),

@@ -24,7 +24,7 @@ const STRT: u32 = 1 << 16;
 const EOPIE: u32 = 1 << 24;
 const ERRIE: u32 = 1 << 25;
 const LOCK: u32 = 1 << 31;
-/// As delivered.
+/// `OPTCR` as delivered: nothing protected.
 const OPTCR: u32 = 0x0FFF_AAED;
 
 /// By x8, x16 and x32 (x64 with its own supply), ms: typical and longest; DS8626, table 40.
@@ -125,7 +125,7 @@ impl Flash {
         (self.keys, self.option_keys) = (Some(0), Some(0));
     }
 
-    /// For the accelerator.
+    /// `ACR`, for the accelerator.
     pub fn acr(&self) -> u32 {
         self.acr
     }
@@ -135,7 +135,7 @@ impl Flash {
         self.work.map(|(_, _, end)| end)
     }
 
-    /// Of its work.
+    /// When its work is done.
     pub fn deadline(&self) -> Ps {
         self.busy_until().unwrap_or(NEVER)
     }
@@ -254,7 +254,7 @@ impl Flash {
         self.sr & EOP != 0 && self.cr & EOPIE != 0 || self.sr & ERRORS != 0 && self.cr & ERRIE != 0
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => self.acr,

@@ -24,7 +24,7 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// From outside, with levels.
+    /// Pins driven from outside, and their levels.
     driven: u32,
     level: u32,
 }
@@ -91,7 +91,7 @@ impl Gpio {
         self.ports[port] = Port { driven, level, ..Port::new(port) };
     }
 
-    /// From outside, or no more.
+    /// A pin is driven from outside, or no more.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         let port = &mut self.ports[pin.0 as usize];
         let bit = 1 << pin.1;
@@ -99,7 +99,7 @@ impl Gpio {
         port.level = port.level & !bit | if level == Some(true) { bit } else { 0 };
     }
 
-    /// At a pin.
+    /// The level at a pin.
     pub fn is_high(&self, pin: Pin) -> bool {
         self.ports[pin.0 as usize].is_high(pin.1)
     }
@@ -110,19 +110,19 @@ impl Gpio {
         port.mode(pin.1) == 1 && port.odr >> pin.1 & 1 == 0
     }
 
-    /// By the chip.
+    /// Whether the pin is pulled up by the chip.
     pub fn is_pulled_up(&self, pin: Pin) -> bool {
         self.ports[pin.0 as usize].pupdr >> (2 * pin.1) & 3 == 1
     }
 
-    /// By a device's alternate function.
+    /// Whether a device's alternate function has this pin.
     pub fn is_routed(&self, pin: Pin, function: u8) -> bool {
         let port = &self.ports[pin.0 as usize];
         port.mode(pin.1) == 2
             && port.afr[pin.1 as usize / 8] >> (4 * (pin.1 % 8)) & 0xF == u32::from(function)
     }
 
-    /// Of a port's pins.
+    /// The levels of a port's pins.
     pub fn levels(&self, port: usize) -> u32 {
         self.ports[port].levels()
     }

@@ -55,9 +55,9 @@ pub struct Symbol {
 /// A program for the flash.
 #[derive(Clone, Debug, Default)]
 pub struct Image {
-    /// By address.
+    /// Its pieces, by addresses.
     pub pieces: Vec<(u32, Vec<u8>)>,
-    /// By address, if the file has names.
+    /// Its symbols by address, if the file has names.
     pub symbols: Vec<Symbol>,
 }
 
@@ -113,7 +113,7 @@ impl Image {
     }
 }
 
-/// From a file.
+/// Numbers out of a file.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {

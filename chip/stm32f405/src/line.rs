@@ -18,7 +18,7 @@ pub enum Flaw {
 /// Start bit, eight bits, stop bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Char {
-    /// Of its start bit.
+    /// When its start bit begins.
     pub start: Ps,
     /// Bit length.
     pub bit: Ps,
@@ -29,7 +29,7 @@ pub struct Char {
 }
 
 impl Char {
-    /// Of its stop bit.
+    /// When its stop bit ends.
     pub fn end(&self) -> Ps {
         self.start + 10 * self.bit
     }
@@ -39,7 +39,7 @@ impl Char {
     }
 }
 
-/// As a receiver reads it.
+/// A character as a receiver reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
     /// The byte.

@@ -27,7 +27,7 @@ pub struct Board {
     pub hse_hz: u32,
     /// Low-speed oscillator: 17 to 47 kHz.
     pub lsi_hz: u32,
-    /// Of memory at power-on, and random numbers.
+    /// Seed of memory at power-on and of random numbers.
     pub seed: u64,
 }
 
@@ -48,7 +48,7 @@ pub struct Machine {
     /// The chip round it.
     pub chip: Chip,
     image: Image,
-    /// Of the world outside.
+    /// The moment that the world outside has come to.
     now: Ps,
     is_off: bool,
     seed: u64,
@@ -154,7 +154,7 @@ impl Machine {
         Ok(())
     }
 
-    /// To the processor.
+    /// Hands the chip's signals to the processor.
     fn deliver(&mut self) -> Result<(), Box<Report>> {
         if !std::mem::take(&mut self.chip.attention) {
             return Ok(());
@@ -201,7 +201,7 @@ impl Machine {
         self.lines = 0;
     }
 
-    /// Of the stop.
+    /// Reason and place of the stop.
     pub fn report(&self, reason: &str) -> Box<Report> {
         let registers = std::array::from_fn(|number| self.core.register(number as u8));
         let name =
@@ -271,7 +271,7 @@ impl Machine {
         self.chip.apply_clocks(self.moment());
     }
 
-    /// From outside, or lets it go.
+    /// Drives a pin from outside, or lets it go.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         self.chip.gpio.drive(pin, level);
         self.chip.look_at_lines();
@@ -301,7 +301,7 @@ impl Machine {
         self.chip.selects[bus] = Some(select);
     }
 
-    /// On pins that the program moves.
+    /// Connects something to pins that the program moves itself.
     pub fn connect_pins(&mut self, pins: Pins, wire: Box<dyn Wire>) {
         self.chip.bits = Some(Bits::new(pins, wire));
     }
@@ -333,7 +333,7 @@ impl Machine {
         }
     }
 
-    /// Since the model began.
+    /// Milliseconds since the model began, for texts.
     pub fn ms(&self) -> u64 {
         self.now / MS
     }

@@ -140,7 +140,7 @@ pub const SPI: [u16; 3] = [35, 36, 51];
 pub const TIM: [u16; 5] = [28, 29, 30, 50, 43];
 /// Of a controller's streams.
 pub const DMA: [[u16; 8]; 2] = [[11, 12, 13, 14, 15, 16, 17, 47], [56, 57, 58, 59, 60, 68, 69, 70]];
-/// By groups of lines.
+/// Of groups of lines of EXTI.
 pub const EXTI: [(u32, u16); 10] = [
     (1, 6),
     (1 << 1, 7),

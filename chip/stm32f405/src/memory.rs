@@ -4,7 +4,7 @@ use cortex_m4_model::Size;
 
 /// Start and size.
 pub const FLASH: (u32, u32) = (0x0800_0000, 1024 * 1024);
-/// Only the processor reaches it.
+/// The core coupled memory: only the processor reaches it.
 pub const CCM: (u32, u32) = (0x1000_0000, 64 * 1024);
 /// SRAM1 and SRAM2 in a row.
 pub const SRAM: (u32, u32) = (0x2000_0000, 128 * 1024);

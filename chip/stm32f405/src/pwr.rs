@@ -28,7 +28,7 @@ pub struct Pwr {
     supply_mv: u32,
     /// Below the detector's level.
     is_low: bool,
-    /// By the supply.
+    /// Held in reset by the supply.
     pub is_off: bool,
 }
 
@@ -74,7 +74,7 @@ impl Pwr {
         self.cr & DBP != 0
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         match offset {
             0 => Some(self.cr),
@@ -84,7 +84,7 @@ impl Pwr {
         }
     }
 
-    /// At this offset.
+    /// Writes the register at this offset.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             // CWUF and CSBF read as 0. Other chips only: the overdrive of the F42x. (Bit 15, the upper one

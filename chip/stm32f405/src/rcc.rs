@@ -183,7 +183,7 @@ impl Rcc {
         self.cir & CSSF != 0
     }
 
-    /// By the watchdog (RM0090, 7.2.5).
+    /// The watchdog forces the low-speed oscillator on (RM0090, 7.2.5).
     pub fn force_lsi(&mut self, now: Ps) {
         self.csr |= 1;
         self.since[LSI] = self.since[LSI].min(now);
@@ -236,13 +236,13 @@ impl Rcc {
         }
     }
 
-    /// Of the chosen clock.
+    /// When the clock that was chosen will be ready.
     pub fn deadline(&self) -> Ps {
         let chosen = self.cfgr & 3;
         if self.cfgr >> 2 & 3 == chosen || chosen == 3 { NEVER } else { self.ready_at(chosen as usize) }
     }
 
-    /// As they are now.
+    /// All clocks as they are now.
     pub fn clocks(&self, now: Ps) -> Clocks {
         let source = if self.pll_on_hse() { self.hse_hz } else { HSI_HZ };
         let m = (self.pllcfgr & 0x3F).max(1);

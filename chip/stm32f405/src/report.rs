@@ -47,7 +47,7 @@ pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
 pub struct Report {
     /// Why.
     pub reason: String,
-    /// Since the model began.
+    /// Microseconds since the model began.
     pub us: u64,
     /// R0 to R15.
     pub registers: [u32; 16],

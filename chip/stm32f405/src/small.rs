@@ -41,7 +41,7 @@ impl Iwdg {
         SECOND / u64::from(self.lsi_hz)
     }
 
-    /// Of the reset.
+    /// When it resets the chip.
     pub fn deadline(&self) -> Ps {
         self.bites
     }
@@ -51,7 +51,7 @@ impl Iwdg {
         self.bites != NEVER
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&self, offset: u32, now: Ps) -> Option<u32> {
         Some(match offset {
             0x00 => 0,
@@ -96,7 +96,7 @@ impl Iwdg {
 pub enum Randomness {
     /// It gives numbers.
     Good,
-    /// Never a number.
+    /// It never has one.
     Never,
     /// A bad seed.
     BadSeed,
@@ -145,7 +145,7 @@ impl Rng {
         self.cr & 8 != 0 && self.status(now, pll48) & 0x61 != 0
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&mut self, offset: u32, now: Ps, pll48: u32) -> Option<u32> {
         Some(match offset {
             0x00 => self.cr,
@@ -165,7 +165,7 @@ impl Rng {
         })
     }
 
-    /// At this offset.
+    /// Writes the register at this offset.
     pub fn write(&mut self, offset: u32, value: u32, now: Ps) -> Option<()> {
         match offset {
             0x00 => {
@@ -204,12 +204,12 @@ impl Crc {
         Self { sum: u32::MAX, idr: 0 }
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&self, offset: u32) -> Option<u32> {
         [self.sum, self.idr, 0].get(offset as usize / 4).copied()
     }
 
-    /// At this offset.
+    /// Writes the register at this offset.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<()> {
         match offset {
             0 => {

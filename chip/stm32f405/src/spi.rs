@@ -68,7 +68,7 @@ pub struct Spi {
     to_send: Option<u16>,
     /// And its last clock.
     sending: Option<(u16, u64)>,
-    /// Of an APB clock.
+    /// Processor cycles of a clock of the bus APB.
     bus_cycles: u64,
     /// Clock, to the card, from it.
     pub routed: [bool; 3],
@@ -123,7 +123,7 @@ impl Spi {
         bits * (2 << (self.cr1 >> 3 & 7)) * self.bus_cycles
     }
 
-    /// To this moment.
+    /// Brings it to this moment.
     pub fn advance(&mut self, now: Now, time: &Timebase) {
         while let Some((word, end)) = self.sending.take_if(|(_, end)| *end <= now.cycle) {
             let received = self.exchange(word, time.ps(end), time.hz());
@@ -191,7 +191,7 @@ impl Spi {
             || self.cr2 & ERRIE != 0 && status & (OVR | MODF) != 0
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&mut self, offset: u32, now: Now, time: &Timebase) -> Option<u32> {
         self.advance(now, time);
         Some(match offset {

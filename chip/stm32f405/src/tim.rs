@@ -31,7 +31,7 @@ pub struct Tim {
     ccr: [u32; 4],
     dcr: u32,
     or: u32,
-    /// Of prescaler and reload.
+    /// Active values of prescaler and reload.
     psc_now: u32,
     arr_now: u32,
     max: u32,
@@ -39,7 +39,7 @@ pub struct Tim {
     /// Since the counter's value, at this cycle.
     ticks: u64,
     at: u64,
-    /// Of the timer's clock.
+    /// Processor cycles of a clock of the timer's.
     clock: u64,
 }
 
@@ -104,12 +104,12 @@ impl Tim {
         Some(if to > from { to - from } else { period - from + to })
     }
 
-    /// To the counter's restart.
+    /// Steps until the counter begins anew.
     fn steps_to_update(&self) -> Option<u64> {
         self.steps_to(0)
     }
 
-    /// To this cycle.
+    /// Brings it to this cycle.
     pub fn advance(&mut self, now: u64) {
         let passed = now.saturating_sub(self.at) / self.clock;
         self.at += passed * self.clock;
@@ -171,7 +171,7 @@ impl Tim {
         }
     }
 
-    /// Of the next interrupt.
+    /// The cycle of the next flag that interrupts.
     pub fn deadline(&self) -> u64 {
         if !self.is_counting() {
             return NEVER;
@@ -198,7 +198,7 @@ impl Tim {
         self.channels == 4 || !matches!(offset, 0x04 | 0x1C | 0x3C | 0x40 | 0x48 | 0x50)
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         self.advance(now);
         Some(match offset {

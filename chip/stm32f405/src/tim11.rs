@@ -8,10 +8,10 @@ const EACH_EIGHTH: u32 = 0b1101;
 /// `TI1_RMP`.
 const CRYSTAL: u32 = 2;
 const CC1IF: u32 = 1 << 1;
-/// Of a capture.
+/// Edges of a capture.
 const EDGES: u64 = 8;
 
-/// At an access.
+/// The timer's clocks at the moment of an access.
 #[derive(Clone, Copy, Debug)]
 pub struct Input {
     /// The moment.
@@ -49,7 +49,7 @@ impl Tim11 {
         (input.ps / period, input.ps / period * period)
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&mut self, offset: u32, input: Input) -> Option<u32> {
         let (number, at) = self.captures(input);
         Some(match offset {

@@ -12,7 +12,7 @@ pub const US: Ps = 1_000_000;
 pub const MS: Ps = 1_000 * US;
 /// Picoseconds.
 pub const SECOND: Ps = 1_000 * MS;
-/// Never.
+/// A moment that never comes.
 pub const NEVER: u64 = u64::MAX;
 
 /// Both ways.
@@ -29,12 +29,12 @@ pub struct Now {
 pub struct Timebase {
     hz: u32,
     base: Now,
-    /// By 2^32.
+    /// Picoseconds a cycle, by 2^32.
     ps_a_cycle: u64,
 }
 
 impl Timebase {
-    /// From cycle 0 at 0 s.
+    /// From cycle 0 at 0 s on, at this rate.
     pub fn new(hz: u32) -> Self {
         let mut time = Self { hz: 0, base: Now::default(), ps_a_cycle: 0 };
         time.set(Now::default(), hz);

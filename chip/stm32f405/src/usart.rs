@@ -55,7 +55,7 @@ pub struct Counts {
 pub struct Usart {
     /// The input line.
     pub line: Line,
-    /// With each stop bit's end.
+    /// Sent characters, with the end of each stop bit.
     pub sent: Vec<(Ps, u8)>,
     /// Reception, transmission.
     pub routed: (bool, bool),
@@ -69,7 +69,7 @@ pub struct Usart {
     gtpr: u32,
     received: u8,
     to_send: Option<u8>,
-    /// And its end.
+    /// The character on its way out, and its end.
     sending: Option<(u8, Ps)>,
     /// For the next start bit.
     free: Ps,
@@ -129,7 +129,7 @@ impl Usart {
         };
     }
 
-    /// In hertz.
+    /// The bus clock is this from now on.
     pub fn set_clock(&mut self, pclk: u32) {
         self.pclk = pclk;
     }
@@ -149,7 +149,7 @@ impl Usart {
         self.cr[0] & (UE | RE) == UE | RE && self.routed.0
     }
 
-    /// Of the next event.
+    /// When something happens next.
     pub fn deadline(&self) -> Ps {
         let reception = match self.incoming {
             Some((_, done)) => done,
@@ -254,7 +254,7 @@ impl Usart {
             || cr3 & EIE != 0 && cr3 & DMAR != 0 && sr & (FE | NF | ORE) != 0
     }
 
-    /// At this offset.
+    /// The register at this offset.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         Some(match offset {
             0x00 => {

@@ -53,7 +53,7 @@ pub struct BlockCounts {
 }
 
 impl BlockCounts {
-    /// Of another session, left from an earlier file.
+    /// Counts since `before`.
     #[must_use]
     pub const fn since(&self, before: &Self) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl BlockCounts {
 /// A wrong checksum, apparently of an older session or of none.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Of this session, sound or not.
+    /// Its header.
     pub header: Header,
     /// Rebuilt from parity, also counted by their kind.
     pub sector: Sector,

@@ -32,7 +32,7 @@ const fn cut(low: u32, range: u32) -> Option<u32> {
     }
 }
 
-/// For one entry.
+/// Output buffer of the encoder for one entry.
 pub(crate) struct Scratch<const N: usize> {
     bytes: [u8; N],
     len: usize,

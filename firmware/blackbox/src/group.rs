@@ -16,7 +16,7 @@ use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, Sector};
 pub enum Entry<'a> {
     /// A frame as it was received.
     Frame {
-        /// On the monitor's clock; whole milliseconds.
+        /// When, on the monitor's clock; whole milliseconds.
         at: Instant,
         /// From magic byte to checksum or signature.
         bytes: &'a [u8],
@@ -25,7 +25,7 @@ pub enum Entry<'a> {
     },
     /// A record of the monitor's own.
     Record {
-        /// On the monitor's clock; whole milliseconds.
+        /// When, on the monitor's clock; whole milliseconds.
         at: Instant,
         /// The record.
         record: Record<'a>,
@@ -37,7 +37,7 @@ pub enum Entry<'a> {
 pub enum Outline<'a> {
     /// Its bytes were not put together.
     Frame {
-        /// On the monitor's clock; whole milliseconds.
+        /// When, on the monitor's clock; whole milliseconds.
         at: Instant,
         /// Its message id.
         id: u32,

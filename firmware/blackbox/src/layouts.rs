@@ -15,7 +15,7 @@ use hums_dialect::{Kind, Message, Role};
 
 use crate::crc::Crc32c;
 
-/// Of builds that wrote logs, newest last.
+/// Layout tables of builds that wrote logs, newest last.
 static STORED: [&[u8]; 1] = [NEWEST];
 
 const NEWEST: &[u8] = include_bytes!("../layouts/table-1.bin");

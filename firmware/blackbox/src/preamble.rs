@@ -12,7 +12,7 @@ use crate::bytes::Fields;
 
 pub(crate) const PREAMBLE_BYTES: usize = 26;
 
-/// Of a group.
+/// Preamble of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Preamble {
     /// Of the layout table that the group was written with.

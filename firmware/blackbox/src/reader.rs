@@ -31,7 +31,7 @@ pub enum Item<'a> {
     },
     /// A record of the monitor's own.
     Record {
-        /// On the monitor's clock, whole milliseconds.
+        /// Time on the monitor's clock, whole milliseconds.
         at: Instant,
         /// UTC, microseconds since 1970, if known.
         utc_micros: Option<u64>,
@@ -61,7 +61,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// For reports.
+    /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Missing => "missing",

@@ -111,7 +111,7 @@ impl Sector {
         self.bytes[2] & SINCE_FIRST == 0
     }
 
-    /// In its session, from 0.
+    /// The sector's number in its session, from 0.
     pub fn number(&self) -> u32 {
         self.u32_at(11)
     }
@@ -162,12 +162,12 @@ impl Sector {
     }
 }
 
-/// Of a sector.
+/// Header of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// Others are left over from an earlier file.
     pub session: u32,
-    /// In its session, from 0.
+    /// The sector's number in its session, from 0.
     pub number: u32,
     /// How many sectors after the first one of its group it is: 0 to 63.
     pub since_first: u8,

@@ -152,7 +152,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Of the monitor.
+    /// Adds a record of the monitor's own.
     pub fn record(
         &mut self,
         at: Instant,
@@ -395,7 +395,7 @@ impl Writer {
 mod tests {
     use super::*;
 
-    /// By sector.
+    /// Whether each sector starts a group.
     struct Starts(Vec<bool>);
 
     impl SectorSink for Starts {

@@ -173,7 +173,7 @@ impl Default for Asking {
     }
 }
 
-/// Of the vehicle.
+/// Current state of the vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Known {
     /// The autopilot.
@@ -206,7 +206,7 @@ impl Asking {
         }
     }
 
-    /// Of the requests.
+    /// Recipient of the requests.
     pub fn of(&self) -> Option<Source> {
         self.vehicle.map(|(source, _)| source)
     }
@@ -219,7 +219,7 @@ impl Asking {
             && self.parameter(known).is_none()
     }
 
-    /// Of the vehicle.
+    /// Processes a frame of the vehicle.
     pub fn seen(&mut self, id: u32) {
         if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {
             let message = &mut self.messages[index];

@@ -28,7 +28,7 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// Without the vehicle's system id.
+    /// Before the vehicle's system id is known.
     pub const fn new() -> Self {
         Self::of(SYSTEM_DEFAULT, COMPONENT)
     }
@@ -48,7 +48,7 @@ impl Encoder {
         self.system
     }
 
-    /// Of the next frame.
+    /// The sequence number of the next frame.
     pub const fn set_sequence(&mut self, sequence: u8) {
         self.sequence = sequence;
     }

@@ -31,7 +31,7 @@ struct Missing {
     tries: u8,
 }
 
-/// Of one autopilot.
+/// The events of one autopilot.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Events {
     /// The next number.
@@ -46,7 +46,7 @@ impl Events {
         Self { next: None, missing: None, asked_at: None }
     }
 
-    /// From the asked autopilot.
+    /// A frame of the autopilot that we ask.
     pub fn heard(&mut self, id: u32, payload: &[u8]) {
         let fields = Fields(payload);
         match id {

@@ -9,7 +9,7 @@ use hums_dialect::wire::{
 
 use crate::packet::Fields;
 
-/// Of the checksum.
+/// Result of the checksum test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Check {
     /// Correct with our definition of the message.
@@ -167,13 +167,13 @@ impl<'a> Frame<'a> {
         self.header.id
     }
 
-    /// Of the sender.
+    /// System id of the sender.
     #[inline]
     pub const fn system(&self) -> u8 {
         self.header.system
     }
 
-    /// Of the sender.
+    /// Component id of the sender.
     #[inline]
     pub const fn component(&self) -> u8 {
         self.header.component
@@ -225,13 +225,13 @@ impl<'a> Frame<'a> {
         self.bytes.get(self.header.payload_at()..self.header.checksum_at()).unwrap_or_default()
     }
 
-    /// Of the frame.
+    /// All bytes of the frame.
     #[inline]
     pub const fn bytes(&self) -> &'a [u8] {
         self.bytes
     }
 
-    /// Of the checksum.
+    /// Result of the checksum test.
     #[inline]
     pub const fn check(&self) -> Check {
         self.check

@@ -23,7 +23,7 @@ struct Part<'a> {
     severity: u8,
     /// 0 for a text in one message.
     id: u16,
-    /// Among the parts, from 0.
+    /// Its place among the parts, from 0.
     sequence: u8,
     words: &'a [u8],
 }

@@ -117,12 +117,12 @@ impl Window {
     }
 }
 
-/// Of one port.
+/// One port's way out.
 #[derive(Clone, Debug)]
 pub struct Outlet {
     /// Makes our frames.
     pub encoder: Encoder,
-    /// If signing is on.
+    /// Signs our frames, if signing is on.
     pub seal: Option<Seal>,
     window: Window,
     events: Bucket,

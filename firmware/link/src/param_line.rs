@@ -8,7 +8,7 @@
 //!
 //! `#` begins a comment.
 
-/// As `QGroundControl`'s files name it.
+/// Our MAVLink component, as `QGroundControl`'s files name it.
 const COMPONENT: &str = "191";
 
 /// Content of a line.

@@ -9,7 +9,7 @@ use crate::signing::Key;
 /// Most waiting answers. Further requests are dropped; the sender repeats them.
 const REPLIES_MAX: usize = 12;
 
-/// Of origin or destination.
+/// Port of origin or destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Port {
@@ -51,7 +51,7 @@ pub enum Request<'a> {
     Key(Key, u64),
 }
 
-/// With its target.
+/// A request and its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked<'a> {
     /// System and component; 0 is all.
@@ -127,7 +127,7 @@ pub enum Reply {
     Keyed(bool),
 }
 
-/// And lists of parameters.
+/// Answers in line, and lists of parameters under way.
 #[derive(Clone, Debug, Default)]
 pub struct Replies {
     line: Deque<(Port, Reply), REPLIES_MAX>,
@@ -149,7 +149,7 @@ impl Replies {
         Self { line: Deque::new(), lists: [List { next: 0, left: 0 }; 2], dropped: 0 }
     }
 
-    /// Once; a full queue drops it.
+    /// Queues an answer once; a full queue drops it.
     pub fn push(&mut self, port: Port, reply: Reply) {
         if !self.line.iter().any(|waiting| *waiting == (port, reply))
             && self.line.push_back((port, reply)).is_err()
@@ -158,7 +158,7 @@ impl Replies {
         }
     }
 
-    /// Of `count` parameters.
+    /// Begins a list of `count` parameters.
     pub fn list(&mut self, port: Port, count: u16) {
         let list = &mut self.lists[port as usize];
         if list.left == 0 {
@@ -167,7 +167,7 @@ impl Replies {
         list.left = count;
     }
 
-    /// In the queue.
+    /// The next queued answer.
     pub fn first(&self) -> Option<(Port, Reply)> {
         self.line.front().copied()
     }

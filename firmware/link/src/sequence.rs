@@ -53,7 +53,7 @@ impl Sender {
     }
 }
 
-/// Of all senders on a link.
+/// The sequence numbers of all senders on a link.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sequences {
     senders: [Option<Sender>; SENDERS_MAX],
@@ -94,7 +94,7 @@ impl Sequences {
     }
 }
 
-/// Since power-on; 136 years fit.
+/// Whole seconds since power-on; 136 years fit.
 fn seconds(at: Instant) -> u32 {
     (at.as_micros() / Span::from_secs(1).as_micros()) as u32
 }

@@ -224,7 +224,7 @@ impl Times {
     }
 }
 
-/// And the history of its use.
+/// The key, and the history of its use.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Signing {
     key: Option<Key>,
@@ -246,7 +246,7 @@ impl Signing {
         }
     }
 
-    /// If there is one.
+    /// The key, if there is one.
     pub const fn key(&self) -> Option<&Key> {
         self.key.as_ref()
     }
@@ -302,7 +302,7 @@ impl Signing {
         Verdict::Good
     }
 
-    /// Of the latest good frame.
+    /// The stamp of the latest frame that was good.
     pub fn latest(&self) -> u64 {
         self.streams.iter().map(|stream| stream.last).fold(self.floor, u64::max)
     }

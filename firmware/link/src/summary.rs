@@ -131,7 +131,7 @@ pub struct OwnFigures {
     pub queue_percent: f32,
     /// Longest call of the card, seconds.
     pub stall_s: f32,
-    /// For `ONBOARD_COMPUTER_STATUS`.
+    /// Content of `ONBOARD_COMPUTER_STATUS`.
     pub computer: ComputerStatus,
 }
 
@@ -155,7 +155,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Before any frame.
+    /// Before the first frame.
     pub fn new(params: &Params) -> Self {
         Self {
             outlet: Outlet::new(
@@ -332,13 +332,13 @@ impl Summary {
         }
     }
 
-    /// For more urgent ones.
+    /// Findings that were dropped for more urgent ones.
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }
 }
 
-/// As the vehicle is.
+/// Our heartbeat as the vehicle is.
 pub fn heartbeat(monitor: &Monitor) -> Packet {
     messages::heartbeat(match monitor.health().overall() {
         Level::Critical => 5,

@@ -185,12 +185,12 @@ const fn since(now: Instant, at_ms: u32) -> u64 {
     (now.as_millis() as u32).wrapping_sub(at_ms) as u64
 }
 
-/// In the tables.
+/// The number of a check in the tables.
 fn number(check: &str) -> Option<u8> {
     Some(health::checks().position(|known| known.name == check)? as u8)
 }
 
-/// And its instance.
+/// The number of a finding's check, and its instance.
 fn key(finding: &Finding) -> Option<(u8, u8)> {
     Some((number(finding.check)?, finding.instance))
 }

@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Write as _};
 
-/// In one message.
+/// Bytes of text in one message.
 pub use hums_core::protect::TEXT_BYTES_MAX;
 
 /// `MAV_SEVERITY`.

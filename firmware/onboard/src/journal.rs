@@ -65,7 +65,7 @@ impl<'a> Journal<'a> {
         self.record(now, &Record::Event(Event { number: BY_HAND, text: text.as_str() }), sectors);
     }
 
-    /// To be recorded.
+    /// Counts a loss, to be recorded.
     pub(crate) fn lose(&mut self, now: Instant, what: Lost, count: u64) {
         self.lose_since(now, now, what, count);
     }
@@ -84,7 +84,7 @@ impl<'a> Journal<'a> {
         losses.flush(now, all, &mut write);
     }
 
-    /// Without room.
+    /// Frames that found no room.
     pub(crate) const fn refused(&self) -> u64 {
         self.refused
     }
@@ -114,7 +114,7 @@ pub(crate) struct Logbook<'a> {
     pub(crate) monitor: &'a mut Monitor,
     pub(crate) journal: Journal<'a>,
     pub(crate) card: &'a CardStatus,
-    /// Of this start.
+    /// The cause of this start.
     pub(crate) cause: ResetCause,
 }
 

@@ -5,7 +5,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// Since power-on, modulo 2^32.
+/// Counters of the autopilot's port since power-on, each modulo 2^32.
 #[derive(Debug, Default)]
 pub struct PortStatus {
     bytes: AtomicU32,
@@ -23,7 +23,7 @@ pub struct PortStatus {
 pub struct PortReading {
     /// Bytes received.
     pub bytes: u32,
-    /// In no frame.
+    /// Bytes that belong to no frame.
     pub bytes_not_frames: u32,
     /// Frames of known shape with a wrong checksum; their bytes count as bytes outside frames.
     pub damaged: u32,

@@ -13,7 +13,7 @@ use crate::queues::FramesIn;
 /// After this silence a begun frame will not be finished: [`Reception::idle`] is due.
 pub const SILENCE: Span = Span::from_millis(20);
 
-/// With its losses.
+/// The autopilot port's framer, and its losses.
 pub struct Reception<'a> {
     framer: Framer,
     status: &'a PortStatus,
@@ -21,7 +21,7 @@ pub struct Reception<'a> {
 }
 
 impl<'a> Reception<'a> {
-    /// Before any byte.
+    /// Before the first byte.
     pub const fn new(status: &'a PortStatus) -> Self {
         Self { framer: Framer::new(), status, frames_lost: 0 }
     }

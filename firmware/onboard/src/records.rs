@@ -116,7 +116,7 @@ impl Recorded {
         self.usage_at
     }
 
-    /// For a new file.
+    /// All usage again, for a new file.
     pub(crate) fn usage_anew(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.usage_at = Instant::ZERO;
         self.usage(now, Moment::Periodic, book, sectors);

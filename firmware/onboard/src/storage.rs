@@ -12,7 +12,7 @@ use crate::shelf::Server;
 /// How soon to call again after [`Service::NoCard`].
 pub const NO_CARD_RETRY: Span = Span::from_millis(100);
 
-/// Of one call.
+/// The result of one call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Service {
     /// It wrote, formatted or searched: call again at once.
@@ -23,7 +23,7 @@ pub enum Service {
     NoCard,
 }
 
-/// With the reading end of its queue.
+/// The recorder with the reading end of its queue.
 pub struct Storage<'a, D: CardDevice> {
     recorder: Recorder<'a, D>,
 }
@@ -34,7 +34,7 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         Self { recorder: Recorder::new(device, status, held, entropy) }
     }
 
-    /// At most one command.
+    /// Writes waiting sectors with at most one command.
     pub fn service(&mut self, now: Instant, sectors: &mut SectorsOut) -> Service {
         if self.recorder.format(now) {
             return Service::Wrote;
@@ -59,7 +59,7 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         self.recorder.finish();
     }
 
-    /// For stored logs and the card.
+    /// The recorder, for stored logs and for the card.
     pub const fn recorder(&mut self) -> &mut Recorder<'a, D> {
         &mut self.recorder
     }

@@ -25,7 +25,7 @@ impl Task {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Reception, Self::Monitor, Self::Downlink, Self::Storage];
 
-    /// In the log.
+    /// As the log names it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reception => "reception",

@@ -27,7 +27,7 @@ impl Default for Uplink {
 }
 
 impl Uplink {
-    /// Before any byte.
+    /// Before the first byte.
     pub const fn new() -> Self {
         Self { framer: Framer::new(), frames_lost: 0 }
     }

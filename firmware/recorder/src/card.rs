@@ -44,7 +44,7 @@ impl Place {
     }
 }
 
-/// In the card's root directory.
+/// One log segment in the card's root directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogEntry {
     /// Its name.
@@ -65,14 +65,14 @@ pub struct LogEntry {
 pub struct Segment {
     /// Its name.
     pub name: LogName,
-    /// In bytes.
+    /// The file's length in bytes.
     pub bytes: u32,
     chain: ClusterChain,
     place: Place,
 }
 
 impl Segment {
-    /// Of a directory entry.
+    /// The segment of a directory entry.
     pub const fn of(entry: &LogEntry) -> Self {
         Self {
             name: entry.name,
@@ -131,7 +131,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.into_device()
     }
 
-    /// For accesses besides files.
+    /// The device, for accesses besides files.
     pub const fn device(&self) -> &D {
         self.volume.device()
     }
@@ -433,7 +433,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.write_metadata(&block, place.block)
     }
 
-    /// By any file.
+    /// Whether no file has the entry at this place.
     #[inline(never)]
     fn is_unused(&self, place: Place) -> Result<bool, CardError<D::Error>> {
         let mut block = [[0; BLOCK_BYTES]];
@@ -441,7 +441,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(block[0].get(usize::from(place.offset)..).is_some_and(is_unused))
     }
 
-    /// By name.
+    /// Finds an existing segment.
     pub fn segment(&self, name: LogName) -> Result<Segment, CardError<D::Error>> {
         Ok(Segment::of(&self.find(name)?.ok_or(CardError::NotFound)?))
     }
@@ -455,7 +455,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Some((Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes))
     }
 
-    /// For writing in place.
+    /// Opens an existing segment for writing in place.
     pub fn open(&mut self, name: LogName) -> Result<(), CardError<D::Error>> {
         self.open = None;
         self.open = Some(self.segment(name)?);
@@ -484,7 +484,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(blocks.len())
     }
 
-    /// Of a segment.
+    /// Reads one block of a segment.
     pub fn read(
         &self,
         segment: &mut Segment,

@@ -84,7 +84,7 @@ pub(crate) struct Directory {
     /// Not hidden, and a sum over their names.
     pub(crate) shown: u16,
     pub(crate) names: u32,
-    /// Of the file of parameters.
+    /// First cluster and length of the file of parameters.
     pub(crate) settings: Option<(u32, u32)>,
     /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
@@ -194,7 +194,7 @@ impl Directory {
         (!self.oldest.is_empty()).then(|| self.oldest.remove(0))
     }
 
-    /// Besides the known ones.
+    /// Whether logs besides the known ones may be overwritten.
     pub(crate) const fn has_more(&self) -> bool {
         self.next > 0 || self.has_more
     }
@@ -333,7 +333,7 @@ impl Directory {
         }
     }
 
-    /// Of a full directory.
+    /// The last cluster of a full directory.
     pub(crate) const fn last_cluster(&self) -> u32 {
         self.root.last()
     }
@@ -341,7 +341,7 @@ impl Directory {
 
 type Step<E> = Result<ControlFlow<()>, CardError<E>>;
 
-/// With what is there.
+/// A place in the directory with what is there.
 pub(crate) struct Slot<'b> {
     pub(crate) index: u32,
     pub(crate) place: Place,

@@ -21,7 +21,7 @@ const ENTRIES: u32 = 128;
 pub const BLOCKS_MIN: u32 =
     PARTITION_START + RESERVED_BLOCKS + FAT32_CLUSTERS_MIN.div_ceil(ENTRIES - 1) + FAT32_CLUSTERS_MIN;
 
-/// Of formatting.
+/// Why a card was not formatted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FormatError<E> {
     /// The card did not take a block.
@@ -72,7 +72,7 @@ struct Plan {
     structures: usize,
 }
 
-/// Of the FAT.
+/// The first block of the FAT.
 const FAT_START: u32 = PARTITION_START + RESERVED_BLOCKS;
 type Make = fn(&Plan) -> Block;
 /// The blocks that are written after the FAT and the root directory are cleared, in this order.
@@ -98,7 +98,7 @@ impl Plan {
 }
 
 impl Formatting {
-    /// Before any step.
+    /// A card before the first step.
     pub const fn new(volume_id: u32) -> Self {
         Self { volume_id, plan: None }
     }

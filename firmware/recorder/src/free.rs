@@ -29,7 +29,7 @@ pub(crate) struct FreeSearch {
     found: u32,
     /// The first of these.
     first: u32,
-    /// Of a search that goes on; 0: none.
+    /// Clusters of a search that goes on; 0: none.
     wanted: u32,
     /// This many clusters are not free. Only another computer frees clusters.
     too_many: u32,

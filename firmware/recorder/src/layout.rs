@@ -20,11 +20,11 @@ pub(crate) const EXFAT_TYPE: u8 = 0x07;
 /// In the first partition of a card; block numbers are absolute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// Of the volume.
+    /// The volume's first block.
     pub start: u32,
     /// The information sector (free cluster hint).
     pub info: u32,
-    /// Of the first FAT.
+    /// The first FAT's first block.
     pub fat_start: u32,
     /// Blocks of one FAT with entries of clusters.
     pub fat_blocks: u32,
@@ -40,7 +40,7 @@ pub struct Layout {
     pub clusters: u32,
     /// First one of the root directory.
     pub root: u32,
-    /// By formatting.
+    /// The number that formatting gave the volume.
     pub volume_id: u32,
 }
 
@@ -76,7 +76,7 @@ impl<E> fmt::Display for LayoutError<E> {
 }
 
 impl Layout {
-    /// Of the first partition.
+    /// Reads and checks a card's first partition.
     pub fn read<D: CardDevice>(device: &D) -> Result<Self, LayoutError<D::Error>> {
         let card_blocks = device.num_blocks().map_err(LayoutError::Device)?;
         let mut block = [[0; BLOCK_BYTES]];
@@ -144,12 +144,12 @@ impl Layout {
         })
     }
 
-    /// In a cluster.
+    /// Whether a block belongs to a cluster.
     pub const fn is_data(&self, block: u32) -> bool {
         block >= self.data_start && block - self.data_start < self.clusters * self.cluster_blocks
     }
 
-    /// For files and directories.
+    /// Bytes that files and directories can hold.
     pub const fn data_bytes(&self) -> u64 {
         self.clusters as u64 * self.cluster_blocks as u64 * BLOCK_BYTES as u64
     }

@@ -40,7 +40,7 @@ pub use status::{CardState, CardStatus};
 
 use hums_core::clock::Instant;
 
-/// For recording.
+/// The consequence of a card error for recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// No card answers, or another one does.
@@ -61,7 +61,7 @@ pub type Block = [u8; BLOCK_BYTES];
 
 /// A card: a device of blocks that can start over, as after it was pulled and put back.
 pub trait CardDevice {
-    /// Of an access.
+    /// Why an access failed.
     type Error: core::fmt::Debug;
 
     /// In a row, from this one on.
@@ -70,7 +70,7 @@ pub trait CardDevice {
     /// In a row, from this one on.
     fn write(&self, blocks: &[Block], start: u32) -> Result<(), Self::Error>;
 
-    /// Of the card.
+    /// How many blocks the card has.
     fn num_blocks(&self) -> Result<u32, Self::Error>;
 
     /// Drops the card's identity: the next access identifies any card.
@@ -82,7 +82,7 @@ pub trait CardDevice {
     /// A service begins: all waits until the next call together have a limit.
     fn begin_service(&self) {}
 
-    /// For timing commands.
+    /// The clock for timing the card's commands.
     fn now(&self) -> Instant {
         Instant::ZERO
     }
@@ -97,7 +97,7 @@ pub trait CardDevice {
         false
     }
 
-    /// Of an error.
+    /// The consequence of an error.
     fn trouble(_error: &Self::Error) -> Trouble {
         Trouble::Refusing
     }

@@ -5,7 +5,7 @@ use core::fmt;
 
 pub(crate) const EXTENSION: &str = "HUM";
 
-/// Of a log's segment.
+/// The name of one segment of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LogName {
     /// The session's number on this card, 1 to [`LogName::SESSION_MAX`]; counts up with each power-on.

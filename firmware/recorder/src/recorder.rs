@@ -48,12 +48,12 @@ pub enum NotYet {
     Later,
 }
 
-/// In work.
+/// The segment in work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InWork {
     /// Its name.
     pub name: LogName,
-    /// In its sectors.
+    /// The session number in the seal of its sectors.
     pub session: u32,
     /// 0 without sectors.
     pub first: u32,
@@ -216,7 +216,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.segments.log.filter(|_| self.socket.is_mounted() && self.segments.is_open)
     }
 
-    /// In work.
+    /// The name of the segment in work.
     pub fn log_name(&self) -> Option<LogName> {
         self.open_segment().map(|log| log.name)
     }
@@ -233,7 +233,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.card()
     }
 
-    /// With its card.
+    /// Gives the device back, with its card.
     pub fn into_device(self) -> Option<D> {
         self.socket.into_device()
     }

@@ -105,7 +105,7 @@ pub struct CardStatus {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counted {
-    /// For logs, thousandths.
+    /// The share for logs, in thousandths.
     pub(crate) permille: u32,
     /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,
@@ -116,11 +116,11 @@ pub(crate) struct Counted {
 /// A reading of [`CardStatus`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CardReading {
-    /// Of the card.
+    /// The state of the card.
     pub state: CardState,
     /// On this card; 0 before there is one.
     pub session: u32,
-    /// In this session.
+    /// Segments begun in this session.
     pub segments: u32,
     /// Of earlier sessions: the card is full.
     pub segments_overwritten: u32,
@@ -130,7 +130,7 @@ pub struct CardReading {
     pub writes: u32,
     /// Retries included.
     pub write_errors: u32,
-    /// In unwritten sectors.
+    /// Frames in sectors that could not be written.
     pub frames_lost: u32,
     /// Unwritten.
     pub sectors_lost: u32,
@@ -152,7 +152,7 @@ impl Default for CardStatus {
 }
 
 impl CardStatus {
-    /// Not looked at yet.
+    /// Before the card was looked at.
     pub const fn new() -> Self {
         Self {
             state: AtomicU8::new(CardState::Unknown as u8),
@@ -213,7 +213,7 @@ impl CardStatus {
         self.state.store(state as u8, Ordering::Relaxed);
     }
 
-    /// Of the opened volume.
+    /// Sets the serial number of the opened volume.
     pub fn set_volume(&self, volume: u32) {
         self.volume.store(volume, Ordering::Relaxed);
     }

@@ -72,7 +72,7 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_stride + index))
     }
 
-    /// Of one cluster.
+    /// Changes the FAT entry of one cluster.
     #[inline(never)]
     pub(crate) fn link(&self, cluster: u32, next: u32) -> Result<(), CardError<D::Error>> {
         let mut block = self.read_fat(cluster / ENTRIES)?;
@@ -80,7 +80,7 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         self.write_fat(&block, cluster / ENTRIES)
     }
 
-    /// Of one cluster.
+    /// The FAT entry of one cluster.
     #[inline(never)]
     pub(crate) fn entry(&self, cluster: u32) -> Result<u32, CardError<D::Error>> {
         Ok(entry(&self.read_fat(cluster / ENTRIES)?[0], cluster))
@@ -91,7 +91,7 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         cluster >= 2 && cluster - 2 < self.layout.clusters
     }
 
-    /// Of a cluster.
+    /// The first block of a cluster.
     pub(crate) const fn block_of(&self, cluster: u32) -> u32 {
         self.layout.data_start + (cluster - 2) * self.layout.cluster_blocks
     }

@@ -315,7 +315,7 @@ fn forget_hint(device: &MemCard) {
     change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
 }
 
-/// From this cluster on.
+/// The search for room begins at this cluster.
 fn set_hint(device: &MemCard, cluster: u32) {
     change(device, 2048 + 1, |info| info[492..496].copy_from_slice(&cluster.to_le_bytes()));
 }

@@ -3,7 +3,7 @@
 /// Longest name of a parameter, as in `PARAM_VALUE`.
 pub const NAME_BYTES_MAX: usize = 16;
 
-/// Of [`param_value`].
+/// The longest value that [`param_value`] makes.
 pub const PARAM_BYTES_MAX: usize = 1 + NAME_BYTES_MAX + 4;
 
 /// Numbers never change meaning.
@@ -41,7 +41,7 @@ impl Key {
         if self.0 <= u8::MAX as u32 { Some(self.0 as u8) } else { None }
     }
 
-    /// Of a parameter.
+    /// Whether it is a parameter's.
     pub const fn is_param(self) -> bool {
         self.0 & Self::PARAM != 0
     }
@@ -51,7 +51,7 @@ impl Key {
         self.0
     }
 
-    /// Of any stored form.
+    /// The key of any stored form.
     pub const fn from_stored(key: u32) -> Self {
         Self(key)
     }

@@ -73,7 +73,7 @@ impl Item {
         self.at + 2 * WORD
     }
 
-    /// In the flash.
+    /// Bytes of the item in the flash.
     pub(crate) const fn bytes(&self) -> usize {
         ITEM_BYTES + self.length.next_multiple_of(WORD)
     }
@@ -104,7 +104,7 @@ pub(crate) struct Content {
 pub(crate) struct Sector<'f, F> {
     flash: &'f mut F,
     start: usize,
-    /// Of the items.
+    /// Upper limit of the items.
     end: usize,
 }
 
@@ -139,7 +139,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(Header { generation, is_complete, superseded_by: decoded(self.word(SUPERSEDED_AT)?) })
     }
 
-    /// With a new header.
+    /// Erases the sector and writes a new header.
     pub(crate) fn begin(&mut self, generation: u16) -> Result<(), F::Error> {
         self.flash.erase(self.start as u32, (self.start + F::ERASE_SIZE) as u32)?;
         self.write_word(GENERATION_AT, coded(generation))?;
@@ -209,7 +209,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(true)
     }
 
-    /// From this offset on.
+    /// The next complete item from this offset.
     pub(crate) fn next(&mut self, mut at: usize) -> Result<Option<Item>, F::Error> {
         while at + ITEM_BYTES <= self.end {
             match self.item(at)? {

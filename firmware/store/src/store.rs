@@ -10,7 +10,7 @@ pub const VALUE_BYTES_MAX: usize = 512;
 
 type Outcome<T, F> = Result<T, Error<<F as ErrorType>::Error>>;
 
-/// Of a save or a read.
+/// Error of a save or a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error<E> {
     /// An erase is needed and not allowed now. Nothing changed.
@@ -29,7 +29,7 @@ impl<E> From<E> for Error<E> {
     }
 }
 
-/// Of a save.
+/// Result of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
     /// The value was stored already.
@@ -38,7 +38,7 @@ pub enum Saved {
     Written,
 }
 
-/// At a start.
+/// State of the flash at a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// An intact store.

@@ -9,20 +9,20 @@ use serde::Serialize;
 
 use crate::names::counter_name;
 
-/// Of a session.
+/// All counters of a session.
 #[derive(Debug, Default, Serialize)]
 pub struct Counters {
-    /// Of the vehicle.
+    /// Those of the vehicle.
     pub plain: Vec<Plain>,
     /// By motor.
     pub motors: Vec<Motor>,
     /// By quantity.
     pub ranges: Vec<Ranges>,
-    /// On the counters.
+    /// A remark on the counters.
     pub remark: Option<&'static str>,
 }
 
-/// Of the vehicle.
+/// One of the vehicle.
 #[derive(Debug, Serialize)]
 pub struct Plain {
     /// For people.
@@ -41,13 +41,13 @@ pub struct Plain {
 pub struct Motor {
     /// From 0.
     pub number: u8,
-    /// In this session, s.
+    /// How long it turned in this session, s.
     pub run_time_s: Option<f64>,
-    /// In this session.
+    /// How often it turned in this session.
     pub revolutions: Option<f64>,
-    /// In its life, s.
+    /// How long in its life, s.
     pub life_run_time_s: Option<f64>,
-    /// In its life.
+    /// How often in its life.
     pub life_revolutions: Option<f64>,
 }
 
@@ -56,13 +56,13 @@ pub struct Motor {
 pub struct Ranges {
     /// The quantity's name.
     pub title: &'static str,
-    /// Of the ranges' ends.
+    /// The unit of the ranges' ends.
     pub unit: &'static str,
     /// Its ranges.
     pub bands: Vec<Band>,
 }
 
-/// From, to (`null`: open), seconds.
+/// From, to (`null` for an open range), seconds.
 pub type Band = (Option<f32>, Option<f32>, f64);
 
 /// A message of the vehicle has the quantity: otherwise zero means unknown. Motors, ranges and the past never show a
@@ -89,7 +89,7 @@ pub fn is_told(name: &str, vehicle: &Vehicle) -> bool {
     }
 }
 
-/// By any message.
+/// Whether any message shows if the vehicle flies.
 pub fn tells_flight(vehicle: &Vehicle) -> bool {
     let Vehicle { landed, global, local, hud, .. } = vehicle;
     landed.get().is_some() || global.get().is_some() || local.get().is_some() || hud.get().is_some()

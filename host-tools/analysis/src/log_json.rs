@@ -24,13 +24,13 @@ pub struct ImageJson {
     not_looked_at: Option<String>,
 }
 
-/// Of a run.
+/// The images of a run.
 #[derive(Debug, Serialize)]
 pub struct ImagesJson {
     images: Vec<ImageJson>,
 }
 
-/// As JSON.
+/// The images of a run as JSON.
 pub fn images_json(images: &[logs::find::Image]) -> ImagesJson {
     let json = |image: &logs::find::Image| ImageJson {
         path: image.path.display().to_string(),
@@ -49,14 +49,14 @@ pub struct LogJson {
     /// `hums`, `tlog`, `raw`, `dataflash`, `ulog`.
     format: &'static str,
     files: Vec<String>,
-    /// By its sectors, hexadecimal.
+    /// As its sectors name it, hexadecimal.
     session: Option<String>,
     closed: bool,
     /// `null` for another format.
     end: Option<EndJson>,
     start_utc: Option<String>,
     end_utc: Option<String>,
-    /// Since power-on.
+    /// Seconds since the monitor's power-on.
     start_s: Option<f64>,
     end_s: Option<f64>,
     duration_s: f64,
@@ -66,10 +66,10 @@ pub struct LogJson {
     frame_bytes: u64,
     records: u64,
     messages: Vec<MessageJson>,
-    /// Beyond the list, without definitions here.
+    /// Frames of ids beyond the list, without definitions here.
     frames_of_other_messages: u64,
     gaps_count: u64,
-    /// As far as counted.
+    /// As far as they were counted.
     frames_missing: u64,
     /// Unknown numbers.
     gaps_uncounted: u64,
@@ -94,11 +94,11 @@ pub struct LogJson {
     bytes_on_card: u64,
     sectors: u64,
     sectors_damaged: u64,
-    /// Of its files.
+    /// All blocks of its files.
     blocks: BlocksJson,
 }
 
-/// Of a recording.
+/// The vehicle of a recording.
 #[derive(Debug, Serialize)]
 pub struct VehicleJson {
     /// MAVLink system id.
@@ -117,7 +117,7 @@ pub struct VehicleJson {
 
 #[derive(Debug, Serialize)]
 struct MessageJson {
-    /// For MAVLink messages.
+    /// The id, for MAVLink messages.
     id: Option<u32>,
     name: String,
     verified: bool,
@@ -369,7 +369,7 @@ pub fn duration_s(log: &Overview) -> f64 {
     }
 }
 
-/// If received.
+/// The vehicle, if it was received.
 pub fn vehicle(log: &Overview) -> Option<VehicleJson> {
     let vehicle = log.contents.vehicle?;
     let [major, minor, patch, _] = vehicle.firmware.to_be_bytes();

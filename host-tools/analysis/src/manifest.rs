@@ -21,10 +21,10 @@ use crate::utc::iso8601;
 
 const SCHEMA: Schema = Schema::first("hums-manifest");
 
-/// In the making.
+/// A manifest in the making.
 #[derive(Debug, Default, Serialize)]
 pub struct Manifest {
-    /// And commit.
+    /// This program and its commit.
     program: &'static str,
     made_utc: String,
     inputs: Vec<FileJson>,
@@ -32,7 +32,7 @@ pub struct Manifest {
     logs: Vec<LogJson>,
 }
 
-/// With its content.
+/// A file and its content.
 #[derive(Debug, Serialize)]
 struct FileJson {
     /// Without folders above the named one.
@@ -41,7 +41,7 @@ struct FileJson {
     sha256: String,
 }
 
-/// And its losses.
+/// A log, and what it lacks.
 #[derive(Debug, Serialize)]
 struct LogJson {
     name: String,

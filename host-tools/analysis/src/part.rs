@@ -9,7 +9,7 @@ use hums_core::health::Subsystem;
 /// Hours, flights, battery cycles, motor hours; 0 without a limit.
 pub type Limits = [f64; 4];
 
-/// Of their parameters.
+/// How the names of their parameters end.
 const ENDS: [&str; 4] = ["_HOURS", "_FLIGHTS", "_CYCLES", "_MOT_HOURS"];
 
 /// Place from 0, and limit: `CMP1_FLIGHTS` is 0 and 1.
@@ -37,7 +37,7 @@ pub struct Limit {
     pub unit: &'static str,
     /// `turning`; empty for other units.
     pub how: &'static str,
-    /// Of its parameter.
+    /// How the name of its parameter ends.
     pub end: &'static str,
 }
 
@@ -98,7 +98,7 @@ pub fn due_words((name, limit): &(String, Option<String>)) -> String {
     limit.as_ref().map_or_else(|| name.clone(), |limit| format!("{name} (limit {limit})"))
 }
 
-/// By the check.
+/// Whether a check reports that a part is due.
 pub fn is_due(check: &str) -> bool {
     check.ends_with("_due")
 }

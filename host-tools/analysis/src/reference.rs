@@ -18,7 +18,7 @@ use crate::mavlink::values::Scalar;
 /// Slow streams: 2 to 5 s.
 const AGE_MAX: Span = Span::from_secs(10);
 
-/// In the tables.
+/// Motors of the reference system's tables.
 pub const MOTORS: usize = 4;
 
 /// One of the reference system's quantities. Motors count from 0.
@@ -30,7 +30,7 @@ pub enum Quantity {
     BatteryPercent,
     /// Battery voltage, V.
     BatteryVolts,
-    /// At the air's sensor, degC.
+    /// Temperature of the air at its sensor, degC.
     Temperature,
     /// Static pressure, hPa.
     Pressure,
@@ -42,7 +42,7 @@ pub enum Quantity {
     Velocity(usize),
     /// m/s.
     VelocityModule,
-    /// Over ground, m/s.
+    /// Speed over ground by the GNSS receiver, m/s.
     GnssSpeed,
     /// Above mean sea level, m.
     Altitude,
@@ -76,7 +76,7 @@ pub enum Quantity {
     EscTemperature(usize),
 }
 
-/// In order.
+/// ESC quantities in the reference system.
 const ESC: [fn(usize) -> Quantity; 6] = [
     Quantity::EscRpm,
     Quantity::EscVoltage,

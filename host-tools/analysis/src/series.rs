@@ -8,21 +8,21 @@ use hums_core::clock::Instant;
 
 /// A large screen's columns.
 const INTERVALS_MAX: usize = 2048;
-/// At first.
+/// The first length of an interval.
 const INTERVAL_MS: u64 = 50;
 /// All that a vehicle's model can fill.
 const SERIES_MAX: usize = 256;
 /// As 64 full series, some 5 MiB; a flying vehicle fills some forty.
 const FILLED_MAX: usize = 64 * INTERVALS_MAX;
 
-/// Of intervals.
+/// The row of intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
     start_ms: Option<u64>,
     interval_ms: u64,
 }
 
-/// Of one series.
+/// One interval of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extremes {
     low: f32,
@@ -112,10 +112,10 @@ pub type Line<P> = (P, u8);
 pub struct Store<P> {
     grid: Grid,
     series: BTreeMap<Line<P>, Series>,
-    /// Of all series.
+    /// Intervals that have a value, of all series.
     filled: usize,
     series_max: usize,
-    /// Of all series.
+    /// Number of values in all series.
     taken: u64,
 }
 
@@ -188,7 +188,7 @@ impl<P: Copy + Ord> Store<P> {
         Some((self.grid.start_ms?, self.grid.interval_ms))
     }
 
-    /// In all series.
+    /// Number of values in all series.
     pub fn taken(&self) -> u64 {
         self.taken
     }
@@ -207,7 +207,7 @@ impl<P: Copy + Ord> Store<P> {
         })
     }
 
-    /// With values, in order.
+    /// All lines that have a value, in their order.
     pub fn lines(&self) -> impl Iterator<Item = Line<P>> {
         self.series.keys().copied()
     }

@@ -11,18 +11,18 @@ pub enum Soundness {
     Repaired,
     /// Nothing but parity.
     Unprotected,
-    /// Perhaps its end, or a proved order.
+    /// Perhaps its end, or an order that is proved.
     NotProved,
     /// Nothing; bytes outside frames.
     NotFrames,
-    /// Not written by its recorder.
+    /// Something that its recorder did not write.
     Lossy,
     /// Was in it.
     Damaged,
 }
 
 impl Soundness {
-    /// Of a HUMS log.
+    /// Of a log of ours.
     pub fn of(ending: &Ending) -> Self {
         let (summary, is_counted) = (&ending.summary, ending.aside().is_none());
         match () {

@@ -7,7 +7,7 @@ use crate::names::vocabulary;
 /// Should be zero: a limit below one means "any", and is not shown.
 const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
 
-/// For people.
+/// A value for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shown {
     /// `None` if unknown; number and limit are not for people.
@@ -16,7 +16,7 @@ pub enum Shown {
     Quantity(Option<f32>, Option<f32>),
 }
 
-/// Of a check.
+/// The shown value and limit of a check.
 pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
     if check_named(check).is_some_and(|check| check.unit.is_flag()) {
         return Shown::State(name(check, value));
@@ -72,7 +72,7 @@ pub fn name(check: &str, value: f32) -> Option<&'static str> {
     names.get(place).copied()
 }
 
-/// Of an alarm, as a sentence.
+/// The meaning of a check's alarm, as a sentence.
 pub fn meaning(check: &str) -> &'static str {
     vocabulary(check).map_or("", |words| words.meaning)
 }

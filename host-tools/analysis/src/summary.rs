@@ -91,7 +91,7 @@ pub struct EndsInAir {
     pub height_m: Option<f32>,
     /// m/s; negative: sank.
     pub climb_mps: Option<f32>,
-    /// Over ground, m/s.
+    /// Speed over ground, m/s.
     pub speed_mps: Option<f32>,
     /// Last, degrees north and east.
     pub place_deg: Option<(f64, f64)>,
@@ -128,7 +128,7 @@ pub struct ExceedanceLine {
     pub session: Crossings,
     /// In the airframe's life.
     pub lifetime: Crossings,
-    /// Of the peaks.
+    /// The unit of the peaks.
     pub unit: String,
 }
 
@@ -137,7 +137,7 @@ pub struct ExceedanceLine {
 pub struct FlightLine {
     /// Take-off, or first seen.
     pub from: Instant,
-    /// If in the log.
+    /// Landing, if it is in the log.
     pub to: Option<Instant>,
 }
 
@@ -146,7 +146,7 @@ pub struct FlightLine {
 pub struct ComponentLine {
     /// Its kind.
     pub kind: &'static str,
-    /// From 1; 0 is all.
+    /// Which of its kind, from 1; 0 is all.
     pub number: u8,
     /// The operator's.
     pub name: String,
@@ -154,7 +154,7 @@ pub struct ComponentLine {
     pub serial: String,
     /// Green, yellow or red.
     pub status: &'static str,
-    /// Of its life.
+    /// The part of its life that is used.
     pub used_percent: f32,
     /// Its figures.
     pub figures: Figures,
@@ -175,15 +175,15 @@ pub struct Contents {
     pub messages: Vec<MessageCount>,
     /// Unverified: distinguished ids are limited.
     pub other_messages: Amount,
-    /// Of the monitor.
+    /// Records of the monitor's own.
     pub records: u64,
     /// The first boot record.
     pub boot: Option<BootLine>,
     /// The last vehicle record.
     pub vehicle: Option<Vehicle>,
-    /// At power-on, microseconds since 1970.
+    /// UTC at power-on, microseconds since 1970.
     pub epoch_us: Option<u64>,
-    /// In order, up to [`LISTED_MAX`].
+    /// Changes of level, in order, up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// All.
     pub findings_count: u64,
@@ -213,15 +213,15 @@ pub struct Contents {
     pub lifetime_at: Option<Instant>,
     /// By check and instance, last recorded.
     pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
-    /// By place, from 1, last recorded.
+    /// Components by place, from 1, as recorded last.
     pub components: BTreeMap<u8, ComponentLine>,
-    /// By place, from 0.
+    /// Limits of use of each part, by place from 0.
     pub part_limits: [part::Limits; COMPONENTS_MAX],
     /// Count, first and last time.
     pub losses: BTreeMap<&'static str, Loss>,
     /// The recorder's last statistics.
     pub stats: Option<Stats>,
-    /// In order, up to [`LISTED_MAX`].
+    /// Gaps, in order, up to [`LISTED_MAX`].
     pub gaps: Vec<Gap>,
     /// Offset and cause, in another format.
     pub gap_words: Vec<(Option<u64>, String)>,
@@ -236,7 +236,7 @@ pub struct Contents {
 }
 
 impl Contents {
-    /// Of all messages.
+    /// Frames of all messages.
     pub fn frames(&self) -> u64 {
         self.all_frames().count
     }
@@ -275,12 +275,12 @@ impl Contents {
         flights
     }
 
-    /// Of all frames.
+    /// Bytes of all frames.
     pub fn frame_bytes(&self) -> u64 {
         self.all_frames().bytes
     }
 
-    /// In a tlog.
+    /// Bytes that the frames take in a tlog.
     pub fn tlog_bytes(&self) -> u64 {
         self.frame_bytes() + 8 * self.frames()
     }
@@ -492,7 +492,7 @@ pub struct Overview {
     pub format: Option<Format>,
     /// Set aside for it.
     pub bytes_on_card: u64,
-    /// Of each part.
+    /// UTC by the clock of each part.
     pub epochs: Epochs,
     /// Its contents.
     pub contents: Contents,
@@ -561,7 +561,7 @@ impl Overview {
         }
     }
 
-    /// If known.
+    /// UTC at this time, if known.
     pub fn utc_us(&self, at: Instant) -> Option<u64> {
         self.epochs.utc_us(at)
     }

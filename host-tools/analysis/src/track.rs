@@ -5,10 +5,10 @@ use hums_core::units::Position;
 
 /// When full, every second one goes.
 const POINTS_MAX: usize = 4_096;
-/// At first.
+/// The first distance between two.
 const EVERY: Span = Span::from_millis(100);
 
-/// At a time.
+/// A place at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// When.
@@ -21,7 +21,7 @@ pub struct Point {
     pub height_m: Option<f32>,
 }
 
-/// In order.
+/// Places in order of time.
 #[derive(Clone, Debug)]
 pub struct Track {
     points: Vec<Point>,

@@ -60,7 +60,7 @@ pub const fn why(gap: &Gap) -> &'static str {
     }
 }
 
-/// With its time.
+/// The content of a loss record, with its time.
 pub fn told(loss: &Loss) -> String {
     let words = words(loss).unwrap_or_else(|| match loss.what {
         Lost::NotFrames => format!("{} of no frame came over the line", count(loss.count, "byte")),

@@ -56,7 +56,7 @@ impl Traits {
         self.board.is_some()
     }
 
-    /// Of the log's files.
+    /// The name of the log's files.
     pub fn name(&self, place: &Place) -> String {
         let Some(log) = place.own() else {
             return format!("{}-{}", file_name(place), self.identity(place));
@@ -74,7 +74,7 @@ impl Traits {
     }
 }
 
-/// In one command.
+/// The name of a log's files in one command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Named {
     /// Name, and index within its session, from 1.
@@ -86,7 +86,7 @@ pub enum Named {
 /// Names one command's logs. Different logs of one session (a shortened copy) differ.
 #[derive(Debug, Default)]
 pub struct Names {
-    /// By session and content.
+    /// The indices of logs, by session and content.
     known: BTreeMap<(Option<u32>, [u8; 16]), usize>,
     of_session: BTreeMap<u32, u32>,
     taken: BTreeMap<String, u32>,
@@ -183,7 +183,7 @@ fn cut(mut name: String) -> String {
     name
 }
 
-/// Of all bytes.
+/// Hash of all bytes of a file.
 fn fingerprint(path: &Path) -> Result<[u8; 16]> {
     let digest = digest(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(digest.first_chunk().copied().unwrap_or_default())

@@ -20,7 +20,7 @@ const PART_BYTES: usize = 50;
 /// A text, or one message's part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
-    /// Of the first part.
+    /// When its first part came.
     pub at: Instant,
     /// Who says it.
     pub source: Source,
@@ -28,7 +28,7 @@ pub struct Text {
     pub severity: u8,
     /// Untrusted, never markup.
     pub words: String,
-    /// Once joined.
+    /// The alert in it, once it is put together.
     pub alert: Option<Alert>,
     /// Shared by its parts; 0 for a single one.
     id: u16,

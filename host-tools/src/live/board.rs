@@ -224,7 +224,7 @@ fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
     }
 }
 
-/// Or the reason for its absence.
+/// The worst finding, or the reason for its absence.
 fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: usize) -> String {
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at.as_millis()));

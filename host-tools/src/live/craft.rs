@@ -80,7 +80,7 @@ pub struct Craft {
     limits_at: Option<Instant>,
     /// Air data in an inertial message are then another sensor's.
     barometer: bool,
-    /// Before this session.
+    /// Parts with known hours before this session.
     lives: [bool; COMPONENTS_MAX],
     /// By usage: on the ground last, and before the last flight.
     grounded_s: f64,

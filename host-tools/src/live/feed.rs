@@ -33,9 +33,9 @@ const GATHERED_BYTES: usize = 1_024;
 const PIECES: usize = 8;
 /// Between two updates. Pages that draw in 10 ms keep up.
 const SOON: Duration = Duration::from_millis(40);
-/// Of a broken connection.
+/// How soon a broken connection is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
-/// Of data.
+/// A source without data for this long is silent.
 const SILENT: Duration = Duration::from_secs(3);
 
 /// Follows a live source until Ctrl-C.
@@ -58,7 +58,7 @@ pub struct Feed {
 
 enum Link {
     Open(Box<dyn Port>),
-    /// Until the next try.
+    /// It is tried again at this time.
     Lost(Wall),
     /// Sent by a thread.
     Opening(Receiver<Result<Box<dyn Port>>>),

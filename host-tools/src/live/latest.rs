@@ -39,7 +39,7 @@ pub const QUANTITIES: [(&str, Quantity, Span); 23] = [
 ];
 const PLACES: usize = QUANTITIES.len() + 6 * MOTORS_MAX;
 
-/// By quantity.
+/// Time and last value of each quantity.
 #[derive(Clone, Debug)]
 pub struct Latest([Option<(Instant, Scalar)>; PLACES]);
 

@@ -25,7 +25,7 @@ use crate::interrupt;
 const COPIES_MAX: usize = 128;
 /// In all copies, some 8 KiB each: 32 copies of eight vehicles.
 const COPIED_MAX: usize = 256;
-/// Between the first copies.
+/// The first distance between two.
 const COPY_EVERY: Span = Span::from_secs(5);
 const SPEEDS: (f64, f64) = (0.1, 64.0);
 /// Besides frames: a log's parameters and parts.

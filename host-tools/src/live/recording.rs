@@ -17,7 +17,7 @@ use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::{Place, Recording};
 
-/// For a choice.
+/// Maximum number of sessions listed for a choice.
 const LISTED_MAX: usize = 12;
 
 /// An input, found good.
@@ -25,7 +25,7 @@ pub struct Opened {
     /// Its name.
     pub name: String,
     recording: Option<Recording>,
-    /// Without frames.
+    /// Its place, if it has no frames.
     native: Option<Place>,
     is_of_box: bool,
 }
@@ -92,7 +92,7 @@ fn listed(names: &[String]) -> String {
 pub enum Content<'a> {
     /// A frame.
     Frame(&'a Frame<'a>),
-    /// Of an autopilot's log.
+    /// An entry of an autopilot's own log.
     Entry(&'a Entry),
     /// Another report.
     Told(&'a Told),

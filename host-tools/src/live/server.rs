@@ -88,7 +88,7 @@ pub fn serve(
     })
 }
 
-/// For every request and answer.
+/// Rules for every request and every answer.
 async fn check(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let mut response = if !shared.guard.knows_host(headers) {
@@ -167,7 +167,7 @@ enum Asked {
     Speed { to: f64 },
 }
 
-/// With the data it has.
+/// One page, and the data it has.
 struct Page {
     follow: tokio::sync::watch::Receiver<Arc<Published>>,
     vehicle: Option<u8>,

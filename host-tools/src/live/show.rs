@@ -21,7 +21,7 @@ use crate::part;
 /// The bytes' source and state.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SourceJson {
-    /// From the command line.
+    /// As the command line names it.
     pub name: String,
     /// Can be paused and sought.
     pub recording: bool,
@@ -29,7 +29,7 @@ pub struct SourceJson {
     pub phase: &'static str,
     /// More in words.
     pub words: String,
-    /// Of a HUMS log.
+    /// The end of a HUMS log, in words.
     pub log_end: Option<String>,
     /// Progress of reading, 0 to 1.
     pub progress: f64,
@@ -117,7 +117,7 @@ struct State<'a> {
     mode: Cow<'static, str>,
     overall: &'static str,
     overall_said: Option<&'a str>,
-    /// Before it became unknown.
+    /// The last level before it became unknown.
     overall_was: Option<&'static str>,
     heard_ms: u64,
     px4: bool,

@@ -68,7 +68,7 @@ impl SpoolWriter {
 }
 
 impl Spool {
-    /// From [`SpoolWriter::offset`].
+    /// Goes to an offset from [`SpoolWriter::offset`].
     pub fn seek(&mut self, offset: u64) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(offset)).map(|_| ())
     }

@@ -18,7 +18,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// In this order.
+    /// These are given, in this order.
     pub fn new(given: &[(&'static ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
@@ -41,7 +41,7 @@ impl Limits {
         }
     }
 
-    /// For later vehicles.
+    /// The same for all vehicles that come.
     pub fn learn(&mut self, name: &str, value: f32) {
         let mut params = self.params;
         self.take(&mut params, name, value);

@@ -37,7 +37,7 @@ pub type Histories = BTreeMap<u8, History>;
 pub struct World {
     /// By system id.
     pub crafts: BTreeMap<u8, Craft>,
-    /// From any sender.
+    /// Number of frames received, from any sender.
     pub frames: u64,
     /// Of no known definition.
     pub unverified: u64,
@@ -52,7 +52,7 @@ pub struct World {
     owner: Option<u8>,
     /// Before their first heartbeat: system and frame.
     early: Vec<(u8, Vec<u8>)>,
-    /// Before that.
+    /// The log's parts before that.
     parts: [Option<Component>; COMPONENTS_MAX],
     next_tick: Instant,
 }

@@ -128,7 +128,7 @@ impl Arrivals {
         self.broken_off = true;
     }
 
-    /// Of the input.
+    /// Oddities of the input.
     pub fn remark(&self) -> Option<String> {
         let broken_off =
             self.broken_off.then(|| "was not read to its end: the run was ended before".to_owned());

@@ -22,7 +22,7 @@ use crate::utc::moment;
 
 const SCHEMA: Schema = Schema::first("hums-run");
 
-/// For `--json`; its names are a contract.
+/// The object of `--json`; its names are a contract.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// Frames that came in.
@@ -39,7 +39,7 @@ pub struct Report {
     pub bytes_logged: u64,
     /// File system included.
     pub blocks_written: u64,
-    /// Of the sector queue.
+    /// The fullest the sector queue was.
     pub queue_bytes_max: u64,
     /// Its size.
     pub queue_bytes_capacity: u64,
@@ -51,12 +51,12 @@ pub struct Report {
     pub gs_bytes: u64,
     /// In order, up to [`FINDINGS_MAX`]; the log has all.
     pub findings: Vec<Finding>,
-    /// Beyond the limit.
+    /// How many more there were.
     #[serde(skip_serializing_if = "is_none")]
     pub findings_left_out: u64,
     /// Usage counters, units in their names.
     pub usage: serde_json::Map<String, serde_json::Value>,
-    /// On the card.
+    /// The run's log files on the card.
     pub log_files: Vec<String>,
     /// In whole or in part, for want of room.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -79,7 +79,7 @@ pub struct Report {
     /// Deepest use by urgency, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_by_urgency: Option<serde_json::Value>,
-    /// By stage, if measured.
+    /// Cycles of the processor by stage, if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycles: Option<serde_json::Value>,
     /// Percent in the worst second but the first, if measured.
@@ -116,7 +116,7 @@ pub struct Finding {
     pub instance: u8,
     /// The new level.
     pub level: String,
-    /// Since the first input byte.
+    /// Seconds since the first input byte.
     pub time_s: f64,
     /// `null` if the input stopped.
     pub value: Option<f64>,
@@ -231,7 +231,7 @@ impl Report {
         Ok(Outcome::lossy(self.frames_lost > 0 || !self.overwritten.is_empty() && !self.may_overwrite))
     }
 
-    /// For an input without frames.
+    /// A remark about an input without any frame.
     pub fn remark(&self, input: &Endpoint) -> Option<String> {
         (self.bytes_in > 0 && self.frames_in == 0).then(|| {
             format!(

@@ -28,13 +28,13 @@ use crate::outcome::usage;
 
 /// `MAV_CMD_REQUEST_MESSAGE`
 const REQUEST_MESSAGE: u16 = 512;
-/// In `AUTOPILOT_VERSION`.
+/// Offset of `uid2` in `AUTOPILOT_VERSION`.
 const UID_AT: usize = 60;
 /// A ground station's.
 const SYSTEM: u8 = 255;
 /// `MAV_COMP_ID_MISSIONPLANNER`
 const OUR_COMPONENT: u8 = 190;
-/// Until the board's first message.
+/// Timeout for the board's first message.
 const CONNECT: Duration = Duration::from_secs(15);
 /// For further boards: two heartbeats of each, since a radio may lose one.
 const LISTEN: Duration = Duration::from_millis(2_200);
@@ -46,12 +46,12 @@ const KEY_FILE_BYTES_MAX: u64 = 4096;
 /// Unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;
 
-/// With one board.
+/// A conversation with one board.
 pub struct Client {
     duplex: Duplex,
     framer: Framer,
     encoder: Encoder,
-    /// With this PC's time.
+    /// Signs outgoing frames with this PC's time.
     seal: Option<Seal>,
     begun: Instant,
     /// 0 until known.
@@ -89,7 +89,7 @@ impl Client {
         Ok(client)
     }
 
-    /// Without a board yet.
+    /// Before a board is found.
     fn over(duplex: Duplex, seal: Option<Seal>) -> Self {
         Self {
             duplex,
@@ -167,7 +167,7 @@ impl Client {
         self.next(end, |frame| if frame.system() == system { look(frame) } else { None })
     }
 
-    /// Of all boards.
+    /// As [`Self::until`], of all boards.
     fn next<T>(&mut self, end: Instant, mut look: impl FnMut(&Frame<'_>) -> Option<T>) -> Result<Option<T>> {
         loop {
             while let Some(bytes) = self.frames.pop_front() {
@@ -280,7 +280,7 @@ pub fn key(path: &Path) -> Result<Key> {
     Ok(hex::bytes_of(text).map_or_else(|| Key::of_passphrase(text), Key))
 }
 
-/// As signatures count it.
+/// This PC's time, as signatures count it.
 pub fn stamp_now() -> u64 {
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     stamp(since_1970.as_micros() as u64)

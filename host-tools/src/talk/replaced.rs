@@ -102,7 +102,7 @@ fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, numb
     }
 }
 
-/// By the board's parameters.
+/// The place of a part by the board's parameters.
 fn on_board(client: &mut Client, part: Kind, number: u8) -> Result<usize> {
     let mut known = Vec::new();
     for place in 1..=COMPONENTS_MAX {

@@ -11,7 +11,7 @@ pub enum Fault {
     WriteError,
     /// Only the status shows it.
     NotProgrammed,
-    /// In place of a block's token.
+    /// This comes in place of a block's token.
     Token(u8),
     NoBlock,
     /// Nanoseconds.

@@ -25,7 +25,7 @@ pub enum Event {
 pub struct Counts {
     /// Bytes.
     pub bytes: u64,
-    /// With no card selected.
+    /// Of them, those with no card selected.
     pub unselected: u64,
     /// Falls of the select pin.
     pub selects: u64,
@@ -51,7 +51,7 @@ struct Inner {
 pub struct Slot(Rc<RefCell<Inner>>);
 
 impl Slot {
-    /// At 0 s.
+    /// A slot with this card in it, at 0 s.
     pub fn new(card: Option<Model>) -> Self {
         Self(Rc::new(RefCell::new(Inner {
             card: card.map(SdCard::new),
@@ -91,7 +91,7 @@ impl Slot {
         self.0.borrow_mut().happen(event);
     }
 
-    /// With a card.
+    /// Whether a card is in it.
     pub fn has_card(&self) -> bool {
         self.0.borrow().card.is_some()
     }

@@ -86,7 +86,7 @@ pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slo
     (machine, slot, medium)
 }
 
-/// With this card.
+/// A board of this image with this card.
 pub fn board_of(image: Image, board: Board, card: Model) -> (Machine, Slot) {
     let slot = Slot::new(Some(card));
     let wired = wired(&image);
@@ -104,12 +104,12 @@ pub fn wired(image: &Image) -> &'static hums_boards::Board {
     hums_boards::find(name.expect("the image names its board")).expect("a board of this version")
 }
 
-/// As the model counts pins.
+/// A pin, as the model counts it.
 pub fn pin(pin: hums_boards::Pin) -> Pin {
     Pin(pin.port, pin.number)
 }
 
-/// As the model counts ports.
+/// A port, as the model counts it.
 pub fn usart(port: &hums_boards::Port) -> usize {
     usize::from(port.usart) - 1
 }

@@ -21,7 +21,7 @@ pub struct Session {
     pub gaps: usize,
 }
 
-/// In their order.
+/// All sessions, in their order.
 pub fn read(medium: &Medium) -> Vec<Session> {
     some(medium, 0)
 }
@@ -104,7 +104,7 @@ pub struct Compared {
     pub ends: (usize, usize),
 }
 
-/// By content; the reader checks the order.
+/// Compares by content; the reader checks their order.
 pub fn compare<'a>(sent: &[Vec<u8>], recorded: impl Iterator<Item = &'a [u8]>) -> Compared {
     let mut places: HashMap<&[u8], VecDeque<usize>> = HashMap::new();
     for (place, frame) in sent.iter().enumerate() {

@@ -20,7 +20,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// At its first power-on.
+    /// A board that gets power for the first time.
     pub fn rig(&self, parts: Board) -> Rig {
         Rig::new(&self.image, parts, self.frames.clone())
     }
@@ -47,7 +47,7 @@ pub struct Rig {
     pub slot: Slot,
     /// The card's blocks.
     pub medium: Medium,
-    /// With the time of their last bits.
+    /// Sent frames, with the time of their last bits.
     pub sent: Vec<(Ps, Vec<u8>)>,
     frames: Vec<Vec<u8>>,
     next: usize,
@@ -64,7 +64,7 @@ impl Rig {
         Self::with(image, parts, frames, Vec::new())
     }
 
-    /// With a card of these faults.
+    /// The same with a card that has these faults.
     pub fn with(image: &Image, parts: Board, frames: Vec<Vec<u8>>, plans: Vec<Plan>) -> Self {
         let (machine, slot, medium) = board_with(image.clone(), parts, plans);
         let (wired, sent, led) = (wired(image), Vec::new(), Vec::new());
@@ -189,7 +189,7 @@ pub fn set(name: &str, value: f32, sequence: u8) -> Vec<u8> {
     frame(23, &payload, 168, sequence)
 }
 
-/// From a disarmed quadrotor of ArduPilot.
+/// A heartbeat of a disarmed quadrotor of ArduPilot's.
 pub fn heartbeat(sequence: u8) -> Vec<u8> {
     let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, 0x51, 3, 3], 50, sequence);
     // From the autopilot's own component.

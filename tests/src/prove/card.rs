@@ -79,7 +79,7 @@ impl Card {
         Volume::new(&self.file, layout)?.walk().context("the file system cannot be walked")
     }
 
-    /// By `fsck.vfat -n`, without effects of a cut.
+    /// `fsck.vfat -n` finds only effects of a cut.
     pub(super) fn check(&mut self) -> Result<()> {
         let path = self.dir.path().join("partition");
         if self.partition.is_none() {

@@ -115,7 +115,7 @@ fn whole_pages(options: &Options, figures: &mut Figures) -> Result<()> {
 #[derive(Default)]
 struct Outcome {
     noticed: u64,
-    /// Not noticed; all frames came out.
+    /// Not noticed, and all frames came out.
     harmless: u64,
     single: u64,
     bursts: u64,

@@ -33,7 +33,7 @@ const SECOND_US: u64 = 1_000_000;
 const KEY: [u8; 32] = [0x5a; 32];
 /// With a key, bytes a second.
 const BUDGET: u32 = 1_000;
-/// Also the seconds of each.
+/// The highest value that anybody may set.
 const BUDGET_MAX: u32 = 5_000;
 const AP_BUDGET_MAX: u32 = 10_000;
 
@@ -117,7 +117,7 @@ struct Half {
     to_autopilot: ToAutopilot,
     autopilot_budget: u32,
     changed: usize,
-    /// Of earlier sessions.
+    /// Logs of earlier sessions that are marked as erased.
     erased: usize,
 }
 

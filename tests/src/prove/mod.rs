@@ -30,7 +30,7 @@ pub use report::{Part, Provenance, write as write_report};
 /// One campaign.
 #[derive(Debug)]
 pub struct Campaign {
-    /// On the command line.
+    /// Its name on the command line.
     pub name: &'static str,
     /// The promise, as a sentence.
     pub about: &'static str,

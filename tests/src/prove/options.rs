@@ -7,7 +7,7 @@ pub struct Options {
     pub short: bool,
     /// Makes chance repeatable.
     pub seed: u64,
-    /// In place of the campaign's own.
+    /// A number of cases instead of the campaign's own.
     pub runs: Option<u64>,
 }
 

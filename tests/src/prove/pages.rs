@@ -145,7 +145,7 @@ impl Tally {
 
 pub(super) struct Outcome {
     pub(super) tallies: Vec<(Kind, Tally)>,
-    /// In words.
+    /// Each miss in words.
     pub(super) misses: Vec<String>,
 }
 
@@ -175,7 +175,7 @@ pub(super) struct Subject {
     /// Sectors, some space, and the parity of a closed log.
     bytes: Vec<u8>,
     sectors: usize,
-    /// From 0.
+    /// The number of each sector's group, from 0.
     group_of: Vec<usize>,
     has_parity: bool,
     whole: Record,

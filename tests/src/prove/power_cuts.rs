@@ -161,9 +161,9 @@ struct Outcome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Tear {
     Whole,
-    /// Before this byte.
+    /// The bytes before this one.
     Before(usize),
-    /// From this byte on.
+    /// The bytes from this one on.
     From(usize),
 }
 
@@ -190,9 +190,9 @@ struct Session {
     card: Card,
     before: Vec<u8>,
     files: Vec<CardFile>,
-    /// Of earlier sessions.
+    /// Files of earlier sessions that this one overwrote.
     overwritten: BTreeSet<String>,
-    /// By block.
+    /// The earlier session's file of a block.
     owners: BTreeMap<u32, usize>,
     trace: Vec<Written>,
     /// The session's own logs, and its number in sectors.

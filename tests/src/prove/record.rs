@@ -19,7 +19,7 @@ pub(super) struct Record {
     pub(super) frames: Vec<Frame>,
     /// Without gaps.
     pub(super) groups: Vec<usize>,
-    /// After this many frames.
+    /// Each gap with the number of frames before it.
     pub(super) gaps: Vec<(usize, Gap)>,
     pub(super) summary: Summary,
 }

@@ -12,7 +12,7 @@ use super::figures::Figures;
 /// The figures' source.
 #[derive(Debug)]
 pub struct Provenance {
-    /// Without any change.
+    /// The commit, without any change.
     pub commit: String,
     /// The seed.
     pub seed: u64,

@@ -25,7 +25,7 @@ use crate::shell::Shell;
 const SMALLER_MIN: f64 = 6.5;
 /// Tlog by `xz -9e`, and log.
 const SMALLER_THAN_XZ_MIN: f64 = 2.3;
-/// At 921,600 baud.
+/// Bytes of MAVLink a second at 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;
 /// Of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;

@@ -10,7 +10,7 @@ use crate::pc;
 use crate::repo;
 use crate::shell::Shell;
 
-/// Only cross-compiled.
+/// The package that only cross-compiles.
 const FIRMWARE: &str = "hums-app";
 
 /// Changed packages: since the last commit, or in it.

@@ -187,7 +187,7 @@ impl Core {
         Ok(())
     }
 
-    /// Perhaps the program counter.
+    /// A load's register, which may be the program counter.
     #[inline(always)]
     pub(crate) fn loaded(&mut self, register: u8, value: u32) -> Result<(), Trap> {
         if register == 15 {

@@ -53,7 +53,7 @@ pub enum Index {
     Post,
 }
 
-/// Of a byte or halfword.
+/// The extensions of a byte or halfword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extend {
     Sxtb,
@@ -64,7 +64,7 @@ pub enum Extend {
     Uxtb16,
 }
 
-/// Of a parallel addition or subtraction.
+/// The lanes of a parallel addition or subtraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lanes {
     Add8,
@@ -86,7 +86,7 @@ pub enum Prefix {
     Uh,
 }
 
-/// Of one operand.
+/// The bit and byte operations of one operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unary {
     Clz,
@@ -137,7 +137,7 @@ pub enum Long {
     Smlsld { exchange: bool },
 }
 
-/// Of three registers.
+/// The floating-point operations of three registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Float3 {
     Vmla,
@@ -155,7 +155,7 @@ pub enum Float3 {
     Vfnms,
 }
 
-/// Of two registers.
+/// The floating-point operations of two registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Float2 {
     /// VMOV

@@ -6,13 +6,13 @@ use cortex_m4_model::{Bus, Core, Fault, Outcome, Size};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Of QEMU's mps2-an386.
+/// The memories of QEMU's mps2-an386 that programs use.
 pub const MEMORIES: [(u32, usize); 3] = [(0, 0x40_0000), (0x2000_0000, 0x40_0000), (0x2100_0000, 0x100_0000)];
 
 /// Flat memories, errors elsewhere.
 pub struct Flat {
     pub memories: [Vec<u8>; 3],
-    /// Of fetches; of loads and stores.
+    /// Of each fetch, and of each load or store.
     pub waits: (u32, u32),
     /// A store here asks for attention.
     pub bell: Option<u32>,

@@ -142,7 +142,7 @@ pub struct Frame {
     pub xpsr: u32,
 }
 
-/// Beside printing.
+/// The action of a handler beside printing.
 pub type Action = fn(&mut Frame, &mut u32);
 pub static mut ACTIONS: [Option<Action>; 64] = [None; 64];
 pub static mut QUIET: bool = false;

@@ -11,7 +11,7 @@ use cases::{Case, generate, sequence};
 use random::Random;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// In QEMU's mps2-an386.
+/// Addresses of a batch's parts in QEMU's mps2-an386.
 const TESTS: usize = 12_000;
 const SLOTS: u32 = 0x2100_1000;
 const SLOT: u32 = 64;
@@ -49,7 +49,7 @@ fn bytes_of(words: impl IntoIterator<Item = u32>) -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
-/// Beside the program.
+/// The memory that a batch needs beside the program.
 fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     let mut random = Random(seed ^ 0x5EED | 1);
     let mut pattern: Vec<u32> = (0..SCRATCH_WORDS)

@@ -41,7 +41,7 @@ pub(crate) fn logged_since(machine: &Machine, place: u32) -> Vec<u8> {
     (0..bytes).map(|at| machine.memory(buffer + (place + at) % ring, 1)[0]).collect()
 }
 
-/// For programs that log text.
+/// The log, of a program that logs text.
 pub(crate) fn log(machine: &Machine) -> String {
     let Some([buffer, _, written]) = channel(machine) else { return String::new() };
     String::from_utf8_lossy(machine.memory(buffer, written)).into_owned()

@@ -103,7 +103,7 @@ pub(crate) fn delay_timer_blinky(machine: &mut Machine) -> Outcome {
     expect(good && pauses.len() >= 7, format!("it changed after {pauses:?} ms"))
 }
 
-/// By TIM2's update.
+/// Toggles the LED each second by TIM2's update.
 pub(crate) fn blinky_timer_irq(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, Pin(0, 5), 8_500)?;
     // "Off" before the timer begins.

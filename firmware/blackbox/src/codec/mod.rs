@@ -91,7 +91,7 @@ impl Model {
         }
     }
 
-    /// At a group's start.
+    /// Starts afresh, at a group's start.
     pub(crate) fn reset(&mut self, at_ms: u64, layouts: Layouts) {
         self.layouts = layouts;
         self.last_ms = at_ms;

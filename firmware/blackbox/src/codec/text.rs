@@ -12,7 +12,7 @@ const MATCHES: usize = 8;
 
 pub(crate) struct TextModel {
     rows: [Cdf; ROWS],
-    /// As in the text before.
+    /// Whether a byte is as in the text before.
     same: [Cell; MATCHES],
 }
 

@@ -31,7 +31,7 @@ impl Found {
         }
     }
 
-    /// For reports.
+    /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unknown => "unknown",
@@ -62,7 +62,7 @@ pub struct Before {
 }
 
 impl Before {
-    /// If found.
+    /// End of the previous session, if found.
     pub const fn has_end(&self) -> bool {
         matches!(self.found, Found::Sectors | Found::Frames)
     }

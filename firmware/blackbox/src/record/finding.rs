@@ -8,13 +8,13 @@ use super::stored::{Fields, Sink};
 /// A check changed its level: `hums_core::health::Finding` with texts of any lifetime.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FindingRecord<'a> {
-    /// After the debounce.
+    /// When, after the debounce.
     pub at: Instant,
-    /// Of the vehicle.
+    /// The part of the vehicle.
     pub subsystem: Subsystem,
     /// Stable name.
     pub check: &'a str,
-    /// If there are several.
+    /// The number of the part, if there are several.
     pub instance: u8,
     /// The new level.
     pub level: Level,

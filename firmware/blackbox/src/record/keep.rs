@@ -11,7 +11,7 @@ pub struct Keep {
     pub all: bool,
     /// Start of the part that is, or was, stored only briefly.
     pub from: u32,
-    /// Of the stored part.
+    /// Minimum length of the stored part, in seconds.
     pub seconds: u32,
 }
 

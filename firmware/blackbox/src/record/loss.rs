@@ -30,7 +30,7 @@ pub enum Lost {
 }
 
 impl Lost {
-    /// For reports.
+    /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::UartOverrun => "uart_overrun",
@@ -154,7 +154,7 @@ statistics! {
     gs_queue_bytes_capacity,
     /// Processor load of the last second, thousandths; 0 if not measured.
     cpu_permille,
-    /// In the worst second.
+    /// The same in the worst second.
     cpu_permille_max,
     /// The deepest the stack was, bytes.
     stack_bytes_max,

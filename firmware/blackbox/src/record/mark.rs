@@ -13,7 +13,7 @@ pub enum Resting {
 }
 
 impl Resting {
-    /// For reports.
+    /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Disarmed => "disarmed",
@@ -42,7 +42,7 @@ pub struct Mark {
     pub why: Resting,
     /// In progress: the mark begins in it or in the next one.
     pub sector: u32,
-    /// Of the session, modulo 2^32.
+    /// Frames of the session before the mark, modulo 2^32.
     pub frames: u32,
 }
 

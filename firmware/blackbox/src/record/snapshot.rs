@@ -25,9 +25,9 @@ pub struct Snapshot<'a> {
     pub instance: u8,
     /// Decides the columns.
     pub subsystem: Subsystem,
-    /// Before or after the finding.
+    /// `false`: before the finding; `true`: after it.
     pub after: bool,
-    /// Of the first sample.
+    /// The time of the first sample.
     pub first: Instant,
     /// Between two samples.
     pub interval: Span,
@@ -113,7 +113,7 @@ impl PartialEq for Snapshot<'_> {
     }
 }
 
-/// For a snapshot.
+/// Room for the values of a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct SnapshotValues {
     bytes: [u8; VALUES_MAX],

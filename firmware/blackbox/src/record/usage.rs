@@ -20,7 +20,7 @@ pub enum Moment {
 pub const USAGE_ENTRIES_MAX: usize = 84;
 const _: () = assert!(HEAD_BYTES + 1 + USAGE_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
 
-/// Of a lifetime record.
+/// Entries of a lifetime record at most.
 pub const LIFETIME_ENTRIES_MAX: usize = 80;
 const _: () = assert!(HEAD_BYTES + 4 * 4 + 2 + LIFETIME_ENTRIES_MAX * ENTRY_BYTES <= RECORD_BYTES_MAX);
 
@@ -43,11 +43,11 @@ pub struct Lifetime<'a> {
     pub moment: Moment,
     /// MAVLink id of the airframe, 0 unknown.
     pub system: u8,
-    /// Of the autopilot, 0 unknown.
+    /// The autopilot's unique id, 0 unknown.
     pub uid: u64,
-    /// Of the monitor.
+    /// Power-ons of the monitor.
     pub boots: u32,
-    /// With the airframe.
+    /// Power-ons in which the airframe was heard.
     pub sessions: u32,
     entries: Entries<'a>,
 }
@@ -117,7 +117,7 @@ impl Moment {
         }
     }
 
-    /// For reports.
+    /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Start => "start",

@@ -13,9 +13,9 @@ pub struct Exceedance<'a> {
     pub moment: Moment,
     /// Stable name.
     pub check: &'a str,
-    /// If there are several.
+    /// The number of the part, if there are several.
     pub instance: u8,
-    /// Of the peaks.
+    /// The unit of the peaks.
     pub unit: &'a str,
     /// In this session.
     pub session: Crossings,
@@ -76,7 +76,7 @@ pub enum Why {
 }
 
 impl Why {
-    /// For reports.
+    /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Start => "start",
@@ -109,7 +109,7 @@ pub struct Component<'a> {
     pub number: u8,
     /// Green, yellow or red.
     pub status: Status,
-    /// In this place.
+    /// How often the part in this place was replaced.
     pub replaced: u32,
     /// The operator's.
     pub name: &'a str,
@@ -121,7 +121,7 @@ pub struct Component<'a> {
     pub used_percent: f32,
     /// MAVLink system and component id; 0, 0 for the monitor.
     pub by: (u8, u8),
-    /// After a replacement.
+    /// Serial number of the new part after a replacement.
     pub new_serial: &'a str,
 }
 

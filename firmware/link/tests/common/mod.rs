@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Beside the tests.
+/// Excerpts that live beside the tests.
 pub fn excerpt(name: &str) -> Recording {
     Recording::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name))
 }
@@ -51,7 +51,7 @@ impl Recording {
     }
 }
 
-/// As zlib does, bit by bit.
+/// CRC-32 as zlib computes it, bit by bit.
 pub fn crc32(mut crc: u32, bytes: &[u8]) -> u32 {
     crc = !crc;
     for byte in bytes {

@@ -66,7 +66,7 @@ pub(crate) const fn only_asks(command: u16) -> bool {
 pub(crate) struct Commands {
     pub(crate) replies: Replies,
     limits: [Limiter; 2],
-    /// From this port now.
+    /// Recording is stopped by command.
     stopped: bool,
 }
 
@@ -79,7 +79,7 @@ impl Commands {
         self.limits[port as usize].allows(now)
     }
 
-    /// By command.
+    /// Whether recording is stopped by command.
     pub(crate) const fn stopped(&self) -> bool {
         self.stopped
     }

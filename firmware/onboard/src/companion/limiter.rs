@@ -5,7 +5,7 @@ use hums_link::request::Port;
 
 use crate::journal::By;
 
-/// And the port of the answer.
+/// An asker, and the port of the answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asker {
     pub(crate) port: Port,
@@ -16,7 +16,7 @@ pub(crate) struct Asker {
 const REQUESTS_MAX: u32 = 20;
 const REQUESTS_PER_S: u32 = 5;
 
-/// At once, and each second.
+/// A limit at once, and a limit each second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limiter {
     left: u32,

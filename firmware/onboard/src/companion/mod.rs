@@ -100,7 +100,7 @@ impl Companion {
         self.pass.lost
     }
 
-    /// For their signature.
+    /// Requests that were refused for their signature.
     pub(crate) const fn requests_refused(&self) -> u32 {
         self.secure.refused
     }
@@ -116,7 +116,7 @@ impl Companion {
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
     }
 
-    /// At the ground station's own port.
+    /// A frame of the ground station's own port.
     pub(crate) fn uplink(
         &mut self,
         now: Instant,
@@ -383,7 +383,7 @@ impl Companion {
         }
     }
 
-    /// As far as possible.
+    /// Sends waiting answers as far as possible.
     pub(crate) fn answer(
         &mut self,
         now: Instant,

@@ -36,9 +36,9 @@ const UNKNOWN: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pass {
-    /// Of others.
+    /// Lost frames of others.
     pub(super) lost: u32,
-    /// Of an unknown definition.
+    /// Last time of a frame of an unknown definition.
     unknown_at: Option<Instant>,
 }
 

@@ -87,7 +87,7 @@ pub(crate) struct Secure {
     last: u64,
     /// A key was set together with the time: both outlets begin anew.
     reseal: bool,
-    /// For their signature.
+    /// Requests that were refused for their signature.
     pub(super) refused: u32,
 }
 
@@ -151,7 +151,7 @@ impl Secure {
         }
     }
 
-    /// By a frame's signature on this port.
+    /// The authorisation by a frame's signature on this port.
     pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
         let guard = guard(params, port);
         if guard == 0 || self.signing.key().is_none() {
@@ -190,7 +190,7 @@ impl Secure {
         }
     }
 
-    /// From a trusted port.
+    /// Takes a key from a trusted port.
     pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp > 0 || self.signing.key() != Some(&key) {
             (self.last, self.reseal) = (0, true);

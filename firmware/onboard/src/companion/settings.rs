@@ -61,7 +61,7 @@ impl Settings {
         }
     }
 
-    /// For this file.
+    /// Whether the card's answers are for this file.
     pub(crate) const fn is_reading(&self) -> bool {
         matches!(self.state, State::Reading(_))
     }

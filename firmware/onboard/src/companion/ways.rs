@@ -24,7 +24,7 @@ impl Ways<'_, '_> {
         }
     }
 
-    /// If its port's budget allows.
+    /// Passes a frame of another system on, likewise.
     pub(crate) fn pass(&mut self, now: Instant, port: Port, class: Class, frame: &[u8]) -> bool {
         let Self { gs, autopilot, queues } = self;
         match port {

@@ -37,20 +37,20 @@ use happenings::CRITICAL;
 pub use happenings::{CELLS_UNKNOWN, PARTS_CHANGED};
 use marks::Marks;
 
-/// Between calls of [`Monitoring::tick`].
+/// How often [`Monitoring::tick`] is to be called.
 pub const TICK: Span = Span::from_millis(monitor::TICK.as_millis());
 /// Maximum time until a sector in progress is given to storage. With the tick's 50 ms a power cut costs less than 200
 /// ms, even at a low rate.
 const PARTIAL: Span = Span::from_millis(150);
-/// Of the recorder's statistics.
+/// How often the recorder's statistics are recorded.
 const STATS: Span = Span::from_secs(10);
-/// Of usage.
+/// How often usage is recorded.
 const USAGE: Span = Span::from_secs(60);
 
-/// Of a restart after a fault.
+/// The `MAV_SEVERITY` of a restart after a fault.
 const FAULT_SEVERITY: u8 = 4;
 
-/// In order.
+/// The steps of a frame, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     Encode {
@@ -76,7 +76,7 @@ pub struct Monitoring<'a> {
     recorded: Recorded,
     notices: Notices,
     card_notices: CardNotices,
-    /// At the last tick.
+    /// Files of storage at the last tick.
     files: u32,
     figures: Figures<'a>,
     marks: Marks,
@@ -299,7 +299,7 @@ impl<'a> Monitoring<'a> {
         self.book.monitor
     }
 
-    /// To restore, save and set values.
+    /// The monitor, to restore, save and set its values.
     pub const fn monitor_mut(&mut self) -> &mut Monitor {
         self.book.monitor
     }
@@ -314,7 +314,7 @@ impl<'a> Monitoring<'a> {
         self.figures.machine = machine;
     }
 
-    /// Since power-on.
+    /// The pipeline's figures since power-on.
     pub fn stats(&self, gs: &GsIn) -> Stats {
         self.figures.stats(self.book.card, &self.book.journal, &self.companion, gs)
     }

@@ -56,7 +56,7 @@ impl MailboxIn<'_> {
     }
 }
 
-/// For the store writer.
+/// The store writer's end.
 pub struct MailboxOut<'a>(FramedConsumer<&'a Queue>);
 
 impl MailboxOut<'_> {

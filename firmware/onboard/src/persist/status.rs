@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use hums_core::lifetime::Room;
 
-/// Of the store.
+/// The state of the store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StoreState {
@@ -51,7 +51,7 @@ pub struct StoreStatus {
 /// A reading of [`StoreStatus`]; counters since power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StoreReading {
-    /// At the start.
+    /// The store's state at the start.
     pub state: StoreState,
     /// At the start, plus one if the flash was damaged.
     pub unreadable: u32,
@@ -63,7 +63,7 @@ pub struct StoreReading {
     pub failed: u32,
     /// Erases while the autopilot talked: frames were lost with each.
     pub erased: u32,
-    /// To spare.
+    /// Whether there is room to spare.
     pub room: Room,
 }
 

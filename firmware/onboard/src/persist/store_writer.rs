@@ -10,7 +10,7 @@ use hums_store::{Error, Found, Key, Store, param};
 use super::mailbox::MailboxOut;
 use super::status::{Calm, StoreState, StoreStatus, count};
 
-/// Of a sector, before a flight.
+/// Minimum free part of a sector before a flight.
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with a smaller free part is erased on the ground even while the autopilot talks.
 const SCARCE: (usize, usize) = (1, 4);
@@ -21,7 +21,7 @@ pub(crate) const SIGNED_MAX: u8 = 4;
 const LANDING: usize = Exceedances::BYTES + 2 * Session::BYTES_TYPICAL + 4 * 16;
 const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
-/// Of [`StoreWriter::service`].
+/// The result of one call of [`StoreWriter::service`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Saved {
     /// An item was taken: another may wait.
@@ -36,9 +36,9 @@ pub struct StoreWriter<'a, F: NorFlash> {
     store: Option<Store<F>>,
     items: MailboxOut<'a>,
     pub(crate) status: &'a StoreStatus,
-    /// Of the oldest item.
+    /// The oldest item has been counted as waiting.
     waits: bool,
-    /// In this calm time.
+    /// The work of this calm time is done.
     turned: bool,
     /// Less than [`SCARCE`] of the sector in use is free.
     scarce: bool,

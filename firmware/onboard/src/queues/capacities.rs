@@ -27,5 +27,5 @@ pub const SECTOR_QUEUE_SECTORS: usize = 132 + ROW_BLOCKS;
 /// longest entry.
 pub const SECTOR_RESERVE: usize = ENTRY_SECTORS_MAX + 1;
 
-/// In the sector queue.
+/// Bytes of log that the sector queue holds.
 pub const SECTOR_QUEUE_BYTES: usize = SECTOR_QUEUE_SECTORS * SECTOR_BYTES;

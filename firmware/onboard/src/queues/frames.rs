@@ -36,7 +36,7 @@ impl<const BYTES: usize> FramesIn<'_, BYTES> {
         true
     }
 
-    /// At once.
+    /// The most bytes that waited at once.
     pub fn bytes_max(&self) -> u32 {
         self.1.max()
     }

@@ -67,7 +67,7 @@ pub struct Ends<'a> {
     pub uplink_out: UplinkOut<'a>,
     /// For storage.
     pub shelf: Server<'a>,
-    /// For requests to the autopilot.
+    /// For the task that sends to the autopilot.
     pub autopilot_out: AutopilotOut<'a>,
 }
 
@@ -91,7 +91,7 @@ impl Queues {
         }
     }
 
-    /// Once.
+    /// Hands out the ends, once.
     pub fn split(&mut self) -> Ends<'_> {
         let (sectors_in, sectors_out) = self.sectors.split(SECTOR_RESERVE);
         let (reader, shelf) = self.shelf.split();

@@ -44,22 +44,22 @@ impl GsIn<'_> {
         }
     }
 
-    /// Of the summary stream.
+    /// The way of the summary stream.
     pub const fn route(&self) -> SummaryRoute {
         self.route
     }
 
-    /// Of the summary stream.
+    /// Sets the way of the summary stream.
     pub const fn set_route(&mut self, route: SummaryRoute) {
         self.route = route;
     }
 
-    /// Since power-on.
+    /// Frames queued since power-on.
     pub const fn frames(&self) -> u64 {
         self.gs.frames
     }
 
-    /// Since power-on.
+    /// Bytes queued since power-on.
     pub const fn bytes(&self) -> u64 {
         self.gs.bytes
     }
@@ -89,7 +89,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         Self { queue, level, frames: 0, bytes: 0, lost: 0 }
     }
 
-    /// Or counts it as lost.
+    /// Queues a frame, or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         let len = frame.len() as u16;
         let Ok(mut grant) = self.queue.grant(len) else {
@@ -103,7 +103,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         self.bytes += frame.len() as u64;
     }
 
-    /// Since power-on.
+    /// Frames queued since power-on.
     pub const fn frames(&self) -> u64 {
         self.frames
     }
@@ -114,7 +114,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
     }
 }
 
-/// Of a port.
+/// The reading end of a port's queue.
 pub struct PortOut<'a, const BYTES: usize>(
     pub(super) FramedConsumer<&'a Churrasco<BYTES>>,
     pub(super) &'a Level,

@@ -41,7 +41,7 @@ pub struct SectorsIn<'a> {
 }
 
 impl SectorsIn<'_> {
-    /// For records.
+    /// Lends the reserve too, for records.
     pub(crate) fn with_reserve<R>(&mut self, write: impl FnOnce(&mut Self) -> R) -> R {
         let reserve = core::mem::replace(&mut self.reserve, 0);
         let result = write(self);
@@ -54,12 +54,12 @@ impl SectorsIn<'_> {
         self.len() == 0
     }
 
-    /// With those being written.
+    /// Sectors waiting, with those that are being written.
     pub fn len(&self) -> usize {
         self.len.load(Ordering::Acquire)
     }
 
-    /// At once.
+    /// The most sectors that waited at once.
     pub const fn deepest(&self) -> usize {
         self.deepest
     }

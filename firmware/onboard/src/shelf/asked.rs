@@ -4,7 +4,7 @@ use hums_recorder::LogName;
 
 /// Bytes of a log in one answer.
 pub const DATA_MAX: usize = 240;
-/// Of an answer.
+/// Bytes of an answer's head.
 pub(super) const HEAD: usize = 36;
 /// The identity of a log, independent of the card's directory: another log of the same name differs in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ impl LogId {
     pub const NONE: Self = Self { name: LogName { session: 0, segment: 0 }, session: 0, first: 0 };
 }
 
-/// Of a log.
+/// The requested part of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// Its length.
@@ -84,7 +84,7 @@ pub struct Answer {
     pub found: Result<(), NoLog>,
     /// The log's identity.
     pub log: LogId,
-    /// In bytes.
+    /// The log's length in bytes.
     pub bytes: u32,
     /// Time of its last write by its directory entry, in seconds since 1970 UTC; 0: unknown.
     pub utc_secs: u32,

@@ -125,7 +125,7 @@ struct Sum {
 }
 
 impl Server<'_> {
-    /// Of the monitor.
+    /// Whether a request waits.
     pub fn is_wanted(&self) -> bool {
         self.erases.is_some() || self.sum.is_some() || self.wants.ready()
     }
@@ -163,7 +163,7 @@ impl Server<'_> {
         }
     }
 
-    /// Or begins its checksum.
+    /// Answers one request, or begins its checksum.
     fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
         let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
         let _ = self.wants.dequeue();

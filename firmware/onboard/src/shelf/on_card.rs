@@ -51,7 +51,7 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         &self.block
     }
 
-    /// For sectors.
+    /// The number of blocks for sectors.
     const fn limit(&self) -> u32 {
         data_blocks(self.segment.blocks())
     }

@@ -16,11 +16,11 @@ const SEGMENTS_MIN: u64 = 16;
 /// Bytes of a segment after a refused write: 30 s of a full line (921,600 baud).
 const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
 
-/// On the present card.
+/// The session's log on the present card.
 #[derive(Clone, Copy)]
 pub(super) struct Log {
     pub(super) name: LogName,
-    /// In its sectors.
+    /// The session number in the seal of its sectors.
     pub(super) session: u32,
     volume_id: u32,
     /// The sector number at block 0 of the open segment; `None` before the first sector.
@@ -45,7 +45,7 @@ pub(super) struct Segments<'a> {
     /// Differs from power-on to power-on.
     entropy: u32,
     pub(super) log: Option<Log>,
-    /// On the present card.
+    /// The present card has a segment of it.
     pub(super) is_open: bool,
     /// The newest segments on the card from before the session, until they were read.
     earlier: Newest,
@@ -58,7 +58,7 @@ impl<'a> Segments<'a> {
         Self { status, entropy, log: None, is_open: false, earlier: Newest::new(), is_dated: false }
     }
 
-    /// For a card that is formatted now.
+    /// A number for a card that is formatted now.
     pub(super) const fn volume_id(&self, now: Instant) -> u32 {
         mix(self.entropy, now.as_micros() as u32)
     }

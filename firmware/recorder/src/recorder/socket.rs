@@ -11,7 +11,7 @@ use crate::status::CardStatus;
     reason = "one of these exists, in a static: its largest variant is the budget"
 )]
 pub(super) enum Socket<'a, D: CardDevice> {
-    /// Without a usable card.
+    /// The device, while no usable card is in it.
     Waiting(D),
     Mounted(Card<'a, D>),
     Formatting(D, Formatting),
@@ -86,7 +86,7 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         }
     }
 
-    /// By the device, since the last call.
+    /// Repetitions by the device since the last call.
     pub(super) fn take_retries(&self) -> u32 {
         match self {
             Self::Mounted(card) => card.device().take_retries(),

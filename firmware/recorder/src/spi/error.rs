@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::Trouble;
 
-/// Of an access.
+/// Why an access failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpiError {
     /// The board's bus failed.
@@ -56,7 +56,7 @@ impl SpiError {
         }
     }
 
-    /// For recording.
+    /// The consequence for recording.
     pub const fn trouble(self) -> Trouble {
         match self {
             Self::NoAnswer | Self::Changed => Trouble::Gone,

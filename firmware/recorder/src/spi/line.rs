@@ -26,7 +26,7 @@ const STATUS_LOCKED: u8 = 0x01 | 0x20;
 
 pub(super) struct Line<P> {
     pub(super) port: P,
-    /// Of the present service.
+    /// The time limit of the present service.
     pub(super) deadline: Option<Instant>,
     /// Blocks carry checksums that count.
     pub(super) checks: bool,
@@ -109,7 +109,7 @@ impl<P: Port> Line<P> {
         Err(SpiError::NoAnswer)
     }
 
-    /// Once the card is ready.
+    /// As [`Self::command_now`], once the card is ready.
     pub(super) fn command(&mut self, command: u8, argument: u32) -> Result<u8, SpiError> {
         self.ready(BUSY_MAX)?;
         self.command_now(command, argument)

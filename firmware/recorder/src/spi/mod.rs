@@ -33,7 +33,7 @@ use line::{Line, TOKEN_MANY, TOKEN_ONE};
 
 /// Time limit of all waits of one service together. Storage must report in every 10 s.
 pub const SERVICE_MAX: Span = Span::from_secs(8);
-/// Of a failure that may be temporary.
+/// Tries of an access whose failure may be temporary.
 pub const TRIES: u32 = 3;
 
 const READ: u8 = 17;
@@ -51,9 +51,9 @@ struct Inner<P> {
     line: Line<P>,
     /// `None`: the card must be identified before it is used.
     card: Option<Identity>,
-    /// Of the last card.
+    /// The identity of the last card.
     cid: Option<[u8; 16]>,
-    /// Since the last call.
+    /// Repeated accesses since the last call.
     retries: u32,
 }
 

@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 
-/// Of the bus.
+/// The speed of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// At most 400 kHz, which every card takes before identification (SD specification, 4.2.1).
@@ -29,6 +29,6 @@ pub trait Port {
     /// Sets the bus's speed.
     fn set_clock(&mut self, clock: Clock);
 
-    /// For the driver's limits.
+    /// The time for the driver's limits.
     fn now(&self) -> Instant;
 }

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use hums_recorder::format::format;
 use hums_recorder::{Block, Buffers, CardDevice};
 
-/// Of a mebibyte.
+/// Blocks of a mebibyte.
 pub const MIB_BLOCKS: u32 = 2048;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

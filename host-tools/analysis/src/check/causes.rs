@@ -8,13 +8,13 @@ use hums_core::health::{Alarm, Level, root_cause};
 use super::problem::began;
 use crate::source::told::Finding;
 
-/// Not well now.
+/// A check of a part that is not well.
 struct Open<'a> {
     since: Instant,
     level: Level,
     check: &'a str,
     instance: u8,
-    /// Without a cause yet.
+    /// Findings of the check without a cause yet.
     unexplained: Vec<usize>,
 }
 

@@ -9,13 +9,13 @@ use crate::source::recording::Format;
 
 /// A recording, judged.
 pub struct Checked {
-    /// For people.
+    /// Name of the recording for people.
     pub name: String,
     /// Format of the recording.
     pub format: Format,
     /// The judgement.
     pub judged: Judged,
-    /// For a HUMS log.
+    /// The evidence of its end, for a HUMS log.
     pub ending: Option<Ending>,
 }
 

@@ -17,9 +17,9 @@ const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_
 const CELL_VOLTAGE: &str = "cell_voltage";
 /// Of checks of earlier flights and worn parts.
 const UNTOLD: &str = "only earlier flights (--past) or a monitor on board tell";
-/// Of checks without a limit.
+/// Why a check without a limit is not judged.
 pub(super) const OFF: &str = "its limit is off";
-/// Between notes.
+/// Period of the notes.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,7 +30,7 @@ struct Seen {
 
 #[derive(Debug)]
 pub(super) struct Coverage {
-    /// By check.
+    /// In the order of the checks.
     seen: Vec<Seen>,
     next: Instant,
 }
@@ -89,14 +89,14 @@ impl Coverage {
     }
 }
 
-/// At its end.
+/// Facts about a recording at its end.
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
     /// Received over a link.
     pub(super) is_of_link: bool,
-    /// On the monitor's own wire.
+    /// The recording was taken on the monitor's own wire.
     pub(super) on_the_wire: bool,
     /// Time armed.
     pub(super) armed: Span,

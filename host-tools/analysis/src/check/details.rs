@@ -31,23 +31,23 @@ const NEAR: Span = Span::from_secs(20);
 pub(super) struct Details {
     failsafes: String,
     sensors: u32,
-    /// By the estimator's flags.
+    /// The sensors that the estimator's flags reject.
     doubted: Option<Causes>,
     /// Last text by cause, with its time.
     said: [Option<(Instant, String)>; Cause::COUNT],
-    /// Of the first receiver.
+    /// The last position of the first GPS receiver.
     fix: Option<(Instant, Position)>,
     /// Metres, and when.
     jump: Option<(Instant, f64)>,
     /// In order of appearance: component and id.
     batteries: Vec<(u8, u8)>,
-    /// Up to [`BEYOND_MAX`].
+    /// Those beyond them, up to [`BEYOND_MAX`].
     beyond: BTreeSet<(u8, u8)>,
-    /// In order of appearance.
+    /// Autopilots in the order in which they came.
     autopilots: Vec<Heard>,
-    /// Before a joint.
+    /// Remarks on the recordings before a joint.
     earlier: Vec<String>,
-    /// Before a joint.
+    /// The autopilots of those.
     others: Vec<Heard>,
 }
 
@@ -57,11 +57,11 @@ struct Heard {
     system: u8,
     /// `MAV_AUTOPILOT`
     autopilot: u8,
-    /// Once reported.
+    /// Its unique id, once reported.
     uid: u64,
 }
 
-/// Not an autopilot.
+/// `MAV_AUTOPILOT_INVALID`: the sender is not an autopilot.
 const NO_AUTOPILOT: u8 = 8;
 
 /// Distinguished autopilots.
@@ -97,7 +97,7 @@ impl Details {
         all
     }
 
-    /// In force from here on.
+    /// These failsafes are in force from here on.
     pub(super) fn failsafes(&mut self, words: &str) {
         words.clone_into(&mut self.failsafes);
     }
@@ -125,7 +125,7 @@ impl Details {
         is_wrong
     }
 
-    /// With position and speed.
+    /// A GPS receiver reports its position and speed.
     pub(super) fn gnss(&mut self, at: Instant, gnss: &Gnss) {
         let Some(position) = gnss.position.filter(|_| gnss.instance == 0 && gnss.fix >= 3) else { return };
         let before = self.fix.replace((at, position)).filter(|(then, _)| at.since(*then) <= NEAR);
@@ -166,7 +166,7 @@ impl Details {
         }
     }
 
-    /// By heartbeats, each once.
+    /// The systems whose autopilot sent heartbeats, each once.
     pub(super) fn systems(&self) -> Vec<u8> {
         let systems: BTreeSet<u8> = self.autopilots.iter().map(|heard| heard.system).collect();
         systems.into_iter().collect()

@@ -39,7 +39,7 @@ pub struct Mishap {
     pub unheard_from: Option<Instant>,
 }
 
-/// Up to [`LISTED_MAX`].
+/// Flights as they come, up to [`LISTED_MAX`].
 #[derive(Debug, Default)]
 pub(super) struct Flights {
     list: Vec<Flight>,

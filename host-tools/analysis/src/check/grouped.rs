@@ -7,7 +7,7 @@ use hums_core::health::Level;
 
 use super::problem::{Problem, mishaps};
 
-/// With its effects.
+/// A cause with its effects.
 #[derive(Debug)]
 pub struct Group<'a> {
     /// One check and level; at least one.

@@ -146,7 +146,7 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// Before any item.
+    /// Before the first item.
     pub fn new(limits: &Limits, format: Format) -> Self {
         Self {
             monitor: Box::new(Monitor::new(limits.params)),
@@ -194,13 +194,13 @@ impl Judge {
         self.flights.going_on()
     }
 
-    /// At the last item.
+    /// Flight state and phase at the last item.
     pub fn phase(&self) -> (&FlightState, Phase) {
         let flight = self.monitor.flight();
         (flight, flight.phase(self.clock.now().into(), self.monitor.vehicle()))
     }
 
-    /// In force now.
+    /// The limits that hold now.
     pub fn params(&self) -> &Params {
         self.monitor.params()
     }
@@ -210,7 +210,7 @@ impl Judge {
         self.monitor.vibration_limit()
     }
 
-    /// Of the single battery; 0 unknown.
+    /// Cell count of the single battery; 0 if unknown.
     pub fn cell_count(&self) -> u8 {
         self.monitor.cell_count()
     }
@@ -598,7 +598,7 @@ impl Judge {
         }
     }
 
-    /// Of the vehicle's link, if known.
+    /// Frame loss of the vehicle's link, if known.
     fn link(&mut self, steps: Instant) -> LinkReading {
         let source = self.monitor.vehicle().source;
         self.wire.as_mut().map_or_else(LinkReading::default, |wire| wire.reading(steps, source))
@@ -612,7 +612,7 @@ impl Judge {
         }
     }
 
-    /// From the exceedances.
+    /// Takes the worst values from the monitor's exceedances.
     fn peaks(&mut self, at: Instant) {
         let steps = self.clock.monitor(at);
         for exceedance in self.monitor.exceedances().iter(steps.into()) {
@@ -748,7 +748,7 @@ fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
     estimated.or_else(received).map(|position| (position.latitude_deg, position.longitude_deg))
 }
 
-/// By usage: without gaps.
+/// Time armed by the usage counters: without gaps.
 fn armed(monitor: &Monitor) -> Span {
     let mut seconds = 0.0;
     monitor.for_each_counter(|number, value| {

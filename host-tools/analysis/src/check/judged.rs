@@ -44,7 +44,7 @@ impl Holes {
         }
     }
 
-    /// As far as known.
+    /// The vehicle was silent, as far as is known.
     pub(super) fn silence(&mut self, from: Instant, to: Instant) {
         if self.silences.len() < LISTED_MAX {
             self.silences.push((from, to));
@@ -72,7 +72,7 @@ pub struct Judged {
     pub monitor: Box<Monitor>,
     /// The last of each kind.
     pub facts: BTreeMap<About, String>,
-    /// Of each part.
+    /// UTC of each part of the recording.
     pub epochs: Epochs,
     /// First and last time.
     pub span: Option<(Instant, Instant)>,
@@ -88,7 +88,7 @@ pub struct Judged {
     pub findings_count: u64,
     /// Worst first.
     pub problems: Vec<Problem>,
-    /// With something to judge.
+    /// Checks that had something to judge.
     pub judged: Vec<&'static str>,
     /// With the reason; checks for another autopilot are in neither list.
     pub not_judged: Vec<(&'static str, String)>,
@@ -102,20 +102,20 @@ pub struct Judged {
     pub cells_unknown: Option<Instant>,
     /// In order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
-    /// Without data.
+    /// The times without data.
     pub holes: Holes,
     /// Damage.
     pub damages: u64,
     /// Lost by the recorder.
     pub losses: u64,
-    /// Of the recording's clock.
+    /// Number of restarts of the recording's clock.
     pub restarts: u64,
     /// No times at all: nothing judged.
     pub is_timeless: bool,
 }
 
 impl Judged {
-    /// At the end.
+    /// The vehicle, as it was known at the end.
     pub fn vehicle(&self) -> &Vehicle {
         self.monitor.vehicle()
     }
@@ -130,7 +130,7 @@ impl Judged {
         self.gaps.iter().any(|gap| gap.cause == Cause::Lost && !gap.is_noise())
     }
 
-    /// In all flights.
+    /// Time in the air, in all flights together.
     pub fn flown(&self) -> Span {
         self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
     }
@@ -183,7 +183,7 @@ impl Judged {
         }
     }
 
-    /// With data.
+    /// Number of checks with data.
     pub fn checks(&self) -> JudgedChecks {
         let is_of_box = |check: &&&str| {
             vocabulary(check)

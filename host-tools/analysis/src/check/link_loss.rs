@@ -50,7 +50,7 @@ const TILTED_RAD: f32 = 0.785;
 const ON_BACK_G: f32 = 0.5;
 const IDLE_THROTTLE: f32 = 0.1;
 const FULL_THROTTLE: f32 = 0.9;
-/// Of used values.
+/// Older values are not used.
 const FRESH: Span = Span::from_secs(2);
 /// m: a receiver's height at rest.
 const STANDS_M: f32 = 3.0;
@@ -60,7 +60,7 @@ const FALLING_MPS: f32 = 2.5;
 const HPA_PER_METRE: f32 = 0.12;
 /// After first reception.
 const FIRST: Span = Span::from_secs(10);
-/// Of kept sinks.
+/// Sinks are kept for this long.
 const WINDOW: Span = Span::from_millis(900);
 
 /// How it came down.
@@ -95,7 +95,7 @@ impl Verdict {
     }
 }
 
-/// In the air.
+/// A silence of the vehicle in the air.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
     /// Last reception, less lost spans, over which time stops.
@@ -135,17 +135,17 @@ pub(super) struct LinkLoss {
     first_at: Option<Instant>,
     /// Has flown, or received for [`FIRST`].
     is_known: bool,
-    /// Until armed again.
+    /// A finding stays until the vehicle is armed again.
     found: Option<Verdict>,
     silence: Option<Silence>,
-    /// Of the last seconds, pressures in hPa.
+    /// Sinks, and pressures in hPa, of the last seconds.
     sinks: VecDeque<(Instant, f32)>,
     pressures: VecDeque<(Instant, f32)>,
     /// Last other pressure.
     changed_at: Option<Instant>,
     rate: f32,
     from_above_g: f32,
-    /// At rest, with altitude.
+    /// Start of the receiver's rest, and its altitude.
     stands_since: Option<Instant>,
     stands_at_m: f32,
 }
@@ -309,7 +309,7 @@ impl LinkLoss {
         None
     }
 
-    /// And its value.
+    /// A sign of a crash, and its value.
     fn sign(
         &self,
         now: Instant,
@@ -369,7 +369,7 @@ impl LinkLoss {
             && self.is_sinking(now, FALLING_MPS) == Some(false)
     }
 
-    /// In the last moments.
+    /// The greatest sink of the last moments.
     fn sink_mps(&self, now: Instant) -> f32 {
         let recent = self.sinks.iter().filter(|(at, _)| now.since(*at) <= FRESH);
         recent.fold(0.0, |greatest: f32, (_, sink_mps)| greatest.max(*sink_mps))

@@ -199,7 +199,7 @@ impl HasEnding for Told {
     }
 }
 
-/// As in `hums check`.
+/// Judges one recording, as `hums check` does.
 pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked> {
     overview::judge(place, limits, heard, false).map(|read| checked(place, read))
 }

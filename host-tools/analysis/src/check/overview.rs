@@ -40,7 +40,7 @@ pub(super) struct Read {
     pub(super) judged: Judged,
     /// Summary of the data read.
     pub(super) summary: Summary,
-    /// Of the file.
+    /// Bytes of the file that were read.
     taken: u64,
 }
 

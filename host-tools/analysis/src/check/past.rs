@@ -19,7 +19,7 @@ use crate::source::recording::{Format, Place};
 /// Limits, and a vehicle's earlier flights.
 pub(super) struct Past {
     limits: Limits,
-    /// With earlier flights.
+    /// The vehicle's baselines, if there are earlier flights.
     taught: Option<(Baselines, Option<Vehicle>)>,
 }
 
@@ -71,7 +71,7 @@ impl Series {
         Self { past_is_given: past.taught.is_some(), vehicles: Vec::new() }
     }
 
-    /// Of the next log.
+    /// Judges the trends of the next log.
     pub(super) fn judge(&mut self, checked: Result<Checked>) -> Result<Checked> {
         let mut checked = checked?;
         let is_of_box = checked.format == Format::Hums && !self.past_is_given;
@@ -97,7 +97,7 @@ pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
     learnt(limits, places).map(|(baselines, _)| baselines)
 }
 
-/// With the vehicle, if known.
+/// The same, with the vehicle if known.
 fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
     let (mut baselines, mut first) = (Baselines::default(), None::<(&str, Vehicle)>);
     for place in places {

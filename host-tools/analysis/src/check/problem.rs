@@ -24,11 +24,11 @@ const DETAILS_MAX: usize = 32;
 /// One check and part, at a warning or worse.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// Of the vehicle.
+    /// The part of the vehicle.
     pub subsystem: Subsystem,
     /// Stable name.
     pub check: String,
-    /// From 0.
+    /// Which one of several, from 0.
     pub instance: u8,
     /// The worst level.
     pub level: Level,
@@ -38,13 +38,13 @@ pub struct Problem {
     pub times: u32,
     /// At a warning or worse, without gaps.
     pub lasted: Span,
-    /// At the end too.
+    /// It was still so at the end.
     pub lasting: bool,
     /// Worst known.
     pub value: f32,
-    /// Of the worst level.
+    /// The limit of the worst level.
     pub limit: f32,
-    /// Of both.
+    /// The unit of both.
     pub unit: String,
     /// Failsafes, sensors.
     pub details: Vec<String>,
@@ -114,7 +114,7 @@ type Since = (Instant, Span);
 /// Joins changes of level.
 #[derive(Debug, Default)]
 pub(super) struct Problems {
-    /// Up to [`LISTED_MAX`].
+    /// The changes, up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// Number of findings.
     pub findings_count: u64,

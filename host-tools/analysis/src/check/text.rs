@@ -32,7 +32,7 @@ const SHOWN_MAX: usize = 6;
 /// `--json` has them all.
 const LINES_MAX: usize = 8;
 
-/// In the verdict.
+/// Details in the verdict.
 const HEADLINE_DETAILS_MAX: usize = 2;
 /// Of a line's beginning.
 const CRITICAL: &str = "CRITICAL";
@@ -64,7 +64,7 @@ pub fn screen(checked: &Checked, verbose: bool) -> String {
     text
 }
 
-/// Of many.
+/// One log of many, as a line.
 pub fn line(checked: &Checked) -> String {
     let judged = &checked.judged;
     let level = match (judged.verdict(), checked.soundness()) {
@@ -110,7 +110,7 @@ fn but(checked: &Checked) -> String {
 #[derive(Debug, Default)]
 pub struct Table {
     levels: BTreeMap<&'static str, u64>,
-    /// By findings.
+    /// Logs by their findings.
     checks: BTreeMap<String, (u64, u64)>,
     logs: u64,
     unsound: BTreeMap<Soundness, u64>,
@@ -214,7 +214,7 @@ fn vehicle(judged: &Judged) -> String {
     text
 }
 
-/// As people write it.
+/// A version as people write it.
 pub(super) fn firmware(version: u32) -> Option<String> {
     let [major, minor, patch, _] = version.to_be_bytes();
     (version != 0).then(|| format!("{major}.{minor}.{patch}"))
@@ -423,7 +423,7 @@ fn words_of_alarm(check: &str) -> &str {
     alarm.split_once('|').map_or(alarm, |(fault, _)| fault)
 }
 
-/// In parentheses.
+/// The first of the details, in parentheses.
 fn details(problem: &Problem, max: usize) -> String {
     let details: Vec<&str> = problem.details.iter().take(max).map(String::as_str).collect();
     if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
@@ -469,7 +469,7 @@ fn sentence(group: &[&Problem]) -> String {
     text
 }
 
-/// For people.
+/// A check's name for people.
 fn name(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }

@@ -31,9 +31,9 @@ use hums_onboard::monitoring::PARTS_CHANGED;
 use super::problem::Problem;
 use crate::source::told::Finding;
 
-/// Before, nothing is compared.
+/// Flights that make a baseline; before, nothing is compared.
 pub const FLIGHTS_MIN: u16 = 3;
-/// In a baseline of many flights.
+/// Weight of a flight in a baseline of many.
 const WEIGHT: f32 = 0.1;
 /// Remembered flights.
 const REMEMBERED: u16 = 10;
@@ -82,7 +82,7 @@ struct Terms {
     /// Of unchanged flights: a part of the baseline, of a share in percents. Hover figures are from real flights of one
     /// quadrotor, at one place and day.
     prior: f32,
-    /// Beyond it a flight teaches nothing.
+    /// A flight beyond this limit teaches nothing.
     warn: Param,
     critical: Param,
 }
@@ -115,7 +115,7 @@ fn terms(quantity: Quantity) -> Terms {
     Terms { check, part, subsystem, bad, is_share, prior, warn, critical }
 }
 
-/// In order.
+/// An event of a recording's trends, in order.
 #[derive(Clone, Debug)]
 pub enum Episode {
     /// A flight.
@@ -151,7 +151,7 @@ impl Flown {
     }
 }
 
-/// Of one quantity.
+/// The normal value of one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Baseline {
     /// In the quantity's unit.
@@ -216,7 +216,7 @@ impl Default for Baselines {
 }
 
 impl Baselines {
-    /// Of any baseline.
+    /// The most flights that any baseline was learned from.
     pub fn flights(&self) -> u16 {
         self.0.iter().map(|baseline| baseline.flights).max().unwrap_or(0)
     }

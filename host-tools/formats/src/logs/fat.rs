@@ -54,7 +54,7 @@ pub struct CardFile {
     pub path: String,
     /// Session and segment; `None` for another name whose first block is a log's sector.
     pub name: Option<LogName>,
-    /// By the directory, bytes.
+    /// The size by the directory, in bytes.
     pub size: u64,
     /// Less than `size` if its chain is damaged.
     pub extents: Vec<Extent>,
@@ -71,7 +71,7 @@ pub struct Walk {
     pub free_clusters: u64,
     /// Clusters without a file: a power cut, or a lost entry.
     pub lost_clusters: u64,
-    /// As far as there is room.
+    /// Their places, as far as there is room.
     pub lost: Vec<Extent>,
     /// Their first cluster is free and begins with a log's sector.
     pub deleted_logs: u64,
@@ -113,7 +113,7 @@ pub struct Volume<'a, I> {
     used: Vec<u64>,
     walk: Walk,
     extents: usize,
-    /// Beyond [`FILES_MAX`] and [`DAMAGE_MAX`].
+    /// Segments beyond [`FILES_MAX`], and damage beyond [`DAMAGE_MAX`].
     files_more: u64,
     damage_more: u64,
 }

@@ -27,7 +27,7 @@ impl Fingerprinter {
     }
 }
 
-/// Without decoding.
+/// Reads a log's sectors without decoding them.
 pub fn fingerprint(log: &Log) -> Result<Fingerprint> {
     let (mut groups, mut all) = (Groups::new(log), Fingerprinter::default());
     while let Some(group) = groups.next_group()? {

@@ -19,7 +19,7 @@ use crate::files::{FileId, why_unread};
 const DEPTH_MAX: usize = 16;
 /// Folders that wait.
 const WAITING_MAX: usize = 10_000;
-/// Of one folder.
+/// Segments of one folder that are kept.
 const SEGMENTS_MAX: usize = 8 * LOGS_MAX;
 
 /// Endings of cards' images.
@@ -110,7 +110,7 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result
 pub struct Walked(BTreeSet<FileId>);
 
 impl Walked {
-    /// Not walked before.
+    /// Whether a folder was not walked before.
     pub fn is_new(&mut self, dir: &Path) -> bool {
         FileId::of(dir).map_or(true, |id| self.0.insert(id))
     }

@@ -53,7 +53,7 @@ impl Found {
         self.remark(sentence);
     }
 
-    /// As far as there is room.
+    /// Adds a log, as far as there is room.
     pub(super) fn log(&mut self, log: Log) {
         if self.logs.len() < LOGS_MAX {
             self.logs.push(log);

@@ -41,7 +41,7 @@ pub struct Groups<'a> {
     /// Of the last block's file. `None` as for `strangers`.
     repairs: Option<(Option<usize>, Repairs)>,
     repaired: u64,
-    /// From parity so far.
+    /// Evidence from the parity of the files so far.
     evidence: Evidence,
 }
 
@@ -153,12 +153,12 @@ impl<'a> Groups<'a> {
         BlockCounts { repaired: self.repaired, ..self.assembler.counts() }
     }
 
-    /// From parity, once all is read.
+    /// Evidence from parity, once all is read.
     pub const fn evidence(&self) -> Evidence {
         self.evidence
     }
 
-    /// After the last sector.
+    /// Counts of the blocks after the last sector.
     pub const fn behind(&self) -> BlockCounts {
         self.assembler.behind_last()
     }

@@ -108,7 +108,7 @@ impl<T> Queue<T> {
     }
 }
 
-/// On every way out.
+/// Closes the queue on every way out.
 struct Closing<'a, T>(&'a Queue<T>);
 
 impl<T> Drop for Closing<'_, T> {

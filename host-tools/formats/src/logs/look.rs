@@ -58,7 +58,7 @@ impl std::fmt::Display for Unread {
     }
 }
 
-/// By content.
+/// Finds the kind of a file.
 pub fn look(path: &Path) -> Result<Content> {
     let context = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(context)?;

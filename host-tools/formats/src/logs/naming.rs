@@ -49,7 +49,7 @@ impl PartialOrd for SegmentName {
 }
 
 impl SegmentName {
-    /// Within the session.
+    /// The first segment of its session.
     pub fn first(&self) -> Self {
         Self { segment: 0, ..self.clone() }
     }
@@ -113,7 +113,7 @@ pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>)
     }
 }
 
-/// With several inputs, the input's name comes first: each card has a session 1.
+/// Of equal names the later ones get a number.
 pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
     for name in names {

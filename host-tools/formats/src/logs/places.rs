@@ -18,7 +18,7 @@ const READ_BYTES: u64 = 64 * 1024;
 pub struct Piece {
     /// A segment, packed log or card image.
     pub path: PathBuf,
-    /// Within the file.
+    /// Its places in the file.
     pub extents: Vec<Extent>,
 }
 
@@ -56,7 +56,7 @@ impl Log {
         name.and_then(|name| segment_name(Path::new(name))).map(|name| name.segment)
     }
 
-    /// In order.
+    /// The blocks, in order.
     pub fn blocks(&self) -> Blocks<'_> {
         Blocks { log: self, piece: 0, extent: 0, offset: 0, begun: 0, file: None, buffer: Vec::new(), at: 0 }
     }
@@ -67,7 +67,7 @@ pub struct Blocks<'a> {
     log: &'a Log,
     piece: usize,
     extent: usize,
-    /// Already read of the extent.
+    /// Bytes of the extent already read.
     offset: u64,
     /// Bytes before the buffer.
     begun: u64,

@@ -17,7 +17,7 @@ pub use super::repair::Evidence;
 use super::strangers::Strange;
 use crate::plural::count;
 
-/// For each worker.
+/// Groups in work for each worker, and at most.
 const GROUPS_PER_WORKER: usize = 2;
 const GROUPS_MAX: usize = 16;
 /// Bytes of a group's entries before they are handed on. A usual flight's group is smaller in any format (a
@@ -49,7 +49,7 @@ pub trait Deliver<C> {
 /// Totals of the reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
-    /// By the sectors.
+    /// The session that the sectors name.
     pub session: Option<u32>,
     /// Ended in order; otherwise power failed.
     pub closed: bool,
@@ -71,17 +71,17 @@ pub struct Summary {
     pub entries_fell: u64,
     /// Blocks by kind.
     pub blocks: BlockCounts,
-    /// Of the first entry.
+    /// The first entry's time.
     pub first: Option<Instant>,
-    /// Of the last entry.
+    /// The last entry's time.
     pub last: Option<Instant>,
     /// UTC at power-on, microseconds since 1970; the last value counts.
     pub epoch_us: Option<u64>,
     /// From its records.
     pub marks: Marks,
-    /// Of the first sector.
+    /// The number of the first sector.
     pub first_number: Option<u32>,
-    /// Of the last sector.
+    /// The number of the last sector.
     pub last_number: Option<u32>,
     /// The last sector is only a copy of one in progress.
     pub ends_partial: bool,
@@ -91,13 +91,13 @@ pub struct Summary {
     pub check_end: Option<u32>,
     /// Groups that continue other entries than those before them.
     pub unchained: u64,
-    /// After the last sector.
+    /// Counts of the blocks after the last sector.
     pub behind: BlockCounts,
     /// Foreign blocks up to its files' end.
     pub foreign_at_end: u64,
-    /// From parity.
+    /// Evidence from its parity.
     pub parity: Evidence,
-    /// In its files.
+    /// Strange sectors in its files.
     pub strange: Vec<Strange>,
     /// Missing files before its first one.
     pub files_gone: u32,
@@ -202,7 +202,7 @@ impl Collect for Uncollected {
     }
 }
 
-/// Not decoded to its end.
+/// A group that is not decoded to its end.
 struct Rest {
     decoder: Box<GroupDecoder>,
     group: Group,
@@ -212,7 +212,7 @@ struct Rest {
     end: usize,
 }
 
-/// As far as it was decoded.
+/// A group, decoded as far as it was.
 struct Decoded<C> {
     collected: Option<C>,
     rest: Option<Rest>,
@@ -220,9 +220,9 @@ struct Decoded<C> {
     missing: u32,
     damaged: bool,
     sectors: u32,
-    /// Of its first sector.
+    /// The number of its first sector.
     number: u32,
-    /// By its sectors' counts.
+    /// Frames that its sectors complete, by their own counts.
     frames_said: u32,
     /// First time and frames before it; `None` if it cannot be decoded.
     begun: Option<(Instant, u32)>,
@@ -244,7 +244,7 @@ struct Decoded<C> {
 }
 
 impl<C: Collect> Decoded<C> {
-    /// From its sectors' headers.
+    /// The facts from its sectors' headers.
     fn of(group: &Group) -> Self {
         let (first, last) = (group.first(), group.last());
         Self {
@@ -350,11 +350,11 @@ struct Stitch {
     open: Option<Gap>,
     /// Modulo 2^32, while the count is unbroken.
     expected: Option<u32>,
-    /// By the last sector.
+    /// The check that the last sector has.
     check: Option<u32>,
     cut: bool,
     damaged_partial: u32,
-    /// By its number.
+    /// The number of the log's first file.
     first_file: Option<u32>,
 }
 

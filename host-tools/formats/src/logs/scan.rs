@@ -16,13 +16,13 @@ use crate::progress;
 
 /// All sessions: 16 MiB. The recorder makes a segment in a few runs.
 const RUNS_MAX: usize = 1 << 20;
-/// Between updates of the bar.
+/// Blocks between two looks at the bar.
 const BLOCKS_OF_BAR: u64 = 2_048;
 /// Kept sessions.
 const SESSIONS_MAX: usize = 10_000;
 
 pub(super) struct Scan {
-    /// By the place of the first sector.
+    /// The sessions, by the place of their first sector.
     pub(super) logs: Vec<Log>,
     /// Too many sessions or runs.
     pub(super) left_out: u64,

@@ -113,7 +113,7 @@ pub fn place(name: &str) -> (&str, Option<u32>) {
     (card, number.parse().ok().filter(|_| number.len() == 5))
 }
 
-/// By its first sector.
+/// The session of a log's first sector.
 pub fn first_session(log: &Log) -> Option<u32> {
     first_sector(log).map(|first| first.session)
 }

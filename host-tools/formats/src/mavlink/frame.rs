@@ -22,7 +22,7 @@ pub enum Check {
     Unknown,
 }
 
-/// At the beginning of some bytes.
+/// The structure at the beginning of some bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Peek<'a> {
     Other,
@@ -44,7 +44,7 @@ pub struct Frame<'a> {
     pub system: u8,
     /// Sender.
     pub component: u8,
-    /// As sent: MAVLink 2 leaves trailing zeros out.
+    /// The payload as sent: MAVLink 2 leaves trailing zeros out.
     pub payload: &'a [u8],
 }
 

@@ -15,7 +15,7 @@ pub enum Value<'a> {
     Text(&'a [u8]),
 }
 
-/// In the type it was sent in.
+/// One number, in the type it was sent in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scalar {
     Unsigned(u64),
@@ -46,7 +46,7 @@ pub struct Array<'a> {
 }
 
 impl<'a> Array<'a> {
-    /// In order.
+    /// The elements in order.
     pub fn iter(self) -> impl ExactSizeIterator<Item = Scalar> + 'a {
         self.bytes.chunks_exact(self.kind.size()).map(move |bytes| scalar(self.kind, bytes))
     }
@@ -75,7 +75,7 @@ impl Payload {
         Self { message, bytes }
     }
 
-    /// In wire order.
+    /// Each field with its value, in wire order.
     pub fn fields(&self) -> impl Iterator<Item = (&'static Field, Value<'_>)> {
         let mut at = 0;
         self.message.fields.iter().map(move |field| {

@@ -79,7 +79,7 @@ impl Blocks {
         self.unwritten.count + self.foreign.count
     }
 
-    /// Once all has been taken.
+    /// The damage, once all has been taken.
     pub fn gaps(&self, at: Instant) -> impl Iterator<Item = Gap> {
         let unwritten = self.unwritten.gap(at, "of nothing but 0x00 or 0xff");
         unwritten.into_iter().chain(self.foreign.gap(at, "of something else than MAVLink"))

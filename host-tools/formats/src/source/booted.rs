@@ -81,7 +81,7 @@ pub struct Booted<S> {
     /// An incomplete frame's.
     waiting: Vec<u8>,
     at_us: u64,
-    /// With the latest chunk.
+    /// Another recording began with the latest chunk.
     begins: bool,
     blocks: Blocks,
     /// The end cuts off a frame.

@@ -38,7 +38,7 @@ pub struct Stamp {
 /// Times after a message in the file.
 #[derive(Clone, Debug, Default)]
 pub struct Ahead {
-    /// Up to [`super::doubt::ASKED`].
+    /// Up to [`super::doubt::ASKED`] of the requested ones.
     pub stamps: Vec<Stamp>,
     /// None follow.
     pub is_end: bool,
@@ -94,7 +94,7 @@ pub enum Reading {
 struct Series {
     /// Old or not.
     last_us: Option<u64>,
-    /// Without a pause.
+    /// Number of messages in a row without a pause.
     steady: u8,
     /// Without a later time while the recording's time was this one.
     still: u8,
@@ -268,7 +268,7 @@ impl Clock {
                 .is_some_and(|(last, now)| last.saturating_add(STEADY_US) >= now)
     }
 
-    /// After the first valid time.
+    /// Whether a valid time has come.
     pub const fn has_begun(&self) -> bool {
         self.begun
     }
@@ -297,7 +297,7 @@ pub struct Wrong {
 }
 
 impl Wrong {
-    /// At this byte.
+    /// One more, at this byte of the recording.
     pub fn add(&mut self, at: Instant, place: u64) {
         self.count += 1;
         self.first.get_or_insert((at, place));

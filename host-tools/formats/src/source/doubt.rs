@@ -22,9 +22,9 @@ const GOES_ON_US: u64 = 500_000;
 /// Out of order up to here: slow topics come late.
 const FAR_US: u64 = 800_000;
 
-/// Of each time in a row.
+/// Value of each time in a row.
 const TIME: i32 = 10;
-/// Of a fall.
+/// Cost of a fall.
 const FALL: i32 = RUN * TIME + TIME / 2;
 /// Of disorder: a little more than a time's value.
 const LATE: i32 = TIME + 2;
@@ -34,7 +34,7 @@ const PAUSE: i32 = 1;
 /// A compared time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Time {
-    /// As recorded, microseconds.
+    /// As it was recorded, microseconds.
     pub us: u64,
     /// Steady until just now.
     pub steady: bool,

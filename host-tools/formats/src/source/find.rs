@@ -32,7 +32,7 @@ const PASSED_OVER_MAX: usize = 20;
 pub struct Found {
     /// In named order, a folder's by name.
     pub places: Vec<Place>,
-    /// Of cards and images.
+    /// Facts from the file systems of cards and images.
     pub images: Vec<Image>,
     /// Sentences.
     pub remarks: Vec<String>,
@@ -118,7 +118,7 @@ impl Found {
         self.remarks.extend(remarks.into_iter().flatten().take(REMARKS_MAX));
     }
 
-    /// Of one system id.
+    /// Reads only the vehicle with this system id.
     pub fn of_system(mut self, system: Option<u8>) -> Result<Self> {
         if let Some(own) = self.places.iter().find(|place| system.is_some() && place.own().is_some()) {
             return Err(usage(format!(
@@ -250,7 +250,7 @@ pub fn besides(folder: &Path, own: &logs::Found) -> Result<(Vec<String>, bool)> 
     Ok((words, walk.unknown > 0))
 }
 
-/// By number of each card.
+/// Which session each number of the cards holds.
 pub fn sessions_of(places: &[Place]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }
@@ -269,7 +269,7 @@ fn is_own(path: &Path) -> Result<bool> {
     })
 }
 
-/// As stored; `None` if unreadable.
+/// Its first bytes as stored; `None` if unreadable.
 fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     let mut start = Vec::new();
     fs::File::open(content).and_then(|file| file.take(bytes as u64).read_to_end(&mut start)).ok()?;

@@ -36,7 +36,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// For JSON and tables.
+    /// The name that JSON and tables use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hums => "hums",
@@ -47,7 +47,7 @@ impl Format {
         }
     }
 
-    /// For people.
+    /// The name for people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Hums => "log of HUMS",

@@ -23,7 +23,7 @@ pub struct Progress(Arc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Before unpacking.
+    /// Bytes taken from the file, before unpacking.
     taken: AtomicU64,
     /// 0 if unknown.
     total: AtomicU64,
@@ -46,7 +46,7 @@ impl Progress {
         self.total().map_or(0.0, |total| (self.taken() as f64 / total as f64).min(1.0))
     }
 
-    /// Of compressed bytes.
+    /// Damage of the compressed bytes, if any.
     pub fn damage(&self) -> Option<String> {
         self.0.damage.lock().ok()?.clone()
     }
@@ -86,7 +86,7 @@ impl Input {
         Ok(input)
     }
 
-    /// From standard input or memory.
+    /// The bytes of `inner`: standard input, memory.
     pub fn new(inner: impl Read + Send + 'static) -> io::Result<Self> {
         let progress = Progress::default();
         let mut counted = Counted { inner, progress: progress.clone() };

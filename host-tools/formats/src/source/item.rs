@@ -26,7 +26,7 @@ pub const AUTOPILOT: u8 = 1;
 /// An item of a recording.
 #[derive(Clone, Copy, Debug)]
 pub enum Item<'a> {
-    /// At time zero, microseconds since 1970.
+    /// UTC at time zero, microseconds since 1970.
     Epoch(u64),
     /// As received; its contents follow.
     Frame(&'a Frame<'a>),
@@ -35,7 +35,7 @@ pub enum Item<'a> {
     Parameter(Parameter<'a>),
     /// Long texts are whole; the time is the first part's, perhaps a second back.
     Text(Text<'a>),
-    /// At each report.
+    /// The flight mode, at each report of it.
     Mode(Mode<'a>),
     /// Numbered.
     Event(Event<'a>),
@@ -79,7 +79,7 @@ pub struct Text<'a> {
 pub struct Mode<'a> {
     /// The autopilot's number.
     pub number: u32,
-    /// If known.
+    /// Its name, if known.
     pub name: Option<&'a str>,
 }
 
@@ -94,7 +94,7 @@ pub struct Event<'a> {
     pub severity: u8,
     /// Empty if unknown.
     pub words: &'a str,
-    /// As in a [`Text`].
+    /// The alert in it: as in a [`Text`].
     pub alert: Option<Alert>,
 }
 
@@ -176,7 +176,7 @@ impl Columns {
         self.columns.push(Column { name, unit: unit.to_owned(), kind });
     }
 
-    /// In order.
+    /// All of them, in order.
     pub fn finish(self) -> Vec<Column> {
         self.columns
     }
@@ -230,7 +230,7 @@ pub enum Value<'a> {
 }
 
 impl Value<'_> {
-    /// If it is one.
+    /// As a number, if it is one.
     pub fn number(self) -> Option<f64> {
         Some(match self {
             Self::Unsigned(value) => value as f64,
@@ -273,7 +273,7 @@ impl Gap {
         Self::new(Some(at), Cause::Damaged, words).at(place)
     }
 
-    /// With this place.
+    /// The same gap at this place.
     #[must_use]
     pub const fn at(mut self, place: u64) -> Self {
         self.place = Some(place);
@@ -310,11 +310,11 @@ impl Gap {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
     Damaged,
-    /// In the middle of something.
+    /// The file ends in the middle of something.
     Cut,
     /// By the recorder's own record.
     Lost,
-    /// On purpose.
+    /// The recorder left it out on purpose.
     NotKept,
     /// Silence in the air; the flight's end is unknown.
     Silent,
@@ -328,7 +328,7 @@ impl Cause {
         matches!(self, Self::Damaged | Self::Silent | Self::NoTimes)
     }
 
-    /// For tables and JSON.
+    /// The name, for tables and JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Damaged => "damaged",
@@ -372,7 +372,7 @@ pub enum Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// By table name.
+    /// Whether the rows of this table are wanted.
     pub fn has(self, name: &str) -> bool {
         match self {
             Self::None => false,
@@ -408,7 +408,7 @@ impl std::fmt::Display for Stop {
 
 impl std::error::Error for Stop {}
 
-/// With their bytes in the file.
+/// Messages, and their bytes in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Amount {
     /// Number of messages.
@@ -425,7 +425,7 @@ impl Amount {
     }
 }
 
-/// Of one name.
+/// Messages of one name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MessageCount {
     /// MAVLink id, and whether the checksum matches; `None` in an autopilot's log.
@@ -443,15 +443,15 @@ pub struct Summary {
     pub messages: Vec<MessageCount>,
     /// Beyond the limit of ids.
     pub other_messages: Amount,
-    /// In a HUMS log's entries.
+    /// Invalid frames in entries of a HUMS log.
     pub not_frames: u64,
     /// First and last handed-on time.
     pub span: Option<(Instant, Instant)>,
     /// Damage.
     pub gaps: u64,
-    /// By the recorder.
+    /// Losses reported by the recorder.
     pub losses: u64,
-    /// For a HUMS log.
+    /// The evidence of its end, for a HUMS log.
     pub ending: Option<Ending>,
 }
 

@@ -16,7 +16,7 @@ use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
-/// Before an empty chunk.
+/// Silence before an empty chunk is handed on.
 const SILENCE: Duration = Duration::from_millis(50);
 /// A UDP datagram.
 const BUFFER_BYTES: usize = 65_536;
@@ -29,7 +29,7 @@ struct Live {
     buffer: Vec<u8>,
 }
 
-/// With its writer.
+/// Opens a live SRC, with its writer.
 pub(super) fn open(endpoint: &Endpoint) -> Result<(Box<dyn Source>, Box<dyn Write + Send>)> {
     let duplex = duplex::open(endpoint, SILENCE)?;
     interrupt::watch();

@@ -141,7 +141,7 @@ pub struct RawReader {
 }
 
 impl RawReader {
-    /// At `baud`.
+    /// Reads from `input`, at `baud`.
     pub fn new(input: Input, baud: u32) -> Self {
         Self { bytes: Paced::new(Raw::new(input), baud) }
     }
@@ -256,7 +256,7 @@ impl Strays {
         }
     }
 
-    /// Without those reported elsewhere.
+    /// Reports them, without those that are reported elsewhere.
     fn tell(self, now: Instant, others: u64, take: &mut Take<'_>) -> Result<()> {
         if self.words > 0 {
             let words = format!(

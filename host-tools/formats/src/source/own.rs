@@ -208,7 +208,7 @@ impl Collect for Kept {
 }
 
 struct Both<C> {
-    /// For the result.
+    /// The result needs frames.
     frames: bool,
     collected: C,
     kept: Kept,

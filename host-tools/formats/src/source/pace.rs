@@ -47,14 +47,14 @@ pub struct Pace {
     /// First and latest time.
     first: Option<Instant>,
     last: Option<Instant>,
-    /// Of the latest message.
+    /// Place of the latest message.
     place: u64,
     /// Bytes still without time, and their beginning.
     level: u64,
     since: Option<(Instant, u64)>,
     /// Both times, before the first became too slow.
     witness: Option<(Instant, u64)>,
-    /// In a row.
+    /// The clock's falls in a row.
     falls: Option<Falls>,
     /// First time and place at which the clock did not run.
     stands: Option<(Instant, u64)>,
@@ -129,7 +129,7 @@ impl Pace {
         wrong.gap().filter(|_| !never_ran).into_iter().chain(self.gap())
     }
 
-    /// Of the clock, once all has been read.
+    /// Faults of the clock, once all has been read.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.stands?;
         let words = "the recorded times stand still, fall again and again, or go on far too slowly, from here on: what is \

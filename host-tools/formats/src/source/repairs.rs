@@ -13,7 +13,7 @@ use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Attitude, Autopilot, GlobalPosition, Observation, Source, Wanted};
 use hums_core::units::Radians;
 
-/// Of compared values.
+/// Older values are not compared.
 const FRESH: Span = Span::from_secs(1);
 /// Equal for this long while turning: no setpoint.
 const LEADS_FOR: Span = Span::from_secs(5);
@@ -29,7 +29,7 @@ const VOTES_MAX: i8 = 3 * SURE;
 /// `ArduPilot`'s 4.0 counts down.
 const COUNTS_DOWN_SINCE: u32 = 0x0400_0000;
 
-/// By source.
+/// State of each source.
 #[derive(Debug, Default)]
 pub struct Repairs(BTreeMap<(u8, u8), Teller>);
 
@@ -44,7 +44,7 @@ struct Teller {
 }
 
 impl Repairs {
-    /// As it should have been reported.
+    /// The observation as it should have been reported.
     pub fn mend(&mut self, at: Instant, source: Source, observation: &Observation) -> Observation {
         let teller = self.0.entry((source.system, source.component)).or_default();
         match *observation {

@@ -26,7 +26,7 @@ pub enum Kind {
     Raw,
 }
 
-/// With its beginning put back.
+/// The input with its beginning put back.
 pub type Sniffed<R> = io::Chain<Cursor<Vec<u8>>, R>;
 
 /// Looks at the beginning of `input`.

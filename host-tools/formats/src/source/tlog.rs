@@ -18,7 +18,7 @@ pub struct Tlog<R> {
     noise_bytes: u64,
     jumps: u64,
     utc_start_us: Option<u64>,
-    /// With the latest record.
+    /// Another recording began with the latest record.
     begins: bool,
     damages: u64,
     ended: bool,

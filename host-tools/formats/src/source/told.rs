@@ -45,7 +45,7 @@ pub enum Told {
         from: Instant,
         /// The last.
         to: Instant,
-        /// If known.
+        /// Number of missing frames, if known.
         frames: u64,
     },
     CellsUnknown,
@@ -57,7 +57,7 @@ pub enum Told {
 /// A check's change of level, by any finder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// After the debounce.
+    /// When, after the debounce.
     pub at: Instant,
     /// The part of the vehicle.
     pub subsystem: Subsystem,
@@ -78,7 +78,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// For a check that no longer applies.
+    /// The words for a check that no longer applies.
     pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
     /// After landing the check no longer applies: not known to be good.

@@ -34,12 +34,12 @@ use crate::source::epochs::Epochs;
 
 /// Far less than any database refuses.
 const BATCH_BYTES: usize = 256 * 1024;
-/// Of the first point.
+/// Or when its first point is this old.
 const BATCH_AGE: Duration = Duration::from_millis(250);
-/// Of usage counters.
+/// Period of the usage counters.
 const USAGE_EVERY: Span = Span::from_secs(10);
 const LOOK: Duration = Duration::from_millis(20);
-/// At the end.
+/// Maximum wait for the database at the end.
 const LAST_WAIT: Duration = Duration::from_secs(15);
 
 /// The side that makes points.
@@ -172,7 +172,7 @@ impl Influx {
         }
     }
 
-    /// In sizes that a database takes.
+    /// In parts that a database takes.
     fn give_settled(&self, settled: Option<&Batch>) {
         let mut part = Batch::default();
         for line in settled.into_iter().flat_map(|all| all.text.split_inclusive(|byte| *byte == b'\n')) {

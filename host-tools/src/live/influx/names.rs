@@ -28,11 +28,11 @@ fn random<const N: usize>() -> Result<[u8; N]> {
     Ok(random)
 }
 
-/// As far as known.
+/// Names of vehicles and sessions, as far as known.
 #[derive(Debug)]
 pub struct Names {
     session: String,
-    /// By system; 0 unknown.
+    /// Vehicles by system, with their unique ids; 0 if unknown.
     vehicles: BTreeMap<u8, u64>,
     tags: BTreeMap<u8, (String, Tags)>,
     /// No vehicle can guess it.
@@ -130,7 +130,7 @@ impl Names {
         if told || late { self.end() } else { None }
     }
 
-    /// With the names so far.
+    /// The waiting points, with the names known so far.
     pub fn end(&mut self) -> Option<Batch> {
         let Waiting { mut batch, systems, .. } = self.waiting.take()?;
         // Already replaced as a field.

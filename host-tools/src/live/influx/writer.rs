@@ -19,9 +19,9 @@ const LIMIT: Duration = Duration::from_secs(10);
 /// After a failure; doubles up to the longest.
 const WAIT_MIN: Duration = Duration::from_millis(200);
 const WAIT_MAX: Duration = Duration::from_secs(5);
-/// Of an answer.
+/// Maximum number of bytes read from an answer.
 const ANSWER_BYTES_MAX: u64 = 64 * 1024;
-/// Of an answer's characters.
+/// Maximum number of characters reported from it.
 const WORDS_MAX: usize = 200;
 /// For one batch: a bad point among 2,048 takes at most 30; beyond this good points are lost with bad ones.
 const REQUESTS_MAX: usize = 64;

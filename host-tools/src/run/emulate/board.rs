@@ -28,7 +28,7 @@ const LEAST: Ps = 2_400 * MS;
 /// Without a write on a slow card; before silence is a finding (3 s).
 const QUIET: Ps = 200 * MS;
 const MOST: Ps = 3_000 * MS;
-/// Between looks at the ports.
+/// The ports are looked after this often.
 const STEP: Ps = 20 * MS;
 /// Autopilot's, and radio's until a parameter sets another.
 const BAUDS: [f64; 2] = [921_600.0, 57_600.0];
@@ -62,7 +62,7 @@ pub(super) struct Board {
     to_ground: Box<dyn Write + Send>,
     to_autopilot: Box<dyn Write + Send>,
     lines: [Line; 2],
-    /// Of short power cuts, sorted.
+    /// When power goes for a moment, sorted.
     reboots: VecDeque<u64>,
     /// Received, and to the ground station.
     came: Framer,
@@ -73,7 +73,7 @@ pub(super) struct Board {
 struct Wiring {
     /// Autopilot's and radio's.
     ports: [usize; 2],
-    /// Of ports and card.
+    /// Exceptions of the DMA of ports and card.
     dma: Vec<u16>,
 }
 
@@ -127,7 +127,7 @@ impl Board {
         }
     }
 
-    /// In the chip's time.
+    /// Microseconds since the first byte, in the chip's time.
     fn moment(at_us: u64) -> Ps {
         LEAD.saturating_add(at_us.saturating_mul(US))
     }
@@ -290,7 +290,7 @@ impl Load {
     }
 }
 
-/// For a port's divider.
+/// The usual rate that a port's divider stands for.
 fn nearest(baud: f64) -> f64 {
     const USUAL: [f64; 9] =
         [9_600.0, 19_200.0, 38_400.0, 57_600.0, 115_200.0, 230_400.0, 460_800.0, 921_600.0, 1_500_000.0];

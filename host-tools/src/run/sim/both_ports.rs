@@ -28,7 +28,7 @@ pub enum Side {
     Ground,
 }
 
-/// Before its first byte.
+/// The board before its first byte.
 #[derive(Clone, Copy, Debug)]
 pub struct Board<'a> {
     /// Its card.
@@ -46,7 +46,7 @@ pub struct Outcome {
     pub done: PowerOn,
     /// Changes of level.
     pub findings: Vec<Finding>,
-    /// At the end.
+    /// Parameters at the end.
     pub params: Params,
 }
 

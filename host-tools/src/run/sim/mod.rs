@@ -131,9 +131,9 @@ pub fn power_on(
 pub struct PowerOn {
     /// The pipeline's figures.
     pub stats: Stats,
-    /// In memory at the end.
+    /// Frames that were still in memory when it ended.
     pub frames_left: u64,
-    /// By storage.
+    /// The state of the card, by storage.
     pub card: CardReading,
 }
 
@@ -153,7 +153,7 @@ struct World<'a> {
     gs: Box<dyn Write + Send>,
     autopilot: Box<dyn Write + Send>,
     report: Report,
-    /// Of short power cuts, sorted.
+    /// When our own power goes for a moment, sorted.
     reboots: Vec<u64>,
     boots: u32,
     entropy: u32,
@@ -229,7 +229,7 @@ impl World<'_> {
         report.gs_bytes += stats.gs_bytes;
     }
 
-    /// With the card's data.
+    /// The report, with the data of the card itself.
     fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<Report> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();

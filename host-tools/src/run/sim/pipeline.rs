@@ -37,14 +37,14 @@ pub(super) struct Pipeline<'a, 'w> {
     storage: Storage<'a, Slot<'a>>,
     store_writer: StoreWriter<'a, FileFlash>,
     handover: Handover<'a>,
-    /// Since this power-on, like all times here.
+    /// Since this power-on, as all that follow.
     now: Instant,
     tick_at: Instant,
     /// `None` while it waits for a sector.
     storage_at: Option<Instant>,
     /// The card keeps storage.
     busy_until: Instant,
-    /// For the port's next frame.
+    /// When the GS port can take the next frame.
     gs_at: Instant,
     silent_at: Option<Instant>,
     uplink_silent_at: Option<Instant>,

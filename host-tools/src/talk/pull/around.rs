@@ -39,11 +39,11 @@ const SECTOR: u32 = SECTOR_BYTES as u32;
 
 #[derive(Debug)]
 pub(super) struct Brought {
-    /// By name on the board.
+    /// Names on the board, and the partial files.
     pub(super) files: Vec<(String, PathBuf)>,
     /// The moment.
     pub(super) at: Instant,
-    /// If requested.
+    /// The finding, if one was requested.
     pub(super) found: Option<Finding>,
     /// Whether all requested sectors were read.
     pub(super) outcome: Outcome,
@@ -87,7 +87,7 @@ pub(super) fn pull(
     Ok(Brought { files: log.finish(&places)?, at, found, outcome: outcome.and(searched) })
 }
 
-/// Without a recording.
+/// Refuses a moment without a recording.
 fn check_recorded(at: Instant, overview: &Overview, is_to_end: bool) -> Result<()> {
     let summary = &overview.ending.summary;
     let (Some(first), Some(last)) = (summary.first, summary.last) else {
@@ -345,7 +345,7 @@ impl<'a> RemoteLog<'a> {
         Overview::verified(&self.read_as_log(&places))
     }
 
-    /// Of the partial files.
+    /// These places of the partial files.
     fn read_as_log(&self, places: &Range<u32>) -> Log {
         let piece = |file: &RemoteFile| {
             let start = places.start.clamp(file.first, file.first + file.sectors) - file.first;
@@ -372,7 +372,7 @@ impl<'a> RemoteLog<'a> {
 #[derive(Debug)]
 struct PartialFile {
     file: NamedTempFile<File>,
-    /// Once complete.
+    /// Its name, once complete.
     target: PathBuf,
     /// Downloaded sectors.
     has: Vec<bool>,
@@ -431,7 +431,7 @@ impl PartialFile {
         Ok(())
     }
 
-    /// If it belongs here.
+    /// A downloaded sector, if it belongs at this place.
     fn sector(&mut self, at: u32) -> Result<Option<(Header, Sector)>> {
         let mut bytes = [0; SECTOR_BYTES];
         self.seek(at)

@@ -50,7 +50,7 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
 }
 
 pub(super) struct Heading {
-    /// On this PC.
+    /// Name of the log on this PC.
     pub(super) name: String,
     /// If readable.
     pub(super) session: Option<u32>,
@@ -73,7 +73,7 @@ pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Headi
     heading_by(name, length, |at| bytes_of(ftp, at, SECTOR))
 }
 
-/// Of a file on this PC.
+/// The same for a downloaded file on this PC.
 pub(super) fn heading_here(path: &Path, name: &str, length: u32) -> Result<Heading> {
     let unread = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(unread)?;
@@ -113,7 +113,7 @@ fn heading_by(name: &str, length: u32, mut sector_at: impl FnMut(u32) -> Result<
     Ok(Heading { name: format!("{of}_{:02}.HUM", segment.segment), session, sectors })
 }
 
-/// Of the open log.
+/// These bytes of the board's log that is open.
 pub(super) fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     while bytes.len() < wanted as usize {

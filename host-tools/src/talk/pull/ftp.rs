@@ -113,7 +113,7 @@ fn refused(answer: &Answer, what: &str) -> Error {
     anyhow!("the board refuses {what} of this log{why}; call again")
 }
 
-/// With a board's file server.
+/// A conversation with a board's file server.
 pub(super) struct Ftp {
     client: Client,
     sequence: u16,

@@ -22,7 +22,7 @@ const NEEDS_LOG_BEFORE: &str = "session before";
 /// New, or there already.
 #[derive(Debug, Serialize)]
 pub(super) struct LogJson {
-    /// On the board.
+    /// As the board calls it.
     pub(super) name: String,
     pub(super) path: PathBuf,
     pub(super) is_new: bool,

@@ -28,7 +28,7 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::word;
 
-/// Between two messages.
+/// Bytes between two progress messages.
 const TOLD_BYTES: u32 = 8 * 1024;
 
 const SCHEMA: Schema = Schema::first("hums-pull");
@@ -99,7 +99,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Of a board's log.
+/// The number of a board's log.
 fn number(log: &str) -> Option<u32> {
     segment_name(Path::new(log)).map(|name| name.session)
 }
@@ -160,7 +160,7 @@ fn each(
     failed.map_or(Ok(outcome), Err)
 }
 
-/// Of the newest log.
+/// Downloads a moment of the newest of these logs.
 fn around(
     ftp: &mut Ftp,
     mut logs: Vec<(String, u32)>,

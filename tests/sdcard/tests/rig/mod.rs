@@ -35,7 +35,7 @@ pub struct Rig {
     pub findings: Vec<(Instant, &'static str, Level)>,
     pub armed: bool,
     pub is_silent: bool,
-    /// Of the card.
+    /// The longest service of the card.
     pub longest: Span,
     supervisor: Supervisor,
     port: &'static PortStatus,

@@ -7,7 +7,7 @@ use super::options::Known;
 use super::outcome::{Outcome, judge};
 use super::sets::Set;
 
-/// In the set's order.
+/// The results of one set's flights, in their order.
 #[derive(Debug)]
 pub(super) struct Judged {
     pub(super) name: String,

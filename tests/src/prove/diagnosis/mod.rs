@@ -29,9 +29,9 @@ use crate::flights::root;
 use judged::judge_all;
 pub use options::Flights;
 
-/// For `prove`.
+/// Its name for `prove`.
 pub const DIAGNOSIS: &str = "diagnosis";
-/// For a list.
+/// Its description for a list.
 pub const ABOUT: &str = "faults found and false alarms, on labelled flights";
 
 /// Returns the text to print. `commit` is called if the document is written.

@@ -16,7 +16,7 @@ pub(super) enum Known {
 /// Flights to judge, and the results' use.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Flights {
-    /// Besides those of the repository.
+    /// Folders of flights besides those of the repository.
     pub(super) folders: Vec<(PathBuf, Known)>,
     pub(super) short: bool,
     pub(super) write: bool,
@@ -28,7 +28,7 @@ impl Flights {
         Self { short: true, ..Self::default() }
     }
 
-    /// From a command line.
+    /// From the words of a command line.
     pub fn parse(words: &[String]) -> Result<Self> {
         let (mut options, mut words) = (Self::default(), words.iter());
         while let Some(word) = words.next() {

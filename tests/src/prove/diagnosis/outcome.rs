@@ -35,7 +35,7 @@ pub(super) struct False {
 
 #[derive(Clone, Debug)]
 pub(super) struct Fault {
-    /// In the messages at all.
+    /// Whether the messages show it at all.
     pub(super) visible: bool,
     /// The first alarm; time from the fault.
     pub(super) told: Option<Alarm>,
@@ -65,7 +65,7 @@ pub(super) struct Outcome {
     pub(super) fault: Option<Fault>,
     /// True and counted; none without a truth.
     pub(super) counts: Option<(Counts, Counts)>,
-    /// Without a label.
+    /// The verdict on a recording without a label.
     pub(super) by_hand: Option<Recording>,
 }
 

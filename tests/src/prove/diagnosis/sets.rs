@@ -11,7 +11,7 @@ use super::labels::{self, FILE, Label};
 use super::options::{Flights, Known};
 use crate::flights;
 
-/// Of the search for labels.
+/// Depth of the search for labels in folders.
 const DEPTH_MAX: usize = 4;
 
 #[derive(Debug)]

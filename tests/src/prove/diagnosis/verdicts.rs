@@ -61,7 +61,7 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// With the reason.
+    /// The verdict on a check's alarms, and why.
     pub(super) fn of(&self, check: &str) -> (Verdict, &str) {
         self.alarms.get(check).map_or((Verdict::Unknown, ""), |word| (word.verdict, &word.why))
     }
@@ -71,7 +71,7 @@ fn all() -> Result<Vec<Recording>> {
     serde_json::from_str(JUDGED).context("verdicts.json")
 }
 
-/// By name and content.
+/// The verdict on a recording, by name and content.
 pub(super) fn find(path: &Path) -> Result<Option<Recording>> {
     let name = path.file_name().unwrap_or_default();
     let Some(known) = all()?.into_iter().find(|known| name == known.file.as_str()) else { return Ok(None) };

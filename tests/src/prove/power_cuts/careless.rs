@@ -36,7 +36,7 @@ use crate::prove::stream::{FULL_RATE, Stream};
 const CACHE_BLOCKS_MAX: u64 = 64;
 /// 4 and 16 KiB of flash.
 const PAGE_BLOCKS: [u32; 2] = [8, 32];
-/// Of the next power-on.
+/// Recording time of the next power-on, in seconds.
 const NEXT_S: f64 = 0.3;
 /// No earlier session has it.
 const NEXT_BOOTS: u32 = 1_000;
@@ -48,9 +48,9 @@ const SCENARIOS: &[Scenario] = &[
     Scenario { seconds: 10.0, ..NEW_CARD },
     Scenario { flight: PX4, card_mib: 300, ..SHORT },
 ];
-/// In words.
+/// Cases that are described in words.
 const NOTES_MAX: usize = 40;
-/// In the short form.
+/// Scenarios of the short form.
 const SCENARIOS_SHORT: usize = 2;
 
 pub(in crate::prove) const LABELS: Labels = Labels {
@@ -167,7 +167,7 @@ struct Tally {
     spoiled: u64,
     /// Fewer frames of an earlier session than before.
     less: u64,
-    /// Without any report.
+    /// Of them those without any report.
     untold: u64,
     /// Lost although none of the session's sectors was spoiled.
     beyond: u64,
@@ -195,7 +195,7 @@ impl Tally {
 
 struct Outcome {
     tallies: [Tally; Fault::ALL.len()],
-    /// In words.
+    /// Unreported losses, and overwritten sectors, in words.
     notes: Vec<String>,
 }
 
@@ -210,11 +210,11 @@ struct Kept {
 
 struct Subject {
     session: Session,
-    /// By block.
+    /// Sectors of earlier sessions by their block.
     kept: BTreeMap<u32, Kept>,
-    /// By earlier session.
+    /// Frames of each earlier session.
     frames: BTreeMap<u32, usize>,
-    /// Of the next power-on.
+    /// The recording of the next power-on.
     next: Stream,
     /// A faultless card, where it differs from the earlier content.
     now: Blocks,
@@ -357,7 +357,7 @@ impl Subject {
         self.record_again(wrong, tally)
     }
 
-    /// On the earlier sessions.
+    /// The readers' results on the earlier sessions.
     fn read(&self, wrong: &Blocks, tally: &mut Tally) -> Result<()> {
         // Overwritten in normal operation, and changed by the fault.
         let (mut made_room, mut spoiled) = (BTreeSet::new(), BTreeSet::new());

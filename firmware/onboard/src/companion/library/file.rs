@@ -35,7 +35,7 @@ pub(super) struct Job {
 enum Kind {
     /// Needs nothing from the card.
     Say(Option<Error>),
-    /// By place.
+    /// One entry of the directory, by place.
     List(u16),
     Open(LogName),
     /// Length or checksum of a file that the firmware holds.

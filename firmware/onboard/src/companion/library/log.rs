@@ -29,7 +29,7 @@ struct Download {
     id: u16,
     /// `None` once the log is gone.
     log: Option<LogId>,
-    /// Of the number.
+    /// The list of the number.
     listed: Option<u32>,
 }
 
@@ -73,7 +73,7 @@ impl Places {
     }
 }
 
-/// By place, from 0.
+/// A list in progress: entries by place, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct List {
     next: u16,

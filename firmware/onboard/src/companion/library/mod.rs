@@ -36,7 +36,7 @@ pub(crate) struct Library {
     /// Earlier logs are to be erased.
     pub(crate) erases: bool,
     places: Places,
-    /// Over FTP.
+    /// The file that is open over FTP.
     open: Option<Open>,
 }
 

@@ -14,7 +14,7 @@ use super::*;
 use crate::check::flights::Flight;
 use crate::source::item::hand_said;
 
-/// Only a monitor with checks writes it.
+/// A record that only a monitor with checks writes.
 const CHECKED: Record<'_> = Record::Usage(Usage::new(Moment::Start, &[]));
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };

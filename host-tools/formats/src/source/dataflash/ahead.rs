@@ -15,7 +15,7 @@ use crate::source::doubt::ASKED;
 pub(super) const AHEAD_BYTES: usize = 256 * 1_024;
 /// Without a message, the rest is erased memory.
 const ERASED_BYTES: usize = 4 * 1_024;
-/// Of a line.
+/// Fields of a line that are looked at.
 const VALUES_MAX: usize = 32;
 /// Searched for arming after a pause: a logger's beginning ...
 const MESSAGES_MAX: usize = 2_048;
@@ -24,7 +24,7 @@ const ARMS_US: u64 = 1_000_000;
 /// Searched definitions.
 const DEFINED_MAX: usize = 256;
 
-/// After a message in the file.
+/// The bytes after a message in the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead<'a> {
     /// [`AHEAD_BYTES`] or more, unless the file ends.

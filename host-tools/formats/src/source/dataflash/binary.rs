@@ -26,11 +26,11 @@ pub(super) enum Piece<'a> {
     Message {
         /// Its type.
         kind: u8,
-        /// After the header.
+        /// The bytes after the header.
         payload: &'a [u8],
         /// Its beginning.
         place: u64,
-        /// After the message.
+        /// The bytes after it.
         after: Ahead<'a>,
     },
     Damage(Damage),
@@ -56,9 +56,9 @@ struct Skipped {
     bytes: u64,
     /// All are this byte.
     only: Option<u8>,
-    /// Of an undefined message at their beginning.
+    /// The type of an undefined message at their beginning.
     undefined: Option<u8>,
-    /// Of a shortened message at their beginning.
+    /// The type of a shortened message at their beginning.
     cut: Option<u8>,
 }
 
@@ -73,7 +73,7 @@ impl<R: Read> Binary<R> {
         Self { buffer: Buffer::new(input), skipped: None }
     }
 
-    /// Not consumed.
+    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.buffer.window(bytes)
     }
@@ -174,7 +174,7 @@ impl<'a> Window<'a> {
 }
 
 enum Look {
-    /// With this length.
+    /// A message of this length begins here.
     Message(usize),
     /// No message.
     Skip { bytes: usize, undefined: Option<u8>, cut: Option<u8> },

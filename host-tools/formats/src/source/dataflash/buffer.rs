@@ -24,7 +24,7 @@ impl<R: Read> Buffer<R> {
         Self { input, bytes: Vec::new(), at: 0, base: 0, ended: false }
     }
 
-    /// Not consumed.
+    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.fill(bytes)?;
         Ok(self.rest())
@@ -34,7 +34,7 @@ impl<R: Read> Buffer<R> {
         self.base + self.at as u64
     }
 
-    /// After the buffer.
+    /// Whether the file ends after the buffer.
     pub(super) const fn ended(&self) -> bool {
         self.ended
     }

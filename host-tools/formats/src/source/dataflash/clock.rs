@@ -28,7 +28,7 @@ pub(super) struct Clock {
     times: clock::Clock,
     /// The log's only clock.
     week_first_us: Option<u64>,
-    /// Before the present message.
+    /// Start of a silence before the present message.
     silence: Option<Instant>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct When {
     pub(super) restarted: bool,
     /// Microseconds since power-on, if known.
     pub(super) boot_us: Option<u64>,
-    /// Of its own time.
+    /// Validity of its own time.
     pub(super) own: Own,
     /// By messages of this type.
     pub(super) stands: bool,

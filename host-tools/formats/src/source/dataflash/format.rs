@@ -9,7 +9,7 @@ use crate::source::item::Table;
 pub(super) const HEADER_BYTES: usize = 3;
 /// Its layout is fixed.
 pub(super) const FMT_TYPE: u8 = 128;
-/// With its header.
+/// Length of FMT with its header.
 pub(super) const FMT_BYTES: u8 = 89;
 /// FMT defines itself.
 pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES];
@@ -61,7 +61,7 @@ pub(super) enum FieldKind {
 
 /// Names in a binary FMT.
 const COLUMNS_BYTES: usize = 64;
-/// Of an `a` field.
+/// Numbers in an `a` field.
 pub(super) const ARRAY_LENGTH: usize = 32;
 
 impl FieldKind {
@@ -130,7 +130,7 @@ pub(super) struct Field {
     /// Its label.
     pub(super) name: String,
     pub(super) kind: FieldKind,
-    /// After the header.
+    /// Offset after the header.
     pub(super) offset: usize,
 }
 
@@ -140,7 +140,7 @@ pub(super) struct Format {
     pub(super) kind: u8,
     /// Its name: `ATT`.
     pub(super) name: String,
-    /// By FMT, with header.
+    /// Its length with its header, by FMT.
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
@@ -155,7 +155,7 @@ pub(super) struct Format {
     pub(super) characters: usize,
     /// Column and kind.
     pub(super) time: Option<TimeField>,
-    /// Once a row was made.
+    /// Its rows' table, once a row was made.
     pub(super) table: Option<Arc<Table>>,
     pub(super) role: Role,
 }
@@ -184,9 +184,9 @@ impl Role {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TimeField {
-    /// Since power-on, since 2015.
+    /// Microseconds since power-on in this column: since 2015.
     Micros(u8),
-    /// Since power-on, before 2015.
+    /// Milliseconds since power-on in this column: before.
     Millis(u8),
 }
 
@@ -249,7 +249,7 @@ impl Format {
         self.fields.last().is_none_or(|field| matches!(field.kind, FieldKind::Text(_)))
     }
 
-    /// By label.
+    /// The column of this label.
     pub(super) fn field(&self, name: &str) -> Option<usize> {
         self.fields.iter().position(|field| field.name == name)
     }
@@ -269,7 +269,7 @@ fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
     if name.starts_with("GPS") { at("T", &millis) } else { at("TimeMS", &millis) }.map(TimeField::Millis)
 }
 
-/// From FMTU.
+/// Units of one type from FMTU.
 #[derive(Clone, Debug, Default)]
 struct Units {
     units: Vec<u8>,
@@ -279,7 +279,7 @@ struct Units {
 /// So far.
 pub(super) struct Formats {
     by_kind: Vec<Option<Box<Format>>>,
-    /// With header; 0 without a definition.
+    /// Lengths with the header by type; 0 without a definition.
     pub(super) lengths: Lengths,
     units: Vec<Option<Units>>,
     unit_names: Vec<Option<String>>,
@@ -290,12 +290,12 @@ pub(super) struct Formats {
     newest: Option<u8>,
 }
 
-/// For a scanner.
+/// Lengths of the types, as a scanner needs them.
 #[derive(Clone, Debug)]
 pub(super) struct Lengths {
-    /// By FMT; 0 if unusable.
+    /// From FMT; 0 without a usable definition.
     pub(super) told: [u8; 256],
-    /// By the fields, if different; else 0.
+    /// From the fields, if different; 0 otherwise.
     pub(super) fields: [u8; 256],
 }
 
@@ -308,7 +308,7 @@ pub(super) enum Defined {
 }
 
 impl Formats {
-    /// Only FMT.
+    /// Only FMT is defined.
     pub(super) fn new() -> Self {
         let mut by_kind: Vec<Option<Box<Format>>> = Vec::new();
         by_kind.resize_with(256, || None);
@@ -367,7 +367,7 @@ impl Formats {
         self.get(kind).is_some_and(|format| format.is_known && !format.lacks_names)
     }
 
-    /// Once.
+    /// The fault of a definition, once.
     pub(super) fn take_odd(&mut self, kind: u8) -> Option<String> {
         self.by_kind.get_mut(usize::from(kind))?.as_deref_mut()?.odd.take()
     }

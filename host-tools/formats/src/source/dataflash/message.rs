@@ -15,9 +15,9 @@ pub(super) struct Message<'a> {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Body<'a> {
-    /// After the header.
+    /// The bytes after the header.
     Bytes(&'a [u8]),
-    /// Between the commas.
+    /// The words between the commas.
     Words(&'a [&'a str]),
 }
 
@@ -40,7 +40,7 @@ impl<'a> Message<'a> {
         self.any_number(column).filter(|number| number.is_finite())
     }
 
-    /// Also if not finite.
+    /// The same, be it finite or not.
     pub(super) fn any_number(&self, column: usize) -> Option<f64> {
         let field = self.field(column)?;
         match self.body {

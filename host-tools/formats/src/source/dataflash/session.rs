@@ -31,7 +31,7 @@ const SOURCE: Source = Source { system: 1, component: 1 };
 /// Later messages count as the last log's.
 const JOINTS_MAX: u32 = 1_000;
 
-/// From a file's first part.
+/// Facts about the whole file from its first part.
 pub(super) struct First {
     formats: Formats,
     state: State,
@@ -59,12 +59,12 @@ impl First {
         &self.formats
     }
 
-    /// For a scanner.
+    /// The lengths so far, for a scanner.
     pub(super) fn lengths(&mut self) -> &mut Lengths {
         &mut self.formats.lengths
     }
 
-    /// Before the first message.
+    /// Takes a line before the first message.
     pub(super) fn banner(&mut self, words: &str) {
         let words = words.trim();
         if self.banner.is_none() && self.state.is_firmware(words) {
@@ -266,7 +266,7 @@ impl<'w> Session<'w> {
         &self.formats
     }
 
-    /// For a scanner.
+    /// The lengths so far, for a scanner.
     pub(super) fn lengths(&mut self) -> &mut Lengths {
         &mut self.formats.lengths
     }

@@ -11,9 +11,9 @@ const LINE_BYTES_MAX: usize = 64 * 1024;
 
 #[derive(Debug)]
 pub(super) struct Line<'a> {
-    /// In the file.
+    /// Its place in the file.
     pub(super) place: u64,
-    /// With its end.
+    /// Its bytes in the file, with its end.
     pub(super) bytes: u64,
     /// Invalid UTF-8 is read as ISO 8859-1.
     pub(super) words: Cow<'a, str>,
@@ -41,7 +41,7 @@ impl<R: Read> Lines<R> {
         Self(Buffer::new(input))
     }
 
-    /// Not consumed.
+    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.0.window(bytes)
     }

@@ -313,7 +313,7 @@ fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     told
 }
 
-/// At seconds of the autopilot's clock.
+/// Attitudes at these seconds of the autopilot's clock, raw.
 fn attitudes(seconds: std::ops::Range<u32>) -> Vec<u8> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let frame = |second| encoder.frame(&mut buffer, &Packet::new(30).u32(0, second * 1_000)).to_vec();

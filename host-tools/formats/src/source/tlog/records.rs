@@ -32,11 +32,11 @@ pub enum Record {
         /// The frame.
         bytes: Vec<u8>,
     },
-    /// In no record.
+    /// Bytes that belong to no record.
     Noise(Vec<u8>),
 }
 
-/// In order.
+/// The records of a tlog, in order.
 pub struct Records<R> {
     input: R,
     buffer: Vec<u8>,

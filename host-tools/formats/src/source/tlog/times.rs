@@ -82,7 +82,7 @@ impl Beside {
         early_us
     }
 
-    /// Of the recorder's clock.
+    /// Faults of the recorder's clock.
     fn gap(&self) -> Option<Gap> {
         let is_start = |at: Instant| at.as_micros() <= START_US && self.passed_us <= START_US && !self.stands;
         let (at, place) = self.began.filter(|(at, _)| !is_start(*at))?;

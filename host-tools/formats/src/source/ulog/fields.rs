@@ -53,7 +53,7 @@ impl<'a> Fields<'a> {
         self.get(field).map(|value| value as f32).filter(|value| value.is_finite())
     }
 
-    /// Not negative.
+    /// An integer that is not negative.
     pub(super) fn count(&self, field: usize) -> Option<u64> {
         self.get(field).filter(|value| *value >= 0.0).map(|value| value as u64)
     }

@@ -91,7 +91,7 @@ pub(super) struct Field {
     pub(super) number: Number,
     /// Elements of an array.
     pub(super) array: Option<u32>,
-    /// In the message's data.
+    /// Offset in the message's data.
     pub(super) offset: u32,
 }
 
@@ -99,13 +99,13 @@ pub(super) struct Field {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     pub(super) name: String,
-    /// Without padding, by place.
+    /// Without padding, in order of their places.
     pub(super) fields: Vec<Field>,
-    /// Of its data.
+    /// Bytes of its data.
     pub(super) bytes: usize,
     /// Without padding at the end, which a writer leaves out.
     pub(super) least_bytes: usize,
-    /// Of its time.
+    /// Place of its time.
     pub(super) timestamp: Option<u32>,
 }
 
@@ -114,7 +114,7 @@ pub(super) enum FormatError {
     Malformed,
     /// There are too many already.
     TooMany,
-    /// With another definition.
+    /// It exists already, with another definition.
     Redefined(String),
     Unknown(String),
     /// Deeper than [`DEPTH_MAX`], or in a circle.
@@ -149,7 +149,7 @@ struct Written {
     name: String,
 }
 
-/// Of a log.
+/// The definitions of a log.
 #[derive(Debug)]
 pub(super) struct Formats {
     written: HashMap<String, Vec<Written>>,

@@ -18,7 +18,7 @@ pub(super) const VERSION_AT: usize = MAGIC.len();
 pub(super) const VERSION_MAX: u8 = 1;
 /// In a search, other than data: checking 65,536 bytes for each byte would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
-/// Of a synchronisation message.
+/// Content of a synchronisation message.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ pub(super) enum Message<'a> {
     Unknown,
 }
 
-/// With type and name.
+/// A value with its type and name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Keyed<'a> {
     pub(super) name: &'a str,
@@ -68,7 +68,7 @@ impl<'a> Keyed<'a> {
         Some(Self { name, number: Number::named(kind), array, value })
     }
 
-    /// As long as its type.
+    /// Whether the value has the length of its type.
     fn fits(&self) -> bool {
         self.number
             .is_some_and(|number| number.bytes() * self.array.unwrap_or(1) as usize == self.value.len())
@@ -95,9 +95,9 @@ pub(super) fn words(bytes: &[u8]) -> &str {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found<'a> {
-    /// With its bytes, header included.
+    /// A message, and its bytes with the header.
     Message(Message<'a>, usize),
-    /// Within a message.
+    /// The input ends within a message.
     Cut,
     /// No valid message.
     Nothing,
@@ -113,7 +113,7 @@ pub(super) struct Parser<'a> {
 enum Belief<'a> {
     /// Not made by chance.
     Sure(Message<'a>),
-    /// If the next one is.
+    /// It could be one, if the next one is.
     Likely(Message<'a>),
     Not,
 }
@@ -276,7 +276,7 @@ fn could_be(kind: u8, bytes: usize) -> bool {
     }
 }
 
-/// With the body's length.
+/// Kind, and length of the body.
 fn header(rest: &[u8]) -> Option<(u8, usize)> {
     let &[low, high, kind] = rest.first_chunk::<HEADER_BYTES>()?;
     Some((kind, usize::from(u16::from_le_bytes([low, high]))))

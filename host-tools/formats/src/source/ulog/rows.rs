@@ -87,7 +87,7 @@ const UNITS: &str = "_m_s_s=m/s2 _m_s2=m/s2 _m_s=m/s _rad_s=rad/s _deg_s=deg/s _
     _ga=G _gs=G _rpm=rpm _percent=% _cell_v=V _filtered_v=V voltage_v=V 5v_v=V 3v3_v=V current_a=A \
     _average_a=A _filtered_a=A";
 
-/// Without a unit at the end.
+/// Names without their unit at the end.
 const NAMED: &str = "timestamp=us timestamp_sample=us esc_voltage=V esc_current=A esc_temperature=degC vx=m/s vy=m/s \
     vz=m/s ref_alt=m dist_bottom=m eph=m epv=m time_remaining_s=s voltage5V_v=V";
 

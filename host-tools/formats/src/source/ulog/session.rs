@@ -31,7 +31,7 @@ const OLD_US: u64 = 1_000_000;
 
 /// The longest message, and the look-ahead.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
-/// For a search.
+/// Bytes needed for a search for the next message.
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
 /// Data was appended.
 const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];
@@ -41,7 +41,7 @@ const APPENDED_MAX: usize = 3;
 const KEPT_OVER_BOOTS: [&str; 1] = ["mission"];
 /// Appended to the last log after a hard fault (`hardfault_log`).
 const HARD_FAULT: &str = "hardfault_plain";
-/// Of one piece of information.
+/// Words of one piece of information at most.
 const WORDS_BYTES_MAX: usize = 256;
 
 pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
@@ -427,7 +427,7 @@ impl<'a, 'b> Session<'a, 'b> {
         Ok(false)
     }
 
-    /// As logged.
+    /// The latest time as the log has it.
     fn recorded(&self) -> u64 {
         self.clock.recorded_us().unwrap_or(0)
     }

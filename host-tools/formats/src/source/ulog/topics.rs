@@ -26,7 +26,7 @@ pub(super) struct Subscription {
     pub(super) instance: u8,
     /// With its fields' places.
     pub(super) topic: Option<(&'static Topic, Vec<Option<Slot>>)>,
-    /// If wanted.
+    /// If rows are wanted.
     pub(super) table: Option<Arc<Table>>,
     /// Of the last observed message.
     pub(super) observed_us: Option<u64>,
@@ -48,7 +48,7 @@ impl Subscription {
     }
 }
 
-/// By number.
+/// All of them, by number.
 #[derive(Debug, Default)]
 pub(super) struct Subscriptions {
     numbered: Vec<Option<Box<Subscription>>>,
@@ -162,7 +162,7 @@ impl Subscriptions {
         self.living = 0;
     }
 
-    /// By name.
+    /// Counts of messages by name.
     pub(super) fn counts(mut self) -> Vec<MessageCount> {
         self.clear();
         let of = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };

@@ -25,7 +25,7 @@ impl<R: Read> Window<R> {
         Self { input, buffer: Vec::new(), at: 0, place: 0, ended: false, trouble: None }
     }
 
-    /// Not yet consumed.
+    /// Bytes read and not yet consumed.
     pub(super) fn rest(&self) -> &[u8] {
         self.buffer.get(self.at..).unwrap_or_default()
     }

@@ -65,7 +65,7 @@ impl Pipeline<'_, '_> {
         *self.monitoring.monitor().params()
     }
 
-    /// In the end.
+    /// Whether the card had no room in the end.
     pub(in crate::run::sim) fn is_full(&self) -> bool {
         self.slot_status.read().state == CardState::Full
     }

@@ -35,9 +35,9 @@ impl Word {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Arming {
     armed: Option<bool>,
-    /// In the first message.
+    /// State in the first message about arming.
     first_told: Option<bool>,
-    /// Since and until.
+    /// Since when and until when the evidence has lasted.
     evidence: Option<(Instant, Instant)>,
 }
 
@@ -59,7 +59,7 @@ impl Arming {
         }
     }
 
-    /// Before the first message.
+    /// It was armed before the first message.
     pub(super) const fn begin_armed(&mut self) {
         (self.armed, self.first_told) = (Some(true), Some(true));
     }

@@ -7,7 +7,7 @@ use super::state::State;
 use crate::source::dataflash::format::{Field, FieldKind};
 use crate::source::dataflash::message::Message;
 
-/// Of one handler.
+/// Columns that one handler reads at most.
 const SLOTS_MAX: usize = 16;
 
 /// Column by slot; `None` if the file lacks it.
@@ -70,10 +70,10 @@ impl Handler {
 pub(super) struct Given<'a> {
     pub(super) message: &'a Message<'a>,
     pub(super) slots: &'a Slots,
-    /// By the name.
+    /// The sensor in the message's name.
     pub(super) base: u8,
     pub(super) at: Instant,
-    /// Since power-on, if known.
+    /// Microseconds since power-on, if the log has them.
     pub(super) boot_us: Option<u64>,
 }
 

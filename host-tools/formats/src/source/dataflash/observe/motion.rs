@@ -37,7 +37,7 @@ const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 const AT_ONCE: Span = Span::from_millis(100);
 /// Larger angles are invalid.
 const TURN_DEG: f32 = 360.0;
-/// Of an attitude.
+/// Rates go with an attitude within this.
 const RATES_AGE: Span = Span::from_millis(500);
 
 /// Columns of GPS.
@@ -195,7 +195,7 @@ fn receiver_ms(given: &Given<'_>) -> Option<NonZeroU32> {
     NonZeroU32::new(week.wrapping_mul(WEEK_MS).wrapping_add(ms) as u32)
 }
 
-/// By the receiver's time of week.
+/// UTC by the receiver's time of the week.
 fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
     /// 1980-01-06 in seconds since 1970.
     const GPS_EPOCH_S: u64 = 315_964_800;

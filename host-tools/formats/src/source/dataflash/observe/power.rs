@@ -23,7 +23,7 @@ pub(super) const HANDLERS: &[Handler] = &[
     handler("RPM", "I RPM|rpm1 rpm2", rpm),
 ];
 
-/// In older versions.
+/// Older versions logged whole hundredths of volts and amperes.
 fn hundredths(given: &Given<'_>, slot: usize) -> Option<f32> {
     given.single(slot).map(|value| if given.is_integer(slot) { value / 100.0 } else { value })
 }

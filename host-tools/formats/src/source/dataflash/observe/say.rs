@@ -22,7 +22,7 @@ pub(in crate::source::dataflash) enum Say<'a> {
     /// A restart after a fault, as a sentence.
     ProcessorFault(&'a str),
     Arming(&'a str),
-    /// At this message, microseconds since 1970.
+    /// UTC at this message, microseconds since 1970.
     Utc(u64),
     /// Messages.
     Lost(u64),

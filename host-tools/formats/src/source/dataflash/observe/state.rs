@@ -34,7 +34,7 @@ impl<T: Copy> Dated<T> {
         self.0 = Some((at, value));
     }
 
-    /// If not older than `age`.
+    /// The value, while it is not older than `age`.
     pub(super) fn within(&self, now: Instant, age: Span) -> Option<T> {
         self.0.filter(|(at, _)| now.since(*at) <= age).map(|(_, value)| value)
     }
@@ -80,12 +80,12 @@ impl RateUnit {
 /// Where messages about arming are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ToldArming {
-    /// As far as is known.
+    /// Nowhere, as far as the file is known.
     #[default]
     Nowhere,
     /// In the file's first part; the first message's value.
     First(bool),
-    /// Before the file's last power-on.
+    /// Before the last power-on that the file holds.
     Before,
 }
 
@@ -110,7 +110,7 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) capacity_mah: [Option<f32>; INSTANCES],
     /// `AHRS_EKF_TYPE`: 2 or 3; 0 without a filter.
     pub(super) estimator: Option<u8>,
-    /// From the top byte down.
+    /// Version of the firmware, from the top byte down.
     pub(super) version: u32,
     /// POS is logged.
     pub(super) has_positions: bool,
@@ -132,7 +132,7 @@ impl Facts {
 #[derive(Debug, Default)]
 pub(in crate::source::dataflash) struct State {
     pub(super) facts: Facts,
-    /// By VER or a text.
+    /// Its version is known, from VER or a text.
     pub(super) identified: bool,
     /// Handed on.
     told_version: u32,
@@ -166,7 +166,7 @@ pub(in crate::source::dataflash) struct State {
     pub(super) altitude: Dated<f32>,
     pub(super) baro_height: Dated<f32>,
     pub(super) climb: Dated<f32>,
-    /// From CTUN.
+    /// The estimator's, of CTUN.
     pub(super) told_climb: Dated<f32>,
     pub(super) airspeed: Dated<f32>,
     pub(super) ground_speed: Dated<f32>,
@@ -205,7 +205,7 @@ enum Rearms {
     Since(Instant),
 }
 
-/// By arming and take-off.
+/// State from messages of arming and take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::source::dataflash) struct Standing {
     arming: Arming,
@@ -257,7 +257,7 @@ impl State {
         craft.is_some()
     }
 
-    /// As far as is known.
+    /// Whether motors may turn, as far as is known.
     pub(in crate::source::dataflash) fn is_armed(&self) -> bool {
         self.arming.armed() == Some(true)
     }
@@ -275,7 +275,7 @@ impl State {
         Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes }
     }
 
-    /// From [`State::standing`].
+    /// Sets the state from [`State::standing`].
     pub(in crate::source::dataflash) fn stand(&mut self, standing: Standing) {
         Standing { arming: self.arming, landed: self.landed, failsafes: self.failsafes } = standing;
     }
@@ -313,7 +313,7 @@ impl State {
         }
     }
 
-    /// By a message.
+    /// A message reports that it is on the ground.
     pub(super) fn land(&mut self) {
         if self.tells_landing() {
             self.landed = LandedState::OnGround;

@@ -66,12 +66,12 @@ impl Craft {
         })
     }
 
-    /// By events.
+    /// Whether events report take-off and landing.
     pub(super) const fn tells_landing(self) -> bool {
         matches!(self, Self::Copter | Self::Heli)
     }
 
-    /// In every version.
+    /// Whether every version reports arming.
     pub(super) const fn tells_arming(self) -> bool {
         matches!(self, Self::Sub)
     }
@@ -166,7 +166,7 @@ pub(super) fn error(subsystem: u8, code: u8) -> String {
     format!("{name}: {words}")
 }
 
-/// Or its end (code 0).
+/// The alert of an ERR, or its end (code 0).
 pub(super) fn alert(subsystem: u8, code: u8) -> Option<Alert> {
     let cause = row(subsystem)?.2?;
     let urgency = match (subsystem, code) {
@@ -233,7 +233,7 @@ pub(super) fn subsystem(number: u8) -> &'static str {
     row(number).map_or("", |(_, name, ..)| name)
 }
 
-/// By name.
+/// The failsafes of these bits, by their names.
 pub(super) fn failsafes(bits: u64) -> String {
     let named = SUBSYSTEMS.iter().filter(|(subsystem, ..)| bits & (1 << subsystem) != 0);
     named.map(|(_, name, ..)| *name).collect::<Vec<_>>().join(", ")

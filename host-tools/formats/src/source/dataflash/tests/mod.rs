@@ -70,7 +70,7 @@ impl Seen {
         }
     }
 
-    /// With a place in the file.
+    /// Gaps that have a place in the file.
     fn damage(&self) -> Vec<&(Cause, u64, u64, String)> {
         self.gaps.iter().filter(|gap| gap.1 != u64::MAX).collect()
     }

@@ -25,18 +25,18 @@ const REPEAT_US: u64 = 1_000_000;
 /// Useful topics.
 const LISTS: [&[Topic]; 4] = [system::TOPICS, motion::TOPICS, power::TOPICS, receivers::TOPICS];
 
-/// If needed.
+/// The row of a topic, if it is needed.
 pub(super) fn topic(name: &str) -> Option<&'static Topic> {
     LISTS.into_iter().flatten().find(|topic| topic.name == name)
 }
 
 impl Px4 {
-    /// At the beginning or changed.
+    /// A parameter, at the beginning or changed.
     pub(super) fn parameter(&mut self, name: &str, value: f64) {
         self.system.parameter(name, value);
     }
 
-    /// Once known.
+    /// The version of the firmware, once it is known.
     pub(super) fn identity(&mut self, release: u32) {
         self.system.release = release;
     }

@@ -150,14 +150,14 @@ fn other_air(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// As `SERVO_OUTPUT_RAW`.
+/// The source of `SERVO_OUTPUT_RAW`.
 fn outputs(px4: &mut Px4, sample: &Sample<'_>) {
     let pulse = |output: usize| sample.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
     let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);
     px4.observe(Observation::Outputs(Outputs { port: sample.instance, pulses }));
 }
 
-/// Without `sensor_combined`.
+/// For a log without `sensor_combined`.
 fn acceleration(px4: &mut Px4, sample: &Sample<'_>) {
     if !px4.motion.combined && is_due(px4, sample) {
         inertial(px4, 0, sample.fields.vector(0), px4.motion.rate);

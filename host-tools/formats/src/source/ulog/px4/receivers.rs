@@ -18,7 +18,7 @@ const SILENCE: Span = Span::from_millis(2_500);
 /// A fix with a position: `FIX_TYPE_2D`.
 const FIX_2D: u8 = 2;
 
-/// Of both topics.
+/// Fields of both topics.
 const FIELDS: &str = "fix_type satellites_used hdop eph latitude_deg longitude_deg altitude_msl_m lat lon alt vel_m_s \
     time_utc_usec jamming_state spoofing_state cog_rad";
 
@@ -32,7 +32,7 @@ pub(super) fn dropout(receivers: &mut Receivers) {
     receivers.heard = [None; RECEIVERS_MAX];
 }
 
-/// As MAVLink reports it.
+/// MAVLink's report about silent receivers.
 pub(super) fn silence(receivers: &Receivers, now: Instant, observe: &mut dyn FnMut(Observation)) {
     for (instance, heard) in receivers.heard.iter().enumerate() {
         if heard.is_some_and(|heard| now.since(heard) > SILENCE) {

@@ -31,7 +31,7 @@ pub(super) const fn topic(
 #[derive(Clone, Copy, Debug)]
 pub(in crate::source::ulog) struct Sample<'a> {
     pub(in crate::source::ulog) at: Instant,
-    /// Since the autopilot's boot.
+    /// Microseconds since the autopilot's boot.
     pub(in crate::source::ulog) recorded_us: u64,
     /// From before the log, or long before the latest message.
     pub(in crate::source::ulog) is_old: bool,
@@ -39,7 +39,7 @@ pub(in crate::source::ulog) struct Sample<'a> {
     pub(in crate::source::ulog) fields: Fields<'a>,
 }
 
-/// Of an event, looked at.
+/// Bytes of an event's arguments that are looked at.
 pub(in crate::source::ulog) const ARGUMENTS: usize = 8;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -74,7 +74,7 @@ pub(super) const MEDIUM_US: u64 = 100_000;
 
 #[derive(Debug, Default)]
 pub(in crate::source::ulog) struct Px4 {
-    /// To be handed on.
+    /// Outputs of the last messages, to be handed on.
     pub(in crate::source::ulog) reports: Vec<Report>,
     pub(super) system: System,
     pub(super) motion: Motion,
@@ -118,7 +118,7 @@ pub(super) struct System {
     pub(super) failsafes: String,
     pub(super) told_failsafes: String,
     pub(super) reached: Option<i64>,
-    /// From a receiver.
+    /// UTC less the time since boot, from a receiver.
     pub(super) utc_offset_us: Option<u64>,
 }
 
@@ -127,7 +127,7 @@ pub(super) struct System {
 pub(super) struct Status {
     pub(super) arming: u8,
     pub(super) nav: u8,
-    /// By the pilot, since v1.14.
+    /// The mode requested by the pilot, since v1.14.
     pub(super) meant: Option<u8>,
     pub(super) failsafe: bool,
     pub(super) type_number: u8,
@@ -155,9 +155,9 @@ pub(super) struct Motion {
     pub(super) airspeed: Option<f32>,
     pub(super) airspeed_validated: bool,
     pub(super) thrust: [Option<f32>; 2],
-    /// Without a thrust setpoint.
+    /// Motor outputs, if the log has no thrust setpoint.
     pub(super) motors: Option<f32>,
-    /// In the log.
+    /// The log has `estimator_status`.
     pub(super) estimator_status: bool,
     /// As far as `estimator_status_flags` has them.
     pub(super) estimator_flags: u16,
@@ -216,7 +216,7 @@ pub(super) const RECEIVERS_MAX: usize = 2;
 pub(super) struct Receivers {
     /// Messages of the receivers themselves.
     pub(super) sensors: bool,
-    /// Of the last message.
+    /// Time of each one's last message.
     pub(super) heard: [Option<Instant>; RECEIVERS_MAX],
     pub(super) told_utc: bool,
 }

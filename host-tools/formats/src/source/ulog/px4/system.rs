@@ -80,7 +80,7 @@ impl System {
         }
     }
 
-    /// Or is meant to.
+    /// Whether another computer flies it, or is meant to.
     fn is_offboard(&self) -> bool {
         const OFFBOARD: u8 = 14;
         self.status.is_some_and(|status| status.nav == OFFBOARD || status.meant == Some(OFFBOARD))
@@ -133,7 +133,7 @@ impl System {
     }
 }
 
-/// As `hums_link` does.
+/// The kinds that `hums_link` makes of `MAV_TYPE`.
 fn kind(type_number: u8) -> VehicleKind {
     match type_number {
         2 | 3 | 4 | 13 | 14 | 15 | 29 | 35 => VehicleKind::Rotorcraft,
@@ -258,7 +258,7 @@ fn rc(px4: &mut Px4, sample: &Sample<'_>) {
     px4.observe(Observation::RadioControl(RadioControl { rssi }));
 }
 
-/// Since v1.9.
+/// A telemetry radio, from v1.9 on.
 fn radio(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let byte = |field| fields.byte(field).filter(|&value| value < u8::MAX);
@@ -364,7 +364,7 @@ impl Px4 {
         }
     }
 
-    /// As MAVLink repeats them.
+    /// The messages that MAVLink repeats without a new topic.
     pub(super) fn repeat(&mut self, recorded_us: u64) {
         self.heartbeat();
         self.landed();
