@@ -1,7 +1,7 @@
 //! A smoothed figure and its baseline in this flight.
 //!
-//! The baseline is the mean of the smoothed figure over the last minute; its range is [`SPREADS`] times the mean distance from that mean.
-//! The caller says which samples are learnt. So a fault does not become the baseline, and an offset from the beginning of a flight does.
+//! The baseline is the mean of the smoothed figure over the last minute; its range is [`SPREADS`] times the mean distance from
+//! that mean. So a fault does not become the baseline, and an offset from the beginning of a flight does.
 
 /// The baseline is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;
@@ -12,7 +12,6 @@ const FIGURE_MAX: f32 = 1e6;
 const SPREADS: f32 = 4.0;
 
 state! {
-    /// A figure and its usual level.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct AdaptiveBaseline {
         smooth: f32,
@@ -33,7 +32,6 @@ impl AdaptiveBaseline {
         Self { learnt_s: -settles_s, ..Self::default() }
     }
 
-    /// Whether a sample is in the possible range.
     pub(crate) fn is_sane(sample: f32) -> bool {
         (-FIGURE_MAX..=FIGURE_MAX).contains(&sample)
     }
@@ -60,7 +58,6 @@ impl AdaptiveBaseline {
         self.spread += weight * (libm::fabsf(off) - self.spread);
     }
 
-    /// Whether the baseline is known.
     pub(crate) fn is_known(&self) -> bool {
         self.learnt_s >= KNOWN_S
     }

@@ -54,7 +54,7 @@ pub(crate) fn take(
     }
 }
 
-/// The downward direction, in the body's axes.
+/// Downwards, in the body's axes.
 fn down([roll, pitch]: [f32; 2]) -> [f32; 3] {
     let level = libm::cosf(pitch);
     [-libm::sinf(pitch), libm::sinf(roll) * level, libm::cosf(roll) * level]

@@ -1,8 +1,7 @@
 //! Alerts: problems that the autopilot itself reports, by a text, an event, a flag of health or of the estimator.
 //!
-//! Autopilots report one problem in many ways. Each way becomes a [`Cause`] in one place: texts in `alert/texts.rs`,
-//! PX4's events in `alert/events.rs`, flags of health in [`crate::cause`], the estimator's here. A new way is one row
-//! there. A severe report that is in no table is [`Cause::Other`].
+//! Each way becomes a [`Cause`] in one place: texts in `alert/texts.rs`, PX4's events in `alert/events.rs`, flags of health in
+//! [`crate::cause`], the estimator's here. A new way is one row there. A severe report that is in no table is [`Cause::Other`].
 //!
 //! A text or an event is a moment: it holds for [`HOLDS`]. A flag counts from the second message with it on: one
 //! wrong message must not raise an alarm.
@@ -84,7 +83,6 @@ pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Cau
     if had_both && !has_both(flags) { said.with(Cause::Estimator) } else { said }
 }
 
-/// Whether an estimator has attitude and position.
 const fn has_both(flags: u16) -> bool {
     const ATTITUDE: u16 = 1;
     const POSITION: u16 = 1 << 3 | 1 << 4;
@@ -92,7 +90,6 @@ const fn has_both(flags: u16) -> bool {
 }
 
 state! {
-    /// The flags of the last two messages.
     #[derive(Clone, Copy, Debug)]
     struct Flags {
         now: Causes,
@@ -115,8 +112,7 @@ state! {
     /// The standing alerts of the autopilot. Only those of the armed time count: earlier ones are about arming.
     #[derive(Clone, Copy, Debug)]
     pub struct Alerts {
-        /// For each cause its reported urgency, and the time until which a single report holds, ms; then the time of the
-        /// last report.
+        /// For each cause its urgency; until when a single report holds, ms; the time of the last report.
         told: [Option<Urgency>; Cause::COUNT],
         until_ms: [u32; Cause::COUNT],
         told_at: Stamp,
@@ -132,7 +128,6 @@ state! {
         had: Causes,
         /// Causes that flags of the last `SYS_STATUS` cover, healthy or not.
         spoken_of: Causes,
-        /// The estimator had attitude and position.
         had_both: bool,
     }
 }
@@ -150,7 +145,6 @@ impl Alerts {
         }
     }
 
-    /// The `MAV_STATE` of a heartbeat.
     pub(crate) const fn take_state(&mut self, at: Instant, state: u8) {
         let emergency = state >= CRITICAL_STATE;
         if emergency && !self.emergency {
@@ -159,7 +153,6 @@ impl Alerts {
         self.emergency = emergency;
     }
 
-    /// Whether the autopilot reported a new problem within this time.
     pub(crate) fn have_begun_within(&self, now: Instant, span: Span) -> bool {
         self.began_at.age(now).is_some_and(|age| age <= span)
     }
@@ -201,7 +194,6 @@ impl Alerts {
         self.failures.take(at, causes);
     }
 
-    /// The estimator's flags, and whether a GNSS receiver has a 3D fix.
     pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator, has_fix: bool) {
         self.had_both |= has_both(estimator.flags);
         self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix));
@@ -250,7 +242,7 @@ impl Alerts {
     }
 }
 
-/// Whether a time in milliseconds modulo 2^32 is before this one.
+/// Times are in milliseconds modulo 2^32.
 const fn is_past(now: Instant, until_ms: u32) -> bool {
     (now.as_millis() as u32).wrapping_sub(until_ms).cast_signed() > 0
 }

@@ -1,14 +1,14 @@
 //! Construction of large values in place, part by part. A whole value would fill a board's stack, and as a constant
 //! it would be a copy in flash, nearly all zeros.
 
-/// Runs a step on a stack frame of its own, which is freed before the next step.
+/// A frame of its own, freed before the next step.
 #[inline(never)]
 pub(crate) fn apart(act: impl FnOnce()) {
     act();
 }
 
 /// Makes a structure in a place ([`core::mem::MaybeUninit`]) out of all its fields, one after the other; gives the
-/// reference to it. A missing field does not compile.
+/// reference to it.
 macro_rules! place {
     ($place:expr, $Whole:ident { $($part:ident: $value:expr),* $(,)? }) => {{
         let place: &mut core::mem::MaybeUninit<$Whole> = $place;

@@ -1,14 +1,12 @@
 //! The first barometer against the height of GNSS, its noise, and the climb of the estimator.
 //!
-//! 1. Barometer and GNSS ([`Comparison::BaroGnss`]): weather and site make an offset, which is learnt. Two effects on
-//!    a healthy barometer are allowed for. Air that is warmer or colder than standard makes a scale error:
-//!    [`SCALE_PART`] of the change of height. The wind of the flight presses on the housing: half of the change of
-//!    the dynamic pressure.
+//! 1. Barometer and GNSS ([`Comparison::BaroGnss`]): weather and site make an offset, which is learnt. Two effects on a healthy
+//!    barometer are allowed for. Air that is warmer or colder than standard makes a scale error: [`SCALE_PART`] of the change
+//!    of height.
 //! 2. Noise ([`Comparison::BaroNoise`]): the step of the height from sample to sample, less the climb. The errors of
 //!    a late message ([`LATE_S`]) and of a changing climb are taken off.
-//! 3. Climb ([`Comparison::BaroClimb`]): an accelerometer that folds vibration into an offset lets an estimator fall
-//!    while the vehicle climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`.
-//!    The change of the whole dynamic pressure is taken off.
+//! 3. Climb ([`Comparison::BaroClimb`]): an accelerometer that folds vibration into an offset lets an estimator fall while the
+//!    vehicle climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`.
 //! 4. The wrong height after a leap ([`Heights::receiver_leapt`]): the estimator's climb decides, which over so short
 //!    a time is its accelerometer's. If the receiver's height moved within [`RECEIVER_S`] without that climb, and the
 //!    barometer's by less than half as much, the receiver is wrong. A slow drift takes the estimator along and is
@@ -43,13 +41,11 @@ state! {
         height_m: f32,
         at: Stamp,
         leapt_m: f32,
-        /// The error of a late height, by the climb, m.
         late_m: f32,
     }
 }
 
 impl Leap {
-    /// Takes a height; the climb is `None` if unknown.
     fn take(&mut self, at: Instant, height_m: f32, climb_mps: Option<f32>) {
         let step = self.at.age(at).filter(|step| *step <= PAUSE);
         let risen_m = height_m - self.height_m;
@@ -84,7 +80,6 @@ state! {
 }
 
 state! {
-    /// The heights of barometer and receiver.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Heights {
         /// The first pressure of the flight, hPa; 0 before it.
@@ -178,7 +173,6 @@ impl Heights {
         smooth(usual, air, learnt_s / (AIR_S + learnt_s), f32::INFINITY);
     }
 
-    /// The leap of the receiver's height alone, m.
     pub(crate) fn receiver_leapt(&self, now: Instant) -> Option<Reading> {
         let [barometer_m, receiver_m] = self.leaps.map(|leap| leap.far_m());
         let alone_m = if receiver_m > 2.0 * barometer_m { receiver_m } else { 0.0 };

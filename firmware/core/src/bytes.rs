@@ -62,7 +62,6 @@ pub struct Fields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// Writes an item of this version. Bytes that do not fit are left out: the length is checked by each item's test.
     pub(crate) fn write(out: &'a mut [u8], version: u8) -> Self {
         if let Some(first) = out.first_mut() {
             *first = version;
@@ -70,23 +69,19 @@ impl<'a> Fields<'a> {
         Self { way: Way::Write(out), at: 1, short: false, lacks: false }
     }
 
-    /// Reads an item of at least the oldest version.
     pub(crate) fn read(stored: &'a [u8], oldest: u8, newest: u8) -> Result<Self, Unreadable> {
         let version = *stored.first().filter(|version| **version >= oldest).ok_or(Unreadable)?;
         Ok(Self { way: Way::Read(stored), at: 1, short: false, lacks: version < newest })
     }
 
-    /// Bytes written or read.
     pub(crate) const fn len(&self) -> usize {
         self.at
     }
 
-    /// Whether all bytes were read.
     pub(crate) const fn is_read(&self) -> bool {
         matches!(self.way, Way::Read(stored) if stored.len() <= self.at)
     }
 
-    /// Whether numbers take only as many bytes as they need.
     pub(crate) const fn is_short(&self) -> bool {
         self.short
     }
@@ -177,7 +172,6 @@ impl<'a> Fields<'a> {
 
 /// A field of fixed length.
 pub(crate) trait Field {
-    /// Writes or reads it.
     fn code(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable>;
 }
 
@@ -202,7 +196,6 @@ impl<T: Field, const N: usize> Field for [T; N] {
     }
 }
 
-/// Fields in their order.
 macro_rules! fields {
     ($fields:ident: $($field:expr),* $(,)?) => {{
         use $crate::bytes::Field as _;

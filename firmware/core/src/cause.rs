@@ -1,4 +1,4 @@
-//! Causes: faults as an autopilot reports them, in common terms, and the status flags that report each.
+//! Causes: faults as an autopilot reports them, and the status flags that report each.
 
 numbered! {
     /// A fault that the autopilot reports. It has the name of its check.
@@ -83,7 +83,6 @@ impl Alert {
     }
 }
 
-/// The meaning of a text or an event, by the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Meaning {
     /// Something is wrong.

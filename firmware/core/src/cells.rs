@@ -39,7 +39,7 @@ const ANOTHER: f32 = 0.7;
 pub(crate) const DOUBTED: u8 = 0x80;
 /// Below this no battery is connected.
 const PLUGGED_V: f32 = 2.5;
-/// The default of `ArduPilot`'s `BATT_LOW_VOLT`, which does not depend on the pack.
+/// `ArduPilot`'s default of `BATT_LOW_VOLT`.
 const LOW_AS_DELIVERED_V: f32 = 10.5;
 
 /// The meaning of an autopilot's parameter for a battery.
@@ -102,11 +102,10 @@ state! {
         id: u8,
         /// The highest voltage, or part of it, was measured at rest.
         rested: bool,
-        /// The count of earlier flights; 0 for none.
+        /// 0: none.
         before: u8,
         /// The last flight did not confirm it.
         doubted: bool,
-        /// 0: not known.
         count: u8,
     }
 }
@@ -121,7 +120,6 @@ state! {
     }
 }
 
-/// Counts as a set of bits: bit n stands for n cells.
 type Counts = u32;
 
 fn counts(volts: f32, from_v: f32, to_v: f32) -> Counts {
@@ -216,7 +214,6 @@ impl Cells {
         }
     }
 
-    /// Whether this count fits the battery's highest voltage.
     pub(crate) fn fits(&self, battery: usize, count: u8) -> bool {
         self.packs.get(battery).is_some_and(|pack| {
             let lowest_v = if pack.rested { CELL_EMPTY_V } else { CELL_LOADED_V };
@@ -242,7 +239,6 @@ impl Cells {
         .unwrap_or(0.0)
     }
 
-    /// Whether a voltage of this battery was received.
     pub(crate) fn has_voltage(&self, battery: usize) -> bool {
         self.packs.get(battery).is_some_and(|pack| pack.highest_v > 0.0)
     }

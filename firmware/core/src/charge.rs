@@ -16,11 +16,9 @@ const FULL: f32 = 1.15;
 /// The least fall of the state of charge. An error of 10 mV is 5 % of it in the flat part of the curve.
 const FALL_MIN: f32 = 0.3;
 
-/// The state of a battery before a flight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Charge {
     state: f32,
-    /// Charge taken by then, Ah.
     consumed_ah: f32,
 }
 

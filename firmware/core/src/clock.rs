@@ -1,6 +1,6 @@
 //! Time at the edge (links, recorder, files): microseconds since power-on, from one monotonic clock that the caller reads.
 //!
-//! 64 bits of microseconds last 584,000 years, so nothing here wraps. Judgement works with [`crate::time`], in milliseconds.
+//! Judgement works with [`crate::time`], in milliseconds.
 
 use core::fmt;
 use core::num::NonZeroU64;
@@ -8,8 +8,8 @@ use core::ops::Add;
 
 use crate::time;
 
-/// UTC that can be true, microseconds since 1970: 2010, when MAVLink was new, to 2100. A GPS receiver without a fix, or one that
-/// counts its weeks from 0 again, reports an earlier date.
+/// UTC that can be true, microseconds since 1970: 2010 to 2100. A GPS receiver without a fix, or one that counts its weeks from
+/// 0 again, reports an earlier date.
 pub const UTC_MICROS: core::ops::Range<u64> = 1_262_304_000_000_000..4_102_444_800_000_000;
 
 /// A point in time: microseconds since the monitor's power-on. Kept one higher, so that an optional one takes no more room.

@@ -84,7 +84,6 @@ impl Kind {
         matches!(self, Self::Motor | Self::Propeller | Self::Esc)
     }
 
-    /// Whether its hours are those powered, and not those in the air.
     const fn wears_while_powered(self) -> bool {
         matches!(self, Self::Card | Self::Other)
     }
@@ -145,7 +144,6 @@ impl Figures {
     }
 }
 
-/// The parameters of a component. Those of all components follow each other, each in this order.
 #[derive(Clone, Copy)]
 enum Setting {
     Kind,
@@ -164,7 +162,7 @@ const _: () = {
 impl Setting {
     const COUNT: usize = 6;
 
-    /// The value for the component at `place`; 0 for a place beyond the last.
+    /// 0 for a place beyond the last.
     fn of(self, place: usize, params: &Params) -> f32 {
         let index = Param::Cmp1Kind as usize + place * Self::COUNT + self as usize;
         let param = Param::ALL.get(index).filter(|_| place < COMPONENTS_MAX);
@@ -217,7 +215,6 @@ pub struct Component {
     pub number: u8,
     /// How often the part in this place was replaced.
     pub replaced: u16,
-    /// Its figures less those of the session, because it may have come into the session, or changed, in the middle.
     base: Figures,
     /// The power-on before which `base` counts; stored items only.
     as_of: u32,
@@ -261,7 +258,7 @@ impl Component {
         }
     }
 
-    /// Takes kind and number from its parameters; `true` if they changed. The figures stay.
+    /// `true` if kind or number changed; the figures stay.
     pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
         let kind = Kind::from_number(Setting::Kind.of(place, params) as u8).unwrap_or_default();
         let number = (Setting::Number.of(place, params) as u8).min(MOTORS_MAX as u8);
@@ -273,7 +270,7 @@ impl Component {
         true
     }
 
-    /// Puts a new part in its place, with no wear. Returns the old one.
+    /// A new part, with no wear; returns the old one.
     pub(crate) fn replace(&mut self, serial: Label, wear: &Wear<'_>) -> Self {
         let old = Self { base: self.figures(wear), ..*self };
         self.serial = serial;
@@ -299,7 +296,7 @@ impl Component {
         self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
     }
 
-    /// Marks it as counted before this power-on; whether that is new, so that it is saved again.
+    /// Whether it is new at this power-on, so that it is saved again.
     pub(crate) const fn begin(&mut self, boots: u32) -> bool {
         let begins = self.as_of != boots;
         self.as_of = boots;

@@ -11,8 +11,6 @@
 //! | accelerometer, attitude | velocity of the receiver | [`crate::imu_gnss`] |
 //! | vibration | its baseline | [`Crosschecks::take_vibration`] |
 //! | body rates | their setpoint | [`crate::rate_tracking`] |
-//!
-//! An inertial sensor that sends nothing but zeros is not fitted.
 
 use crate::baro_gnss::Heights;
 use crate::flight::Flight;
@@ -37,7 +35,6 @@ const NOT_COMPARED: [f32; 3] = [f32::NAN; 3];
 const EVERY: Span = Span::from_millis(100);
 
 state! {
-    /// The memory of all comparisons.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Crosschecks {
         pub(crate) gates: Gates,
@@ -60,7 +57,6 @@ state! {
 }
 
 impl Crosschecks {
-    /// Takes a sample of a sensor.
     fn take(&mut self, at: Instant, kind: Kind, instance: u8, sample: [f32; 3]) {
         let is_own = match kind {
             Kind::Accelerometer | Kind::Gyro => instance > 0 || !self.selects,
@@ -75,7 +71,6 @@ impl Crosschecks {
         }
     }
 
-    /// Takes an observation that the vehicle took.
     pub(crate) fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
         let Self { gates, residuals, rate_setpoint, .. } = self;
         match observation {
@@ -171,7 +166,6 @@ impl Crosschecks {
         *self = Self { gates, pairs, selects, repeats: self.repeats.begun(), ..Self::default() };
     }
 
-    /// One step, at least every 50 ms.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
         self.gates.step(now, vehicle, flight);
         let step = self.stepped_at.age(now);
@@ -194,7 +188,6 @@ impl Crosschecks {
         (0..SENSORS_MAX).rev().find(|sensor| measured(*sensor)).map_or(0, |last| last as u8 + 1)
     }
 
-    /// Whether any two were compared in this flight.
     pub(crate) fn are_compared(&self) -> bool {
         self.pairs.iter().any(Pairs::are_compared)
     }
@@ -216,7 +209,6 @@ impl Crosschecks {
     }
 }
 
-/// The comparison of vibration with its baseline, on the scale that the vehicle knows.
 fn vibration_of(vehicle: &Vehicle) -> Comparison {
     match vehicle.vibration.get().map(|vibration| vibration.scale) {
         Some(VibrationScale::Px4Metrics) => Comparison::VibrationPx4,

@@ -45,7 +45,6 @@ state! {
         pub(crate) outputs: MotorOutputs,
         /// Of the last sample, and smoothed.
         load_factor: Latest<[f32; 2]>,
-        /// When anything at all was heard of the vehicle.
         heard: Option<Instant>,
         /// When it was heard again after a silence, or a plane had no throttle last.
         resumed: Instant,
@@ -89,7 +88,7 @@ impl Lately {
 }
 
 impl Derived {
-    /// Something was heard: after a silence of the link, or as usual.
+    /// Anything heard: after a silence of the link, or as usual.
     fn hear(&mut self, at: Instant) {
         let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
         if pause_s.is_none_or(|pause_s| pause_s > SILENCE_S.max(SILENCE_PAUSES * self.pause_s)) {
@@ -188,14 +187,12 @@ impl Derived {
         self.write_errors.take(now, recorder.write_errors);
     }
 
-    /// The battery is another one.
     pub(crate) fn forget_resistance(&mut self, battery: usize) {
         if let Some(resistance) = self.resistance.get_mut(battery) {
             *resistance = Resistance::default();
         }
     }
 
-    /// The internal resistance of a battery.
     pub(crate) fn resistance(&self, battery: usize) -> Option<&Resistance> {
         self.resistance.get(battery)
     }
@@ -252,7 +249,6 @@ impl Derived {
         Reading::new(Some(heard.earlier(now)), self.motors.silence_s(heard, self.resumed, motor))
     }
 
-    /// Whether all ESCs are silent at once.
     pub(crate) fn are_escs_silent(&self) -> bool {
         self.heard.is_some_and(|heard| self.motors.are_silent(heard, self.resumed))
     }
@@ -268,13 +264,13 @@ impl Derived {
         Reading::new(self.load_factor.at(), self.load_factor.get().map(|[sample_g, _]| *sample_g))
     }
 
-    /// The same of the force as it is smoothed by axis ([`crate::inertial`]): a load that counts.
+    /// Smoothed by axis ([`crate::inertial`]): a load that counts.
     pub(crate) fn load_factor_g(&self) -> Option<f32> {
         self.load_factor.get().map(|[_, smooth_g]| *smooth_g)
     }
 }
 
-/// A sample of the specific force in units of gravity; `None` where it was not measured.
+/// `None` where it was not measured.
 pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
     Some(norm(force.map(|axis| axis.0)))
         .filter(|force| *force <= MetresPerSecond2::MAX)

@@ -1,9 +1,8 @@
 //! Election of the vehicle: of the systems on the autopilot's port, the one that streams most.
 //!
-//! An autopilot forwards other systems' messages, so the first heartbeat on the port may be another vehicle's. The
-//! first system is taken at once, so that nothing waits. For [`SETTLES`] another one takes its place if it streams
-//! far more. Then the choice stands until the vehicle has been silent for [`SILENT`]: the autopilot was changed, or
-//! its system id.
+//! An autopilot forwards other systems' messages, so the first heartbeat on the port may be another vehicle's. For [`SETTLES`]
+//! another one takes its place if it streams far more. Then the choice stands until the vehicle has been silent for [`SILENT`]:
+//! the autopilot was changed, or its system id.
 //!
 //! A vehicle without a stream gives way to a system with one at any time. Autopilots may be silent until they are
 //! asked for streams. So while several send heartbeats and none streams by itself, each is asked for one `TURN`; the
@@ -28,7 +27,6 @@ const UNASKED: Span = Span::from_secs(5);
 /// A system takes the vehicle's place if it has this many times its observations.
 const FAR_MORE: u16 = 2;
 
-/// An autopilot that sent a heartbeat.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     source: Source,
@@ -40,7 +38,6 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// Observations in the busier of the last two windows.
     const fn says(&self) -> u16 {
         if self.now > self.before { self.now } else { self.before }
     }
@@ -54,7 +51,7 @@ state! {
         window: Instant,
         /// When the first heartbeat was heard, or the vehicle was chosen anew.
         since: Option<Instant>,
-        /// When the first heartbeat was heard: turns are counted from there.
+        /// Turns are counted from here.
         first: Instant,
         /// The vehicle makes a stream.
         streams: bool,
@@ -71,7 +68,6 @@ impl Election {
         self.settled || (self.lasts(now) >= SETTLES && self.heard(now).count() == 1)
     }
 
-    /// The system to ask for streams now.
     pub(crate) fn asks(&self, now: Instant, vehicle: Source) -> Option<(Source, Autopilot)> {
         let count = self.heard(now).count();
         let asked = if self.settled || count < 2 || self.is_decided(now) {
@@ -90,12 +86,10 @@ impl Election {
         self.by_itself || (self.streams && (turns < 2 || over))
     }
 
-    /// Candidates with an observation within [`SILENT`].
     fn heard(&self, now: Instant) -> impl Iterator<Item = &Candidate> {
         self.candidates.iter().flatten().filter(move |candidate| now.since(candidate.heard) < SILENT)
     }
 
-    /// Time since this vehicle was chosen.
     pub(crate) fn lasts(&self, now: Instant) -> Span {
         self.since.map_or(Span::ZERO, |since| now.since(since))
     }
@@ -140,7 +134,7 @@ impl Election {
         source
     }
 
-    /// Notes whether the vehicle streams: `says` is its number of observations.
+    /// `says`: its number of observations.
     fn note_stream(&mut self, at: Instant, says: u16) {
         if !self.streams && says >= STREAM_MIN {
             self.streams = true;

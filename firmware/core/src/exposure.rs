@@ -34,7 +34,6 @@ impl Quantity {
         }
     }
 
-    /// The edges between ranges. Stored counts are by range, so these never change.
     pub(crate) const fn edges(self) -> [f32; BINS - 1] {
         match self {
             Self::EscTemperature => [30.0, 45.0, 60.0, 75.0, 90.0, 100.0, 110.0],
@@ -130,7 +129,6 @@ impl Exposure {
         self.before = Tenths::default();
     }
 
-    /// Tenths of a second of this session.
     pub(crate) const fn session(&self) -> &Tenths {
         &self.session
     }

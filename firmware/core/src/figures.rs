@@ -1,8 +1,7 @@
 //! Figures of a flight: quantities of steady flight that show wear and load, each as the mean of its last minute.
 //!
-//! Once a second in steady flight (hover, or cruise on wings; level) each quantity gives a sample. A sample far from
-//! the mean counts only for a part of its distance (`BELIEVED`): a gust or garbage moves the mean little. The mean at
-//! landing is the flight's figure. It is recorded with the session's counters; `hums check` compares the figures of
+//! A sample far from the mean counts only for a part of its distance (`BELIEVED`): a gust or garbage moves the mean little. The
+//! mean at landing is the flight's figure. It is recorded with the session's counters; `hums check` compares the figures of
 //! flights.
 //!
 //! Hover throttle depends on air density and on the battery's voltage: rotor speed goes with duty times voltage,
@@ -27,7 +26,7 @@ const EVERY: Span = Span::from_secs(1);
 const SAMPLES_MIN: u16 = 20;
 /// Samples that a mean looks back over.
 const SAMPLES: u16 = 60;
-/// A sample moves the mean as if it were no further away than this part of it (and [`Quantity::grain`]).
+/// Part of the distance by which a sample moves the mean at most (and [`Quantity::grain`]).
 const BELIEVED: f32 = 0.5;
 /// Voltage of a cell, and pressure at sea level, hPa, for which hover throttle is given.
 const CELL_V: f32 = 3.8;
@@ -98,7 +97,6 @@ impl Quantity {
         }
     }
 
-    /// Whether a value is physically possible.
     fn is_sane(self, value: f32) -> bool {
         let (least, most) = match self {
             Self::Vibration => (0.0, 1_000.0),
@@ -138,7 +136,6 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub struct Figures {
         tracks: [Track; Quantity::COUNT],
-        /// Charge of the batteries before take-off.
         charged: [Option<Charge>; BATTERIES_MAX],
         sampled_at: Stamp,
     }
@@ -213,7 +210,6 @@ fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
 }
 
-/// The value of a quantity in steady flight.
 fn sample(
     now: Instant,
     quantity: Quantity,

@@ -54,7 +54,7 @@ use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 const SETTLED: Span = Span::from_secs(3);
 /// Steady flight is not tilted further, rad.
 const STEADY_TILT_RAD: f32 = 0.26;
-/// Vertical speed from which it is a climb or a descent, m/s; half of it near the ground.
+/// Speed of a climb or a descent, m/s; half of it near the ground.
 const VERTICAL_MPS: f32 = 0.7;
 /// Within this height of the place of arming it takes off or lands, m.
 const NEAR_GROUND_M: f32 = 3.0;
@@ -116,7 +116,6 @@ pub enum FlightEvent {
     Landing,
 }
 
-/// The phase of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
     #[default]
@@ -134,20 +133,17 @@ impl Stage {
         matches!(self, Self::Falling | Self::Impacted | Self::Down)
     }
 
-    /// It has hit something, or lies.
     const fn has_hit(self) -> bool {
         matches!(self, Self::Impacted | Self::Down)
     }
 }
 
-/// Whether the motors may turn.
 #[derive(Clone, Copy, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 struct Arming {
     is_armed: bool,
     /// Armed and not terminated.
     is_on: bool,
-    /// When the motors went off last.
     off_at: Option<Instant>,
     /// A disarmed vehicle was seen: it is at its place of arming when it is armed next.
     seen_off: bool,
@@ -157,22 +153,18 @@ struct Arming {
     on_bench: bool,
 }
 
-/// The height above home at the latest heartbeat.
 #[derive(Clone, Copy, Debug, Default)]
 struct Beat {
     at: Instant,
     height_m: Option<f32>,
 }
 
-/// The latest inertial measurements.
 #[derive(Clone, Copy, Debug, Default)]
 struct Felt {
-    /// When the force changed last.
     at: Instant,
     load_g: Option<f32>,
     /// The part of the force that pushes from above, g.
     from_above_g: f32,
-    /// Body rate, rad/s.
     rate_radps: f32,
 }
 
@@ -184,13 +176,11 @@ pub struct Flight {
     airborne_since: Option<Instant>,
     /// A flight is open, and when the vehicle was in the air last.
     flew_at: Option<Instant>,
-    /// Since when a majority would move the phase.
     changing_since: Option<Instant>,
     /// The vehicle was seen on the ground: a take-off follows.
     seen_on_ground: bool,
     arming: Arming,
     beat: Beat,
-    /// When the autopilot was received last.
     heard_at: Instant,
     pub(crate) pressure: Pressure,
     pub(crate) thrust: Thrust,
@@ -205,7 +195,6 @@ pub struct Flight {
     flies_since: Stamp,
     /// Since when it is carried without rotors, and the pressure then, hPa.
     supported: Option<(Instant, f32)>,
-    /// The first of the shocks that belong together.
     hit_at: Instant,
     touchdown: Touchdown,
     /// The hardest touch of this flight, or of its mishap, m/s.
@@ -222,12 +211,11 @@ impl Flight {
         self.airborne_since.is_some()
     }
 
-    /// In the air for a moment: it flies, and does not just leave the ground.
+    /// It does not just leave the ground.
     pub(crate) fn is_settled(&self, now: Instant) -> bool {
         self.airborne_since.is_some_and(|since| now.since(since) > SETTLED)
     }
 
-    /// Settled, and not tilted far.
     pub(crate) fn is_steady(&self, now: Instant, vehicle: &Vehicle) -> bool {
         self.is_settled(now)
             && vehicle.attitude.get().is_none_or(|attitude| {
@@ -255,7 +243,6 @@ impl Flight {
         self.seen_on_ground
     }
 
-    /// Whether it is known to stand on the ground.
     pub(crate) const fn stands(&self) -> bool {
         self.seen_on_ground && !self.is_open()
     }
@@ -266,7 +253,6 @@ impl Flight {
         !self.is_open() && !self.in_mishap() && off && vehicle.heartbeat.get().is_some()
     }
 
-    /// Whether a mishap goes on, or may: other checks would only echo it.
     pub(crate) fn in_mishap(&self) -> bool {
         self.stage.is_mishap() || self.watch.is_some()
     }
@@ -276,7 +262,6 @@ impl Flight {
         self.watch.is_some()
     }
 
-    /// Whether a mishap is over: the vehicle lies at the place of its impact.
     pub(crate) fn is_down(&self) -> bool {
         self.stage == Stage::Down
     }
@@ -318,7 +303,7 @@ impl Flight {
         (change, event)
     }
 
-    /// In the air a descent may break off; on the ground the last one was the touch. The estimate of a vehicle that lies has any speed.
+    /// In the air a descent may break off; on the ground the last one was the touch.
     fn note_touch(&mut self, now: Instant, vehicle: &Vehicle) {
         let height_m = height_m(now, vehicle);
         if !self.airborne() {
@@ -329,7 +314,6 @@ impl Flight {
         }
     }
 
-    /// Arming, disarming and termination.
     fn note_power(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         let Some(heartbeat) = vehicle.heartbeat.get() else { return };
         let armed = heartbeat.armed;
@@ -399,7 +383,6 @@ impl Flight {
         self.still_since.age(now).is_some_and(|age| age >= STILL)
     }
 
-    /// A sign of a mishap, outside of one.
     fn judge_sign(&mut self, now: Instant, vehicle: &Vehicle, kind: Kind, params: &Params) -> Option<Change> {
         let is_own = self.is_open() || kind == Kind::Disarmed || self.is_turned_over(now, vehicle, kind);
         if !is_own {
@@ -427,7 +410,6 @@ impl Flight {
         Some(Change::Began(kind))
     }
 
-    /// One step of a mishap: it is down, or flies on.
     fn judge_mishap(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
         let passed = now.since(self.signs.seen_at);
         let (is_long, is_given_up) = (passed >= RECOVERED, passed >= GIVEN_UP);
@@ -450,7 +432,7 @@ impl Flight {
         })
     }
 
-    /// One step of a vehicle that is down: whether it has taken off again.
+    /// Whether it has taken off again.
     fn judge_wreck(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
         let is_flying =
             self.arming.is_on && self.takes_off(now, vehicle, votes).is_some() && votes.count().0 >= 2;
@@ -474,14 +456,12 @@ impl Flight {
         self.place = Place::default();
     }
 
-    /// The flight stays as it is.
     fn hold(&mut self, now: Instant) -> Option<FlightEvent> {
         self.changing_since = None;
         self.flew_at = self.flew_at.map(|_| now);
         None
     }
 
-    /// The flight is over.
     fn close(&mut self) -> Option<FlightEvent> {
         let is_open = self.is_open();
         self.seen_on_ground = true;
@@ -489,7 +469,6 @@ impl Flight {
         is_open.then_some(FlightEvent::Landing)
     }
 
-    /// One step without a mishap.
     fn advance(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<FlightEvent> {
         if self.airborne() && !self.arming.is_armed {
             (self.airborne_since, self.changing_since) = (None, None);
@@ -636,13 +615,11 @@ impl Flight {
         self.place.height_m
     }
 
-    /// How fast it touched, m/s.
     pub(crate) const fn touch_mps(&self) -> f32 {
         self.touch_mps
     }
 }
 
-/// When a message was received last, if it has the values.
 fn measured<T>(latest: &Latest<T>, has_values: impl Fn(&T) -> bool) -> Option<Instant> {
     latest.at().filter(|_| latest.get().is_some_and(has_values))
 }

@@ -42,7 +42,6 @@ const LEAP_MPS2: f32 = 6.0;
 const SHAKE_PART: f32 = 0.5;
 
 state! {
-    /// The memory of the comparison.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct ImuGnssResidual {
         /// Sum of forces since the last step, their number, their mean, and its time.
@@ -97,7 +96,6 @@ impl ImuGnssResidual {
         }
     }
 
-    /// Takes a receiver's message unless it is a repetition.
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, gates: Gates) {
         let on_rotors = gates.are(gates::ROTORS);
         let judged = gnss.is_exact() && gates.are(gates::SETTLED | gates::CLEAR | gates::ONE_FRAME);
@@ -155,7 +153,6 @@ impl ImuGnssResidual {
         Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
     }
 
-    /// The difference between force and change of velocity, m/s2.
     pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
         Reading::new(self.at.instant(now), self.residual)
     }

@@ -67,7 +67,6 @@ state! {
         /// The least step at rest; 0 if unknown.
         step_at_rest: f32,
         at: Option<Instant>,
-        /// Rates, smoothed, rad/s.
         rate: [f32; 3],
         rates_at: Stamp,
         still: bool,
@@ -85,7 +84,6 @@ state! {
 }
 
 impl Inertial {
-    /// A sample of the first sensor.
     pub(crate) fn take(&mut self, at: Instant, imu: &Imu) {
         self.take_rates(at, imu.rate);
         if let Some(rates) = imu.rate {
@@ -108,7 +106,6 @@ impl Inertial {
         }
     }
 
-    /// Body rates, of the sensor or of the estimator.
     pub(crate) fn take_rates(&mut self, at: Instant, rates: Option<[RadiansPerSecond; 3]>) {
         // No root: this is done with each inertial sample.
         let square = |rates: [RadiansPerSecond; 3]| rates.iter().map(|rate| rate.0 * rate.0).sum::<f32>();
@@ -154,12 +151,11 @@ impl Inertial {
         }
     }
 
-    /// Whether the steps are known for long enough.
     fn has_steps(&self, now: Instant) -> bool {
         self.at.is_some_and(|at| now.since(at) <= FRESH && at.since(self.steps_since) >= STEPS_KNOWN)
     }
 
-    /// It is at rest: without thrust, on the ground.
+    /// On the ground, without thrust.
     pub(crate) fn rest(&mut self, now: Instant) {
         if self.has_steps(now) && (self.step_at_rest == 0.0 || self.step < self.step_at_rest) {
             self.step_at_rest = self.step;
@@ -177,12 +173,10 @@ impl Inertial {
         self.has_steps(now) && self.step < CALM_MPS2
     }
 
-    /// The specific force, smoothed, m/s2.
     pub(crate) const fn force(&self) -> [f32; 3] {
         self.force
     }
 
-    /// How far the force steps from sample to sample, m/s2.
     pub(crate) const fn shakes_mps2(&self) -> f32 {
         self.step
     }
@@ -192,7 +186,6 @@ impl Inertial {
             && self.rates_at.age(now).is_some_and(|age| age <= FRESH)
     }
 
-    /// Whether it has not turned fast for this span.
     pub(crate) fn turns_little(&self, now: Instant, span: Span) -> bool {
         self.turned_at.age(now).is_none_or(|age| age > span)
     }
@@ -202,7 +195,6 @@ impl Inertial {
         self.is_level_for(now, LASTS)
     }
 
-    /// Whether it has been level and still for this span.
     pub(crate) fn is_level_for(&self, now: Instant, span: Span) -> bool {
         self.is_fresh(now) && self.level_since.age(now).is_some_and(|age| age >= span)
     }
@@ -241,7 +233,6 @@ impl Inertial {
     }
 }
 
-/// The weight of a sample.
 fn weight(step: Option<Span>, constant_s: f32) -> f32 {
     let step_s = step.map_or(f32::INFINITY, Span::as_secs_f32);
     if step_s < 1.0 { step_s / (constant_s + step_s) } else { 1.0 }

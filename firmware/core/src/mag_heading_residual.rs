@@ -22,7 +22,6 @@ const MOVES_DEG: f32 = 2.0;
 /// 1 Hz or more.
 const RATIOS_KNOWN: u8 = 20;
 
-/// Takes the field by the attitude's roll and pitch.
 pub(crate) fn take(
     residuals: &mut Residuals,
     at: Instant,
@@ -47,7 +46,6 @@ pub(crate) fn take(
 }
 
 state! {
-    /// The estimator's use of its compass.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct CompassUse {
         /// Compass ratios in this flight, and whether the last message had none.
@@ -73,7 +71,6 @@ impl CompassUse {
         }
     }
 
-    /// Whether the estimator stopped using a compass that it used in this flight, and whose heading moved away from its own.
     pub(crate) fn unused(&self, now: Instant) -> Option<Reading> {
         let (at, unused) = self.unused;
         Reading::new(at.instant(now), Some(f32::from(u8::from(unused))))

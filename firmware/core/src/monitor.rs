@@ -59,7 +59,6 @@ pub struct Monitor {
 }
 
 state! {
-    /// The state at the last tick.
     #[derive(Clone, Copy, Debug)]
     struct Before {
         armed: bool,
@@ -81,13 +80,12 @@ const CELLS_COME: Span = Span::from_secs(45);
 
 const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 - 64);
 
-/// Whether a battery carries the vehicle: the first one does if none reports itself.
+/// The first one does if none reports itself.
 fn carries(vehicle: &Vehicle, battery: usize) -> bool {
     let known = vehicle.batteries.get(battery).and_then(Latest::get);
     known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle)
 }
 
-/// Whether the count of a carrying battery is unknown: then its voltage raises no alarm.
 fn lacks_cells(vehicle: &Vehicle, derived: &Derived, battery: usize, count: u8) -> bool {
     count == 0 && carries(vehicle, battery) && derived.cells.has_voltage(battery)
 }
@@ -143,7 +141,6 @@ impl Monitor {
         true
     }
 
-    /// Another system on the port becomes the vehicle: all knowledge of the previous one is dropped.
     #[inline(never)] // Its new states are large: not on the stack of every observation.
     fn begin_with_another(&mut self) {
         self.before_tick = Before { changes: self.vehicle.changes, ..Before::default() };
@@ -233,7 +230,6 @@ impl Monitor {
         }
     }
 
-    /// The flight's own step.
     fn step_flight(&mut self, now: Instant) -> Option<FlightEvent> {
         let Self { vehicle, flight, params, happenings, .. } = self;
         let (change, event) = flight.step(now, vehicle, params);
@@ -287,7 +283,7 @@ impl Monitor {
         (0..BATTERIES_MAX).any(|battery| lacks_cells(vehicle, derived, battery, count(battery)))
     }
 
-    /// Keeps the known cells for the next power-on, and reports unknown ones once.
+    /// Keeps known cells for the next power-on, reports unknown ones once.
     fn step_cells(&mut self, now: Instant) {
         let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;
         let come = self.parameters_asked || vehicle.known_for(now) >= CELLS_COME;
@@ -405,7 +401,6 @@ impl Monitor {
         &mut self.params
     }
 
-    /// The number of this power-on, from 1.
     const fn boots(&self) -> u32 {
         self.before.boots.saturating_add(1)
     }

@@ -19,7 +19,6 @@ pub fn height_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     global.or_else(local).filter(|height_m| height_m.is_finite())
 }
 
-/// A figure of the pilot's display that is finite.
 fn displayed(now: Instant, vehicle: &Vehicle, figure: impl FnOnce(&Hud) -> Option<f32>) -> Option<f32> {
     vehicle.hud.within(now, MOTION_AGE).and_then(figure).filter(|figure| figure.is_finite())
 }
@@ -45,7 +44,6 @@ pub fn climb_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     climb_within(now, vehicle, MOTION_AGE)
 }
 
-/// The same, from values up to this age.
 pub(crate) fn climb_within(now: Instant, vehicle: &Vehicle, age: Span) -> Option<f32> {
     let global = vehicle.global.within(now, age).map(|global| -global.velocity[2].0);
     let local = || vehicle.local.within(now, age).map(|local| -local.velocity[2].0);
@@ -102,18 +100,15 @@ impl WindowMax {
         self.now = self.now.max(value);
     }
 
-    /// The greatest of this window; nothing that is old.
     pub(crate) fn now(&self, at: Instant) -> f32 {
         if at.since(self.window) <= PAUSE { self.now } else { 0.0 }
     }
 
-    /// The greatest of this window and the one before.
     pub(crate) fn greatest(&self, at: Instant) -> f32 {
         if at.since(self.window) <= PAUSE { self.now.max(self.before) } else { 0.0 }
     }
 }
 
-/// The estimator of motion: speeds of the last second, the place of arming, and whether the receiver stands.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Kinematics {
     pub(crate) speed: WindowMax,
@@ -130,18 +125,16 @@ pub(crate) struct Kinematics {
 }
 
 impl Kinematics {
-    /// The vehicle is armed here, or disarmed.
     pub(crate) fn arm(&mut self, now: Instant, vehicle: &Vehicle, armed: bool) {
         self.armed_m = height_m(now, vehicle).filter(|_| armed);
     }
 
-    /// It stands without thrust.
     pub(crate) fn idle(&mut self, now: Instant, vehicle: &Vehicle) {
         self.idle_m = altitude_m(now, vehicle).or(self.idle_m);
     }
 
-    /// Height above the place of arming, m, by the position; above home if the arming was not received; by the
-    /// display without a position.
+    /// Above the place of arming, m, by the position; above home if the arming was not received; by the display without a
+    /// position.
     pub(crate) fn rise_m(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
         let by_position = height_m(now, vehicle).map(|height_m| height_m - self.armed_m.unwrap_or(0.0));
         let by_display =
@@ -149,7 +142,6 @@ impl Kinematics {
         by_position.or_else(by_display)
     }
 
-    /// One step: whether the receiver stands, and the estimate moves.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle) {
         let receiver = vehicle.gnss[0].within(now, PAUSE).filter(|gnss| gnss.is_exact());
         let slow = receiver.and_then(|gnss| gnss.speed).filter(|speed| speed.0 < STILL_MPS);
@@ -165,7 +157,6 @@ impl Kinematics {
         }
     }
 
-    /// Whether the estimate moved within the last seconds while the receiver stood: it is lost.
     pub(crate) fn has_strayed(&self, now: Instant) -> bool {
         self.strayed_at.is_some_and(|at| now.since(at) <= STRAYED)
     }

@@ -56,7 +56,6 @@ const SLOWS_PART: Range<f32> = 0.5..0.9;
 /// 60 degrees a second: a vehicle that lost two motors of four spins faster within a moment.
 const SPINS_RAD_S: f32 = 1.05;
 
-/// The work of a motor since the vehicle was armed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Role {
     #[default]
@@ -106,7 +105,6 @@ impl Track {
 }
 
 state! {
-    /// All motors by number.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Motors {
         tracks: [Track; MOTORS_MAX],
@@ -116,7 +114,6 @@ state! {
 }
 
 impl Motors {
-    /// Takes what ESCs sent, once the vehicle knows it.
     pub(crate) fn take(&mut self, at: Instant, group: &EscGroup, vehicle: &Vehicle, airborne: bool) {
         if !vehicle.armed() {
             self.tracks.iter_mut().for_each(|track| track.role = Role::Unknown);
@@ -138,7 +135,7 @@ impl Motors {
         let on_wings = vehicle.hovers(now) == Some(false);
         let is_known = |role: Role| role == Role::Pushes || (role == Role::Lifts && !on_wings);
         let Some(tracks) = self.tracks.get_mut(motors.clone()) else { return };
-        // Mostly all is known: this is done with each message of an ESC.
+        // Mostly all is known.
         if tracks.iter().all(|track| is_known(track.role)) {
             return;
         }
@@ -164,7 +161,6 @@ impl Motors {
         self.tracks.get(motor).is_some_and(|track| track.role == Role::Lifts)
     }
 
-    /// The smoothed speeds of the motors that are fitted, by number.
     fn speeds(&self) -> impl Iterator<Item = (u8, f32)> + Clone + '_ {
         let tracks = (0..).zip(&self.tracks);
         tracks.filter(|(_, track)| track.is_fitted()).map(|(motor, track)| (motor, track.smooth_rpm))
@@ -233,7 +229,6 @@ impl Motors {
         Reading::new(vehicle.motors.get(place)?.moved_at, Some(part * 100.0))
     }
 
-    /// Whether a motor turns slower than the others that lift, and not much slower.
     fn slows_down(&self, now: Instant, vehicle: &Vehicle, motor: usize) -> bool {
         let rpm = |motor: usize| {
             let motor =
@@ -243,7 +238,6 @@ impl Motors {
         against_others(motor, rpm).is_some_and(|(own, mean, _)| SLOWS_PART.contains(&(own / mean)))
     }
 
-    /// Whether half of the motors that lift stand nearly still and the vehicle does not spin.
     fn is_driven_so(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let currents = || {
             let lifting = (0..MOTORS_MAX).filter(|motor| self.lifts(*motor));
@@ -291,7 +285,6 @@ impl Motors {
         Reading::new(track.last.instant(now), Some(if is_named { off } else { 0.0 }))
     }
 
-    /// How far a motor's speed is from the nearest one of the others.
     fn nearest(&self, motor: u8, own: f32) -> f32 {
         let others = self.speeds().filter(|(other, _)| *other != motor);
         others.map(|(_, speed)| (speed - own).abs()).reduce(f32::min).unwrap_or(0.0)
@@ -343,7 +336,6 @@ impl Motors {
     }
 }
 
-/// Whether a motor turns now.
 pub(crate) fn turns(vehicle: &Vehicle, motor: usize) -> bool {
     vehicle.motors.get(motor).and_then(|motor| motor.esc.rpm).is_some_and(|rpm| rpm.0.abs() > TURNING_RPM)
 }
@@ -373,7 +365,6 @@ fn current_part(
     (asked && others >= 2 && mean_a > CURRENT_MIN_A).then(|| own_a / mean_a)
 }
 
-/// A motor's figure, the mean of the others that have one, and how many these are.
 fn against_others(motor: usize, figure: impl Fn(usize) -> Option<f32>) -> Option<(f32, f32, u8)> {
     let own = figure(motor)?;
     let others = (0..MOTORS_MAX).filter(|other| *other != motor).filter_map(figure);

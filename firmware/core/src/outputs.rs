@@ -16,10 +16,9 @@
 //! motor alone is a quarter of the loss above them. (Flat: a fifth, less the gap of the fourth.) A tilt of such a
 //! vehicle raises two or three alike. It counts five times.
 //!
-//! A slightly weak motor stands out little, and in wind no more than others do at times; but it goes on doing so. So
-//! what a motor stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off
-//! again (a CUSUM: E. S. Page, Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds
-//! counts as what stands out at once.
+//! So what a motor stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off again
+//! (a CUSUM: E. S. Page, Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what
+//! stands out at once.
 //!
 //! A motor that alone is at the end of its range while no other one is near it gives less than is asked of it,
 //! however the vehicle falls.
@@ -79,7 +78,6 @@ const MOVES: f32 = 0.02;
 /// A state without an observed beginning counts after this time.
 const LASTS: Span = Span::from_secs(3);
 
-/// What an output's range is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Range {
     /// Pulses of 1000 to 2000 us.
@@ -106,7 +104,6 @@ impl Range {
         }
     }
 
-    /// Which part of it an output is.
     fn part(self, output: u16) -> f32 {
         // Dividing is dear.
         let (zero, of_whole) = match self {
@@ -118,7 +115,6 @@ impl Range {
     }
 }
 
-/// What an output says of its motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Verdict {
     /// Nothing that counts.
@@ -132,7 +128,6 @@ pub(crate) enum Verdict {
 }
 
 impl Verdict {
-    /// How far its command stands out, percent of the average; all of it at the end of its range.
     pub(crate) fn excess_percent(self) -> f32 {
         match self {
             Self::Ok | Self::ShutOff => 0.0,
@@ -167,7 +162,6 @@ state! {
 }
 
 state! {
-    /// The memory of the motors' commands.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct MotorOutputs {
         /// The group that has the motors: the first one that has any output.
@@ -188,7 +182,6 @@ state! {
 }
 
 impl MotorOutputs {
-    /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
         let Self { port, range, outputs, .. } = *self;
         let outputs =
@@ -284,7 +277,6 @@ impl MotorOutputs {
         at_end.filter(|_| lasts).unwrap_or((0, Verdict::Ok))
     }
 
-    /// Which outputs are not as they were received first.
     fn note_moved(&mut self, outputs: &[u16; JUDGED_MAX]) {
         for (output, now) in self.outputs.iter_mut().zip(outputs) {
             if output.first == 0 {
@@ -294,8 +286,7 @@ impl MotorOutputs {
         }
     }
 
-    /// Whether this output alone is at an end of its range in a flight without a received take-off: its motor's
-    /// earlier speed is not known.
+    /// Its motor's earlier speed is not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
         self.takeoff_not_recorded
             && self.verdict.0 == motor
@@ -328,12 +319,10 @@ impl MotorOutputs {
         self.output(motor).is_some_and(|output| output.off)
     }
 
-    /// Whether it is at the end of its range.
     pub(crate) fn is_full(&self, motor: u8) -> bool {
         self.output(motor).is_some_and(|output| output.full)
     }
 
-    /// The verdict by what the outputs are usually given.
     fn judge(&mut self, count: usize, step_s: f32) {
         let (place, stands_out) = self.find_weak(count, step_s);
         let is_quiet = !self.is_known() || stands_out < HOLD_PERCENT;
@@ -353,7 +342,6 @@ impl MotorOutputs {
         outputs.find(|(_, output)| output.share.figure() < SHUT_OFF_SHARE).map(|(place, _)| place)
     }
 
-    /// The motor that stands out most, at once or over time, and by how much, percent of the average.
     fn find_weak(&mut self, count: usize, step_s: f32) -> (u8, f32) {
         let mut changes = [(0.0, 0); JUDGED_MAX];
         for ((place, change), output) in (0_u8..).zip(&mut changes).zip(&self.outputs).take(count) {
@@ -376,7 +364,6 @@ impl MotorOutputs {
         if sum > now { (summed, sum) } else { (first.1, now) }
     }
 
-    /// The motor that has stood out over time, and by how much.
     fn sum(&mut self, excess: f32, motor: u8, step_s: f32) -> (u8, f32) {
         if self.is_known() {
             let (place, sum) = &mut self.summed;
@@ -395,12 +382,10 @@ impl MotorOutputs {
         self.outputs.first().is_some_and(|output| output.share.is_known())
     }
 
-    /// The number of judged motors; 0 for a frame that is not judged now.
     fn judged(&self, vehicle: &Vehicle) -> usize {
         motors(vehicle).max(self.count.into()) * usize::from(motors(vehicle) > 0)
     }
 
-    /// Whether any told something in this flight.
     pub(crate) fn are_told(&self) -> bool {
         self.at.is_set()
     }

@@ -29,7 +29,6 @@ const UNKNOWN_TIMES: f32 = 4.0;
 /// Within this time the turn of a vehicle makes no difference, even a fast one.
 const AT_ONCE_MS: u64 = 5;
 
-/// A kind of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Accelerometers: apart in m/s2.
@@ -80,7 +79,6 @@ impl Kind {
 }
 
 state! {
-    /// The last sample of a sensor.
     #[derive(Clone, Copy, Debug)]
     struct Sample {
         at: Stamp,
@@ -89,7 +87,6 @@ state! {
 }
 
 state! {
-    /// Two sensors of a kind.
     #[derive(Clone, Copy, Debug)]
     struct Pair {
         /// How far they are apart, smoothed.
@@ -122,7 +119,6 @@ impl Pair {
 }
 
 state! {
-    /// All sensors of one kind.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Pairs {
         samples: [Sample; SENSORS_MAX],
@@ -131,7 +127,7 @@ state! {
 }
 
 impl Pairs {
-    /// Takes a sample, and compares it with those of the others of the same moment.
+    /// Compared with the others' of the same moment.
     pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: usize, axes: [f32; 3], gates: Gates) {
         let Self { samples, pairs } = self;
         let moment = kind.one_moment(gates);
@@ -152,12 +148,10 @@ impl Pairs {
         }
     }
 
-    /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
         self.pairs = [Pair::default(); SENSORS_MAX];
     }
 
-    /// Whether a sensor has measured, and does so still.
     pub(crate) fn has_measured(&self, sensor: usize) -> bool {
         self.samples.get(sensor).is_some_and(|sample| sample.at.is_set())
     }
@@ -167,7 +161,6 @@ impl Pairs {
         sample.is_some_and(|sample| sample.at.age(now).is_some_and(|age| age <= PAUSE))
     }
 
-    /// Whether any two were compared in this flight.
     pub(crate) fn are_compared(&self) -> bool {
         self.pairs.iter().any(|pair| pair.residual.at().is_set())
     }

@@ -35,7 +35,6 @@ pub(crate) struct Pressure {
 }
 
 impl Pressure {
-    /// Takes a pressure of the first barometer.
     pub(crate) fn take(&mut self, at: Instant, hpa: f32) {
         if !hpa.is_finite() || hpa <= 0.0 {
             return;
@@ -55,12 +54,10 @@ impl Pressure {
         }
     }
 
-    /// The vehicle is armed here, or disarmed.
     pub(crate) fn arm(&mut self, now: Instant, armed: bool) {
         self.armed_hpa = if armed && self.is_fresh(now) { self.hpa } else { 0.0 };
     }
 
-    /// Height above a pressure, m.
     fn rise_m(&self, from_hpa: f32) -> f32 {
         SCALE_HEIGHT_M * (from_hpa - self.hpa) / self.hpa
     }
@@ -69,7 +66,6 @@ impl Pressure {
         self.hpa > 0.0 && now.since(self.window) <= PAUSE
     }
 
-    /// Pressure, hPa, of a barometer that measures.
     pub(crate) fn now(&self, now: Instant) -> Option<f32> {
         (self.is_fresh(now) && now.since(self.changed_at) <= PAUSE).then_some(self.hpa)
     }
@@ -80,12 +76,10 @@ impl Pressure {
         known.then(|| self.rise_m(self.armed_hpa))
     }
 
-    /// Whether another pressure of this flight is within this height of the present one.
     pub(crate) fn is_within(&self, of_hpa: f32, limit_m: f32) -> bool {
         libm::fabsf(self.rise_m(of_hpa)) < limit_m
     }
 
-    /// Last time of a sink as fast as under a parachute.
     pub(crate) const fn sank_at(&self) -> Instant {
         self.sank_at
     }
@@ -95,7 +89,7 @@ impl Pressure {
         self.now(now).map(|_| now.since(self.sank_at))
     }
 
-    /// Whether the pressure follows this climb (negative: a sink) of one to two seconds; `None` without a barometer that measures.
+    /// `climb_mps` is of one to two seconds, negative in a sink; `None` without a barometer that measures.
     pub(crate) fn follows(&self, now: Instant, climb_mps: f32) -> Option<bool> {
         let least_m = (SHOWN_S * libm::fabsf(climb_mps)).max(NOISE_M);
         self.now(now).filter(|_| self.before_hpa > 0.0)?;

@@ -194,7 +194,6 @@ enum State {
 /// By which sign the autopilot returns or lands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
-    /// It accepted the request.
     Accepted,
     Mode,
     /// The vehicle sinks as in a landing, or the autopilot calls it one.
@@ -217,7 +216,6 @@ enum Input {
     Waits,
 }
 
-/// The next state, and the reported stage with its detail.
 type Move = (State, Option<(Stage, u8)>);
 
 /// The protective action's memory.
@@ -238,7 +236,6 @@ pub struct Protect {
     reason: Option<u16>,
 }
 
-/// The inputs of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct Situation<'a> {
     pub(crate) now: Instant,
@@ -258,18 +255,16 @@ impl Situation<'_> {
 }
 
 impl Protect {
-    /// The request for the autopilot, once.
     pub(crate) const fn take_request(&mut self) -> Option<Request> {
         self.request.take()
     }
 
-    /// The cancel command; `true` if there is something to cancel.
+    /// `true` if there is something to cancel.
     pub(crate) const fn cancel(&mut self) -> bool {
         self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. });
         self.cancelled
     }
 
-    /// One step, after the checks'.
     pub(crate) fn step(&mut self, situation: &Situation<'_>) -> Option<Step> {
         use Input::{Answer, Command, Flies, FlightOver, ModeByAutopilot, ModeByPilot, Waits};
         use State::{Asking, Counting, Done, Idle, ModeChanged, OnItsWay};
@@ -311,7 +306,6 @@ impl Protect {
         told.map(|(stage, detail)| Step { action: self.action, stage, detail })
     }
 
-    /// The input of this step.
     fn input(&mut self, situation: &Situation<'_>) -> Input {
         let Situation { now, vehicle, flight, .. } = *situation;
         let cancelled = core::mem::take(&mut self.cancelled);
@@ -359,7 +353,6 @@ impl Protect {
         modes(vehicle).is_none() || self.changed_at.age(now).is_some_and(|age| age <= now.since(at))
     }
 
-    /// The autopilot's answer to the latest request, once it has come.
     fn answer(&self, vehicle: &Vehicle) -> Option<u8> {
         let State::Asking { attempt, at, .. } = self.state else { return None };
         vehicle.command_ack.at().filter(|answered_at| attempt > 0 && !at.is_after(*answered_at))?;
@@ -367,7 +360,6 @@ impl Protect {
         Some(ack.result).filter(|result| *result != TEMPORARILY_REJECTED || attempt == ATTEMPTS_MAX)
     }
 
-    /// Announces the action, once something is critical.
     fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
         let Situation { now, params, .. } = *situation;
         let action = Action::from_number(params.get(Param::ProtAction) as u8);
@@ -404,7 +396,6 @@ impl Protect {
         (State::Asking { attempt, at: now, progress: false }, Some((Stage::Asked, attempt)))
     }
 
-    /// The autopilot answered the request.
     fn hear(&self, situation: &Situation<'_>, attempt: u8, result: u8) -> Move {
         let at = situation.now;
         let next = match result {
@@ -433,14 +424,14 @@ impl Protect {
     }
 }
 
-/// Whether it can come down where it is. A VTOL has to report a hover: a headwind can stop it over the ground.
+/// A VTOL has to report a hover: a headwind can stop it over the ground.
 fn hovers(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, .. } = *situation;
     vehicle.hovers(now) == Some(true)
         && (vehicle.kind() != VehicleKind::Vtol || vehicle.vtol == VtolState::Hover)
 }
 
-/// Whether it comes down as a mission's landing does. A mission that goes to a lower place looks the same, and is waited for too.
+/// A mission that goes to a lower place looks like its landing, and is waited for too.
 fn approaches(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, .. } = *situation;
     let mode = vehicle.heartbeat.get().map(|heartbeat| heartbeat.mode);
@@ -478,9 +469,7 @@ fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
     critical.or_else(silent).map(|(number, _)| number)
 }
 
-/// Modes of an autopilot, by its own numbers.
 struct Modes {
-    /// It returns or lands.
     returns: &'static [u32],
     /// Failsafes wait in it: a pilot's choice of it cancels nothing.
     waits: u32,
@@ -511,7 +500,6 @@ const PLANE: Modes = Modes {
 const COPTER: Modes =
     Modes { returns: &[6, 9, 21, 27], waits: 17, mission: 3, after_mission: &[5, 17], tells_landing: true };
 
-/// The modes of the vehicle's autopilot, if they are known.
 fn modes(vehicle: &Vehicle) -> Option<&'static Modes> {
     let heartbeat = vehicle.heartbeat.get()?;
     match (heartbeat.autopilot, heartbeat.kind) {
@@ -522,7 +510,7 @@ fn modes(vehicle: &Vehicle) -> Option<&'static Modes> {
     }
 }
 
-/// Whether the autopilot changed the mode by its own: a failsafe may wait in it, or a mission was flown to its end.
+/// A failsafe may wait in the mode, or a mission was flown to its end.
 fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
     modes(vehicle).is_some_and(|modes| {
         let is_end = before == modes.mission && modes.after_mission.contains(&after);
@@ -530,7 +518,7 @@ fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bo
     })
 }
 
-/// Whether the vehicle shows a sign of landing: by its landed state, because it sinks close to the ground, or in a mission.
+/// By its landed state, because it sinks close to the ground, or in a mission.
 fn is_landing(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, flight, .. } = *situation;
     vehicle.landed.within(now, SILENT) == Some(&LandedState::Landing)

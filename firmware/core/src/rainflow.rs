@@ -7,18 +7,13 @@
 /// Turning points kept. A residue grows and then shrinks: 2 N points need N distinct sizes of swing.
 const POINTS: usize = 32;
 
-/// Counts the cycles of one load by range.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rainflow<const BINS: usize> {
-    /// The lowest range of each bin, ascending.
     edges: [f32; BINS],
-    /// Half cycles of each bin.
     halves: [u32; BINS],
     points: [f32; POINTS],
     used: u8,
-    /// The extreme since the last turning point.
     extreme: Option<f32>,
-    /// The least change of a turn.
     turn: f32,
 }
 
@@ -28,7 +23,7 @@ impl<const BINS: usize> Rainflow<BINS> {
         Self { edges, halves: [0; BINS], points: [0.0; POINTS], used: 0, extreme: None, turn }
     }
 
-    /// Takes the next value of the load; NaN and infinities are skipped.
+    /// NaN and infinities are skipped.
     pub(crate) fn take(&mut self, value: f32) {
         if !value.is_finite() {
             return;
@@ -66,7 +61,7 @@ impl<const BINS: usize> Rainflow<BINS> {
                 break;
             }
             if last == 2 {
-                // The range begins where the history begins: half a cycle.
+                // Where the history begins: half a cycle.
                 self.count(a, b, 1);
                 self.remove(0, 1);
             } else {

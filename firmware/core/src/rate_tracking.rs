@@ -32,7 +32,6 @@ const SINKS_MPS: f32 = -0.5;
 /// Time after which `THRUST_WARN` reports a lasting loss.
 const IN_VAIN: Span = Span::from_secs(2);
 
-/// The latest setpoint of the rates about roll and pitch.
 pub(crate) type RateSetpoint = Latest<[RadiansPerSecond; 2]>;
 
 pub(crate) fn take_setpoint(
@@ -79,7 +78,6 @@ state! {
 }
 
 impl Thrust {
-    /// A pilot's display: throttle.
     pub(crate) fn take(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, gates: Gates) {
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
         let level = vehicle

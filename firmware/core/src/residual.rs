@@ -3,7 +3,7 @@
 //!
 //! 1. A sample counts while all gates of its [`Row`] are open.
 //! 2. One sample moves the residual by `clamp` at most, so that one wrong message raises no alarm.
-//! 3. The residual is smoothed. An allowance (delay, scale, wind) is smoothed with it and taken off.
+//! 3. The residual is smoothed.
 //! 4. Its baseline is the mean of the last minute ([`crate::adaptive_baseline`]). A residual further out than `hold`
 //!    teaches nothing.
 //! 5. The reported value is the excess over the baseline. It is as old as the sample.
@@ -32,14 +32,12 @@ pub(crate) const LATE_S: f32 = 0.3;
 /// Time over which a receiver's position and height are compared with its speed and the climb, s.
 pub(crate) const RECEIVER_S: f32 = 4.0;
 
-/// Which side of the baseline is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
     Above,
     Either,
 }
 
-/// The baseline of a residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Learn {
     /// Zero, for good.
@@ -50,7 +48,6 @@ enum Learn {
     Range,
 }
 
-/// How one comparison is judged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row {
     /// The gates that must be open ([`crate::gates`]).
@@ -98,7 +95,6 @@ const RATE: Row = Row {
     ..ROW
 };
 
-/// The comparisons of two figures, or of a figure with its past.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Comparison {
     MagHeading,
@@ -177,7 +173,6 @@ pub(crate) const PAIRS: [Row; 4] = {
 };
 
 impl Row {
-    /// The residual beyond which nothing is learnt.
     pub(crate) const fn hold(&self) -> f32 {
         self.hold
     }
@@ -201,7 +196,6 @@ pub(crate) fn smooth<const N: usize>(figure: &mut [f32; N], sample: [f32; N], we
 }
 
 state! {
-    /// The memory of one comparison.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Residual {
         at: Stamp,
@@ -216,7 +210,6 @@ impl Residual {
         Self { figure: AdaptiveBaseline::after(settles_s), ..Self::default() }
     }
 
-    /// When it was compared last.
     pub(crate) const fn at(&self) -> Stamp {
         self.at
     }
@@ -260,7 +253,6 @@ impl Residual {
 }
 
 state! {
-    /// The memory of all comparisons but pairs.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Residuals {
         each: [Residual; Comparison::COUNT],
@@ -286,7 +278,6 @@ impl Residuals {
         if row.is_open(gates) { self.each[of as usize].take(row, at, sample, allowance) } else { 0.0 }
     }
 
-    /// The residual beyond its baseline.
     pub(crate) fn excess(&self, of: Comparison) -> Option<f32> {
         self.each[of as usize].excess(of.row())
     }
@@ -296,7 +287,6 @@ impl Residuals {
         self.as_measured(now, of, self.excess(of))
     }
 
-    /// Another figure of the same sample.
     fn as_measured(&self, now: Instant, of: Comparison, value: Option<f32>) -> Option<Reading> {
         Reading::new(self.each[of as usize].at.instant(now), value)
     }

@@ -17,14 +17,12 @@ pub const INTERVAL: Span = Span::from_millis(200);
 pub const SAMPLES: usize = 25;
 /// Columns of one snapshot at most.
 pub const COLUMNS_MAX: usize = 8;
-/// Snapshots that are being taken at the same time.
 const PENDING_MAX: usize = 4;
 
 const AFTER: Span = Span::from_millis(INTERVAL.as_millis() * SAMPLES as u64);
 
 type Read = fn(&Inputs<'_>) -> Option<f32>;
 
-/// A quantity that is kept: its name, which ends in its unit, and how it is read.
 struct Quantity(&'static str, Read);
 
 /// Columns of each subsystem, in the order of [`KEPT`]. A later version may only append to a subsystem's.
@@ -154,7 +152,6 @@ impl Snapshot<'_> {
 }
 
 impl Snapshots {
-    /// Keeps a sample where one is due.
     pub(crate) fn step(&mut self, inputs: &Inputs<'_>) {
         if self.filled > 0 && inputs.now.since(self.newest) < INTERVAL {
             return;
@@ -176,7 +173,7 @@ impl Snapshots {
         (0..usize::from(self.filled)).map(move |sample| &self.ring[(first + sample) % SAMPLES])
     }
 
-    /// Takes a critical finding, unless a snapshot of its subsystem is being taken.
+    /// No snapshot of a subsystem begins while one of it is being taken.
     pub(crate) fn trigger(&mut self, finding: &Finding) {
         let same = |pending: &Pending| pending.subsystem == finding.subsystem;
         if finding.level != Level::Critical || self.pending.iter().flatten().any(same) {

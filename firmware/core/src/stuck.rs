@@ -91,12 +91,11 @@ impl Stuck {
         }
     }
 
-    /// The same, as another flight begins, in which nothing is usual yet.
+    /// Another flight begins: nothing is usual yet.
     const fn begun(self) -> Self {
         Self { moved: 0.0, usual_ms: 0, ..self }
     }
 
-    /// Whether a sensor's values differ in this flight.
     const fn is_known(&self) -> bool {
         self.changes >= CHANGES_KNOWN
     }
@@ -107,7 +106,6 @@ impl Stuck {
         self.since_ms.wrapping_sub(other.since_ms) as i32 > i32::from(other.lasts_ms / 2)
     }
 
-    /// Whether it trembled while nothing moved, and does not any more.
     fn fell_silent(&self) -> bool {
         self.trembles >= CHANGES_KNOWN
             && u32::from(self.lasts_ms)
@@ -126,7 +124,6 @@ impl Stuck {
 }
 
 state! {
-    /// How far the vehicle has moved in this flight, to and fro.
     #[derive(Clone, Copy, Debug)]
     struct Moved {
         climbed_m: f32,
@@ -162,7 +159,6 @@ impl Moved {
 }
 
 state! {
-    /// All sensors by kind, and the receivers.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Repeats {
         moved: Moved,
@@ -172,14 +168,12 @@ state! {
 }
 
 impl Repeats {
-    /// The same, as another flight begins.
     pub(crate) fn begun(&self) -> Self {
         let mut begun = Self::default();
         begun.sensors[Kind::Barometer as usize] = self.sensors[Kind::Barometer as usize].map(Stuck::begun);
         begun
     }
 
-    /// One step of a vehicle that may move.
     pub(crate) fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
         self.moved.step(now, step_s, vehicle);
     }
@@ -200,7 +194,6 @@ impl Repeats {
         }
     }
 
-    /// Takes a receiver's place in flight.
     pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss) {
         let place = gnss.position.filter(|_| gnss.fix >= 3);
         let altitude = gnss.altitude.map_or(0.0, |altitude| altitude.0).to_bits();
@@ -246,7 +239,6 @@ impl Repeats {
         stuck.lasts(now, moved, least * times)
     }
 
-    /// The same of a receiver.
     pub(crate) fn receiver_stuck(&self, now: Instant, receiver: u8) -> Option<Reading> {
         self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
     }

@@ -15,12 +15,10 @@ const HOVER_PART: f32 = 0.5;
 /// Time constant of the hover throttle, and the hover time until it is known, s.
 const HOVER_S: f32 = 10.0;
 
-/// The effect of a throttle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Power {
     /// Too little to carry the vehicle.
     Idle,
-    /// Idling or hovering rotors.
     Little,
     /// It carries the vehicle.
     Carries,
@@ -28,7 +26,6 @@ pub(crate) enum Power {
     Full,
 }
 
-/// The estimator of the thrust.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Thrust {
     hover: f32,
@@ -46,7 +43,6 @@ impl Thrust {
         (self.hovered_s, self.has_flown) = (0.0, false);
     }
 
-    /// Takes a throttle of an armed vehicle, and whether it hovers.
     pub(crate) fn take(&mut self, at: Instant, part: f32, hovers: bool) {
         let step_s = at.since(core::mem::replace(&mut self.at, at)).min(PAUSE).as_secs_f32();
         if part > self.idle().min(IDLE_THROTTLE) {
@@ -60,7 +56,6 @@ impl Thrust {
         }
     }
 
-    /// Whether the hover throttle is known.
     pub(crate) fn is_learnt(&self) -> bool {
         self.hovered_s >= HOVER_S
     }
@@ -70,7 +65,6 @@ impl Thrust {
         if self.is_learnt() { HOVER_PART * self.hover } else { IDLE_THROTTLE }
     }
 
-    /// The effect of a throttle.
     pub(crate) fn power(&self, part: f32) -> Power {
         let carries = if self.is_learnt() { self.idle() } else { CARRIES };
         match part {
@@ -81,12 +75,10 @@ impl Thrust {
         }
     }
 
-    /// Whether the throttle reached its level of flight since arming.
     pub(crate) const fn has_flown(&self) -> bool {
         self.has_flown
     }
 
-    /// Whether it had more than idle throttle within this span.
     pub(crate) fn was_driven(&self, now: Instant, within: Span) -> bool {
         self.driven_at != Instant::ZERO && now.since(self.driven_at) <= within
     }

@@ -113,12 +113,11 @@ impl Stamp {
         Some(now.since(self.0?))
     }
 
-    /// The same in milliseconds.
     pub(crate) fn age_ms(self, now: Instant) -> Option<u64> {
         Some(self.age(now)?.as_millis())
     }
 
-    /// The point in time, no later than `now`.
+    /// No later than `now`.
     pub(crate) fn instant(self, now: Instant) -> Option<Instant> {
         Some(self.0?.earlier(now))
     }

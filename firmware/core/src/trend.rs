@@ -37,7 +37,6 @@ impl Resistance {
     const SAMPLES_SAG: u16 = 20;
     const SPREAD_SAG: f32 = 0.2;
 
-    /// Takes a measurement of the battery.
     pub(crate) fn take(&mut self, voltage: Option<Volts>, current: Option<Amperes>) {
         let (Some(voltage), Some(current)) = (voltage, current) else { return };
         let (voltage_v, current_a) = (voltage.0, current.0);
@@ -106,12 +105,10 @@ impl Rate {
     /// A larger step is a counter that started again.
     const STEP_MAX: u32 = 10_000;
 
-    /// From the first value of the counter.
     pub(crate) const fn new(at: Instant, count: u32) -> Self {
         Self { count, events: [0; 2], half_began_ms: at.as_millis() as u32 }
     }
 
-    /// Takes the counter's value.
     pub(crate) fn take(&mut self, at: Instant, count: u32) {
         let now_ms = at.as_millis() as u32;
         let age_ms = now_ms.wrapping_sub(self.half_began_ms);
@@ -127,7 +124,6 @@ impl Rate {
         }
     }
 
-    /// Events in the time looked back on.
     pub(crate) fn per_minute(&self) -> u32 {
         self.events[0].saturating_add(self.events[1])
     }

@@ -122,7 +122,6 @@ state! {
         pub engine: Latest<Engine>,
         /// The generator.
         pub generator: Latest<Generator>,
-        /// Its highest speed since it was switched on; `None` until it runs in this flight, from arming to disarming.
         pub(crate) generator_top: Option<Rpm>,
         /// The autopilot's word on flying.
         pub landed: Latest<LandedState>,

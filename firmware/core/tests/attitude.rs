@@ -26,7 +26,6 @@ fn quad(autopilot: Autopilot, mode: u32) -> Quad {
     Quad { mode, autopilot, ..Quad::healthy() }
 }
 
-/// A mission and a mode in which the pilot's sticks ask for an angle.
 const ANGLES: [(Autopilot, u32); 4] = [
     (Autopilot::ArduPilot, 3),
     (Autopilot::ArduPilot, 0),

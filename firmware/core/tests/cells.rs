@@ -230,7 +230,6 @@ fn a_pack_that_sags_under_its_load_is_not_empty_until_its_cells_are() {
         &[],
     );
     assert_eq!(outcome.cells(), [(0, Level::Critical)]);
-    // A failing cell under an even load is not a sag.
     let fails = |now_ms: u64| if now_ms < EMPTY_MS { (15.6, 14.0) } else { (13.7, 15.0) };
     assert_eq!(fly_with(&mut Monitor::new(protected()), fails, &[]).cells(), [(0, Level::Critical)]);
     // If no battery reports itself, the autopilot's figures serve as well.

@@ -30,7 +30,6 @@ struct Fitted {
     field: [[f32; 3]; 3],
     pressure: [f32; 3],
     pulses: [f32; MOTORS_MAX],
-    /// How fast it turns, rad/s.
     yaw_rate: f32,
     /// Body rates about roll and pitch, and their setpoints, rad/s.
     turns: [f32; 2],
@@ -198,7 +197,6 @@ impl Fitted {
     }
 }
 
-/// Flies; the script changes the messages from the beginning on.
 fn fly(script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     fly_with([(100, 0); 3], script)
 }
@@ -221,7 +219,6 @@ fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<F
     findings
 }
 
-/// The fault of a script is found as this check of this instance, in time, and as no other.
 #[track_caller]
 fn finds(check: &str, instance: u8, level: Level, within_ms: u64, fault: impl Fn(u64, &mut Fitted)) {
     let findings = fly(|now_ms, fitted| {
@@ -301,7 +298,6 @@ fn of_three_sensors_the_one_that_comes_apart_is_named() {
 
 #[test]
 fn of_two_sensors_the_second_stands_for_both() {
-    // The third is not fitted.
     let two = |fitted: &mut Fitted| {
         (fitted.force[2], fitted.rate[2], fitted.field[2], fitted.pressure[2]) =
             ([0.0; 3], [0.0; 3], [0.0; 3], 0.0);
@@ -319,7 +315,6 @@ fn of_two_sensors_the_second_stands_for_both() {
     }
 }
 
-/// All sensors feel turns and pushes: a little, and in gusts after a while.
 fn gusts(now_ms: u64, fitted: &mut Fitted) {
     let strong = if now_ms < FAULT_MS { 0.05 } else { 1.0 };
     let wave = |period_ms: f32| (now_ms as f32 / period_ms).sin();
@@ -485,7 +480,6 @@ fn a_plane_that_stands_after_a_hole_has_no_stuck_sensors() {
         (fitted.quad.kind, fitted.quad.type_number, fitted.speed) = (VehicleKind::Plane, 1, 15.0);
         fitted.silence = FAULT_MS..FAULT_MS + 6_000;
         if now_ms >= FAULT_MS + 6_000 {
-            // A simulator without noise.
             (fitted.force, fitted.rate, fitted.field) = (still.force, still.rate, still.field);
             (fitted.attitude_noise, fitted.quad.roll) = (0.0, 0.3);
         }
@@ -568,7 +562,6 @@ fn position_messages_that_stop_are_told() {
     let found = findings.first().expect("something");
     assert_eq!((found.check, found.level), ("position_silent", Level::Warning));
     assert!(found.at.as_millis() < FAULT_MS + 3_500, "{found:?}");
-    // Checks that need a position are stale.
     assert!(findings.iter().skip(1).all(|one| one.level == Level::Stale), "{findings:?}");
 }
 
@@ -665,11 +658,9 @@ fn satellites_that_go_are_told_while_the_receiver_is_still_exact() {
     finds("gps_sats_fall", 0, Level::Warning, 2_500, |_, fitted| fitted.quad.gnss.satellites = Some(9));
     finds("gps_hdop_rise", 0, Level::Warning, 2_500, |_, fitted| fitted.quad.gnss.hdop = Some(2.2));
     is_quiet(|now_ms, fitted| {
-        // Few, and now and then one or two fewer.
         fitted.quad.gnss.satellites = Some(if now_ms / 3_000 % 2 == 0 { 9 } else { 7 });
         fitted.quad.gnss.hdop = Some(if now_ms / 3_000 % 2 == 0 { 1.5 } else { 2.0 });
     });
-    // Too few satellites for any flight have a check of their own.
     let findings = fly(|now_ms, fitted| {
         if now_ms >= FAULT_MS {
             (fitted.quad.gnss.satellites, fitted.quad.gnss.accuracy) = (Some(5), Some(Metres(2.0)));
@@ -694,7 +685,6 @@ fn vibration_that_jumps_is_named_and_gusts_are_not() {
     });
 }
 
-/// Turns all compasses by these degrees.
 fn turned(fitted: &mut Fitted, degrees: f32) {
     let (sin, cos) = degrees.to_radians().sin_cos();
     for field in &mut fitted.field {
@@ -751,7 +741,6 @@ fn a_motor_that_is_a_little_weak_is_named_once_it_has_been_so_for_long() {
         let is_gust = (FAULT_MS..FAULT_MS + 4_000).contains(&now_ms);
         fitted.pulses[2] += if is_gust { 44.0 } else { 0.0 };
     });
-    // A pilot who yaws for long.
     is_quiet(|now_ms, fitted| {
         let yaws = now_ms >= FAULT_MS;
         (fitted.yaw_rate, fitted.pulses[2]) =
@@ -918,14 +907,12 @@ fn px4_that_stops_using_its_compass_is_named() {
     let [found] = told[..] else { panic!("{findings:?}") };
     assert_eq!((found.check, found.level), ("compass_unused", Level::Warning));
     assert!((FAULT_MS + 500..FAULT_MS + 900).contains(&found.at.as_millis()), "{found:?}");
-    // A compass that was never used is not lost.
     is_quiet(|_, fitted| {
         (fitted.quad.autopilot, fitted.quad.estimator) = (Autopilot::Px4, px4(None));
         fitted.quad.vibration.levels = [Some(0.0), Some(0.0), Some(1.0)];
     });
 }
 
-/// A sensor that repeats its value of the moment of the fault.
 #[test]
 fn a_sensor_that_repeats_one_value_is_named() {
     for sensor in 0..3_u8 {
@@ -959,7 +946,6 @@ fn compasses_that_all_repeat_their_values_are_stuck_once_the_vehicle_turns() {
             fitted.quad.roll = (now_ms - FAULT_MS).min(5_000) as f32 * 0.008 / 1_000.0;
         }
     });
-    // A change of all of them comes 0.2 s later in the first one's message.
     is_quiet(|now_ms, fitted| {
         let late_ms = [200, 0, 0];
         for (field, late_ms) in fitted.field.iter_mut().zip(late_ms) {

@@ -135,7 +135,6 @@ fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../docs").join(name)
 }
 
-/// The document is `wanted`, or is written so on request.
 #[track_caller]
 fn assert_is(name: &str, wanted: &str) {
     if std::env::var_os("HUMS_WRITE_DOCS").is_some() {
@@ -204,12 +203,10 @@ fn mission_planner_gets_the_words_of_every_parameter() {
     assert_is("stations/ParameterMetaData.xml", &text);
 }
 
-/// A check and its inputs.
 fn inputs() -> impl Iterator<Item = (&'static str, &'static str)> {
     INPUTS.lines().filter_map(|line| line.split_once(": "))
 }
 
-/// A document holds a table between the marks of its name.
 fn assert_holds(document: &str, name: &str, table: &str) {
     let begin = format!("<!-- {name}: made by firmware/core/tests/docs.rs -->\n");
     let end = format!("<!-- end of {name} -->\n");

@@ -18,7 +18,6 @@ use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Metres, Radians
 const FAULT_MS: u64 = 20_000;
 const END_MS: u64 = 95_000;
 
-/// A fault: it changes the quad, and adds other observations.
 type Fault = fn(&mut Quad, &mut Vec<Observation>);
 
 /// Off by default, since they depend on the engine and on the devices.
@@ -212,7 +211,6 @@ fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
     quad.escs[motor].as_mut().unwrap()
 }
 
-/// Signal of both ends, and their noise.
 fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
     let ([rssi, remote_rssi], [noise, remote_noise]) = (rssi.map(Some), noise.map(Some));
     let radio = TelemetryRadio { rssi, remote_rssi, noise, remote_noise, errors: 0 };
@@ -257,7 +255,6 @@ fn a_generator_is_judged_once_it_has_run_and_until_it_is_switched_off() {
     assert_eq!(generator_levels(false, &[runs, stands, starts]), [], "disarmed");
 }
 
-/// A fault is found as this level, after the debounce of its check.
 fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad, &mut Vec<Observation>)) {
     let check = health::check_named(name).expect(name);
     let findings = fly(&LIMITS, fault);

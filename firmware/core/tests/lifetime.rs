@@ -15,7 +15,6 @@ use hums_core::time::Instant;
 use hums_core::units::{Amperes, Metres, MetresPerSecond, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
-/// A store of all items.
 #[derive(Default)]
 struct Store(BTreeMap<u8, Vec<u8>>);
 
@@ -111,7 +110,6 @@ fn sessions_add_up_and_the_greatest_stays() {
     }
 }
 
-/// Sums of a life that may neither be lost nor counted twice, in the order of comparison.
 fn sums(monitor: &Monitor) -> Vec<f64> {
     let life = monitor.lifetime();
     let counters = [
@@ -139,7 +137,6 @@ fn sums(monitor: &Monitor) -> Vec<f64> {
     sums
 }
 
-/// Three components, by hours, cycles and motor hours.
 fn with_components() -> Params {
     let mut params = Params::defaults();
     for (name, value) in [

@@ -16,7 +16,6 @@ fn told(script: impl Fn(u64) -> (Quad, Vec<Esc>, f32)) -> Vec<(&'static str, u8)
     told_given(script, |_| None)
 }
 
-/// The same, with pulses of the motors.
 fn told_given(
     script: impl Fn(u64) -> (Quad, Vec<Esc>, f32),
     given: impl Fn(u64) -> Option<[u16; MOTORS_MAX]>,
@@ -61,7 +60,6 @@ fn flies(vehicle: &Quad, speeds: &[f32], yaw_rate: f32) -> Vec<(&'static str, u8
     })
 }
 
-/// ESCs that report only their currents.
 fn escs_of(currents: &[f32]) -> Vec<Esc> {
     currents.iter().map(|current| Esc { current: Some(Amperes(*current)), ..Esc::default() }).collect()
 }
@@ -158,7 +156,6 @@ fn the_motor_that_pushes_a_vtol_is_not_lost_while_it_hovers() {
     let lifted = |pusher: f32| escs_of(&[5.0, 5.0, 5.0, 5.0, pusher]);
     let hovers = |now_ms| (quadplane(now_ms, VtolState::Hover), lifted(0.0), 0.0);
     assert_eq!(told(hovers), []);
-    // The pusher helps against the wind for a while.
     let helped = |now_ms| {
         let pusher = if (10_000..30_000).contains(&now_ms) { 6.0 } else { 0.0 };
         (quadplane(now_ms, VtolState::Hover), lifted(pusher), 0.0)
@@ -173,7 +170,6 @@ fn the_motor_that_pushes_a_vtol_is_not_lost_while_it_hovers() {
         _ => (quadplane(now_ms, VtolState::Hover), lifted(if now_ms < 26_000 { 3.0 } else { 0.0 }), 0.0),
     };
     assert_eq!(told(returns), []);
-    // A lifting motor is found, even beside a pusher.
     let lost = |now_ms| {
         let escs = escs_of(&[5.0, 5.0, if now_ms < 40_000 { 5.0 } else { 0.1 }, 5.0, 0.0]);
         (quadplane(now_ms, VtolState::Hover), escs, 0.0)
@@ -224,7 +220,6 @@ fn quad_given(speeds: [f32; 4], given: [u16; 4], for_ms: u64) -> Vec<(&'static s
     quad_given_on(|pulse| pulse, speeds, given, for_ms)
 }
 
-/// The same with a driver of another range.
 fn quad_given_on(
     driver: fn(u16) -> u16,
     speeds: [f32; 4],

@@ -24,7 +24,6 @@ use hums_core::usage::FIGURE_FIRST;
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// The kind of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Values {
     /// Anything: sane, extreme, NaN or infinite.
@@ -33,7 +32,6 @@ enum Values {
     Unknown,
 }
 
-/// Makes observations (splitmix64: the same ones each time).
 struct Random {
     state: u64,
     values: Values,
@@ -318,7 +316,6 @@ impl Random {
         }
     }
 
-    /// Parameters anywhere in their ranges.
     fn params(&mut self) -> Params {
         let mut params = Params::defaults();
         for _ in 0..self.below(40) {
@@ -346,7 +343,6 @@ impl Random {
     }
 }
 
-/// Invariants after any observation.
 fn check(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
         let sign = counter >= FIGURE_FIRST || value >= 0.0;
@@ -393,7 +389,6 @@ fn not_better(whole: Level, part: Level) -> bool {
     rank(whole) >= rank(part)
 }
 
-/// Feeds a thousand random observations to a monitor; returns it and its time.
 fn run(random: &mut Random) -> (Monitor, Instant) {
     let mut monitor = Monitor::new(random.params());
     // At power-on, and where the clock wraps.

@@ -29,7 +29,6 @@ const HOLD: u32 = 0x0304_0000;
 const MISSION: u32 = 0x0404_0000;
 const PRECLAND: u32 = 0x0904_0000;
 
-/// Steps and requests of a flight with their times in milliseconds.
 struct Outcome {
     steps: Vec<(u64, Step)>,
     requests: Vec<(u64, Request)>,
@@ -63,7 +62,6 @@ fn params(action: Action) -> Params {
     params
 }
 
-/// A minute with a return as the action.
 fn fly(script: impl Fn(u64, &mut Quad, &mut Monitor)) -> Outcome {
     fly_with(&params(Action::Return), script)
 }
@@ -87,7 +85,6 @@ fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad, &mut Monitor)) -> O
     Outcome { steps: run.happenings.into_iter().filter_map(step).collect(), requests: run.requests }
 }
 
-/// Feeds an observation once.
 fn say(now_ms: u64, monitor: &mut Monitor, at_ms: u64, source: Source, observation: Observation) {
     if now_ms == at_ms {
         monitor.observe(Instant::from_millis(now_ms), source, &observation);

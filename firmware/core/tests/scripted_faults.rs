@@ -12,7 +12,6 @@ use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Celsius, Fraction, Volts};
 use hums_core::usage::UsageCounter;
 
-/// When the fault begins and ends in each script.
 const FAULT_MS: u64 = 20_000;
 const END_MS: u64 = 100_000;
 
@@ -21,7 +20,6 @@ fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
     fly_with(&Params::defaults(), script).1
 }
 
-/// The same with other parameters; returns the monitor at the end as well.
 fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<Finding>) {
     let mut monitor = Monitor::new(*params);
     let mut findings = Vec::new();
@@ -382,7 +380,6 @@ fn an_esc_of_a_plane_that_glides_may_fall_silent() {
     assert!(!told(0.0));
 }
 
-/// Times of an estimator check's critical levels, and the check that explains each.
 fn critical_of(check: &str, findings: &[Finding]) -> Vec<(u64, &'static str)> {
     let mine = findings.iter().filter(|finding| finding.check == check && finding.level == Level::Critical);
     mine.map(|finding| (finding.at.as_millis() / 1_000, finding.because)).collect()

@@ -6,7 +6,6 @@ use hums_core::params::Params;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 
-/// Flights and landings in two minutes of a script.
 fn counts(script: impl Fn(u64) -> Vec<Observation>) -> (u32, u32) {
     let mut run = Run::new(&Params::defaults());
     run.says(0..120_000, script);

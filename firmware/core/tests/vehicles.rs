@@ -14,7 +14,6 @@ use hums_core::usage::UsageCounter;
 
 const OTHER: Source = Source { system: 7, component: 1 };
 
-/// A monitor whose stored life is of this airframe.
 fn with_life_of(airframe: Airframe) -> Run {
     let mut run = Run::new(&Params::defaults());
     let life = Lifetime { airframe, boots: 41, ..Lifetime::default() };
@@ -24,7 +23,6 @@ fn with_life_of(airframe: Airframe) -> Run {
     run
 }
 
-/// A minute of the autopilot's messages.
 fn minute(says: impl Fn(u64) -> Vec<Observation>) -> Run {
     let mut run = Run::new(&Params::defaults());
     run.says(0..60_000, says);
@@ -198,7 +196,6 @@ fn a_link_that_is_silent_is_told_as_such_and_not_as_silent_escs() {
         let mut said = Quad::healthy().says(now_ms);
         match now_ms {
             20_000..24_500 => said.clear(),
-            // Other messages come first.
             24_500..24_700 => said.retain(|said| !matches!(said, Observation::Escs(_))),
             _ => {}
         }
@@ -229,7 +226,6 @@ fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() 
     }
 }
 
-/// The classes of vehicles: their kind and their `MAV_TYPE`.
 const CLASSES: [(VehicleKind, u8); 8] = [
     (VehicleKind::Rotorcraft, 2),
     (VehicleKind::Rotorcraft, 13),

@@ -11,12 +11,10 @@ use crate::cause::{Alert, Cause, Meaning};
 /// The autopilot's component in the number of an event.
 const AUTOPILOT: u32 = 1 << 24;
 
-/// The number of an event of the autopilot, by its name.
 const fn number(name: &str) -> u32 {
     AUTOPILOT | fnv1a(name) & 0x00FF_FFFF
 }
 
-/// The meaning of an event.
 #[derive(Clone, Copy, Debug)]
 enum Says {
     /// A fixed one.
@@ -126,7 +124,7 @@ events! {
         vtol_att_ctrl_quadchute_min_alt vtol_att_ctrl_quadchute_tout vtol_att_ctrl_quadchute_trans_alt_err;
 }
 
-/// The same by number, computed when the firmware is built: the firmware holds no names.
+/// By number, computed when the firmware is built: the firmware holds no names.
 static NUMBERED: [(u32, Says); EVENTS.len()] = {
     let mut numbered = [(0, Says::Is(Meaning::Fine)); EVENTS.len()];
     let mut row = 0;
@@ -142,7 +140,6 @@ pub fn name(id: u32) -> Option<&'static str> {
     EVENTS.iter().map(|(name, _)| *name).find(|name| number(name) == id)
 }
 
-/// The meaning of an event.
 pub(super) fn meaning(id: u32, arguments: &[u8]) -> Meaning {
     let argument = |at: u8| arguments.get(usize::from(at)).copied().unwrap_or_default();
     let Some((_, says)) = NUMBERED.iter().find(|(known, _)| *known == id) else { return Meaning::Unknown };
@@ -169,7 +166,6 @@ mod tests {
 
     #[test]
     fn numbers_of_events_are_those_of_the_public_definitions() {
-        // From all_events.json.
         for (name, known) in [
             ("sensor_failover", 12_894_058),
             ("check_accel_no_data", 16_230_031),

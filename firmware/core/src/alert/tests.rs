@@ -113,7 +113,6 @@ fn an_event_tells_its_cause_by_its_number_and_its_arguments() {
     assert_eq!(of_event(7, 3, &[]), None, "not known");
 }
 
-/// Alerts of a vehicle that is armed.
 fn armed() -> Alerts {
     let mut alerts = Alerts::default();
     alerts.take_armed(T0, true);
@@ -164,7 +163,6 @@ fn words_and_flags_hold_as_long_as_they_should() {
          15 Gnss = 2; 16 Gnss = ended; 5 Gyro = -",
         // It ends by a text; it outlasts disarming, but not the next arming.
         "0 arm; 20 warning Gnss; 21 over Gnss; 22 Gnss = 0; 23 warning Gnss; 24 disarm; 24 Gnss = 1; 25 arm; 25 Gnss = -",
-        // An autopilot that crashes disarms with that text, and reports the damage right behind it.
         "0 arm; 1 disarm; 1 warning Gnss; 2 critical Crash; 2 Crash = 2; 2 Gnss = -",
         "0 arm; 1 disarm; 2 critical Accelerometer; 2 Accelerometer = 2",
         "0 arm; 1 disarm; 5 critical Crash; 5 Crash = -",

@@ -7,7 +7,6 @@
 
 use crate::cause::{Alert, Cause, Meaning};
 
-/// The texts to which a row applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Where {
     /// All.
@@ -18,7 +17,6 @@ enum Where {
     Sound,
 }
 
-/// Meaning and texts of a kind of rows.
 macro_rules! kind {
     (fine) => {
         (Meaning::Fine, Where::Everywhere)
@@ -138,7 +136,6 @@ texts! {
     (broad Failsafe): "failsafe";
 }
 
-/// The pairs of letters of each row's pattern.
 static PAIRS: [u64; TEXTS.len()] = {
     let mut all = [0; TEXTS.len()];
     let mut row = 0;
@@ -166,7 +163,6 @@ const fn pairs(text: &[u8]) -> u64 {
     bits
 }
 
-/// The meaning of a text, which is severe or of unknown severity.
 pub(super) fn meaning(text: &[u8], is_severe: bool) -> Meaning {
     let has = pairs(text);
     let is_about = |pattern: &str, place: Where| match place {

@@ -11,7 +11,6 @@ use crate::params::{Param, Params};
 use crate::time::{Instant, PAUSE, Span};
 use crate::vehicle::Vehicle;
 
-/// How long it is watched.
 const WATCH: Span = Span::from_secs(3);
 /// A disarmed vehicle that sinks so fast sinks through the air, m/s.
 pub(super) const FALLING_MPS: f32 = 2.5;
@@ -20,22 +19,19 @@ const FALLEN_M: f32 = 2.0;
 /// A terminated one falls so fast some seconds later, by the air pressure alone, m/s.
 const DROPS_MPS: f32 = 10.0;
 
-/// It was disarmed or terminated out of a flight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DisarmWatch {
     since: Instant,
-    /// Height above home, m, if that is known.
+    /// Above home, m.
     pub(super) height_m: Option<f32>,
     /// Height above mean sea level, m.
     altitude_m: Option<f32>,
-    /// Nothing has carried it since.
     pub(super) is_unloaded: bool,
     /// It stood still and level since.
     stood: bool,
 }
 
 impl Flight {
-    /// Its motors went off at this height above home: it is watched if it may be in the air.
     pub(super) fn note_disarming(
         &mut self,
         now: Instant,
@@ -58,7 +54,6 @@ impl Flight {
         }
     }
 
-    /// One step of the watch.
     pub(super) fn judge_disarming(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
         let Some(mut watch) = self.watch else { return };
         // A terminated vehicle stays armed.

@@ -60,7 +60,6 @@ const FULL_ON_WINGS: f32 = 0.97;
 /// Samples, one after the other, before anything is believed.
 const SAMPLES: u8 = 3;
 
-/// How long something has been so, and in how many samples.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lasting {
     since: Instant,
@@ -83,13 +82,11 @@ impl Lasting {
         (self.samples >= SAMPLES).then(|| at.since(self.since))
     }
 
-    /// Whether it was so in the last samples, for so long.
     fn lasts(&self, now: Instant, span: Span) -> bool {
         self.samples >= 2 && now.since(self.last) <= PAUSE && now.since(self.since) >= span
     }
 }
 
-/// The detectors, and what they have seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
     /// The worst of each sign, in its own unit; 0 for none.
@@ -106,14 +103,12 @@ pub(super) struct Signs {
     sinks: Lasting,
 }
 
-/// A height that fades, m.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Peak {
     height_m: Option<f32>,
     at: Instant,
 }
 
-/// A shock, and its effect.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shock {
     at: Instant,
@@ -122,7 +117,6 @@ pub(super) struct Shock {
     speed_mps: f32,
     /// Sink just before it, m/s.
     pub(super) sink_mps: f32,
-    /// The speed broke off.
     stopped: bool,
     /// Little carried the vehicle just before.
     dropped: bool,
@@ -131,7 +125,7 @@ pub(super) struct Shock {
 }
 
 impl Flight {
-    /// Takes an observation that the vehicle took.
+    /// An observation that the vehicle took.
     pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation, params: &Params) {
         self.estimate(at, vehicle, observation);
         let watched = self.arming.is_on
@@ -170,7 +164,6 @@ impl Flight {
         }
     }
 
-    /// The estimators take what they use.
     fn estimate(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
         match observation {
             Observation::Air(air) | Observation::ImuAndAir(_, air) if air.instance == 0 => {
@@ -204,7 +197,6 @@ impl Flight {
         self.signs.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
     }
 
-    /// It was seen, with such a value, which is above the limit.
     pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32, params: &Params) {
         let is_felt = matches!(kind, Kind::FreeFall | Kind::Tumbling);
         if is_felt && self.signs.doubted_since.older_than(at, RECOVERED) {
@@ -432,8 +424,6 @@ impl Flight {
             || matches!(power, Some(Power::Idle | Power::Full))
     }
 
-    /// Whether its own rotors, and no hand, caused a sign outside of a flight. It had throttle just now, and the
-    /// inertial messages show the sign.
     pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
         self.thrust.was_driven(now, DRIVEN)
             && on_rotors(now, vehicle)

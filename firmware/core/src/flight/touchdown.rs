@@ -12,7 +12,6 @@ const SINK_MIN_MPS: f32 = 0.3;
 /// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
 const SAME_HEIGHT_M: f32 = 1.5;
 
-/// The end of a descent.
 #[derive(Clone, Copy, Debug)]
 struct Stop {
     at: Instant,
@@ -20,7 +19,6 @@ struct Stop {
     sink_mps: f32,
 }
 
-/// The last end of a descent.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Touchdown(Option<Stop>);
 

@@ -40,7 +40,6 @@ const STEADY: Span = Span::from_secs(3);
 /// A climb or sink by this, m/s, shows in the pressure, or the estimate is lost.
 const LOST_MPS: f32 = 2.0;
 
-/// The vote of one witness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vote {
     /// It does not tell.
@@ -79,7 +78,6 @@ impl Votes {
         self.known |= witness;
     }
 
-    /// How many say that it flies, and that it stands.
     pub(super) const fn count(self) -> (u32, u32) {
         (self.flies.count_ones(), self.stands.count_ones())
     }
@@ -119,7 +117,6 @@ impl Flight {
         }
     }
 
-    /// Whether its autopilot says that it is on the ground.
     pub(super) fn calls_itself_landed(&self, now: Instant, vehicle: &Vehicle) -> bool {
         self.word(now, vehicle) == Stands
     }
@@ -151,7 +148,6 @@ impl Flight {
         }
     }
 
-    /// Whether its height differs from the place of arming.
     pub(super) fn is_away(&self, now: Instant, vehicle: &Vehicle) -> bool {
         are_away(self.heights(now, vehicle, self.is_lost(now, vehicle)))
     }
@@ -319,7 +315,6 @@ fn are_away(heights: [Vote; 2]) -> bool {
     heights.iter().any(|vote| matches!(vote, Flies | Below))
 }
 
-/// Whether it hangs on rotors now.
 pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
     vehicle.hovers(now) == Some(true)
 }
@@ -330,7 +325,6 @@ pub(super) fn is_on_wings(now: Instant, vehicle: &Vehicle) -> bool {
     !vehicle.hovers(now).unwrap_or(!has_wings)
 }
 
-/// Whether it is on its side or its back by its attitude.
 fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
     !vehicle.inertial.contradicts(now)
         && vehicle

@@ -11,7 +11,6 @@ pub(super) const ALARMS_MAX: usize = 32;
 /// estimator needs some seconds to settle.
 pub(super) const OUTLIVES: Span = Span::from_secs(8);
 
-/// An alarm, by the number of its state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
     pub(super) slot: u16,
@@ -69,20 +68,18 @@ impl Alarms {
         Some(place.as_ref()?.since)
     }
 
-    /// The state that explains an alarm and still has its own.
     pub(super) fn cause(&self, slot: u16) -> Option<u16> {
         let known = self.iter().find(|known| known.slot == slot)?;
         known.cause.filter(|_| known.cause_ended.is_none())
     }
 
-    /// A state explains an alarm, or none does.
     pub(super) fn explain(&mut self, slot: u16, cause: Option<u16>) {
         if let Some(known) = self.standing.iter_mut().flatten().find(|known| known.slot == slot) {
             (known.cause, known.cause_ended) = (cause, None);
         }
     }
 
-    /// The alarm in a place, if it has outlived its cause: it is explained no longer once that is reported.
+    /// It is explained no longer once it is reported.
     pub(super) fn outliving(&self, place: usize, now: Instant) -> Option<u16> {
         let known = self.standing.get(place)?.as_ref()?;
         (now.since(known.cause_ended?) >= OUTLIVES).then_some(known.slot)
@@ -94,13 +91,12 @@ impl Alarms {
         }
     }
 
-    /// A state explains that another one is stale.
     pub(super) fn silence(&mut self, slot: u16, cause: u16) {
         (self.silence, self.silence_ended) = (Some(cause), None);
         self.set_silenced(slot, true);
     }
 
-    /// A state that is stale still when the silence that explained it is over for [`OUTLIVES`]; gives each once.
+    /// Gives each once.
     pub(super) fn outliving_silence(&mut self, now: Instant) -> Option<u16> {
         if now.since(self.silence_ended?) < OUTLIVES {
             return None;

@@ -59,7 +59,6 @@ fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) ->
     Reading::new(vehicle.attitude.at(), vehicle.attitude.get().map(degrees))
 }
 
-/// How far two angles are apart, the short way round.
 fn apart(one: f32, other: f32) -> f32 {
     let turn = core::f32::consts::TAU;
     let apart = libm::fabsf(one - other) % turn;

@@ -1,7 +1,6 @@
 //! The mechanism of a check: a value against its limits, with debounce, hysteresis, a condition and the stale state.
 //!
-//! A check is data ([`Check`]) plus one pure function that reads its value; its memory is a [`State`]. Adding a check
-//! is one entry in its subsystem's table and one function.
+//! A check is data ([`Check`]) plus one pure function that reads its value; its memory is a [`State`].
 //!
 //! "Bad for `debounce`" takes time and samples: the value is beyond its limit for so long, and in [`SAMPLES`]
 //! measurements of it. A slow stream holds its last value: that is one sample, however long it is held.
@@ -49,7 +48,6 @@ pub enum When {
 }
 
 impl When {
-    /// All of them, by their number.
     pub(super) const ALL: [Self; 3] = [Self::Always, Self::Armed, Self::InFlight];
 }
 
@@ -86,7 +84,6 @@ impl InstanceOf {
     }
 }
 
-/// How many instances of each kind have ever reported: the others have no value, and are not read.
 pub(super) struct Reported([u8; InstanceOf::Pair as usize + 1]);
 
 impl Reported {
@@ -186,12 +183,10 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Values above them are bad.
     pub(super) const fn above(warn: Option<Param>, critical: Option<Param>, hysteresis: f32) -> Self {
         Self { side: Side::Above, warn, critical, hysteresis }
     }
 
-    /// Values below them are bad.
     pub(super) const fn below(warn: Option<Param>, critical: Option<Param>, hysteresis: f32) -> Self {
         Self { side: Side::Below, warn, critical, hysteresis }
     }
@@ -201,7 +196,6 @@ impl Limits {
         [self.warn, self.critical].map(|limit| limit.map_or(f32::NAN, |param| params.get(param)))
     }
 
-    /// Whether a value is beyond a limit, or nearer to it than a margin.
     fn is_beyond(&self, value: f32, limit: f32, margin: f32) -> bool {
         match self.side {
             Side::Above => value > limit - margin,
@@ -260,7 +254,6 @@ const UNSEEN: Span = Span::from_secs(15);
 /// Bad measurements in a row that make an alarm: one wrong message is none.
 pub const SAMPLES: u8 = 2;
 
-/// Two counts up to 15 in a byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Samples(u8);
 
@@ -268,7 +261,6 @@ impl Samples {
     const BAD: u8 = 0;
     const VERY_BAD: u8 = 4;
 
-    /// Counts measurements that are bad one after the other; whether there were enough.
     fn count(&mut self, which: u8, bad: bool, measured: bool) -> bool {
         let before = self.0 >> which & 0xF;
         let count = if bad { (before + u8::from(measured || before == 0)).min(0xF) } else { 0 };
@@ -305,7 +297,6 @@ impl Repeats {
     }
 }
 
-/// How a check is stepped.
 #[derive(Clone, Copy)]
 pub(super) struct How {
     /// It applies.
@@ -324,13 +315,11 @@ state! {
         level: Option<Level>,
         /// The lowest level while levels are held: a warning or critical.
         held: Option<Level>,
-        /// Measurements in a row beyond the warning's limit, and beyond the critical one.
         samples: Samples = Samples(0),
         repeats: Repeats = Repeats(0),
         bad: Stamp,
         very_bad: Stamp,
         better: Stamp,
-        /// When the value was measured last.
         seen: Stamp,
     }
 }
@@ -361,13 +350,12 @@ impl Check {
         }
     }
 
-    /// The limit of a level; NaN where there is none.
+    /// NaN where there is none.
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
         let [warn, critical] = self.limits.values(params);
         if level == Level::Critical || warn.is_nan() { critical } else { warn }
     }
 
-    /// The finding of a change of level.
     pub(super) const fn finding(&self, instance: u8, at: Instant, change: Change, feeds: Feeds) -> Finding {
         Finding {
             at,
@@ -399,7 +387,6 @@ impl State {
         self.level
     }
 
-    /// Its level, if that is an alarm.
     pub(super) const fn alarm(&self) -> Option<Level> {
         match self.level {
             Some(level @ (Level::Warning | Level::Critical)) => Some(level),
@@ -417,7 +404,6 @@ impl State {
         self.level.is_none() && self.held.is_none() && !self.seen.is_set()
     }
 
-    /// Whether it is good and no change is pending.
     fn is_calm(&self) -> bool {
         let counts = self.bad.is_set() || self.very_bad.is_set() || self.samples != Samples(0);
         self.level == Some(Level::Ok) && self.better.is_set() && !counts
@@ -446,14 +432,12 @@ impl State {
         true
     }
 
-    /// Notes when a value was measured, without judging it.
     pub(super) fn see(&mut self, now: Instant, reading: Option<Reading>) {
         if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
             self.seen = Stamp::at(reading.at.earlier(now));
         }
     }
 
-    /// Levels may fall again.
     pub(super) const fn release(&mut self) {
         self.held = None;
     }
@@ -510,7 +494,6 @@ impl State {
         }
     }
 
-    /// How long it must be good before the level falls.
     fn clear(&self, check: &Check) -> Span {
         // The detector ends a mishap. The next sign is a new mishap, and reported.
         if check.subsystem == Subsystem::Mishap {

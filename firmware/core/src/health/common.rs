@@ -16,7 +16,6 @@ pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);
 /// For streams that come at 0.5 Hz.
 pub(super) const STALE_SLOW: Option<NonZeroU8> = NonZeroU8::new(12);
 
-/// The common values of most checks.
 pub(super) const PLAIN: Check = Check {
     name: "",
     subsystem: Subsystem::Power,
@@ -32,7 +31,7 @@ pub(super) const PLAIN: Check = Check {
     read: |_, _| None,
 };
 
-/// A debounce of a warning, and of a critical level, ms.
+/// Debounces in ms.
 pub(super) const fn after(warning_ms: u16, critical_ms: u16) -> [Debounce; 2] {
     [Debounce::millis(warning_ms), Debounce::millis(critical_ms)]
 }
@@ -54,7 +53,7 @@ macro_rules! row {
 }
 pub(super) use row;
 
-/// The autopilot's own word on `CAUSE`, the number of a [`Cause`]: 1 is a warning, 2 is critical.
+/// The autopilot's own word on `CAUSE`, the number of a [`Cause`].
 pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
     Check {
         name: Cause::ALL[CAUSE].name(),

@@ -77,20 +77,17 @@ struct Entry {
     instance: u8,
     /// [`Level::Ok`] while nothing is exceeded.
     level: Level,
-    /// Since when it has had that level.
     since: Instant,
     session: Crossings,
     before: Crossings,
 }
 
 impl Entry {
-    /// Counts how long its level has lasted.
     fn extend(&mut self, now: Instant) {
         self.session.extend(self.level, (now.since(self.since).as_millis() / 100) as u32);
         self.since = now;
     }
 
-    /// The entry with its current level counted up to now.
     fn now(mut self, now: Instant) -> Option<Exceedance> {
         self.extend(now);
         let check = checks().nth(self.check.into())?;
@@ -129,7 +126,7 @@ impl Exceedances {
     /// instance, warnings and criticals (u16), tenths of a second of both (u32), peak (f32).
     pub const BYTES: usize = 1 + EXCEEDANCES_MAX * ENTRY_BYTES;
 
-    /// Takes a check's change of level; `check` is its place among all checks.
+    /// `check`: its place among all checks.
     pub(crate) fn change(&mut self, check: u16, side: Side, finding: &Finding) {
         let Some(entry) = self.entry(check, finding) else { return };
         entry.extend(finding.at);
@@ -146,7 +143,6 @@ impl Exceedances {
         entry.level = finding.level;
     }
 
-    /// Takes the value of a check whose limit is exceeded.
     pub(crate) fn note(&mut self, check: u16, instance: u8, side: Side, value: f32) {
         let entries = self.entries.iter_mut().flatten();
         if let Some(entry) =
@@ -156,7 +152,6 @@ impl Exceedances {
         }
     }
 
-    /// The entry of a check and instance, a new one where there is none.
     fn entry(&mut self, check: u16, finding: &Finding) -> Option<&mut Entry> {
         let same = |entry: &Option<Entry>| {
             entry.is_some_and(|entry| (entry.check, entry.instance) == (check, finding.instance))
@@ -203,7 +198,7 @@ impl Exceedances {
         self.entries.iter().flatten().filter(changed).filter_map(move |entry| entry.now(now))
     }
 
-    /// Ends all exceedances: the previous vehicle was heard last at this time.
+    /// The previous vehicle was heard last at this time.
     pub(crate) fn end(&mut self, now: Instant) {
         for entry in self.entries.iter_mut().flatten() {
             entry.extend(now);
@@ -211,7 +206,6 @@ impl Exceedances {
         }
     }
 
-    /// Whether anything is exceeded now.
     pub(crate) fn lasting(&self) -> bool {
         self.entries.iter().flatten().any(|entry| rank(entry.level) > 0)
     }

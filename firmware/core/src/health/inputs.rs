@@ -31,7 +31,6 @@ pub struct Inputs<'a> {
 }
 
 impl Inputs<'_> {
-    /// A value measured now.
     pub(super) fn reading(&self, value: impl Into<Option<f32>>) -> Option<Reading> {
         Reading::new(Some(self.now), value.into())
     }

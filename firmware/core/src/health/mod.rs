@@ -55,7 +55,6 @@ state! {
 const _: () = assert!(size_of::<Health>() <= 20 * STATES + 512 + 80);
 
 impl Health {
-    /// As if nothing had been seen.
     pub(crate) fn clear(&mut self) {
         self.states.fill(State::default());
         self.alarms = Alarms::default();
@@ -112,7 +111,6 @@ impl Health {
         }
     }
 
-    /// A step of one state that may change it.
     #[inline(never)]
     fn turn(
         &mut self,
@@ -170,12 +168,11 @@ impl Health {
         cause.and_then(check_of).map_or("", |(cause, _)| cause.name)
     }
 
-    /// The alarms that stand.
     fn standing(&self) -> impl Iterator<Item = Alarm> {
         self.alarms.iter().filter_map(|standing| Alarm::at(standing.slot, standing.level, standing.since))
     }
 
-    /// An alarm, or a lack of data, that outlives the alarm that explained it, as a finding of its own.
+    /// A finding of its own.
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
         let (check, instance) = check_of(slot)?;
         let level = self.states.get(usize::from(slot))?.level()?;
@@ -199,7 +196,7 @@ impl Health {
         self.numbered_levels().map(|(_, check, instance, level)| (check, instance, level))
     }
 
-    /// The same, each with a number that is its own.
+    /// Each has a number that is its own.
     pub(crate) fn numbered_levels(&self) -> impl Iterator<Item = (u16, &'static Check, u8, Level)> + Clone {
         let states = slots().zip(&self.states);
         states.filter_map(|((slot, check, instance), state)| {
@@ -240,9 +237,8 @@ impl Health {
     }
 }
 
-/// The conditions of a step, for all checks.
 struct Now {
-    /// How checks are stepped, by [`When`] they apply.
+    /// By [`When`] they apply.
     hows: [How; When::ALL.len()],
 }
 

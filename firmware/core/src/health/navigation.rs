@@ -20,7 +20,6 @@ use crate::vehicle::RECEIVERS_MAX;
 const SMOOTHED: [Debounce; 2] = after(200, 1_000);
 /// Four messages of a receiver at 5 Hz, two at 2 Hz. Dilutions of precision leap as satellites come and go, and wait longer.
 const RECEIVER_SAYS: [Debounce; 2] = after(600, 1_000);
-/// Hysteresis of these checks.
 const MARGIN: f32 = 0.5;
 
 const ESTIMATOR: Check = Check {

@@ -75,19 +75,16 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// The consumer of the battery that a check is of.
 pub(super) fn feeds(check: &Check, inputs: &Inputs<'_>, instance: u8) -> Feeds {
     let of_battery = check.subsystem == Subsystem::Power && check.instances == BATTERIES;
     let slot = inputs.vehicle.batteries.get(usize::from(instance)).filter(|_| of_battery);
     slot.and_then(Latest::get).map_or(Feeds::Vehicle, |battery| battery.feeds)
 }
 
-/// A figure of a battery that reports itself.
 fn of(inputs: &Inputs<'_>, battery: u8, value: impl FnOnce(&Battery) -> Option<f32>) -> Option<Reading> {
     inputs.vehicle.batteries.get(usize::from(battery))?.read(value)
 }
 
-/// The highest cell less the lowest one.
 fn spread_v(battery: &Battery) -> Option<f32> {
     let cells = battery.cells.iter().flatten().map(|cell| cell.volts().0);
     Some(cells.clone().reduce(f32::max)? - cells.reduce(f32::min)?)

@@ -24,7 +24,6 @@ const ESC: Check = Check {
     ..PLAIN
 };
 
-/// A body rate that does not follow its setpoint.
 const RATE: Check = Check {
     unit: Unit::of("deg/s"),
     limits: Limits::above(Some(Param::RateWarn), Some(Param::RateCrit), 5.0),
@@ -82,19 +81,16 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// The verdict of the outputs on a motor, as a check's value.
 fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<Reading> {
     let (at, verdict) = inputs.derived.outputs.verdict(inputs.now, inputs.vehicle, motor)?;
     Some(Reading { at, value: value(verdict) })
 }
 
-/// The difference between rate setpoint and rate, about roll (0) or pitch (1).
 fn rate_off_deg_s(inputs: &Inputs<'_>, axis: usize) -> Option<Reading> {
     let reading = inputs.derived.crosschecks.residuals.reading(inputs.now, Comparison::RATES[axis])?;
     Some(Reading { value: reading.value.to_degrees(), ..reading })
 }
 
-/// A figure of a motor's last `ESC_INFO`.
 fn state(inputs: &Inputs<'_>, motor: u8, value: impl FnOnce(&Esc) -> Option<f32>) -> Option<Reading> {
     let motor = inputs.vehicle.motors.get(usize::from(motor))?;
     Reading::new(motor.state_at, value(&motor.esc))

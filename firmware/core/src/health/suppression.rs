@@ -2,8 +2,8 @@
 //!
 //! A failed motor tips the vehicle over, and a receiver without a fix makes the estimator doubt. So each check has a
 //! [`Role`]: its group, and the groups that explain it. An alarm explains another one if it is as bad or worse, began
-//! within [`NEAR`] of it, and is of the same motor, battery or receiver. The finding names it. Such a finding is
-//! recorded like any other, and not sent to the ground. A rise of the level is an onset too.
+//! within [`NEAR`] of it, and is of the same motor, battery or receiver. Such a finding is recorded like any other, and not
+//! sent to the ground. A rise of the level is an onset too.
 //!
 //! A mishap explains only an alarm that begins with it or after it: an earlier one may be its cause.
 
@@ -22,15 +22,12 @@ const WITH_MISHAP: Span = Span::from_millis(200);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub(super) enum Group {
-    /// The autopilot sends nothing.
     Silence,
     /// Frames are lost on the autopilot's port.
     FramesLost,
     /// The autopilot restarted.
     Reboot,
-    /// A battery is empty.
     Battery,
-    /// The autopilot calls a battery low.
     BatteryState,
     /// What else an autopilot has a failsafe for.
     FailsafeCause,
@@ -84,13 +81,10 @@ pub(super) enum Group {
     BaroFault,
     /// Any other word on a single sensor.
     Sensor,
-    /// The roll rate does not follow the setpoint.
     RollRate,
-    /// The pitch rate does not follow the setpoint.
     PitchRate,
     /// The estimator's climb is wrong. Height control follows it.
     EkfClimb,
-    /// The estimator doubts itself.
     Ekf,
     /// A failsafe acts.
     Failsafe,
@@ -99,7 +93,6 @@ pub(super) enum Group {
 }
 
 impl Group {
-    /// The set of this group alone.
     pub(super) const fn bit(self) -> u64 {
         1 << self as u8
     }
@@ -170,7 +163,6 @@ impl Role {
 
 const _: () = assert!((Group::Other as u32) < Role::SETS);
 
-/// Whether its text is better advice than that of a sinking vehicle.
 pub(super) const fn is_of_drive(check: &Check) -> bool {
     check.role.is_of(DRIVE | Group::EscTelemetry.bit())
 }
@@ -208,7 +200,6 @@ pub struct Alarm {
     pub check: &'static Check,
     /// Which one, where there are several.
     pub instance: u8,
-    /// The number of its state.
     pub(super) slot: u16,
 }
 
@@ -234,7 +225,6 @@ impl Alarm {
         let (before, after) = (effect.since.since(self.since), self.since.since(effect.since));
         match effect.level {
             Level::Ok | Level::Advisory => false,
-            // A silent link has no data, however long it is silent.
             Level::Stale => self.check.role.is(Group::Silence) && after <= NEAR,
             level if (self.level as u8) < level as u8 => false,
             _ if self.check.subsystem == Subsystem::Mishap => {
@@ -279,7 +269,6 @@ mod tests {
     #[test]
     fn each_alarm_has_the_cause_that_stands_before_it() {
         for (effect, alarms, cause) in [
-            // The first in the order of groups, and of the tables.
             ("ekf_alert w0", "gnss_alert w0, imu_gps w0", "imu_gps"),
             ("ekf_alert w0", "gnss_alert w0, imu_gps w0, gps_stuck w0", "gps_stuck"),
             ("ekf_alert w0", "compass_alert w0, gyro_mismatch w0", "gyro_mismatch"),
@@ -301,7 +290,6 @@ mod tests {
             ("accel_mismatch w0", "vibration w0", "vibration"),
             ("accel_mismatch c0", "vibration w0", ""),
             ("failsafe_alert c0", "gps_fix c0, vibration w0", "gps_fix"),
-            // A silent link has no data, however long it is silent.
             ("cell_voltage s0", "gps_fix c0, heartbeat w0", "heartbeat"),
             ("cell_voltage s90", "heartbeat c0", "heartbeat"),
             ("cell_voltage c0", "heartbeat c0", ""),
@@ -335,7 +323,6 @@ mod tests {
         }
     }
 
-    /// Every pair of checks, in both orders of time.
     #[test]
     fn a_standing_alarm_explains_only_what_begins_near_its_onset() {
         let mut pairs = 0;

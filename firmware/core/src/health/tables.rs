@@ -1,4 +1,4 @@
-//! All checks: each subsystem's table is in a file of its own.
+//! All checks; each subsystem's table is in a file of its own.
 
 use super::check::Check;
 use super::{attitude, computer, engine, link, mishap, navigation, power, propulsion, recorder, structure};
@@ -16,7 +16,7 @@ pub(super) const TABLES: [&[Check]; 10] = [
     mishap::CHECKS,
 ];
 
-/// Checks in all tables together, and states that they have: one for each instance.
+/// Checks in all tables, and states: one for each instance.
 const COUNTS: (usize, usize) = {
     let (mut rows, mut states) = (0, 0);
     let mut table = 0;
@@ -32,12 +32,9 @@ const COUNTS: (usize, usize) = {
     (rows, states)
 };
 
-/// How many checks there are.
 const CHECKS_COUNT: usize = COUNTS.0;
-/// States that all checks together have: one for each instance.
 pub(super) const STATES: usize = COUNTS.1;
 
-/// All checks, by subsystem.
 static CHECKS: [Check; CHECKS_COUNT] = {
     let mut all = [TABLES[0][0]; CHECKS_COUNT];
     let (mut table, mut count) = (0, 0);
@@ -65,13 +62,12 @@ pub fn checks() -> impl ExactSizeIterator<Item = &'static Check> + Clone {
     CHECKS.iter()
 }
 
-/// The states of all checks: the number of each, its check and which one of several.
+/// Number, check and instance of each state.
 pub(super) fn slots() -> impl Iterator<Item = (u16, &'static Check, u8)> + Clone {
     let each = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
     (0..).zip(each).map(|(slot, (check, instance))| (slot, check, instance))
 }
 
-/// The check of a state, and which one of several.
 pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
     let mut left = slot;
     for check in checks() {
@@ -83,7 +79,6 @@ pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
     None
 }
 
-/// The state of a check.
 pub(super) fn slot_of(name: &str, instance: u8) -> Option<u16> {
     slots().find(|(_, check, number)| *number == instance && check.name == name).map(|(slot, ..)| slot)
 }

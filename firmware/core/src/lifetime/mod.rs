@@ -3,9 +3,9 @@
 //! Counters of earlier sessions are saved once, at the beginning of a session. The session's own counters are one
 //! short item ([`Session`]) that is saved often.
 //!
-//! An item is a version byte and then fields, little endian. A later version only appends. So version n reads items
-//! of n + 1, and n + 1 reads items of n with zero in the missing fields. The store guards the bytes (a checksum, two
-//! copies); decoding only keeps figures in their ranges.
+//! An item is a version byte and then fields, little endian. So version n reads items of n + 1, and n + 1 reads items
+//! of n with zero in the missing fields. The store guards the bytes (a checksum, two copies); decoding only keeps
+//! figures in their ranges.
 //!
 //! Figures keep their precision over the life of an airframe:
 //!
@@ -140,7 +140,6 @@ state! {
 /// Counters of version 1: the first of [`UsageCounter::ALL`]. Those of later versions stand at the item's end.
 const COUNTERS_V1: usize = 32;
 
-/// Counters of an item, by their places in [`UsageCounter::ALL`].
 fn counters(totals: &mut Totals, places: Range<usize>, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
     for counter in &UsageCounter::ALL[places] {
         let mut value = totals.raw(*counter);
@@ -150,7 +149,6 @@ fn counters(totals: &mut Totals, places: Range<usize>, fields: &mut Fields<'_>) 
     Ok(())
 }
 
-/// Run time and revolutions of each motor; whole revolutions in the short form.
 fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
     let revolutions = if fields.is_short() { Form::Count } else { Form::Amount };
     fields.list(

@@ -50,23 +50,20 @@ impl Saving {
         1 << key.number()
     }
 
-    /// The item differs from its saved form.
     pub(crate) const fn change(&mut self, key: ItemKey) {
         self.changed |= Self::bit(key);
     }
 
-    /// Saves the item at once: it was changed by hand.
     pub(crate) const fn hurry(&mut self, key: ItemKey) {
         self.change(key);
         self.due |= Self::bit(key);
     }
 
-    /// Saves all changed items at once.
     pub(crate) const fn hurry_all(&mut self) {
         self.due |= self.changed;
     }
 
-    /// The next item to save; the same one until it is [`Self::saved`].
+    /// The same one until it is [`Self::saved`].
     pub(crate) fn due(&mut self, now: Instant, armed: bool, room: Room) -> Option<ItemKey> {
         if room == Room::Enough {
             if !self.next.is_after(now) {
@@ -88,7 +85,6 @@ impl Saving {
         due
     }
 
-    /// The store has taken the item's bytes.
     pub(crate) const fn saved(&mut self, key: ItemKey) {
         self.changed &= !Self::bit(key);
         self.due &= !Self::bit(key);
@@ -101,7 +97,6 @@ mod tests {
 
     const NOTHING: Option<ItemKey> = None;
 
-    /// Everything that is due.
     fn take(saving: &mut Saving, at_s: u64, armed: bool) -> Vec<ItemKey> {
         let mut keys = Vec::new();
         while let Some(key) = saving.due(Instant::from_millis(at_s * 1_000), armed, Room::Enough) {

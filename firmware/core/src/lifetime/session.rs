@@ -2,9 +2,8 @@
 //! short. At the next start it is added to the saved totals.
 //!
 //! Each item that adds up over sessions names the power-on that it is *as of*: it counts everything before that one.
-//! The session is added to items that are as of the same power-on, and to no other. So each figure is counted once,
-//! even if power fails while items are saved. An item that was not saved again gets the session added; one that was
-//! saved includes it.
+//! The session is added to items that are as of the same power-on, and to no other. An item that was not saved again
+//! gets the session added; one that was saved includes it.
 //!
 //! Layout, version 1:
 //!
@@ -55,7 +54,6 @@ impl Session {
         Self { boots, heard: true, totals: *totals, battery_cycles, exposure }
     }
 
-    /// The session as it stands.
     pub(crate) fn now(
         boots: u32,
         heard: bool,
@@ -70,7 +68,6 @@ impl Session {
         Self { boots, heard, totals: *totals, battery_cycles, exposure: *exposure.session() }
     }
 
-    /// The wear of components in it.
     pub(crate) const fn wear(&self) -> Wear<'_> {
         Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
     }

@@ -13,7 +13,6 @@ use crate::time::{Instant, Span};
 const UID_COMES: Span = Span::from_secs(60);
 
 impl Monitor {
-    /// Checks whose lifetime it is, and which items are to be saved.
     pub(super) fn step_life(&mut self, now: Instant, event: Option<FlightEvent>) {
         let uid = self.vehicle.identity.get().map_or(0, |identity| identity.uid);
         // A system id can be set, so a known unique id is waited for. Nothing is decided before the vehicle is
@@ -24,7 +23,6 @@ impl Monitor {
         }
         let seen = Airframe { system: self.vehicle.source.map_or(0, |source| source.system), uid };
         if self.before.airframe.differs(seen) {
-            // A lifetime belongs to an airframe: this one's begins with this session.
             self.happenings.push(Happening::OtherAirframe);
             self.before = Lifetime { boots: self.before.boots, ..Lifetime::default() };
             self.exceedances.forget_life();

@@ -23,7 +23,6 @@ use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Greater accelerations, m/s2 or g, are garbage: no vehicle here reaches them.
 const ACCELERATION_MAX: f32 = 10_000.0;
-/// The counters of the load factor's cycles, by bin.
 const LOAD_CYCLES: [UsageCounter; 7] = [
     UsageCounter::LoadCycles0,
     UsageCounter::LoadCycles1,
@@ -39,7 +38,6 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub struct Usage {
         last: Option<Instant>,
-        /// The discharge current now.
         current_a: Option<f32>,
         /// All counters but the cycles of the load factor, which are computed when asked for.
         totals: Totals,
@@ -99,7 +97,6 @@ impl Usage {
         self.totals.extend(UsageCounter::CurrentMax, f64::from(current_a.unwrap_or(0.0)));
     }
 
-    /// Takes a value unless it is NaN or beyond its limit.
     fn extend(&mut self, counter: UsageCounter, value: f32, limit: f32) {
         if value <= limit {
             self.totals.extend(counter, f64::from(value));
@@ -188,7 +185,6 @@ impl Usage {
         }
     }
 
-    /// Counts the end of a flight by a landing or a mishap.
     fn land(&mut self, flight: &Flight, params: &Params) {
         let ended = if flight.is_down() { UsageCounter::Mishaps } else { UsageCounter::Landings };
         self.totals.add(ended, 1.0);
@@ -198,7 +194,6 @@ impl Usage {
         }
     }
 
-    /// Ends a flight of unknown end.
     pub(crate) fn break_off(&mut self) {
         (self.held_s, self.landing_s) = ([0.0; 2], 0.0);
     }
@@ -238,12 +233,10 @@ impl Usage {
         }
     }
 
-    /// The time of the last step.
     pub(crate) fn until(&self) -> Instant {
         self.last.unwrap_or_default()
     }
 
-    /// The discharge current of all batteries together, as of the last step.
     pub(crate) const fn current_a(&self) -> Option<f32> {
         self.current_a
     }
@@ -254,7 +247,6 @@ impl Usage {
     }
 }
 
-/// The counter of the time spent in a phase of flight.
 const fn regime(phase: Phase) -> UsageCounter {
     match phase {
         Phase::Ground => UsageCounter::Ground,

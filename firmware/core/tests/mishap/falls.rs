@@ -25,7 +25,6 @@ fn a_fall_with_the_motors_asked_for_thrust_ends_the_flight_with_its_touch() {
         assert_eq!(outcome.flights(), DOWN, "{of:?}");
         assert_eq!(outcome.count(UsageCounter::HardLandings), 1);
         assert!(outcome.count(UsageCounter::TouchdownMax) >= 15, "{of:?}");
-        // No finding that would only echo it.
         let echoes = outcome.findings.iter().filter(|finding| {
             finding.subsystem != Subsystem::Mishap && finding.at.as_millis() > began_ms + 100
         });
@@ -196,7 +195,6 @@ fn a_kill_switch_at_the_touch_down_is_no_alarm_and_in_the_air_it_is_one() {
 
 #[test]
 fn a_flight_that_is_terminated_without_an_estimate_falls_by_the_air_pressure() {
-    // Position, speed and specific force stay as they were.
     for (falls, told, counts) in [(true, &["disarmed_in_air"][..], DOWN), (false, &[], ANY)] {
         let outcome = fly(&hovering(ROTORS[1]), |ms, quad, motion| {
             let seconds = if falls { (ms as f32 / 1_000.0).min(2.5) } else { 0.0 };

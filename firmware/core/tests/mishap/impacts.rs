@@ -18,7 +18,6 @@ fn a_quad_that_lies_on_its_back_has_crashed_whatever_its_estimator_says() {
     assert_eq!(outcome.flights(), (1, 0, 1), "{:?}", outcome.changes);
 }
 
-/// Turns over between two bounces; its rotors turn it as fast a second later.
 fn turns_over(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     if (1_000..3_000).contains(&ms) {
         (quad.roll, motion.rates) = (2.5, [3.0, 0.5, 0.0]);
@@ -119,7 +118,6 @@ fn a_landing_is_none_however_hard() {
     });
 }
 
-/// Touches at 11.5 m/s with a hard jolt, and slides to a stop.
 fn skids(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     let slid = ms as f32 / 1_000.0;
     motion.ground_mps = if ms < 2_000 { 11.5 } else { (11.5 - 8.0 * (slid - 2.0)).max(0.0) };
@@ -176,7 +174,6 @@ fn a_wreck_is_down_whatever_it_does_and_flies_again_where_it_hovers() {
     });
 }
 
-/// Falls less than a metre in 0.45 s, and lies.
 fn drop_low(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     if ms < 450 {
         (motion.load_g, quad.height, quad.climb) = (0.4, 0.7, -2.0);
@@ -198,7 +195,6 @@ fn a_shock_between_two_samples_of_what_fell_is_an_impact_at_its_own_time() {
     assert_eq!(fly(&hovering(ROTORS[0]), drop_low).told(), [""; 0]);
 }
 
-/// Sinks from 60 m and hits the ground at 12 m/s; its rotors run on.
 fn hits_and_runs_on(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     let seconds = ms as f32 / 1_000.0;
     quad.throttle = if ms < 5_000 { 0.95 } else { 0.5 };
@@ -226,7 +222,6 @@ fn what_lies_over_with_running_motors_never_flies_on() {
             outcome.changes.iter().any(|(_, change)| matches!(change, Change::FliesOn | Change::FliesAgain));
         assert!(!is_over, "{of:?}: {:?}", outcome.changes);
         assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
-        // Upright, at the place of its fall.
         let upright = fly(&hovering(*of), hits_and_runs_on);
         assert_eq!(upright.flights(), (1, 0, 1), "{of:?}: {:?}", upright.changes);
     }
@@ -343,7 +338,6 @@ fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
     }
 }
 
-/// Knocked with these g while it tumbles for 0.8 s; then it holds its place.
 fn is_knocked(ms: u64, motion: &mut Motion, knock_g: f32) {
     if ms < 800 {
         (motion.load_g, motion.rates) = (knock_g, [6.2, 0.0, 0.0]);

@@ -41,9 +41,7 @@ struct Motion {
     pressure_hpa: Option<f32>,
     /// The greatest specific force since the last sample, for a shock.
     shock_g: Option<f32>,
-    /// The climb of the pilot's display, if it has one.
     displayed_mps: Option<f32>,
-    /// The autopilot's roll setpoint, if it sends one.
     roll_wanted: Option<f32>,
     /// No message comes but the radio's.
     unheard: bool,
@@ -113,7 +111,6 @@ fn fly_from(at_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Mot
     fly_between(at_ms, 60_000, vehicle, script)
 }
 
-/// The same for a recording that ends then.
 fn fly_until(end_ms: u64, vehicle: &Quad, script: impl Fn(u64, &mut Quad, &mut Motion)) -> Outcome {
     fly_between(AT_MS, end_ms, vehicle, script)
 }
@@ -176,10 +173,8 @@ fn fly_between(
     Outcome { monitor: run.monitor, findings: run.findings, changes, reports }
 }
 
-/// Autopilot, kind and `MAV_TYPE` of a vehicle.
 type Of = (Autopilot, VehicleKind, u8);
 
-/// Flights, landings, and mishaps.
 type Counts = (u32, u32, u32);
 
 /// The outcome of a flight: reported mishaps in order, after ".." any others; and the counts.
@@ -195,7 +190,6 @@ fn judge(
     judge_from(AT_MS, vehicles, what, (told, counts), script);
 }
 
-/// The same, with a script from this time on.
 fn judge_from(
     at_ms: u64,
     vehicles: impl IntoIterator<Item = Quad>,
@@ -215,7 +209,6 @@ fn judge_from(
     }
 }
 
-/// In the air on rotors, and on wings.
 fn rotors() -> impl Iterator<Item = Quad> {
     ROTORS.into_iter().map(hovering)
 }
@@ -228,7 +221,6 @@ fn wings() -> impl Iterator<Item = Quad> {
 const FLIES: Counts = (1, 0, 0);
 const LANDED: Counts = (1, 1, 0);
 const DOWN: Counts = (1, 0, 1);
-/// Flights are not counted.
 const ANY: Counts = (u32::MAX, 0, 0);
 
 /// Falls from 20 m for two seconds, hits with 15 g, and lies.

@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// On the ground, upright and still.
 fn stands(quad: &mut Quad, motion: &mut Motion) {
     (quad.height, quad.climb, motion.ground_mps) = (0.1, 0.0, 0.0);
     motion.rates = [0.0; 3];
@@ -14,7 +13,6 @@ fn has_landed(quad: &mut Quad, motion: &mut Motion) {
     (quad.throttle, quad.armed, quad.landed) = (0.0, false, Some(LandedState::OnGround));
 }
 
-/// Carried by its side.
 fn lies_over(motion: &mut Motion) {
     (motion.load_g, motion.drag_g) = (0.05, 1.0);
 }

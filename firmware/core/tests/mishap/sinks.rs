@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// Sinks at 8 m/s for two seconds.
 fn sinks(ms: u64, quad: &mut Quad, _: &mut Motion) {
     if ms < 2_000 {
         (quad.climb, quad.height) = (-8.0, 200.0 - ms as f32 / 125.0);
@@ -52,7 +51,6 @@ fn an_estimator_that_does_not_believe_itself_makes_no_mishap_unless_the_air_agre
     });
 }
 
-/// Sinks at 3.4 m/s with all its thrust.
 fn sinks_with_thrust(ms: u64, quad: &mut Quad, motion: &mut Motion) {
     motion.ground_mps = 8.0;
     if ms < 8_000 {

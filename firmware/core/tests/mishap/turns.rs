@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// Turns at these rates for this time.
 fn turns(rates: [f32; 3], lasts_ms: u64) -> impl Fn(u64, &mut Quad, &mut Motion) {
     move |ms, _, motion| motion.rates = if ms < lasts_ms { rates } else { CALM.rates }
 }
@@ -37,7 +36,6 @@ fn a_plane_rolls_and_dives_as_it_likes_and_a_spin_is_told() {
     });
 }
 
-/// On the ground, without throttle.
 fn on_ground(of: Of) -> Quad {
     Quad { landed: Some(LandedState::OnGround), height: 0.0, throttle: 0.0, ..hovering(of) }
 }
@@ -107,7 +105,6 @@ fn what_its_own_rotors_turn_over_is_told_though_it_never_flew_and_what_a_hand_tu
     let each_arming: Come<'_> = (&["overturned"; 3], none);
     judge([on_ground(ROTORS[0])], "each arming", each_arming, |ms, quad, motion| match ms % 13_000 {
         since @ ..6_000 => flips(quad, motion, since, 0.4),
-        // Stood up again, armed again.
         since => (quad.armed, quad.throttle, quad.height) = (since > 8_000, 0.0, 0.0),
     });
 }

@@ -75,23 +75,18 @@ fn a_level_is_what_its_values_of_some_time_say() {
         ),
         (above, usual, 1, "0 10, 1000 50, 1450 10, 5000", " | ok"),
         (alone, long, 1, "0 10, 1000 70, 62000", "61000 critical | critical"),
-        // At its limit it is good, and at the end of its hysteresis good again.
         (above, usual, 1, "0 45, 5000", " | ok"),
         (battery, usual, 1, "0 15, 5000", " | ok"),
         (above, usual, 1, "0 45.1, 1000 40, 4000", "500 warning, 3000 ok | ok"),
         (battery, usual, 1, "0 14.9, 1000 16, 4000", "500 warning, 3000 ok | ok"),
         (above, usual, 1, "0 50, 1000 42, 20000 39, 30000", "500 warning, 22000 ok | ok"),
-        // Silence is stale, is reported once, and is not healthy.
         (above, usual, 1, "0 =1, 1500 =1, 2000", "1050 stale, 1500 ok | ok"),
         (above, usual, 1, "0 NaN, 50 inf, 100 -inf, 150 -, 200", " | none"),
         (above, usual, 1, "0 10, 1000 -, 3000 70, 5000", "2000 stale, 3200 critical | critical"),
         (above, usual, 1, "0 10, 500 50, 2000 -, 5000", "1000 warning, 3000 stale | stale"),
-        // A first value that is bad is not OK while it is debounced.
         (above, usual, 1, "0 70, 50", " | none"),
         (alone, usual, 1, "0 70, 50", " | none"),
-        // A value that came after the step began is fresh.
         (above, usual, 1, "0 -, 50 +10, 100", " | ok"),
-        // A check that does not apply has no level.
         (above, usual, 1, "0 10, 50 off, 100", " | none"),
         (above, usual, 1, "0 50, 1000 off, 1050", "500 warning, 1000 ok | none"),
         // One wrong message raises no alarm, even if it is held for long or is the last one.
@@ -99,7 +94,6 @@ fn a_level_is_what_its_values_of_some_time_say() {
         (above, usual, 12, "0 =10, 2500 =170, 14000", " | ok"),
         (above, usual, 12, "0 =10, 2500 =170, 5000 =170, 7500 =10, 12000", "5000 critical, 9500 ok | ok"),
         (above, none, 12, "0 =10, 2500 =170, 5000 =170, 7500", "5000 critical | critical"),
-        // A critical value needs two measurements of its own.
         (
             above,
             usual,
@@ -107,7 +101,6 @@ fn a_level_is_what_its_values_of_some_time_say() {
             "0 =50, 1000 =50, 2000 =70, 3000 =50, 4000 =70, 5000 =70, 6000",
             "1000 warning, 5000 critical | critical",
         ),
-        // Two bad measurements in a row count although the value grew stale between them.
         (above, usual, 5, "0 =10, 20000 =170, 40000 =170, 42000", "5050 stale, 40200 critical | critical"),
     ] {
         let check = Check { limits, debounce, stale_s: NonZeroU8::new(stale_s), ..CHECK };

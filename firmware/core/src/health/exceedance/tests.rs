@@ -121,7 +121,6 @@ fn what_is_no_longer_exceeded_or_was_only_before_has_no_peak_now() {
     assert_eq!(roll.lifetime.peak.to_bits(), 70.5_f32.to_bits());
 }
 
-/// The instances that are kept, in their order.
 fn kept(exceedances: &Exceedances) -> Vec<u8> {
     exceedances.iter(Instant::ZERO).map(|exceedance| exceedance.instance).collect()
 }
