@@ -36,7 +36,6 @@ For a board with an STM32F405RG and a crystal of 4 to 26 MHz (an even number). N
 pub fn render() -> String {
     let mut page = format!("{HEAD}\n{}", table(""));
     for board in all() {
-        // Cannot fail: it is a text.
         let _ = section(&mut page, board);
     }
     page + TAIL
@@ -49,7 +48,6 @@ pub fn table(page: &str) -> String {
         let slot = if card.has_slot { "slot on the board" } else { "no slot: wire a socket" };
         let input = if owner.takes_5v { "documented" } else { "not documented" };
         let (anchor, usb, price) = (anchor(title), &owner.usb, &owner.price);
-        // Cannot fail: it is a text.
         let _ =
             writeln!(table, "| [{title}]({page}#{anchor}) `{name}` | {slot} | {usb} | {price} | {input} |");
     }

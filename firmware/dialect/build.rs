@@ -22,7 +22,6 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 /// The root of the definitions: all published ones, ArduPilot's and PX4's dialects included.
 const ROOT: &str = "all.xml";
 
-/// The dialect whose messages are read field by field.
 const READ_FROM: &str = "ardupilotmega.xml";
 
 /// Their names. A structure is generated for each; all of a dialect would take half a minute to compile.
@@ -72,13 +71,11 @@ struct Field {
     name: String,
     /// The type as the checksum seed spells it: `uint8_t`, `char`, …
     type_name: String,
-    /// The variant of `Kind`.
     kind: &'static str,
     size: usize,
     /// `None` for a scalar.
     array: Option<usize>,
     extension: bool,
-    /// The variant of `Role`.
     role: &'static str,
     units: String,
     enumeration: String,
@@ -251,7 +248,6 @@ fn read_field(node: Node, extension: bool) -> Result<Field> {
     })
 }
 
-/// The property of a field for the recorder's prediction, beyond its type.
 fn role(node: Node) -> &'static str {
     let time = node.attribute("name").is_some_and(|name| name.starts_with("time"));
     match node.attribute("units") {

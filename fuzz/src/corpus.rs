@@ -68,7 +68,6 @@ fn entries() -> Vec<u8> {
     out
 }
 
-/// Texts that are markup.
 fn markup() -> Vec<u8> {
     let mut out = Vec::new();
     push(&mut out, 0, 10, 0, &[0, 0, 0, 0, 2, 3, 81, 4, 3]);

@@ -26,7 +26,6 @@ pub fn check(data: &[u8]) {
     assert_eq!(counts.bytes_in_frames + counts.bytes_not_frames, bytes.len() as u64);
     assert_eq!(counts.bytes_in_frames, found.iter().map(Vec::len).sum::<usize>() as u64);
     assert_eq!(counts.frames, found.len() as u64);
-    // Frames are the received ones, in order.
     let mut rest = bytes;
     for frame in &found {
         let at =

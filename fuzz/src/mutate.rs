@@ -10,7 +10,6 @@ use hums::rng::Rng;
 
 use crate::Target;
 
-/// Values at limits of code.
 const NUMBERS: [u64; 12] = [0, 1, 2, 7, 0x7f, 0x80, 0xff, 0x7fff, 0x8000, 0xffff, 0x7fff_ffff, u64::MAX];
 
 /// Makes inputs from those of a corpus.
@@ -85,7 +84,6 @@ impl Mutator {
                     *to = from;
                 }
             }
-            // The end of another input.
             6 => {
                 let other = self.pick();
                 let from = self.below(other.len());
@@ -154,7 +152,6 @@ fn holds(target: &Target, input: &[u8]) -> bool {
     catch_unwind(AssertUnwindSafe(|| (target.check)(input))).is_ok()
 }
 
-/// Writes an input that broke a target to the folder of broken inputs.
 fn keep(target: &'static Target, input: &[u8]) -> io::Result<Broken> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
     fs::create_dir_all(&folder)?;

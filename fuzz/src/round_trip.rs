@@ -3,7 +3,6 @@
 use hums_blackbox::{FRAME_BYTES_MAX, Item, LogReader, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
 
-/// The sectors written, sealed.
 #[derive(Default)]
 struct Card(Vec<Sector>);
 

@@ -41,7 +41,6 @@ const CYCLES_A_MICROSECOND: u64 = 168;
 /// Cycles of each stage since the start. The model of the chip reads it by its name.
 #[unsafe(no_mangle)]
 static STAGE_CYCLES: [Mutex<Cell<u64>>; STAGES] = [const { Mutex::new(Cell::new(0)) }; STAGES];
-/// The stage that runs, and the counter when it began.
 static CURRENT: Mutex<Cell<(Stage, u32)>> = Mutex::new(Cell::new((Stage::Idle, 0)));
 
 /// Runs `work` on the account of `stage`. Longer than 2^32 cycles (25 s) in one go counts modulo that.
@@ -57,7 +56,6 @@ pub(crate) fn enter(stage: Stage) {
     switch_to(stage);
 }
 
-/// Cycles of all stages but idle since the start.
 fn busy() -> u64 {
     let cycles = |cs: CriticalSection<'_>| {
         let all = STAGE_CYCLES.iter().skip(Stage::Idle as usize + 1);
@@ -80,7 +78,6 @@ fn switch_to(stage: Stage) -> Stage {
     })
 }
 
-/// Processor load, second by second.
 pub(crate) struct Load {
     since: Instant,
     busy: u64,
@@ -88,7 +85,6 @@ pub(crate) struct Load {
 }
 
 impl Load {
-    /// Nothing is known yet.
     pub(crate) const fn new() -> Self {
         Self { since: Instant::ZERO, busy: 0, worst: 0 }
     }

@@ -12,7 +12,7 @@ pub(crate) const MONITOR: Interrupt = Interrupt::CAN1_RX0;
 pub(crate) const DOWNLINK: Interrupt = Interrupt::CAN1_RX1;
 pub(crate) const STORAGE: Interrupt = Interrupt::CAN1_SCE;
 
-/// The number of the exception that runs; 0 is thread mode.
+/// 0 is thread mode.
 pub(crate) fn running() -> u16 {
     match SCB::vect_active() {
         VectActive::ThreadMode => 0,
@@ -21,7 +21,6 @@ pub(crate) fn running() -> u16 {
     }
 }
 
-/// The number of the exception that a task runs as.
 pub(crate) fn number_of(task: Task) -> u16 {
     let interrupt = match task {
         Task::Reception => RECEPTION,
@@ -44,12 +43,10 @@ pub(crate) fn rank(number: u16) -> usize {
 
 /// The most urgent active task, which ran until now. Used if no exception number was stacked.
 pub(crate) fn begun() -> u16 {
-    // As they interrupt each other.
     let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
     tasks.into_iter().map(number_of).find(|number| NVIC::is_active(Number(number - 16))).unwrap_or(0)
 }
 
-/// An interrupt by its number.
 #[derive(Clone, Copy)]
 struct Number(u16);
 
@@ -60,7 +57,6 @@ unsafe impl InterruptNumber for Number {
     }
 }
 
-/// Name of the code that runs as this exception.
 pub(crate) fn task_of(number: u16) -> &'static str {
     match Task::ALL.into_iter().find(|task| number_of(*task) == number) {
         Some(task) => task.name(),

@@ -24,7 +24,6 @@ static MONITOR_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static DOWNLINK_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static STORAGE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// Spawners of the tasks.
 pub(crate) struct Spawners {
     pub(crate) reception: SendSpawner,
     pub(crate) monitor: SendSpawner,
@@ -32,7 +31,7 @@ pub(crate) struct Spawners {
     pub(crate) storage: SendSpawner,
 }
 
-/// Starts all executors. Call once.
+/// To be called once.
 pub(crate) fn start() -> Spawners {
     for port in board::PORT_INTERRUPTS {
         port.set_priority(Priority::P1);
@@ -50,7 +49,6 @@ pub(crate) fn start() -> Spawners {
     }
 }
 
-/// Runs a task's executor.
 fn run(executor: &'static InterruptExecutor) {
     // SAFETY: only the interrupt that the executor was started with calls this, and its start unmasks that interrupt.
     costs::measure(Stage::Tasks, || unsafe { executor.on_interrupt() });

@@ -23,11 +23,9 @@ const PLACE_BYTES: usize = 64;
 /// Bytes of the file's path within the place: the rest is for the line.
 const FILE_BYTES: usize = PLACE_BYTES - 8;
 const MESSAGE_BYTES: usize = 128;
-/// Messages that are remembered.
 const SEEN: usize = 8;
 /// Bytes of [`Fault::last_messages`].
 const LAST_BYTES: usize = 200;
-/// Says that a note is there.
 const MARK: u32 = 0x4641_554C;
 
 /// How a start can end, by the numbers that the record uses.
@@ -88,7 +86,6 @@ struct Starts {
 #[unsafe(link_section = ".uninit.starts")]
 static STARTS: Starts = Starts { mark: AtomicU32::new(0), count: AtomicU32::new(0) };
 
-/// How the last start ended.
 pub(crate) struct Fault {
     kind: u8,
     task: &'static str,
@@ -99,7 +96,6 @@ pub(crate) struct Fault {
 }
 
 impl Fault {
-    /// As the log records it.
     pub(crate) fn record(&self) -> record::Fault<'_> {
         let Self { kind, task, registers, place, message, .. } = self;
         record::Fault { kind: *kind, task, place, registers: *registers, message }
@@ -147,7 +143,6 @@ pub(crate) fn begin() {
     }
 }
 
-/// A message is about to be worked on.
 pub(crate) fn seen(at: Instant, id: u32) {
     let Seen { next, messages, .. } = &LAST_SEEN;
     let index = next.load(Ordering::Relaxed) as usize % SEEN;
@@ -227,7 +222,6 @@ pub(crate) fn late(interrupted: &ExceptionFrame) {
     }
 }
 
-/// The watchdog was fed after all.
 pub(crate) fn not_late() {
     NOTE.mark.store(0, Ordering::Relaxed);
 }

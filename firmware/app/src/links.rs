@@ -1,5 +1,4 @@
-//! Signals between tasks. The data goes through the queues of `hums_onboard::queues`; a signal only wakes the reader. Signals
-//! coalesce, so sending one never blocks.
+//! Signals between tasks. Signals coalesce, so sending one never blocks.
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -23,7 +22,6 @@ pub(crate) fn now() -> Instant {
     Instant::from_micros(embassy_time::Instant::now().as_micros())
 }
 
-/// A span in the executor's time.
 pub(crate) const fn wait(span: hums_core::clock::Span) -> embassy_time::Duration {
     embassy_time::Duration::from_micros(span.as_micros())
 }

@@ -45,7 +45,6 @@ static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
 static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
 static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
-/// Panic message of a second spawn of a task.
 const ONCE: &str = "each task is spawned once";
 
 #[cortex_m_rt::entry]
@@ -53,7 +52,6 @@ fn main() -> ! {
     start().run()
 }
 
-/// Connects the parts and starts the tasks.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn start() -> board::Idle {

@@ -34,7 +34,7 @@ pub(crate) unsafe fn init() {
     }
 }
 
-/// High-water mark and size of the stack, bytes.
+/// High-water mark and size, bytes.
 pub(crate) fn stack_used() -> (usize, usize) {
     let (bottom, top) = stack_bounds();
     let free = 4 * stack_words().take_while(|word| *word == PAINT).count();
@@ -46,7 +46,6 @@ pub(crate) fn stack_bounds() -> (usize, usize) {
     ((&raw const _stack_end).addr(), (&raw const _stack_start).addr())
 }
 
-/// The stack's words from its bottom up.
 pub(crate) fn stack_words() -> impl Iterator<Item = u32> {
     let (bottom, top) = (&raw const _stack_end, &raw const _stack_start);
     // SAFETY: both addresses bound the stack's memory, which is always readable.

@@ -8,7 +8,6 @@ use cortex_m_rt::ExceptionFrame;
 /// In the order of [`hums_blackbox::record::Fault::registers`]: the stacked registers, then four fault registers.
 pub(crate) type Registers = [u32; 12];
 
-/// The stacked registers and the fault registers.
 pub(crate) fn stacked(frame: &ExceptionFrame) -> Registers {
     let f = frame;
     let [cfsr, hfsr, mmfar, bfar] = status();

@@ -3,7 +3,6 @@
 use hums_onboard::{Mailbox, PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;
 
-/// Check-ins of the tasks.
 pub(crate) static SUPERVISOR: Supervisor = Supervisor::new();
 /// Counters of reception.
 pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
@@ -11,5 +10,4 @@ pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
 /// Monitor to storage: items to store.
 pub(crate) static MAILBOX: Mailbox = Mailbox::new();
-/// Results of the saves.
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();

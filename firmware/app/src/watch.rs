@@ -15,10 +15,9 @@ use crate::fault;
 /// The watchdog does not run yet.
 const NEVER: u32 = u32::MAX;
 
-/// Turns of `SysTick` since the watchdog was fed.
+/// Turns of `SysTick`.
 static SINCE_FED: AtomicU32 = AtomicU32::new(NEVER);
 
-/// The watchdog was fed.
 pub(crate) fn fed() {
     let since = SINCE_FED.swap(0, Ordering::Relaxed);
     if since != NEVER && since >= board::LATE_TURNS {

@@ -2,8 +2,7 @@
 //! the `mavlink` crate.
 //!
 //! Three readers share it. The framer needs length and checksum seed; the black box the kind of each field, to
-//! predict it; the host tools names and units (feature `names`). The common parts of all messages stand beside it:
-//! the parts of a frame ([`wire`]) and its checksum ([`crc`]).
+//! predict it; the host tools names and units (feature `names`).
 //!
 //! Messages that are read field by field are structures from the `mavlink` crate's generator ([`ardupilotmega`]).
 #![cfg_attr(not(test), no_std)]

@@ -40,7 +40,6 @@ fn turned(quarter: i32, rest: f32) -> f32 {
 /// Quarter turns, and the rest of an angle. A quarter turn has three parts (Cody and Waite), whose products are exact.
 fn reduce(angle: f32) -> (i32, f32) {
     const PARTS: [f32; 3] = [1.570_312_5, 4.837_513e-4, 7.549_79e-8];
-    // NaN is out of range too.
     let angle = if fabsf(angle) <= ANGLE_MAX { angle } else { 0.0 };
     let quarter = (angle * core::f32::consts::FRAC_2_PI + copysignf(0.5, angle)) as i32;
     (quarter, PARTS.iter().fold(angle, |rest, part| rest - quarter as f32 * part))

@@ -11,9 +11,7 @@ use crate::source::told::Finding;
 
 /// Word for the monitor on board, as `checked_by` in `hums info --json`.
 pub const BOARD: &str = "board";
-/// Word for this program.
 const HUMS: &str = "hums";
-/// Word if nothing could be judged.
 const NOBODY: &str = "nobody";
 
 /// This program's findings in a recording whose recorder ran no checks.

@@ -83,7 +83,6 @@ impl Texts {
     }
 }
 
-/// How long the frame is that begins here.
 fn length(bytes: &[u8]) -> Option<usize> {
     let [magic, payload, flags, ..] = *bytes else { return None };
     match magic {

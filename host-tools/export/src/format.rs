@@ -109,7 +109,6 @@ pub trait Part: Any + Send {
     fn held_bytes(&self) -> usize;
 }
 
-/// A part of a format that is made of observations alone.
 impl Part for () {
     fn held_bytes(&self) -> usize {
         0

@@ -62,18 +62,15 @@ pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identit
     Ok((Identity { vehicle, date, session, epochs }, checked))
 }
 
-/// Sources of the identity.
 #[derive(Default)]
 struct Known {
     /// The monitor's record of the vehicle. A packed log has no such record, so the vehicle's own messages
     /// count too.
     recorded: Option<Vehicle>,
-    /// The board's unique id.
     board: Option<[u8; 12]>,
     /// The first system whose autopilot sends a heartbeat.
     heard: Option<u8>,
     uid: Option<u64>,
-    /// The time of the first observation.
     first: Option<Instant>,
 }
 

@@ -24,7 +24,6 @@ const EVERY: Span = Span::from_millis(200);
 /// After this time without a place the track begins again.
 const SILENCE: Span = Span::from_secs(5);
 
-/// Findings of a part.
 #[derive(Default)]
 pub(crate) struct Findings(pub(crate) Vec<Finding>);
 
@@ -38,7 +37,6 @@ impl Part for Findings {
     }
 }
 
-/// The way so far.
 #[derive(Default)]
 pub(crate) struct Journey {
     motion: Motion,
@@ -47,24 +45,21 @@ pub(crate) struct Journey {
     track: Track,
     findings: Vec<Finding>,
     findings_left_out: u64,
-    /// Places of the way.
     pub(crate) fixes: u64,
 }
 
-/// A finding with a place.
 pub(crate) struct Placed<'a> {
     pub(crate) at: Instant,
     pub(crate) latitude_deg: f64,
     pub(crate) longitude_deg: f64,
     pub(crate) altitude_m: f32,
-    /// The check and its instance.
     pub(crate) name: String,
     pub(crate) words: String,
     pub(crate) finding: &'a Finding,
 }
 
 impl Journey {
-    /// Takes a part. `each` gets the places of the wanted time, and whether the track begins again with it.
+    /// `each` gets the places of the wanted time, and whether the track begins again with it.
     pub(crate) fn take(
         &mut self,
         context: &Context,
@@ -146,9 +141,7 @@ pub(crate) fn push_xml(out: &mut String, text: &str) {
     }
 }
 
-/// An element with text.
 pub(crate) fn push_element(out: &mut String, name: &str, text: &str) {
-    // Writing to a string cannot fail.
     let _ = write!(out, "<{name}>");
     push_xml(out, text);
     let _ = write!(out, "</{name}>");

@@ -198,7 +198,6 @@ pub fn run(args: &Request) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Refuses what no format of the request can have.
 fn check_request(args: &Request) -> Result<()> {
     if args.findings && !args.formats.iter().any(|format| format.about.name == "tlog") {
         return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
@@ -212,7 +211,6 @@ fn check_request(args: &Request) -> Result<()> {
     Ok(())
 }
 
-/// Prints the remarks on what was found.
 fn remark(found: &Found, remarks: &[String]) {
     for remark in remarks.iter().chain(&found.remarks) {
         note!("{remark}");
@@ -225,7 +223,7 @@ fn remark(found: &Found, remarks: &[String]) {
     }
 }
 
-/// A log beside the requested one, which may show how that one ends.
+/// Neighbour of the requested log, which may show how that one ends.
 fn beside(work: &NamedLog<'_>) -> Result<Done> {
     let ending = match work.log.own() {
         Some(_) => Some(check::overview(work.log)?.ending),
@@ -259,7 +257,7 @@ fn check_output(args: &Request, logs: usize, formats: &Formats) -> Result<bool> 
         )));
     }
     let extension = args.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    // No folder is made of a file's name by mistake.
+    // A file's name never makes a folder by mistake.
     let is_file_name = extension
         .is_some_and(|extension| FORMATS.iter().any(|format| format.about.extension() == extension.as_str()));
     if !one_file && logs > 0 && is_file_name && !says_directory(&args.output) {
@@ -276,7 +274,6 @@ fn check_output(args: &Request, logs: usize, formats: &Formats) -> Result<bool> 
 /// same reading.
 type Read<'a> = (Summary, Writers<'a>, Option<Checked>);
 
-/// The work for each log.
 struct Task<'a> {
     formats: Formats,
     selection: Selection,
@@ -289,7 +286,7 @@ struct Task<'a> {
     offset_s: f64,
 }
 
-/// A log's outcome, reported in the logs' order.
+/// Reported in the logs' order.
 struct Done {
     name: String,
     outcome: Outcome,
@@ -304,13 +301,11 @@ struct Done {
 }
 
 impl Done {
-    /// Without files and remarks.
     fn of(log: &Place) -> Self {
         let (made, remarks) = (Vec::new(), Vec::new());
         Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, made, remarks }
     }
 
-    /// Adds further files of the same log.
     fn add(&mut self, next: Self) {
         self.outcome = self.outcome.and(next.outcome);
         self.ending = next.ending.or_else(|| self.ending.take());
@@ -325,7 +320,6 @@ impl Done {
         self.outcome.and(Outcome::lossy(!is_sound))
     }
 
-    /// Prints the remarks and the files written, or adds them to the JSON.
     fn tell(self, json: Option<&mut MadeJson>) -> Result<()> {
         for remark in &self.remarks {
             note!("{remark}");
@@ -398,7 +392,6 @@ impl Task<'_> {
         Ok(done)
     }
 
-    /// Decodes the selected part of a log into files of this name.
     fn decode_part(
         &self,
         work: &NamedLog<'_>,
@@ -503,7 +496,6 @@ impl Task<'_> {
         Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole())
     }
 
-    /// Reads a log into its files, which are not whole yet.
     fn read<'a>(
         &self,
         place: &Place,

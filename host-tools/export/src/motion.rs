@@ -22,7 +22,6 @@ pub(crate) struct Fix {
     pub height_m: Option<f32>,
 }
 
-/// The vehicle, replayed from its observations.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
     vehicle: Vehicle,
@@ -31,7 +30,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Takes an observation; `false` if it is not of the vehicle.
+    /// `false` if it is not of the vehicle.
     pub(crate) fn observe(&mut self, observed: &Observed) -> bool {
         let own = self.vehicle.observe(observed.at.into(), observed.source, &observed.observation);
         if own {
@@ -71,7 +70,6 @@ impl Motion {
         Some(between(origin, self.fix_by(&Observation::GlobalPosition(*global))?))
     }
 
-    /// Velocity north, east and down, m/s.
     pub(crate) fn velocity(&self) -> Option<[f32; 3]> {
         let local = self.vehicle.local.get().map(|local| local.velocity);
         let velocity = local.or_else(|| self.vehicle.global.get().map(|global| global.velocity))?;

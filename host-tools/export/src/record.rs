@@ -139,7 +139,6 @@ fn recorder_rows(record: &Record<'_>) -> Vec<Row> {
     }
 }
 
-/// Kept parts of the log, and the extent of its completeness.
 fn extent_rows(record: &Record<'_>) -> Vec<Row> {
     let one = |table, cells| vec![Row::new(table, cells)];
     match record {

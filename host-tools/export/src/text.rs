@@ -150,14 +150,13 @@ pub fn push_json_number(out: &mut Vec<u8>, scalar: Scalar) {
 
 /// Text as a JSON string.
 pub fn push_json_text(out: &mut Vec<u8>, text: &[u8]) {
-    // Names of fields and most texts need no escape; looking for one takes less than writing byte by byte.
+    // Most texts need no escape; looking for one takes less than writing byte by byte.
     if text.iter().all(|byte| matches!(byte, b' '..=b'~') && *byte != b'"' && *byte != b'\\') {
         out.push(b'"');
         out.extend_from_slice(text);
         out.push(b'"');
         return;
     }
-    // Writing a string to a Vec cannot fail.
     let _ = serde_json::to_writer(out, &String::from_utf8_lossy(text));
 }
 

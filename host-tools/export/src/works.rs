@@ -9,14 +9,12 @@ use crate::naming::{self, Named, Traits};
 use crate::outcome::usage as usage_error;
 use crate::source::recording::Place;
 
-/// A log, and the name of its files.
 pub(super) struct NamedLog<'a> {
     pub(super) log: &'a Place,
     pub(super) traits: Traits,
     pub(super) named: Named,
 }
 
-/// The logs of a command, named.
 pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<NamedLog<'a>>> {
     let mut traits = Vec::new();
     // A log that cannot be read is named all the same: reading it says why.

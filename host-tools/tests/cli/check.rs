@@ -141,7 +141,6 @@ fn a_log_whose_middle_is_gone_is_not_called_all_right_anywhere() {
     let line = |name: &str| table.lines().find(|line| line.contains(name)).unwrap_or_default().to_owned();
     assert!(line("log.hum").starts_with("damaged ") && line("calm.tlog").starts_with("ok "), "{table}");
     assert!(line("log.hum").ends_with("part of it is missing or damaged"), "{table}");
-    // Without a number of missing frames, no text gives zero.
     fs::write(dir.path().join("log.hum"), [&log[..512], &log[from..]].concat()).expect("written");
     for command in ["check", "info", "info --verify", "decode -o out --format tlog"] {
         let ended = run(dir.path(), &format!("{command} log.hum"), 3);
@@ -299,7 +298,6 @@ fn a_log_without_times_is_not_called_good_and_its_page_neither() {
     assert!(!info.contains("sector"), "{info}");
 }
 
-/// Messages of an `ArduPilot` log: the definition of FMT, then these.
 fn dataflash(messages: &[(u8, Vec<u8>)]) -> Vec<u8> {
     let mut log = Vec::new();
     for (kind, payload) in
@@ -311,7 +309,6 @@ fn dataflash(messages: &[(u8, Vec<u8>)]) -> Vec<u8> {
     log
 }
 
-/// The FMT message of a type.
 fn format_of(kind: u8, length: u8, name: &str, characters: &str, columns: &str) -> Vec<u8> {
     let mut payload = vec![kind, length];
     for (words, size) in [(name, 4), (characters, 16), (columns, 64)] {
@@ -512,7 +509,6 @@ fn what_a_logger_itself_lost_is_said_and_is_no_damage_to_any_command() {
     let info = text(&run(dir.path(), "info drop.ulg", 0));
     assert!(info.contains("1 place of loss or noise"), "{info}");
     run(dir.path(), "report drop.ulg -o page.html", 0);
-    // It has one vehicle.
     run(dir.path(), "check --system 1 drop.ulg", 2);
     let output = run(dir.path(), "decode drop.ulg -o out --format csv", 0);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -572,7 +568,6 @@ fn with_times(log: &[u8], time: impl Fn(usize, u64) -> u64) -> Vec<u8> {
     records.flat_map(|(index, (us, frame))| [&time(index, us).to_be_bytes()[..], frame].concat()).collect()
 }
 
-/// A tlog as a computer whose clock is an hour ahead would have recorded it.
 fn an_hour_ahead(log: &[u8]) -> Vec<u8> {
     with_times(log, |_, us| us + 3_600_000_000)
 }
@@ -697,7 +692,6 @@ fn a_packed_recording_has_the_times_the_damage_and_the_joints_that_check_sees() 
     assert_eq!(checked["gaps"][0]["why"], "1 frame with a wrong checksum, which is not read");
 }
 
-/// Such a frame cannot be verified: it is kept unchanged.
 #[test]
 fn a_frame_whose_id_is_not_known_is_kept_bit_for_bit() {
     let dir = tempfile::tempdir().expect("directory");
@@ -819,7 +813,6 @@ fn filtered(name: &str, dir: &Path, file: &str, keep: impl Fn(usize, usize, u32)
     fs::write(dir.join(file), bytes).expect("written");
 }
 
-/// Heartbeats and texts alone: flight, height and faults are unknown.
 #[test]
 fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
     let dir = tempfile::tempdir().expect("directory");
@@ -877,7 +870,6 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     assert!(listed.contains("; begins in the air; ends in the air"), "{listed}");
 }
 
-/// A finding of the box has the worst value of the flight, not that at its beginning.
 #[test]
 fn a_card_tells_the_worst_value_of_what_the_box_found() {
     let dir = tempfile::tempdir().expect("directory");

@@ -29,7 +29,6 @@ fn read(dir: &Path, command: &'static str, inputs: &str) -> (&'static str, i32, 
     (command, code, String::from_utf8_lossy(&said).into_owned())
 }
 
-/// Every command that reads, with these inputs.
 pub(crate) fn readers(dir: &Path, inputs: &str) -> Vec<(&'static str, i32, String)> {
     READERS.map(|command| read(dir, command, inputs)).to_vec()
 }
@@ -42,7 +41,6 @@ pub(crate) fn all_say(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
     assert_said([READERS[0], READERS[1 + turn]].map(|command| read(dir, command, inputs)), code, words);
 }
 
-/// Each of them ends with this code and prints this.
 #[track_caller]
 pub(crate) fn each_says(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
     assert_said(readers(dir, inputs), code, words);

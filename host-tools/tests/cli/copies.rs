@@ -87,8 +87,6 @@ fn two_copies_of_one_session_have_two_pages_and_the_damaged_one_is_not_kept_alon
     }
 }
 
-/// A copy of a log with another log behind it: only the copied one is read, and it counts once. The other one is in
-/// no output.
 #[test]
 fn another_log_behind_a_copy_is_told_by_every_command() {
     let dir = copied(2);
@@ -103,7 +101,6 @@ fn another_log_behind_a_copy_is_told_by_every_command() {
     let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("FAILED  files ") && said.contains("1 session: damage"), "{said}");
     assert!(text(&run(dir.path(), "info --list copied", 3)).contains("not proved to be whole"));
-    // A copy alone gives no finding.
     fs::write(at("all.hum"), &one).expect("written");
     all_say(dir.path(), "copied", 0, &["00001 once more (not counted)"]);
 }

@@ -26,7 +26,6 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
     );
 }
 
-/// A header with a valid check, but wrong counts of frames and records: an invalid entry, or a lost one.
 #[test]
 fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
     let dir = copied(1);
@@ -101,7 +100,6 @@ fn what_parity_contradicts_is_told_by_every_command() {
     assert_eq!(verified(&lost), (true, false));
 }
 
-/// No data of them is lost, but the card may damage others: no reader calls such a log good.
 #[test]
 fn sectors_that_parity_made_again_are_told_by_every_command() {
     let dir = copied(1);
@@ -142,7 +140,6 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
         assert_eq!((&json["ok"], &json["logs"][0]["ok"]), (&false.into(), &false.into()));
         assert!(count.starts_with(&made_again.to_string()), "{json}");
         assert_eq!(frames(&text(&run(dir.path(), "info copied", 3))), before);
-        // The screen shows it too, not only standard error.
         let screen = text(&run(dir.path(), "check copied", 3));
         assert!(screen.contains("; the log is repaired from its parity, nothing is lost"), "{screen}");
     }
@@ -157,7 +154,6 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
     assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
 }
 
-/// The log is whole, but the card's next losses cannot be rebuilt.
 #[test]
 fn parity_that_is_gone_is_told_by_every_command() {
     let dir = copied(1);
@@ -221,7 +217,6 @@ fn a_sector_that_was_put_between_the_last_ones_costs_no_frame() {
     }
 }
 
-/// `verify` and `info` count the same superseded sectors, foreign sectors and other blocks of a log's file.
 #[test]
 fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
     let dir = copied(1);

@@ -4,7 +4,6 @@ use std::fs;
 
 use super::support::{contents, flight, json, recorded, records, run, text};
 
-/// The manifest has the hash of what was read, and is not written over anything.
 #[test]
 fn a_manifest_names_each_file_with_its_hash() {
     use sha2::Digest as _;
@@ -21,7 +20,6 @@ fn a_manifest_names_each_file_with_its_hash() {
     run(dir.path(), "info --verify card.img --manifest card.img", 2);
 }
 
-/// A query over a fleet counts each session once, however often its logs were decoded.
 #[test]
 fn a_folder_that_is_decoded_again_and_again_has_each_session_once() {
     let dir = tempfile::tempdir().expect("directory");
@@ -46,7 +44,6 @@ fn a_folder_that_is_decoded_again_and_again_has_each_session_once() {
     run(dir.path(), "decode logs -o fleet --format parquet --message HEARTBEAT", 1);
 }
 
-/// The texts are those of the box, at the times of `hums check`; without them the frames are those of the recording.
 #[test]
 fn a_tlog_with_findings_has_them_as_texts_of_the_box() {
     let dir = tempfile::tempdir().expect("directory");

@@ -23,13 +23,11 @@ fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_ev
         all_say(dir.path(), "copied", 3, &[&told]);
         fs::remove_file(path).expect("removed");
     }
-    // The log itself, in place of its sectors.
     let path = dir.path().join("copied/00001_00.HUM");
     let was = fs::read(&path).expect("there");
     fs::write(&path, vec![0; SEGMENT]).expect("written");
     all_say(dir.path(), "copied", 3, &["00001_00.HUM has the name of a segment and holds nothing of ours"]);
     fs::write(&path, was).expect("written");
-    // A log with another name.
     fs::write(dir.path().join("copied/flight.hum"), "nothing").expect("written");
     all_say(dir.path(), "copied", 3, &["flight.hum: has the name of a log and holds nothing of ours"]);
 }
@@ -106,7 +104,6 @@ fn a_file_that_the_next_start_found_empty_is_no_loss() {
     for (command, code, said) in readers(dir.path(), "copied") {
         assert_eq!(code, 0, "{command}: {said}");
     }
-    // Without the third one this is unknown.
     fs::remove_file(at("00003_00.HUM")).expect("removed");
     all_say(dir.path(), "copied", 3, &["00002_00.HUM has the name of a segment and holds nothing of ours"]);
 }

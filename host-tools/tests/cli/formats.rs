@@ -25,7 +25,6 @@ fn read(path: &Path) -> SerializedFileReader<File> {
     SerializedFileReader::new(File::open(path).expect("a file")).expect("Parquet")
 }
 
-/// A directory with a flight packed as `NAME.hum`.
 fn packed(names: &[&str]) -> TempDir {
     let dir = tempfile::tempdir().expect("a directory");
     for name in names {
@@ -35,7 +34,6 @@ fn packed(names: &[&str]) -> TempDir {
     dir
 }
 
-/// The files below a directory, by name.
 fn files(dir: &Path, ending: &str) -> BTreeMap<String, PathBuf> {
     let mut found = BTreeMap::new();
     let mut waiting = vec![dir.to_owned()];
@@ -110,7 +108,6 @@ fn a_second_of_flight_has_the_format_of_the_reference_systems_example() {
         let flying = values.iter().filter(|row| shape(row) == shape(EXAMPLE)).count();
         assert!(flying > 200, "{name}: {flying} of {} rows", values.len());
         assert!(values.iter().all(|row| row.split("; ").count() == 13), "{name}");
-        // One row a second, and the same seconds in all tables.
         let seconds: Vec<u64> = values[1..]
             .iter()
             .map(|row| row.split_once('s').expect("a time").0.parse().expect("seconds"))
@@ -129,7 +126,6 @@ fn a_second_of_flight_has_the_format_of_the_reference_systems_example() {
     }
 }
 
-/// A line of the protocol: measurement, tags, fields, time.
 fn point(line: &str) -> (String, BTreeMap<String, String>, BTreeMap<String, String>, u64) {
     let (mut parts, mut part, mut quoted, mut escaped) = (Vec::new(), String::new(), false, false);
     for c in line.chars() {
@@ -267,7 +263,6 @@ fn parquet_keeps_types_units_and_every_value() {
         at += 1;
     }
     assert_eq!(at, rows.len());
-    // As many rows in every table as in the CSV's.
     for (name, csv) in files(&dir.path().join("out"), ".csv") {
         let parquet = read(&tables[&name]).metadata().file_metadata().num_rows();
         let lines = fs::read_to_string(csv).expect("text").lines().count() as i64 - 1;

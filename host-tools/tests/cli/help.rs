@@ -19,7 +19,6 @@ const SERVES: &str = "live";
 /// Examples that need a firmware image (`tests/chip` runs one) or a board (`tests/sim/companion.rs` simulates one).
 const ELSEWHERE: [&str; 2] = ["--firmware", "box "];
 
-/// The examples of a help text, without remarks, pipes and redirections.
 fn examples(help: &str) -> Vec<String> {
     let lines = help.lines().filter_map(|line| line.strip_prefix("  hums "));
     let plain = |line: &str| {
@@ -28,7 +27,6 @@ fn examples(help: &str) -> Vec<String> {
     lines.filter_map(plain).collect()
 }
 
-/// The help texts of the program and of all its commands.
 fn helps(dir: &Path) -> Vec<String> {
     let mut root = Cli::command();
     root.build();
@@ -48,7 +46,6 @@ fn waits(example: &str) -> bool {
     for_a_link || (!live && (example.contains("udpin:") || example.contains("udpout:")))
 }
 
-/// Starts a server of a page, and ends it when it has printed the address.
 fn serve(dir: &Path, example: &str) {
     let port = UdpSocket::bind("127.0.0.1:0").expect("a port").local_addr().expect("its address").port();
     let example = example.replace(":14550", &format!(":{port}"));

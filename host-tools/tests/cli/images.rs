@@ -17,7 +17,6 @@ fn a_wiped_card_is_told_with_and_without_salvage() {
     };
     assert_eq!(codes(), [0; 4]);
     let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
-    // All of them: a quick format.
     let mut wiped = image.clone();
     for name in [b"00001_00HUM", b"00002_00HUM"] {
         wiped[entry(name)..entry(name) + 32].fill(0);
@@ -33,7 +32,6 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
     let path = dir.path().join("card.img");
     let image = fs::read(&path).expect("an image");
     let entry = |name: &[u8]| image.windows(11).position(|bytes| bytes == name).expect("an entry");
-    // The newest one was renamed on a PC.
     let mut renamed = image.clone();
     renamed[entry(b"00003_00HUM")..][..11].copy_from_slice(b"FLIGHT  BAK");
     fs::write(&path, &renamed).expect("written");
@@ -67,7 +65,6 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
     }
     let told = json(&run(dir.path(), "info --json card.img", 0));
     assert_eq!(told["images"][0]["not_looked_at"], words);
-    // The oldest one was deleted: that makes room, and is reported.
     let mut oldest = image.clone();
     let at = entry(b"00001_00HUM");
     free(&mut oldest, at);

@@ -7,7 +7,6 @@ use std::process::{Command, Stdio};
 
 use crate::support::{attempt, contents, flight, hums, json, px4, recorded, run, text, until};
 
-/// Whether a run has begun the ground station's output.
 fn is_begun(dir: &Path) -> bool {
     let mut names = fs::read_dir(dir).expect("a folder").map(|entry| entry.expect("an entry").file_name());
     names.any(|name| name.to_string_lossy().starts_with(".gs."))
@@ -196,7 +195,6 @@ fn a_store_beside_recordings_is_named_and_is_no_loss() {
     run(dir.path(), "info .", 3);
 }
 
-/// A half store would be refused from then on.
 #[test]
 fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     let dir = tempfile::tempdir().expect("a folder");
@@ -217,7 +215,6 @@ fn a_store_that_cannot_be_made_leaves_nothing_that_is_in_the_way() {
     assert!(contents(dir.path()) == before, "{said}");
 }
 
-/// After a kill at any write the card is valid, and the next run continues on it; so does the store.
 #[test]
 fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with() {
     let dir = recorded();

@@ -8,12 +8,9 @@ use hums::cli::Cli;
 
 use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps, text};
 
-/// The kind of file that an argument names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
-    /// A file or a folder that is only read.
     Input,
-    /// A file or a folder that is written.
     Output,
     /// No file.
     Other,
@@ -33,7 +30,6 @@ fn role(arg: &Arg) -> Role {
     }
 }
 
-/// The error about an output that is one of its inputs.
 const IS_INPUT: &str = "input of this command";
 
 /// For an output that is not a file, the error instead of [`IS_INPUT`]: the command, the output, the text, and the
@@ -100,13 +96,11 @@ pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, Stri
     words
 }
 
-/// The flags of a command that take no value and change what it does.
 fn flags(command: &clap::Command) -> Vec<String> {
     let is_flag = |arg: &&Arg| matches!(arg.get_action(), ArgAction::SetTrue);
     command.get_arguments().filter(is_flag).filter_map(|arg| Some(format!("--{}", arg.get_long()?))).collect()
 }
 
-/// All commands without subcommands, with their words.
 pub(crate) fn leaves<'a>(
     command: &'a clap::Command,
     path: &[&'a str],
@@ -225,7 +219,6 @@ fn refused(dir: &Path, words: &[String], words_said: &str, before: &[(String, St
     let output = attempt(dir, &line);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(matches!(output.status.code(), Some(1 | 2)), "hums {line}: {:?}\n{said}", output.status);
-    // Nothing was changed or left behind.
     let after = stamps(dir);
     for file in before {
         assert!(after.contains(file), "hums {line}: {} is not what it was\n{said}", file.0);

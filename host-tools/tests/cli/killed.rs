@@ -11,7 +11,6 @@ use crate::support::{
     all_named, attempt, contents, flight, frames_of, furnished, json, named, px4, run, until,
 };
 
-/// Files and folders that are not whole.
 fn parts(dir: &Path) -> Vec<String> {
     contents(dir).into_iter().map(|(name, _)| name).filter(|name| name.contains(".hums-part")).collect()
 }
@@ -199,7 +198,6 @@ fn what_is_not_whole_in_a_folder_is_passed_over_and_told() {
     assert_eq!(all_named(&dir.path().join("out"), "00001").len(), 1);
 }
 
-/// Two signals at once (from a shell and `timeout`, say) are one request to end.
 #[test]
 fn two_signals_right_after_each_other_end_the_page_in_good_order() {
     let mut live = Command::new(env!("CARGO_BIN_EXE_hums"));

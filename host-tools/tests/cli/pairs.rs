@@ -73,7 +73,6 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         let gap = gaps.iter().find(is_there).unwrap_or_else(|| panic!("{name}: {gaps:?}"));
         // The rest of the message in which it begins may look like one.
         assert!(gap["bytes"].as_u64() >= Some(800), "{name}: {gap}");
-        // The data before and behind it is judged.
         let (from, to) = (checked["from_s"].as_f64(), checked["to_s"].as_f64());
         assert!(to.zip(from).is_some_and(|(to, from)| to - from > 60.0), "{name}: {checked}");
         let said = text(&run(dir.path(), &format!("check {name}"), 4));

@@ -12,7 +12,6 @@ use crate::support::{
     attempt, contents, flight, frames, frames_of, hums, json, named, px4, recorded, run, text,
 };
 
-/// A packed log of the PX4 flight.
 fn packed(dir: &Path) {
     run(dir, "decode --format hum PX4 -o flight.hum", 0);
 }
@@ -182,7 +181,6 @@ fn filters_choose_by_time_and_by_message() {
     run(dir.path(), "decode flight.hum -o - --format jsonl --from yesterday", 2);
 }
 
-/// Findings in the output of `hums decode`: level, check, seconds, source.
 fn findings_of(jsonl: &str) -> Vec<String> {
     let rows = jsonl.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).expect(line));
     let findings = rows.filter(|row| row["record"] == "HUMS_FINDING");
@@ -221,7 +219,6 @@ fn a_recording_that_nobody_checked_has_the_findings_of_this_program_and_says_so(
             (&last["fields"]["verdict"], last["fields"]["findings"].as_u64()),
             (&"critical".into(), Some(found.len() as u64))
         );
-        // A part has the findings in its time.
         let until = format!(
             "decode {input} -o - --format jsonl --to {}",
             found[2].split(' ').nth(2).expect("a time")
@@ -443,7 +440,6 @@ fn slips_of_the_command_line_are_usage_errors() {
     assert!(!dir.path().join("c.img").exists(), "a slip left an image behind");
 }
 
-/// A process may have no room for threads (`ulimit -v`): here no stack gets its requested size.
 #[test]
 fn where_the_system_gives_no_thread_the_work_is_done_without() {
     let dir = recorded();
@@ -465,7 +461,6 @@ fn where_the_system_gives_no_thread_the_work_is_done_without() {
     assert!(decoded("out", None) == decoded("again", Some("140737488355328")));
 }
 
-/// A box that is restarted in flight: the first log ends in the air, the second one begins there.
 #[test]
 fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_the_order_in_which_they_began()
 {
@@ -492,7 +487,6 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
     let next = text(&run(dir.path(), "info z.img --session 2", 0));
     assert_eq!(counter(&next, "Take-offs").as_deref(), Some("0"), "{next}");
     assert_eq!(counter(&next, "Landings").as_deref(), Some("1"), "{next}");
-    // Without -o a page lies beside its log, and is not overwritten.
     fs::create_dir(dir.path().join("beside")).expect("a folder");
     fs::copy(dir.path().join("y.tlog"), dir.path().join("beside/y.tlog")).expect("a copy");
     for (line, code) in
@@ -500,7 +494,6 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
     {
         run(dir.path(), line, code);
     }
-    // Nothing in it tells of the folders of this computer.
     run(dir.path(), &format!("report {} -o pages/", dir.path().join("beside").display()), 0);
     for page in ["beside/y.html", "pages/index.html"] {
         let page = fs::read_to_string(dir.path().join(page)).expect("a page");
@@ -527,7 +520,6 @@ fn session_of_points(folder: &Path, recording: &str) -> String {
     tag.split([',', ' ']).next().expect("a name").to_owned()
 }
 
-/// A companion computer alone sends only unknown messages; its recordings are distinguished by their bytes.
 #[test]
 fn recordings_without_a_known_message_are_sessions_with_dates_of_their_own() {
     let dir = tempfile::tempdir().expect("a directory");

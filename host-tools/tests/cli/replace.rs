@@ -13,7 +13,6 @@ use crate::support::{
     all_named, attempt, contents, end_of, frames_of, furnished, named, px4, run, stamps, text,
 };
 
-/// Two cards, each with the first session of a vehicle of its own.
 fn two_cards() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     for (name, recording) in [("c1", "px4_hil_quad_low.tlog"), ("c2", "ap_quad_guided.tlog")] {
@@ -63,7 +62,6 @@ fn two_cards_decoded_into_one_folder_stay_apart() {
     assert_eq!(contents(&dir.path().join("one_by_one")), contents(&dir.path().join("at_once")));
 }
 
-/// Two folders, each with a log of the same name: the whole one, and one without its last half.
 fn whole_and_cut() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     for folder in ["whole", "cut", "one"] {
@@ -114,7 +112,6 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
     assert_eq!(parquet_sessions(&fleet).len(), 1);
 }
 
-/// Every command with the flag, found in the definition of the command line, with each of its formats.
 #[test]
 fn every_command_with_the_flag_makes_the_same_again_with_it() {
     let mut root = Cli::command();
@@ -173,7 +170,6 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
             let line = line.replace("OUT", name);
             let said = run(dir.path(), &line, 1);
             assert!(stamps(dir.path()) == before, "{line}");
-            // A command without the flag does not advise it.
             let said = String::from_utf8_lossy(&said.stderr);
             assert_eq!(said.contains("--force"), !line.starts_with("sim"), "{line}: {said}");
         }
@@ -182,7 +178,6 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
     assert!(String::from_utf8_lossy(&said.stderr).contains("are one file"));
 }
 
-/// Two cards have an equal log; the trend on a page belongs to the page's own card.
 #[test]
 fn a_page_of_an_equal_session_of_another_card_is_refused() {
     let dir = tempfile::tempdir().expect("directory");

@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 use assert_cmd::Command;
 use tempfile::TempDir;
 
-/// A recording of the repository.
 pub(crate) fn flight(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name)
 }
@@ -55,7 +54,7 @@ pub(crate) fn hums() -> Command {
     command
 }
 
-/// Runs it in `dir` and returns its output; the exit code must be this one.
+/// The exit code must be this one.
 #[track_caller]
 pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     let output = attempt(dir, line);
@@ -64,7 +63,7 @@ pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     output
 }
 
-/// Runs it in `dir` and returns its output, with any exit code.
+/// Any exit code.
 #[track_caller]
 pub(crate) fn attempt(dir: &Path, line: &str) -> Output {
     let arguments = line.split_whitespace().map(|word| match word {
@@ -77,12 +76,10 @@ pub(crate) fn attempt(dir: &Path, line: &str) -> Output {
     output
 }
 
-/// Standard output as text.
 pub(crate) fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// The object that `--json` printed.
 pub(crate) fn json(output: &Output) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
@@ -137,7 +134,6 @@ pub(crate) fn made_once(what: &str, make: impl FnOnce(&Path)) -> TempDir {
     dir
 }
 
-/// The frames of a tlog, without their times.
 pub(crate) fn frames(tlog: &[u8]) -> Vec<Vec<u8>> {
     let mut frames = Vec::new();
     let mut at = 0;
@@ -153,7 +149,6 @@ pub(crate) fn frames(tlog: &[u8]) -> Vec<Vec<u8>> {
     frames
 }
 
-/// The frames of a recording of the repository.
 pub(crate) fn frames_of(path: &Path) -> Vec<Vec<u8>> {
     frames(&fs::read(path).expect("a recording"))
 }
@@ -167,7 +162,6 @@ pub(crate) fn named(dir: &Path, base: &str) -> String {
     names[0].clone()
 }
 
-/// The names of all logs of this base, sorted.
 pub(crate) fn all_named(dir: &Path, base: &str) -> Vec<String> {
     let entries = fs::read_dir(dir).expect("a directory").map(|entry| entry.expect("an entry").file_name());
     let mut names: Vec<String> = entries
@@ -205,7 +199,6 @@ pub(crate) fn furnished() -> TempDir {
     dir
 }
 
-/// All files of a directory, by name.
 pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
     each_file(dir, |path| fs::read(path).expect("a file"))
 }
@@ -214,7 +207,7 @@ pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
 /// untouched.
 pub(crate) type Stamp = (u64, u64, i64, i64);
 
-/// All files below a directory by name, without reading them: a card's image is large.
+/// By name, without reading them: a card's image is large.
 pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
     each_file(dir, |path| {
         let of = fs::metadata(path).expect("a file");
@@ -222,7 +215,6 @@ pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
     })
 }
 
-/// All files below a directory by name, in order, with a property of each.
 fn each_file<T: Ord>(dir: &Path, of: impl Fn(&Path) -> T + Copy) -> Vec<(String, T)> {
     let mut found = Vec::new();
     let entries = fs::read_dir(dir).expect("a directory");
@@ -239,7 +231,6 @@ fn each_file<T: Ord>(dir: &Path, of: impl Fn(&Path) -> T + Copy) -> Vec<(String,
     found
 }
 
-/// Waits until a condition holds.
 #[track_caller]
 pub(crate) fn until(what: &str, is: impl Fn() -> bool) {
     let limit = Instant::now() + Duration::from_secs(30);

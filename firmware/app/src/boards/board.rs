@@ -23,7 +23,7 @@ pub(crate) use super::stm32f4::{
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
 static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
 
-/// Parts of a board: reception and transmission of each port, and the rest.
+/// Reception and transmission of each port, and the rest.
 pub(crate) struct Parts {
     pub(crate) autopilot: (PortRx, PortTx),
     pub(crate) gs: (PortRx, PortTx),
@@ -48,7 +48,6 @@ macro_rules! port {
     }};
 }
 
-/// The card's port and its type: on an SPI, or on pins that the processor moves itself.
 macro_rules! card {
     (type pins $pins:tt) => {
         stm32f4::PinPort
@@ -70,7 +69,6 @@ macro_rules! card {
     }};
 }
 
-/// The board's name, interrupts and parts.
 macro_rules! board {
     (
         tag $tag:literal $skip:literal $end:literal;
@@ -82,7 +80,7 @@ macro_rules! board {
         high { $($high:ident)* } low { $($low:ident)* } pull { $($pull:ident)* }
         streams { $($stream:ident $channel:ident)* }
     ) => {
-        /// The board's name. It stands behind a mark in the image, so that tools know the image's board.
+        /// A mark before it in the image tells tools the image's board.
         pub(crate) const NAME: &str = $tag.split_at($end).0.split_at($skip).1;
 
         /// Interrupts of the ports and the card, more urgent than every task.
@@ -93,7 +91,6 @@ macro_rules! board {
 
         bind_interrupts!(struct Irqs { $($stream => dma::InterruptHandler<peripherals::$channel>;)* });
 
-        /// Starts clocks, watchdog, ports and card.
         pub(crate) fn take() -> Parts {
             let (cause, cause_register) = reset_cause();
             let p = start(Crystal { hz: $hz, divider: rcc::PllPreDiv::$divider });
@@ -118,7 +115,6 @@ macro_rules! board {
     };
 }
 
-/// Drives a pin to this level for ever.
 #[allow(dead_code, reason = "not every board holds pins")]
 fn hold(pin: Peri<'static, impl Pin>, level: Level) {
     core::mem::forget(Output::new(pin, level, Speed::Low));

@@ -16,12 +16,9 @@ pub(crate) struct Overrun {
     pub(crate) blind_ms: u32,
 }
 
-/// Data of the machine and of this start.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Boot {
-    /// Unique id of the processor.
     pub(crate) id: [u8; 12],
-    /// Cause of the start.
     pub(crate) cause: ResetCause,
     /// Reset status register.
     pub(crate) cause_register: u32,

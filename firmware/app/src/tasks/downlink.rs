@@ -29,7 +29,6 @@ pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> !
         SUPERVISOR.report(Task::Downlink, now());
         set_baud(&mut port, &BAUD_GS).await;
         if !queue.lend(async |frame| send(&mut port, frame, &GS_STOOD_STILL).await).await {
-            // Either way it looks into the queue.
             let _ = with_timeout(REPORT, links::GS.wait()).await;
         }
     }
@@ -45,7 +44,7 @@ pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'s
     }
 }
 
-/// Sends a frame; drops it after the timeout.
+/// Dropped after the timeout.
 async fn send(port: &mut board::PortTx, frame: &[u8], stood_still: &AtomicBool) {
     if with_timeout(SEND_MAX, port.transmit(frame)).await.is_err() {
         port.restart();

@@ -31,7 +31,6 @@ const DRAINED_MAX: usize = 64;
 /// That turn.
 const REST: Duration = Duration::from_millis(1);
 
-/// The monitor's ends of the queues.
 pub(crate) struct Ends {
     pub(crate) frames: FramesOut<'static>,
     pub(crate) uplink: UplinkOut<'static>,
@@ -98,7 +97,7 @@ pub(crate) async fn run(
     }
 }
 
-/// Records the end of the previous start and reports it to the ground station.
+/// The end of the previous start, for record and ground station.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
@@ -110,7 +109,7 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     }
 }
 
-/// Reports missing parts of the board once; `told` stores the reported ones.
+/// Once each; `told` stores the reported ones.
 #[inline(never)]
 fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 6], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);
@@ -135,7 +134,7 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
 
 // Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
-/// Processes the waiting frames, at most [`DRAINED_MAX`]; `true` if there may be more.
+/// At most [`DRAINED_MAX`]; `true` if there may be more.
 #[inline(never)]
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
     let Ends { frames, sectors, gs, .. } = ends;
@@ -159,7 +158,6 @@ fn uplink(body: &mut Monitoring<'static>, ends: &mut Ends) {
     while measure(Stage::Monitor, || body.uplink(now(), uplink, sectors, gs)) {}
 }
 
-/// Records news of the store.
 #[inline(never)]
 fn note(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover<'static>) {
     while let Some(news) = handover.news() {

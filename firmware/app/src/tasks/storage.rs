@@ -19,14 +19,12 @@ use crate::links::{self, now};
 /// Check-in interval while idle.
 const REPORT: Duration = Duration::from_secs(1);
 
-/// Body of the task.
 type Body = Storage<'static, board::Card>;
 
 // Statics of their own: made within the task, both would take 8 and 1.5 KiB of its stack first.
 static HELD: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 static BODY: StaticCell<Body> = StaticCell::new();
 
-/// Makes the task's body, once.
 #[inline(never)]
 fn prepare(card: board::Card, entropy: u32) -> &'static mut Body {
     BODY.init_with(|| Storage::new(card, &CARD_STATUS, HELD.take(), entropy))
@@ -65,7 +63,6 @@ async fn wait_for_work(
     while sectors.is_empty() && !asked {
         SUPERVISOR.report(Task::Storage, now());
         keep(store_writer);
-        // Either way it looks again.
         let _ = with_timeout(REPORT, links::SECTORS.wait()).await;
         asked = shelf.is_wanted();
     }
@@ -83,7 +80,6 @@ fn serve(body: &mut Body, shelf: &mut Server<'static>) -> bool {
     measure(Stage::Storage, || body.serve(shelf))
 }
 
-/// Saves one item, if there is one.
 #[inline(never)]
 fn keep(store_writer: &mut StoreWriter<'static, board::StoreFlash>) {
     measure(Stage::Storage, || store_writer.service(false));

@@ -11,7 +11,7 @@ use crate::journey::{Findings, Journey, push_element, utc};
 use crate::made::OutputFile;
 use crate::story::Story;
 
-/// The open file. Waypoints come before the track, and some are known last.
+/// Waypoints come before the track, and some are known last.
 pub(super) struct Gpx {
     file: Single,
     track: Spool,
@@ -38,7 +38,6 @@ impl Writer for Gpx {
             if begins {
                 out.push_str("</trkseg><trkseg>\n");
             }
-            // Writing to a string cannot fail.
             let _ = write!(
                 out,
                 "<trkpt lat=\"{:.7}\" lon=\"{:.7}\"><ele>{:.2}</ele>",

@@ -30,7 +30,6 @@ use crate::{Request, SCHEMA};
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
 
-/// Its line of the table.
 pub(super) const FORMAT: Format = Format {
     about: About {
         is_of_frames: true,
@@ -44,7 +43,6 @@ pub(super) const FORMAT: Format = Format {
     way: Way::Alone(run),
 };
 
-/// Runs `hums decode --format hum`.
 fn run(args: &Request) -> Result<Outcome> {
     let (input, path) = (input(args)?, output(args));
     let name = input.to_string();
@@ -140,7 +138,7 @@ fn output(args: &Request) -> PathBuf {
     }
 }
 
-/// So many bytes of frames make the session's number: few, because a recording that has grown is the same one.
+/// Bytes of frames that make the session's number: few, because a recording that has grown is the same one.
 const FIRST_BYTES: usize = 2 * 1024;
 
 /// The session's number, by the recording's first time and its first frames with theirs. So a log packed twice is the
@@ -150,7 +148,6 @@ fn session_of(hash: Sha256) -> u32 {
     u32::from_be_bytes(number) | 1
 }
 
-/// The result of packing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Done {
     frames: u64,
@@ -246,15 +243,14 @@ impl<W: Write> Packer<W> {
         self.write_out()
     }
 
-    /// Notes in the log that another recording was joined on.
+    /// Another recording was joined on.
     fn joint(&mut self, at_us: u64) -> Result<()> {
         let at = Instant::from_micros(at_us);
         self.framer.idle(&mut |_: hums_link::Frame<'_>| {});
         self.record(at, &Record::Note(Note { severity: 6, text: JOINED }))
     }
 
-    /// Notes new damage: the recording has this many damaged places by now, and the increase since the previous chunk
-    /// is a loss.
+    /// Damage of the recording up to now; its increase since the previous chunk is a loss.
     fn damaged(&mut self, before_us: u64, at_us: u64, damages: u64) -> Result<()> {
         let count = damages - std::mem::replace(&mut self.damages, damages).min(damages);
         if count == 0 {

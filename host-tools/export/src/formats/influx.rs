@@ -56,7 +56,7 @@ impl Tags {
         Self { session: tag_value(session), vehicle: tag_value(vehicle) }
     }
 
-    /// `,session=...`, in the order of the alphabet, as databases like it.
+    /// In the order of the alphabet, as databases like it.
     fn push_session(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(b",session=");
         out.extend_from_slice(self.session.as_bytes());
@@ -96,7 +96,7 @@ impl Lines {
         self.text.len()
     }
 
-    /// Ends the line that began at `start`; a line without fields is dropped.
+    /// A line without fields is dropped.
     fn end(&mut self, start: usize, at: Instant, fields: usize) {
         if fields == 0 {
             self.text.truncate(start);
@@ -133,7 +133,7 @@ impl Lines {
         }
     }
 
-    /// Actuator commands, if the autopilot reports them: the status untagged, the values by `motor`.
+    /// The status untagged, the values by `motor`.
     fn actuators(&mut self, tags: &Tags, at: Instant, payload: &Payload) {
         let Some(active) = payload.number("active") else { return };
         self.reference(tags, at, None, [("Actuator Output Status".to_owned(), Scalar::Double(active))]);
@@ -216,7 +216,6 @@ impl Lines {
     }
 }
 
-/// The fields of one line.
 struct Fields<'a> {
     text: &'a mut Vec<u8>,
     count: usize,
@@ -287,7 +286,6 @@ impl<'a> Fields<'a> {
         for byte in text.bytes() {
             match byte {
                 b'"' | b'\\' => out.extend_from_slice(&[b'\\', byte]),
-                // A line is a point.
                 b'\n' | b'\r' => out.push(b' '),
                 _ => out.push(byte),
             }
@@ -371,7 +369,6 @@ impl Clock {
     }
 }
 
-/// The open file, and the state of points that are made in order.
 pub(super) struct Influx {
     file: Single,
     messages: Clock,
@@ -382,7 +379,6 @@ pub(super) struct Influx {
     count: u64,
 }
 
-/// Points of a group.
 #[derive(Default)]
 pub(super) struct Points(Lines);
 
@@ -419,7 +415,6 @@ impl Writer for Influx {
         })
     }
 
-    /// Writes the frames of a group, and their quantities of the reference system.
     fn part(&mut self, context: &Context, part: Points, story: &Story) -> Result<()> {
         self.text.clear();
         self.messages.write(&part.0, &context.epochs, &mut self.text);

@@ -86,7 +86,6 @@ impl Writer for Jsonl {
     }
 }
 
-/// The first members of every object.
 fn push_times(out: &mut Vec<u8>, at: Instant, utc_us: Option<u64>) {
     out.extend_from_slice(b"{\"time_boot\":");
     push_seconds(out, at.as_micros());

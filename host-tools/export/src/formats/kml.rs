@@ -45,7 +45,6 @@ impl Kml {
 fn piece(context: &Context, places: &[(Instant, Fix)]) -> String {
     let mut out = String::from("<Placemark><name>track</name><styleUrl>#track</styleUrl>");
     let times: Option<Vec<String>> = places.iter().map(|(at, _)| utc(context, *at)).collect();
-    // Writing to a string cannot fail.
     let coordinates = |out: &mut String, separator: char, end: &str| {
         for (_, fix) in places {
             let (longitude, latitude) = (fix.longitude_deg, fix.latitude_deg);

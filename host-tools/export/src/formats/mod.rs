@@ -36,7 +36,6 @@ pub fn find(name: &str) -> Option<&'static Format> {
     FORMATS.iter().find(|format| format.about.name == name)
 }
 
-/// The table of `docs/decode.md`.
 #[cfg(test)]
 fn table() -> String {
     use std::fmt::Write as _;

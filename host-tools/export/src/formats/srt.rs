@@ -26,7 +26,6 @@ pub(super) struct Srt {
     reference: Reference,
     /// The beginning of the video, microseconds of the log; known with the log's first observation.
     begin_us: Option<i64>,
-    /// The beginning of the next cue.
     next_us: i64,
     /// In order of time.
     findings: Vec<Finding>,
@@ -34,7 +33,6 @@ pub(super) struct Srt {
 }
 
 impl Srt {
-    /// Writes the cue of the second that begins now.
     fn cue(&mut self, context: &Context, now_us: i64) -> Result<()> {
         let from_us = now_us - self.begin_us.unwrap_or(0);
         let Ok(at_us) = u64::try_from(now_us) else { return Ok(()) };
@@ -60,7 +58,6 @@ impl Srt {
             words.push(format!("battery {}", battery.join(" ")));
         }
         let mut out = String::new();
-        // Writing to a string cannot fail.
         let _ = writeln!(
             out,
             "{}\n{} --> {}\n{}",

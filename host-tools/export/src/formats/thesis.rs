@@ -37,19 +37,17 @@ const VFR_HUD: &str =
     "Airspeed [m/s]; Groundspeed [m/s]; Heading [deg]; Throttle [%]; Altitude [m]; Climbrate [m/s]";
 const GAPS: &str = "From [s]; To [s]; Cause; Frames missing";
 
-/// The tables of one log, open.
 pub(super) struct Thesis {
     folder: Folder,
     tables: [(BufWriter<FolderFile>, PathBuf); 5],
     reference: Reference,
     /// The next whole second, once the first frame has set it.
     next: Option<u64>,
-    /// Rows written to each table.
     rows: u64,
 }
 
 impl Thesis {
-    /// Takes an observation: first come the rows of the seconds that have passed.
+    /// First come the rows of the seconds that have passed.
     fn observe(&mut self, context: &Context, observed: &Observed) -> Result<()> {
         let at_us = observed.at.as_micros();
         let mut next = *self.next.get_or_insert(at_us.next_multiple_of(SECOND_US));

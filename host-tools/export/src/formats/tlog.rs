@@ -18,15 +18,12 @@ use crate::story::Story;
 /// The open tlog.
 pub(super) struct Tlog {
     file: Single,
-    /// The table of gaps beside it.
     gaps: Option<Single>,
     /// Gaps of a tlog that is not a file and so has no table beside it.
     gaps_left_out: u64,
-    /// Texts that go between the frames.
     texts: Option<Texts>,
 }
 
-/// Records of a tlog.
 #[derive(Default)]
 pub(super) struct Records(Vec<u8>);
 
@@ -138,7 +135,6 @@ impl Writer for Tlog {
     }
 }
 
-/// The first line of a table of gaps beside a tlog.
 fn gaps_header() -> String {
     let nothing = Gap {
         from: None,

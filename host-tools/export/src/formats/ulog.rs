@@ -62,7 +62,6 @@ const TOPICS: [(&str, &str); 14] = [
     ("cpuload", "float load;"),
 ];
 
-/// A topic by its place in [`TOPICS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Topic {
     Attitude,
@@ -81,7 +80,6 @@ enum Topic {
     Load,
 }
 
-/// The pilot's channels and the findings of a part.
 #[derive(Default)]
 pub(crate) struct Words {
     channels: Vec<(Instant, Vec<u8>)>,
@@ -116,7 +114,6 @@ impl Part for Words {
     }
 }
 
-/// The fields of a message.
 #[derive(Default)]
 struct Fields(Vec<u8>);
 
@@ -206,7 +203,6 @@ pub(crate) struct Ulog {
     messages: u64,
 }
 
-/// A message with its head.
 fn message(kind: u8, content: &[u8]) -> Vec<u8> {
     let length = u16::try_from(content.len()).unwrap_or(u16::MAX);
     let content = content.get(..usize::from(length)).unwrap_or(content);
@@ -355,7 +351,6 @@ impl Ulog {
         self.put((Topic::Magnetometer, imu.instance), at, &Fields::of(field.map(|part| part.0)))
     }
 
-    /// All that stands before the data.
     fn head(&self) -> Vec<u8> {
         let first_us = self.first.unwrap_or(Instant::ZERO).as_micros();
         let mut out = [&MAGIC[..], &first_us.to_le_bytes()].concat();

@@ -85,7 +85,6 @@ pub fn run(args: &Request) -> Result<Outcome> {
     Ok(Outcome::lossy(lossy))
 }
 
-/// A copy in work.
 struct Share {
     rules: Rules,
     moved: Moved,
@@ -119,7 +118,7 @@ impl Share {
         }
     }
 
-    /// Copies frames. Returns whether the recording has damage.
+    /// Returns whether the recording has damage.
     fn link(&mut self, place: &Place, context: &Context, args: &Request) -> Result<bool> {
         let mut file = Single::open(context, &args.output)?;
         let want = Want { frames: true, ..Want::default() };
@@ -199,13 +198,13 @@ impl Share {
         Some(out)
     }
 
-    /// The number of a system in the copy: they are counted from 1 in the order of their first frames.
+    /// Systems are counted from 1 in the order of their first frames.
     fn system(&mut self, system: u8) -> u8 {
         let next = (self.systems.len() as u8).wrapping_add(1);
         *self.systems.entry(system).or_insert(next)
     }
 
-    /// Copies observations, texts and parameters. Returns whether the recording has damage.
+    /// Returns whether the recording has damage.
     fn own(&mut self, place: &Place, context: &Context, args: &Request) -> Result<bool> {
         let mut file = Ulog::open(context, &args.output)?;
         let (mut story, mut lossy) = (Story::default(), false);
@@ -236,7 +235,6 @@ impl Share {
         Ok(lossy)
     }
 
-    /// Prints the list of what was removed and moved.
     fn tell(self, args: &Request) -> Result<()> {
         let line = |words: &str| output::line(&printable::word(words));
         line(&format!("{}: {} kept", args.output.display(), count(self.kept, "message")))?;

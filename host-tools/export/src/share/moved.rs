@@ -24,7 +24,6 @@ pub(super) struct Moved {
     place: Option<(f64, f64)>,
     altitude_m: Option<f64>,
     pressure_hpa: Option<f64>,
-    /// UTC at time zero, microseconds.
     utc_us: Option<u64>,
 }
 
@@ -76,7 +75,7 @@ impl Moved {
         SHARED_UTC_US.saturating_add(us).saturating_sub(zero)
     }
 
-    /// The bytes of a field, moved by its rule. A field of another type than the rule knows is zero.
+    /// Moved by its rule; zero if its type is not the rule's.
     pub(super) fn field(&mut self, at: Instant, rule: Rule, kind: Kind, bytes: &[u8]) -> Vec<u8> {
         let degrees = |degrees: f64| ((degrees * 1e7).round() as i32).to_le_bytes().to_vec();
         let whole = || bytes.first_chunk().map_or(0, |bytes| i32::from_le_bytes(*bytes));

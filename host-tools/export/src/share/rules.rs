@@ -13,7 +13,6 @@ const DIGITS_MAX: usize = 3;
 /// Numbers in a text that stays, at most.
 const NUMBERS_MAX: usize = 2;
 
-/// The treatment of a field that stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rule {
     Keep,
@@ -97,18 +96,16 @@ impl Rules {
         Self { messages, keep: parts("keep"), drop: parts("drop"), words: lines(WORDS).flatten().collect() }
     }
 
-    /// The fields of a message; `None` if the message is removed.
     pub(super) fn fields(&self, id: u32) -> Option<&[Place]> {
         self.messages.get(&id).map(Vec::as_slice)
     }
 
-    /// Whether a parameter stays.
     pub(super) fn keeps_parameter(&self, name: &str) -> bool {
         self.keep.iter().any(|begin| name.starts_with(begin))
             && !self.drop.iter().any(|part| name.contains(part))
     }
 
-    /// Whether a text stays. Decimals and more than two numbers may be a place.
+    /// Decimals and more than two numbers may be a place.
     pub(super) fn keeps_text(&self, text: &str) -> bool {
         let has_decimals = text
             .as_bytes()

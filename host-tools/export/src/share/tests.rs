@@ -53,7 +53,6 @@ fn planted(place: &rules::Place) -> Vec<u8> {
     bytes
 }
 
-/// A record of a tlog.
 fn record(at_us: u64, packet: &Packet) -> Vec<u8> {
     let mut buffer = [0; FRAME_BYTES_MAX];
     [&(UTC_US + at_us).to_be_bytes()[..], Encoder::of(1, 1).frame(&mut buffer, packet)].concat()

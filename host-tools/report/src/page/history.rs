@@ -1,9 +1,8 @@
 //! A flight on the page, bounded: series for the plots, the track, phases, modes, parameters, texts and
 //! findings.
 //!
-//! It only grows at its end, so a page asks for the part after its last one ([`Cursor`]); a slow page needs
-//! no queue. If older parts changed (joined intervals, a thinned track) the page takes everything again. A
-//! report is one part with the whole.
+//! It only grows at its end, so a page asks for the part after its last one ([`Cursor`]); a slow page needs no queue.
+//! If older parts changed (joined intervals, a thinned track) the page takes everything again.
 //!
 //! For playback of a recording it is complete at the start; a page is then shown the part up to the present
 //! moment.
@@ -47,12 +46,11 @@ pub struct History {
     samples: Samples,
     frames: Frames,
     notes: VecDeque<(Instant, Note)>,
-    /// Number of dropped notes, so that the others keep their numbers.
+    /// Dropped notes, so that the others keep their numbers.
     notes_gone: u64,
     phases: Spans,
     modes: Spans,
     parameters: Parameters,
-    /// Gaps of the recording.
     gaps: Vec<(Instant, Instant)>,
     autopilot: Autopilot,
     params: Option<Box<Params>>,
@@ -244,7 +242,6 @@ impl History {
         }
     }
 
-    /// Its series, the autopilot, and the limits in use.
     pub(super) fn drawn(&self) -> (&Store<Plot>, Autopilot, Option<&Params>) {
         (&self.samples.store, self.autopilot, self.params.as_deref())
     }
@@ -335,7 +332,6 @@ impl History {
         })
     }
 
-    /// All plots that have a line.
     fn plots(&self) -> Vec<PlotJson> {
         let mut all: Vec<(Plot, PlotJson)> = Vec::new();
         for (plot, line) in self.samples.store.lines() {
@@ -361,12 +357,11 @@ impl History {
 fn name((plot, line): Line) -> String {
     // Room for the longest: it is made ten times a second for each line.
     let mut name = String::with_capacity(24);
-    // Writing to a `String` cannot fail.
     let _ = write!(name, "{plot:?}:{line}");
     name
 }
 
-/// A place, at its time since `from`.
+/// At its time since `from`.
 pub(super) fn told(place: &Point, from: Instant) -> Place {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
     (place.at.as_secs_f64() - from.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)

@@ -20,7 +20,6 @@ pub fn embedded(value: &impl Serialize) -> String {
         &json(value),
         |c| matches!(c, '<' | '>' | '&' | '\u{2028}' | '\u{2029}'),
         |out, c| {
-            // Writing to a `String` cannot fail.
             let _ = write!(out, "\\u{:04x}", u32::from(c));
         },
     )
@@ -38,7 +37,6 @@ pub fn json(value: &impl Serialize) -> String {
     if text.is_ascii() {
         return text;
     }
-    // Writing to a `String` cannot fail.
     rewritten(&text, redirects, |out, c| {
         let _ = write!(out, "<U+{:04X}>", u32::from(c));
     })

@@ -85,7 +85,6 @@ pub fn merged(flights: &[Flight<'_>]) -> Part {
     }
 }
 
-/// Adds the series of a flight, from its take-off on.
 fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
     let (own, autopilot, _) = flight.history.drawn();
     let Some((start_ms, step_ms)) = own.spacing_ms() else { return };

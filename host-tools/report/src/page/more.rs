@@ -30,7 +30,7 @@ pub fn compass_deg(radians: f32) -> f32 {
     radians.to_degrees().rem_euclid(360.0)
 }
 
-/// The yaw of a quaternion, its real part first, radians.
+/// Its real part is first; radians.
 fn yaw_rad([w, x, y, z]: [f32; 4]) -> f32 {
     (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z))
 }
@@ -257,7 +257,6 @@ fn flag(row: &Row<'_>, name: &str) -> bool {
     matches!(value_of(row, name), Some(Value::Flag(true)))
 }
 
-/// Whether it is the first instance of a topic.
 fn is_first(row: &Row<'_>) -> bool {
     number(row, "multi_id").is_none_or(|instance| instance < 0.5)
 }

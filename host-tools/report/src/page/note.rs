@@ -14,7 +14,6 @@ use crate::source::told;
 use crate::states::{Shown, meaning, shown};
 use crate::statustext::Text;
 
-/// Prefix of a finding of a HUMS.
 const OURS: &str = "HUMS: ";
 
 /// The note on a battery with an unknown cell count.
@@ -77,7 +76,6 @@ pub struct Cause {
 }
 
 impl Cause {
-    /// Of the check of this name.
     fn of(check: &str) -> Self {
         let words =
             vocabulary(check).map_or_else(|| check_name(check, 0), |known| known.said.name.to_owned());
@@ -87,10 +85,9 @@ impl Cause {
 
 /// A box sends three texts in half a minute at most, and a warning at the end of its event.
 const AGAIN_S: f64 = 45.0;
-/// Prefix of a return to normal.
 const OVER: &str = "over: ";
 
-/// Check and part in the text of a HUMS, and the rest of the text.
+/// Check, part, and the rest of the text.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).unwrap_or(words);
@@ -190,7 +187,6 @@ impl Note {
         Self { at_s: text.at.as_secs_f64(), kind, level, from, subsystem: "", words, found: None }
     }
 
-    /// A finding of a HUMS on board, from its text.
     fn on_board(text: &Text) -> Option<Self> {
         let words = text.words.trim_start_matches(OURS);
         let (check, instance, rest) = told_check(words)?;
@@ -268,7 +264,6 @@ mod tests {
 
     use super::*;
 
-    /// Each text of a box is known for the check and the part that it is of, whatever its level.
     #[test]
     fn what_a_box_tells_has_the_name_that_it_has_here() {
         // The same fault on another autopilot's scale, and after another time.

@@ -16,7 +16,6 @@ const CHANGES_MAX: usize = 16;
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
     known: BTreeMap<String, Vec<(Instant, f64)>>,
-    /// Their defaults, if the log has them.
     defaults: BTreeMap<String, DefaultValue>,
     /// Values of parameters beyond [`PARAMETERS_MAX`].
     left_out: u64,
@@ -29,7 +28,6 @@ pub struct ParameterJson {
     name: String,
     /// Times, seconds, and values: the first one, and each change.
     values: Vec<(f64, f64)>,
-    /// Its default, if the log has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     default: Option<f64>,
 }

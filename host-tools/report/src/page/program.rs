@@ -46,7 +46,7 @@ pub fn program(entry: &str) -> String {
     program
 }
 
-/// The modules that a module needs and itself, each after those that it imports from.
+/// Each after those that it imports from.
 fn needed(entry: &str) -> Vec<&str> {
     let mut order = Vec::new();
     add(entry, &mut order, &mut Vec::new());
@@ -70,7 +70,6 @@ fn text(name: &str) -> &'static str {
 }
 
 fn push_module(out: &mut String, name: &str, text: &str) {
-    // Writing to a String cannot fail.
     let _ = writeln!(out, "const module_{name} = (() => {{");
     let mut exports = Vec::new();
     for line in text.lines() {
@@ -88,13 +87,11 @@ fn push_module(out: &mut String, name: &str, text: &str) {
     let _ = writeln!(out, "return {{ {} }};\n}})();", exports.join(", "));
 }
 
-/// The names imported by a line, and the module.
 fn import(line: &str) -> Option<(&str, &str)> {
     let (names, from) = line.strip_prefix("import {")?.split_once("} from \"./")?;
     Some((names, from.strip_suffix(".js\";")?))
 }
 
-/// The name exported by a line.
 fn export(line: &str) -> Option<&str> {
     line.strip_prefix("export const ")?.split([' ', '=']).next()
 }

@@ -35,7 +35,6 @@ impl Samples {
         self.radio(at, observation);
     }
 
-    /// Attitude, height, speed, place.
     fn motion(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
         let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
         match observation {
@@ -110,7 +109,6 @@ impl Samples {
         }
     }
 
-    /// Batteries, motors, the autopilot's load.
     fn power(&mut self, at: Instant, reference: &Reference, observation: &Observation) {
         let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
         match observation {
@@ -145,7 +143,6 @@ impl Samples {
         }
     }
 
-    /// Vibration, estimator, temperatures, engine.
     fn condition(&mut self, at: Instant, observation: &Observation) {
         let mut push = |plot, line: u8, value: Option<f32>| self.put(at, (plot, line), value);
         match observation {

@@ -33,7 +33,6 @@ pub struct Candidate<'a> {
     pub page: Option<&'a str>,
 }
 
-/// A recording that was read.
 struct Recorded<'a> {
     candidate: Candidate<'a>,
     overview: Overview,
@@ -54,7 +53,6 @@ struct Data {
 struct FlightJson {
     name: String,
     page: Option<String>,
-    /// UTC of its take-off.
     start_utc: Option<String>,
     vehicle: Option<String>,
     airframe: Option<String>,
@@ -106,7 +104,6 @@ pub fn html(recordings: &[Candidate<'_>]) -> Result<Option<String>> {
 }
 
 impl Recorded<'_> {
-    /// The name of one of its flights.
     fn name(&self, index: usize) -> String {
         let name = &self.overview.ending.name;
         if self.replay.flights.len() > 1 { format!("{name}, flight {}", index + 1) } else { name.clone() }
@@ -143,7 +140,6 @@ impl Recorded<'_> {
     }
 }
 
-/// Parameters that at least two flights have and that differ.
 fn differing(replays: &[&Replay]) -> Vec<(String, Vec<Option<f64>>)> {
     let mut all: BTreeMap<&str, Vec<Option<f64>>> = BTreeMap::new();
     for (place, replay) in replays.iter().enumerate() {

@@ -90,12 +90,10 @@ impl Extents {
     }
 }
 
-/// The greater of the known values.
 fn most(one: Option<f32>, other: Option<f32>) -> Option<f32> {
     [one, other].into_iter().flatten().reduce(f32::max)
 }
 
-/// Remaining charge of the battery.
 fn percent(at: Instant, reference: &Reference) -> Option<f32> {
     Some(reference.value(at, Quantity::BatteryPercent)?.as_f64() as f32)
 }

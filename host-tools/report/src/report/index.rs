@@ -21,7 +21,6 @@ pub const FILE: &str = "index.html";
 #[derive(Debug, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Row {
-    /// Its file, in the same folder.
     file: String,
     name: String,
     start_utc: Option<String>,
@@ -95,7 +94,7 @@ impl Pages {
     }
 }
 
-/// Faults of a recording; for one of another program also the data that its recorder did not write.
+/// Also the data that another program's recorder did not write.
 fn faults(log: &Overview) -> Vec<String> {
     let mut faults = log.faults();
     let losses = log.ending.summary.losses;

@@ -6,8 +6,7 @@
 //! with the firmware's own rules, and [`trend`] compares with the earlier sessions of the same card. [`page`]
 //! puts all of it, as JSON, beside the program that draws it.
 //!
-//! A vehicle's data never become markup: text goes into the page as data, and only as text onto it. The
-//! page's own policy blocks other scripts and all loading.
+//! The page's own policy blocks other scripts and all loading.
 
 pub mod compare;
 pub mod flights;
@@ -42,7 +41,6 @@ use crate::summary::Overview;
 /// Output of `hums report --json`.
 const SCHEMA: Schema = Schema::first("hums-report");
 
-/// The pages that were written.
 #[derive(Debug, Default, Serialize)]
 struct PagesJson {
     pages: Vec<PageJson>,
@@ -160,7 +158,6 @@ fn beside(inputs: &[PathBuf]) -> Result<PathBuf> {
     Ok(input.with_file_name(name.with_extension("html")))
 }
 
-/// The pages in the making, session by session.
 struct Making<'a> {
     places: &'a [Place],
     inputs: &'a Inputs,
@@ -172,16 +169,13 @@ struct Making<'a> {
     rows: Vec<index::Row>,
     names: Names,
     outcome: Outcome,
-    /// The parameters of a session that was read last, by its index.
     parameters: Option<(usize, Vec<(String, f64)>)>,
-    /// Whether the outputs are reported as JSON, at the end.
     json: bool,
     made: PagesJson,
     put: &'a mut Put<'a>,
 }
 
 impl Making<'_> {
-    /// Takes the next session, and makes its page if wanted.
     fn session(&mut self, overview: &Overview) -> Result<()> {
         let (index, this) = (self.earlier.len(), trend::Session::of(overview));
         let is_wanted = self.wanted.pages && self.wanted.sessions.contains(&index);
@@ -211,7 +205,6 @@ impl Making<'_> {
         Ok(())
     }
 
-    /// Makes the page of a session, and reports it.
     fn page(
         &mut self,
         index: usize,
@@ -260,7 +253,6 @@ impl Making<'_> {
         Ok((!values.is_empty()).then(|| page::Before { name: place.name.clone(), values }))
     }
 
-    /// Writes a page, and says so.
     fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<()> {
         (self.put)(path, what, html, inputs)?;
         let made = PageJson { path: path.to_owned(), session: what.session(), bytes: html.len() as u64 };
@@ -271,7 +263,6 @@ impl Making<'_> {
         Ok(())
     }
 
-    /// All sessions have been: the comparisons, and the table of a folder.
     fn end(mut self, compare: bool) -> Result<Outcome> {
         let comparisons = if compare { self.compare()? } else { Vec::new() };
         if self.wanted.directory {
@@ -337,7 +328,7 @@ impl Making<'_> {
     }
 }
 
-/// The same with the names of files alone: a page is given to others, and this computer's folders are not.
+/// With names of files alone: a page is given to others, and this computer's folders are not.
 fn without_folders(overview: &Overview) -> Overview {
     let mut overview = overview.clone();
     for file in &mut overview.ending.files {
@@ -395,12 +386,11 @@ fn write(path: &Path, html: &str, inputs: &Inputs) -> Result<()> {
     file.finish()
 }
 
-/// The sessions that get a page, and its path.
 struct Wanted {
     sessions: RangeInclusive<usize>,
     output: PathBuf,
     directory: bool,
-    /// A page a session, and not the comparison alone.
+    /// Not the comparison alone.
     pages: bool,
 }
 

@@ -19,7 +19,6 @@ use crate::summary::{JudgedChecks, Overview};
 
 const TEMPLATE: &str = include_str!("../page/assets/report.html");
 
-/// Data for the page's program.
 #[derive(Serialize)]
 struct Data<'a> {
     version: &'static str,
@@ -32,7 +31,6 @@ struct Data<'a> {
     /// Number of checks with a critical problem, and with a warning.
     critical: usize,
     warning: usize,
-    /// The verdict of `hums check`, as a sentence.
     verdict: &'a str,
     texts_count: u64,
     /// Number of checks with data, and of all; `null` if nothing was judged.
@@ -157,7 +155,6 @@ pub(crate) fn policy(programs: &[&str]) -> String {
     hashes.join(" ")
 }
 
-/// A template with the text of each mark, in this order.
 pub(crate) fn fill(template: &str, texts: &[(&str, &str)]) -> String {
     texts.iter().fold(template.to_owned(), |page, (mark, text)| page.replacen(mark, text, 1))
 }

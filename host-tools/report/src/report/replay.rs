@@ -114,7 +114,6 @@ impl Replay {
         Ok(replay)
     }
 
-    /// Takes the gaps of the recording.
     fn gaps(&mut self, judged: &Judged) {
         for gap in &judged.gaps {
             let span = gap.from.or(gap.to).zip(gap.to.or(gap.from));
@@ -129,7 +128,6 @@ impl Replay {
         }
     }
 
-    /// Takes the next item, which was judged.
     fn item(&mut self, at: Instant, item: Item<'_>, judge: &Judge) {
         match item {
             Item::Frame(frame) => self.history.frame(at, frame, self.reference.vehicle().source),

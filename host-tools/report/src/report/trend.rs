@@ -29,7 +29,6 @@ const FLIGHT_MIN_S: f64 = 30.0;
 /// The comparison.
 #[derive(Debug, Serialize)]
 pub struct Trend {
-    /// The sessions, oldest first; the last is the one reported.
     sessions: Vec<SessionJson>,
     rows: Vec<RowJson>,
 }

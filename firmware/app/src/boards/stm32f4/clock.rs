@@ -30,15 +30,12 @@ const CAPTURE_TRIES_MAX: u32 = 10_000;
 
 /// The crystal does not run, or not at the board's frequency.
 static CRYSTAL_FAILED: AtomicBool = AtomicBool::new(false);
-/// It runs at another frequency.
 static CRYSTAL_IS_WRONG: AtomicBool = AtomicBool::new(false);
 
-/// Whether the crystal has failed since the start.
 pub(crate) fn crystal_failed() -> bool {
     CRYSTAL_FAILED.load(Ordering::Relaxed)
 }
 
-/// Whether the crystal is not the board's.
 pub(crate) fn crystal_is_wrong() -> bool {
     CRYSTAL_IS_WRONG.load(Ordering::Relaxed)
 }
@@ -124,8 +121,7 @@ pub(super) fn finish() {
     }
 }
 
-/// Crystal failure: the chip has switched to its own oscillator without the PLL (RM0090, 7.2.7). The handler uses only registers
-/// that no other code touches after the start.
+/// Crystal failure: the chip has switched to its own oscillator without the PLL (RM0090, 7.2.7).
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
     if !RCC.cir().read().cssf() {

@@ -14,17 +14,14 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashEr
 
 use super::{supply, watchdog};
 
-/// Address of the flash.
 const FLASH_BEGIN: usize = 0x0800_0000;
 /// Sector 1 begins here (RM0090, table 5).
 const BEGIN: usize = FLASH_BEGIN + 16 * 1024;
 /// The store's first sector.
 const SECTOR: u8 = 1;
-/// A sector from 0 to 3.
 const SECTOR_BYTES: usize = 16 * 1024;
 /// Sectors 1 and 2.
 const BYTES: usize = 2 * SECTOR_BYTES;
-/// Unit of a write.
 const WORD: usize = 4;
 /// Unlock keys of the flash control (RM0090, 3.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -48,7 +45,6 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// The store's part of the flash.
 pub(crate) struct StoreFlash(());
 
 impl StoreFlash {
@@ -156,7 +152,6 @@ fn unlocked(work: impl FnOnce() -> Result<(), FlashError>) -> Result<(), FlashEr
     outcome
 }
 
-/// Waits until the flash is done and returns the result.
 fn finish() -> Result<(), FlashError> {
     while FLASH.sr().read().bsy() {}
     let status = FLASH.sr().read();

@@ -48,7 +48,7 @@ pub(crate) const GS_RING_BYTES: usize = 512;
 /// Period of the uplink, which is not urgent.
 pub(crate) const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
 
-/// Starts clocks, counters and monitors of the machine. Returns the chip's parts.
+/// Clocks, counters and monitors of the machine.
 pub(crate) fn start(crystal: Crystal) -> Peripherals {
     watchdog::start();
     let parts = embassy_stm32::init(clock::config(crystal));
@@ -74,7 +74,6 @@ pub(crate) fn chip_is_wrong() -> bool {
     pac::DBGMCU.idcode().read().dev_id() != DEVICE || kib < FLASH_KIB_MIN
 }
 
-/// Starts the cycle counter, and `SysTick` for `crate::watch`.
 fn start_counters() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
@@ -106,7 +105,7 @@ pub(crate) struct Led {
 }
 
 impl Led {
-    /// On this pin, lit at this level. `waits`: the pin belongs to the debug port.
+    /// `waits`: the pin belongs to the debug port.
     pub(crate) fn new(pin: Flex<'static>, lit: Level, waits: bool) -> Self {
         let from = if waits { Instant::MIN + PROBE_TIME } else { Instant::MIN };
         Self { pin, lit, from }

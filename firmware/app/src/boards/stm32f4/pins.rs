@@ -47,7 +47,7 @@ impl Line {
 }
 
 impl PinPort {
-    /// The port on these pins, mode 0, with its select pin high.
+    /// Mode 0, with the select pin high.
     pub(crate) fn new(
         sck: Peri<'static, impl Pin>,
         mosi: Peri<'static, impl Pin>,

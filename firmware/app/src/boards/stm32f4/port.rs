@@ -47,7 +47,6 @@ pub(crate) fn halves<T: Instance, R: RxDma<T>, S: TxDma<T>>(
     )
 }
 
-/// A port's reception: a DMA ring.
 pub(crate) struct PortRx {
     /// Keeps the pin and the port's clock.
     _port: UartRx<'static, Blocking>,
@@ -116,7 +115,6 @@ impl PortRx {
     }
 }
 
-/// A port's transmission, by DMA.
 pub(crate) struct PortTx {
     /// Keeps the pin and the port's clock.
     _port: UartTx<'static, Blocking>,

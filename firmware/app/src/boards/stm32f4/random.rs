@@ -6,7 +6,6 @@ use embassy_stm32::{peripherals, rcc};
 /// Looks for a number, which takes 40 clocks of 48 MHz (RM0090, 24.3): some hundred times as many.
 const TRIES_MAX: u32 = 2_000;
 
-/// A number that differs from one start to the next; `None` where the generator does not work.
 pub(crate) fn number() -> Option<u32> {
     rcc::enable_and_reset::<peripherals::RNG>();
     RNG.cr().write(|w| w.set_rngen(true));

@@ -3,7 +3,6 @@
 use embassy_stm32::pac;
 use hums_onboard::ResetCause;
 
-/// Reads and clears the cause of the start.
 pub(crate) fn reset_cause() -> (ResetCause, u32) {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));

@@ -35,7 +35,6 @@ pub(super) fn watch() {
     }
 }
 
-/// Whether it is too low now.
 pub(super) fn is_low() -> bool {
     pac::PWR.csr1().read().pvdo()
 }

@@ -22,9 +22,7 @@ use crate::costs::{Stage, measure};
 const AHEAD_MAX: u64 = 1 << 31;
 
 struct State {
-    /// Wraps of the counter.
     wraps: u32,
-    /// Last reading of the counter.
     last: u32,
     alarms: Queue,
 }
@@ -45,7 +43,6 @@ impl State {
         u64::from(self.wraps) << 32 | u64::from(count)
     }
 
-    /// Wakes due tasks and sets the alarm to the next one.
     fn arm(&mut self) {
         loop {
             let now = self.now();
@@ -74,7 +71,7 @@ impl Driver for Clock {
     }
 }
 
-/// Starts the clock at 0. The clock tree is set.
+/// The clock tree is set; time begins at 0.
 pub(super) fn start() {
     rcc::enable_and_reset::<peripherals::TIM2>();
     let ticks = rcc::frequency::<peripherals::TIM2>().0 / TICK_HZ as u32;

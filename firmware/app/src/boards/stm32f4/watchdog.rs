@@ -10,7 +10,7 @@ use embassy_stm32::pac::{DBGMCU, IWDG};
 /// A second of 32 kHz by 8.
 const RELOAD: u16 = 4_000 - 1;
 
-/// Starts it. A debugger that halts the processor halts it as well.
+/// A debugger that halts the processor halts it as well.
 pub(super) fn start() {
     DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
     IWDG.kr().write(|w| w.set_key(Key::START));
@@ -33,7 +33,6 @@ pub(super) fn reload() {
     IWDG.kr().write(|w| w.set_key(Key::RESET));
 }
 
-/// Handle to feed it.
 pub(crate) struct Watchdog(());
 
 impl Watchdog {

@@ -28,13 +28,10 @@ pub(super) struct Csv {
     tables: Tables,
 }
 
-/// Lines of each table.
 #[derive(Default)]
 pub(super) struct Lines {
     tables: BTreeMap<Table, Vec<u8>>,
-    /// Lines of frames that we have no definition of.
     unknown: UnknownLines,
-    /// A header for each table of the monitor's own.
     headers: BTreeMap<&'static str, Vec<&'static str>>,
     /// Bytes in `tables`, with the tables' own memory.
     tables_bytes: usize,
@@ -44,7 +41,6 @@ pub(super) struct Lines {
 const TABLE_BYTES: usize = 256;
 
 impl Lines {
-    /// Adds a line to a table.
     fn line(&mut self, table: Table, write: impl FnOnce(&mut Vec<u8>)) {
         let out = self.tables.entry(table).or_default();
         let before = table_bytes(out);
@@ -136,12 +132,11 @@ impl Writer for Csv {
     }
 }
 
-/// Memory of a table's lines; 0 before the first one.
+/// 0 before the first line.
 fn table_bytes(lines: &[u8]) -> usize {
     if lines.is_empty() { 0 } else { TABLE_BYTES + lines.len() }
 }
 
-/// The first two cells of every row.
 fn push_times(out: &mut Vec<u8>, at: Instant, utc_us: Option<u64>) {
     push_seconds(out, at.as_micros());
     out.push(b',');

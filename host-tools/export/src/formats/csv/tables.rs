@@ -16,10 +16,9 @@ const OPEN_MAX: usize = 256;
 /// Ids without a definition that have a table of their own at most. The first ones have it; all others share one.
 pub(crate) const UNKNOWN_TABLES_MAX: usize = 512;
 
-/// The tables, some of them open.
 pub(crate) struct Tables {
     folder: Folder,
-    /// Ids without a definition that have a table of their own.
+    /// Ids with a table of their own.
     unknown: BTreeSet<u32>,
     open: BTreeMap<Table, BufWriter<FolderFile>>,
     /// Tables that have their header; not all of them are open.
@@ -28,7 +27,6 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
-    /// Empty; all tables will be in this folder.
     pub(crate) fn new(folder: Folder) -> Self {
         Self {
             folder,
@@ -39,14 +37,12 @@ impl Tables {
         }
     }
 
-    /// The columns of the monitor's own tables.
     pub(crate) fn headers(&mut self, headers: &BTreeMap<&'static str, Vec<&'static str>>) {
         for (name, columns) in headers {
             self.headers.entry(name).or_insert_with(|| columns.clone());
         }
     }
 
-    /// Adds lines to a table.
     pub(crate) fn put(&mut self, table: Table, lines: &[u8]) -> Result<()> {
         let name = format!("{}.csv", table.name());
         let path = self.folder.path().join(&name);
@@ -75,8 +71,7 @@ impl Tables {
         Ok(())
     }
 
-    /// Adds frames of ids without a definition: to the id's own table, or to the one that the ids beyond
-    /// [`UNKNOWN_TABLES_MAX`] share.
+    /// Frames of an id beyond [`UNKNOWN_TABLES_MAX`] go to the one table that those ids share.
     pub(crate) fn put_unknown(&mut self, lines: &UnknownLines) -> Result<()> {
         let (mut own, mut shared): (BTreeMap<u32, Vec<u8>>, Vec<u8>) = Default::default();
         for line in lines.iter() {
@@ -105,7 +100,7 @@ impl Tables {
         self.begun.len()
     }
 
-    /// All lines are there: the folder gets its name.
+    /// The folder gets its name.
     pub(crate) fn finish(mut self) -> Result<()> {
         for (table, mut file) in std::mem::take(&mut self.open) {
             settle(file.flush(), &self.folder.path().join(table.name()))?;
@@ -121,7 +116,6 @@ fn cell(name: &str) -> String {
     String::from_utf8_lossy(&out).into_owned()
 }
 
-/// A table's first line.
 fn header(table: Table, own: &[&str]) -> String {
     let mut names: Vec<String> = vec!["time_boot[s]".into(), "time_utc".into()];
     match table {

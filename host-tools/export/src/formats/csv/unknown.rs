@@ -3,7 +3,6 @@
 
 use crate::text::push_integer;
 
-/// Lines of a CSV table, with their ids.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct UnknownLines {
     text: Vec<u8>,
@@ -18,7 +17,6 @@ struct Place {
     end: usize,
 }
 
-/// One line, without its end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct UnknownLine<'a> {
     /// The message id.
@@ -28,7 +26,7 @@ pub(crate) struct UnknownLine<'a> {
 }
 
 impl UnknownLines {
-    /// Adds a line: `head` writes its cells up to the place of the id, `tail` those after it, each with a comma before it.
+    /// `head` writes the cells up to the place of the id, `tail` those after it, each with a comma before it.
     pub(crate) fn push(&mut self, id: u32, head: impl FnOnce(&mut Vec<u8>), tail: impl FnOnce(&mut Vec<u8>)) {
         head(&mut self.text);
         let middle = self.text.len();
@@ -36,7 +34,6 @@ impl UnknownLines {
         self.places.push(Place { id, middle, end: self.text.len() });
     }
 
-    /// The lines in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = UnknownLine<'_>> {
         let mut start = 0;
         self.places.iter().map(move |place| {
@@ -47,14 +44,12 @@ impl UnknownLines {
         })
     }
 
-    /// Bytes of memory that it holds.
     pub(crate) fn held_bytes(&self) -> usize {
         self.text.len() + size_of::<Place>() * self.places.len()
     }
 }
 
 impl UnknownLine<'_> {
-    /// The line in a table of its id.
     pub(crate) fn push(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(self.head);
         out.extend_from_slice(self.tail);

@@ -15,7 +15,6 @@ use crate::format::Single;
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// Bytes of a chunk before its compression.
 const CHUNK_BYTES: usize = 1 << 20;
-/// Operation codes of records.
 const HEADER: u8 = 1;
 const FOOTER: u8 = 2;
 const SCHEMA: u8 = 3;
@@ -40,7 +39,6 @@ pub(super) struct Container {
     /// Records of schemas and channels, for the summary.
     schemas: Vec<u8>,
     channels: Vec<u8>,
-    /// Messages of each channel.
     counts: Vec<u64>,
     schema_count: u16,
     chunk_indices: Vec<u8>,
@@ -49,7 +47,6 @@ pub(super) struct Container {
     span: Option<(u64, u64)>,
 }
 
-/// The chunk that is being filled.
 #[derive(Default)]
 struct Chunk {
     records: Vec<u8>,
@@ -138,7 +135,7 @@ impl Container {
         self.file.write(bytes)
     }
 
-    /// Adds a schema in Protocol Buffers. Returns its number.
+    /// Returns the schema's number.
     pub(super) fn schema(&mut self, name: &str, descriptors: &[u8]) -> u16 {
         self.schema_count = self.schema_count.saturating_add(1);
         let record = Record::default().u16(self.schema_count).text(name).text("protobuf").bytes(descriptors);
@@ -147,7 +144,7 @@ impl Container {
         self.schema_count
     }
 
-    /// Adds a channel. Returns its number; `None` if the file has no room for more.
+    /// Returns the channel's number; `None` if the file has no room for more.
     pub(super) fn channel(&mut self, schema: u16, topic: &str, about: &[(String, String)]) -> Option<u16> {
         let number = u16::try_from(self.counts.len()).ok()?;
         let record = Record::default().u16(number).u16(schema).text(topic).text("protobuf").map(about);
@@ -179,7 +176,6 @@ impl Container {
         if self.chunk.records.len() >= CHUNK_BYTES { self.end_chunk() } else { Ok(()) }
     }
 
-    /// Facts about the whole file.
     pub(super) fn metadata(&mut self, name: &str, facts: &[(String, String)]) -> Result<()> {
         let record = Record::default().text(name).map(facts).record(METADATA);
         let index = Record::default().u64(self.place).u64(record.len() as u64).text(name);
@@ -220,7 +216,7 @@ impl Container {
         Ok(())
     }
 
-    /// Writes the summary. Returns the file and the number of messages.
+    /// Returns the file and the number of messages.
     pub(super) fn finish(mut self) -> Result<(Single, u64)> {
         self.end_chunk()?;
         self.write(&Record::default().u32(0).record(DATA_END))?;

@@ -38,7 +38,6 @@ use container::Container;
 use protobuf::{bytes, double, float, inside, signed, unsigned, varint};
 use schemas::Schema;
 
-/// The sender and the kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Topic {
     /// Of a system and a component.
@@ -68,7 +67,6 @@ impl Messages {
         self.entries.push((topic, time_ns, self.data.len()));
     }
 
-    /// Each message with its topic and time.
     fn iter(&self) -> impl Iterator<Item = (Topic, u64, &[u8])> {
         let begins = std::iter::once(0).chain(self.entries.iter().map(|(.., end)| *end));
         self.entries.iter().zip(begins).map(|((topic, time_ns, end), begin)| {
@@ -182,7 +180,6 @@ fn timestamp(out: &mut Vec<u8>, number: u32, time_ns: u64) {
     });
 }
 
-/// The open file, and the vehicle's motion.
 pub(super) struct Mcap {
     file: Container,
     channels: BTreeMap<Topic, Option<u16>>,
@@ -192,7 +189,7 @@ pub(super) struct Mcap {
 }
 
 impl Mcap {
-    /// The channel of a topic, made for its first message; `None` if the file has no room for more.
+    /// Made for its first message; `None` if the file has no room for more.
     fn channel(&mut self, topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option<u16> {
         if let Some(known) = self.channels.get(&topic) {
             return *known;
@@ -208,7 +205,6 @@ impl Mcap {
         channel
     }
 
-    /// Messages that are made of observations and texts.
     fn derive(&mut self, context: &Context, story: &Story) -> Messages {
         let (mut messages, epochs) = (Messages::default(), &context.epochs);
         let mut said = story.said.iter().peekable();
@@ -286,7 +282,6 @@ impl Mcap {
     }
 }
 
-/// `foxglove.Log` of a text.
 fn text(messages: &mut Messages, epochs: &Epochs, said: &Said) {
     let Said::Text { at, severity, words } = said else { return };
     let level = match severity {

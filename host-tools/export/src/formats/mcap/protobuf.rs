@@ -46,7 +46,6 @@ pub(super) struct Field {
     pub(super) is_list: bool,
 }
 
-/// An enumeration inside a message.
 pub(super) type Enumeration = (&'static str, &'static [&'static str]);
 
 const VARINT: u64 = 0;

@@ -9,7 +9,6 @@ use super::protobuf::{Enumeration, Field, Type, file};
 use crate::row::{CellType, Row, plain_name};
 use crate::source::item::Table;
 
-/// A schema, and the topic that has it.
 pub(super) struct Schema {
     pub(super) name: String,
     pub(super) topic: String,
@@ -22,10 +21,9 @@ pub(super) struct Schema {
 const TIME_FILE: &str = "google/protobuf/timestamp.proto";
 const TIMESTAMP: Type = Type::Message(".google.protobuf.Timestamp");
 
-/// A message's name, its fields, and its enumeration.
 type Definition<'a> = (&'a str, Vec<Field>, Option<Enumeration>);
 
-/// The schema of a topic; `None` of a message without a definition, or a table without a row.
+/// `None` of a message without a definition, or a table without a row.
 pub(super) fn schema(topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option<Schema> {
     Some(match topic {
         Topic::Mavlink(system, component, id) => {
@@ -72,7 +70,7 @@ pub(super) fn schema(topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option
     })
 }
 
-/// A message whose fields are numbered from 1: name, type, list or not, unit.
+/// Fields are numbered from 1: name, type, list or not, unit.
 fn plain(
     package: &str,
     name: &str,
@@ -90,7 +88,6 @@ fn plain(
     Schema { name: format!("{package}.{name}"), topic, descriptors, about }
 }
 
-/// A file of definitions, after the one of times.
 fn with_time(package: &str, messages: &[Definition<'_>]) -> Vec<u8> {
     let mut out = Vec::new();
     let time = ("Timestamp", fields(&[("seconds", Type::Int64), ("nanos", Type::Int32)]), None);

@@ -19,7 +19,6 @@ pub(crate) struct Batches {
     held_bytes: usize,
 }
 
-/// A row with its time since power-on and its UTC.
 pub(crate) type TimedRow = (Instant, Option<u64>, Row);
 
 /// Memory of an empty table, and of a row besides the values of its message: its times, its sender.
@@ -61,7 +60,6 @@ impl Batches {
         columns.frame(at, utc_us, frame, known);
     }
 
-    /// Adds a row of the monitor's own.
     pub(crate) fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
         let texts = row.cells.iter().map(|(_, cell)| match cell {
             Cell::Text(text) | Cell::Words(text, _) => text.len(),
@@ -72,12 +70,10 @@ impl Batches {
         self.rows.entry(row.table).or_default().push((at, utc_us, row.clone()));
     }
 
-    /// Bytes of memory that it holds, roughly.
     pub(crate) fn held_bytes(&self) -> usize {
         self.held_bytes
     }
 
-    /// The frames and the rows of each table.
     pub(crate) fn parts(self) -> (BTreeMap<Table, TableRows>, BTreeMap<&'static str, Vec<TimedRow>>) {
         (self.frames, self.rows)
     }

@@ -25,12 +25,9 @@ pub(crate) const TAKEN_FRAMES: [&str; 7] =
 /// Texts that are handed to the encoder at once: each takes some 40 bytes there.
 const TEXTS_AT_ONCE: usize = 1024;
 
-/// The type of a column's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// An unsigned integer of this many bits.
     Unsigned(i8),
-    /// An integer of this many bits.
     Signed(i8),
     Single,
     Double,
@@ -93,7 +90,6 @@ impl Kind {
     }
 }
 
-/// Values by the type in which Parquet stores them.
 #[derive(Debug)]
 enum Values {
     Flags(Vec<bool>),
@@ -117,7 +113,7 @@ impl Values {
     }
 }
 
-/// Texts in a row, and the end of each.
+/// The end of each.
 #[derive(Debug, Default)]
 struct Texts {
     text: String,
@@ -136,7 +132,6 @@ impl Texts {
         self.ends.extend(next.ends.drain(..).map(|end| begin + end));
     }
 
-    /// This many texts from this one on.
     fn some(&self, from: usize, count: usize) -> Vec<ByteArray> {
         let begins = std::iter::once(0).chain(self.ends.iter().copied());
         let texts = begins.zip(&self.ends).skip(from).take(count);
@@ -150,7 +145,6 @@ pub(super) struct Column {
     kind: Kind,
     units: &'static str,
     enumeration: &'static str,
-    /// Elements of each row's list; 0 without lists.
     length: usize,
     is_optional: bool,
     /// Those that are there.
@@ -190,7 +184,6 @@ impl Column {
         Self { units, ..Self::new(free_name(&plain, &TAKEN), kind).optional() }
     }
 
-    /// Its properties besides name and type.
     pub(super) fn about(&self) -> impl Iterator<Item = (String, &'static str)> {
         let known = [("units", self.units), ("enum", self.enumeration)];
         let name = &self.name;
@@ -233,7 +226,6 @@ impl Column {
             .build()
     }
 
-    /// Adds a value of this field.
     fn push_value(&mut self, value: Value<'_>) {
         match value {
             // Invalid UTF-8 gets replacement characters.
@@ -243,7 +235,7 @@ impl Column {
         }
     }
 
-    /// Adds a cell. A cell that is not of the column's type is null.
+    /// A cell that is not of the column's type is null.
     fn push_cell(&mut self, cell: Option<&Cell>) {
         let scalar = match (self.kind, cell) {
             (Kind::Text, Some(Cell::Text(text))) => return self.push_text(text),
@@ -304,7 +296,6 @@ impl Column {
             (Values::Singles(column), Values::Singles(next)) => column.append(next),
             (Values::Doubles(column), Values::Doubles(next)) => column.append(next),
             (Values::Texts(column), Values::Texts(next)) => column.append(next),
-            // The columns of one table are made alike.
             _ => {}
         }
     }
@@ -355,7 +346,6 @@ impl Column {
     }
 }
 
-/// The rows of a table that wait to be written.
 #[derive(Debug)]
 pub(crate) struct TableRows {
     columns: Vec<Column>,
@@ -371,7 +361,6 @@ impl TableRows {
         Self { columns: times.into_iter().chain(columns).collect(), rows: 0, has_frames }
     }
 
-    /// Of the frames of a table.
     pub(crate) fn of_frames(table: Table) -> Self {
         let sender = ["system", "component"].map(|name| Column::new(name, Kind::Unsigned(8)));
         let fields = match table {
@@ -409,7 +398,6 @@ impl TableRows {
         columns
     }
 
-    /// Adds a frame; of a message that is not known its bytes as hexadecimal digits.
     pub(crate) fn frame(
         &mut self,
         at: Instant,
@@ -441,7 +429,6 @@ impl TableRows {
         }
     }
 
-    /// Adds the rows that come next.
     pub(crate) fn append(&mut self, mut next: Self) {
         self.rows += std::mem::take(&mut next.rows);
         for (column, next) in self.columns.iter_mut().zip(&mut next.columns) {
@@ -449,7 +436,6 @@ impl TableRows {
         }
     }
 
-    /// Takes all rows out, and leaves it empty.
     pub(crate) fn take(&mut self) -> Self {
         let (rows, columns) = (std::mem::take(&mut self.rows), &mut self.columns);
         let take = |column: &mut Column| Column {
@@ -470,12 +456,10 @@ impl TableRows {
         self.rows
     }
 
-    /// Whether the rows are frames.
     pub(crate) fn has_frames(&self) -> bool {
         self.has_frames
     }
 
-    /// Bytes of memory that they take.
     pub(crate) fn held_bytes(&self) -> usize {
         self.columns.iter().map(Column::held_bytes).sum()
     }

@@ -63,16 +63,12 @@ const CHUNK_BYTES: usize = 800;
 /// Tables that are written before it is looked at how many are open.
 const AT_ONCE: usize = 16;
 
-/// Memory limits for all tables of one session.
 #[derive(Clone, Copy)]
 struct Limits {
-    /// Bytes of columns that wait to be encoded.
     pending_bytes: usize,
-    /// Bytes of files that are open.
     open_bytes: usize,
 }
 
-/// The tables of one session, open.
 struct ParquetTables {
     folder: Folder,
     limits: Limits,
@@ -80,28 +76,22 @@ struct ParquetTables {
     tables: BTreeMap<Table, TableFile>,
 }
 
-/// Properties of the writer, and the session's metadata for each file.
 struct Properties {
     writer: WriterPropertiesBuilder,
     about: Vec<KeyValue>,
 }
 
-/// A table: the rows that wait, and its file while that is open.
 struct TableFile {
     table: Table,
     columns: TableRows,
-    /// Memory of its waiting rows.
     pending_bytes: usize,
     open: Option<Open>,
-    /// Files of it so far.
     parts: u32,
 }
 
-/// A file that is written.
 struct Open {
     path: PathBuf,
     writer: SerializedFileWriter<FolderFile>,
-    /// Its memory.
     bytes: usize,
 }
 
@@ -122,7 +112,6 @@ impl ParquetTables {
         Self { folder, limits: LIMITS, properties: Properties { writer, about }, tables: BTreeMap::new() }
     }
 
-    /// Takes a group's columns.
     fn put(&mut self, batches: Batches) -> Result<()> {
         let (frames, rows) = batches.parts();
         for (table, columns) in frames {
@@ -184,7 +173,7 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Writes the rest, and each file's end: the folder gets its name. Returns it and the number of tables.
+    /// The folder gets its name; returns it and the number of tables.
     fn finish(mut self) -> Result<(PathBuf, usize)> {
         let count = self.tables.len();
         let (folder, properties) = (&self.folder, &self.properties);
@@ -214,7 +203,6 @@ impl Part for Batches {
     }
 }
 
-/// The tables of a log.
 pub(super) struct Parquet(ParquetTables);
 
 impl Writer for Parquet {
@@ -319,12 +307,10 @@ impl TableFile {
         Ok(())
     }
 
-    /// Memory of its open file.
     fn open_bytes(&self) -> usize {
         self.open.as_ref().map_or(0, |open| open.bytes)
     }
 
-    /// Writes the waiting rows as a row group.
     fn write_group(&mut self, folder: &Folder, properties: &Properties) -> Result<()> {
         if self.columns.rows() == 0 {
             return Ok(());
@@ -342,7 +328,7 @@ impl TableFile {
         open.write(rows.columns()).with_context(|| cannot_write(&open.path))
     }
 
-    /// Ends its file; later rows go into a further one.
+    /// Later rows go into a further file.
     fn end_file(&mut self) -> Result<()> {
         let Some(Open { path, writer, .. }) = self.open.take() else { return Ok(()) };
         writer.close().map(|_| ()).with_context(|| cannot_write(&path))
