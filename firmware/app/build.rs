@@ -84,7 +84,7 @@ fn copy(from: &str, to: &Path) {
     fs::copy(from, to).expect("the linker script is in the source tree");
 }
 
-/// Empty without git.
+/// The commit; empty without git.
 fn commit() -> String {
     // The log of HEAD grows with every commit, so that the next build looks again.
     if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]) {

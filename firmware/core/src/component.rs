@@ -162,7 +162,7 @@ const _: () = {
 impl Setting {
     const COUNT: usize = 6;
 
-    /// 0 for a place beyond the last.
+    /// The component's value; 0 for a place beyond the last.
     fn of(self, place: usize, params: &Params) -> f32 {
         let index = Param::Cmp1Kind as usize + place * Self::COUNT + self as usize;
         let param = Param::ALL.get(index).filter(|_| place < COMPONENTS_MAX);

@@ -264,13 +264,13 @@ impl Derived {
         Reading::new(self.load_factor.at(), self.load_factor.get().map(|[sample_g, _]| *sample_g))
     }
 
-    /// Smoothed by axis ([`crate::inertial`]): a load that counts.
+    /// Load factor of the force smoothed by axis ([`crate::inertial`]): a load that counts.
     pub(crate) fn load_factor_g(&self) -> Option<f32> {
         self.load_factor.get().map(|[_, smooth_g]| *smooth_g)
     }
 }
 
-/// `None` where it was not measured.
+/// A sample in units of gravity; `None` where it was not measured.
 pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
     Some(norm(force.map(|axis| axis.0)))
         .filter(|force| *force <= MetresPerSecond2::MAX)

@@ -51,7 +51,7 @@ state! {
         window: Instant,
         /// When the first heartbeat was heard, or the vehicle was chosen anew.
         since: Option<Instant>,
-        /// Turns are counted from here.
+        /// First heartbeat: turns are counted from here.
         first: Instant,
         /// The vehicle makes a stream.
         streams: bool,

@@ -211,7 +211,7 @@ impl Flight {
         self.airborne_since.is_some()
     }
 
-    /// It does not just leave the ground.
+    /// In the air for a moment, not just leaving the ground.
     pub(crate) fn is_settled(&self, now: Instant) -> bool {
         self.airborne_since.is_some_and(|since| now.since(since) > SETTLED)
     }

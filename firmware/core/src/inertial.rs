@@ -155,7 +155,7 @@ impl Inertial {
         self.at.is_some_and(|at| now.since(at) <= FRESH && at.since(self.steps_since) >= STEPS_KNOWN)
     }
 
-    /// On the ground, without thrust.
+    /// Rest on the ground, without thrust.
     pub(crate) fn rest(&mut self, now: Instant) {
         if self.has_steps(now) && (self.step_at_rest == 0.0 || self.step < self.step_at_rest) {
             self.step_at_rest = self.step;

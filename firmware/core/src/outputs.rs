@@ -286,7 +286,7 @@ impl MotorOutputs {
         }
     }
 
-    /// Its motor's earlier speed is not known.
+    /// Whether its output alone is at an end of its range in a flight without a received take-off: its motor's earlier speed is not known.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
         self.takeoff_not_recorded
             && self.verdict.0 == motor

@@ -127,7 +127,7 @@ state! {
 }
 
 impl Pairs {
-    /// Compared with the others' of the same moment.
+    /// A sample, compared with the others' of the same moment.
     pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: usize, axes: [f32; 3], gates: Gates) {
         let Self { samples, pairs } = self;
         let moment = kind.one_moment(gates);

@@ -510,7 +510,7 @@ fn modes(vehicle: &Vehicle) -> Option<&'static Modes> {
     }
 }
 
-/// A failsafe may wait in the mode, or a mission was flown to its end.
+/// Reasons of its own: a failsafe may wait in the mode, or a mission was flown to its end.
 fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
     modes(vehicle).is_some_and(|modes| {
         let is_end = before == modes.mission && modes.after_mission.contains(&after);
@@ -518,7 +518,7 @@ fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bo
     })
 }
 
-/// By its landed state, because it sinks close to the ground, or in a mission.
+/// Signs of landing: its landed state, a sink close to the ground, or a mission's.
 fn is_landing(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, flight, .. } = *situation;
     vehicle.landed.within(now, SILENT) == Some(&LandedState::Landing)

@@ -117,7 +117,7 @@ impl Stamp {
         Some(self.age(now)?.as_millis())
     }
 
-    /// No later than `now`.
+    /// The time, no later than `now`.
     pub(crate) fn instant(self, now: Instant) -> Option<Instant> {
         Some(self.0?.earlier(now))
     }

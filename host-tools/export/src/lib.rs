@@ -286,7 +286,7 @@ struct Task<'a> {
     offset_s: f64,
 }
 
-/// Reported in the logs' order.
+/// A log's outcome, reported in the logs' order.
 struct Done {
     name: String,
     outcome: Outcome,

@@ -32,7 +32,7 @@ impl Tables {
     }
 }
 
-/// Kept for ever.
+/// Names, kept for ever.
 fn names(table: &Table) -> Option<Names> {
     let columns = table.columns.iter().map(|column| {
         if column.unit.is_empty() {

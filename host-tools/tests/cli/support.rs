@@ -54,7 +54,7 @@ pub(crate) fn hums() -> Command {
     command
 }
 
-/// The exit code must be this one.
+/// The output; the exit code must be this one.
 #[track_caller]
 pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     let output = attempt(dir, line);
@@ -63,7 +63,7 @@ pub(crate) fn run(dir: &Path, line: &str, code: i32) -> Output {
     output
 }
 
-/// Any exit code.
+/// The output, with any exit code.
 #[track_caller]
 pub(crate) fn attempt(dir: &Path, line: &str) -> Output {
     let arguments = line.split_whitespace().map(|word| match word {
@@ -207,7 +207,7 @@ pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
 /// untouched.
 pub(crate) type Stamp = (u64, u64, i64, i64);
 
-/// By name, without reading them: a card's image is large.
+/// Files by name, without reading them: a card's image is large.
 pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
     each_file(dir, |path| {
         let of = fs::metadata(path).expect("a file");

@@ -97,7 +97,7 @@ pub(crate) async fn run(
     }
 }
 
-/// The end of the previous start, for record and ground station.
+/// The previous start's end, for record and ground station.
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
 fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
@@ -109,7 +109,7 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     }
 }
 
-/// Once each; `told` stores the reported ones.
+/// Missing parts of the board, once each; `told` stores the reported ones.
 #[inline(never)]
 fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 6], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);
@@ -134,7 +134,7 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
 
 // Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
-/// At most [`DRAINED_MAX`]; `true` if there may be more.
+/// At most [`DRAINED_MAX`] frames; `true` if there may be more.
 #[inline(never)]
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
     let Ends { frames, sectors, gs, .. } = ends;

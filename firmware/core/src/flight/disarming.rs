@@ -22,7 +22,7 @@ const DROPS_MPS: f32 = 10.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DisarmWatch {
     since: Instant,
-    /// Above home, m.
+    /// Height above home, m.
     pub(super) height_m: Option<f32>,
     /// Height above mean sea level, m.
     altitude_m: Option<f32>,

@@ -96,7 +96,7 @@ impl Alarms {
         self.set_silenced(slot, true);
     }
 
-    /// Gives each once.
+    /// A state that is stale still when its silence is over for [`OUTLIVES`]; each once.
     pub(super) fn outliving_silence(&mut self, now: Instant) -> Option<u16> {
         if now.since(self.silence_ended?) < OUTLIVES {
             return None;

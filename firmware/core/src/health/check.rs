@@ -350,7 +350,7 @@ impl Check {
         }
     }
 
-    /// NaN where there is none.
+    /// The limit; NaN where there is none.
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
         let [warn, critical] = self.limits.values(params);
         if level == Level::Critical || warn.is_nan() { critical } else { warn }

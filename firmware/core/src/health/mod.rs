@@ -172,7 +172,7 @@ impl Health {
         self.alarms.iter().filter_map(|standing| Alarm::at(standing.slot, standing.level, standing.since))
     }
 
-    /// A finding of its own.
+    /// An outlived alarm, or lack of data, as a finding of its own.
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
         let (check, instance) = check_of(slot)?;
         let level = self.states.get(usize::from(slot))?.level()?;
@@ -196,7 +196,7 @@ impl Health {
         self.numbered_levels().map(|(_, check, instance, level)| (check, instance, level))
     }
 
-    /// Each has a number that is its own.
+    /// Levels, each with a number of its own.
     pub(crate) fn numbered_levels(&self) -> impl Iterator<Item = (u16, &'static Check, u8, Level)> + Clone {
         let states = slots().zip(&self.states);
         states.filter_map(|((slot, check, instance), state)| {
@@ -238,7 +238,7 @@ impl Health {
 }
 
 struct Now {
-    /// By [`When`] they apply.
+    /// Steps of checks, by [`When`] they apply.
     hows: [How; When::ALL.len()],
 }
 

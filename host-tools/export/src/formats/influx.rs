@@ -56,7 +56,7 @@ impl Tags {
         Self { session: tag_value(session), vehicle: tag_value(vehicle) }
     }
 
-    /// In the order of the alphabet, as databases like it.
+    /// Tags in the order of the alphabet, as databases like it.
     fn push_session(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(b",session=");
         out.extend_from_slice(self.session.as_bytes());

@@ -75,7 +75,7 @@ impl Moved {
         SHARED_UTC_US.saturating_add(us).saturating_sub(zero)
     }
 
-    /// Moved by its rule; zero if its type is not the rule's.
+    /// A field's bytes, moved by its rule; zero if its type is not the rule's.
     pub(super) fn field(&mut self, at: Instant, rule: Rule, kind: Kind, bytes: &[u8]) -> Vec<u8> {
         let degrees = |degrees: f64| ((degrees * 1e7).round() as i32).to_le_bytes().to_vec();
         let whole = || bytes.first_chunk().map_or(0, |bytes| i32::from_le_bytes(*bytes));

@@ -361,7 +361,7 @@ fn name((plot, line): Line) -> String {
     name
 }
 
-/// At its time since `from`.
+/// A place, at its time since `from`.
 pub(super) fn told(place: &Point, from: Instant) -> Place {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
     (place.at.as_secs_f64() - from.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)

@@ -30,7 +30,7 @@ pub fn compass_deg(radians: f32) -> f32 {
     radians.to_degrees().rem_euclid(360.0)
 }
 
-/// Its real part is first; radians.
+/// Yaw, radians, of a quaternion with its real part first.
 fn yaw_rad([w, x, y, z]: [f32; 4]) -> f32 {
     (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z))
 }

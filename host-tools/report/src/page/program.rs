@@ -46,7 +46,7 @@ pub fn program(entry: &str) -> String {
     program
 }
 
-/// Each after those that it imports from.
+/// A module and its imports, each after those that it imports from.
 fn needed(entry: &str) -> Vec<&str> {
     let mut order = Vec::new();
     add(entry, &mut order, &mut Vec::new());

@@ -94,7 +94,7 @@ impl Pages {
     }
 }
 
-/// Also the data that another program's recorder did not write.
+/// Faults; of another program's recording also the data that its recorder did not write.
 fn faults(log: &Overview) -> Vec<String> {
     let mut faults = log.faults();
     let losses = log.ending.summary.losses;

@@ -328,7 +328,7 @@ impl Making<'_> {
     }
 }
 
-/// With names of files alone: a page is given to others, and this computer's folders are not.
+/// An overview with names of files alone: a page is given to others, and this computer's folders are not.
 fn without_folders(overview: &Overview) -> Overview {
     let mut overview = overview.clone();
     for file in &mut overview.ending.files {
@@ -390,7 +390,7 @@ struct Wanted {
     sessions: RangeInclusive<usize>,
     output: PathBuf,
     directory: bool,
-    /// Not the comparison alone.
+    /// A page a session, and not the comparison alone.
     pages: bool,
 }
 

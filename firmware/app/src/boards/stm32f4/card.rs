@@ -67,7 +67,7 @@ impl SpiPort {
     /// Cards take 25 MHz; the next slower clock of these chips is 21: 84 MHz by 4, or 42 by 2.
     const TRANSFER: Hertz = Hertz(21_000_000);
 
-    /// Mode 0, with the select pin high.
+    /// A port in mode 0, with its select pin high.
     pub(crate) const fn new(bus: Spi<'static, Async, Master>, select: Output<'static>) -> Self {
         Self { bus, select, pause: Pause::new() }
     }

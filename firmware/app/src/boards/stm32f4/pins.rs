@@ -47,7 +47,7 @@ impl Line {
 }
 
 impl PinPort {
-    /// Mode 0, with the select pin high.
+    /// A port in mode 0, with its select pin high.
     pub(crate) fn new(
         sck: Peri<'static, impl Pin>,
         mosi: Peri<'static, impl Pin>,

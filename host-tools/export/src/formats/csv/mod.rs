@@ -132,7 +132,7 @@ impl Writer for Csv {
     }
 }
 
-/// 0 before the first line.
+/// Bytes; 0 before the first line.
 fn table_bytes(lines: &[u8]) -> usize {
     if lines.is_empty() { 0 } else { TABLE_BYTES + lines.len() }
 }

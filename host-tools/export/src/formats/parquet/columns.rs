@@ -113,7 +113,7 @@ impl Values {
     }
 }
 
-/// The end of each.
+/// Texts in a row, and the end of each.
 #[derive(Debug, Default)]
 struct Texts {
     text: String,
