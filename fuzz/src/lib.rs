@@ -11,7 +11,7 @@
 //! # To add a target
 //! 1. Write `fuzz/src/NAME.rs` with `pub fn check(data: &[u8])`. The framework limits the length of `data`; the function bounds
 //!    everything else. It gives any bytes to the reader, for instance a file's contents ([`file::with_file`] makes a file of
-//!    them), and asserts its rules.
+//!    them), and asserts its rules. A panic of the reader itself needs no assertion.
 //! 2. Add `pub mod NAME;` and a row of [`TARGETS`] to this file.
 //! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are
 //!    generated, never taken from foreign recordings. Without a corpus the mutations begin from noise and reach

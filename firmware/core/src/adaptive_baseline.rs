@@ -1,7 +1,8 @@
 //! A smoothed figure and its baseline in this flight.
 //!
 //! The baseline is the mean of the smoothed figure over the last minute; its range is [`SPREADS`] times the mean distance from
-//! that mean. So a fault does not become the baseline, and an offset from the beginning of a flight does.
+//! that mean. The caller says which samples are learnt, so a fault does not become the baseline, and an offset from the
+//! beginning of a flight does.
 
 /// The baseline is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;

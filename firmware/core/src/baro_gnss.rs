@@ -2,11 +2,12 @@
 //!
 //! 1. Barometer and GNSS ([`Comparison::BaroGnss`]): weather and site make an offset, which is learnt. Two effects on a healthy
 //!    barometer are allowed for. Air that is warmer or colder than standard makes a scale error: [`SCALE_PART`] of the change
-//!    of height.
+//!    of height. The wind of the flight presses on the housing: half of the change of the dynamic pressure.
 //! 2. Noise ([`Comparison::BaroNoise`]): the step of the height from sample to sample, less the climb. The errors of
 //!    a late message ([`LATE_S`]) and of a changing climb are taken off.
 //! 3. Climb ([`Comparison::BaroClimb`]): an accelerometer that folds vibration into an offset lets an estimator fall while the
-//!    vehicle climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`.
+//!    vehicle climbs, and height control gives full throttle. On rotors only, by the climb of `VFR_HUD`; the change of the
+//!    whole dynamic pressure is taken off.
 //! 4. The wrong height after a leap ([`Heights::receiver_leapt`]): the estimator's climb decides, which over so short
 //!    a time is its accelerometer's. If the receiver's height moved within [`RECEIVER_S`] without that climb, and the
 //!    barometer's by less than half as much, the receiver is wrong. A slow drift takes the estimator along and is

@@ -1,4 +1,5 @@
-//! Sensors against each other and against what they imply: the front ends of [`crate::residual`].
+//! Sensors against each other and against what they imply: the front ends of [`crate::residual`]. An inertial sensor that sends
+//! nothing but zeros is not fitted.
 //!
 //! | sensor | against | module |
 //! |---|---|---|

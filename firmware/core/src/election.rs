@@ -1,8 +1,8 @@
 //! Election of the vehicle: of the systems on the autopilot's port, the one that streams most.
 //!
-//! An autopilot forwards other systems' messages, so the first heartbeat on the port may be another vehicle's. For [`SETTLES`]
-//! another one takes its place if it streams far more. Then the choice stands until the vehicle has been silent for [`SILENT`]:
-//! the autopilot was changed, or its system id.
+//! An autopilot forwards other systems' messages, so the first heartbeat on the port may be another vehicle's. The first system
+//! is taken at once. For [`SETTLES`] another one takes its place if it streams far more. Then the choice stands until the
+//! vehicle has been silent for [`SILENT`]: the autopilot was changed, or its system id.
 //!
 //! A vehicle without a stream gives way to a system with one at any time. Autopilots may be silent until they are
 //! asked for streams. So while several send heartbeats and none streams by itself, each is asked for one `TURN`; the

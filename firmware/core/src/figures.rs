@@ -1,8 +1,8 @@
 //! Figures of a flight: quantities of steady flight that show wear and load, each as the mean of its last minute.
 //!
-//! A sample far from the mean counts only for a part of its distance (`BELIEVED`): a gust or garbage moves the mean little. The
-//! mean at landing is the flight's figure. It is recorded with the session's counters; `hums check` compares the figures of
-//! flights.
+//! Once a second in steady flight (hover, or cruise on wings; level) each quantity gives a sample. One far from the mean counts
+//! only for a part of its distance (`BELIEVED`): a gust or garbage moves the mean little. The mean at landing is the flight's
+//! figure. It is recorded with the session's counters; `hums check` compares the figures of flights.
 //!
 //! Hover throttle depends on air density and on the battery's voltage: rotor speed goes with duty times voltage,
 //! thrust with its square and with density. `ArduPilot`'s throttle is linear in thrust, PX4's in speed (`THR_MDL_FAC`

@@ -16,9 +16,9 @@
 //! motor alone is a quarter of the loss above them. (Flat: a fifth, less the gap of the fourth.) A tilt of such a
 //! vehicle raises two or three alike. It counts five times.
 //!
-//! So what a motor stands out by beyond [`DRIFT_PERCENT`] is summed over time, and what falls short of that is taken off again
-//! (a CUSUM: E. S. Page, Continuous inspection schemes, Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what
-//! stands out at once.
+//! A slightly weak motor stands out little, but goes on doing so. So what a motor stands out by beyond [`DRIFT_PERCENT`] is
+//! summed over time, and what falls short of that is taken off again (a CUSUM: E. S. Page, Continuous inspection schemes,
+//! Biometrika 41, 1954). The sum of [`SUMMED_S`] seconds counts as what stands out at once.
 //!
 //! A motor that alone is at the end of its range while no other one is near it gives less than is asked of it,
 //! however the vehicle falls.

@@ -3,7 +3,7 @@
 //!
 //! 1. A sample counts while all gates of its [`Row`] are open.
 //! 2. One sample moves the residual by `clamp` at most, so that one wrong message raises no alarm.
-//! 3. The residual is smoothed.
+//! 3. The residual is smoothed. An allowance (delay, scale, wind) is smoothed with it and taken off.
 //! 4. Its baseline is the mean of the last minute ([`crate::adaptive_baseline`]). A residual further out than `hold`
 //!    teaches nothing.
 //! 5. The reported value is the excess over the baseline. It is as old as the sample.

@@ -1,6 +1,6 @@
 //! Files that are not read but known by their first bytes: archives, compressed and encrypted logs, text in UTF-16.
 
-/// First bytes, and advice for such a file: the end of a sentence that begins with its name.
+/// First bytes, and advice: the end of a sentence that begins with the file's name.
 const KNOWN: [(&[u8], &str); 8] = [
     (b"PK\x03\x04", "is a ZIP archive; unpack it (unzip), and give what is in it"),
     (b"\xfd7zXZ\0", "is compressed with xz; unpack it (xz -dk), or compress it with gzip instead"),

@@ -133,7 +133,7 @@ pub const ALL_BYTES: usize = 2 * LARGEST_BYTES;
 const AT_ONCE_MAX: usize = 4_096;
 
 impl DatagramReader {
-    /// The next datagram's bytes; none where it is of no use.
+    /// No bytes where the datagram is of no use.
     fn next(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.socket.recv_from(buffer) {
             Ok((_, from)) if self.fixed && Some(from) != *lock(&self.peer) => Ok(0),

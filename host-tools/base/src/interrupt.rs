@@ -37,7 +37,6 @@ pub fn watch_twice() {
     watch_for(2);
 }
 
-/// So many are only noted.
 fn watch_for(wishes: u32) {
     REQUESTED.get_or_init(|| watched(wishes, next));
 }
@@ -63,7 +62,7 @@ fn watched<N: FnMut() + Send + 'static>(
     requested
 }
 
-/// Waits for this many signals; the next one ends the program at once.
+/// The next signal ends the program at once.
 fn tell_apart(wishes: u32, mut next: impl FnMut(), armed: &AtomicBool) {
     let mut last: Option<Instant> = None;
     for wish in 1..=wishes {
@@ -78,7 +77,6 @@ fn tell_apart(wishes: u32, mut next: impl FnMut(), armed: &AtomicBool) {
     armed.store(true, Ordering::SeqCst);
 }
 
-/// A function that returns at the next signal.
 #[cfg(unix)]
 fn next() -> io::Result<impl FnMut() + Send + 'static> {
     let (mut heard, tell) = io::pipe()?;
@@ -88,7 +86,6 @@ fn next() -> io::Result<impl FnMut() + Send + 'static> {
     Ok(move || while !matches!(io::Read::read(&mut heard, &mut [0]), Ok(1)) {})
 }
 
-/// A function that returns at the next signal.
 #[cfg(not(unix))]
 fn next() -> io::Result<impl FnMut() + Send + 'static> {
     let heard = Arc::new(AtomicBool::new(false));

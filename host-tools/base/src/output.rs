@@ -34,7 +34,6 @@ impl Schema {
     }
 }
 
-/// An object with its schema.
 #[derive(Serialize)]
 struct Named<'a, T> {
     #[serde(flatten)]

@@ -50,7 +50,6 @@ pub fn message(text: &str) -> Cow<'_, str> {
 /// JSON with the same meaning: such characters occur inside of strings only, and are written there by their numbers.
 pub fn json(text: &str) -> Cow<'_, str> {
     let is_meant = |c: char| (c > '\u{7e}' && c.is_control()) || redirects(c);
-    // Writing to a `String` cannot fail.
     rewritten(text, is_meant, |out, c| {
         let _ = write!(out, "\\u{:04x}", u32::from(c));
     })

@@ -34,7 +34,6 @@ pub struct Ground {
 pub struct SideOutput(Arc<Mutex<Inside>>);
 
 struct Inside {
-    /// The flag that requested it.
     flag: &'static str,
     to: To,
     failed: bool,
@@ -84,7 +83,7 @@ impl SideOutput {
 }
 
 impl Inside {
-    /// Tries an operation on the output; after an error nothing more is written.
+    /// After an error nothing more is written.
     fn attempt(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
         let done = match &mut self.to {
             To::Nowhere => Ok(()),
@@ -176,7 +175,6 @@ fn listen(mut port: Box<dyn Port>) -> io::Result<GroundInput> {
                 Err(error) if duplex::is_silence(&error) => continue,
                 Err(_) => break,
             };
-            // A piece that finds no room is lost.
             if let Err(TrySendError::Disconnected(_)) = sender.try_send(piece) {
                 break;
             }

@@ -86,7 +86,7 @@ fn civil(days: u64) -> (u64, u64, u64) {
     (year_of_era + era * 400 + u64::from(month <= 2), month, day)
 }
 
-/// A time as [`moment`] writes it, in microseconds: `4:20.8`, `1:04:20`.
+/// In microseconds, as [`moment`] writes it: `4:20.8`, `1:04:20`.
 fn parse_moment(text: &str) -> Option<u64> {
     let (before, seconds) = text.rsplit_once(':')?;
     let (hours, minutes) = before.split_once(':').unwrap_or(("0", before));

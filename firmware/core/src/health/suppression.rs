@@ -2,8 +2,8 @@
 //!
 //! A failed motor tips the vehicle over, and a receiver without a fix makes the estimator doubt. So each check has a
 //! [`Role`]: its group, and the groups that explain it. An alarm explains another one if it is as bad or worse, began
-//! within [`NEAR`] of it, and is of the same motor, battery or receiver. Such a finding is recorded like any other, and not
-//! sent to the ground. A rise of the level is an onset too.
+//! within [`NEAR`] of it, and is of the same motor, battery or receiver. Such a finding names its cause, is recorded like any
+//! other, and not sent to the ground. A rise of the level is an onset too.
 //!
 //! A mishap explains only an alarm that begins with it or after it: an earlier one may be its cause.
 

@@ -3,9 +3,9 @@
 //! Counters of earlier sessions are saved once, at the beginning of a session. The session's own counters are one
 //! short item ([`Session`]) that is saved often.
 //!
-//! An item is a version byte and then fields, little endian. So version n reads items of n + 1, and n + 1 reads items
-//! of n with zero in the missing fields. The store guards the bytes (a checksum, two copies); decoding only keeps
-//! figures in their ranges.
+//! An item is a version byte and then fields, little endian. A later version only appends: each reads
+//! the items of the other, with zero in missing fields. The store guards the bytes (a checksum, two
+//! copies); decoding only keeps figures in their ranges.
 //!
 //! Figures keep their precision over the life of an airframe:
 //!

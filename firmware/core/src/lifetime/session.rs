@@ -2,8 +2,9 @@
 //! short. At the next start it is added to the saved totals.
 //!
 //! Each item that adds up over sessions names the power-on that it is *as of*: it counts everything before that one.
-//! The session is added to items that are as of the same power-on, and to no other. An item that was not saved again
-//! gets the session added; one that was saved includes it.
+//! The session is added to items that are as of the same power-on, and to no other: each figure counts once, even if
+//! power fails while items are saved. An item that was not saved again gets the session added; one that was saved
+//! includes it.
 //!
 //! Layout, version 1:
 //!

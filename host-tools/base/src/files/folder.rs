@@ -58,7 +58,6 @@ impl Folder {
         Ok(Self { path, target, part, session, files: Mutex::default() })
     }
 
-    /// Whether nothing is there, or an empty folder.
     fn is_free(path: &Path) -> bool {
         match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_none(),
@@ -96,7 +95,6 @@ impl Folder {
         let stamp = Stamp { session, files: files.into_inner().unwrap_or_else(PoisonError::into_inner) };
         let placed =
             File::create(part.path().join(STAMP)).and_then(|file| stamp.write(&file)).and_then(|()| {
-                // `create` has checked the existing files.
                 if let Some(old) = Stamp::of(&target) {
                     old.files.iter().map(String::as_str).chain([STAMP]).try_for_each(|name| {
                         let removed = fs::remove_file(target.join(name));
@@ -118,7 +116,6 @@ impl Folder {
     }
 }
 
-/// Refuses a place that may not be replaced by a session's folder.
 fn check(path: &Path, session: &str) -> Result<()> {
     let shown = path.display();
     if path.is_file() {

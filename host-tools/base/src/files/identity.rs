@@ -37,7 +37,7 @@ impl FileId {
     }
 }
 
-/// The file that a path leads to, without links if it exists.
+/// A path without links, if the file exists.
 pub(super) fn without_links(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

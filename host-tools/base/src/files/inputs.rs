@@ -40,12 +40,10 @@ impl Inputs {
         self
     }
 
-    /// Whether outputs may replace files.
     pub(super) fn may_replace(&self) -> bool {
         self.force == Some(true)
     }
 
-    /// Whether the command has a flag with which they may.
     pub(super) const fn can_replace(&self) -> bool {
         self.force.is_some()
     }
@@ -60,7 +58,6 @@ impl Inputs {
         self.files.insert(id, path.display().to_string());
     }
 
-    /// Whether one of them comes live.
     pub(super) const fn is_live(&self) -> bool {
         self.live
     }

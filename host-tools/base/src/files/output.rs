@@ -27,14 +27,12 @@ pub struct Output {
     part: Part,
 }
 
-/// The destination of the bytes.
 #[derive(Debug)]
 enum To {
     File(File),
     Standard(Stdout),
 }
 
-/// The fate of the written bytes at the end.
 #[derive(Debug)]
 enum Part {
     /// They are in their place.
@@ -122,7 +120,6 @@ impl Output {
         Self { to: BufWriter::with_capacity(BUFFER_BYTES, to), path: path.to_owned(), part }
     }
 
-    /// A file into which each write goes at once.
     fn at_once(file: File, path: &Path, part: Part) -> Self {
         Self { to: BufWriter::with_capacity(0, To::File(file)), path: path.to_owned(), part }
     }

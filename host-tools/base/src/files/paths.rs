@@ -20,7 +20,6 @@ pub fn means_standard_output(path: &Path) -> bool {
     ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"].iter().any(|name| path == Path::new(name))
 }
 
-/// The folder that a path is in.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -28,7 +27,6 @@ pub(super) fn folder_of(path: &Path) -> &Path {
 /// As much of a target's name as its part has: file systems take 255 bytes.
 const NAME_CHARS_MAX: usize = 50;
 
-/// How the name of a target's part begins.
 pub(super) fn part_prefix(target: &Path) -> io::Result<String> {
     let name = target.file_name().ok_or(io::ErrorKind::InvalidInput)?.to_string_lossy();
     Ok(format!(".{}.", name.chars().take(NAME_CHARS_MAX).collect::<String>()))

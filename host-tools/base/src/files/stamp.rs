@@ -12,17 +12,14 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::Path;
 
-/// The name of the file.
 pub(super) const STAMP: &str = ".hums";
 /// A stamp is a line and some hundred names.
 const BYTES_MAX: u64 = 4 << 20;
 
-/// The content of a stamp.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Stamp {
-    /// The session that the tables are of.
     pub(super) session: String,
-    /// The names of the files that were made; none while the folder is being made, or where the stamp is cut off.
+    /// Files that were made; none while the folder is being made, or where the stamp is cut off.
     pub(super) files: BTreeSet<String>,
 }
 

@@ -115,7 +115,6 @@ fn what_was_begun_is_gone_on_with() {
     assert_eq!(names(dir.path()), ["log"]);
 }
 
-/// Makes a folder with one file.
 fn tables(path: &Path, session: &str, force: bool, name: &str) -> anyhow::Result<()> {
     let folder = Folder::create(path, &Inputs::none().forcing(force), session)?;
     folder.file(name)?.write_all(b"rows")?;
@@ -134,7 +133,6 @@ fn a_folder_is_replaced_as_a_whole_with_force_and_by_its_own_session_only() {
     assert!(words(tables(&path, "s2", true, "b.csv")).contains("holds the files of another session, s1"));
     tables(&path, "s1", true, "b.csv").expect("made");
     assert_eq!(names(&path), [".hums", "b.csv"]);
-    // A foreign file would be lost.
     fs::write(path.join("notes"), "mine").expect("written");
     assert!(words(tables(&path, "s1", true, "c.csv")).contains("notes: was not made by this command"));
     assert_eq!(
