@@ -63,6 +63,12 @@ pub struct Quad {
     pub start_height: f32,
 }
 
+impl Default for Quad {
+    fn default() -> Self {
+        Self::healthy()
+    }
+}
+
 impl Quad {
     pub fn healthy() -> Self {
         let esc = Esc {
