@@ -1,14 +1,11 @@
 //! Speeds and currents of motors against each other: frames, turning, standing and pushing motors.
 
-use crate::common::{AUTOPILOT, Quad};
-use hums_core::Monitor;
+use crate::common::{Quad, Run};
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{
     Attitude, Autopilot, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
 };
 use hums_core::params::Params;
-use hums_core::status::LinkReading;
-use hums_core::time::Instant;
 use hums_core::units::{Amperes, Celsius, Radians, RadiansPerSecond, Rpm};
 
 /// A minute of flight; the findings about motors. `script` gives the vehicle, its ESCs and its yaw rate.
@@ -20,10 +17,8 @@ fn told_given(
     script: impl Fn(u64) -> (Quad, Vec<Esc>, f32),
     given: impl Fn(u64) -> Option<[u16; MOTORS_MAX]>,
 ) -> Vec<(&'static str, u8)> {
-    let mut monitor = Monitor::new(Params::defaults());
-    let mut findings = Vec::new();
-    for now_ms in (0..60_000).step_by(100) {
-        let now = Instant::from_millis(now_ms);
+    let mut run = Run::new(&Params::defaults());
+    run.says(0..60_000, |now_ms| {
         let (quad, escs, yaw_rate) = script(now_ms);
         let group = |first: usize| EscGroup {
             first: first as u8,
@@ -35,18 +30,12 @@ fn told_given(
         let more =
             [Observation::Attitude(attitude), Observation::Escs(group(0)), Observation::Escs(group(4))];
         let given = given(now_ms).map(|pulses| Observation::Outputs(Outputs { port: 0, pulses }));
-        for said in quad.says(now_ms).into_iter().filter(own).chain(more).chain(given) {
-            monitor.observe(now, AUTOPILOT, &said);
-        }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-            if finding.check.starts_with("motor") {
-                findings.push((finding.check, finding.instance));
-            }
-        });
-    }
-    findings.dedup();
-    findings
+        quad.says(now_ms).into_iter().filter(own).chain(more).chain(given).collect()
+    });
+    let of_motors = run.findings.iter().filter(|finding| finding.check.starts_with("motor"));
+    let mut told: Vec<_> = of_motors.map(|finding| (finding.check, finding.instance)).collect();
+    told.dedup();
+    told
 }
 
 /// With these speeds, and turning with `yaw_rate`, from 20 s on.
@@ -67,24 +56,14 @@ fn escs_of(currents: &[f32]) -> Vec<Esc> {
 #[test]
 fn an_esc_whose_messages_come_once_a_second_is_silent_after_five_of_them() {
     let told = |lost: u64| {
-        let mut monitor = Monitor::new(Params::defaults());
-        let mut findings = Vec::new();
-        for now_ms in (0..60_000).step_by(100) {
-            let now = Instant::from_millis(now_ms);
-            let quad = Quad::healthy();
-            let second = |escs| Observation::Escs(EscGroup { first: 4, escs });
+        let mut run = Run::new(&Params::defaults());
+        run.flies(0..60_000, |now_ms, quad, more| {
             let is_heard = now_ms % 1_000 == 0 && !(30_000..30_000 + 1_000 * lost).contains(&now_ms);
-            for said in quad.says(now_ms).into_iter().chain(is_heard.then_some(second(quad.escs))) {
-                monitor.observe(now, AUTOPILOT, &said);
-            }
-            let link = LinkReading { frames_lost: Some(0.0), at: now };
-            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-                if finding.check == "esc_silent" && finding.level == Level::Critical {
-                    findings.push(((now_ms - 29_000) / 1_000, finding.instance));
-                }
-            });
-        }
-        findings
+            let second = Observation::Escs(EscGroup { first: 4, escs: quad.escs });
+            more.extend(is_heard.then_some(second));
+        });
+        let critical = run.of_check("esc_silent").filter(|finding| finding.level == Level::Critical);
+        critical.map(|one| ((one.at.as_millis() - 29_000) / 1_000, one.instance)).collect::<Vec<_>>()
     };
     assert_eq!(told(4), []);
     assert_eq!(told(6), [(5, 4), (5, 5), (5, 6), (5, 7)]);
@@ -373,25 +352,16 @@ fn a_motor_that_alone_is_given_all_in_wind_that_tilts_the_vehicle_is_weak() {
 
 /// Findings about PX4's ESCs with two messages: speeds ten times a second, and states by `info` at a time in ms.
 fn px4_escs(info: impl Fn(u64) -> Option<Esc>) -> Vec<Finding> {
-    let mut monitor = Monitor::new(Params::defaults());
-    let mut findings = Vec::new();
-    let quad = Quad { autopilot: Autopilot::Px4, ..Quad::healthy() };
-    let status = quad.escs.map(|esc| Some(Esc { temperature: None, failures: None, errors: None, ..esc? }));
-    let quad = Quad { escs: status, ..quad };
-    for now_ms in (0..90_000).step_by(100) {
-        let now = Instant::from_millis(now_ms);
-        let info = info(now_ms).map(|esc| Observation::Escs(EscGroup { first: 0, escs: [Some(esc); 4] }));
-        for said in quad.says(now_ms).into_iter().chain(info) {
-            monitor.observe(now, AUTOPILOT, &said);
+    let mut run = Run::new(&Params::defaults());
+    run.flies(0..90_000, |now_ms, quad, more| {
+        quad.autopilot = Autopilot::Px4;
+        for esc in quad.escs.iter_mut().flatten() {
+            *esc = Esc { temperature: None, failures: None, errors: None, ..*esc };
         }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-            if finding.check.starts_with("esc") {
-                findings.push(*finding);
-            }
-        });
-    }
-    findings
+        let info = info(now_ms).map(|esc| EscGroup { first: 0, escs: [Some(esc); 4] });
+        more.extend(info.map(Observation::Escs));
+    });
+    run.findings.into_iter().filter(|finding| finding.check.starts_with("esc")).collect()
 }
 
 #[test]

@@ -1,14 +1,11 @@
-//! Scripted faults in a simulated flight. Each is found within its debounce plus 100 ms, and cleared when its value
-//! was good by more than the hysteresis for two seconds.
+//! Scripted faults in a simulated flight: silences, restarts, counters, hysteresis, and alarms that explain others.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
-use crate::common::{AUTOPILOT, Quad};
+use crate::common::{Quad, Run};
 use hums_core::Monitor;
-use hums_core::health::{CLEAR, Finding, Level, Subsystem};
+use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::observation::{Autopilot, EstimatorScale, Observation, Sensors, SystemTime, VehicleKind};
 use hums_core::params::Params;
-use hums_core::status::{LinkReading, Recording};
-use hums_core::time::{Instant, Span};
 use hums_core::units::{Amperes, Celsius, Fraction, Volts};
 use hums_core::usage::UsageCounter;
 
@@ -21,42 +18,13 @@ fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
 }
 
 fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<Finding>) {
-    let mut monitor = Monitor::new(*params);
-    let mut findings = Vec::new();
-    for now_ms in (0..120_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        let mut quad = Quad::healthy();
+    let mut run = Run::new(params);
+    run.flies(0..120_000, |now_ms, quad, _| {
         if (FAULT_MS..END_MS).contains(&now_ms) {
-            script(now_ms, &mut quad);
+            script(now_ms, quad);
         }
-        if now_ms.is_multiple_of(100) {
-            for observation in quad.says(now_ms) {
-                monitor.observe(now, AUTOPILOT, &observation);
-            }
-        }
-        let link = LinkReading { frames_lost: Some(quad.lost), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
-    }
-    (monitor, findings)
-}
-
-/// The check reaches the level within its debounce plus 100 ms, and is good again after the fault. Only checks in
-/// `also` may have findings besides.
-fn found(findings: &[Finding], check: &str, instance: u8, level: Level, debounce_ms: u64, also: &[&str]) {
-    let mine = |finding: &&Finding| finding.check == check && finding.instance == instance;
-    let first = findings.iter().filter(mine).find(|finding| finding.level == level);
-    let first = first.unwrap_or_else(|| panic!("{check} {instance} never {level:?}: {findings:?}"));
-    let after_ms = first.at.as_millis().saturating_sub(FAULT_MS);
-    assert!(
-        (debounce_ms..=debounce_ms + 100).contains(&after_ms),
-        "{check} after {after_ms} ms, debounce {debounce_ms} ms"
-    );
-    let last = findings.iter().rfind(mine).expect("there is one");
-    assert_eq!(last.level, Level::Ok, "{check} is not cleared: {last:?}");
-    let cleared_ms = last.at.as_millis().saturating_sub(END_MS + CLEAR.as_millis());
-    assert!(last.at.as_millis() >= END_MS && cleared_ms <= 100, "{check} cleared at {:?}", last.at);
-    let others = findings.iter().filter(|finding| finding.check != check && !also.contains(&finding.check));
-    assert_eq!(others.count(), 0, "{findings:?}");
+    });
+    (run.monitor, run.findings)
 }
 
 #[test]
@@ -72,53 +40,6 @@ fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
     for subsystem in Subsystem::ALL {
         let level = if subsystem == Subsystem::Engine { Level::Stale } else { Level::Ok };
         assert_eq!(health.subsystem(subsystem), level, "{subsystem:?}");
-    }
-}
-
-#[test]
-fn each_fault_is_found_alone_and_cleared() {
-    type Fault = fn(&mut Quad);
-    // The check, its instance, its level, its debounce in milliseconds, and other checks that may have findings.
-    let cases: [(Fault, &str); 17] = [
-        (|quad| quad.battery.voltage = Some(Volts(13.2)), "cell_voltage 0 critical 5000"),
-        (|quad| quad.battery.remaining = Some(Fraction(0.05)), "batt_remaining 0 critical 2000"),
-        (
-            |quad| quad.escs[2].as_mut().unwrap().temperature = Some(Celsius(120.0)),
-            "esc_temperature 2 critical 500",
-        ),
-        (|quad| quad.escs[1].as_mut().unwrap().current = Some(Amperes(0.0)), "motor_loss 1 critical 500"),
-        (
-            |quad| {
-                (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(0.9));
-            },
-            "ekf_failsafe 0 critical 1000 ekf_variance ekf_compass",
-        ),
-        (|quad| quad.estimator.compass = Some(1.2), "ekf_compass 0 warning 500"),
-        (|quad| quad.integrity.jamming = 3, "gps_jamming 0 critical 1000"),
-        (|quad| quad.gnss.fix = 1, "gps_fix 0 critical 200"),
-        (|quad| quad.vibration.levels[2] = Some(70.0), "vibration 0 critical 1000 vibration_rise"),
-        (|quad| quad.acceleration_down = -45.0, "load_factor 0 critical 500"),
-        (|quad| quad.roll = 1.2, "roll 0 critical 300"),
-        (|quad| quad.system.load = Some(Fraction(0.97)), "load 0 critical 2000"),
-        (|quad| quad.lost = 0.08, "frames_lost 0 critical 2000"),
-        (|quad| quad.recorder.recording = Recording::Stopped, "recording 0 critical 1000"),
-        // The vehicle counts as armed until the next heartbeat, which is sooner than the debounce.
-        (
-            |quad| {
-                quad.armed = false;
-                quad.recorder.recording = Recording::Stopped;
-            },
-            "recording 0 warning 1000",
-        ),
-        (|quad| quad.recorder.stall = Span::from_millis(800), "card_stall 0 warning 0"),
-        (|quad| quad.recorder.room = Some(0.005), "card_room 0 critical 1000"),
-    ];
-    for (fault, expected) in cases {
-        let words: Vec<&str> = expected.split(' ').collect();
-        let [check, instance, level, debounce_ms, also @ ..] = &words[..] else { panic!("{expected}") };
-        let level = Level::ALL.into_iter().find(|known| known.name() == *level).unwrap();
-        let (instance, debounce_ms) = (instance.parse().unwrap(), debounce_ms.parse().unwrap());
-        found(&fly(|_, quad| fault(quad)), check, instance, level, debounce_ms, also);
     }
 }
 
@@ -317,25 +238,16 @@ fn errors_that_rise_are_counted_a_minute_across_the_end_of_their_counter() {
 
 #[test]
 fn a_clock_that_jumps_is_no_fault_and_counts_no_time() {
-    let mut monitor = Monitor::new(Params::defaults());
-    let mut findings = Vec::new();
-    for now_ms in (0..30_000).step_by(100) {
-        let now = Instant::from_millis(now_ms);
-        let mut quad = Quad::healthy();
-        quad.boot_offset_ms = if now_ms < 20_000 { 100_000 } else { 3_700_000 };
-        for observation in quad.says(now_ms) {
-            monitor.observe(now, AUTOPILOT, &observation);
-        }
-        let utc_micros = Some(if now_ms < 15_000 { 1_700_000_000_000_000 } else { 1_400_000_000_000_000 });
+    let mut run = Run::new(&Params::defaults());
+    run.flies(0..30_000, |now_ms, quad, more| {
         // The autopilot's own clock jumps as well: forward, which no restart does.
-        let jump_ms = if now_ms < 20_000 { 100_000 } else { 3_700_000 };
-        let time = SystemTime { boot_ms: (now_ms + jump_ms) as u32, utc_micros };
-        monitor.observe(now, AUTOPILOT, &Observation::SystemTime(time));
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |finding| findings.push(*finding));
-    }
-    assert_eq!(findings, []);
-    let usage = monitor.usage();
+        quad.boot_offset_ms = if now_ms < 20_000 { 100_000 } else { 3_700_000 };
+        let utc_micros = Some(if now_ms < 15_000 { 1_700_000_000_000_000 } else { 1_400_000_000_000_000 });
+        let boot_ms = (now_ms as i64 + quad.boot_offset_ms) as u32;
+        more.push(Observation::SystemTime(SystemTime { boot_ms, utc_micros }));
+    });
+    assert_eq!(run.findings, []);
+    let usage = run.monitor.usage();
     for counter in [UsageCounter::Armed, UsageCounter::Flight] {
         let counted_s = usage.value(counter).unwrap();
         assert!((25.0..=30.0).contains(&counted_s), "{}: {counted_s}", counter.name());
@@ -441,53 +353,27 @@ fn a_mishap_that_is_over_explains_nothing_where_levels_are_latched() {
 
 #[test]
 fn a_value_of_power_on_is_stale_for_ever() {
-    let mut monitor = Monitor::new(Params::defaults());
-    let quad = Quad::healthy();
-    let mut hot = quad.battery;
-    hot.temperature = Some(Celsius(95.0));
-    let mut levels = Vec::new();
+    let mut run = Run::new(&Params::defaults());
     for day in [0, 24, 25, 48] {
-        for ms in (0..20_000).step_by(50) {
-            let now = Instant::from_millis(day * 86_400_000 + ms);
-            for observation in quad.says(ms) {
-                if !matches!(observation, Observation::Battery(_)) {
-                    monitor.observe(now, AUTOPILOT, &observation);
-                }
-            }
-            if day == 0 && ms < 6_000 {
-                monitor.observe(now, AUTOPILOT, &Observation::Battery(hot));
-            }
-            let link = LinkReading { frames_lost: Some(0.0), at: now };
-            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-                if finding.check == "batt_temperature" {
-                    levels.push((day, finding.level));
-                }
-            });
-        }
+        let day_ms = day * 86_400_000;
+        run.flies(day_ms..day_ms + 20_000, |now_ms, quad, _| {
+            quad.battery_silent = now_ms >= 6_000;
+            quad.battery.temperature = Some(Celsius(95.0));
+        });
     }
-    assert_eq!(levels.last(), Some(&(0, Level::Stale)), "{levels:?}");
+    let last = run.of_check("batt_temperature").next_back().expect("it was hot");
+    assert!(last.level == Level::Stale && last.at.as_millis() < 20_000, "{last:?}");
 }
 
 #[test]
 fn what_has_no_data_when_a_silence_is_over_is_told_then() {
-    let mut monitor = Monitor::new(Params::defaults());
-    let mut stale = Vec::new();
-    for now_ms in (0..100_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
-        let mut quad = Quad::healthy();
-        quad.silent = (20_000..50_000).contains(&now_ms);
-        for observation in quad.says(now_ms) {
-            if now_ms < 19_000 || !matches!(observation, Observation::Battery(_)) {
-                monitor.observe(now, AUTOPILOT, &observation);
-            }
-        }
-        let link = LinkReading { frames_lost: Some(0.0), at: now };
-        monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-            if finding.level == Level::Stale && (finding.check == "batt_remaining" || now_ms > 50_000) {
-                stale.push((finding.check, now_ms / 1_000, finding.because));
-            }
-        });
-    }
+    let mut run = Run::new(&Params::defaults());
+    run.flies(0..100_000, |now_ms, quad, _| {
+        (quad.silent, quad.battery_silent) = ((20_000..50_000).contains(&now_ms), now_ms >= 19_000);
+    });
+    let is_late = |one: &&Finding| one.check == "batt_remaining" || one.at.as_millis() > 50_000;
+    let stale = run.findings.iter().filter(|one| one.level == Level::Stale).filter(is_late);
+    let stale: Vec<_> = stale.map(|one| (one.check, one.at.as_millis() / 1_000, one.because)).collect();
     let of_battery: Vec<_> = stale.iter().filter(|(check, ..)| *check == "batt_remaining").collect();
     let [(_, first_s, "heartbeat"), (_, again_s, "")] = of_battery[..] else { panic!("{stale:?}") };
     assert!(*first_s < 50 && (58..=62).contains(again_s), "{stale:?}");

@@ -202,21 +202,45 @@ impl Run {
         Self { monitor, findings, happenings, requests, reports }
     }
 
+    /// The same with a monitor that has a past.
+    pub fn of(monitor: Monitor) -> Self {
+        Self { monitor, ..Self::new(&Params::defaults()) }
+    }
+
+    fn tick(&mut self, now_ms: u64, quad: &Quad) {
+        let now = Instant::from_millis(now_ms);
+        let link = LinkReading { frames_lost: Some(quad.lost), at: now };
+        self.monitor.tick(now, &link, &quad.recorder, &mut |finding| self.findings.push(*finding));
+        while let Some(happening) = self.monitor.take_happening() {
+            if let Happening::Mishap(change) = happening {
+                self.reports.push((now_ms, self.monitor.flight().report(change)));
+            }
+            self.happenings.push((now_ms, happening));
+        }
+        self.requests.extend(self.monitor.take_request().map(|request| (now_ms, request)));
+    }
+
     /// Steps the monitor every 50 ms; before each step the script feeds it.
     pub fn steps(&mut self, times_ms: core::ops::Range<u64>, mut script: impl FnMut(u64, &mut Monitor)) {
         for now_ms in times_ms.step_by(50) {
-            let now = Instant::from_millis(now_ms);
             script(now_ms, &mut self.monitor);
-            let link = LinkReading { frames_lost: Some(0.0), at: now };
-            let recorder = Quad::healthy().recorder;
-            self.monitor.tick(now, &link, &recorder, &mut |finding| self.findings.push(*finding));
-            while let Some(happening) = self.monitor.take_happening() {
-                if let Happening::Mishap(change) = happening {
-                    self.reports.push((now_ms, self.monitor.flight().report(change)));
-                }
-                self.happenings.push((now_ms, happening));
+            self.tick(now_ms, &Quad::healthy());
+        }
+    }
+
+    /// The same, with a healthy quad's messages every 100 ms; the script changes the quad, and adds observations.
+    pub fn flies(
+        &mut self,
+        times_ms: core::ops::Range<u64>,
+        mut script: impl FnMut(u64, &mut Quad, &mut Vec<Observation>),
+    ) {
+        for now_ms in times_ms.step_by(50) {
+            let (mut quad, mut more) = (Quad::healthy(), Vec::new());
+            script(now_ms, &mut quad, &mut more);
+            if now_ms.is_multiple_of(100) {
+                observe(&mut self.monitor, now_ms, AUTOPILOT, quad.says(now_ms).into_iter().chain(more));
             }
-            self.requests.extend(self.monitor.take_request().map(|request| (now_ms, request)));
+            self.tick(now_ms, &quad);
         }
     }
 
@@ -227,6 +251,11 @@ impl Run {
                 observe(monitor, now_ms, AUTOPILOT, says(now_ms));
             }
         });
+    }
+
+    /// The findings of a check.
+    pub fn of_check(&self, check: &str) -> impl DoubleEndedIterator<Item = &Finding> + Clone {
+        self.findings.iter().filter(move |finding| finding.check == check)
     }
 
     /// The names of the checks with a finding, each once, in alphabetical order.
