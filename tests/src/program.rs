@@ -79,6 +79,7 @@ pub fn hums<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Outcome 
 /// The machine that runs the pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {
+    /// `hums sim`: this PC.
     Sim,
     /// `hums sim --firmware`: the image on the model of its chip.
     Chip,

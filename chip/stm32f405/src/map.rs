@@ -27,11 +27,13 @@ pub enum Unit {
     Gpio(u8),
     /// The CRC unit.
     Crc,
+    /// Reset and clock control.
     Rcc,
     /// The flash's controller.
     Flash,
     /// DMA1 and DMA2: 0 and 1.
     Dma(u8),
+    /// The random number generator.
     Rng,
     /// The debugger's identity.
     Dbgmcu,

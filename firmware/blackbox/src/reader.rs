@@ -40,6 +40,7 @@ pub enum Item<'a> {
     },
     /// A missing part.
     Gap(Gap),
+    /// End of the input.
     End(Summary),
 }
 

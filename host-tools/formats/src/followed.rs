@@ -17,6 +17,7 @@ pub const HELD_MAX: usize = 4;
 
 /// The result of a log that was read.
 pub trait HasEnding {
+    /// Its end, if it is a HUMS log.
     fn ending(&mut self) -> Option<&mut Ending>;
 }
 

@@ -35,7 +35,9 @@ pub enum Command {
     Pause,
     /// Time goes on.
     Play,
+    /// Go to this time, seconds since the first byte.
     Seek(f64),
+    /// Seconds of the recording per second.
     Speed(f64),
 }
 

@@ -21,11 +21,15 @@ const BATCHES: usize = 4;
 /// A log's entry.
 #[derive(Clone, Debug)]
 pub enum Entry {
+    /// An observation of the vehicle.
     Observation(Source, Box<Observation>),
+    /// A text of the vehicle.
     Text(Text),
+    /// A parameter and its value.
     Parameter(String, f64),
     /// Further values for plots.
     More(More),
+    /// The log has a gap between these times.
     Gap(Instant, Instant),
 }
 

@@ -3,19 +3,25 @@
 /// The fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
+    /// A command gets no answer.
     Silent,
     /// The checksum shows it.
     DamagedCommand,
+    /// A block that is read is damaged on its way.
     DamagedRead,
+    /// A block that is written is damaged on its way.
     DamagedWrite,
+    /// A block that is written is refused with a write error.
     WriteError,
     /// Only the status shows it.
     NotProgrammed,
     /// This comes in place of a block's token.
     Token(u8),
+    /// A requested block never comes.
     NoBlock,
     /// Nanoseconds.
     Busy(u64),
+    /// The line carries noise.
     Noise,
 }
 

@@ -15,6 +15,7 @@ use crate::model::Model;
 pub enum Event {
     /// A block that it is programming is torn.
     Pull,
+    /// A card is put in.
     Insert(Model),
     /// Power is lost for a moment, as by a pull.
     Bounce,

@@ -9,6 +9,7 @@ pub enum Resting {
     Disarmed = 1,
     /// The vehicle landed.
     Landed = 2,
+    /// A mishap began, or ended with the vehicle down.
     Mishap = 3,
 }
 

@@ -53,6 +53,7 @@ const FAULT_SEVERITY: u8 = 4;
 /// The steps of a frame, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
+    /// Encoding into the record.
     Encode {
         /// Its arrival time.
         at: Instant,

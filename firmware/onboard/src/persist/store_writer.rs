@@ -26,6 +26,7 @@ const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 pub enum Saved {
     /// An item was taken: another may wait.
     Took,
+    /// There is nothing to do.
     Idle,
     /// The oldest item waits until an erase is allowed.
     Waits,

@@ -22,10 +22,15 @@ const PURPOSE: u64 = 2;
 /// Why an operation failed.
 #[derive(Debug)]
 pub enum CardError {
+    /// The power is off: all operations fail.
     PowerGone,
+    /// No card is in the slot.
     Absent,
+    /// The card refused the write.
     WriteRefused,
+    /// The block is beyond the card's end.
     OutOfRange,
+    /// The image file itself failed.
     Image(io::Error),
 }
 

@@ -3,6 +3,7 @@
 /// The session just before a log on its card, by the log's boot record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SessionBefore {
+    /// No boot record names one.
     #[default]
     NotNamed,
     /// It was read too.

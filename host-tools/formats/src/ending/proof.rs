@@ -24,7 +24,9 @@ pub enum Proof {
     Differs,
     /// Lost sectors, and frames if counted.
     Short {
+        /// Missing sectors; 0 if the last one is there in an older copy with fewer frames.
         sectors: u32,
+        /// Frames that are missing.
         frames: Option<u32>,
         /// The source.
         by: Teller,
@@ -34,6 +36,7 @@ pub enum Proof {
 /// The source of a log's end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Teller {
+    /// The next start on the card.
     NextStart,
     /// Its own parity covers sectors once they are on the card.
     Parity,

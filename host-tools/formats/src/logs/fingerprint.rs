@@ -22,6 +22,7 @@ impl Fingerprinter {
         }
     }
 
+    /// The hash of all sectors.
     pub fn finish(self) -> Fingerprint {
         self.0.finalize().first_chunk().copied().unwrap_or_default()
     }

@@ -17,6 +17,7 @@ const LOOK_BLOCKS: usize = 2048;
 /// A file's kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
+    /// Sectors of a log.
     Log,
     /// A partition table, or blocks to be searched.
     Image,

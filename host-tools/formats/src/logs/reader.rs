@@ -26,6 +26,7 @@ pub const PART_BYTES: usize = 4 << 20;
 
 /// Collects a group's entries, or a part of them.
 pub trait Collect: Send {
+    /// Takes the next entry of the group.
     fn entry(&mut self, entry: &Entry<'_>);
 
     /// Bytes of memory, roughly. Beyond [`PART_BYTES`] it is handed on, and another one goes on.
@@ -36,11 +37,13 @@ pub trait Collect: Send {
         false
     }
 
+    /// Takes the next entry, a well-formed frame of this id and size.
     fn frame(&mut self, _at: Instant, _id: u32, _bytes: usize, _verified: bool) {}
 }
 
 /// Receives groups in order.
 pub trait Deliver<C> {
+    /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
     /// The next group, or the next part of one.
     fn group(&mut self, collected: C) -> Result<()>;

@@ -19,15 +19,18 @@ pub enum Check {
     Good,
     /// Damage, or another definition.
     Bad,
+    /// The dialect lacks this message id, so it is unknown.
     Unknown,
 }
 
 /// The structure at the beginning of some bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Peek<'a> {
+    /// Not the beginning of a frame.
     Other,
     /// The bytes end before the frame does.
     Short,
+    /// A frame, consistent in its length.
     Frame(Frame<'a>),
 }
 

@@ -10,6 +10,7 @@ use hums_dialect::{Field, Kind, Message};
 pub enum Value<'a> {
     /// A number.
     Scalar(Scalar),
+    /// An array of numbers.
     Array(Array<'a>),
     /// Up to the first NUL. It should be UTF-8, but vehicles send any bytes.
     Text(&'a [u8]),
@@ -18,7 +19,9 @@ pub enum Value<'a> {
 /// One number, in the type it was sent in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scalar {
+    /// An unsigned integer of any width.
     Unsigned(u64),
+    /// A signed integer of any width.
     Signed(i64),
     /// A `float`.
     Single(f32),

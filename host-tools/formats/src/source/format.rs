@@ -26,6 +26,7 @@ pub const STORE_SECTOR_BYTES: usize = 16 * 1024;
 pub enum Format {
     /// From a file, a card or an image.
     Hums,
+    /// A ground station's log.
     Tlog,
     /// A port's bytes.
     Raw,

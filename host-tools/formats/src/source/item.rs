@@ -32,6 +32,7 @@ pub enum Item<'a> {
     Frame(&'a Frame<'a>),
     /// SI units.
     Observation(Source, &'a Observation),
+    /// A parameter of the autopilot.
     Parameter(Parameter<'a>),
     /// Long texts are whole; the time is the first part's, perhaps a second back.
     Text(Text<'a>),
@@ -39,6 +40,7 @@ pub enum Item<'a> {
     Mode(Mode<'a>),
     /// Numbered.
     Event(Event<'a>),
+    /// A fact about the vehicle or the recording.
     Fact(Fact<'a>),
     /// A message of another format, with its own names and units.
     Row(Row<'a>),
@@ -112,8 +114,11 @@ pub struct Fact<'a> {
 pub enum About {
     /// `ArduCopter V4.6.0 (3fc7011a)`.
     Firmware,
+    /// The autopilot's hardware: `PX4_FMU_V5`.
     Hardware,
+    /// The airframe: `QUAD/X`.
     Frame,
+    /// The recorder: program or device.
     Recorder,
     /// Unresolved failsafes with `, ` between; empty without any.
     Failsafes,
@@ -219,7 +224,9 @@ pub enum Value<'a> {
     Unsigned(u64),
     /// An integer.
     Signed(i64),
+    /// A number of single precision.
     Single(f32),
+    /// A number of double precision.
     Double(f64),
     /// Yes or no.
     Flag(bool),
@@ -309,6 +316,7 @@ impl Gap {
 /// Why something is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
+    /// The file is damaged here.
     Damaged,
     /// The file ends in the middle of something.
     Cut,
@@ -367,7 +375,9 @@ pub enum Rows<'a> {
     /// None.
     #[default]
     None,
+    /// Those of all tables.
     All,
+    /// Those of tables with these names.
     Named(&'a [String]),
 }
 
@@ -457,5 +467,6 @@ pub struct Summary {
 
 /// Reads one recording.
 pub trait Reader: Send {
+    /// Reads it from its beginning to its end.
     fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary>;
 }

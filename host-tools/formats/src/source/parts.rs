@@ -17,6 +17,7 @@ pub const PART_ITEMS: u32 = 4_096;
 
 /// A part's result.
 pub trait Collect: Send {
+    /// Takes the next item of the part.
     fn item(&mut self, at: Instant, item: Item<'_>);
 
     /// Roughly; beyond [`PART_BYTES`] it is handed on, and another one goes on.
@@ -25,6 +26,8 @@ pub trait Collect: Send {
 
 /// Receives parts in order.
 pub trait Deliver<C> {
+    /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
+    /// Takes the result of the next part.
     fn part(&mut self, collected: C) -> Result<()>;
 }

@@ -13,6 +13,7 @@ pub struct Chunk {
 
 /// A stream of chunks.
 pub trait Source: Send {
+    /// The next chunk; `None` at the end.
     fn next(&mut self) -> io::Result<Option<Chunk>>;
 
     /// Answers all calls that this one does not.

@@ -14,6 +14,7 @@ use crate::loss;
 /// A record of the monitor's.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
+    /// A setting of the monitor.
     Parameter {
         /// Its name.
         name: String,
@@ -29,6 +30,7 @@ pub enum Told {
         /// The part.
         component: Component,
     },
+    /// A check changed its level.
     Finding(Box<Finding>),
     /// The worst so far in this session.
     Peak {
@@ -48,7 +50,9 @@ pub enum Told {
         /// Number of missing frames, if known.
         frames: u64,
     },
+    /// The box does not know the cell count of a battery.
     CellsUnknown,
+    /// The box has no data of earlier flights.
     StoreNew,
     /// Only a monitor with checks writes it: its findings are complete.
     Checked,
