@@ -93,7 +93,6 @@ pub struct Step {
 pub struct Assembler {
     session: Option<u32>,
     held: Option<Step>,
-    /// The previously held sector.
     out: Option<Step>,
     /// Sectors after a jump of the number, until the log is known to continue with them.
     ahead: Deque<Step, AHEAD_MAX>,
@@ -105,7 +104,6 @@ pub struct Assembler {
     first_number: Option<u32>,
     last_number: Option<u32>,
     bad_blocks: u32,
-    /// Apparently of this session.
     bad_own: u32,
     counts: BlockCounts,
     at_last: BlockCounts,
@@ -135,7 +133,6 @@ impl Assembler {
         self.believed |= self.late && !self.has_begun();
     }
 
-    /// Whether a sector is held or was given out.
     const fn has_begun(&self) -> bool {
         self.held.is_some() || self.last_number.is_some()
     }
@@ -366,7 +363,6 @@ impl Assembler {
     }
 }
 
-/// Takes the fuller of two versions of a sector.
 fn replace(held: &mut Step, step: &Step) {
     if fullness(&step.header) >= fullness(&held.header) {
         held.header = step.header;

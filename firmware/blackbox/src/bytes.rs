@@ -38,7 +38,6 @@ impl<'a> Fields<'a> {
         Self { rest: bytes }
     }
 
-    /// Up to `count` bytes.
     pub(crate) fn bytes(&mut self, count: usize) -> &'a [u8] {
         let (taken, rest) = self.rest.split_at(count.min(self.rest.len()));
         self.rest = rest;

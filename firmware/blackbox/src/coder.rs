@@ -32,7 +32,6 @@ const fn cut(low: u32, range: u32) -> Option<u32> {
     }
 }
 
-/// Output buffer of the encoder for one entry.
 pub(crate) struct Scratch<const N: usize> {
     bytes: [u8; N],
     len: usize,

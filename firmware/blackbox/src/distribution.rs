@@ -70,7 +70,6 @@ impl Cdf {
     /// All symbols alike.
     pub(crate) const FLAT: Self = Self::from_sizes([1; SYMBOLS]);
 
-    /// From the symbols' relative sizes.
     pub(crate) const fn from_sizes(sizes: [u16; SYMBOLS]) -> Self {
         let mut total = 0_u32;
         let mut index = 0;
@@ -111,7 +110,6 @@ impl Cdf {
         (start, (one + size + two + other).div_ceil(2) - start)
     }
 
-    /// Moves towards a symbol (modulo 16).
     #[expect(clippy::inline_always, reason = "the writer's hottest path: a call more costs a tenth of it")]
     #[inline(always)]
     pub(crate) fn adapt(&mut self, symbol: usize) {
@@ -165,7 +163,6 @@ impl Cell {
     /// Zero and one alike.
     pub(crate) const EVEN: Self = Self(0x8000);
 
-    /// Uses so far, up to 15.
     pub(crate) const fn uses(self) -> u32 {
         self.0 as u32 & 15
     }

@@ -214,7 +214,6 @@ impl Column {
         found
     }
 
-    /// Rest of a sum without the taken sectors.
     fn held(&self, index: usize) -> Option<(Sum, u32, [u8; SECTOR_BYTES])> {
         let (held, sum) = (self.sums.get(index)?.as_ref()?, *Sum::ALL.get(index)?);
         let mut rest = held.block;
@@ -232,7 +231,6 @@ impl Column {
         (covered.next().is_none() && place < found.len()).then_some((place, *number))
     }
 
-    /// A sector from the rest of the sums; `None` if the result is not a valid sector.
     fn sector_of(&self, number: u32, rest: &[u8; SECTOR_BYTES], weight: u8) -> Option<Sector> {
         let mut bytes = [0; SECTOR_BYTES];
         add(&mut bytes, rest, weight);
@@ -270,7 +268,6 @@ fn weight(sum: Sum, last: u32, number: u32) -> Option<u8> {
     rows(last, number).map(|rows| power(sum, rows))
 }
 
-/// Factor of a sector this many rows before the last one.
 fn power(sum: Sum, rows: u32) -> u8 {
     match sum {
         Sum::P => 1,
@@ -278,7 +275,6 @@ fn power(sum: Sum, rows: u32) -> u8 {
     }
 }
 
-/// Powers of two that there are in GF(256).
 const ORDER: u32 = 255;
 
 /// Summed part of a sector: all fields that its position and session do not determine.

@@ -227,7 +227,6 @@ impl Writer {
         }
         self.last_ms = self.last_ms.max(self.millis(at));
         let entry = Entry { kind, at_ms: self.last_ms, bytes };
-        // Before the codec has seen it.
         let value = chain::value_of(&entry);
         if !self.in_group {
             self.begin_group(entry.at_ms);

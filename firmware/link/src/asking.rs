@@ -32,7 +32,6 @@ pub const LISTEN: Span = Span::from_secs(5);
 pub const ROUND: Span = Span::from_secs(10);
 /// Share of the line for all requested messages, percent.
 pub const SHARE: u32 = 50;
-/// Timeout of an answer.
 const ANSWER: Span = Span::from_secs(1);
 /// Repeats of an unanswered command.
 const TRIES: u8 = 3;
@@ -119,7 +118,6 @@ enum Has {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Message {
-    /// Frames since the last check.
     seen: u8,
     has: Has,
     /// Accepted requests without a message.
@@ -158,7 +156,6 @@ pub struct Asking {
     /// Time of the next check of the rates.
     look_at: Instant,
     window: Span,
-    /// Unanswered commands in a row.
     deaf: u8,
     /// For an autopilot without intervals: the next group to request; the number of groups when done.
     groups: Option<usize>,

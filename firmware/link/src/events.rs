@@ -18,12 +18,9 @@ const CURRENT_EVENT_SEQUENCE: u32 = 411;
 const RESPONSE_EVENT_ERROR: u32 = 413;
 /// More than PX4 stores: a wider gap is a restart of the autopilot, or too old.
 const GAP_MAX: u16 = 20;
-/// How long an answer may take.
 const ANSWER: Span = Span::from_secs(1);
-/// Requests for the same events.
 const TRIES: u8 = 3;
 
-/// Events that were missed, first and last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Missing {
     first: u16,
@@ -127,7 +124,6 @@ mod tests {
 
     const PX4: Source = Source { system: 1, component: 1 };
 
-    /// Requests due in this second.
     fn asks(events: &mut Events, second: u64) -> Option<(u16, u16)> {
         let mut asked = None;
         events.tick(Instant::from_millis(1_000 * second), PX4, &mut |packet| {

@@ -31,7 +31,6 @@ pub(crate) struct Header {
     pub(crate) id: u32,
 }
 
-/// Reason for a missing header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoHeader {
     /// Undecided: this many bytes are needed.

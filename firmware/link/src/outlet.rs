@@ -75,7 +75,6 @@ impl Bucket {
     }
 }
 
-/// Bytes that left the port, or will, by time.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     slots: [u16; Self::SLOTS],
@@ -100,7 +99,6 @@ impl Window {
         self.newest = self.newest.max(slot);
     }
 
-    /// Bytes that leave the port in the second before `start`, and later.
     fn sum(&self, start: Instant) -> u32 {
         let first = Self::slot(start).saturating_sub(Self::SECOND);
         let count = (self.newest + 1).saturating_sub(first).min(Self::SLOTS as u64);

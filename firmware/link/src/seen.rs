@@ -18,7 +18,6 @@ pub(crate) enum Extra {
     Once(u8),
     /// Seen at least twice.
     Confirmed(u8),
-    /// Never seen, and no place left to remember it.
     Full,
 }
 
@@ -47,7 +46,6 @@ impl Seen {
         }
     }
 
-    /// With a right checksum.
     pub(crate) fn verified(&mut self, system: u8, index: usize) {
         let place = self.place_of(system).unwrap_or_else(|| {
             let used = usize::from(self.systems_used);

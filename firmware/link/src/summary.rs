@@ -56,7 +56,6 @@ const FORWARDED: &[(u32, u16)] = &[
     (11_031, 1_000), // ESC_TELEMETRY_5_TO_8
     (11_032, 1_000), // ESC_TELEMETRY_9_TO_12
 ];
-/// Our values, which alternate with forwarded messages.
 const VALUES: usize = FORWARDED.len();
 const STATE: usize = VALUES + 1;
 const COMPUTER: usize = STATE + 1;
@@ -71,7 +70,6 @@ const COMPUTER_BYTES: usize = 250 + SIGNATURE_BYTES;
 
 /// Bytes that may wait at the port, findings apart: 50 ms at 57,600 baud.
 pub const WAITING_BYTES: u32 = 288;
-/// Findings that wait for their turn.
 const WAITING_MAX: usize = 16;
 const HEARTBEAT: Span = Span::from_secs(1);
 /// Intervals after which a message goes like a heartbeat.
@@ -454,7 +452,6 @@ pub fn text(finding: &Finding) -> Text {
     text
 }
 
-/// `14.9 %`, as exact as a pilot needs it.
 fn quantity(value: f32, unit: &str) -> Text {
     let (unit, digits) = match unit {
         "degC" => ("C", 0),

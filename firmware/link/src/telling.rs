@@ -33,7 +33,6 @@ const MILD_MAX: usize = 3;
 const SPAN: Span = Span::from_secs(30);
 /// Texts of a mishap, one of its cause included; the text that it is down comes beside them.
 const MISHAP_MAX: u8 = 2;
-/// Open alarms with stored details.
 const OPEN_MAX: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,12 +184,10 @@ const fn since(now: Instant, at_ms: u32) -> u64 {
     (now.as_millis() as u32).wrapping_sub(at_ms) as u64
 }
 
-/// The number of a check in the tables.
 fn number(check: &str) -> Option<u8> {
     Some(health::checks().position(|known| known.name == check)? as u8)
 }
 
-/// The number of a finding's check, and its instance.
 fn key(finding: &Finding) -> Option<(u8, u8)> {
     Some((number(finding.check)?, finding.instance))
 }

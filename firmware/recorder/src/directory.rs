@@ -73,10 +73,8 @@ pub(crate) struct Directory {
     /// The oldest logs that may be overwritten, the oldest first; the first `sure` of them are older than all others.
     oldest: Vec<LogEntry, OLDEST_MAX>,
     sure: usize,
-    /// Other logs may be overwritten besides those.
     has_more: bool,
     deleted: Vec<u32, DELETED_MAX>,
-    /// The first entry that was never used.
     end: u32,
     /// Clusters that logs have. Each counts at most the clusters of the longest segment, since its entry may be
     /// wrong.
@@ -88,7 +86,6 @@ pub(crate) struct Directory {
     pub(crate) settings: Option<(u32, u32)>,
     /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
-    /// FAT blocks that were checked for claims.
     verified: Range<u32>,
     /// Looking on: the next entry, and the FAT blocks that are being checked for claims.
     next: u32,
@@ -194,7 +191,6 @@ impl Directory {
         (!self.oldest.is_empty()).then(|| self.oldest.remove(0))
     }
 
-    /// Whether logs besides the known ones may be overwritten.
     pub(crate) const fn has_more(&self) -> bool {
         self.next > 0 || self.has_more
     }
@@ -307,7 +303,6 @@ impl Directory {
             || blocks.start >= self.verified.start && blocks.end <= self.verified.end
     }
 
-    /// The cluster behind all that logs claim.
     pub(crate) const fn claimed_end(&self) -> u32 {
         self.claimed_end
     }
@@ -341,7 +336,6 @@ impl Directory {
 
 type Step<E> = Result<ControlFlow<()>, CardError<E>>;
 
-/// A place in the directory with what is there.
 pub(crate) struct Slot<'b> {
     pub(crate) index: u32,
     pub(crate) place: Place,

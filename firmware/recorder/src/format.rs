@@ -14,7 +14,6 @@ const RESERVED_BLOCKS: u32 = 32;
 const INFO_BLOCK: u32 = 1;
 const BACKUP_BLOCK: u32 = 6;
 const ROOT_CLUSTER: u32 = 2;
-/// FAT entries in a block.
 const ENTRIES: u32 = 128;
 /// The smallest card that FAT32 fits on, in blocks: 65,525 clusters of one block, their FAT and what is before them. The
 /// FAT has entries for the blocks that it takes itself, too (see `Plan::new`): a block of it for each 127 clusters.
@@ -72,7 +71,6 @@ struct Plan {
     structures: usize,
 }
 
-/// The first block of the FAT.
 const FAT_START: u32 = PARTITION_START + RESERVED_BLOCKS;
 type Make = fn(&Plan) -> Block;
 /// The blocks that are written after the FAT and the root directory are cleared, in this order.
@@ -129,7 +127,6 @@ impl Formatting {
     }
 }
 
-/// Clears blocks, [`CLEAR_BLOCKS`] at most.
 #[inline(never)]
 fn clear<D: CardDevice>(device: &D, at: u32, count: u32) -> Result<(), FormatError<D::Error>> {
     let zeros = [[0; BLOCK_BYTES]; CLEAR_BLOCKS as usize];

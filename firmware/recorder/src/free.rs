@@ -27,7 +27,6 @@ pub(crate) struct FreeSearch {
     /// FAT blocks searched since enough clusters were found, and free clusters in the last of them.
     searched: u32,
     found: u32,
-    /// The first of these.
     first: u32,
     /// Clusters of a search that goes on; 0: none.
     wanted: u32,

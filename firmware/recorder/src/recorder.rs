@@ -88,7 +88,6 @@ pub struct Recorder<'a, D: CardDevice> {
     /// The card was changed within a group: on the new card nothing is readable before the next group.
     await_group: bool,
     segments: Segments<'a>,
-    /// The room on this card is counted.
     room_known: bool,
     finished: bool,
 }
@@ -383,7 +382,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Ok(())
     }
 
-    /// A short one after a refused sector.
     fn next_segment(&mut self, is_short: bool) -> Result<(), CardError<D::Error>> {
         self.write_parity();
         let next = self.segments.next(is_short, self.socket.card().ok_or(CardError::NotOpen)?);

@@ -10,10 +10,8 @@ use super::slots::{Length, Slot};
 use super::texts::Texts;
 use crate::coder::Coder;
 
-/// Context of bytes by their place.
 const AT: u32 = 0x100;
 
-/// State for all payloads.
 pub(super) struct Body {
     pub(super) elements: Elements,
     pub(super) common: Common,

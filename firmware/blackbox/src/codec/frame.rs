@@ -72,7 +72,6 @@ impl Frame {
         self.used = self.payload.len();
     }
 
-    /// `None` unless the bytes are exactly one frame.
     pub(crate) fn parse(&mut self, bytes: &[u8]) -> Option<()> {
         let frame = self;
         let rest;

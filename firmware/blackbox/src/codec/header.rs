@@ -10,7 +10,6 @@ use crate::coder::Coder;
 use crate::distribution::Cdf;
 
 const AS_EXPECTED: usize = 0;
-/// The frame before again.
 pub(super) const REPEATED: usize = 1;
 const SEQUENCE_JUMPS: usize = 2;
 const SPELLED_OUT: usize = 3;
@@ -54,13 +53,11 @@ impl Headers {
         self.signatures = Cdf::FLAT;
     }
 
-    /// The last frame's header was unexpected.
     #[inline]
     pub(super) const fn is_rough(&self) -> bool {
         self.last != AS_EXPECTED as u8
     }
 
-    /// Header, length and checksum.
     #[inline]
     pub(super) fn is_expected(slot: &Slot, sender: &Sender, frame: &Frame, verified: bool) -> bool {
         frame.sequence == sender.sequence && is_usual(slot, frame, verified)
@@ -175,7 +172,6 @@ fn take_flags(slot: &Slot, frame: &mut Frame) {
     }
 }
 
-/// Except for its sequence number.
 fn is_usual(slot: &Slot, frame: &Frame, verified: bool) -> bool {
     // The checksum of a verified frame matched our definition. If it no longer matches, memory has changed; the chain reveals
     // this to readers.

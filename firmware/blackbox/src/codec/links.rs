@@ -27,7 +27,6 @@ struct Link {
     scale: f32,
 }
 
-/// Link of a field to registers.
 struct Row {
     id: u32,
     offset: u8,
@@ -51,7 +50,6 @@ impl Row {
     }
 }
 
-/// Degrees in a radian.
 const DEGREES: f32 = 57.295_78;
 
 /// 1e-7 degrees of latitude in a metre: 1e7 / 111,319.
@@ -208,7 +206,6 @@ impl Registers {
         Some((self.get(register) * link.scale) as i32 as u32)
     }
 
-    /// Stores a field in its register.
     #[inline]
     pub(super) fn publish(&mut self, element: &Element) {
         if let Some(row) = ROWS.get(usize::from(element.row()).wrapping_sub(1))

@@ -34,12 +34,12 @@ use crate::limits::ENTRY_BYTES_MAX;
 pub(crate) const CODED_BYTES_MAX: usize = 640;
 const _: () = assert!(ENTRY_BYTES_MAX + 20 <= CODED_BYTES_MAX);
 
-/// The kind of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A frame, and whether its checksum matches our definition.
-    Frame { verified: bool },
-    /// A record in its stored form.
+    Frame {
+        verified: bool,
+    },
     Record,
 }
 
@@ -91,7 +91,6 @@ impl Model {
         }
     }
 
-    /// Starts afresh, at a group's start.
     pub(crate) fn reset(&mut self, at_ms: u64, layouts: Layouts) {
         self.layouts = layouts;
         self.last_ms = at_ms;
@@ -297,7 +296,6 @@ impl Model {
         Some((slot.verified, at_ms))
     }
 
-    /// A slot's first frame: sender and message.
     fn new_slot<C: Coder>(&mut self, coder: &mut C, key: Key) -> Option<u8> {
         let sender = self.slots.senders.get(usize::from(key.sender))?;
         let (system, component) = (u32::from(sender.system), u32::from(sender.component));

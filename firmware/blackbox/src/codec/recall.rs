@@ -8,7 +8,6 @@ use crate::coder::{Coder, Reading, Writing};
 const NONE: u16 = u16::MAX;
 
 pub(crate) struct Recall {
-    /// The slot of the frame that is read.
     slot: usize,
     /// Seed of the frame's checksum, if the checksum was not sent.
     pub(crate) seed: Option<u8>,

@@ -92,7 +92,6 @@ impl Slot {
         next: [0; 2],
     };
 
-    /// A slot before its first frame.
     pub(crate) fn new(
         key: Key,
         place: Option<Place>,
@@ -129,7 +128,6 @@ impl Slot {
 pub(crate) struct Sender {
     pub(crate) system: u8,
     pub(crate) component: u8,
-    /// The next frame's sequence number.
     pub(crate) sequence: u8,
     pub(crate) signature_link: u8,
     pub(crate) signature_time: u64,
@@ -160,7 +158,6 @@ const KINDS: usize = 32;
 const ORDER_3: usize = 512;
 const ORDER_2: usize = 256;
 
-/// A guess and how often it was right in a row, up to 3.
 #[derive(Clone, Copy)]
 struct Guess {
     slot: u8,
@@ -171,7 +168,6 @@ struct Guess {
 const UNSET: Guess = Guess { slot: 0, sure: 0 };
 const NO_GUESS: Guess = Guess { slot: NONE, sure: 0 };
 
-/// All slots and senders, and the order in which they speak.
 pub(crate) struct Slots {
     pub(crate) list: [Slot; SLOTS],
     used: u8,
@@ -179,7 +175,6 @@ pub(crate) struct Slots {
     senders_used: u8,
     order_3: [Guess; ORDER_3],
     order_2: [Guess; ORDER_2],
-    /// The last three slots, the latest first.
     past: [u8; 3],
     /// The places in `order_3` and `order_2` for its successor.
     places: (u16, u16),
@@ -240,7 +235,6 @@ impl Slots {
         usize::from(self.used)
     }
 
-    /// Whether a further slot fits.
     pub(crate) fn has_room(&self) -> bool {
         usize::from(self.used) < SLOTS
     }
@@ -370,7 +364,6 @@ impl Slots {
     }
 }
 
-/// Indices of the contexts of these three slots, or these two.
 const fn places([a, b, c]: [u8; 3]) -> (u16, u16) {
     let (a, b, c) = (a as u32, b as u32, c as u32);
     let two = (a << 8 | b).wrapping_mul(0x9e37_79b1) >> 16;

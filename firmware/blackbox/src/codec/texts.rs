@@ -72,7 +72,6 @@ impl Texts {
         Some(())
     }
 
-    /// Makes room for the last text of an element, if there is any.
     fn keep(&mut self, element: &mut Element, size: usize) {
         element.aux = NOT_KEPT;
         let at = usize::from(self.used);

@@ -9,7 +9,6 @@ use crate::limits::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
 /// Bytes of the head: kind; version, and in the upper four bits times; words; halves.
 pub(crate) const HEAD_BYTES: usize = 4;
 
-/// The version of each record.
 const VERSION: u8 = 1;
 
 /// Decoded head.
@@ -138,7 +137,6 @@ impl<'a> Sink<'a> {
         self.bytes(&[kind, VERSION, 0, 0])
     }
 
-    /// A time, before all other numbers.
     pub(crate) fn time(&mut self, at: Instant) -> &mut Self {
         debug_assert_eq!(2 * self.out.get(1).map_or(0, |version| version >> 4), self.counted(2));
         if let Some(version) = self.out.get_mut(1) {

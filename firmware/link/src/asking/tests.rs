@@ -10,7 +10,6 @@ struct Script {
     unknown: Vec<u32>,
     /// Promised and never sent.
     empty: Vec<u32>,
-    /// Does not answer commands.
     deaf: bool,
     /// Answers every `SET_MESSAGE_INTERVAL` with this `MAV_RESULT`.
     refuses: Option<u8>,
@@ -20,7 +19,6 @@ struct Script {
     identified: bool,
     baud: u32,
     parameters: Vec<&'static str>,
-    /// Requested parameters, and the times.
     parameters_asked: Vec<(u64, String)>,
     /// Time in ms, command (or stream with the highest bit), first parameter.
     asked: Vec<(u64, u16, u32)>,

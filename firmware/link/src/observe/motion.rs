@@ -15,7 +15,6 @@ use hums_dialect::ardupilotmega as ap;
 use super::fields::{read, unless};
 use crate::packet::Fields;
 
-/// Standard gravity, m/s2.
 const GRAVITY: f32 = hums_core::units::GRAVITY;
 /// A fix with a position: `GPS_FIX_TYPE_2D_FIX`.
 const FIX_2D: u8 = 2;

@@ -92,7 +92,6 @@ pub(super) fn engine(payload: &[u8]) -> Option<Engine> {
     })
 }
 
-/// The generator of a hybrid drone.
 pub(super) fn generator(payload: &[u8]) -> Option<Generator> {
     let message = read::<ap::GENERATOR_STATUS_DATA>(payload, &[])?;
     Some(Generator {

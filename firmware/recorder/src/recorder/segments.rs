@@ -16,7 +16,6 @@ const SEGMENTS_MIN: u64 = 16;
 /// Bytes of a segment after a refused write: 30 s of a full line (921,600 baud).
 const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
 
-/// The session's log on the present card.
 #[derive(Clone, Copy)]
 pub(super) struct Log {
     pub(super) name: LogName,
@@ -25,7 +24,6 @@ pub(super) struct Log {
     volume_id: u32,
     /// The sector number at block 0 of the open segment; `None` before the first sector.
     pub(super) base: Option<u32>,
-    /// The newest copy of the sector in progress.
     pub(super) newest_copy: NewestCopy,
 }
 

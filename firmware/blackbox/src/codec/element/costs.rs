@@ -1,6 +1,5 @@
 //! Recent costs of an element's predictions: their lengths of error in bits, averaged, in eighths of a bit.
 
-/// Predictions that are weighed.
 pub(super) const PREDICTIONS: usize = 6;
 
 const UNKNOWN: u8 = 100;
@@ -28,7 +27,6 @@ impl Costs {
         self.word() >> (8 * prediction) & 0xff
     }
 
-    /// The first one of the first `COUNT`, and its cost.
     #[inline]
     pub(super) fn cheapest<const COUNT: usize>(self) -> (usize, u32) {
         let mut best = (0, self.of(0));

@@ -162,7 +162,6 @@ impl Element {
         bits & QUIET != 0
     }
 
-    /// Bytes on the wire.
     #[inline]
     pub(crate) const fn size(&self) -> usize {
         /// By kind; 0 for kinds of variable size.
@@ -173,7 +172,6 @@ impl Element {
         }
     }
 
-    /// Start offset in the payload.
     #[inline]
     pub(crate) const fn offset(&self) -> usize {
         (self.end as usize).wrapping_sub(self.size())
@@ -191,7 +189,6 @@ impl Element {
         self.quiet = KNOWN | if same { counted } else { 0 };
     }
 
-    /// The last value as a number.
     pub(crate) fn number(&self) -> f32 {
         match (self.what(), self.exponent) {
             (What::Float, _) => f32::from_bits(self.last),
@@ -206,7 +203,6 @@ impl Element {
         self.decimal & DECIMALS
     }
 
-    /// Learns whether the value is a decimal.
     #[inline]
     fn weigh_decimal(&mut self, is: bool) {
         let decimals = self.decimals();
@@ -230,7 +226,6 @@ pub(crate) struct Context {
     pub(crate) elapsed_ms: u32,
     /// The newest time that any message gave, in microseconds; only differences count.
     pub(crate) clock_us: u32,
-    /// The newest time in milliseconds.
     pub(crate) clock_ms: u32,
     /// The float before in this frame: now and before.
     pub(crate) neighbour: Option<(f32, f32)>,
