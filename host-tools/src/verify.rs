@@ -96,7 +96,6 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     Ok(Outcome::lossy(!ok))
 }
 
-/// Totals of all logs.
 struct Totals {
     /// Number of sessions.
     logs: u64,

@@ -42,7 +42,6 @@ impl Page {
         path
     }
 
-    /// Waits for all results.
     #[track_caller]
     fn check(&mut self, selector: &str, paths: &[PathBuf]) {
         self.shown.run("document.documentElement.dataset.state = ''; return null");

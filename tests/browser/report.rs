@@ -449,7 +449,6 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     assert_compared(&mut page, &pages, &now, &before);
 }
 
-/// As in `hums check` and `hums info`.
 #[track_caller]
 fn assert_times(page: &mut LivePage, recording: &Path) {
     let info = json(&hums(["info".as_ref(), "--json".as_ref(), recording.as_os_str()]).text());

@@ -28,7 +28,6 @@ const STORAGE_NOTICED_MS: u64 = 11_100;
 /// Frames of full rate: memory, a quarter of a second, and the start.
 const LOST_MAX: usize = 700;
 
-/// The expected result of a fault.
 struct Expected<'a> {
     cause: Cause,
     fault: &'a str,

@@ -246,7 +246,6 @@ fn mavproxy_shows_what_the_box_says_with_the_module_and_nothing_without_it() {
     assert!(level.contains("HUMS level: ") && !level.contains("not heard"), "{said}");
 }
 
-/// Puts `PARAMS.TXT` on a card.
 fn put_parameters(image: &Path, lines: &str) {
     let text = image.with_file_name("PARAMS.TXT");
     fs::write(&text, lines).unwrap();

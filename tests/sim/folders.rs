@@ -84,7 +84,6 @@ fn devices_in_a_folder_are_passed_over_and_said() {
     not_tested("a device in a folder (none can be made here, and /dev/pts has none)");
 }
 
-/// The commands that read recordings.
 fn readers(path: &Path, out: &Path) -> Vec<Vec<OsString>> {
     let words = |words: &[&str]| words.iter().map(OsString::from).collect::<Vec<_>>();
     let (page, tables) = (out.join("page.html").into_os_string(), out.join("csv").into_os_string());

@@ -13,7 +13,6 @@ use serde_json::Value;
 const FOUND_S: f64 = 2.0;
 const DELAY_S: f64 = 3.0;
 
-/// The peers' observations, and the recorded steps.
 struct Outcome {
     said: Value,
     steps: Vec<(String, u64)>,

@@ -15,7 +15,6 @@ enum Way {
 }
 
 impl Core {
-    /// Extended as its width says.
     #[inline(always)]
     pub(crate) fn load<B: Bus>(&mut self, bus: &mut B, address: u32, width: Width) -> Result<u32, Trap> {
         match width {
@@ -216,7 +215,6 @@ impl Core {
         })
     }
 
-    /// Needs more than the bus.
     #[cold]
     #[inline(never)]
     pub(crate) fn read_slowly<B: Bus>(

@@ -22,7 +22,6 @@ pub(crate) struct Entry {
 
 const EMPTY: Entry = Entry { tag: u32::MAX, op: Op::Undefined, bytes: 2, cycles: 1, writes: 0x1F };
 
-/// With the pages that hold any.
 pub(crate) struct Cache {
     entries: Box<[Entry; ENTRIES]>,
     pages: Box<[u64; 1 << 9]>,

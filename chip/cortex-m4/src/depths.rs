@@ -49,7 +49,6 @@ impl Depths {
         }
     }
 
-    /// Returns to the interrupted code.
     pub(crate) fn resumed(&mut self) {
         self.lowest = self.entering.1;
     }

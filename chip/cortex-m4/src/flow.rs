@@ -268,7 +268,6 @@ impl Core {
         }
     }
 
-    /// A branch to an `EXC_RETURN`.
     fn return_from<B: Bus>(&mut self, bus: &mut B, value: u32) {
         let returning = self.ipsr;
         let nested = self.exceptions.active.iter().count();

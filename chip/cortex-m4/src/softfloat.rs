@@ -43,7 +43,6 @@ impl Rounding {
     }
 }
 
-/// A number taken apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Number {
     Zero,

@@ -79,7 +79,6 @@ impl Chip {
         lane(word, address, size)
     }
 
-    /// By the processor or DMA.
     fn read_device(&mut self, address: u32, size: Size) -> u32 {
         let now = self.moment;
         let word = address & !3;
@@ -120,7 +119,6 @@ impl Chip {
         lane(value, address, size)
     }
 
-    /// By the processor or DMA.
     fn write_device(&mut self, address: u32, size: Size, value: u32) -> Option<Unit> {
         let word = address & !3;
         let Some((unit, gate)) = map::unit_at(address) else {

@@ -256,7 +256,6 @@ impl Art {
 mod tests {
     use super::*;
 
-    /// Against a list by use.
     #[test]
     fn the_least_recently_used_line_goes_first() {
         const PLACES: usize = 8;

@@ -266,7 +266,6 @@ impl Chip {
         }
     }
 
-    /// The next moment at this place.
     fn schedule(&mut self, slot: usize) {
         let time = &self.time;
         let at = match slot {
@@ -340,7 +339,6 @@ impl Chip {
         self.refresh(unit, now);
     }
 
-    /// Next moment and interrupt.
     pub(crate) fn refresh(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Flash => self.schedule(FLASH),
@@ -365,7 +363,6 @@ impl Chip {
         self.look_at(unit, now);
     }
 
-    /// The interrupt lines of a device.
     pub(crate) fn look_at(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Flash => self.line(map::FLASH, self.flash.interrupts()),

@@ -44,7 +44,6 @@ pub enum Speed {
     Longest,
 }
 
-/// The work in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Work {
     Erase { from: u32, bytes: u32 },

@@ -113,7 +113,6 @@ impl Image {
     }
 }
 
-/// Numbers out of a file.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {

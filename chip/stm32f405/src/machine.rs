@@ -154,7 +154,6 @@ impl Machine {
         Ok(())
     }
 
-    /// Hands the chip's signals to the processor.
     fn deliver(&mut self) -> Result<(), Box<Report>> {
         if !std::mem::take(&mut self.chip.attention) {
             return Ok(());

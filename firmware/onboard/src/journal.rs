@@ -65,7 +65,6 @@ impl<'a> Journal<'a> {
         self.record(now, &Record::Event(Event { number: BY_HAND, text: text.as_str() }), sectors);
     }
 
-    /// Counts a loss, to be recorded.
     pub(crate) fn lose(&mut self, now: Instant, what: Lost, count: u64) {
         self.lose_since(now, now, what, count);
     }
@@ -114,7 +113,6 @@ pub(crate) struct Logbook<'a> {
     pub(crate) monitor: &'a mut Monitor,
     pub(crate) journal: Journal<'a>,
     pub(crate) card: &'a CardStatus,
-    /// The cause of this start.
     pub(crate) cause: ResetCause,
 }
 

@@ -10,7 +10,6 @@ const WINDOW: Span = Span::from_secs(1);
 pub(crate) const KINDS: [Lost; 6] =
     [Lost::UartOverrun, Lost::NotFrames, Lost::DamagedFrames, Lost::QueueFull, Lost::Card, Lost::Records];
 
-/// One of each kind.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Losses {
     open: [Option<Loss>; KINDS.len()],

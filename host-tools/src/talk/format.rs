@@ -134,7 +134,6 @@ mod tests {
     use super::*;
     use crate::talk::tests::fake::{self, found};
 
-    /// By the board's answer.
     fn end(silence_ms: u64, limit_ms: u64, said: fn() -> fake::Answers) -> Result<()> {
         let mut client = found(&[1], move |_| said());
         format(&mut client, Duration::from_millis(silence_ms), Duration::from_millis(limit_ms))

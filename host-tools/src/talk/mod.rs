@@ -89,7 +89,6 @@ impl Client {
         Ok(client)
     }
 
-    /// Before a board is found.
     fn over(duplex: Duplex, seal: Option<Seal>) -> Self {
         Self {
             duplex,
@@ -257,7 +256,6 @@ fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> any
     }
 }
 
-/// For us, or for all.
 const fn is_for_us(system: u8, component: u8) -> bool {
     (system == SYSTEM || system == 0) && (component == OUR_COMPONENT || component == 0)
 }

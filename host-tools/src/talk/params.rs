@@ -244,7 +244,6 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     Ok((values.into_values().collect(), wrong))
 }
 
-/// Invalid names, and duplicate ones.
 fn strange_names(values: &BTreeMap<u16, Param>) -> Vec<String> {
     let mut wrong = Vec::new();
     let mut places: BTreeMap<&str, u16> = BTreeMap::new();

@@ -76,7 +76,6 @@ fn wait(rig: &mut Rig, ms: u64) {
 /// Operation, requested operation, complete, offset, data.
 type Answer = (u8, u8, bool, u32, Vec<u8>);
 
-/// Answers within this many milliseconds.
 fn ftp(rig: &mut Rig, opcode: u8, offset: u32, size: u8, data: &[u8], ms: u64) -> Vec<Answer> {
     let size = if data.is_empty() { size } else { data.len() as u8 };
     let mut payload = vec![0, 1, 191, 7, 0, 0, opcode, size, 0, 0, 0];

@@ -200,7 +200,6 @@ fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     }
 }
 
-/// In the scratch memory.
 fn prepare_memory(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     let to_pc = to_pc(case.op);
     // An address without memory.

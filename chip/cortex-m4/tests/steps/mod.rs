@@ -28,7 +28,6 @@ const POINTERS: u32 = 0x2028_0000;
 const RECORD: usize = 8 + 32 + 8 + 6 + SCRATCH_WORDS_STORED;
 const SCRATCH_WORDS_STORED: usize = 96;
 
-/// Some of every class.
 fn batch(seed: u64) -> Vec<Case> {
     let mut random = Random(seed | 1);
     let mut cases = Vec::new();

@@ -82,7 +82,6 @@ pub(crate) fn expect_pauses(changes: &[(u64, bool)], ms: u64, least: usize) -> O
     expect(good, format!("it changed after {pauses:?} ms, and not each {ms} ms"))
 }
 
-/// And its fastest clock.
 #[derive(Default)]
 pub(crate) struct Tap(pub(crate) std::rc::Rc<std::cell::RefCell<(Vec<u8>, u32)>>);
 

@@ -79,7 +79,6 @@ impl Commands {
         self.limits[port as usize].allows(now)
     }
 
-    /// Whether recording is stopped by command.
     pub(crate) const fn stopped(&self) -> bool {
         self.stopped
     }

@@ -95,12 +95,10 @@ impl Companion {
         self.commands.stopped()
     }
 
-    /// For lack of room.
     pub(crate) const fn passed_lost(&self) -> u32 {
         self.pass.lost
     }
 
-    /// Requests that were refused for their signature.
     pub(crate) const fn requests_refused(&self) -> u32 {
         self.secure.refused
     }
@@ -110,7 +108,6 @@ impl Companion {
         self.secure.restore(store_writer);
     }
 
-    /// Of the signing key.
     pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) {
         let seals = [&summary.outlet.seal, &self.outlet.seal];
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
@@ -383,7 +380,6 @@ impl Companion {
         }
     }
 
-    /// Sends waiting answers as far as possible.
     pub(crate) fn answer(
         &mut self,
         now: Instant,

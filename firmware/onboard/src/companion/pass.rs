@@ -36,7 +36,6 @@ const UNKNOWN: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pass {
-    /// Lost frames of others.
     pub(super) lost: u32,
     /// Last time of a frame of an unknown definition.
     unknown_at: Option<Instant>,

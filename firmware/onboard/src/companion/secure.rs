@@ -87,7 +87,6 @@ pub(crate) struct Secure {
     last: u64,
     /// A key was set together with the time: both outlets begin anew.
     reseal: bool,
-    /// Requests that were refused for their signature.
     pub(super) refused: u32,
 }
 
@@ -190,7 +189,6 @@ impl Secure {
         }
     }
 
-    /// Takes a key from a trusted port.
     pub(crate) fn set_key(&mut self, now: Instant, key: Key, stamp: u64) {
         if stamp > 0 || self.signing.key() != Some(&key) {
             (self.last, self.reseal) = (0, true);

@@ -7,7 +7,6 @@ use hums_link::request::Port;
 
 use crate::queues::GsIn;
 
-/// Lent for one call.
 pub(crate) struct Ways<'w, 'q> {
     pub(crate) gs: &'w mut Outlet,
     pub(crate) autopilot: &'w mut Outlet,
@@ -33,7 +32,6 @@ impl Ways<'_, '_> {
         }
     }
 
-    /// By a port's budget.
     pub(crate) fn bulk_frame_max(&self, port: Port) -> usize {
         match port {
             Port::Gs => self.gs.bulk_frame_max(),

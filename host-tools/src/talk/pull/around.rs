@@ -43,9 +43,7 @@ pub(super) struct Brought {
     pub(super) files: Vec<(String, PathBuf)>,
     /// The moment.
     pub(super) at: Instant,
-    /// The finding, if one was requested.
     pub(super) found: Option<Finding>,
-    /// Whether all requested sectors were read.
     pub(super) outcome: Outcome,
 }
 
@@ -345,7 +343,6 @@ impl<'a> RemoteLog<'a> {
         Overview::verified(&self.read_as_log(&places))
     }
 
-    /// These places of the partial files.
     fn read_as_log(&self, places: &Range<u32>) -> Log {
         let piece = |file: &RemoteFile| {
             let start = places.start.clamp(file.first, file.first + file.sectors) - file.first;

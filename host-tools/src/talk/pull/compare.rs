@@ -25,7 +25,6 @@ pub(super) enum Likeness {
     Other,
 }
 
-/// Of the open log.
 pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Result<Likeness> {
     let mut file = File::open(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     if bytes == 0 {
@@ -50,7 +49,6 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
 }
 
 pub(super) struct Heading {
-    /// Name of the log on this PC.
     pub(super) name: String,
     /// If readable.
     pub(super) session: Option<u32>,

@@ -113,7 +113,6 @@ fn refused(answer: &Answer, what: &str) -> Error {
     anyhow!("the board refuses {what} of this log{why}; call again")
 }
 
-/// A conversation with a board's file server.
 pub(super) struct Ftp {
     client: Client,
     sequence: u16,
@@ -282,7 +281,6 @@ impl Ftp {
         }
     }
 
-    /// At least one byte.
     pub(super) fn piece(&mut self, offset: u32, bytes: u32) -> Result<Vec<u8>> {
         let size = bytes.min(u32::from(DATA_MAX)) as u8;
         let mut answer = self.ask(READ, offset, size, b"", TRIES)?;

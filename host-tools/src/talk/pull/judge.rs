@@ -19,7 +19,6 @@ const NEED_ALL_FILES: [&str; 5] = ["sector sequence", "group decoding", "frames 
 /// Needs the log before.
 const NEEDS_LOG_BEFORE: &str = "session before";
 
-/// New, or there already.
 #[derive(Debug, Serialize)]
 pub(super) struct LogJson {
     /// As the board calls it.

@@ -99,7 +99,6 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The number of a board's log.
 fn number(log: &str) -> Option<u32> {
     segment_name(Path::new(log)).map(|name| name.session)
 }
@@ -264,7 +263,6 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     }
 }
 
-/// Under the log's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LocalCopy {
     Nothing,

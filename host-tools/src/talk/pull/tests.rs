@@ -274,7 +274,6 @@ fn recorded_by(session: u32, seconds: u64, clocks: &[(u64, u64)]) -> Vec<u8> {
     memory.sectors
 }
 
-/// Only `hums box pull`'s arguments.
 #[derive(clap::Parser)]
 struct Line {
     #[command(flatten)]

@@ -51,7 +51,6 @@ fn flown(outcome: &Outcome) -> &'static str {
     }
 }
 
-/// And judged by hand.
 pub(super) fn is_vehicle(outcome: &Outcome) -> bool {
     outcome.by_hand.as_ref().is_some_and(|known| known.flown == Flown::Vehicle)
 }

@@ -8,7 +8,6 @@ pub(super) fn hours(seconds: f64) -> String {
     format!("{:.2}", seconds / SECONDS_AN_HOUR)
 }
 
-/// With the upper bound.
 pub(super) fn an_hour(events: u64, seconds: f64) -> [String; 2] {
     let hours = seconds / SECONDS_AN_HOUR;
     if hours <= 0.0 {

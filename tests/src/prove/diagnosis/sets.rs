@@ -16,7 +16,6 @@ const DEPTH_MAX: usize = 4;
 
 #[derive(Debug)]
 pub(super) struct Set {
-    /// Its name in tables.
     pub(super) name: String,
     pub(super) known: Known,
     /// In the order of labels or names.

@@ -60,7 +60,6 @@ enum Kind {
 }
 
 impl Job {
-    /// With this file open.
     pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<Open>) -> Self {
         let mut reply = ftp::Reply::to(asked);
         let kind = match asked.operation {

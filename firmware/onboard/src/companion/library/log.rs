@@ -83,7 +83,6 @@ pub(super) struct List {
 }
 
 impl List {
-    /// Numbers from `first` to `last`.
     pub(super) fn new(first: u16, last: u16) -> Self {
         Self { next: first.saturating_sub(1), last: last.saturating_sub(1), lacks: false }
     }
