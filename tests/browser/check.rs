@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use hums_tests::child;
 use hums_tests::flights::{own, root};
-use hums_tests::oracle::LivePage;
+use hums_tests::oracle::{self, LivePage};
 use hums_tests::program::{LIMIT, Machine, Recording, browser, command};
 
 use super::live::shoot;
@@ -173,6 +173,46 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
     page.shown.wait("return document.querySelector('iframe')?.srcdoc.length > 10000", 10);
     shoot(&mut page.shown, "check");
     assert_eq!(page.shown.console(), serde_json::json!([]), "a script of the report is refused");
+}
+
+#[test]
+fn firefox_judges_and_saves_what_the_command_line_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("hums-check.html");
+    fs::write(&page, hums_report::browser::page(&fs::read(browser()).unwrap()).unwrap()).unwrap();
+    let flights = ["tests/flights/px4_hil_quad_low.tlog", "tests/labelled/bin/f12_gps_jump.bin.gz"];
+    let names = ["a.tlog", "b.bin.gz"].map(str::to_owned);
+    let logs = names.clone().map(|name| folder.path().join(name));
+    for (from, to) in flights.iter().zip(&logs) {
+        fs::copy(root().join(from), to).unwrap();
+    }
+    let shown = oracle::firefox(&page, &logs);
+    let expected = hums_in(folder.path(), &["check", "--json"], &names).text();
+    assert_eq!(shown["saved"], expected);
+    let reports: Vec<&str> =
+        shown["reports"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+    let [a, b] = reports[..] else { panic!("{reports:?}") };
+    assert!(a.starts_with("a.tlog-") && b.starts_with("b.bin.gz-"), "{reports:?}");
+}
+
+/// A module of WebAssembly whose program ends as one without memory does: by a trap.
+const TRAP: &str = "0061736d0100000001040160000003020100050301000107130206\
+                    6d656d6f72790200065f737461727400000a05010300000b";
+
+#[test]
+fn a_program_that_stops_by_itself_ends_with_a_sentence() {
+    let mut page = Page::open(1280);
+    page.shown.run(&format!(
+        "const bytes = Uint8Array.from({TRAP:?}.match(/../g), (two) => parseInt(two, 16));
+         const text = document.getElementById('worker').textContent;
+         const worker = new Worker(URL.createObjectURL(new Blob([text], {{ type: 'text/javascript' }})));
+         worker.onmessage = (event) => {{ window.ended = event.data; }};
+         WebAssembly.compile(bytes).then((module) => worker.postMessage({{ module, command: 'check', inputs: [], files: [] }}));
+         return null"
+    ));
+    let ended = page.shown.wait("return window.ended", 20);
+    let why = ended["why"].as_str().unwrap();
+    assert!(why.contains("the program stopped") && why.contains("unreachable"), "{why}");
 }
 
 #[test]

@@ -97,6 +97,12 @@ pub fn browser(page: &Path, parts: &[f32]) -> Value {
     ))
 }
 
+/// The check in Firefox: `tests/oracle/firefox.py`.
+pub fn firefox(page: &Path, logs: &[PathBuf]) -> Value {
+    let arguments = [&[program("HUMS_FIREFOX", "/usr/bin/firefox-esr"), page.to_owned()], logs].concat();
+    json(&run("firefox.py", &arguments))
+}
+
 /// A page of `hums live`: `tests/oracle/live.py`. Ends with the browser.
 pub struct LivePage {
     browser: Child,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 
 use crate::repo::{self, BROWSER_TARGET};
+use crate::setup::{self, Need};
 use crate::shell::Shell;
 
 /// Opens at once, also from a phone's storage.
@@ -28,6 +29,18 @@ pub(crate) fn program(target: &Path) -> PathBuf {
 /// Builds the program.
 pub(crate) fn build() -> Result<()> {
     Shell::cargo().args(BUILD).run()
+}
+
+/// Makes `target/hums-check.html` of the working copy.
+pub(crate) fn page() -> Result<()> {
+    setup::require(&[Need::Linker, Need::BrowserTarget])?;
+    build()?;
+    let page = repo::target().join("hums-check.html");
+    let maker = ["run", "--quiet", "--package=hums-browser", "--bin=hums-check-page", "--"];
+    Shell::cargo().args(maker).arg(program(&repo::target())).arg(&page).run()?;
+    check_size(&page)?;
+    println!("{}", repo::shown(&page));
+    Ok(())
 }
 
 pub(crate) fn check_size(page: &Path) -> Result<()> {

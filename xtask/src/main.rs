@@ -85,6 +85,9 @@ enum Command {
         /// Build them twice and compare, and run what is for Windows under Wine
         #[arg(long)]
         check: bool,
+        /// Make only target/hums-check.html, of the files as they are
+        #[arg(long, conflicts_with = "check")]
+        page: bool,
     },
     /// Build the firmware and program it; what the board has stored stays
     Flash(flash::Options),
@@ -135,7 +138,8 @@ impl Command {
             }
             Self::Bench { what } => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
-            Self::Dist { check } => dist::run(check),
+            Self::Dist { page: true, .. } => browser::page(),
+            Self::Dist { check, .. } => dist::run(check),
             Self::Flash(options) => flash::flash(&options),
             Self::Attach { board } => flash::attach(board),
             Self::Boards => write_boards(),

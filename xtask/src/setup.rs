@@ -42,6 +42,7 @@ pub(crate) enum Need {
     Influx,
     Victoria,
     Chromium,
+    Firefox,
 }
 
 /// Found and installed.
@@ -54,7 +55,7 @@ enum Source {
 }
 
 /// Each need with its purpose.
-const TABLE: [(Need, &str, Source); 16] = [
+const TABLE: [(Need, &str, Source); 17] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
     (Need::BrowserTarget, "Rust's target of the check in a browser", Target(BROWSER_TARGET)),
@@ -71,6 +72,7 @@ const TABLE: [(Need, &str, Source); 16] = [
     (Need::Influx, "InfluxDB", Packages("command -v influxd", "influxdb")),
     (Need::Victoria, "VictoriaMetrics", Packages("command -v victoria-metrics", "victoria-metrics")),
     (Need::Chromium, "Chromium and its driver", Packages(FIND_CHROMIUM, CHROMIUM)),
+    (Need::Firefox, "Firefox", Packages("command -v firefox-esr", "firefox-esr")),
 ];
 
 const FIND_MINGW: &str = "command -v x86_64-w64-mingw32-gcc";

@@ -19,8 +19,8 @@ use crate::pc;
 use crate::prove;
 use crate::repo;
 use crate::setup::Need::{
-    self, BrowserTarget, Chromium, Clippy, Dosfstools, FirmwareTarget, Influx, Mtools, PythonVenv, Rustfmt,
-    Victoria,
+    self, BrowserTarget, Chromium, Clippy, Dosfstools, Firefox, FirmwareTarget, Influx, Mtools, PythonVenv,
+    Rustfmt, Victoria,
 };
 use crate::shell::Shell;
 
@@ -92,7 +92,7 @@ pub(super) const STEPS: [Step; 19] = [
         &[Mtools, Dosfstools, PythonVenv],
         sim,
     ),
-    Step::new(Test, "browser", "all pages in Chromium", &[PythonVenv, Chromium, BrowserTarget], browser),
+    Step::new(Test, "browser", "all pages in Chromium, the check in Firefox too", BROWSERS, browser),
     Step::new(Test, "prove", "the campaigns in their short form", prove::NEEDS, pc::short_campaigns),
     Step::new(Test, "answer", "every format against other readers", &[PythonVenv, Influx], answer),
     Step::new(Test, "live", "databases and Grafana dashboards", &[PythonVenv, Influx, Victoria], live),
@@ -100,6 +100,7 @@ pub(super) const STEPS: [Step; 19] = [
     Step::new(Test, "demo", "cargo xtask demo", &[FirmwareTarget], demo::as_test),
 ];
 
+const BROWSERS: &[Need] = &[PythonVenv, Chromium, Firefox, BrowserTarget];
 const CHIP: &[Need] = &[FirmwareTarget, PythonVenv, Dosfstools];
 
 fn build() -> Result<()> {
