@@ -9,7 +9,6 @@ use crate::latest::{Latest, Reading};
 use crate::motion::MOTION_AGE;
 use crate::motors::Motors;
 use crate::observation::{Battery, Imu, Observation, Vibration};
-use crate::outputs::MotorOutputs;
 use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{Instant, Span, Stamp};
@@ -42,7 +41,6 @@ state! {
         resistance: [Resistance; BATTERIES_MAX],
         pub(crate) motors: Motors,
         pub(crate) crosschecks: Crosschecks,
-        pub(crate) outputs: MotorOutputs,
         /// Of the last sample, and smoothed.
         load_factor: Latest<[f32; 2]>,
         heard: Option<Instant>,
@@ -114,7 +112,7 @@ impl Derived {
             }
             Observation::Outputs(outputs) => {
                 let level = self.crosschecks.gates.are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
-                self.outputs.take(at, outputs, vehicle, flight, level);
+                self.motors.outputs.take(at, outputs, vehicle, flight, level);
             }
             Observation::Gnss(gnss) => {
                 if let Some(had_fix) = self.had_fix.get_mut(usize::from(gnss.instance)) {
@@ -172,7 +170,7 @@ impl Derived {
     ) {
         if matches!(event, Some(FlightEvent::TakeOff | FlightEvent::Resumed)) {
             self.crosschecks.begin();
-            self.outputs.begin();
+            self.motors.outputs.begin();
         }
         self.crosschecks.step(now, vehicle, flight);
         let clips = clips(vehicle).unwrap_or(0);

@@ -232,7 +232,7 @@ fn sample(
             let at = vehicle.motors.get(usize::from(motor))?.moved_at?;
             (now.since(at) <= PAUSE).then(|| derived.motors.departure(motor)).flatten()
         }
-        Quantity::MotorOutput(motor) => derived.outputs.share(now, vehicle, motor),
+        Quantity::MotorOutput(motor) => derived.motors.outputs.share(now, vehicle, motor),
         // Not figures of steady flight.
         Quantity::Resistance(_) | Quantity::Capacity(_) => None,
     }

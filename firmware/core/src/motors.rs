@@ -108,6 +108,8 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Motors {
         tracks: [Track; MOTORS_MAX],
+        /// What the autopilot gives them.
+        pub(crate) outputs: MotorOutputs,
         /// The motor whose speed is furthest from the others'.
         furthest: u8,
     }
@@ -193,25 +195,19 @@ impl Motors {
 
     /// A motor's share of the current, percent, for the check of lost ones: 0 of a motor that stopped. `None` of a motor that is shut off,
     /// and of one that nothing is known of.
-    pub(crate) fn share(
-        &self,
-        now: Instant,
-        vehicle: &Vehicle,
-        outputs: &MotorOutputs,
-        motor: u8,
-    ) -> Option<Reading> {
-        let share = || self.current_share(now, vehicle, motor).filter(|_| !outputs.is_off(motor));
-        self.stopped(vehicle, outputs, motor).or_else(share)
+    pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+        let share = || self.current_share(now, vehicle, motor).filter(|_| !self.outputs.is_off(motor));
+        self.stopped(vehicle, motor).or_else(share)
     }
 
     /// 0 % of a motor that turned and stands while it is given all there is: control asks it for thrust, and nothing comes. Its ESC's speed
     /// alone may be wrong. `None` of any other.
-    fn stopped(&self, vehicle: &Vehicle, outputs: &MotorOutputs, motor: u8) -> Option<Reading> {
+    fn stopped(&self, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         // A motor that stood before the vehicle was received never turned.
-        let turned = outputs.was_found_at_end(motor) || self.track(motor).is_some_and(Track::is_fitted);
+        let turned = self.outputs.was_found_at_end(motor) || self.track(motor).is_some_and(Track::is_fitted);
         let place = usize::from(motor);
         let known = vehicle.motors.get(place).filter(|known| turned && known.esc.rpm.is_some())?;
-        let stands = outputs.is_full(motor)
+        let stands = self.outputs.is_full(motor)
             && !turns(vehicle, place)
             && (0..MOTORS_MAX).any(|other| turns(vehicle, other));
         Reading::new(known.moved_at.filter(|_| stands), Some(0.0))
@@ -261,10 +257,9 @@ impl Motors {
         now: Instant,
         vehicle: &Vehicle,
         flight: &Flight,
-        outputs: &MotorOutputs,
         motor: u8,
     ) -> Option<Reading> {
-        let track = self.track(motor).filter(|track| track.is_fitted() && !outputs.is_off(motor))?;
+        let track = self.track(motor).filter(|track| track.is_fitted() && !self.outputs.is_off(motor))?;
         let middle = self.middle_speed()?;
         // On the ground, still armed, each motor idles as it likes.
         let throttle = vehicle.hud.within(now, FRESH).and_then(|hud| hud.throttle);

@@ -94,7 +94,7 @@ impl Reported {
         let mut counts = [u8::MAX; _];
         for (kind, count) in [
             (InstanceOf::Motor, vehicle.motors_known()),
-            (InstanceOf::Output, if derived.outputs.are_told() { u8::MAX } else { 0 }),
+            (InstanceOf::Output, if derived.motors.outputs.are_told() { u8::MAX } else { 0 }),
             (InstanceOf::Supply, batteries.max(1)),
             (InstanceOf::Battery, batteries),
             (InstanceOf::Receiver, vehicle.receivers_known()),

@@ -47,14 +47,14 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors.errors(motor))),
     row!("motor_loss" ESC, below(_ MotLossCrit 5.0), role: Role::of(Group::MotorLoss, 0), unit: Unit::of("%"),
     debounce: after(0, 500), when: When::InFlight, read: |Inputs { now, vehicle, derived, .. }, motor| {
-        derived.motors.share(*now, vehicle, &derived.outputs, motor)
+        derived.motors.share(*now, vehicle, motor)
     }),
     // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
     row!("motor_imbalance" ESC, above(MotImbalWarn MotImbalCrit 2.0),
     role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
     debounce: after(3_000, 1_000), when: When::InFlight,
     read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
-        derived.motors.imbalance(*now, vehicle, flight, &derived.outputs, motor)
+        derived.motors.imbalance(*now, vehicle, flight, motor)
     }),
     row!("motor_output" ESC, above(MotOutWarn MotOutCrit 5.0),
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
@@ -82,7 +82,7 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<Reading> {
-    let (at, verdict) = inputs.derived.outputs.verdict(inputs.now, inputs.vehicle, motor)?;
+    let (at, verdict) = inputs.derived.motors.outputs.verdict(inputs.now, inputs.vehicle, motor)?;
     Some(Reading { at, value: value(verdict) })
 }
 
