@@ -10,13 +10,11 @@
 use crate::gates::Gates;
 use crate::motion::ground_speed_mps;
 use crate::observation::SecondEstimate;
-use crate::residual::{Comparison, Residuals};
+use crate::residual::{AT_ONCE, Comparison, Residuals};
 use crate::time::{Instant, Span};
 use crate::units::{Position, norm};
 use crate::vehicle::Vehicle;
 
-/// The two estimates are of one moment.
-const FRESH: Span = Span::from_millis(250);
 /// A receiver's place, and a message, are so old, s.
 const LATE_S: f32 = 0.5;
 /// `EKF_POS_HORIZ_ABS`
@@ -34,14 +32,15 @@ pub(crate) fn take(
     if !residuals.is_due(Comparison::Ahrs2Tilt, at, gates, Span::ZERO) {
         return;
     }
-    if let (Some(attitude), Some([roll, pitch, _])) = (vehicle.attitude.within(at, FRESH), second.attitude) {
+    if let (Some(attitude), Some([roll, pitch, _])) = (vehicle.attitude.within(at, AT_ONCE), second.attitude)
+    {
         let one = down([attitude.roll.0, attitude.pitch.0]);
         let other = down([roll.0, pitch.0]);
         let chord = norm([0, 1, 2].map(|axis| one[axis] - other[axis]));
         let tilt_deg = (2.0 * libm::asinf((chord / 2.0).clamp(0.0, 1.0))).to_degrees();
         residuals.take(Comparison::Ahrs2Tilt, at, gates, tilt_deg, 0.0);
     }
-    let Some(global) = vehicle.global.within(at, FRESH) else { return };
+    let Some(global) = vehicle.global.within(at, AT_ONCE) else { return };
     if let Some(altitude) = second.altitude {
         residuals.take(Comparison::Ahrs2Height, at, gates, global.altitude.0 - altitude.0, 0.0);
     }

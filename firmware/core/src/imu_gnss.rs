@@ -19,16 +19,13 @@ use crate::gates::{self, Gates};
 use crate::latest::Reading;
 use crate::motion::climb_within;
 use crate::observation::Gnss;
-use crate::residual::smooth;
+use crate::residual::{AT_ONCE, smooth};
 use crate::rotation::to_earth;
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::Vehicle;
 
-/// Maximum age of an attitude and of forces that are of one moment.
-const FRESH: Span = Span::from_millis(300);
-/// Maximum gap between compared velocities, and maximum age of a climb.
-const PAUSE: Span = Span::from_millis(1_500);
+/// Maximum age of a climb.
 const CLIMB_AGE: Span = Span::from_millis(500);
 /// Time constant, s.
 const SMOOTHING_S: f32 = 1.0;
@@ -85,8 +82,8 @@ impl ImuGnssResidual {
         if !self.at.is_set() {
             return;
         }
-        let is_fresh = self.mean_at.age(now).is_some_and(|age| age <= FRESH);
-        let Some(attitude) = vehicle.attitude.within(now, FRESH).filter(|_| is_fresh) else {
+        let is_fresh = self.mean_at.age(now).is_some_and(|age| age <= AT_ONCE);
+        let Some(attitude) = vehicle.attitude.within(now, AT_ONCE).filter(|_| is_fresh) else {
             self.at = Stamp::NONE;
             return;
         };

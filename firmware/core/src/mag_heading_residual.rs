@@ -6,21 +6,17 @@
 use crate::gates::Gates;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale};
-use crate::residual::{Comparison, Residuals};
+use crate::residual::{AT_ONCE, Comparison, KNOWN_SAMPLES, Residuals};
 use crate::time::{Instant, Span, Stamp};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
-/// The attitude's maximum age, and the maximum rate about each axis, rad/s: field and attitude are not of one moment.
-const ATTITUDE_AGE: Span = Span::from_millis(200);
+/// The maximum rate about each axis, rad/s: field and attitude are not quite of one moment.
 const TURNS_RAD_S: f32 = 0.2;
 /// Samples that come sooner are skipped: angles are expensive.
 const EVERY: Span = Span::from_millis(80);
 /// Least change of the heading, degrees, of an unused compass that is faulty.
 const MOVES_DEG: f32 = 2.0;
-/// Compass ratios in flight after which a message without one means that the compass is no longer used; they come at
-/// 1 Hz or more.
-const RATIOS_KNOWN: u8 = 20;
 
 pub(crate) fn take(
     residuals: &mut Residuals,
@@ -32,7 +28,7 @@ pub(crate) fn take(
     if !residuals.is_due(Comparison::MagHeading, at, gates, EVERY) {
         return;
     }
-    let Some(attitude) = vehicle.attitude.within(at, ATTITUDE_AGE) else { return };
+    let Some(attitude) = vehicle.attitude.within(at, AT_ONCE) else { return };
     let turns = |rates: [RadiansPerSecond; 3]| rates.iter().any(|rate| rate.0.abs() > TURNS_RAD_S);
     if attitude.rates.is_none_or(turns) {
         return;
@@ -63,7 +59,7 @@ impl CompassUse {
         self.ratios = self.ratios.saturating_add(u8::from(estimator.compass.is_some()));
         // An estimator that sends no ratio at all says nothing about its compass.
         let sends = estimator.velocity.is_some() || estimator.position_horizontal.is_some();
-        if sends && self.ratios >= RATIOS_KNOWN {
+        if sends && self.ratios >= KNOWN_SAMPLES {
             // PX4 also pauses the use of a sound compass, for half a minute at a time (in 7 of 20 healthy flights of
             // its simulator).
             let moved = residuals.excess(Comparison::MagHeading).is_some_and(|excess| excess > MOVES_DEG);

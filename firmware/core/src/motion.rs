@@ -72,6 +72,8 @@ pub(crate) const LOW_M: f32 = 1.0;
 pub(crate) const STILL_MPS: f32 = 1.0;
 /// Faster than this it moves, despite wind and noise in an estimate at rest.
 pub(crate) const MOVES_MPS: f32 = 1.5;
+/// A climb or sink slower than this may be none: an estimator of a hover trembles, and has offsets.
+pub(crate) const HANGS_MPS: f32 = 0.3;
 /// Wings carry a vehicle that is faster, and not one that is slower than half of it.
 pub(crate) const WINGS_MPS: f32 = 8.0;
 /// Time after which a receiver without speed stands: its speed is a Doppler measurement, good to some tenths of a

@@ -7,27 +7,23 @@
 //!    that attitude by a quarter of a turn.
 //! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
 
-use crate::gates::{self, Gates};
+use crate::gates::{self, Gates, LEANS_RAD};
 use crate::latest::{Latest, Reading};
 use crate::modes::has_pilots_throttle;
-use crate::motion::climb_mps;
+use crate::motion::{HANGS_MPS, climb_mps};
 use crate::observation::{Attitude, Hud, WantedRates};
 use crate::residual::{Comparison, Residuals};
 use crate::rotation;
 use crate::thrust::FULL;
-use crate::time::{Instant, Span};
+use crate::time::{Instant, PAUSE, Span};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
 /// Maximum age of a setpoint: an agile vehicle turns differently after it.
 const FRESH: Span = Span::from_millis(150);
-/// A display that was not received for longer begins anew.
-const HOLE: Span = Span::from_millis(1_500);
 /// This part of the rates of the setpoint may be missing.
 const LATE_PART: f32 = 0.3;
-/// At full throttle multicopters climb faster than this, m/s, unless tilted further, rad; planes sink more slowly.
-const CLIMBS_MPS: f32 = 0.3;
-const TILT_RAD: f32 = 0.52;
+/// At full throttle planes sink more slowly, m/s.
 const SINKS_MPS: f32 = -0.5;
 /// Time after which `THRUST_WARN` reports a lasting loss.
 const IN_VAIN: Span = Span::from_secs(2);
@@ -83,15 +79,15 @@ impl Thrust {
         let level = vehicle
             .attitude
             .get()
-            .is_none_or(|attitude| attitude.roll.0.abs() < TILT_RAD && attitude.pitch.0.abs() < TILT_RAD);
-        if self.full_at.is_none_or(|before| at.since(before) > HOLE) {
+            .is_none_or(|attitude| attitude.roll.0.abs() < LEANS_RAD && attitude.pitch.0.abs() < LEANS_RAD);
+        if self.full_at.is_none_or(|before| at.since(before) > PAUSE) {
             self.full_since = None;
         }
         // After this time a loss lasts until a climb.
         let was_long = self.full_since.is_some_and(|since| at.since(since) >= IN_VAIN);
         let in_vain = match vehicle.hovers(at) {
-            Some(_) if was_long => climb_mps < CLIMBS_MPS,
-            Some(true) => level && climb_mps < CLIMBS_MPS,
+            Some(_) if was_long => climb_mps < HANGS_MPS,
+            Some(true) => level && climb_mps < HANGS_MPS,
             // A pilot may dive with all his throttle.
             Some(false) => climb_mps < SINKS_MPS && !has_pilots_throttle(vehicle),
             None => false,

@@ -32,6 +32,11 @@ pub(crate) const LATE_S: f32 = 0.3;
 /// Time over which a receiver's position and height are compared with its speed and the climb, s.
 pub(crate) const RECEIVER_S: f32 = 4.0;
 
+/// Values of one moment.
+pub(crate) const AT_ONCE: Span = Span::from_millis(250);
+/// Samples of a flight before anything is usual, or a lack of them says something.
+pub(crate) const KNOWN_SAMPLES: u8 = 20;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
     Above,

@@ -14,14 +14,13 @@
 //! last two.
 
 use crate::latest::Reading;
-use crate::motion::{climb_mps, ground_speed_mps};
+use crate::motion::{HANGS_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::pairs::{Kind, SENSORS_MAX};
+use crate::residual::KNOWN_SAMPLES;
 use crate::time::{Instant, PAUSE};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
-/// Values that differed before anything is usual.
-const CHANGES_KNOWN: u8 = 20;
 /// Fewer repeats say nothing, however slow the message.
 const REPEATS_MIN: u8 = 3;
 /// What lasts so many times what is usual is none of it.
@@ -43,9 +42,8 @@ const TURNED_RAD: f32 = 0.02;
 /// yaw drifts by 0.02 rad in 3 s while a vehicle holds still, and a compass's digit of a milligauss may hide its
 /// noise.
 const ALL_REPEAT_TIMES: f32 = 10.0;
-/// Slower motion does not count, m/s and rad. A simulator without noise hangs still and repeats its sensors' last
+/// A smaller turn does not count, rad. A simulator without noise hangs still and repeats its sensors' last
 /// digits, while its estimator trembles and has offsets.
-const HANGS_MPS: f32 = 0.3;
 const TREMBLES_RAD: f32 = 0.01;
 
 state! {
@@ -97,7 +95,7 @@ impl Stuck {
     }
 
     const fn is_known(&self) -> bool {
-        self.changes >= CHANGES_KNOWN
+        self.changes >= KNOWN_SAMPLES
     }
 
     /// Whether this one took a new value in the second half of the other's repeated time. A change of both comes in
@@ -107,7 +105,7 @@ impl Stuck {
     }
 
     fn fell_silent(&self) -> bool {
-        self.trembles >= CHANGES_KNOWN
+        self.trembles >= KNOWN_SAMPLES
             && u32::from(self.lasts_ms)
                 > (u32::from(self.usual_ms) * SILENT_TIMES).clamp(SILENT_MS, LASTS_MAX_MS)
     }

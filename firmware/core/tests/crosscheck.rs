@@ -942,7 +942,7 @@ fn rates_of_px4_are_about_the_bodys_own_axes() {
 fn full_throttle_that_was_in_vain_is_until_it_climbs() {
     let findings = fly_after(|now_ms, it| {
         it.quad.throttle = 1.0;
-        it.quad.roll = if now_ms < FAULT_MS + 5_000 { 0.02 } else { 0.6 };
+        it.quad.roll = if now_ms < FAULT_MS + 5_000 { 0.02 } else { 0.7 };
         it.quad.climb = if now_ms < FAULT_MS + 15_000 { 0.1 } else { 1.0 };
     });
     let mine = findings.iter().filter(|one| one.check == "thrust_lost");

@@ -5,10 +5,9 @@
 //! this height until it has landed. A stop higher up was a hover.
 
 use super::GROUND_LASTS;
+use crate::motion::HANGS_MPS;
 use crate::time::Instant;
 
-/// A slower sink does not count, m/s.
-const SINK_MIN_MPS: f32 = 0.3;
 /// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
 const SAME_HEIGHT_M: f32 = 1.5;
 
@@ -25,7 +24,7 @@ pub(super) struct Touchdown(Option<Stop>);
 impl Touchdown {
     /// One step in the air: how fast it sinks (negative: climbs), and sank at most in the last second, and how high it is.
     pub(super) fn step(&mut self, at: Instant, sink_mps: f32, fastest_mps: f32, height_m: f32) {
-        if fastest_mps < SINK_MIN_MPS || sink_mps > fastest_mps / 2.0 {
+        if fastest_mps < HANGS_MPS || sink_mps > fastest_mps / 2.0 {
             return;
         }
         let same = |stop: &Stop| {
