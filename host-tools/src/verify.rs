@@ -183,7 +183,7 @@ pub fn verdict(log: &Overview) -> Verdict {
 /// Sectors lost and rebuilt.
 const INTACT: &str = "sectors intact";
 
-/// With reasons; needs [`Overview::verified`].
+/// Failed checks with reasons; needs [`Overview::verified`].
 pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
     let judged = LogJson::new(log);
     let failed = judged.checks.into_iter().filter(|check| check.failed > 0);

@@ -35,7 +35,7 @@ impl Random {
     }
 }
 
-/// With this probability each; returns the changed ones.
+/// Damages bytes with this probability each; returns the changed ones.
 pub fn noise(data: &mut [u8], probability: f64, seed: u64) -> Vec<bool> {
     let mut random = Random::new(seed);
     data.iter_mut()

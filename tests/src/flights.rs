@@ -118,7 +118,7 @@ impl Manifest {
         self.flights.get(&*name).unwrap_or_else(|| panic!("the manifest has no {name}"))
     }
 
-    /// By its kind in the manifest.
+    /// Frames of a recording by its kind in the manifest.
     pub fn frames_of<'a>(&self, path: &Path, data: &'a [u8]) -> Vec<Frame<'a>> {
         if self.found(path).is_tlog {
             frames::of_tlog(data, &self.seeds, false)

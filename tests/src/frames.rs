@@ -16,7 +16,7 @@ pub struct Frame<'a> {
     pub time_us: Option<u64>,
     /// The message id.
     pub id: u32,
-    /// From start byte to checksum or signature.
+    /// The frame from start byte to checksum or signature.
     pub bytes: &'a [u8],
     /// Known id, valid checksum.
     pub verified: bool,

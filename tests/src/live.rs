@@ -104,7 +104,7 @@ impl Live {
         Ok(Self { program: Running(child), address: address.trim().to_owned(), stderr })
     }
 
-    /// By Ctrl-C: exit code and output.
+    /// An end by Ctrl-C: exit code and output.
     #[track_caller]
     pub fn interrupt(self, limit: Duration) -> (Option<i32>, String) {
         self.end_by("INT", limit)

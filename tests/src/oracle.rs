@@ -56,12 +56,12 @@ pub fn exports(folder: &Path, name: &str) -> Value {
     json(&run("exports.py", &[folder.to_owned(), PathBuf::from(name)]))
 }
 
-/// Against pyulog: `tests/oracle/ulog.py`.
+/// Our reading against pyulog: `tests/oracle/ulog.py`.
 pub fn ulog(log: &Path, folder: &Path) -> Value {
     json(&run("ulog.py", &[log.to_owned(), folder.to_owned()]))
 }
 
-/// By the format document alone: `tests/oracle/hums_log`.
+/// A decoder by the format document alone: `tests/oracle/hums_log`.
 pub fn second_decoder(log: &Path, format: &str) -> Vec<u8> {
     outcome("hums_log", &[PathBuf::from("--format"), PathBuf::from(format), log.to_owned()]).stdout
 }
@@ -81,12 +81,12 @@ pub fn snippets(document: &Path, folder: &Path) -> Value {
     json(&run("snippets.py", &[document.to_owned(), folder.to_owned()]))
 }
 
-/// By Grafana's own model: `tests/oracle/grafana.py`.
+/// A verdict by Grafana's own model: `tests/oracle/grafana.py`.
 pub fn grafana(dashboards: &[PathBuf]) -> Value {
     json(&run("grafana.py", dashboards))
 }
 
-/// With the mouse at these parts of each plot: `tests/oracle/browser.py`.
+/// A page with the mouse at these parts of each plot: `tests/oracle/browser.py`.
 pub fn browser(page: &Path, parts: &[f32]) -> Value {
     let chromium = program("HUMS_CHROMIUM", "/usr/bin/chromium");
     let driver = program("HUMS_CHROMEDRIVER", "/usr/bin/chromedriver");
@@ -141,7 +141,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "open", "url": url, "scheme": scheme, "width": width, "height": height }));
     }
 
-    /// On a screen or on paper (`print`), with a reader's preferences.
+    /// The page on a screen or on paper (`print`), with a reader's preferences.
     #[track_caller]
     pub fn media(&mut self, media: &str, features: &Value) {
         self.ask(&serde_json::json!({ "do": "media", "media": media, "features": features }));
@@ -234,7 +234,7 @@ pub fn manifest_text(files: &[PathBuf]) -> String {
     ask("manifest.py", files)
 }
 
-/// By pymavlink's messages: `tests/oracle/usage.py`.
+/// Usage by pymavlink's messages: `tests/oracle/usage.py`.
 pub fn usage(files: &[PathBuf]) -> Value {
     json(&ask("usage.py", files))
 }
@@ -254,7 +254,7 @@ pub fn companion(port: u16) -> Value {
     serde_json::from_str(&said).expect("companion.py prints JSON")
 }
 
-/// As the firmware stores it: `tests/oracle/metadata.py`.
+/// A text as the firmware stores it: `tests/oracle/metadata.py`.
 pub fn pack(text: &Path, into: &Path) {
     run("metadata.py", &["pack".into(), text.to_owned(), into.to_owned()]);
 }
@@ -269,17 +269,17 @@ pub fn descriptions(file: &Path) -> Value {
     json(&run("metadata.py", &["words".into(), file.to_owned()]))
 }
 
-/// Over pymavlink's FTP: `tests/oracle/metadata.py`.
+/// Component information over pymavlink's FTP: `tests/oracle/metadata.py`.
 pub fn metadata(port: u16, folder: &Path) -> Value {
     json(&ask("metadata.py", &["fetch".into(), port.to_string().into(), folder.to_owned()]))
 }
 
-/// With pymavlink's signing; `state` passes from run to run: `tests/oracle/signing.py`.
+/// A talk with pymavlink's signing; `state` passes from run to run: `tests/oracle/signing.py`.
 pub fn signing(port: u16, state: &Path) -> Value {
     json(&ask("signing.py", &[PathBuf::from(port.to_string()), state.to_owned()]))
 }
 
-/// In flight, with an emptying battery: `tests/oracle/autopilot.py`.
+/// An autopilot in flight, with an emptying battery: `tests/oracle/autopilot.py`.
 pub fn autopilot(autopilot: u16, gs: u16, pilot: &str) -> Value {
     let arguments = [autopilot.to_string(), gs.to_string(), pilot.to_owned()];
     json(&ask("autopilot.py", &arguments.map(PathBuf::from)))

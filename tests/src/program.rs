@@ -20,7 +20,7 @@ pub const LIMIT: Duration = Duration::from_mins(2);
 /// A second of flight takes some 0.15 s on the chip's model.
 pub const LIMIT_CHIP: Duration = Duration::from_mins(20);
 
-/// From `HUMS_BIN`, or built once.
+/// The path from `HUMS_BIN`, or built once.
 pub fn path() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| match std::env::var_os("HUMS_BIN") {
@@ -180,7 +180,7 @@ pub struct Decoded {
 }
 
 impl Decoded {
-    /// To tlog; exit code: one of `codes`.
+    /// Decodes to tlog; exit code: one of `codes`.
     #[track_caller]
     pub fn of(source: &Path, codes: &[i32]) -> Self {
         let dir = tempfile::tempdir().unwrap();
@@ -194,7 +194,7 @@ impl Decoded {
         Self { tlogs: files.iter().map(|file| fs::read(file).unwrap()).collect() }
     }
 
-    /// In the order of file names.
+    /// All frames in the order of file names.
     pub fn frames(&self, seeds: &Seeds) -> Vec<Frame<'_>> {
         self.tlogs.iter().flat_map(|tlog| frames::of_tlog(tlog, seeds, true)).collect()
     }

@@ -10,7 +10,7 @@ use hums_store::{Found, Store, param};
 /// Items that outlived power.
 #[derive(Debug, Default)]
 pub struct Stored {
-    /// With the last session.
+    /// Life counters with the last session.
     pub lifetime: Option<Lifetime>,
     /// Set ones.
     pub params: Vec<(String, f32)>,

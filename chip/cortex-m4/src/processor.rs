@@ -109,7 +109,7 @@ pub(crate) enum Sleep {
 }
 
 impl Core {
-    /// With interrupt lines (at most 240; STM32F405: 82) and bits of priority (3 to 8; there 4).
+    /// A processor with interrupt lines (at most 240; STM32F405: 82) and bits of priority (3 to 8; there 4).
     pub fn new(lines: u16, priority_bits: u8) -> Self {
         Core {
             r: [0; 16],
@@ -188,7 +188,7 @@ impl Core {
         }
     }
 
-    /// Of its clock, sleep included.
+    /// Cycles of its clock, sleep included.
     pub fn cycles(&self) -> u64 {
         self.cycles
     }
@@ -224,7 +224,7 @@ impl Core {
         self.systick.next_interrupt()
     }
 
-    /// Without instructions: sleep, or standstill.
+    /// Time without instructions: sleep, or standstill.
     pub fn advance_to(&mut self, cycle: u64) {
         let passed = cycle.saturating_sub(self.cycles);
         if self.sleeping.is_some() {
@@ -263,7 +263,7 @@ impl Core {
         self.deadline = 0;
     }
 
-    /// For WFE (EXTI in event mode).
+    /// An event for WFE (EXTI in event mode).
     pub fn event(&mut self) {
         self.event = true;
         self.deadline = 0;
@@ -294,7 +294,7 @@ impl Core {
         self.cyccnt_sleeps = !on;
     }
 
-    /// Of `SysTick`'s other clock source (STM32: 8, the default).
+    /// Divider of `SysTick`'s other clock source (STM32: 8, the default).
     pub fn divide_systick(&mut self, divider: u32) {
         self.systick.divider = u64::from(divider.max(1));
     }

@@ -17,7 +17,7 @@ impl Core {
         outcome
     }
 
-    /// Until the cycle, attention of the bus, or a stop.
+    /// Runs until the cycle, attention of the bus, or a stop.
     pub fn run<B: Bus>(&mut self, bus: &mut B, until: u64) -> Outcome {
         self.until = until;
         self.deadline = 0;

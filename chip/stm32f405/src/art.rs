@@ -147,7 +147,7 @@ impl Art {
         }
     }
 
-    /// At this offset.
+    /// Whether a fetch at this offset needs the flash.
     pub fn needs_flash(&self, offset: u32, bytes: u32) -> bool {
         let kept = |line| line == self.line || self.on.0 && self.instructions.find(line).is_some();
         !kept(offset / LINE) || !kept((offset + bytes - 1) / LINE)

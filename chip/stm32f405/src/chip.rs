@@ -21,7 +21,7 @@ use crate::tim11::Tim11;
 use crate::time::{NEVER, Now, Timebase};
 use crate::usart::Usart;
 
-/// Not modelled, or impossible on the chip.
+/// A stop: not modelled, or impossible on the chip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trouble {
     /// Missing or not modelled, or bits of it: address, and a written value.
@@ -123,7 +123,7 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// At power-on, with crystal, low-speed oscillator, random seed.
+    /// A chip at power-on, with crystal, low-speed oscillator, random seed.
     pub fn new(hse_hz: u32, lsi_hz: u32, seed: u64) -> Self {
         let mut chip = Self {
             time: Timebase::new(16_000_000),
@@ -285,7 +285,7 @@ impl Chip {
         }
     }
 
-    /// Up to this cycle, each event at its moment; ends at a reset.
+    /// Events up to this cycle, each at its moment; ends at a reset.
     pub fn happen(&mut self, until: u64) {
         while self.next <= until && self.reset_by.is_none() && self.trouble.is_none() {
             let at = self.next;

@@ -37,7 +37,7 @@ pub enum Request {
     SpiTx(u8),
 }
 
-/// By stream and channel (RM0090, tables 42 and 43), as far as modelled.
+/// The asking device, by stream and channel (RM0090, tables 42 and 43), as far as modelled.
 pub fn request(dma: usize, stream: usize, channel: u32) -> Option<Request> {
     use Request::{SpiRx, SpiTx, UsartRx, UsartTx};
     Some(match (dma, channel, stream) {

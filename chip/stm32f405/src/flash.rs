@@ -168,7 +168,7 @@ impl Flash {
         Some((end, (from, bytes)))
     }
 
-    /// By power or a reset: bits are somewhere between.
+    /// Work cut by power or a reset: bits are somewhere between.
     pub fn cut(&mut self, now: Ps) {
         if let Some((work, begin, end, before)) = self.ahead.take().filter(|(_, _, end, _)| *end > now) {
             let (Work::Erase { from: at, .. } | Work::Program { at, .. }) = work;

@@ -182,7 +182,7 @@ pub struct Exti {
 }
 
 impl Exti {
-    /// With the lines as they are.
+    /// A reset, with the lines as they are.
     pub fn reset(&mut self) {
         *self = Self { seen: self.seen, ..Self::default() };
     }

@@ -98,7 +98,7 @@ impl Image {
         if is_stack && stack % 4 == 0 && is_entry { Ok(()) } else { Err(Refused::Vectors(stack, entry)) }
     }
 
-    /// And the distance from its beginning.
+    /// Symbol at an address, and the distance from its beginning.
     pub fn symbol(&self, address: u32) -> Option<(&str, u32)> {
         let behind = self.symbols.partition_point(|symbol| symbol.address <= address);
         let symbol = self.symbols.get(behind.checked_sub(1)?)?;
@@ -106,7 +106,7 @@ impl Image {
             .then(|| (symbol.name.as_str(), address - symbol.address))
     }
 
-    /// By name, or part of it.
+    /// Symbol by name, or part of it.
     pub fn find(&self, name: &str) -> Option<&Symbol> {
         let exact = self.symbols.iter().find(|symbol| symbol.name == name);
         exact.or_else(|| self.symbols.iter().find(|symbol| symbol.name.contains(name)))

@@ -62,7 +62,7 @@ impl Line {
         self.chars.extend(chars);
     }
 
-    /// Still to come or to be forgotten.
+    /// Characters still to come or to be forgotten.
     pub fn waiting(&self) -> usize {
         self.chars.len()
     }
@@ -74,7 +74,7 @@ impl Line {
         }
     }
 
-    /// At this moment or after it.
+    /// Next falling edge, at this moment or after it.
     pub fn falls(&self, from: Ps) -> Ps {
         for char in &self.chars {
             if char.start >= from {

@@ -59,7 +59,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Only this program in its flash; power on.
+    /// A board with only this program in its flash; power on.
     pub fn new(image: Image, board: Board) -> Self {
         let mut chip = Chip::new(board.hse_hz, board.lsi_hz, board.seed);
         for (address, bytes) in &image.pieces {
@@ -225,7 +225,7 @@ impl Machine {
         }
     }
 
-    /// At once, amid any work.
+    /// Power goes at once, amid any work.
     pub fn power_off(&mut self) {
         if self.is_off {
             return;
@@ -276,20 +276,20 @@ impl Machine {
         self.chip.look_at_lines();
     }
 
-    /// From `start`; returns the end.
+    /// Bytes on a port's line from `start`; returns the end.
     pub fn send(&mut self, port: usize, bytes: &[u8], start: Ps, baud: f64) -> Ps {
         let (chars, end) = chars(bytes, start, baud);
         self.send_chars(port, chars);
         end
     }
 
-    /// After those that are there.
+    /// Characters on a port's line, after those that are there.
     pub fn send_chars(&mut self, port: usize, chars: Vec<Char>) {
         self.chip.usarts[port].line.extend(chars);
         self.chip.line_changed(port);
     }
 
-    /// Since the last call, with each end.
+    /// Characters sent since the last call, with each end.
     pub fn take_sent(&mut self, port: usize) -> Vec<(Ps, u8)> {
         std::mem::take(&mut self.chip.usarts[port].sent)
     }
@@ -311,7 +311,7 @@ impl Machine {
         self.chip.spis.iter_mut().map(|spi| &mut spi.wire).chain(bits)
     }
 
-    /// As a debugger sees them; fewer at the end.
+    /// Bytes as a debugger sees them; fewer at the end.
     pub fn memory(&self, address: u32, bytes: u32) -> &[u8] {
         let memories = [(SRAM, &self.chip.sram), (CCM, &self.chip.ccm), (FLASH, &self.chip.flash.content)];
         let found = memories.into_iter().find(|((from, size), _)| (*from..from + size).contains(&address));
@@ -322,7 +322,7 @@ impl Machine {
         })
     }
 
-    /// Of RAM, as a debugger or a flipped bit.
+    /// A changed byte of RAM, as by a debugger or a flipped bit.
     pub fn poke(&mut self, address: u32, change: impl Fn(u8) -> u8) {
         for ((from, size), memory) in [(SRAM, &mut self.chip.sram), (CCM, &mut self.chip.ccm)] {
             if (from..from + size).contains(&address) {

@@ -45,7 +45,7 @@ pub type Gate = (Bank, u8);
 /// Ports of pins.
 const GPIO: u32 = 0x4002_0000;
 
-/// And its gate, if any.
+/// The device at an address, and its gate, if any.
 pub fn unit_at(address: u32) -> Option<(Unit, Option<Gate>)> {
     use Bank::{Ahb1, Ahb2, Apb1, Apb2};
     let (unit, gate) = match address & !0x3FF {
@@ -84,7 +84,7 @@ pub fn unit_at(address: u32) -> Option<(Unit, Option<Gate>)> {
     Some((unit, gate))
 }
 
-/// By a reset register's bit.
+/// The device of a reset register's bit.
 pub fn unit_of(gate: Gate) -> Option<Unit> {
     BASES.into_iter().filter_map(unit_at).find(|(_, of)| *of == Some(gate)).map(|(unit, _)| unit)
 }

@@ -56,7 +56,7 @@ impl Memory {
     }
 }
 
-/// At power-on: neither zeros nor the same each time.
+/// Content at power-on: neither zeros nor the same each time.
 pub fn garbage(bytes: &mut [u8], seed: u64) {
     let mut state = seed | 1;
     for byte in bytes {

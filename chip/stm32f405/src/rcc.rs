@@ -112,7 +112,7 @@ const LSI: usize = 4;
 const LSE: usize = 5;
 
 impl Rcc {
-    /// At power-on, with this crystal (or oscillator).
+    /// Clocks at power-on, with this crystal (or oscillator).
     pub fn new(hse_hz: u32) -> Self {
         let mut rcc = Self {
             cr: 0,
@@ -134,7 +134,7 @@ impl Rcc {
         rcc
     }
 
-    /// Only power clears earlier flags and the backup domain.
+    /// A reset: only power clears earlier flags and the backup domain.
     pub fn reset(&mut self, cause: Cause, now: Ps) {
         let is_power = cause == Cause::Power;
         let (bdcr, csr) = if is_power { (0, 0) } else { (self.bdcr, self.csr) };

@@ -135,7 +135,7 @@ impl Rng {
         }
     }
 
-    /// Of the next number.
+    /// Time of the next number.
     pub fn deadline(&self) -> Ps {
         if self.cr & 0xC == 0xC && self.behaves == Randomness::Good { self.ready } else { NEVER }
     }

@@ -113,7 +113,7 @@ impl Spi {
             Self { wire, routed: self.routed, bus_cycles: self.bus_cycles, words: self.words, ..Self::new() };
     }
 
-    /// In processor cycles.
+    /// The bus clock in processor cycles.
     pub fn set_clock(&mut self, bus_cycles: u64) {
         self.bus_cycles = bus_cycles.max(1);
     }
@@ -158,7 +158,7 @@ impl Spi {
         u16::from(high) << 8 | u16::from(byte(word as u8))
     }
 
-    /// Of events that are waited for without asking.
+    /// Time of events that are waited for without asking.
     pub fn deadline(&self) -> u64 {
         let asked = self.cr2 & (RXDMAEN | TXDMAEN | RXNEIE | TXEIE | ERRIE) != 0;
         self.sending.filter(|_| asked).map_or(NEVER, |(_, end)| end)

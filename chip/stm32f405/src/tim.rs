@@ -44,7 +44,7 @@ pub struct Tim {
 }
 
 impl Tim {
-    /// With bits and channels.
+    /// A reset timer with bits and channels.
     pub fn new(bits: u32, channels: u32) -> Self {
         let max = u32::MAX >> (32 - bits);
         Self {
@@ -76,7 +76,7 @@ impl Tim {
             Self { clock: self.clock, at: now, ..Self::new(32 - self.max.leading_zeros(), self.channels) };
     }
 
-    /// In processor cycles.
+    /// The timer's clock in processor cycles.
     pub fn set_clock(&mut self, now: u64, clock: u64) {
         self.advance(now);
         self.clock = clock.max(1);

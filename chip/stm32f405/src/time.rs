@@ -41,7 +41,7 @@ impl Timebase {
         time
     }
 
-    /// From this moment on.
+    /// The processor's rate from this moment on.
     pub fn set(&mut self, now: Now, hz: u32) {
         let hz = hz.max(1);
         self.base = now;

@@ -46,7 +46,7 @@ pub struct Counts {
     pub noise: u64,
     /// While reception was off.
     pub missed: u64,
-    /// Not gone out at a change of rate or switching off.
+    /// Characters not gone out at a change of rate or switching off.
     pub cut: u64,
 }
 

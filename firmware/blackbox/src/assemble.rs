@@ -46,9 +46,9 @@ pub struct BlockCounts {
     pub erased: u64,
     /// Any other block, for example a sector of another format version.
     pub foreign: u64,
-    /// Duplicates, or misplaced sectors, of this session.
+    /// Blocks of an older format version, which this build does not read, also counted as foreign.
     pub older_version: u64,
-    /// Wrong checksum, apparently of this session: torn or damaged.
+    /// Blocks of a newer version, or sealed ones.
     pub newer_version: u64,
 }
 
@@ -75,20 +75,20 @@ impl BlockCounts {
     }
 }
 
-/// A wrong checksum, apparently of an older session or of none.
+/// A sector in order.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Its header.
     pub header: Header,
-    /// Rebuilt from parity, also counted by their kind.
+    /// The sector.
     pub sector: Sector,
-    /// Any other block, for example of another format version.
+    /// Numbers missing before this sector.
     pub missing: u32,
-    /// Of an older format version, which this build does not read, also counted as foreign.
+    /// Invalid or misplaced blocks between the previous sector and this one.
     pub damaged: u32,
 }
 
-/// Of a newer version, or sealed.
+/// Orders the sectors of one session. After each block, [`Self::next`] returns the sectors known to be in order.
 #[derive(Debug, Default)]
 pub struct Assembler {
     session: Option<u32>,

@@ -15,15 +15,15 @@ pub(crate) const PREAMBLE_BYTES: usize = 26;
 /// Preamble of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Preamble {
-    /// Of the layout table that the group was written with.
+    /// Hash of the layout table that the group was written with.
     pub layouts: u32,
     /// First entry, milliseconds since power-on.
     pub start_ms: u64,
-    /// Of the session before this group, modulo 2^32.
+    /// Frames of the session before this group, modulo 2^32.
     pub frames_before: u32,
     /// UTC at power-on, microseconds since 1970, if known.
     pub epoch_micros: Option<u64>,
-    /// Of all entries of the session before this group.
+    /// Check of all entries of the session before this group.
     pub chain: u32,
 }
 
@@ -38,7 +38,7 @@ impl Preamble {
         out
     }
 
-    /// From the body of a group's first sector; `None` if that is too short.
+    /// Reads the body of a group's first sector; `None` if that is too short.
     pub fn read(body: &[u8]) -> Option<Self> {
         let mut fields = Fields::new(body.get(..PREAMBLE_BYTES)?);
         let layouts = fields.u32();

@@ -91,7 +91,7 @@ impl Sector {
         &self.bytes
     }
 
-    /// In progress: a later one with its number supersedes it.
+    /// A copy in progress: a later one with its number supersedes it.
     pub const fn is_partial(&self) -> bool {
         self.bytes[2] & PARTIAL != 0
     }
@@ -101,7 +101,7 @@ impl Sector {
         self.bytes[2] & CLOSED != 0
     }
 
-    /// To be sealed after that.
+    /// Marks a copy in progress; to be sealed after that.
     pub const fn set_partial(&mut self, partial: bool) {
         self.bytes[2] = self.bytes[2] & !PARTIAL | if partial { PARTIAL } else { 0 };
     }

@@ -208,7 +208,7 @@ impl Asking {
         self.vehicle.map(|(source, _)| source)
     }
 
-    /// And each was answered or timed out.
+    /// Whether all parameters were requested, and each was answered or timed out.
     pub fn has_parameters(&self, known: &Known) -> bool {
         known.autopilot != Autopilot::Other
             && self.of() == Some(known.source)

@@ -53,7 +53,7 @@ impl Encoder {
         self.sequence = sequence;
     }
 
-    /// Without a signature.
+    /// Bytes of the frame, without a signature.
     pub fn frame_len(&self, packet: &Packet) -> usize {
         HEADER_V2_BYTES + packet.payload().len() + CHECKSUM_BYTES
     }

@@ -154,7 +154,7 @@ impl<'a> Frame<'a> {
         Self { header, bytes, check, message }
     }
 
-    /// In the dialect's table; `None` if the checksum does not match our definition.
+    /// Index in the dialect's table; `None` if the checksum does not match our definition.
     #[inline]
     pub const fn message(&self) -> Option<u16> {
         self.message

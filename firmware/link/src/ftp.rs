@@ -127,7 +127,7 @@ pub struct Reply {
     pub session: u8,
     /// The operation that is answered.
     pub opcode: u8,
-    /// For a checksum, the number of covered bytes.
+    /// Offset of the data; for a checksum, the number of covered bytes.
     pub offset: u32,
     /// The last one of a burst.
     pub complete: bool,

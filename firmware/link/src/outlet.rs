@@ -266,7 +266,7 @@ impl Outlet {
         true
     }
 
-    /// If it may go now.
+    /// Sends a message of ours, if it may go now.
     pub fn send(&mut self, now: Instant, class: Class, packet: &Packet, out: &mut impl FnMut(&[u8])) -> bool {
         // Signing is work: not for a frame that will not go.
         let tail = if self.seal.is_some() { SIGNATURE_BYTES } else { 0 };

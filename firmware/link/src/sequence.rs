@@ -79,7 +79,7 @@ impl Sequences {
         lost
     }
 
-    /// In the last ten seconds.
+    /// The lost part of one sender's frames in the last ten seconds.
     pub fn reading(&mut self, now: Instant, source: Option<Source>) -> LinkReading {
         let now_s = seconds(now);
         let sender = self.senders.iter_mut().flatten().find(|sender| Some(sender.source) == source);

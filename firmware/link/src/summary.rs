@@ -138,7 +138,7 @@ pub struct OwnFigures {
 pub struct Summary {
     /// Shared by answers and stream.
     pub outlet: Outlet,
-    /// Not if the autopilot carries the stream.
+    /// Forwards the vehicle's frames; not if the autopilot carries the stream.
     pub forwards: bool,
     /// The box's own status.
     pub own: OwnFigures,
@@ -173,7 +173,7 @@ impl Summary {
         }
     }
 
-    /// If it is its turn and within the budget.
+    /// Forwards a frame if it is its turn and within the budget.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, out: &mut impl FnMut(&[u8])) {
         // Heartbeats of the vehicle's other components (gimbal, camera) must not take the autopilot's turn.
         let ours = |vehicle: Source| {

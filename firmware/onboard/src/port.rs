@@ -64,7 +64,7 @@ impl PortStatus {
         }
     }
 
-    /// In the frame queue at once.
+    /// The most bytes in the frame queue at once.
     pub fn queue_bytes_max(&self) -> u32 {
         self.queue_bytes_max.load(Ordering::Relaxed)
     }
@@ -93,7 +93,7 @@ impl PortStatus {
         self.frames_lost.store(reading.frames_lost, Ordering::Relaxed);
     }
 
-    /// Within this time in ms.
+    /// A loss before reception, within this time in ms.
     pub fn count_overrun(&self, blind_ms: u32) {
         self.blind_ms.fetch_add(blind_ms, Ordering::Relaxed);
         self.overrun.fetch_add(1, Ordering::Relaxed);

@@ -54,7 +54,7 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         shelf.serve(&mut self.recorder)
     }
 
-    /// After the last sector: the card can be pulled.
+    /// Ends the session after the last sector: the card can be pulled.
     pub fn finish(&mut self) {
         self.recorder.finish();
     }

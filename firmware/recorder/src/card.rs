@@ -170,7 +170,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         }
     }
 
-    /// In directory order.
+    /// Log segments in directory order.
     pub fn logs(&self, mut each: impl FnMut(LogEntry)) -> Result<(), CardError<D::Error>> {
         self.walk(0, &mut |slot| {
             if let Some(entry) = slot.log().filter(|entry| entry.bytes > 0) {
@@ -227,7 +227,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(found)
     }
 
-    /// And a number that changes with their names.
+    /// Shown logs, and a number that changes with their names.
     pub const fn shown(&self) -> (u16, u32) {
         (self.directory.shown, self.directory.names)
     }

@@ -154,7 +154,7 @@ impl Layout {
         self.clusters as u64 * self.cluster_blocks as u64 * BLOCK_BYTES as u64
     }
 
-    /// Of the used blocks.
+    /// End of the used blocks.
     pub const fn end(&self) -> u32 {
         self.data_start + self.clusters * self.cluster_blocks
     }

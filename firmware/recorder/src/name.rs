@@ -19,7 +19,7 @@ impl LogName {
     pub const SESSION_MAX: u32 = 99_999;
     /// The largest segment number of a session; the session goes on under the next session number.
     pub const SEGMENT_MAX: u32 = 99;
-    /// As in a directory entry.
+    /// Bytes of a name in a directory entry.
     pub const SHORT_BYTES: usize = 11;
 
     /// The next name within the session; `None` when the numbers are used up.
@@ -40,7 +40,7 @@ impl LogName {
         }
     }
 
-    /// In a directory entry, without the dot.
+    /// The name in a directory entry, without the dot.
     pub fn short(self) -> [u8; Self::SHORT_BYTES] {
         let mut short = *b"00000_00HUM";
         let digits = |value: u32, place: u32| b'0' + (value / 10_u32.pow(place) % 10) as u8;

@@ -227,7 +227,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         Some(InWork { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }
 
-    /// For stored logs; `None` without one.
+    /// The card, for stored logs; `None` without one.
     pub const fn card(&mut self) -> Option<&mut Card<'a, D>> {
         self.socket.card()
     }

@@ -109,7 +109,7 @@ pub(crate) struct Counted {
     pub(crate) permille: u32,
     /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,
-    /// Reading of [`CardStatus`].
+    /// Total space, in MiB.
     pub(crate) total_mib: u32,
 }
 
@@ -118,11 +118,11 @@ pub(crate) struct Counted {
 pub struct CardReading {
     /// The state of the card.
     pub state: CardState,
-    /// On this card; 0 before there is one.
+    /// The session's number on this card; 0 before there is one.
     pub session: u32,
     /// Segments begun in this session.
     pub segments: u32,
-    /// Of earlier sessions: the card is full.
+    /// Overwritten segments of earlier sessions: the card is full.
     pub segments_overwritten: u32,
     /// 512 bytes each, taken by the card.
     pub blocks_written: u32,
@@ -136,7 +136,7 @@ pub struct CardReading {
     pub sectors_lost: u32,
     /// Longest command, ms.
     pub stall_ms_max: u32,
-    /// Of the volume opened last.
+    /// Serial number of the volume opened last.
     pub volume: u32,
     /// The share of the card that logs can have, in thousandths: free clusters and those of logs. `None` until the
     /// file allocation table was counted, which takes a while on a large card.
@@ -285,7 +285,7 @@ impl CardStatus {
         self.group_wanted.store(true, Ordering::Release);
     }
 
-    /// Since the last call.
+    /// A group requested since the last call.
     pub fn take_group_wanted(&self) -> bool {
         self.group_wanted.swap(false, Ordering::Acquire)
     }
@@ -322,7 +322,7 @@ impl CardStatus {
         })
     }
 
-    /// For directory entries, seconds since 1970 UTC.
+    /// The date for directory entries, seconds since 1970 UTC.
     pub fn set_utc_secs(&self, utc_secs: u32) {
         self.fat_time.store(utc_secs, Ordering::Relaxed);
     }

@@ -19,12 +19,12 @@ impl Key {
     /// Mount count, four bytes.
     pub(crate) const MOUNTS: Self = Self(Self::OWN);
 
-    /// By number, which its owner never changes.
+    /// An item's key by number, which its owner never changes.
     pub const fn item(number: u8) -> Self {
         Self(number as u32)
     }
 
-    /// By name: a reordered table still finds it.
+    /// A parameter's key by name: a reordered table still finds it.
     pub const fn param(name: &str) -> Self {
         // FNV-1a (draft-eastlake-fnv, 32 bits). The value holds the name itself.
         let mut hash: u32 = 0x811C_9DC5;

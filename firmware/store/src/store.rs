@@ -51,7 +51,7 @@ pub enum Found {
     Unreadable,
 }
 
-/// In flash `F` of exactly two sectors.
+/// Items in flash `F` of exactly two sectors.
 pub struct Store<F: NorFlash> {
     flash: F,
     /// Its generation, and the next item's offset.
@@ -194,7 +194,7 @@ impl<F: NorFlash> Store<F> {
         F::ERASE_SIZE.saturating_sub(self.end)
     }
 
-    /// Since its creation, this one included.
+    /// Mounts since its creation, this one included.
     pub fn mounts(&mut self) -> Outcome<u32, F> {
         let mut mounts = [0; 4];
         self.get(Key::MOUNTS, &mut mounts)?;

@@ -12,7 +12,7 @@ use crate::outcome::usage;
 /// A vehicle's file has some 40 KiB.
 const BYTES_MAX: u64 = 1 << 20;
 
-/// In order; none without a file.
+/// Parameters in order; none without a file.
 pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
     let bytes = read_short(path, BYTES_MAX).context("--params")?;

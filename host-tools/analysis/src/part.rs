@@ -29,7 +29,7 @@ pub fn name(kind: &str, number: u8, given: &str) -> String {
 /// Reached first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// In the limit's unit.
+    /// Use so far, in the limit's unit.
     pub run: f64,
     /// The limit.
     pub limit: f64,
@@ -76,7 +76,7 @@ pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<St
     of(monitor, (0..COMPONENTS_MAX).filter(mine).max_by(|one, other| used(one).total_cmp(&used(other)))?)
 }
 
-/// By place from 0.
+/// A part and its first limit, by place from 0.
 pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
     let part = monitor.components().get(place)?;
     let (figures, _) = monitor.component_figures(place)?;

@@ -87,7 +87,7 @@ const ESC: [fn(usize) -> Quantity; 6] = [
 ];
 
 impl Quantity {
-    /// In the measurement `HUMS`; `None` without one.
+    /// Field in the measurement `HUMS`; `None` without one.
     pub fn field(self) -> Option<String> {
         let axis = |names: [&str; 3], axis: usize| names.get(axis).map(|name| (*name).to_owned());
         Some(match self {

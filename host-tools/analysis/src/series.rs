@@ -107,7 +107,7 @@ impl Series {
 /// Plot and number: a motor, a cell, an axis.
 pub type Line<P> = (P, u8);
 
-/// By plot.
+/// Series by plot.
 #[derive(Clone, Debug)]
 pub struct Store<P> {
     grid: Grid,
@@ -193,7 +193,7 @@ impl<P: Copy + Ord> Store<P> {
         self.taken
     }
 
-    /// Only series with values.
+    /// Series with values in these intervals.
     pub fn part(&self, intervals: RangeInclusive<u16>) -> impl Iterator<Item = (Line<P>, Part)> {
         self.series.iter().filter_map(move |(line, series)| Some((*line, series.part(intervals.clone())?)))
     }

@@ -113,7 +113,7 @@ const SENSORS: [&str; 32] = [
     "extended status",
 ];
 
-/// By bits of `MAV_SYS_STATUS_SENSOR`.
+/// Names of bits of `MAV_SYS_STATUS_SENSOR`.
 pub fn sensors(bits: u32) -> impl Iterator<Item = &'static str> {
     (0..)
         .zip(SENSORS)

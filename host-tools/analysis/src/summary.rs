@@ -58,12 +58,12 @@ pub struct BootLine {
     pub boots: u32,
 }
 
-/// Of those for the vehicle.
+/// Judged checks of those for the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JudgedChecks {
     /// These had.
     pub judged: usize,
-    /// Of box, card and wire only.
+    /// Checks of box, card and wire only.
     pub of_box: usize,
     /// All.
     pub all: usize,
@@ -171,7 +171,7 @@ pub fn damaged_places(count: u64) -> String {
 #[derive(Clone, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub struct Contents {
-    /// By id, or name.
+    /// Messages by id, or name.
     pub messages: Vec<MessageCount>,
     /// Unverified: distinguished ids are limited.
     pub other_messages: Amount,
@@ -191,7 +191,7 @@ pub struct Contents {
     pub checked_here: bool,
     /// If known: for a checking recorder only with few kinds of messages.
     pub judged: Option<JudgedChecks>,
-    /// At first reception.
+    /// In the air at first reception.
     pub begins_in_air: bool,
     /// `true`: take-off; in order, up to [`LISTED_MAX`].
     pub moves: Vec<(Instant, bool)>,
@@ -199,7 +199,7 @@ pub struct Contents {
     pub ends_in_air: Option<EndsInAir>,
     /// Unrecorded time, by report or evidence.
     pub is_lossy: bool,
-    /// Before the log, by the box's first counters.
+    /// Seconds in the air before the log, by the box's first counters.
     pub flight_before_s: Option<f64>,
     /// Latest values.
     pub usage: BTreeMap<String, f64>,
@@ -211,7 +211,7 @@ pub struct Contents {
     pub lifetime: BTreeMap<String, f64>,
     /// See [`Self::lifetime`].
     pub lifetime_at: Option<Instant>,
-    /// By check and instance, last recorded.
+    /// Crossed limits by check and instance, last recorded.
     pub exceedances: BTreeMap<(String, u8), ExceedanceLine>,
     /// Components by place, from 1, as recorded last.
     pub components: BTreeMap<u8, ComponentLine>,
@@ -248,7 +248,7 @@ impl Contents {
         all
     }
 
-    /// Only a checking recorder writes these records.
+    /// Checks by the recorder: only a checking recorder writes these records.
     pub fn is_checked(&self) -> bool {
         self.boot.is_some() || !self.usage.is_empty() || self.findings_count > 0
     }
@@ -290,7 +290,7 @@ impl Contents {
         self.judged.is_some_and(JudgedChecks::is_little) && !self.findings.iter().any(Finding::is_bad)
     }
 
-    /// And its first limit; place from 1.
+    /// A part and its first limit; place from 1.
     pub fn part(&self, place: u8, line: &ComponentLine) -> (String, Option<String>) {
         let name = part::name(line.kind, line.number, &line.name);
         (name, self.first_limit(place, line).map(|limit| limit.to_string()))
@@ -515,7 +515,7 @@ impl Overview {
         Self::read(log, Want { system, ..Want::default() }, Some(take))
     }
 
-    /// With every frame's checksum.
+    /// Reads a log with every frame's checksum.
     pub fn verified(log: &Log) -> Result<Self> {
         Self::read(log, Want { frames: true, ..Want::default() }, None)
     }

@@ -28,12 +28,12 @@ pub fn check_name(check: &str, instance: u8) -> String {
         .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
 }
 
-/// Without its part: `battery cell voltage`.
+/// A check without its part: `battery cell voltage`.
 pub fn check_kind(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }
 
-/// For people; logs have ASCII.
+/// A unit for people; logs have ASCII.
 pub fn unit_name(unit: &str) -> &str {
     match unit {
         "degC" => "\u{b0}C",
@@ -73,7 +73,7 @@ pub fn counter_name(number: u8) -> String {
     }
 }
 
-/// By the stored number.
+/// The source of time by the stored number.
 pub fn clock_source_name(number: u8) -> &'static str {
     match number {
         1 => "SYSTEM_TIME",
@@ -83,7 +83,7 @@ pub fn clock_source_name(number: u8) -> &'static str {
     }
 }
 
-/// Of a monitor's fault.
+/// The kind of a monitor's fault.
 pub fn fault_name(number: u8) -> &'static str {
     match number {
         1 => "panic",
@@ -93,7 +93,7 @@ pub fn fault_name(number: u8) -> &'static str {
     }
 }
 
-/// By its number in a log.
+/// An event by its number in a log.
 pub fn event_name(number: u8) -> &'static str {
     match number {
         1 => "armed",
@@ -118,7 +118,7 @@ pub fn event_name(number: u8) -> &'static str {
     }
 }
 
-/// Of `MAV_AUTOPILOT`, as met in the field.
+/// Names of `MAV_AUTOPILOT`, as met in the field.
 pub fn autopilot_name(number: u8) -> String {
     match number {
         0 => "generic".into(),
@@ -128,7 +128,7 @@ pub fn autopilot_name(number: u8) -> String {
     }
 }
 
-/// Of `MAV_TYPE`, as met in the field.
+/// Names of `MAV_TYPE`, as met in the field.
 pub fn type_name(number: u8) -> String {
     let name = match number {
         0 => "generic",

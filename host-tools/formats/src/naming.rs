@@ -51,7 +51,7 @@ impl Traits {
         Ok(Self { session: groups.session(), board, fingerprint: all.finish() })
     }
 
-    /// By the record of a start.
+    /// A box's log, by the record of a start.
     pub fn has_board(&self) -> bool {
         self.board.is_some()
     }

@@ -46,7 +46,7 @@ pub struct Part {
 pub struct Board {
     /// The whole vehicle's level, from the best source.
     pub overall: &'static str,
-    /// For an unknown level: `was critical`, or why the vehicle is silent.
+    /// Text for an unknown level: `was critical`, or why the vehicle is silent.
     pub said: Option<String>,
     /// The last level before it became unknown.
     pub was: Option<&'static str>,

@@ -48,17 +48,17 @@ pub struct Craft {
     pub monitor: Monitor,
     /// The reference system's view of it.
     pub reference: Reference,
-    /// By quantity of the reference system.
+    /// Last values by quantity of the reference system.
     pub latest: Latest,
     /// A HUMS on board.
     pub companion: Companion,
     /// `RPM`, `RAW_RPM`: the first two sensors.
     pub speed_sensors: [Option<(Instant, f32)>; 2],
-    /// By check that is not well.
+    /// Findings by check that is not well.
     pub worries: BTreeMap<(&'static str, u8), Finding>,
     /// Bad, and no longer judged, until armed again or good.
     pub unjudged: BTreeMap<(&'static str, u8), Finding>,
-    /// And the vehicle flies or will not report it.
+    /// Cells unknown, and the vehicle flies or will not report it.
     pub cells_unknown: bool,
     /// That was reported.
     cells_said: bool,
@@ -68,7 +68,7 @@ pub struct Craft {
     joined: bool,
     /// Time of its autopilot's last message.
     pub heard: Instant,
-    /// And those missing by their own count.
+    /// Frames, and those missing by their own count.
     pub frames: u64,
     /// See [`Self::frames`].
     pub missing: u64,
@@ -126,7 +126,7 @@ impl Craft {
         self.monitor.usage().value(UsageCounter::Flight).unwrap_or(0.0)
     }
 
-    /// With all its hours, from a log.
+    /// A part with all its hours, from a log.
     pub fn learn_part(&mut self, place: usize, part: Component) {
         self.monitor.learn_component(place, part);
         if let Some(known) = self.lives.get_mut(place) {
@@ -364,7 +364,7 @@ impl Craft {
         }
     }
 
-    /// And its limit; `None` for another check.
+    /// The due part and its limit; `None` for another check.
     pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
         part::is_due(finding.check).then(|| part::due(&self.monitor, finding.subsystem)).flatten()
     }

@@ -20,18 +20,18 @@ pub struct Published {
     pub epoch: u64,
     /// Pages see no later data.
     pub now: Instant,
-    /// Made once for all pages.
+    /// Source, time and vehicles.
     pub head: String,
-    /// Time went back: take the histories again.
+    /// The recording's time line; the same text until it changes.
     pub timeline: Arc<str>,
     /// Each vehicle by system id.
     pub crafts: Vec<(u8, String)>,
 }
 
-/// Source, time, vehicles.
+/// A request of a page; apart from the vehicle, only for playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// The same text until it changes.
+    /// Stops time.
     Pause,
     /// Time goes on.
     Play,

@@ -34,7 +34,7 @@ pub enum Entry {
 }
 
 impl Entry {
-    /// If of use here.
+    /// An item's entry, if of use here.
     pub fn of(at: Instant, item: &Item<'_>) -> Option<Self> {
         match *item {
             Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
@@ -97,7 +97,7 @@ impl Native {
         Ok(())
     }
 
-    /// If it came by `until`; otherwise it stays the next.
+    /// The next entry if it came by `until`; otherwise it stays the next.
     pub fn next_until(&mut self, until: Instant) -> io::Result<Option<(Instant, Entry)>> {
         if self.batches.is_none() {
             self.seek(0)?;

@@ -101,7 +101,7 @@ pub enum Content<'a> {
 /// Time, UTC of time zero if known, part read (0 to 1), item. `false` ends the reading.
 pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
 
-/// Once; returns the evidence of a log's end.
+/// Reads once; returns the evidence of a log's end.
 pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> {
     let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();

@@ -63,7 +63,7 @@ impl Drop for Place {
     }
 }
 
-/// Until the following thread ends: `followed` is then closed.
+/// Serves until the following thread ends: `followed` is then closed.
 pub fn serve(
     listener: std::net::TcpListener,
     hub: Arc<Hub>,

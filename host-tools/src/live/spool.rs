@@ -73,7 +73,7 @@ impl Spool {
         self.file.seek(SeekFrom::Start(offset)).map(|_| ())
     }
 
-    /// If it came by `until`; otherwise it stays the next.
+    /// The next frame if it came by `until`; otherwise it stays the next.
     pub fn next_until(&mut self, until: Instant) -> io::Result<Option<Spooled<'_>>> {
         let mut header = [0; HEADER_BYTES];
         match self.file.read_exact(&mut header) {

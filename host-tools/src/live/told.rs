@@ -49,7 +49,7 @@ impl Limits {
     }
 }
 
-/// From 0, of `CMP1_KIND`.
+/// A part's place from 0, of `CMP1_KIND`.
 pub fn place_of(name: &str) -> Option<usize> {
     name.strip_prefix("CMP")?.strip_suffix("_KIND")?.parse::<usize>().ok()?.checked_sub(1)
 }

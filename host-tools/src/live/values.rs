@@ -159,7 +159,7 @@ impl Serialize for Values<'_> {
     }
 }
 
-/// By number; a missing one is an empty object.
+/// Motors by number; a missing one is an empty object.
 #[derive(Debug)]
 pub struct Motors<'a>(pub Values<'a>);
 

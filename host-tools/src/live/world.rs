@@ -39,11 +39,11 @@ pub struct World {
     pub crafts: BTreeMap<u8, Craft>,
     /// Number of frames received, from any sender.
     pub frames: u64,
-    /// Of no known definition.
+    /// Frames of no known definition.
     pub unverified: u64,
     /// Frames of vehicles beyond [`VEHICLES_MAX`].
     pub refused: u64,
-    /// Since last cleared, at most `FOUND_MAX`.
+    /// Findings since last cleared, at most `FOUND_MAX`.
     pub found: Vec<(Instant, u8, Finding)>,
     limits: Limits,
     /// See [`Craft::on_the_wire`].
@@ -81,7 +81,7 @@ impl World {
         }
     }
 
-    /// From the autopilot's own wire.
+    /// Frames from the autopilot's own wire.
     #[must_use]
     pub fn on_the_wire(self, on_the_wire: bool) -> Self {
         Self { on_the_wire, ..self }

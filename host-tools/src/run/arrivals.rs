@@ -123,7 +123,7 @@ impl Arrivals {
         self.broken_off || self.source.damages() > 0
     }
 
-    /// By the user.
+    /// An end by the user.
     pub const fn break_off(&mut self) {
         self.broken_off = true;
     }

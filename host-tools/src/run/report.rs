@@ -49,7 +49,7 @@ pub struct Report {
     pub gs_frames: u64,
     /// Bytes sent to the ground station.
     pub gs_bytes: u64,
-    /// In order, up to [`FINDINGS_MAX`]; the log has all.
+    /// Changes of level in order, up to [`FINDINGS_MAX`]; the log has all.
     pub findings: Vec<Finding>,
     /// How many more there were.
     #[serde(skip_serializing_if = "is_none")]
@@ -58,7 +58,7 @@ pub struct Report {
     pub usage: serde_json::Map<String, serde_json::Value>,
     /// The run's log files on the card.
     pub log_files: Vec<String>,
-    /// In whole or in part, for want of room.
+    /// Sessions overwritten in whole or in part, for want of room.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub overwritten: Vec<String>,
     /// Allowed by the command line.
@@ -67,7 +67,7 @@ pub struct Report {
     /// No room in the end, and no session to overwrite.
     #[serde(skip)]
     pub card_full: bool,
-    /// At a chosen block write.
+    /// A power cut at a chosen block write.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
     /// Deepest use, if known.

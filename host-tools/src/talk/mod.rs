@@ -70,7 +70,7 @@ impl Client {
         Self::find_on(link, if link.system.is_some() { Duration::ZERO } else { LISTEN })
     }
 
-    /// For a command that cannot be undone: looks for further boards even with `--system`.
+    /// A connection for a command that cannot be undone: looks for further boards even with `--system`.
     pub fn connect_alone(link: &Link) -> Result<Self> {
         Self::find_on(link, LISTEN)
     }

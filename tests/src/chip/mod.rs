@@ -74,12 +74,12 @@ pub fn frames(mut tlog: &[u8]) -> Vec<(u64, &[u8])> {
 /// 4 GB, a multiple of a CSD's unit.
 pub const BLOCKS: u32 = 8_388_608;
 
-/// With a faultless card.
+/// A board with a faultless card.
 pub fn board(image: Image, board: Board) -> (Machine, Slot, Medium) {
     board_with(image, board, Vec::new())
 }
 
-/// With a card of these faults.
+/// A board with a card of these faults.
 pub fn board_with(image: Image, board: Board, plans: Vec<Plan>) -> (Machine, Slot, Medium) {
     let medium = Medium::formatted(BLOCKS);
     let (machine, slot) = board_of(image, board, Model { plans, ..Model::new(Kind::Sdhc, medium.clone()) });

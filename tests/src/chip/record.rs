@@ -98,7 +98,7 @@ pub struct Compared {
     pub right: usize,
     /// Sent frames that are not there.
     pub missing: usize,
-    /// Not sent, or more often than sent.
+    /// Frames not sent, or more often than sent.
     pub wrong: usize,
     /// Missing before the first and after the last one.
     pub ends: (usize, usize),

@@ -3,7 +3,7 @@
 /// A campaign's extent.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
-    /// For every change.
+    /// The short form, for every change.
     pub short: bool,
     /// Makes chance repeatable.
     pub seed: u64,

@@ -96,7 +96,7 @@ pub enum Unary {
     Revsh,
 }
 
-/// Of three or four operands, long ones apart.
+/// Multiplications of three or four operands, long ones apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiply {
     Mla,

@@ -86,7 +86,7 @@ impl Bus for Flat {
     }
 }
 
-/// Of this process.
+/// A folder of this process.
 pub fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("cortex-m4-model-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");

@@ -57,7 +57,7 @@ pub struct Before {
     pub sectors: u32,
     /// Its frames, modulo 2^32.
     pub frames: u32,
-    /// Over all its entries; known together with its frames.
+    /// Check over all its entries; known together with its frames.
     pub check: u32,
 }
 

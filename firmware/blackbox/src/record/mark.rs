@@ -41,7 +41,7 @@ impl Resting {
 pub struct Mark {
     /// Why it was written.
     pub why: Resting,
-    /// In progress: the mark begins in it or in the next one.
+    /// Sector in progress: the mark begins in it or in the next one.
     pub sector: u32,
     /// Frames of the session before the mark, modulo 2^32.
     pub frames: u32,

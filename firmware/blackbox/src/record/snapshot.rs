@@ -62,7 +62,7 @@ impl<'a> Snapshot<'a> {
         }
     }
 
-    /// With time and column's name; `None` for an unknown column.
+    /// Values with time and column's name; `None` for an unknown column.
     pub fn iter(&self) -> impl Iterator<Item = (Instant, Option<&'static str>, f32)> + 'a {
         let Self { first, interval, width, subsystem, values, .. } = *self;
         let width = usize::from(width).clamp(1, COLUMNS_MAX);

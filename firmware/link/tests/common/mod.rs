@@ -8,7 +8,7 @@ pub fn excerpt(name: &str) -> Recording {
     Recording::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name))
 }
 
-/// In the folder of `HUMS_FLIGHTS`, or in the repository; `None` in neither.
+/// A flight in the folder of `HUMS_FLIGHTS`, or in the repository; `None` in neither.
 pub fn flight(name: &str) -> Option<Recording> {
     let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/flights");
     let folders = std::env::var_os("HUMS_FLIGHTS").map(PathBuf::from).into_iter().chain([repository]);
@@ -16,7 +16,7 @@ pub fn flight(name: &str) -> Option<Recording> {
     Some(Recording::read(&paths.find(|path| path.exists())?))
 }
 
-/// With a tlog's frames: beginning and time.
+/// The bytes, with a tlog's frames: beginning and time.
 pub struct Recording {
     pub bytes: Vec<u8>,
     /// Start, length, microseconds since 1970; empty for a raw recording.

@@ -13,7 +13,7 @@ use crate::records::Recorded;
 
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
-/// Of a change of propellers, battery or payload.
+/// The text of a change of propellers, battery or payload.
 pub const PARTS_CHANGED: &str = "baselines anew";
 /// An unknown number of cells.
 pub const CELLS_UNKNOWN: &str = "HUMS: cells not known, set BAT_CELLS";

@@ -325,7 +325,7 @@ impl<'a> Monitoring<'a> {
         self.companion.restore(store_writer);
     }
 
-    /// At every tick and at the end.
+    /// Hands over items of the signing key at every tick and at the end.
     pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) {
         self.companion.save(now, &self.summary, handover);
     }

@@ -29,7 +29,7 @@ pub struct Handover<'a> {
     active_at: Instant,
 }
 
-/// For the record and the ground.
+/// A text about the store, for the record and the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct News {
     /// `MAV_SEVERITY`.
@@ -112,7 +112,7 @@ impl<'a> Handover<'a> {
         self.status.read().room
     }
 
-    /// Of another owner; `false` without room.
+    /// An item of another owner; `false` without room.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
         self.items.put(key, value)
     }

@@ -35,7 +35,7 @@ pub enum Calm {
     Silent = 2,
 }
 
-/// Of the writer for the monitor, and back.
+/// Status of the store's writer for the monitor, and back.
 #[derive(Debug, Default)]
 pub struct StoreStatus {
     state: AtomicU8,
@@ -53,7 +53,7 @@ pub struct StoreStatus {
 pub struct StoreReading {
     /// The store's state at the start.
     pub state: StoreState,
-    /// At the start, plus one if the flash was damaged.
+    /// Unreadable items at the start, plus one if the flash was damaged.
     pub unreadable: u32,
     /// Items saved.
     pub saved: u32,
@@ -101,7 +101,7 @@ impl StoreStatus {
         }
     }
 
-    /// By the vehicle's state.
+    /// Cost of an erase now, by the vehicle's state.
     pub fn calm(&self) -> Calm {
         match self.calm.load(Ordering::Relaxed) {
             1 => Calm::Grounded,

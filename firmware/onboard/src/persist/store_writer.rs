@@ -102,13 +102,13 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         self.look_for_room();
     }
 
-    /// Of another owner, by number; returns its length, 0 if there is none.
+    /// An item of another owner, by number; returns its length, 0 if there is none.
     pub fn item(&mut self, number: u8, out: &mut [u8]) -> usize {
         let got = self.store.as_mut().map(|store| store.get(Key::item(number), out));
         got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
-    /// Since it was made; 0 without a store.
+    /// Mounts since it was made; 0 without a store.
     pub fn mounts(&mut self) -> u32 {
         self.store.as_mut().and_then(|store| store.mounts().ok()).unwrap_or(0)
     }

@@ -30,12 +30,12 @@ pub enum SummaryRoute {
 }
 
 impl GsIn<'_> {
-    /// Or counts it as lost.
+    /// Queues a frame, or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         self.gs.put(frame);
     }
 
-    /// Of the summary stream.
+    /// Queues a frame of the summary stream.
     pub fn tell(&mut self, frame: &[u8]) {
         match self.route {
             SummaryRoute::Nobody => {}
@@ -75,7 +75,7 @@ impl GsIn<'_> {
     }
 }
 
-/// With its counters.
+/// Writing end of a port's queue, with its counters.
 pub struct PortIn<'a, const BYTES: usize> {
     queue: FramedProducer<&'a Churrasco<BYTES>>,
     level: &'a Level,
@@ -135,7 +135,7 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         Some(len)
     }
 
-    /// In place; then removes it; `false` if there is none.
+    /// Lends the oldest frame in place; then removes it; `false` if there is none.
     pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8])) -> bool {
         let Ok(grant) = self.0.read() else { return false };
         send(&grant).await;

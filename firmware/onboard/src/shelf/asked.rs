@@ -11,7 +11,7 @@ pub(super) const HEAD: usize = 36;
 pub struct LogId {
     /// Its name.
     pub name: LogName,
-    /// Of its first sector, random; 0 if unreadable.
+    /// Session of its first sector, random; 0 if unreadable.
     pub session: u32,
     /// Its first sector's number in the session.
     pub first: u32,

@@ -145,7 +145,7 @@ impl Server<'_> {
         grant.commit((HEAD + data.len()) as u16);
     }
 
-    /// If there is room for its answer; whether there was one.
+    /// Part of a request, if there is room for its answer; whether there was one.
     pub fn serve<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         if let Some(entry) = self.erases {
             self.last = None;

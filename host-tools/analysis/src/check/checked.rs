@@ -45,7 +45,7 @@ impl Checked {
         self.ending.as_ref().map_or_else(Vec::new, Ending::faults)
     }
 
-    /// If its losses do not count: see [`Ending::aside`].
+    /// The kind of recording, if its losses do not count: see [`Ending::aside`].
     pub fn aside(&self) -> Option<String> {
         self.ending.as_ref().and_then(Ending::aside)
     }

@@ -16,7 +16,7 @@ pub struct Flight {
     pub from: Instant,
     /// Last time in the air.
     pub to: Instant,
-    /// Without stops and gaps.
+    /// Time in the air, without stops and gaps.
     pub air: Span,
     /// Seen on the ground before; otherwise the start is unknown.
     pub took_off: bool,

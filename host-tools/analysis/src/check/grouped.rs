@@ -12,7 +12,7 @@ use super::problem::{Problem, mishaps};
 pub struct Group<'a> {
     /// One check and level; at least one.
     pub members: Vec<&'a Problem>,
-    /// By check and level, in order of time.
+    /// Effects by check and level, in order of time.
     pub effects: Vec<Vec<&'a Problem>>,
     /// A warning with a critical effect.
     pub is_raised: bool,

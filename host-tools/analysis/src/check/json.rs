@@ -185,7 +185,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
     })
 }
 
-/// Of an unreadable log.
+/// The object of an unreadable log.
 pub fn error(log: &str, error: &anyhow::Error) -> String {
     let object = ErrorJson { schema: SCHEMA, version: VERSION, log, error: format!("{error:#}") };
     serde_json::to_string(&object).unwrap_or_default()

@@ -189,7 +189,7 @@ impl Judge {
         Self { wire: (heard == Heard::OnTheWire).then(Sequences::new), ..self }
     }
 
-    /// From 0, as in [`Judged::flights`].
+    /// Flight from 0, as in [`Judged::flights`].
     pub fn flight(&self) -> Option<usize> {
         self.flights.going_on()
     }

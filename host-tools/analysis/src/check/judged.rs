@@ -29,7 +29,7 @@ pub enum JudgedBy {
     Here,
 }
 
-/// From and to: up to [`LISTED_MAX`].
+/// Times without data, from and to: up to [`LISTED_MAX`].
 #[derive(Clone, Debug, Default)]
 pub struct Holes {
     pauses: Vec<(Instant, Instant)>,
@@ -82,7 +82,7 @@ pub struct Judged {
     pub flights: Vec<Flight>,
     /// The last flight goes on.
     pub ends_in_air: Option<EndsInAir>,
-    /// In order, up to [`super::problem::LISTED_MAX`].
+    /// Changes of level in order, up to [`super::problem::LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// Number of findings.
     pub findings_count: u64,
@@ -94,13 +94,13 @@ pub struct Judged {
     pub not_judged: Vec<(&'static str, String)>,
     /// Flights and changes of parts, for trends.
     pub episodes: Vec<Episode>,
-    /// By heartbeats, in order of ids.
+    /// Systems by heartbeats, in order of ids.
     pub systems: Vec<u8>,
     /// Sentences.
     pub remarks: Vec<String>,
-    /// In the air: no voltage alarm.
+    /// Start of unknown cells in the air: no voltage alarm.
     pub cells_unknown: Option<Instant>,
-    /// In order, up to [`super::problem::LISTED_MAX`].
+    /// Gaps in order, up to [`super::problem::LISTED_MAX`].
     pub gaps: Vec<Gap>,
     /// The times without data.
     pub holes: Holes,
@@ -135,7 +135,7 @@ impl Judged {
         self.flights.iter().fold(Span::ZERO, |sum, flight| sum + flight.air)
     }
 
-    /// Against earlier flights; learns from them.
+    /// Judges flights against earlier flights; learns from them.
     pub fn judge_trends(&mut self, past: &mut Baselines) {
         if self.is_timeless {
             return;

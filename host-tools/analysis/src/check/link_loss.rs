@@ -70,7 +70,7 @@ pub(super) struct Verdict {
     pub check: &'static str,
     /// `None` if not measured.
     value: Option<f32>,
-    /// For an impact, the next reception.
+    /// Time of the finding; for an impact, the next reception.
     pub at: Instant,
     /// Last reception before.
     pub from: Option<Instant>,

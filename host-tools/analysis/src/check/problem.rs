@@ -36,7 +36,7 @@ pub struct Problem {
     pub at: Instant,
     /// Changes from good.
     pub times: u32,
-    /// At a warning or worse, without gaps.
+    /// Time at a warning or worse, without gaps.
     pub lasted: Span,
     /// It was still so at the end.
     pub lasting: bool,

@@ -136,7 +136,7 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// At the landing or the recording's end.
+    /// A flight at the landing or the recording's end.
     pub fn of(at: Instant, landed: bool, monitor: &Monitor) -> Self {
         let autopilot = monitor.vehicle().heartbeat.get().map(|heartbeat| heartbeat.autopilot);
         let mut figures = [None; Quantity::COUNT];
@@ -221,7 +221,7 @@ impl Baselines {
         self.0.iter().map(|baseline| baseline.flights).max().unwrap_or(0)
     }
 
-    /// Once enough flights made it.
+    /// The normal figure, once enough flights made it.
     pub fn known(&self, quantity: Quantity) -> Option<f32> {
         let Baseline { value, flights, .. } = self.0[quantity.index()];
         (flights >= FLIGHTS_MIN).then_some(value)

@@ -11,24 +11,24 @@ use crate::plural::{are, count, noun};
 /// The end of a log that was read: the evidence of its completeness, the same for every command.
 #[derive(Clone, Debug, Default)]
 pub struct Ending {
-    /// The log's files.
+    /// Its name.
     pub name: String,
-    /// Totals.
+    /// The log's files.
     pub files: Vec<String>,
-    /// Proof of the end.
+    /// Totals.
     pub summary: Summary,
-    /// The session just before it.
+    /// Proof of the end.
     pub proof: Proof,
-    /// The original's name, if this is a copy.
+    /// The session just before it.
     pub before: SessionBefore,
-    /// Rest of a session outside of all files.
+    /// The original's name, if this is a copy.
     pub again: Option<String>,
-    /// A log alone; [`crate::followed`] adds later evidence.
+    /// Rest of a session outside of all files.
     pub left_over: bool,
 }
 
 impl Ending {
-    /// A part of a sentence.
+    /// A log alone; [`crate::followed`] adds later evidence.
     pub fn of(log: &Log, summary: Summary) -> Self {
         let proof = Proof::of(&summary, None);
         let (name, files, left_over) = (log.name.clone(), log.files.clone(), log.left_over);
@@ -158,7 +158,7 @@ impl Ending {
     }
 }
 
-/// With advice; `None` without any.
+/// A sentence with advice; `None` without any.
 pub fn made_again_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(
@@ -168,7 +168,7 @@ pub fn made_again_words(sectors: u64) -> Option<String> {
     })
 }
 
-/// With advice; `None` without any.
+/// A sentence with advice; `None` without any.
 pub fn unprotected_words(sectors: u64) -> Option<String> {
     (sectors > 0).then(|| {
         format!(

@@ -43,7 +43,7 @@ pub enum Teller {
 }
 
 impl Proof {
-    /// By the log, and by the next start's record if known.
+    /// Proof by the log, and by the next start's record if known.
     pub fn of(summary: &Summary, next: Option<&Before>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
@@ -79,7 +79,7 @@ impl Proof {
         }
     }
 
-    /// Up to the last end mark at least.
+    /// A complete end, up to the last end mark at least.
     pub const fn holds(self) -> bool {
         self.is_whole() || matches!(self, Self::Mark(..))
     }

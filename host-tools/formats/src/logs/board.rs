@@ -9,7 +9,7 @@ pub const HEADING_GROUPS: usize = 2;
 /// A board's unique id; zeros without a board.
 pub type Board = [u8; 12];
 
-/// By the first record of a start in the group.
+/// The board's id by the first record of a start in the group.
 pub fn board_of(group: &[Step]) -> Option<Board> {
     heading(group).and_then(known)
 }
@@ -19,7 +19,7 @@ pub fn known(uid: Board) -> Option<Board> {
     Some(uid).filter(|uid| *uid != [0; 12])
 }
 
-/// As [`board_of`]; zeros without a board.
+/// The board's id as [`board_of`]; zeros without a board.
 pub fn heading(group: &[Step]) -> Option<Board> {
     let mut decoder = Box::new(GroupDecoder::new());
     for step in group {

@@ -63,7 +63,7 @@ pub struct CardFile {
 /// Result of a walk over the volume.
 #[derive(Clone, Debug, Default)]
 pub struct Walk {
-    /// Sentences: the first `DAMAGE_MAX`, then one that counts the others.
+    /// Segments and other files that begin with a log's sector, in directory order, up to `FILES_MAX`; the rest is only checked.
     pub files: Vec<CardFile>,
     /// Damage, as sentences: the first `DAMAGE_MAX`, then one that counts the others.
     pub damage: Vec<String>,

@@ -116,7 +116,7 @@ impl Walked {
     }
 }
 
-/// Also of a link's target; a dead link stays a link.
+/// The kind of an entry, also of a link's target; a dead link stays a link.
 pub fn kind_of(entry: &DirEntry) -> io::Result<FileType> {
     let kind = entry.file_type()?;
     let target = kind.is_symlink().then(|| fs::metadata(entry.path()).ok()).flatten();
@@ -177,7 +177,7 @@ pub fn is_named_as_log(path: &Path) -> bool {
     is_named(path, &[".hum"])
 }
 
-/// By the name, compressed or not.
+/// A card's image by the name, compressed or not.
 pub fn is_named_as_card(path: &Path) -> bool {
     is_named(path, &IMAGES)
 }
@@ -205,7 +205,7 @@ fn nothing_of_ours(path: &Path) -> String {
     format!("{}: has the name {what}", path.display())
 }
 
-/// For an entry that is not a file.
+/// A remark for an entry that is not a file.
 pub fn passed_over(path: &Path, kind: FileType) -> String {
     let what = if kind.is_symlink() {
         "a link to nothing"

@@ -8,7 +8,7 @@ use super::places::{BLOCK_BYTES, Blocks, Log};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
 
-/// In order, or a group's part without its beginning.
+/// Sectors in order, or a group's part without its beginning.
 pub type Group = Vec<Step>;
 
 /// Allocated and never written, like most of a short log's segment. The assembler needs as long as for a
@@ -17,7 +17,7 @@ fn is_empty(block: &[u8; BLOCK_BYTES]) -> bool {
     block.as_chunks().0.iter().all(|piece| *piece == [0; 32])
 }
 
-/// At a log's beginning.
+/// A start's record at a log's beginning.
 pub fn has_start(log: &Log) -> bool {
     let mut groups = Groups::new(log);
     let mut first = (0..HEADING_GROUPS).map_while(|_| groups.next_group().ok()?);
@@ -173,7 +173,7 @@ impl<'a> Groups<'a> {
         self.assembler.session()
     }
 
-    /// After the last sector: broken sectors of the session.
+    /// Damaged blocks after the last sector: broken sectors of the session.
     pub fn damaged_at_end(&self) -> u32 {
         self.assembler.damaged_since().max(u32::from(self.ends_short))
     }

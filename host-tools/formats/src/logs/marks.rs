@@ -36,7 +36,7 @@ pub struct Marks {
     pub took_off: Option<bool>,
     /// Lost frames and records, by the recorder.
     pub lost: u64,
-    /// By the last boot record.
+    /// The log before, by the last boot record.
     pub before: Option<Before>,
     /// Packed on a PC.
     pub packed: bool,

@@ -26,9 +26,9 @@ pub fn session_name(on_card: &str, board: Option<&Board>, session: Option<u32>) 
 pub struct SegmentName {
     /// Box and session, `box3f0042000d51373435363338-s1a2b3c4d`; empty in a name from a card.
     pub of: String,
-    /// `box3f0042000d51373435363338-s1a2b3c4d`; empty on a card.
-    pub session: u32,
     /// Number on its card.
+    pub session: u32,
+    /// The segment within the session.
     pub segment: u32,
 }
 
@@ -54,12 +54,12 @@ impl SegmentName {
         Self { segment: 0, ..self.clone() }
     }
 
-    /// The session's first segment.
+    /// The box, if it is in the name: logs of one box are read as one card's.
     pub fn recorder(&self) -> &str {
         self.of.rsplit_once('-').map_or("", |(recorder, _)| recorder)
     }
 
-    /// Logs of one box are read as one card's.
+    /// The log for people: `00042`, after the box if known.
     pub fn log(&self) -> String {
         match self.recorder() {
             "" => format!("{:05}", self.session),
@@ -68,7 +68,7 @@ impl SegmentName {
     }
 }
 
-/// For people: `00042`, after the box if known.
+/// Segment by a file's name, in any case, also without the ending.
 pub fn segment_name(path: &Path) -> Option<SegmentName> {
     let name = path.file_name()?.to_str()?.to_ascii_lowercase();
     let (base, extension) = name.split_once('.').unwrap_or((&name, "hum"));
@@ -83,29 +83,29 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
     Some(SegmentName { of, session, segment })
 }
 
-/// By name, in any case, also without the ending.
+/// Mark of a part of a log, in front of the ending.
 const PART: &str = ".part";
 
-/// In front of the ending.
+/// Path of a part, made by `hums box pull --around`: `00042-s1a2b3c4d_07.part.HUM`.
 pub fn part_name(whole: &Path) -> PathBuf {
     whole.with_extension("part.HUM")
 }
 
-/// Made by `hums box pull --around`: `00042-s1a2b3c4d_07.part.HUM`.
+/// Segment by a file's name, or by the name of a part of it.
 pub fn segment_or_part(path: &Path) -> Option<SegmentName> {
     let whole = |stem: &str| Some(path.with_file_name(stem.get(..stem.len().checked_sub(PART.len())?)?));
     let part = path.file_stem().filter(|_| is_part(path)).and_then(|stem| whole(stem.to_str()?));
     segment_name(part.as_deref().unwrap_or(path))
 }
 
-/// Also by a part's name.
+/// A part of a log, by the file's name.
 pub fn is_part(path: &Path) -> bool {
     let is_hum = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hum"));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().to_ascii_lowercase());
     is_hum && stem.is_some_and(|stem| stem.ends_with(PART))
 }
 
-/// By the file's name.
+/// Names of one of several inputs' logs begin with its own: each card has a session 1.
 pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>) {
     let stem = input.file_stem().or(input.file_name()).map_or("input".into(), |stem| stem.to_string_lossy());
     for name in names.filter(|name| **name != stem) {
@@ -125,7 +125,8 @@ pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     }
 }
 
-/// Later equal names get a number.
+/// Whether a file's name, without its ending, ends with an identity: a session, `s1a2b3c4d`, or another
+/// recording's content, `r1a2b3c4d`; a further log of a session has a number after it.
 pub fn ends_with_identity(stem: &str) -> bool {
     let is_identity = |name: &str| {
         let digits = name.rsplit_once('-').and_then(|(_, identity)| identity.strip_prefix(['s', 'r']));

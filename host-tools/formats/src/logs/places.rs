@@ -27,7 +27,7 @@ pub struct Piece {
 pub struct Log {
     /// Unique within one call: `00042`, or `card/00042` with several inputs.
     pub name: String,
-    /// On the card or on this PC.
+    /// Names on the card or on this PC.
     pub files: Vec<String>,
     /// A piece for each file, in order.
     pub pieces: Vec<Piece>,

@@ -80,7 +80,7 @@ pub struct Summary {
     pub last: Option<Instant>,
     /// UTC at power-on, microseconds since 1970; the last value counts.
     pub epoch_us: Option<u64>,
-    /// From its records.
+    /// Facts from its records.
     pub marks: Marks,
     /// The number of the first sector.
     pub first_number: Option<u32>,

@@ -21,7 +21,7 @@ const LOST_MAX: usize = 2;
 /// Twice the recorder's longest file. A hostile file of parity is held whole.
 const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;
 
-/// From the parity of a log's files.
+/// Evidence from the parity of a log's files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Evidence {
     /// The last covered sector.

@@ -37,7 +37,7 @@ pub enum Peek<'a> {
 /// Consistent in its length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// From magic to checksum or signature.
+    /// The frame from magic to checksum or signature.
     pub bytes: &'a [u8],
     /// The message id.
     pub id: u32,
@@ -61,7 +61,7 @@ impl Frame<'_> {
         if checked == Some(hums_link::Check::Verified) { Check::Good } else { Check::Bad }
     }
 
-    /// If the dialect has one.
+    /// The definition, if the dialect has one.
     pub fn message(&self) -> Option<&'static Message> {
         hums_dialect::message(self.id)
     }

@@ -88,7 +88,7 @@ impl Payload {
         })
     }
 
-    /// By name; of an array, its first element.
+    /// A field by name; of an array, its first element.
     pub fn number(&self, name: &str) -> Option<f64> {
         let (_, value) = self.fields().find(|(field, _)| field.name == name)?;
         match value {

@@ -27,7 +27,7 @@ pub struct BootTimes {
 }
 
 impl BootTimes {
-    /// And the power-on or recording that begins with it.
+    /// A frame's time, and the power-on or recording that begins with it.
     pub fn at(&mut self, line: Instant, frame: &hums_link::Frame<'_>) -> (Instant, Option<Begins>) {
         let told = boot_ms(frame).filter(|_| self.system.is_none_or(|system| system == frame.system()));
         if let Some(boot_ms) = told {

@@ -150,12 +150,12 @@ impl Clock {
         Self { rules, timeline: Timeline::new(), begun: false, series: Vec::new(), steps }
     }
 
-    /// By a search.
+    /// The first time, by a search.
     pub fn begin(&mut self, us: u64) {
         self.timeline.at(us);
     }
 
-    /// By the log itself; `true` if another log came before, from which time goes on.
+    /// Beginning by the log itself; `true` if another log came before, from which time goes on.
     pub fn begin_log(&mut self, us: u64) -> bool {
         let again = self.timeline.recorded_us().is_some();
         if again {
@@ -254,7 +254,7 @@ impl Clock {
             && last_us.is_none_or(|last| stamp.us.saturating_add(DISORDER_US) >= last)
     }
 
-    /// By this series.
+    /// A clock that stands or runs backwards, by this series.
     pub fn stands(&self, series: usize) -> bool {
         self.series(series).still >= STILL_MIN
     }

@@ -43,9 +43,9 @@ pub struct Time {
 /// Longest pauses at a recording's ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Ends {
-    /// Before the last steady messages.
+    /// Time before the last steady messages.
     pub steady_us: u64,
-    /// After the first, and before the last rare messages.
+    /// Time after the first, and before the last rare messages.
     pub seldom_us: u64,
 }
 

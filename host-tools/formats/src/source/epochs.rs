@@ -56,7 +56,7 @@ impl Epochs {
         Some(epoch_us.saturating_add(at.as_micros()))
     }
 
-    /// If the recording has one clock.
+    /// UTC at time zero, if the recording has one clock.
     pub fn whole(&self) -> Option<u64> {
         self.first_us.filter(|_| self.later.is_empty())
     }

@@ -30,13 +30,13 @@ const PASSED_OVER_MAX: usize = 20;
 /// Result of a search.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// In named order, a folder's by name.
+    /// Recordings in named order, a folder's by name.
     pub places: Vec<Place>,
     /// Facts from the file systems of cards and images.
     pub images: Vec<Image>,
     /// Sentences.
     pub remarks: Vec<String>,
-    /// Beyond the limit, or files named like a recording without one.
+    /// Logs beyond the limit, or files named like a recording without one.
     pub is_cut: bool,
     /// By device and number.
     seen: BTreeSet<FileId>,
@@ -136,7 +136,7 @@ impl Found {
         Ok(self)
     }
 
-    /// By name or number.
+    /// A session by name or number.
     pub fn session(&self, name: &str) -> Result<usize> {
         let number = |name: &str| name.parse::<u32>().ok();
         let is_it = |place: &Place| {

@@ -59,7 +59,7 @@ impl Format {
         }
     }
 
-    /// In a sentence: `a PX4 log (ULog)`.
+    /// The format in a sentence: `a PX4 log (ULog)`.
     pub fn with_article(self) -> String {
         match self {
             Self::Raw => self.words().to_owned(),
@@ -136,7 +136,7 @@ pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
         .or_else(|| is_store::<STORE_SECTOR_BYTES>(start).then_some(STORE))
 }
 
-/// By 64 KiB or the whole file; not HUMS logs.
+/// The format by 64 KiB or the whole file; not HUMS logs.
 pub fn format_of(start: &[u8]) -> Option<Format> {
     detect(start).map(Detected::format)
 }

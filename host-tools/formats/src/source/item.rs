@@ -72,7 +72,7 @@ pub struct Text<'a> {
     pub severity: u8,
     /// Untrusted, never markup.
     pub words: &'a str,
-    /// Also an [`Observation::Alert`], which the monitor takes.
+    /// Its alert, also an [`Observation::Alert`], which the monitor takes.
     pub alert: Option<Alert>,
 }
 
@@ -161,7 +161,7 @@ impl Table {
 pub struct Column {
     /// Its name.
     pub name: String,
-    /// After multipliers; empty if unknown.
+    /// Unit after multipliers; empty if unknown.
     pub unit: String,
     /// Type of the values.
     pub kind: Kind,
@@ -265,7 +265,7 @@ pub struct Gap {
     pub bytes: u64,
     /// The end of a sentence: `a length of 3 bytes for FMT`.
     pub words: String,
-    /// As in a HUMS log, with sectors and frames.
+    /// The gap as in a HUMS log, with sectors and frames.
     pub own: Option<hums_blackbox::Gap>,
 }
 
@@ -287,12 +287,12 @@ impl Gap {
         self
     }
 
-    /// Only bytes outside frames.
+    /// Noise: only bytes outside frames.
     pub fn is_noise(&self) -> bool {
         self.cause == Cause::Lost && self.bytes > 0
     }
 
-    /// Without place and words.
+    /// Our logs' form, without place and words.
     pub fn to_own(&self) -> hums_blackbox::Gap {
         if let Some(own) = self.own {
             return own;
@@ -395,7 +395,7 @@ impl Rows<'_> {
 /// An error ends the reading; [`Stop`] is not a failure.
 pub type Take<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
 
-/// After its alert, if observations are wanted.
+/// A text or event after its alert, if observations are wanted.
 pub fn hand_said(at: Instant, item: Item<'_>, want_observations: bool, take: &mut Take<'_>) -> Result<()> {
     if let Item::Text(Text { source, alert: Some(alert), .. })
     | Item::Event(Event { source, alert: Some(alert), .. }) = item
@@ -451,7 +451,7 @@ pub struct MessageCount {
 pub struct Summary {
     /// Unwanted ones too: by id, or by name without ids.
     pub messages: Vec<MessageCount>,
-    /// Beyond the limit of ids.
+    /// Messages beyond the limit of ids.
     pub other_messages: Amount,
     /// Invalid frames in entries of a HUMS log.
     pub not_frames: u64,

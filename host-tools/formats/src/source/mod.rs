@@ -84,7 +84,7 @@ pub struct Timing {
     pub line_rate: Option<u32>,
 }
 
-/// With the way back, if any.
+/// SRC with the way back, if any.
 pub fn open_both(endpoint: &Endpoint, timing: Timing) -> Result<(Box<dyn Source>, Option<Way>)> {
     if endpoint.is_live() && timing.line_rate.is_none() {
         let (source, writer) = live::open(endpoint)?;
@@ -149,7 +149,7 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
     Ok(Box::new(compressed::Compressed::new(source, progress)))
 }
 
-/// For a command that writes frames.
+/// The error for a command that writes frames.
 pub fn no_frame(input: &Endpoint) -> Error {
     anyhow!("{input}: has no MAVLink frame, so nothing was written; hums check says what a file is")
 }

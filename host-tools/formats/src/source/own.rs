@@ -63,7 +63,7 @@ impl OwnReader {
         Ok(Summary { messages, other_messages, not_frames, span, gaps, losses, ending: Some(ending) })
     }
 
-    /// Also hands on all items in order, as [`Reader::read`]: one reading for both.
+    /// Reads in parts; also hands on all items in order, as [`Reader::read`]: one reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
         want: Want<'_>,

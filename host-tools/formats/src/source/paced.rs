@@ -20,7 +20,7 @@ pub struct Paced<S> {
 }
 
 impl<S: Source> Paced<S> {
-    /// At `baud` (at least 1).
+    /// Bytes with the times of a line at `baud` (at least 1).
     pub fn new(inner: S, baud: u32) -> Self {
         Self { inner, baud: u64::from(baud.max(1)), waiting: VecDeque::new(), sent: 0 }
     }

@@ -12,7 +12,7 @@ use hums_core::clock::Instant;
 use super::item::{Gap, Item};
 pub use crate::logs::reader::PART_BYTES;
 
-/// Of another format.
+/// Items in a part of another format.
 pub const PART_ITEMS: u32 = 4_096;
 
 /// A part's result.

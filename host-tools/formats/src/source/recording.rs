@@ -27,9 +27,9 @@ pub const RAW_BAUD: u32 = 115_200;
 /// A found recording, not yet open.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// For people: path, or path and session.
+    /// Place for people: path, or path and session.
     pub title: String,
-    /// For files made of it, unique within one call: the file's, or a session's as in `hums info`.
+    /// Name for files made of it, unique within one call: the file's, or a session's as in `hums info`.
     pub name: String,
     /// System id of the only wanted vehicle ([`Want::system`]).
     pub system: Option<u8>,
@@ -45,7 +45,7 @@ enum From {
 }
 
 impl Place {
-    /// With only this system id.
+    /// The place with only this system id.
     pub fn of_system(&self, system: u8) -> Self {
         Self { system: Some(system), ..self.clone() }
     }
@@ -97,7 +97,7 @@ impl Place {
         matches!(self.source, From::Standard)
     }
 
-    /// As far as known.
+    /// Bytes, as far as known.
     pub fn bytes(&self) -> u64 {
         match &self.source {
             From::Standard => 0,
@@ -129,7 +129,7 @@ impl Place {
         Ok(Recording { system: self.system, ..recording })
     }
 
-    /// As [`Self::in_parts`], and hands on items in order: one reading for both.
+    /// Parts as [`Self::in_parts`], and items in order: one reading for both.
     pub fn in_parts_and_order<C: Collect>(
         &self,
         log: &Log,
@@ -212,7 +212,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// By content; `name` is for messages.
+    /// A recording by content; `name` is for messages.
     pub fn new(mut input: Input, name: &str) -> Result<Self> {
         let context = || format!("{name}: cannot be read");
         let start = input.peek(LOOK_BYTES).with_context(context)?;
@@ -238,7 +238,7 @@ impl Recording {
         Ok(Self { format: format.format(), progress, name: name.to_owned(), system: None, reader })
     }
 
-    /// Until the end, or until `take` returns [`Stop`].
+    /// Reads until the end, or until `take` returns [`Stop`].
     pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
         let want = Want { system: self.system, ..want };
         let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());

@@ -55,7 +55,7 @@ pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
     Ok((kind, Cursor::new(window).chain(input)))
 }
 
-/// With the number of valid frames.
+/// The kind, with the number of valid frames.
 pub fn sniff_bytes(bytes: &[u8]) -> (Kind, usize) {
     let (votes, good) = count(bytes);
     let kind = match votes {

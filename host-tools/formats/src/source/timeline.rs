@@ -9,9 +9,9 @@
 
 use hums_core::clock::Instant;
 
-/// Beyond this it is a restart, not a reordering.
+/// Step back: beyond this it is a restart, not a reordering.
 pub const STEP_BACK_US_MAX: u64 = 1_000_000;
-/// Beyond this it is damage or a set clock; gaps of hours are real.
+/// Step forward: beyond this it is damage or a set clock; gaps of hours are real.
 pub const STEP_FORWARD_US_MAX: u64 = 24 * 3600 * 1_000_000;
 
 /// A time's result.

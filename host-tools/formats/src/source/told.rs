@@ -85,7 +85,7 @@ impl Finding {
     /// The words for a check that no longer applies.
     pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
 
-    /// After landing the check no longer applies: not known to be good.
+    /// Unjudged: after landing the check no longer applies, and is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
     }
@@ -124,7 +124,7 @@ impl Told {
         Some(Self::Missing { from, to, frames: u64::from(own.frames.unwrap_or(0)) })
     }
 
-    /// If of use here.
+    /// A record's report, if of use here.
     pub fn of(record: &Record<'_>) -> Option<Self> {
         match record {
             Record::Parameter(parameter) => {

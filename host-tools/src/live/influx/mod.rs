@@ -77,7 +77,7 @@ impl Influx {
         })
     }
 
-    /// Before a recording's first point.
+    /// All vehicles, before a recording's first point.
     pub fn know(&mut self, world: &World) {
         self.names.know(world);
     }

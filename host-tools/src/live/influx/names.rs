@@ -55,7 +55,7 @@ impl Names {
         Ok(Self { session, vehicles, tags, mark, waiting: Some(Waiting::default()) })
     }
 
-    /// Before a recording's first point.
+    /// All facts, before a recording's first point.
     pub fn know(&mut self, world: &World) {
         self.learn(world);
         self.waiting = None;
@@ -120,7 +120,7 @@ impl Names {
         None
     }
 
-    /// Once all vehicles are named, or their time is over.
+    /// Waiting points, once all vehicles are named, or their time is over.
     pub fn settle(&mut self, world: &World) -> Option<Batch> {
         let waiting = self.waiting.as_ref()?;
         let late = waiting.since.is_some_and(|since| since.elapsed() >= WAIT)

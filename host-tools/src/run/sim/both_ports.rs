@@ -39,7 +39,7 @@ pub struct Board<'a> {
     pub key: Option<[u8; 32]>,
 }
 
-/// With each change of level and its time.
+/// A result with each change of level and its time.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The figures.

@@ -51,7 +51,7 @@ pub struct Rig {
 
 #[derive(Debug, Default)]
 pub struct Found {
-    /// In the order of sessions.
+    /// Frame numbers in the order of sessions.
     pub frames: Vec<u32>,
     pub all_frames: u64,
     pub gaps: Vec<Gap>,
@@ -274,7 +274,7 @@ impl Rig {
         (found, lost)
     }
 
-    /// Without losses, and without violations on the bus.
+    /// Finishes without losses, and without violations on the bus.
     #[track_caller]
     pub fn finish_whole(self, medium: &Medium) -> Found {
         let slot = self.slot.clone();

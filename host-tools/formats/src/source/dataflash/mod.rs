@@ -63,7 +63,7 @@ pub fn begins(start: &[u8]) -> Option<Form> {
     }
 }
 
-/// By the first 64 KiB.
+/// The form of a log by the first 64 KiB.
 pub fn detect(start: &[u8]) -> Option<Form> {
     /// Type 128, 89 bytes.
     const FMT: &[u8] = &[0xa3, 0x95, FMT_TYPE];

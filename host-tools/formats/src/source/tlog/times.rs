@@ -145,7 +145,7 @@ impl Times {
         self.now
     }
 
-    /// Of a record at this byte.
+    /// The time of a record at this byte.
     pub fn take<R: Read>(&mut self, time_us: u64, bytes: &[u8], place: u64, after: &Records<R>) -> Told {
         let told = self.time(time_us, place, after);
         if let Peek::Frame(frame) = peek(bytes)

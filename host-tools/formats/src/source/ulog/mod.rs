@@ -39,7 +39,7 @@ use super::input::Input;
 use super::item::{Reader, Summary, Take, Want};
 use window::Window;
 
-/// By the first bytes.
+/// Such a log by the first bytes.
 pub fn detect(start: &[u8]) -> bool {
     start.starts_with(&message::MAGIC)
 }

@@ -100,7 +100,7 @@ impl Craft {
     }
 }
 
-/// By number and `MAV_TYPE` (`HEARTBEAT`).
+/// A mode by number and `MAV_TYPE` (`HEARTBEAT`).
 pub fn mode_name(vehicle: u8, number: u32) -> Option<&'static str> {
     let craft = match vehicle {
         // Quadrotor, coaxial, helicopter, hexarotor, octorotor, tricopter, dodecarotor, decarotor.
