@@ -228,7 +228,6 @@ struct LogJson {
     end: EndJson,
     blocks: BlocksJson,
     checks: Vec<Check>,
-    /// Also where sectors were rebuilt.
     #[serde(skip)]
     verdict: Verdict,
 }
@@ -399,7 +398,7 @@ fn newer(log: &Overview) -> String {
     if log.needs_newer_program() { "some need a newer hums".to_owned() } else { String::new() }
 }
 
-/// In no log, so it does not count against it.
+/// Input in no log, so it does not count against it.
 fn came_damaged(contents: &Contents) -> Option<String> {
     let of = |what: Lost| contents.losses.get(what.name()).map(|loss| loss.count).filter(|count| *count > 0);
     let frames = of(Lost::DamagedFrames).map(|frames| count(frames, "damaged frame"));

@@ -354,7 +354,7 @@ fn data_of(path: &Path) -> Value {
     json(data.split_once("</script>").unwrap().0)
 }
 
-/// By an independent reader: the last values, or the first ones.
+/// Parameters by an independent reader: the last values, or the first ones.
 fn parameters(recording: &Path) -> BTreeMap<String, u32> {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
@@ -620,7 +620,7 @@ for (let text = walk.nextNode(); text; text = walk.nextNode()) {
 return worst;
 ";
 
-/// From a wide window too: drawn as wide as A4 within its margins, before the layout on paper.
+/// Plots from a wide window too: drawn as wide as A4 within its margins, before the layout on paper.
 #[track_caller]
 fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
     page.open(address, "light", 1920, 1000);

@@ -59,7 +59,7 @@ impl Shelf {
         self.0.join("card.img")
     }
 
-    /// Also its number of power-ons of this length; a shelf of another image is emptied.
+    /// The shelf, also its number of power-ons of this length; a shelf of another image is emptied.
     fn look(image: &str, minutes: u64) -> (Self, u64) {
         let shelf = Self(Path::new(env!("CARGO_TARGET_TMPDIR")).join("hours"));
         let done = fs::read_to_string(shelf.0.join("done.txt")).unwrap_or_default();

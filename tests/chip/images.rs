@@ -57,7 +57,6 @@ fn what_is_no_image_of_this_chip_is_refused() {
     assert!(matches!(Image::parse(&other), Err(Refused::Vectors(..))));
 }
 
-/// Also the place of `main`.
 fn with_main(code: &[u16]) -> (Vec<u8>, u32) {
     let [mut elf, ..] = files();
     let machine = Machine::new(Image::parse(&elf).unwrap(), Board::default());

@@ -11,7 +11,7 @@ use stm32f405_model::time::{SECOND, US};
 
 use super::bench;
 
-/// Behind an instruction to return to.
+/// Registers behind an instruction to return to.
 const REGISTERS: u32 = SRAM.0 + 0x100;
 const STACK: u32 = SRAM.0 + 0x1000;
 /// `bkpt`

@@ -194,7 +194,7 @@ fn supply(bench: &Bench) -> Outcome {
     told(&rig)
 }
 
-/// At full rate, and in the erase of a calm time.
+/// Cuts at full rate, and in the erase of a calm time.
 fn cuts(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 2 * SECOND;

@@ -141,7 +141,7 @@ impl Database {
         answer["results"][0]["series"].as_array().cloned().unwrap_or_default()
     }
 
-    /// At the end of a span or in each second of it (seconds since 1970).
+    /// Values at the end of a span or in each second of it (seconds since 1970).
     pub(crate) fn query(&self, expression: &str, [from_s, to_s]: [f64; 2], instant: bool) -> Vec<Value> {
         self.get("/internal/force_flush").unwrap();
         let (kind, span) = if instant {

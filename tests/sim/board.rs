@@ -38,7 +38,7 @@ impl Board {
         Self { dir: Some(dir), child, port }
     }
 
-    /// In order, as by Ctrl-C; returns the lines of its log.
+    /// Ends it as by Ctrl-C; returns the lines of its log.
     pub(crate) fn end(self) -> String {
         let dir = self.switch_off();
         let image = dir.path().join("card.img");

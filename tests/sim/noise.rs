@@ -107,7 +107,6 @@ fn each_frame_that_the_programs_own_noise_leaves_whole_survives() {
     Clean::read(FLIGHT).assert_whole_frames_survive(&fs::read(&tap).unwrap(), &recording);
 }
 
-/// By chance, within five standard deviations.
 #[test]
 fn the_noise_flag_damages_as_much_as_it_says_and_all_of_it_is_counted() {
     let path = own("px4_hil_quad_low.tlog");

@@ -294,7 +294,6 @@ fn without_checksums(board: u16) -> u16 {
     port
 }
 
-/// Only if it has this value.
 fn exchange(datagram: &mut [u8], place: usize, from: u8, to: u8) {
     const ID: [u8; 3] = [110, 0, 0];
     const SEED: u8 = 84;

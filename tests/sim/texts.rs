@@ -14,7 +14,6 @@ use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own, root};
 use rayon::prelude::*;
 
-/// Within this time of its first one.
 const EVENT_S: f64 = 10.0;
 const TEXTS_MAX: usize = 3;
 /// Three that are not critical, and the critical ones: in the worst flight vibration and the autopilot's failsafe.
@@ -31,7 +30,7 @@ struct Said {
     text: String,
 }
 
-/// Also the times of critical checks.
+/// Texts, and the times of critical checks.
 fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let dir = tempfile::tempdir().unwrap();
     let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();

@@ -60,7 +60,7 @@ pub(crate) struct Load {
     pub(crate) reason: String,
 }
 
-/// Of a folder (`cargo xtask test --only lines`).
+/// Limits of a folder (`cargo xtask test --only lines`).
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Lines {
@@ -140,7 +140,6 @@ pub(crate) fn check(boards: &[&Board], write: bool) -> Result<()> {
     Ok(())
 }
 
-/// And the table.
 fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
     let path = repo::root().join(FILE);
     let mut section = String::new();
@@ -166,7 +165,6 @@ fn write_taken(used: &BTreeMap<&str, u64>) -> Result<()> {
     Ok(())
 }
 
-/// Before, the table, after.
 fn around_table(text: &str) -> Result<[&str; 3]> {
     let place = |mark: &str| text.find(mark).with_context(|| format!("{TABLE_FILE} has no {mark}"));
     let (from, to) = (place(TABLE[0])? + TABLE[0].len(), place(TABLE[1])?);

@@ -14,7 +14,7 @@ use crate::setup::{self, Need};
 
 /// PX4: compresses the least.
 const FLIGHT: &str = "tests/flights/px4_hil_quad_low.tlog";
-/// In the budgets; others only count in total.
+/// Stages in the budgets; others only count in total.
 const STAGES: [(&str, &str); 5] = [
     ("framer", "framer"),
     ("encode", "encode"),
@@ -29,7 +29,6 @@ pub(crate) fn check() -> Result<()> {
     check_built(&hums::build()?, &image)
 }
 
-/// With built programs.
 pub(crate) fn check_built(program: &Path, image: &Path) -> Result<()> {
     let budgets = Budgets::read()?;
     let report = record_at_full_rate(program, image, &repo::root().join(FLIGHT))?;

@@ -16,7 +16,7 @@ use crate::shell::Shell;
 /// Vibration, lost satellites, jammed GPS, a sagging battery.
 const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
 
-/// With the demo's other output 25 lines.
+/// Lines of the verdict: with the demo's other output 25 lines.
 const VERDICT_LINES_MAX: usize = 12;
 
 /// All done, with losses.
@@ -36,7 +36,7 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// As typed in the user's folder; commands run at the root.
+    /// The path as typed in the user's folder; commands run at the root.
     fn flight(&self) -> Result<PathBuf> {
         let own = || Ok(repo::root().join(FLIGHT));
         self.flight.as_ref().map_or_else(own, |path| Ok(std::path::absolute(path)?))
@@ -74,7 +74,6 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     fly(options, image.as_deref(), start.elapsed())
 }
 
-/// By the firmware in `image`, or on this PC.
 fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
     let folder = repo::target().join("demo");
     if folder.exists() {

@@ -194,7 +194,6 @@ impl Release {
 /// Faults of `docs/usage.md`.
 const FAULTY: &str = "tests/flights/ap_quad_faults.tlog";
 
-/// By `check --json`.
 fn check_findings(program: impl Fn(&Path) -> Shell, tree: &Path) -> Result<()> {
     const FINDINGS: [&str; 3] = ["cell_voltage", "autopilot_state", "batt_state"];
     let (json, code) = program(&tree.join(FAULTY)).output_and_code()?;
@@ -215,7 +214,6 @@ fn lint_for(target: &str) -> Result<()> {
     Shell::cargo().arg("clippy").args(choice).args(["--", "-D", "warnings"]).run()
 }
 
-/// As the program makes them.
 fn for_shells(program: &Path) -> Result<Vec<File>> {
     let made = |name: &str, arguments: &[&str]| -> Result<File> {
         Ok((name.to_owned(), Shell::new(program).args(arguments).output()?.into_bytes()))
@@ -293,7 +291,6 @@ fn write_all(folder: &Path, files: &[File]) -> Result<()> {
     Ok(())
 }
 
-/// For `sha256sum --check`.
 pub(crate) fn sums(files: &[File]) -> String {
     files.iter().fold(String::new(), |mut text, (name, data)| {
         for byte in Sha256::digest(data) {

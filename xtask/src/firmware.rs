@@ -21,17 +21,14 @@ pub(crate) fn default_board() -> &'static Board {
     hums_boards::find(hums_boards::DEFAULT).expect("the default board has a file")
 }
 
-/// For any cargo command.
 pub(crate) fn target() -> String {
     format!("--target={FIRMWARE_TARGET}")
 }
 
-/// With package and profile, from the root.
 pub(crate) fn cargo_arguments() -> [String; 3] {
     ["--package=hums-app".into(), "--profile=firmware".into(), target()]
 }
 
-/// From [`build`], a file a board.
 pub(crate) fn image_of(board: &Board) -> PathBuf {
     repo::target().join("firmware").join(format!("hums-{}.elf", board.name))
 }
@@ -57,10 +54,8 @@ pub(crate) fn flags(tree: &Path) -> Result<OsString> {
     Ok(flags)
 }
 
-/// For the build script.
 pub(crate) const BOARD: &str = "HUMS_BOARD";
 
-/// With a release's flags.
 pub(crate) fn cargo(board: &Board) -> Result<Shell> {
     Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?).env(BOARD, &board.name))
 }
@@ -71,12 +66,11 @@ fn compile(board: &Board, further: &[&str]) -> Result<PathBuf> {
     Ok(repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))
 }
 
-/// For a debug probe; returns the ELF file.
 pub(crate) fn build_with_log(board: &Board) -> Result<PathBuf> {
     compile(board, &["--features=log"])
 }
 
-/// As a release; the other files are beside the ELF file.
+/// An image as a release; the other files are beside the ELF file.
 pub(crate) fn build(board: &Board) -> Result<PathBuf> {
     let built = compile(board, &[])?;
     let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;

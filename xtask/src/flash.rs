@@ -42,7 +42,6 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
     Shell::new(PROBE_RS.0).args(["reset", "--chip", CHIP]).run()
 }
 
-/// With the feature `log`, which it shows.
 pub(crate) fn attach(board: &Board) -> Result<()> {
     let elf = firmware::build_with_log(board)?;
     require(PROBE_RS)?;

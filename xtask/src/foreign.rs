@@ -39,10 +39,10 @@ const PACKAGES: [Package; 3] = [
     },
 ];
 
-/// In `examples/stm32f4/src/bin`, at the tag of [`EMBASSY_MANIFEST`].
+/// Programs in `examples/stm32f4/src/bin`, at the tag of [`EMBASSY_MANIFEST`].
 const EMBASSY: &[&str] = &["wdt", "flash", "usart_dma", "usart_buffered", "button_exti", "multiprio"];
 const EMBASSY_TAG: &str = "embassy-stm32-v0.6.0";
-/// Of that tag, for an STM32F405.
+/// Packages of that tag, for an STM32F405.
 const EMBASSY_MANIFEST: &str = include_str!("../../chip/stm32f405/examples/foreign/embassy.toml");
 const EMBASSY_BUILD: &str = r#"fn main() {
     ["--nmagic", "-Tlink.x", "-Tdefmt.x"].map(|argument| println!("cargo:rustc-link-arg-bins={argument}"));
@@ -118,7 +118,6 @@ fn fetch(package: &Package) -> Result<PathBuf> {
     Ok(to)
 }
 
-/// As a workspace of its own.
 fn for_any_chip(manifest: &str) -> Result<String> {
     let mut manifest: toml::Table = manifest.parse()?;
     let examples = manifest.get_mut("example").and_then(toml::Value::as_array_mut);
@@ -143,7 +142,7 @@ fn embassys(sources: &Path) -> Result<PathBuf> {
     Ok(to)
 }
 
-/// In its own folder, for its linker settings.
+/// A package in its own folder, for its linker settings.
 fn build<'a>(source: &Path, arguments: impl IntoIterator<Item = &'a str>) -> Result<()> {
     // Foreign sources' warnings do not count.
     let silent = format!("target.{FIRMWARE_TARGET}.rustflags=[\"-Awarnings\", \"--cap-lints=warn\"]");

@@ -36,7 +36,6 @@ pub(crate) fn run(seconds: u32) -> Result<()> {
     Ok(())
 }
 
-/// In order.
 fn targets(corpus: &Path) -> Result<Vec<String>> {
     let context = || format!("{}: cannot be read", corpus.display());
     let entries = fs::read_dir(corpus).with_context(context)?;

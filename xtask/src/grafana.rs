@@ -9,7 +9,7 @@ use crate::repo;
 #[path = "../../host-tools/grafana/resolve.rs"]
 mod resolve;
 
-/// Beside the data sources, for `compose.yaml`.
+/// Dashboards beside the data sources, for `compose.yaml`.
 pub(crate) fn write() -> Result<()> {
     let folder = repo::root().join("host-tools/grafana");
     for name in ["flight.json", "health.json"] {

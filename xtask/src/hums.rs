@@ -18,7 +18,6 @@ pub(crate) fn program() -> PathBuf {
     repo::target().join("debug/hums")
 }
 
-/// For measurements; returns the path.
 pub(crate) fn build_release() -> Result<PathBuf> {
     Shell::cargo().args(["build", "--release", "--package=hums"]).run()?;
     Ok(repo::target().join("release/hums"))

@@ -7,17 +7,15 @@ use object::Endianness;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 
-/// Never touched by programming (`firmware/app/src/boards/stm32f4/flash.rs`).
+/// Sectors never touched by programming (`firmware/app/src/boards/stm32f4/flash.rs`).
 pub(crate) const STORE: std::ops::Range<u32> = 0x0800_4000..0x0800_C000;
 
-/// In a row.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
     pub(crate) address: u32,
     pub(crate) bytes: Vec<u8>,
 }
 
-/// In order; an error over the store.
 pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
     let header = FileHeader32::<Endianness>::parse(elf).context("no ELF file")?;
     let endian = header.endian()?;

@@ -160,7 +160,7 @@ impl Command {
     }
 }
 
-/// And the README's table: from its head to the next empty line.
+/// The page, and the README's table: from its head to the next empty line.
 fn write_boards() -> Result<()> {
     let table = hums_boards::page::table("docs/boards.md");
     let path = repo::root().join("README.md");

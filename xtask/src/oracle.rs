@@ -66,7 +66,7 @@ pub(crate) fn prepare() -> Result<()> {
     Ok(())
 }
 
-/// In the `mavlink` crate of `Cargo.lock`.
+/// Definitions in the `mavlink` crate of `Cargo.lock`.
 fn definitions() -> Result<PathBuf> {
     let metadata = MetadataCommand::new().current_dir(repo::root()).exec()?;
     let package = metadata.packages.iter().find(|package| package.name.as_str() == "mavlink");

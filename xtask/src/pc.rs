@@ -88,7 +88,6 @@ fn programs() -> Result<&'static [TestProgram]> {
     PROGRAMS.get().map(Vec::as_slice).context("the tests are not built")
 }
 
-/// Without the end-to-end ones.
 pub(crate) fn unit_tests() -> Result<()> {
     for program in programs()?.iter().filter(|one| !(one.is_integration && one.package == END_TO_END)) {
         run(program, &[])?;

@@ -18,7 +18,7 @@ pub(crate) fn target() -> PathBuf {
     chosen.map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
-/// As typed from the root.
+/// A path as typed from the root.
 pub(crate) fn shown(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).display().to_string()
 }

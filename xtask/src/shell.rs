@@ -59,7 +59,6 @@ impl Shell {
         &self.shown
     }
 
-    /// Without stdout.
     pub(crate) fn quiet(mut self) -> Self {
         self.command.stdout(Stdio::null());
         self

@@ -63,7 +63,6 @@ impl Core {
         self.write_aligned(bus, address, size, value)
     }
 
-    /// Of a pair, of several, or exclusive.
     #[inline(always)]
     pub(crate) fn read_strict<B: Bus>(&mut self, bus: &mut B, address: u32, size: Size) -> Result<u32, Trap> {
         if address & (size.bytes() - 1) != 0 {
@@ -278,7 +277,7 @@ pub(crate) fn own(address: u32) -> bool {
     address >> 20 == 0xE00 && address >> 12 != 0xE_0042
 }
 
-/// By a byte, halfword or word that holds the bit.
+/// A bit-band access by a byte, halfword or word that holds the bit.
 fn align_bit(at: u32, bit: Option<u32>, size: Size) -> (u32, Option<u32>) {
     let low = at & (size.bytes() - 1);
     (at - low, bit.map(|bit| bit + 8 * low))

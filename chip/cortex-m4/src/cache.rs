@@ -15,7 +15,7 @@ pub(crate) struct Entry {
     pub(crate) op: Op,
     /// 2 or 4 bytes.
     pub(crate) bytes: u8,
-    /// Without wait states: see [`crate::timing`].
+    /// Cycles without wait states: see [`crate::timing`].
     pub(crate) cycles: u8,
     pub(crate) writes: u8,
 }
@@ -64,7 +64,7 @@ impl Cache {
         }
     }
 
-    /// Also an instruction that reaches into them from the page before.
+    /// Pages of these bytes, also an instruction that reaches into them from the page before.
     pub(crate) fn forget(&mut self, address: u32, bytes: u32) {
         let first = address >> PAGE_BITS;
         let last = address.saturating_add(bytes.max(1) - 1) >> PAGE_BITS;

@@ -9,7 +9,7 @@ use crate::processor::{Core, slow_regions};
 use crate::registers::FPDSCR;
 use crate::trap::Trap;
 
-/// From `0xE000_ED40` on.
+/// Identification registers from `0xE000_ED40` on.
 const FEATURES: [u32; 13] = [
     0x0000_0030,
     0x0000_0200,

@@ -6,7 +6,7 @@ struct Level {
     exception: u16,
     /// The stack pointer before its frame.
     begin: u32,
-    /// Of the interrupted code until then.
+    /// Stack of the interrupted code until then.
     interrupted: u32,
 }
 

@@ -178,7 +178,6 @@ impl Exceptions {
         grouped.min().unwrap_or(THREAD)
     }
 
-    /// By priority, then number.
     pub(crate) fn first(&self) -> Option<u16> {
         let ready = self.pending.and(&self.enabled);
         if ready.is_empty() {

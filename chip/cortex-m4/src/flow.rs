@@ -113,7 +113,7 @@ impl Core {
         self.interrupt(bus, HARD_FAULT);
     }
 
-    /// Of an exception's own stacking: becomes pending, chosen with the vector.
+    /// A fault of an exception's own stacking: becomes pending, chosen with the vector.
     fn derived(&mut self, number: u16, bits: u32) {
         self.control.cfsr |= bits;
         let fits = self.exceptions.enabled.has(number)
@@ -323,7 +323,7 @@ impl Core {
         }
     }
 
-    /// From the stack that the return names.
+    /// Registers from the stack that the return names.
     fn unstack<B: Bus>(&mut self, bus: &mut B, value: u32) {
         let to_thread = value & 8 != 0;
         let to_process = value & 4 != 0 && to_thread;

@@ -22,7 +22,7 @@ impl Mpu {
         self.control & 1 != 0
     }
 
-    /// From `0xE000_ED90`; `None` for other offsets.
+    /// A register from `0xE000_ED90`; `None` for other offsets.
     pub(crate) fn read(&self, offset: u32) -> Option<u32> {
         let region = self.regions[usize::from(self.number)];
         match offset {

@@ -46,7 +46,7 @@ pub struct Core {
     /// The address after the executed instruction.
     pub(crate) next: u32,
     pub(crate) flags: Flags,
-    /// Of the next instruction, and of the executed one.
+    /// `ITSTATE` of the next instruction, and of the executed one.
     pub(crate) it: u8,
     pub(crate) it_now: u8,
     /// EPSR.T: cleared, every instruction is a fault.
@@ -89,7 +89,7 @@ pub struct Core {
     pub(crate) control: Control,
     pub(crate) systick: SysTick,
     pub(crate) mpu: Mpu,
-    /// By an address's top byte: needs more than the bus.
+    /// Slow accesses by an address's top byte: they need more than the bus.
     pub(crate) slow: [bool; 256],
     pub(crate) cache: Cache,
     trace: [u32; TRACED],
@@ -363,7 +363,7 @@ impl Core {
     }
 }
 
-/// By sixteenths of a gibibyte: the processor's own, or bit-band aliases; with the MPU on all.
+/// Slow regions by sixteenths of a gibibyte: the processor's own, or bit-band aliases; with the MPU on all.
 pub(crate) fn slow_regions(mpu: bool) -> [bool; 256] {
     let mut slow = [mpu; 256];
     for top in [0x22, 0x23, 0x42, 0x43, 0xE0] {

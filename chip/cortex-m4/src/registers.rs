@@ -42,7 +42,6 @@ pub(crate) const LSPACT: u32 = 1;
 /// Implemented bits.
 pub(crate) const FPSCR: u32 = 0xF7C0_009F;
 
-/// Also FPSCR's that come from it.
 pub(crate) const FPDSCR: u32 = 0x07C0_0000;
 
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +60,7 @@ pub(crate) struct Control {
     pub(crate) fpdscr: u32,
     pub(crate) demcr: u32,
     pub(crate) dwt: u32,
-    /// From cycles to CYCCNT while it counts; else its value.
+    /// Offset from cycles to CYCCNT while it counts; else its value.
     pub(crate) cyccnt: u32,
 }
 

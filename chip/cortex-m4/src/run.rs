@@ -73,7 +73,6 @@ impl Core {
         holds
     }
 
-    /// With the MPU on, nothing is kept.
     #[cold]
     #[inline(never)]
     fn decode<B: Bus>(&mut self, bus: &mut B, tag: u32) -> Result<Entry, Trap> {
@@ -153,7 +152,7 @@ impl Core {
         (self.exceptions.grouped(self.exceptions.priority(number)) < priority).then_some(number)
     }
 
-    /// Of the active exceptions, raised by the masks.
+    /// Priority of the active exceptions, raised by the masks.
     pub(crate) fn priority(&self) -> i16 {
         let exceptions = &self.exceptions;
         let mut boosted = THREAD;
@@ -169,7 +168,7 @@ impl Core {
         boosted.min(exceptions.active_priority())
     }
 
-    /// Without an exception taken: PRIMASK does not keep WFI asleep.
+    /// Woken without an exception taken: PRIMASK does not keep WFI asleep.
     fn woken(&mut self) -> bool {
         match self.sleeping {
             Some(Sleep::Event) => core::mem::take(&mut self.event),

@@ -108,7 +108,7 @@ fn invalid(status: &mut u32) -> u32 {
     DEFAULT_NAN
 }
 
-/// With a sticky lowest bit.
+/// Shift with a sticky lowest bit.
 fn jam(value: u128, by: u32) -> u128 {
     match by {
         0 => value,
@@ -198,7 +198,7 @@ fn round_to(
     sign_bit | biased << format.fraction_bits | kept & ((1 << format.fraction_bits) - 1)
 }
 
-/// Not zero; an exact zero is positive unless rounding is downward.
+/// Sum that is not zero; an exact zero is positive unless rounding is downward.
 fn sum(a: (bool, u128, i32), b: (bool, u128, i32), status: &mut u32) -> u32 {
     let (mut a, mut b) = (a, b);
     if a.2 < b.2 {

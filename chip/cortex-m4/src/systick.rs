@@ -8,7 +8,7 @@ pub(crate) struct SysTick {
     interrupts: bool,
     processor_clock: bool,
     reload: u32,
-    /// At `since`, while enabled.
+    /// The value at `since`, while enabled.
     value: u32,
     /// Last change by software, cycles.
     since: u64,
@@ -47,7 +47,6 @@ impl SysTick {
         (first, period)
     }
 
-    /// Since the last change by software.
     fn zeros(&self, now: u64) -> u64 {
         let (first, period) = self.course();
         let ticks = self.ticks(now);

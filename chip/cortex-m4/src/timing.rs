@@ -22,9 +22,9 @@ use crate::op::{Float2, Float3, Op};
 pub(crate) const REFILL_NEAR: u64 = 2;
 /// Target in a register or memory.
 pub(crate) const REFILL_FAR: u64 = 3;
-/// To the handler's first instruction.
+/// From the interrupt to the handler's first instruction.
 pub(crate) const ENTRY: u64 = 12;
-/// To the interrupted code.
+/// From the return to the interrupted code.
 pub(crate) const RETURN: u64 = 10;
 /// From one handler to the next without unstacking.
 pub(crate) const TAIL_CHAIN: u64 = 6;

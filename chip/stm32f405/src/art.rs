@@ -30,7 +30,7 @@ struct Lines<const N: usize> {
     kept: [u32; N],
     /// Place plus one; 0 outside the cache.
     place_of: Box<[u8]>,
-    /// In order of use: the place before, and behind.
+    /// Places in order of use: the place before, and behind.
     ring: [(u8, u8); N],
     /// Used last; behind it the first to go.
     newest: u8,
@@ -101,7 +101,7 @@ pub struct Art {
     held: [[u8; LINE as usize]; DATA_LINES],
     /// Read last by the instruction bus.
     line: u32,
-    /// And when it is there.
+    /// The line, and when it is there.
     ahead: (u32, u64),
     /// Until when the flash is busy with a read.
     busy: u64,

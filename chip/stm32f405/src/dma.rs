@@ -17,7 +17,6 @@ const MINC: u32 = 1 << 10;
 const PFCTRL: u32 = 1 << 5;
 const DBM: u32 = 1 << 18;
 const CT: u32 = 1 << 19;
-/// In `LISR` and `HISR`.
 const TEIF: u32 = 1 << 3;
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
@@ -327,7 +326,7 @@ impl Dma {
 mod tests {
     use super::*;
 
-    /// From `0x2000_0000` on; a counting register at `0x4000_0004`.
+    /// Memory from `0x2000_0000` on; a counting register at `0x4000_0004`.
     struct Board {
         memory: [u8; 64],
         device: u8,

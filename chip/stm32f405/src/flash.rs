@@ -27,12 +27,12 @@ const LOCK: u32 = 1 << 31;
 /// `OPTCR` as delivered: nothing protected.
 const OPTCR: u32 = 0x0FFF_AAED;
 
-/// By x8, x16 and x32 (x64 with its own supply), ms: typical and longest; DS8626, table 40.
+/// Erase by x8, x16 and x32 (x64 with its own supply), ms: typical and longest; DS8626, table 40.
 const ERASE_16K: [(u64, u64); 4] = [(400, 800), (300, 600), (250, 500), (230, 460)];
 const ERASE_64K: [(u64, u64); 4] = [(1_200, 2_400), (700, 1_400), (550, 1_100), (490, 980)];
 const ERASE_128K: [(u64, u64); 4] = [(2_000, 4_000), (1_300, 2_600), (1_000, 2_000), (875, 1_750)];
 const ERASE_ALL: [(u64, u64); 4] = [(16_000, 32_000), (11_000, 22_000), (8_000, 16_000), (6_900, 13_800)];
-/// Of a word: typical and longest.
+/// Programming of a word: typical and longest.
 const PROGRAM: (Ps, Ps) = (16 * US, 100 * US);
 
 /// How fast.

@@ -15,7 +15,7 @@ pub enum Refused {
     OtherProcessor,
     /// Address, bytes.
     Outside(u32, u32),
-    /// Not this chip's: initial stack pointer, reset vector.
+    /// Vectors not this chip's: initial stack pointer, reset vector.
     Vectors(u32, u32),
     /// Nothing is in it.
     Empty,

@@ -17,7 +17,7 @@ use crate::report::Report;
 use crate::spi::Wire;
 use crate::time::{MS, Now, Ps, US};
 
-/// After power (DS8626, table 20: 0.5 to 3 ms).
+/// The chip's wait after power (DS8626, table 20: 0.5 to 3 ms).
 const START: Ps = 1_500_000_000;
 
 /// Parts of a board.

@@ -1,7 +1,7 @@
 //! Power control (RM0090, chapter 5): voltage detector, backup lock, regulator's scale, and the supply's reset. Not
 //! modelled: stop and standby (see `Machine`), the wake-up pin, BOR levels.
 
-/// Of the detector, mV, rising and falling, typical (DS8626, table 20).
+/// Levels of the detector, mV, rising and falling, typical (DS8626, table 20).
 const LEVELS: [(u32, u32); 8] = [
     (2_140, 2_040),
     (2_300, 2_190),

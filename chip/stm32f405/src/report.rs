@@ -20,7 +20,7 @@ impl fmt::Display for Trouble {
     }
 }
 
-/// In words (DDI 0403E, B3.2.15 and B3.2.16).
+/// A fault in words (DDI 0403E, B3.2.15 and B3.2.16).
 pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
     let causes = [
         (cfsr & (1 | 1 << 8), format!("an instruction is wanted from {at:#010x}, where none may be")),

@@ -66,7 +66,7 @@ pub struct Spi {
     overrun_read: bool,
     modf: bool,
     to_send: Option<u16>,
-    /// And its last clock.
+    /// The word, and its last clock.
     sending: Option<(u16, u64)>,
     /// Processor cycles of a clock of the bus APB.
     bus_cycles: u64,

@@ -36,7 +36,7 @@ pub struct Tim {
     arr_now: u32,
     max: u32,
     channels: u32,
-    /// Since the counter's value, at this cycle.
+    /// Ticks since the counter's value, at this cycle.
     ticks: u64,
     at: u64,
     /// Processor cycles of a clock of the timer's.
@@ -87,7 +87,6 @@ impl Tim {
         self.cr1 & CEN != 0
     }
 
-    /// At least one.
     fn steps_to(&self, value: u32) -> Option<u64> {
         let period = u64::from(self.arr_now) + 1;
         let (from, to) = (u64::from(self.cnt), u64::from(value));

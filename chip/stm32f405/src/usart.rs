@@ -71,11 +71,9 @@ pub struct Usart {
     to_send: Option<u8>,
     /// The character on its way out, and its end.
     sending: Option<(u8, Ps)>,
-    /// For the next start bit.
     free: Ps,
     /// Start bit, and when the character is there.
     incoming: Option<(Ps, Ps)>,
-    /// After a character.
     idle_at: Ps,
     /// The next read of DR clears errors.
     sr_was_read: bool,

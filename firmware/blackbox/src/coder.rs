@@ -179,7 +179,7 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-/// With its user's extra memory.
+/// The reading end with its user's extra memory.
 pub(crate) struct Reading<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],

@@ -40,7 +40,7 @@ type Gains = [u32; SYMBOLS / 2];
 /// Gains by speed (from 1 on) and symbol.
 static GAINS: [[Gains; SYMBOLS]; SPEED_LAST as usize] = gains();
 
-/// Of the places above the symbol, beside every place's gain.
+/// Gain of the places above the symbol, beside every place's gain.
 const fn reach(speed: u32) -> u16 {
     (u16::MAX >> speed) - SYMBOLS as u16
 }

@@ -18,7 +18,7 @@ pub enum Entry<'a> {
     Frame {
         /// When, on the monitor's clock; whole milliseconds.
         at: Instant,
-        /// From magic byte to checksum or signature.
+        /// The frame, from magic byte to checksum or signature.
         bytes: &'a [u8],
         /// The checksum matches the monitor's definition.
         verified: bool,
@@ -41,7 +41,7 @@ pub enum Outline<'a> {
         at: Instant,
         /// Its message id.
         id: u32,
-        /// From magic byte to checksum or signature.
+        /// The length, from magic byte to checksum or signature.
         bytes: usize,
         /// The checksum matches the monitor's definition.
         verified: bool,

@@ -56,7 +56,6 @@ pub(crate) enum Layout {
 }
 
 impl Layouts {
-    /// If this build has it.
     pub(crate) fn by_hash(hash: u32) -> Option<Self> {
         if hash == CURRENT {
             return Some(Self::Current);

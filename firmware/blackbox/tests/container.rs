@@ -425,7 +425,7 @@ proptest! {
     }
 }
 
-/// In three groups, with their sectors; `change` comes before the writer.
+/// Heartbeats in three groups, with their sectors; `change` comes before the writer.
 fn three_groups(change: impl Fn(usize, &mut Vec<u8>)) -> (Vec<Sector>, Vec<Frame>) {
     let (mut writer, mut queue, mut frames) = (Box::new(Writer::new()), queue(), Vec::new());
     for index in 0..1_500_u64 {
@@ -445,7 +445,7 @@ fn three_groups(change: impl Fn(usize, &mut Vec<u8>)) -> (Vec<Sector>, Vec<Frame
     (queue.sectors, frames)
 }
 
-/// Never sent, and the most that a sector completes.
+/// Frames never sent, and the most that a sector completes.
 fn strangers(log: &Log, frames: &[Frame], sectors: &[Sector]) -> (usize, usize) {
     let most = sectors.iter().map(|sector| usize::from(sector.frames())).max().unwrap_or(0);
     let came: HashSet<&Frame> = frames.iter().collect();

@@ -36,7 +36,7 @@ fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     card.0.iter().flat_map(|sector| *sector.bytes()).collect()
 }
 
-/// For the writer times only advance.
+/// Times only advance for the writer.
 fn reads_back(log: &[u8], batches: &[Vec<Entry>]) {
     let (mut expected, mut latest) = (batches.iter().flatten(), 0);
     let mut reader = Box::new(LogReader::new());

@@ -110,7 +110,7 @@ pub struct Frame<'a> {
     header: Header,
     bytes: &'a [u8],
     check: Check,
-    /// In the dialect's table, if the checksum is correct.
+    /// Index in the dialect's table, if the checksum is correct.
     message: Option<u16>,
 }
 

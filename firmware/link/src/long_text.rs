@@ -98,7 +98,6 @@ impl LongTexts {
     }
 }
 
-/// If no further part comes.
 fn complete(
     open: &mut Option<Open>,
     give: &mut impl FnMut(Source, Alert),

@@ -292,7 +292,7 @@ impl Outlet {
 mod tests {
     use super::*;
 
-    /// By each frame's beginning and end.
+    /// Budget by each frame's beginning and end.
     fn assert_budget(sent: &[(u64, usize)], budget: u32, baud: u32) {
         let mut free_us = 0;
         let mut spans = Vec::new();

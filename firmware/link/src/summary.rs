@@ -358,7 +358,7 @@ enum Told {
 /// The overall level, on the scale of [`Told::Level`]: every other value, before each of [`VALUES_TOLD`].
 const OVERALL: &str = "HUMS_LEVEL";
 
-/// With a ground station's names.
+/// Values with a ground station's names.
 const VALUES_TOLD: [(&str, Told); 17] = [
     ("L_POWER", Told::Level(Subsystem::Power)),
     ("L_PROPULS", Told::Level(Subsystem::Propulsion)),

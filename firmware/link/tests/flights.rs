@@ -22,7 +22,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// At least a warning: second, check, level.
+    /// Findings of at least a warning: second, check, level.
     fn alarms(&self) -> Vec<(f64, &'static str, Level)> {
         let bad = |finding: &&Finding| matches!(finding.level, Level::Warning | Level::Critical);
         let entry = |finding: &Finding| (finding.at.as_millis() as f64 / 1e3, finding.check, finding.level);
@@ -30,7 +30,7 @@ impl Outcome {
     }
 }
 
-/// At its own times, with a tick every 50 ms.
+/// A recording at its own times, with a tick every 50 ms.
 fn watch(recording: &Recording) -> Outcome {
     let mut framer = Framer::new();
     let mut sequences = Sequences::new();

@@ -6,7 +6,7 @@ use common::{Random, crc32, excerpt, flight};
 use hums_link::{Check, Frame, Framer};
 use std::collections::HashSet;
 
-/// In pieces of `piece` bytes; then the line ends.
+/// Frames in pieces of `piece` bytes; then the line ends.
 fn frames_in_pieces(bytes: &[u8], piece: usize) -> (Vec<(Vec<u8>, Check)>, Framer) {
     let mut framer = Framer::new();
     let mut frames = Vec::new();

@@ -72,7 +72,6 @@ fn params(settings: &[(usize, f32)]) -> Params {
     params
 }
 
-/// As the firmware takes it after each tick.
 fn look(monitor: &mut Monitor, now: Instant) {
     let sane = |counter: u8, value: f64| {
         // A figure may be negative: a motor slower than the others.

@@ -74,7 +74,7 @@ impl<'a> Journal<'a> {
         self.losses.count(since, now, what, count);
     }
 
-    /// Whose window is over, or, at the end, all.
+    /// Losses whose window is over, or, at the end, all.
     #[inline(never)]
     pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;
@@ -98,7 +98,7 @@ impl<'a> Journal<'a> {
         self.writer
     }
 
-    /// If the queue has room and the sector a new entry.
+    /// A copy, if the queue has room and the sector a new entry.
     #[inline(never)]
     pub(crate) fn partial(&mut self, sectors: &mut SectorsIn) {
         let mut copy = Sector::zeroed();
@@ -116,7 +116,7 @@ pub(crate) struct Logbook<'a> {
     pub(crate) cause: ResetCause,
 }
 
-/// By the vehicle's heartbeats since this start.
+/// Arming by the vehicle's heartbeats since this start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Arming {
     /// No heartbeat within the last 3 s, and none before with armed.

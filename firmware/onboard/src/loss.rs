@@ -3,7 +3,7 @@
 use hums_blackbox::record::{Loss, Lost};
 use hums_core::clock::{Instant, Span};
 
-/// Of one kind, in one record.
+/// Losses of one kind, in one record.
 const WINDOW: Span = Span::from_secs(1);
 
 /// Possible in the pipeline.

@@ -28,7 +28,7 @@ pub(crate) enum Notice {
     Text(u8, &'static str),
     Protection(Step),
     Mishap(Report),
-    /// With the cause, and the task if known.
+    /// A restart with the cause, and the task if known.
     Restarted(&'static str, Option<&'static str>),
 }
 
@@ -40,7 +40,7 @@ impl Notices {
         Self(heapless::Vec::new())
     }
 
-    /// If the queue is full, only the record has it.
+    /// A text; if the queue is full, only the record has it.
     pub(crate) fn push(&mut self, notice: Notice) {
         let _ = self.0.push(notice);
     }
@@ -60,7 +60,7 @@ impl Notices {
         }
     }
 
-    /// Of the protective action or a mishap, before all others.
+    /// A text of the protective action or a mishap, before all others.
     pub(crate) fn announce(&mut self, notice: Notice) {
         let Self(notices) = self;
         let is_text = |notice: &Notice| !matches!(notice, Notice::Protection(_) | Notice::Mishap(_));

@@ -20,7 +20,6 @@ fn texts(folder: &Path, found: &mut Vec<String>) {
     }
 }
 
-/// Without our name.
 fn all_texts() -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut found = Vec::new();

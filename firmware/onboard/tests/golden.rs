@@ -125,7 +125,6 @@ fn frames(tlog: &[u8]) -> Vec<(u64, &[u8])> {
     frames
 }
 
-/// By its header.
 fn frame_length(bytes: &[u8]) -> Option<usize> {
     match bytes {
         [0xFE, length, ..] => Some(8 + usize::from(*length)),

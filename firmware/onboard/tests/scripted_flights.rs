@@ -24,7 +24,6 @@ struct Outcome {
     findings: Vec<(f32, Finding)>,
     happenings: Vec<(f32, Happening)>,
     requests: Vec<(f32, Request)>,
-    /// With its time.
     monitor: Box<Monitor>,
     end: Instant,
 }
@@ -127,7 +126,6 @@ fn fly(name: &str) -> Outcome {
     Outcome { findings, happenings, requests, monitor, end: tick_at }
 }
 
-/// As the README says.
 fn is_right(name: &str, it: &Outcome) -> bool {
     match name {
         "d1_ok" | "d1_one" | "d1_all" => {

@@ -38,7 +38,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// By index, in this block of the card.
+    /// An entry by index, in this block of the card.
     pub(crate) const fn of(block: u32, index: u32) -> Self {
         Self { block, offset: (index % BLOCK_ENTRIES) as u16 * ENTRY_BYTES as u16 }
     }
@@ -181,7 +181,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// From this entry on; returns the entry after the last shown one.
+    /// Entries from this one on; returns the entry after the last shown one.
     #[inline(never)]
     fn walk(
         &self,

@@ -7,7 +7,7 @@ use crate::CardDevice;
 use crate::card::CardError;
 use crate::volume::{ENTRIES, Volume, entry};
 
-/// With the row used last.
+/// A chain with the row used last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ClusterChain {
     first: u32,
@@ -77,7 +77,7 @@ impl ClusterChain {
         Ok(true)
     }
 
-    /// After [`Self::locate`] found the end, the chain's last one.
+    /// The row's last cluster; after [`Self::locate`] found the end, the chain's last one.
     pub(crate) const fn last(&self) -> u32 {
         self.cluster + self.length - 1
     }

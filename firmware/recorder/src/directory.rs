@@ -79,7 +79,7 @@ pub(crate) struct Directory {
     /// Clusters that logs have. Each counts at most the clusters of the longest segment, since its entry may be
     /// wrong.
     pub(crate) clusters: u32,
-    /// Not hidden, and a sum over their names.
+    /// Logs not hidden, and a sum over their names.
     pub(crate) shown: u16,
     pub(crate) names: u32,
     /// First cluster and length of the file of parameters.

@@ -38,7 +38,6 @@ pub(crate) struct FreeSearch {
 }
 
 impl FreeSearch {
-    /// From the information sector's cluster on.
     pub(crate) fn new<D: CardDevice>(volume: &Volume<'_, D>) -> Self {
         let mut block = [[0; BLOCK_BYTES]];
         // An unreadable sector counts as an unsigned one.
@@ -180,7 +179,6 @@ pub(crate) fn chain_free<D: CardDevice>(
     Ok((next, last))
 }
 
-/// From its first one on.
 pub(crate) fn free_chain<D: CardDevice>(
     volume: &Volume<'_, D>,
     first: u32,

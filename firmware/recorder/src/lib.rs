@@ -64,10 +64,10 @@ pub trait CardDevice {
     /// Why an access failed.
     type Error: core::fmt::Debug;
 
-    /// In a row, from this one on.
+    /// Blocks in a row, from this one on.
     fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), Self::Error>;
 
-    /// In a row, from this one on.
+    /// Blocks in a row, from this one on.
     fn write(&self, blocks: &[Block], start: u32) -> Result<(), Self::Error>;
 
     /// How many blocks the card has.

@@ -9,13 +9,12 @@ use hums_core::clock::{Instant, Span};
 /// cannot be rebuilt without it.
 const EVERY: Span = Span::from_secs(10);
 
-/// In the blocks in which they are written.
+/// Sums in the blocks in which they are written.
 pub(crate) struct Parity {
     blocks: [Block; PARITY_SECTORS as usize],
     /// Sectors in each column so far, missing ones included.
     rows: [u8; COLUMNS],
     stretch: u32,
-    /// Since the sums were written.
     since: Option<Instant>,
 }
 
@@ -81,7 +80,6 @@ impl Parity {
         self.since.is_some()
     }
 
-    /// Without a full stretch.
     pub(crate) fn is_overdue(&self, now: Instant) -> bool {
         self.since.is_some_and(|since| now.since(since) >= EVERY)
     }

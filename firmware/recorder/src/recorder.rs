@@ -109,7 +109,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// At most once a second; opens a session on it.
+    /// A card at most once a second; opens a session on it.
     fn ready(&mut self, now: Instant) -> Result<(), NotYet> {
         self.begin_service();
         if !self.socket.is_mounted() {
@@ -262,7 +262,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.begin_service();
     }
 
-    /// With those that follow directly; returns their number.
+    /// The first sector with those that follow directly; returns their number.
     fn try_write(
         &mut self,
         now: Instant,

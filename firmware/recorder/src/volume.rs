@@ -41,7 +41,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         self.command(|device| device.write(blocks, at))
     }
 
-    /// Up to [`METADATA_TRIES`] times.
     pub(crate) fn write_metadata(&self, blocks: &[Block], at: u32) -> Result<(), CardError<D::Error>> {
         let mut written = self.write(blocks, at);
         for _ in 1..METADATA_TRIES {
@@ -66,7 +65,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         Ok(block)
     }
 
-    /// In each copy of the FAT.
     pub(crate) fn write_fat(&self, block: &[Block; 1], index: u32) -> Result<(), CardError<D::Error>> {
         let Layout { fat_start, fat_stride, fat_copies, .. } = self.layout;
         (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_stride + index))
@@ -103,7 +101,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
     }
 }
 
-/// From its block of the FAT.
 pub(crate) fn entry(block: &Block, cluster: u32) -> u32 {
     let at = (cluster % ENTRIES * 4) as usize;
     let entry = block.get(at..at + 4).and_then(|entry| entry.try_into().ok());

@@ -21,7 +21,6 @@ fn logs(card: &Card<'_, MemCard>) -> Vec<LogEntry> {
     logs
 }
 
-/// As many calls as the search takes.
 fn create(card: &mut Card<'_, MemCard>, name: LogName, bytes: u32) -> Result<(), CardError<Broken>> {
     loop {
         match card.create(name, bytes) {
@@ -484,7 +483,7 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
     card.read(&mut segment, last, &mut [0; BLOCK_BYTES]).expect("its chain ends with it");
 }
 
-/// Of 21 logs, before the last one's clusters.
+/// Deleted ones of 21 logs, before the last one's clusters.
 fn with_deleted(is_deleted: impl Fn(u32) -> bool) -> MemCard {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();

@@ -54,7 +54,6 @@ fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sect
     }
 }
 
-/// With few commands.
 fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
     let mut blocks: Vec<Block> = sectors.iter().map(|sector| *sector.bytes()).collect();
     let mut waiting = blocks.as_mut_slice();
@@ -554,7 +553,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     assert!(begun > 8 && fuller_copies > 0, "{begun} writes to begin files, {fuller_copies} fuller copies");
 }
 
-/// With copies of the sector in progress; returns the session.
+/// Files with copies of the sector in progress; returns the session.
 fn record_files(device: &MemCard) -> u32 {
     let status = leaked();
     let mut recorder = Recorder::new(device.clone(), status, held(), 99);
@@ -636,7 +635,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
 }
 
-/// At its next start; the card stays unchanged.
+/// The session at its next start; the card stays unchanged.
 fn found_at_next_start(device: &MemCard) -> Before {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();

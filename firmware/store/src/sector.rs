@@ -220,7 +220,6 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(None)
     }
 
-    /// Of its key.
     pub(crate) fn is_newest(&mut self, item: &Item) -> Result<bool, F::Error> {
         let mut at = item.end();
         while let Some(later) = self.next(at)? {

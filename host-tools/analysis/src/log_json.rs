@@ -161,7 +161,6 @@ struct FindingJson {
     time_utc: Option<String>,
     /// `null` if the input stopped.
     value: Option<f32>,
-    /// If not a quantity.
     state: Option<&'static str>,
     limit: Option<f32>,
     unit: String,
@@ -186,7 +185,6 @@ struct CrossingsJson {
     warning_s: f64,
     critical_s: f64,
     peak: Option<f32>,
-    /// If not a quantity.
     state: Option<&'static str>,
 }
 

@@ -35,7 +35,7 @@ pub struct Manifest {
 /// A file and its content.
 #[derive(Debug, Serialize)]
 struct FileJson {
-    /// Without folders above the named one.
+    /// Its name without folders above the named one.
     file: String,
     bytes: u64,
     sha256: String,
@@ -45,7 +45,7 @@ struct FileJson {
 #[derive(Debug, Serialize)]
 struct LogJson {
     name: String,
-    /// By its sectors, hexadecimal; `null` for other recordings.
+    /// Session by its sectors, hexadecimal; `null` for other recordings.
     session: Option<String>,
     /// `null` for other recordings.
     frames: Option<u64>,

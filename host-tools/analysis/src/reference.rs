@@ -243,7 +243,6 @@ impl Reference {
         Some(Scalar::Single(percent(remaining?.0)))
     }
 
-    /// If recent enough.
     fn esc(&self, now: time::Instant, motor: usize, at: fn(&Motor) -> Option<time::Instant>) -> Option<&Esc> {
         let motor = self.vehicle.motors.get(motor)?;
         at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)

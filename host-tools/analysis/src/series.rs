@@ -53,7 +53,7 @@ impl Extremes {
 /// One quantity.
 #[derive(Clone, Debug, Default)]
 struct Series {
-    /// By interval; slow quantities fill few.
+    /// Values by interval; slow quantities fill few.
     values: Vec<(u16, Extremes)>,
     /// Number of its last value.
     last: u64,

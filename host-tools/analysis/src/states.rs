@@ -12,7 +12,7 @@ const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
 pub enum Shown {
     /// `None` if unknown; number and limit are not for people.
     State(Option<&'static str>),
-    /// If known; limit if meaningful.
+    /// A quantity if known; limit if meaningful.
     Quantity(Option<f32>, Option<f32>),
 }
 
@@ -77,7 +77,7 @@ pub fn meaning(check: &str) -> &'static str {
     vocabulary(check).map_or("", |words| words.meaning)
 }
 
-/// By bit of `MAV_SYS_STATUS_SENSOR`; empty for the two that `sensors` ignores.
+/// Names by bit of `MAV_SYS_STATUS_SENSOR`; empty for the two that `sensors` ignores.
 const SENSORS: [&str; 32] = [
     "gyroscope",
     "accelerometer",

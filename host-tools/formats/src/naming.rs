@@ -156,7 +156,7 @@ pub fn is_made(path: &Path) -> bool {
 /// `decode` makes some of them.
 const RECORDINGS: [&str; 6] = ["hum", "tlog", "raw", "bin", "log", "ulg"];
 
-/// By its head: the table of a folder's pages has no session in its name.
+/// A report by its head: the table of a folder's pages has no session in its name.
 fn says_report(path: &Path) -> bool {
     head(path).windows(GENERATOR.len()).any(|part| part == GENERATOR)
 }

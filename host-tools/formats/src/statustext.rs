@@ -8,7 +8,7 @@ use hums_core::observation::Source;
 use crate::mavlink::ids::STATUSTEXT;
 use crate::mavlink::values::{Payload, Value};
 
-/// Without the next part a text ends.
+/// Wait for the next part, without which a text ends.
 const PATIENCE: Span = Span::from_secs(1);
 /// At a time. One more completes all.
 const SENDERS_MAX: usize = 64;

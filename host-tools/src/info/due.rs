@@ -59,7 +59,7 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
     Ok(outcome.and(if is_due { Outcome::Findings } else { Outcome::Done }))
 }
 
-/// By its unique id, else by the user's name, else by folder, kind and autopilot.
+/// The vehicle by its unique id, else by the user's name, else by folder, kind and autopilot.
 fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
     let known = log.contents.vehicle;
     if let Some(vehicle) = known.filter(|vehicle| vehicle.uid != 0) {
@@ -125,7 +125,7 @@ struct Vehicle {
 struct Part {
     line: ComponentLine,
     limit: Option<Limit>,
-    /// Of the first log that has it.
+    /// Figures of the first log that has it.
     first: (f64, f64, Option<u64>),
     last_us: Option<u64>,
     /// The logs have an earlier part in its place.
@@ -198,7 +198,7 @@ struct PartJson {
     unit: Option<&'static str>,
     /// How hours count: in the air, powered, turning.
     hours: Option<&'static str>,
-    /// At the present rate; `null` if unknown.
+    /// Flights left at the present rate; `null` if unknown.
     left_flights: Option<f64>,
     due_utc: Option<String>,
     /// The first log that has it; the part may be older if `since_known` is false.

@@ -88,7 +88,6 @@ struct LogJson {
     checks_all: Option<usize>,
     /// First received in the air.
     begins_in_air: bool,
-    /// In the air, as far as was looked at.
     ends_in_air: bool,
     /// Unrecorded time, in another program's recording.
     lossy: bool,
@@ -206,7 +205,7 @@ pub(super) fn flight_s(log: &Overview) -> Option<f64> {
     log.contents.usage.get(UsageCounter::Flight.name()).map(|all| (all - before).max(0.0))
 }
 
-/// Without space allocated on a card.
+/// Bytes without space allocated on a card.
 fn bytes(log: &Overview) -> u64 {
     if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
 }

@@ -17,7 +17,7 @@ use crate::part;
 /// A heartbeat may be missed this long.
 const SILENT: Span = Span::from_secs(5);
 
-/// Of a HUMS's findings on the radio.
+/// Prefix of a HUMS's findings on the radio.
 const OURS: &str = "HUMS: ";
 
 fn words(finding: &Finding) -> String {

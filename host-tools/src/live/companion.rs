@@ -19,7 +19,7 @@ const LEVELS_AGE_MAX: Span = Span::from_secs(60);
 #[derive(Clone, Debug, Default)]
 pub struct Companion {
     heard: Option<Instant>,
-    /// By a value that only HUMS sends.
+    /// Name by a value that only HUMS sends.
     named: bool,
     levels: Option<(Instant, [Level; Subsystem::ALL.len()])>,
     overall: Option<Level>,

@@ -35,7 +35,7 @@ const SETTLE: Span = Span::from_secs(5);
 const SILENT: Span = Span::from_secs(1);
 const ESC_SILENT: &str = "esc_silent";
 const HEARTBEAT: &str = "heartbeat";
-/// After the first heartbeat: flight is detected with a delay.
+/// Time after the first heartbeat: flight is detected with a delay.
 const JOINED: Span = Span::from_secs(5);
 /// Period of the limits' update.
 const LIMITS_EVERY: Span = Span::from_secs(1);
@@ -82,7 +82,7 @@ pub struct Craft {
     barometer: bool,
     /// Parts with known hours before this session.
     lives: [bool; COMPONENTS_MAX],
-    /// By usage: on the ground last, and before the last flight.
+    /// Seconds by usage: on the ground last, and before the last flight.
     grounded_s: f64,
     before_flight_s: f64,
 }

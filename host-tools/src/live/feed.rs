@@ -22,7 +22,7 @@ use crate::duplex::{self, Port};
 use crate::endpoint::Endpoint;
 use crate::interrupt;
 
-/// Of a read: the clock goes on.
+/// Timeout of a read: the clock goes on.
 const SILENCE: Duration = Duration::from_millis(10);
 /// While no update is due: a wake-up for each message would cost several times the message. Radios and USB
 /// adapters gather as long.
@@ -181,7 +181,6 @@ impl Feed {
         (self.source.phase, self.source.words) = ("lost", why);
     }
 
-    /// Or until the next try.
     fn open_again(&mut self) {
         let opened = match &self.link {
             Link::Opening(link) => link.recv_timeout(SILENCE),
@@ -229,7 +228,7 @@ fn epoch_us(utc: SystemTime, now: Instant) -> u64 {
     u64::try_from(utc_us).unwrap_or(0).saturating_sub(now.as_micros())
 }
 
-/// In pieces with times of arrival.
+/// Bytes in pieces with times of arrival.
 fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Instant, &[u8])> {
     let pieces = bytes.chunks(bytes.len().div_ceil(PIECES).max(1));
     let count = pieces.len() as u64;

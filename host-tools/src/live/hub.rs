@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use super::world::Histories;
 use crate::page::history::{Cursor, Part};
 
-/// Of all pages; a refused one is repeated by a second key press.
+/// Commands of all pages; a refused one is repeated by a second key press.
 const COMMANDS_MAX: usize = 64;
 
 /// The present state, as text made once for all pages.

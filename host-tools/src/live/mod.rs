@@ -88,7 +88,7 @@ struct PagesJson<'a> {
     pages: &'a [String],
 }
 
-/// On a terminal also as a code for a phone that can reach it.
+/// Prints addresses; on a terminal also as a code for a phone that can reach it.
 fn tell(args: &cli::Live, pages: &[String]) -> Result<()> {
     if args.json {
         return output::json(SCHEMA, &PagesJson { pages });
@@ -153,7 +153,6 @@ fn database(args: &cli::Live) -> Result<Option<Influx>> {
     Influx::start(target, session, !args.input.is_live()).map(Some)
 }
 
-/// And prints the counts.
 fn finish(influx: Influx) -> Outcome {
     let figures = influx.finish();
     let missing = figures.waiting + figures.lost + figures.rejected;
@@ -214,7 +213,7 @@ fn others() -> Vec<IpAddr> {
     addresses
 }
 
-/// Without a browser the printed address is enough.
+/// The browser; without one the printed address is enough.
 fn open(page: &str) {
     let (program, first): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])

@@ -21,19 +21,19 @@ use super::told::{Limits, Told};
 use super::world::World;
 use crate::interrupt;
 
-/// Beyond this every second one goes.
+/// Copies: beyond this every second one goes.
 const COPIES_MAX: usize = 128;
-/// In all copies, some 8 KiB each: 32 copies of eight vehicles.
+/// Vehicles in all copies, some 8 KiB each: 32 copies of eight vehicles.
 const COPIED_MAX: usize = 256;
 /// The first distance between two.
 const COPY_EVERY: Span = Span::from_secs(5);
 const SPEEDS: (f64, f64) = (0.1, 64.0);
-/// Besides frames: a log's parameters and parts.
+/// Reports besides frames: a log's parameters and parts.
 const TOLD_MAX: usize = 8_192;
 /// Frames between two looks at the clock.
 const LOOK_EVERY: u64 = 4_096;
 
-/// With the place after it.
+/// The state with the place after it.
 #[derive(Debug)]
 struct Copy {
     at: Instant,
@@ -63,7 +63,7 @@ enum Played {
     Native(Native),
 }
 
-/// After each frame, or entry without frames; `false` ends it.
+/// Callback after each frame, or entry without frames; `false` ends it.
 type Each<'a> = dyn FnMut(Instant, Option<&Frame<'_>>, &mut World) -> bool + 'a;
 
 impl Loaded {
@@ -358,7 +358,7 @@ impl Player {
         Ok(())
     }
 
-    /// From the last copy before it, or from here if nearer.
+    /// A time from the last copy before it, or from here if nearer.
     fn seek(&mut self, to: Instant, loaded: &mut Loaded, world: &mut World, now: &mut Instant) -> Result<()> {
         let copy = loaded.copies.iter().rev().find(|copy| copy.at <= to);
         if to < *now {

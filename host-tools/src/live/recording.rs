@@ -68,7 +68,6 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
     Ok(Opened { name, recording: Some(recording), native, is_of_box })
 }
 
-/// Of all in a path.
 fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
     let mut found = find(&[path.to_owned()], false)?;
     let names: Vec<String> = found.places.iter().map(|place| place.name.clone()).collect();

@@ -227,7 +227,7 @@ impl Page {
         hub.command(command);
     }
 
-    /// With the history that the page lacks.
+    /// The state with the history that the page lacks.
     fn news(&mut self, hub: &Hub) -> Vec<String> {
         let published = Arc::clone(&self.follow.borrow_and_update());
         if published.epoch != self.epoch {

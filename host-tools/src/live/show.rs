@@ -161,7 +161,6 @@ struct ComponentJson {
     flight_h: f64,
     motor_h: f64,
     flights: f64,
-    /// Of its whole life.
     life: bool,
 }
 

@@ -43,7 +43,6 @@ impl Serialize for Shown {
     }
 }
 
-/// And when, if known.
 type Told = (Option<time::Instant>, Option<f32>);
 
 fn of<T>(message: &Latest<T>, value: impl FnOnce(&T) -> Option<f32>) -> Told {
@@ -101,7 +100,7 @@ fn clips(of_each: [u32; 3]) -> f32 {
     of_each.iter().fold(0_u32, |sum, clips| sum.saturating_add(*clips)) as f32
 }
 
-/// Or the current in the autopilot's status.
+/// The current, or that in the autopilot's status.
 fn amperes(vehicle: &Vehicle) -> Told {
     let of_battery = of(&vehicle.batteries[0], |pack| pack.current.map(|amperes| amperes.0));
     let of_system = || of(&vehicle.system, |system| system.current.map(|amperes| amperes.0));

@@ -23,7 +23,7 @@ use crate::source::told::Finding as BoxFinding;
 pub const VEHICLES_MAX: usize = 8;
 /// Longer silences are stepped through only at both ends.
 const SILENCE_MAX: Span = Span::from_secs(600);
-/// For debounce and age at a silence's beginning.
+/// Time for debounce and age at a silence's beginning.
 const SILENCE_HEAD: Span = Span::from_secs(60);
 
 /// A session's start is recorded at once.
@@ -50,14 +50,14 @@ pub struct World {
     on_the_wire: bool,
     /// The log's first vehicle.
     owner: Option<u8>,
-    /// Before their first heartbeat: system and frame.
+    /// Parameters before their first heartbeat: system and frame.
     early: Vec<(u8, Vec<u8>)>,
     /// The log's parts before that.
     parts: [Option<Component>; COMPONENTS_MAX],
     next_tick: Instant,
 }
 
-/// Of all systems, until a heartbeat.
+/// Parameters of all systems, until a heartbeat.
 const EARLY_MAX: usize = 2_048;
 
 /// More than all checks could change in a step.

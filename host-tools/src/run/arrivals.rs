@@ -18,7 +18,7 @@ use crate::source::{self, Chunk, Source, Timing};
 
 /// The board's ring.
 pub const CHUNK_BYTES_MAX: usize = 2048;
-/// Of standard input, until the first frame.
+/// Bytes of standard input, until the first frame.
 const FIRST_BYTES_MAX: usize = 16 << 20;
 
 /// The stream of arrivals.
@@ -30,7 +30,6 @@ pub struct Arrivals {
     waiting: VecDeque<Chunk>,
     tap: SideOutput,
     bytes: u64,
-    /// Of a live one.
     autopilot: Option<Box<dyn Write + Send>>,
     /// Ended early.
     broken_off: bool,

@@ -36,7 +36,7 @@ use ground::Ground;
 use report::Report;
 use store::FileFlash;
 
-/// In real time, while nothing arrives.
+/// Step in real time, while nothing arrives.
 const STEP: Duration = Duration::from_millis(20);
 
 /// A machine that receives the bytes.
@@ -48,7 +48,6 @@ pub trait Machine {
     fn hear(&mut self, chunk: &Chunk) -> Result<bool>;
 }
 
-/// At the requested pace.
 fn drive(
     arrivals: &mut Arrivals,
     ground: &mut Ground,
@@ -136,7 +135,7 @@ fn prepare_card(path: &Path, size_mib: Option<u64>, seed: u64) -> Result<File> {
     Ok(file)
 }
 
-/// Before the first byte: all is open.
+/// A run before the first byte: all is open.
 struct Prepared {
     speed: Speed,
     live: bool,

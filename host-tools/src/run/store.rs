@@ -50,7 +50,6 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
     }
 }
 
-/// Before other files are made.
 pub(super) fn check(path: &Path) -> Result<()> {
     if path.exists() {
         let (bytes, _) = read(path)?;
@@ -69,7 +68,6 @@ pub(super) fn check(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// And the open file.
 fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
     if let Ok(about) = path.metadata() {
         if !about.is_file() {
@@ -112,7 +110,6 @@ fn fill(mut file: &File, path: &Path) -> Result<()> {
     file.write_all(&vec![0xFF; BYTES]).with_context(|| cannot_write(path))
 }
 
-/// As a board would find it.
 fn found(bytes: &[u8]) -> Option<Found> {
     Store::mount(SimFlash::<SECTOR>::with(bytes)).ok().map(|(_, found)| found)
 }
@@ -129,7 +126,7 @@ struct Inside {
 }
 
 impl FileFlash {
-    /// At the `steps`-th word or erase, in its middle.
+    /// A cut at the `steps`-th word or erase, in its middle.
     pub(super) fn cut_after(&self, steps: u64, seed: u64) {
         self.0.borrow_mut().flash.cut_after(steps, seed);
     }
@@ -143,7 +140,7 @@ impl FileFlash {
         self.0.borrow().flash.bytes().to_vec()
     }
 
-    /// Of empty flash: a first start would erase for half a second.
+    /// A store of empty flash: a first start would erase for half a second.
     pub(super) fn prepare(&self) -> Result<()> {
         if self.bytes().iter().any(|byte| *byte != 0xFF) {
             return Ok(());
@@ -156,7 +153,6 @@ impl FileFlash {
         self.write_out(0, BYTES);
     }
 
-    /// Of the file itself.
     pub(super) fn take_error(&self) -> Option<io::Error> {
         self.0.borrow_mut().error.take()
     }

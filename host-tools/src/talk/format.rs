@@ -19,7 +19,7 @@ const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// 512 GB take two minutes, 1 TB four.
 const LIMIT: Duration = Duration::from_mins(5);
-/// Of any message: the board is gone.
+/// Silence of any message: the board is gone.
 const SILENCE: Duration = Duration::from_secs(15);
 
 /// `MAV_RESULT`

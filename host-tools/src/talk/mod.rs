@@ -36,7 +36,7 @@ const SYSTEM: u8 = 255;
 const OUR_COMPONENT: u8 = 190;
 /// Timeout for the board's first message.
 const CONNECT: Duration = Duration::from_secs(15);
-/// For further boards: two heartbeats of each, since a radio may lose one.
+/// Time for further boards: two heartbeats of each, since a radio may lose one.
 const LISTEN: Duration = Duration::from_millis(2_200);
 /// Radios and UDP peers learn from them where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);

@@ -19,7 +19,7 @@ use crate::output::{self, Schema};
 use crate::printable;
 use crate::talk;
 
-/// In a list: the missing values are lost.
+/// Pause in a list: the missing values are lost.
 const GAP: Duration = Duration::from_millis(1_500);
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;

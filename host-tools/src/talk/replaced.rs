@@ -25,9 +25,9 @@ use crate::source::find::find;
 /// `MAV_CMD_USER_1`
 const REPLACED: u16 = 31_010;
 const ANSWER: Duration = Duration::from_secs(2);
-/// With a serial number a repeated command replaces the part once.
+/// Tries: with a serial number a repeated command replaces the part once.
 const TRIES: usize = 3;
-/// In a card's root, read at each power-on.
+/// The file in a card's root, read at each power-on.
 const SETTINGS: &str = "PARAMS.TXT";
 /// Single precision holds 24 bits exactly.
 const CHARACTERS: usize = 3;
@@ -80,7 +80,6 @@ pub fn run(args: &cli::Replaced) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// From 1.
 fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, number: u8) -> Result<usize> {
     let known: Vec<_> = known.into_iter().filter(|(_, kind, _)| *kind != Kind::None).collect();
     let mut mine = known.iter().filter(|(_, kind, of)| *kind == part && *of == number);
@@ -142,7 +141,7 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     }
 }
 
-/// And serial number, by the newest log with components.
+/// Place and serial number, by the newest log with components.
 fn on_card(card: &Path, part: Kind, number: u8) -> Result<(usize, String)> {
     if !card.is_dir() {
         return Err(usage(format!(

@@ -8,7 +8,7 @@ use crate::model::{Kind, Model, crc7, crc16};
 
 /// Clocks with an unselected card that it needs before its first command (6.4.1).
 const WAKE_CLOCKS: u32 = 74;
-/// Before its identification, and afterwards.
+/// Clocks before its identification, and afterwards.
 const IDENTIFICATION_HZ: u32 = 400_000;
 const TRANSFER_HZ: u32 = 25_000_000;
 
@@ -138,7 +138,7 @@ impl SdCard {
         }
     }
 
-    /// Only the first half of a block in programming is new.
+    /// Of a block in programming only the first half is new.
     pub(crate) fn power_off(&self, now_ns: u64) {
         if let Some((at, before)) = self.programmed.filter(|_| self.is_busy(now_ns)) {
             self.model.medium.patch(at, 256, &before[256..]);

@@ -117,7 +117,6 @@ impl Model {
     }
 }
 
-/// From the specification, not the driver's code.
 pub(crate) fn crc7(bytes: &[u8]) -> u8 {
     let mut crc = 0_u8;
     for byte in bytes {

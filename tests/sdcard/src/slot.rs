@@ -40,7 +40,7 @@ struct Inner {
     counts: Counts,
     at_time: Vec<(u64, Event)>,
     at_byte: Vec<(u64, Event)>,
-    /// For a fast check at every byte.
+    /// Times for a fast check at every byte.
     soonest: (u64, u64),
     violations: BTreeMap<String, u32>,
     /// Bytes on the bus.

@@ -273,7 +273,6 @@ fn a_checksum_is_of_what_was_recorded_and_nothing_is_lost_while_it_is_computed()
     assert_eq!(read_card(&medium).gaps, []);
 }
 
-/// Also the number of recorded blocks.
 fn places(medium: &Medium, name: LogName) -> (u32, u32) {
     let (status, held) = (CardStatus::new(), Buffers::new());
     let mounted = Card::mount(medium.clone(), &status, &held);

@@ -17,7 +17,7 @@ use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::{OWN, own};
 
-/// At full rate: a dozen groups, so that ten thousand readings take minutes.
+/// Seconds at full rate: a dozen groups, so that ten thousand readings take minutes.
 const SECONDS: f64 = 15.0;
 /// A sector.
 const BURST_BITS_MAX: u64 = 8 * BLOCK as u64;
@@ -126,7 +126,7 @@ struct Outcome {
 struct Subject {
     card: Card,
     log: Log,
-    /// In order, each with its group.
+    /// Blocks in order, each with its group.
     blocks: Vec<(u32, usize)>,
     whole: Record,
 }

@@ -161,7 +161,6 @@ struct About {
     held_bytes: usize,
 }
 
-/// Without a hole up to this moment.
 fn look(path: &Path, form: &Form, now_us: u64) -> Result<About> {
     let held_bytes = held_bytes().context("this program does not count what it allocates")?;
     let logs = on_card(path);

@@ -31,7 +31,7 @@ const GS_BAUD: u64 = 57_600;
 const STEP_US: u64 = 5_000;
 const SECOND_US: u64 = 1_000_000;
 const KEY: [u8; 32] = [0x5a; 32];
-/// With a key, bytes a second.
+/// Budget with a key, bytes a second.
 const BUDGET: u32 = 1_000;
 /// The highest value that anybody may set.
 const BUDGET_MAX: u32 = 5_000;
@@ -143,7 +143,7 @@ impl ToAutopilot {
     }
 }
 
-/// Also the number of logs marked as erased.
+/// Frames, and the number of logs marked as erased.
 fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     let mut frames = BTreeMap::new();
     for log in on_card(&card.path()).into_iter().take(EARLIER as usize) {
@@ -206,7 +206,7 @@ fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half
     Ok(half)
 }
 
-/// With a key unsigned requests get no answer.
+/// Parameters; with a key unsigned requests get no answer.
 fn params(keyed: bool) -> Result<Params> {
     let mut params = Params::defaults();
     let mut set = |name: &str, value: f32| {

@@ -34,7 +34,7 @@ use super::stream::{FULL_RATE, Stream};
 use crate::damage::Random;
 use crate::flights::own;
 
-/// As in a segment that is not full.
+/// Space as in a segment that is not full.
 const SPACE_BLOCKS: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -158,7 +158,7 @@ struct Damage {
 }
 
 impl Damage {
-    /// Up to eight changed sectors in a row, which parity repairs.
+    /// Damage of up to eight changed sectors in a row, which parity repairs.
     fn is_one_page(&self) -> bool {
         matches!(self.kind, Kind::Erased | Kind::Copied | Kind::Stale) && self.touched.len() <= COLUMNS
     }
@@ -440,7 +440,7 @@ impl Subject {
         Ok(())
     }
 
-    /// By index; all others are frames of the log, in order.
+    /// Missing frames by index; all others are frames of the log, in order.
     fn missing(&self, read: &[Frame]) -> Result<Vec<usize>> {
         let (mut missing, mut given) = (Vec::new(), read.iter().peekable());
         for (index, frame) in self.whole.frames.iter().enumerate() {

@@ -29,7 +29,7 @@ use crate::flights::own;
 
 /// A directory entry.
 const ENTRY: usize = 32;
-/// Once the log has begun.
+/// Loss once the log has begun.
 const LOSS_MAX_US: u64 = 200_000;
 /// The card is opened, the previous session searched, the first segment made.
 const BEGIN_MAX_US: u64 = 300_000;
@@ -168,7 +168,6 @@ enum Tear {
 }
 
 impl Tear {
-    /// In the middle, or between pieces of this size.
     fn by_chance(random: &mut Random, piece: usize) -> Self {
         let pieces = (BLOCK / piece) as u64;
         let at = if random.chance(0.5) { BLOCK / 2 } else { piece * (1 + random.below(pieces - 1)) as usize };

@@ -17,7 +17,6 @@ pub(super) struct Frame {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Record {
     pub(super) frames: Vec<Frame>,
-    /// Without gaps.
     pub(super) groups: Vec<usize>,
     /// Each gap with the number of frames before it.
     pub(super) gaps: Vec<(usize, Gap)>,

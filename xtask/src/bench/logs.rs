@@ -23,7 +23,7 @@ const ASKED_MB_S: f64 = 100.0;
 const BYTES_MIN: f64 = 16e6;
 const ROUNDS: usize = 5;
 
-/// In Python; the first argument is the log.
+/// A reader in Python; the first argument is the log.
 const DATAFLASH: &str = "import sys\n\
     from pymavlink import DFReader\n\
     log = DFReader.DFReader_binary(sys.argv[1])\n\
@@ -94,7 +94,7 @@ fn plain(log: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// On one core; ends with one of these codes.
+/// Seconds on one core; ends with one of these codes.
 fn seconds(python: &Path, program: &OsStr, words: [&OsStr; 3], codes: &[i32]) -> Result<f64> {
     let mut command = on_one_core(python.as_os_str(), true);
     command.args(["-c", TIMED]).arg(program).args(words).env("RAYON_NUM_THREADS", "1");

@@ -27,11 +27,11 @@ const SMALLER_MIN: f64 = 6.5;
 const SMALLER_THAN_XZ_MIN: f64 = 2.3;
 /// Bytes of MAVLink a second at 921,600 baud.
 pub(crate) const BYTES_PER_S: f64 = 92_160.0;
-/// Of the speed of `gzip -d`.
+/// Part of the speed of `gzip -d`.
 const AGAINST_GZIP_MIN: f64 = 0.4;
-/// On slower lines work by the clock is a larger part of each byte.
+/// The line: on slower ones work by the clock is a larger part of each byte.
 const BAUD: &str = "921600";
-/// Of that line: a short recording shows only its start.
+/// Seconds of that line: a short recording shows only its start.
 const SECONDS_MIN: f64 = 10.0;
 /// Bytes of tlog: starts hardly count.
 const DECODED_MIN: f64 = 8e6;
@@ -68,7 +68,7 @@ pub(crate) fn run(what: &[Bench]) -> Result<()> {
     if missed.is_empty() { Ok(()) } else { bail!("{}", missed.join("; ")) }
 }
 
-/// By name; two folders may have the same one.
+/// Recordings by name; two folders may have the same one.
 fn flights() -> Result<Vec<PathBuf>> {
     let mut flights = files_below(&folders("HUMS_FLIGHTS", true), &[".tlog", ".raw"])?;
     flights.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
@@ -95,7 +95,7 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
     sizes_of_sessions(flights).and(logs)
 }
 
-/// With every record that the monitor makes.
+/// Sizes with every record that the monitor makes.
 fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("\nSizes of whole sessions, with all that the monitor records of them\n");
     let program = hums::build_release()?;

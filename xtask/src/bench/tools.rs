@@ -10,7 +10,6 @@ use anyhow::{Context as _, Result};
 
 use crate::repo;
 
-/// If `taskset` is installed.
 pub(super) fn on_one_core(program: &OsStr, one: bool) -> Command {
     if !one || Command::new("taskset").arg("--version").output().is_err() {
         return Command::new(program);
@@ -37,7 +36,6 @@ pub(super) fn folders(variable: &str, besides: bool) -> Vec<PathBuf> {
     folders
 }
 
-/// By the ends of names.
 pub(super) fn files_below(folders: &[PathBuf], ends: &[&str]) -> Result<Vec<PathBuf>> {
     let (mut waiting, mut files) = (folders.to_vec(), Vec::new());
     while let Some(folder) = waiting.pop() {

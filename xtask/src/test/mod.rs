@@ -85,7 +85,6 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     })
 }
 
-/// With the processor's time of started programs.
 fn timed(run: impl FnOnce() -> Result<()>) -> Result<()> {
     let (start, done) = (Instant::now(), run());
     println!("{:<16} {:>8.1}", "in all", start.elapsed().as_secs_f64());
@@ -121,7 +120,7 @@ fn one_after_the_other(steps: impl Iterator<Item = &'static Step>, there: &Outco
     rows
 }
 
-/// Of ended children and theirs (proc(5): fields 16 and 17, ticks of 10 ms).
+/// Time of ended children and theirs (proc(5): fields 16 and 17, ticks of 10 ms).
 fn processor_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // The second field: a name in brackets.

@@ -38,7 +38,6 @@ pub(super) fn run() -> Result<()> {
     Shell::cargo().args(["test", "--quiet", "--lib", "--bins"]).args(&choice).run()
 }
 
-/// In the innermost folder.
 fn package<'a>(file: &Path, packages: &'a [Package]) -> Option<&'a str> {
     let holds = |package: &&Package| {
         package.manifest_path.parent().is_some_and(|folder| repo::root().join(file).starts_with(folder))

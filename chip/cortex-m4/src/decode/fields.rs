@@ -1,6 +1,6 @@
 //! Parts of all encodings.
 
-/// As far as decoding depends on it.
+/// The instruction's place, as far as decoding depends on it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     /// The instruction's address.
@@ -10,7 +10,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// As it reads, aligned: the base of literals.
+    /// The program counter as it reads, aligned: the base of literals.
     pub(super) fn base(self) -> u32 {
         self.address.wrapping_add(4) & !3
     }

@@ -81,7 +81,7 @@ pub(super) fn double_or_exclusive(a: u32, b: u32) -> Op {
     }
 }
 
-/// Of one register.
+/// Address forms of one register.
 enum Form {
     Offset(i32),
     Indexed(i16, Index),
@@ -129,7 +129,7 @@ pub(super) fn store(a: u32, b: u32) -> Op {
     }
 }
 
-/// In all forms, with the hints in their place (`t` 15).
+/// Loads in all forms, with the hints in their place (`t` 15).
 pub(super) fn load(place: Place, a: u32, b: u32, width: Width) -> Op {
     let (n, t) = (reg(a, 0), reg(b, 12));
     let width = match (width, a & 0x100 != 0) {

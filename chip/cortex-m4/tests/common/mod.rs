@@ -160,7 +160,6 @@ pub fn qemu(elf: &Path, parts: &[(u32, &[u8])], folder: &Path) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
 }
 
-/// At its beginning.
 fn boot(elf: &Path, parts: &[(u32, &[u8])]) -> (Flat, Core) {
     let mut memory = Flat::default();
     for (address, bytes) in segments(elf) {

@@ -30,7 +30,7 @@ impl Case {
     }
 }
 
-/// On registers alone, with IT blocks of up to four.
+/// Instructions on registers alone, with IT blocks of up to four.
 pub(crate) fn sequence(random: &mut Random, number: u32) -> Case {
     let slot = SLOTS + number * SLOT;
     let mut case = state(random, "sequence", Op::Nop, slot + AT);
@@ -101,7 +101,7 @@ fn on_registers_alone(op: Op) -> bool {
     }
 }
 
-/// In a slot otherwise full of SVC.
+/// A state in a slot otherwise full of SVC.
 fn state(random: &mut Random, name: &'static str, op: Op, start: u32) -> Case {
     let mut case = Case {
         name,
@@ -117,7 +117,7 @@ fn state(random: &mut Random, name: &'static str, op: Op, start: u32) -> Case {
     case
 }
 
-/// Perhaps conditional; none if harmful here.
+/// An instruction, perhaps conditional; none if harmful here.
 pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
     let (name, pattern) = random.of(patterns::PATTERNS);
     let bits = patterns::fill(pattern, random.next());
@@ -309,7 +309,7 @@ fn by_register(case: &mut Case, n: u8, m: u8, shift: u8, address: u32) -> bool {
     true
 }
 
-/// In the slot, or empty: QEMU repeats its memories behind them, and has devices at `0x4000_0000`.
+/// A target in the slot, or empty: QEMU repeats its memories behind them, and has devices at `0x4000_0000`.
 fn good_target(target: u32, slot: u32) -> bool {
     let outside = matches!(target >> 28, 3 | 6..=13);
     // Not to itself, and not into its own second half.

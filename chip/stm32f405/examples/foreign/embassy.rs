@@ -41,7 +41,7 @@ pub(crate) fn flash(machine: &mut Machine) -> Outcome {
     expect(rest.iter().all(|byte| *byte == 0xFF), "it is not erased".to_owned())
 }
 
-/// By DMA at 115,200 baud, endlessly, with its count.
+/// A program by DMA at 115,200 baud, endlessly, with its count.
 pub(crate) fn usart_dma(machine: &mut Machine) -> Outcome {
     run(machine, SECOND)?;
     let said = text(&machine.take_sent(2));

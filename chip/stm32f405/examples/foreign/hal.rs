@@ -11,7 +11,7 @@ const USART1: usize = 0;
 const USART2: usize = 1;
 const FAST: f64 = 115_200.0;
 const SLOW: f64 = 9_600.0;
-/// To ground; the LED of most.
+/// The button, to ground; the LED of most.
 const BUTTON: Pin = Pin(0, 0);
 const LED: Pin = Pin(2, 13);
 
@@ -67,7 +67,7 @@ pub(crate) fn spi_dma(machine: &mut Machine) -> Outcome {
     expect(*fastest == 4_000_000, format!("its clock has {fastest} Hz"))
 }
 
-/// By EXTI; the pull-up holds the button high.
+/// A button by EXTI; the pull-up holds it high.
 pub(crate) fn rtic_button(machine: &mut Machine) -> Outcome {
     let mut seen = Vec::new();
     for press in 0..5 {
@@ -85,7 +85,7 @@ pub(crate) fn rtic_button(machine: &mut Machine) -> Outcome {
     expect(hz == 100_000_000, format!("it runs at {hz} Hz"))
 }
 
-/// By tasks on TIM3's compare and overflow.
+/// An LED by tasks on TIM3's compare and overflow.
 pub(crate) fn rtic_tick(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, LED, 10_500)?;
     expect_pauses(&changes, 1_000, 8)
@@ -110,7 +110,7 @@ pub(crate) fn blinky_timer_irq(machine: &mut Machine) -> Outcome {
     expect_pauses(&changes[1..], 1_000, 6)
 }
 
-/// By `SysTick`, whose 24 bits do not reach a second.
+/// A delay by `SysTick`, whose 24 bits do not reach a second.
 pub(crate) fn delay_syst_blinky(machine: &mut Machine) -> Outcome {
     let changes = changes(machine, Pin(0, 5), 8_500)?;
     expect_pauses(&changes, 1_000, 6)

@@ -171,7 +171,7 @@ enum Last<'a> {
 }
 
 impl Common {
-    /// With the elements `after` it; `None` unless it was stored.
+    /// The last value with the elements `after` it; `None` unless it was stored.
     #[inline]
     fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
         Some(match element.what() {

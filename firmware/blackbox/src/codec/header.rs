@@ -79,7 +79,6 @@ impl Headers {
         Plan { header: AS_EXPECTED, length: None, checksum: None }
     }
 
-    /// As far as unexpected.
     #[inline(never)]
     pub(super) fn code<C: Coder>(
         &mut self,

@@ -249,7 +249,6 @@ impl Slots {
         self.is_of(second, frame).then_some(second)
     }
 
-    /// Or of no slot.
     #[inline]
     fn is_of(&self, slot: u8, frame: &Frame) -> bool {
         let Some(slot) = self.list.get(usize::from(slot)) else { return false };

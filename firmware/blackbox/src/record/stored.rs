@@ -24,7 +24,7 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// With the bytes after the numbers; `None` unless all numbers are there.
+    /// The shape with the bytes after the numbers; `None` unless all numbers are there.
     pub(crate) fn read(stored: &[u8]) -> Option<(Self, usize)> {
         let [kind, version, words, halves] = *stored.first_chunk()?;
         let shape = Self { kind, version, words, halves };

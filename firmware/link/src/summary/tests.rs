@@ -272,7 +272,7 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
     told_where(findings, because, |_| Orders::Own)
 }
 
-/// If some checks have the orders of others.
+/// Texts if some checks have the orders of others.
 fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Orders) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());

@@ -12,7 +12,7 @@ pub(crate) struct Asker {
     pub(crate) by: By,
 }
 
-/// Of a port at once, and each second.
+/// Requests of a port at once, and each second.
 const REQUESTS_MAX: u32 = 20;
 const REQUESTS_PER_S: u32 = 5;
 

@@ -60,7 +60,6 @@ pub(crate) struct Companion {
     heartbeat_at: Option<Instant>,
     library: Library,
     secure: Secure,
-    /// Until it is sent.
     protect: Option<protect::Request>,
     pass: Pass,
     settings: Settings,
@@ -103,7 +102,7 @@ impl Companion {
         self.secure.refused
     }
 
-    /// From the store: see [`secure`].
+    /// The key from the store: see [`secure`].
     pub(crate) fn restore<F: NorFlash>(&mut self, store_writer: &mut StoreWriter<'_, F>) {
         self.secure.restore(store_writer);
     }
@@ -158,7 +157,7 @@ impl Companion {
         self.pass_down(now, frame, book, summary, gs);
     }
 
-    /// From the autopilot's port to the ground station, if it should be.
+    /// Passed from the autopilot's port to the ground station, if it should be.
     pub(crate) fn pass_down(
         &mut self,
         now: Instant,

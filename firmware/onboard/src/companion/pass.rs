@@ -46,7 +46,6 @@ impl Pass {
         Self { lost: 0, unknown_at: None }
     }
 
-    /// From the ground station's port to the autopilot.
     pub(crate) fn up(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
         let Some(vehicle) = monitor.vehicle().source else { return };
         let of = (frame.system(), frame.component());
@@ -62,7 +61,6 @@ impl Pass {
         self.lost = self.lost.saturating_add(u32::from(!sent));
     }
 
-    /// From the autopilot's port to the ground station.
     pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
         if !is_on(monitor, ways) || frame.id() == secure::SETUP {
             return;

@@ -110,7 +110,7 @@ impl Settings {
         }
     }
 
-    /// If it has come; whether it was the last one.
+    /// The piece, if it has come; whether it was the last one.
     fn read_on(
         &mut self,
         now: Instant,

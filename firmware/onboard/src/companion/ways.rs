@@ -14,7 +14,6 @@ pub(crate) struct Ways<'w, 'q> {
 }
 
 impl Ways<'_, '_> {
-    /// If its port's budget allows.
     pub(crate) fn send(&mut self, now: Instant, port: Port, class: Class, packet: &Packet) -> bool {
         let Self { gs, autopilot, queues } = self;
         match port {

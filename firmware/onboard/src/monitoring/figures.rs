@@ -181,7 +181,7 @@ impl<'a> Figures<'a> {
         }
     }
 
-    /// Since the last tick; passes losses on.
+    /// Counts since the last tick; passes losses on.
     pub(super) fn count(
         &mut self,
         now: Instant,

@@ -43,7 +43,7 @@ impl Marks {
         self.due = None;
     }
 
-    /// After all other records of the moment; gives its sector to storage.
+    /// The mark after all other records of the moment; gives its sector to storage.
     pub(super) fn tick(&mut self, now: Instant, journal: &mut Journal<'_>, sectors: &mut SectorsIn) {
         if let Some(why) = self.due
             && self.at.is_none_or(|at| now.since(at) >= APART)

@@ -119,7 +119,6 @@ impl<'a> Monitoring<'a> {
         self.recorded.usage(now, Moment::Start, &mut self.book, sectors);
     }
 
-    /// With the log's head.
     fn head_file(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Self { book, recorded, identity, files, .. } = self;
         let before = core::mem::replace(files, book.card.read().segments);
@@ -129,7 +128,7 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// In a second boot record, and in that of each further file.
+    /// The previous session, in a second boot record and in that of each further file.
     #[inline(never)]
     fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Some(before) = self.book.card.take_before() else { return };
@@ -361,7 +360,6 @@ impl<'a> Monitoring<'a> {
     }
 }
 
-/// For a pilot.
 fn restart_words(fault: &Fault<'_>) -> &'static str {
     match fault.kind {
         1 => "panic",

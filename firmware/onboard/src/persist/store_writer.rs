@@ -169,7 +169,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
     }
 }
 
-/// At another place, after an error of the flash.
+/// An item at another place, after an error of the flash.
 fn again<F: NorFlash>(
     store: &mut Store<F>,
     error: Error<F::Error>,

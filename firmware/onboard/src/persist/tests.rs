@@ -21,7 +21,7 @@ use hums_store::{Key, Store, param_value};
 
 type Flash = SimFlash<16384>;
 
-/// Without a frame, ended by a power cut.
+/// A power-on without a frame, ended by a power cut.
 fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut StoreWriter<&mut Flash>)) {
     let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
@@ -127,7 +127,7 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
     });
 }
 
-/// In the air, or disarmed on the ground.
+/// A second in the air, or disarmed on the ground.
 fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover, frames: u32) {
     let now = Instant::from_millis(second * 1_000);
     let source = Source { system: 1, component: 1 };
@@ -146,7 +146,7 @@ fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover
     handover.step(now, monitor, frames);
 }
 
-/// From the 20th second on; returns flight seconds in the flash after each.
+/// A flight from the 20th second on; returns flight seconds in the flash after each.
 fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
     let mut kept = Vec::new();
     let mut copies = Vec::new();

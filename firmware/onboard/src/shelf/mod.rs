@@ -244,13 +244,13 @@ fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Opti
     more.is_ok_and(|more| more).then_some(entry + BLOCK_BYTES as u32 / 32)
 }
 
-/// With the segment if the log exists.
+/// The answer, with the segment if the log exists.
 struct Looked {
     answer: Answer,
     segment: Option<Segment>,
 }
 
-/// In the directory unless it is the last one.
+/// The log in the directory unless it is the last one.
 fn find<D: CardDevice>(
     recorder: &mut Recorder<'_, D>,
     want: &Want,
@@ -316,7 +316,7 @@ fn at_place<D: CardDevice>(
     Ok(found.map(|(_, log)| log))
 }
 
-/// From the answer's offset on; returns their number.
+/// Bytes from the answer's offset on; returns their number.
 fn copy<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, answer: &Answer, to: &mut [u8]) -> usize {
     let end = answer.offset.saturating_add(to.len().min(DATA_MAX) as u32).min(answer.bytes);
     let mut done = 0;

@@ -56,7 +56,6 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         data_blocks(self.segment.blocks())
     }
 
-    /// By the first readable one.
     fn begin(&mut self) -> Option<(u32, u32)> {
         let limit = self.limit();
         let far = (LOST_MAX..limit).step_by(LOST_MAX as usize);
@@ -66,7 +65,7 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         })
     }
 
-    /// Of the session, from this number on.
+    /// Blocks of the session, from this number on.
     fn recorded(&mut self, session: u32, first: u32) -> u32 {
         let limit = self.limit();
         let mut end = self.covered(session, first).max(1);
@@ -115,7 +114,7 @@ pub(super) fn holds<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, lo
     Some(begin == (log.session, log.first))
 }
 
-/// With recorded blocks; `None` if the card does not answer.
+/// The log with recorded blocks; `None` if the card does not answer.
 pub(super) fn measure<D: CardDevice>(
     card: &Card<'_, D>,
     segment: &mut Segment,

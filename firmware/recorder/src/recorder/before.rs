@@ -107,7 +107,6 @@ impl<D: CardDevice> Reader<'_, '_, D> {
         Ok(Header::read(&self.block).ok())
     }
 
-    /// From this block on.
     fn probe(
         &mut self,
         from: u32,

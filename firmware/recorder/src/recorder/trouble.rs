@@ -22,7 +22,7 @@ pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
     }
 }
 
-/// On this card, if need be in a new segment.
+/// Another try on this card, if need be in a new segment.
 pub(super) fn may_work_elsewhere<D: CardDevice>(error: &CardError<D::Error>) -> bool {
     match error {
         CardError::Full | CardError::Searching => false,

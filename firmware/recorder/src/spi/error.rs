@@ -41,7 +41,6 @@ impl SpiError {
         matches!(self, Self::NoAnswer | Self::Refused(_) | Self::NoData | Self::Token(_) | Self::Damaged)
     }
 
-    /// Before the next access.
     pub(super) const fn has_lost_card(self) -> bool {
         const IDLE: u8 = 1;
         match self {

@@ -5,15 +5,14 @@ use hums_core::clock::{Instant, Span};
 use super::judged::JudgedBy;
 use crate::utc::moment;
 
-/// After a recording's beginning in the air.
+/// The cell count comes within this time after a recording's beginning in the air.
 const CELLS_COME: Span = Span::from_secs(2);
 
-/// Of the main battery, as reported.
+/// Cells of the main battery, as reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cells {
-    /// In the air: from and to.
+    /// Unknown in the air: from and to.
     unknown: Option<(Instant, Instant)>,
-    /// By the box's report.
     unknown_on_board: bool,
     /// No count of the last flight.
     nothing_stored: bool,
@@ -28,13 +27,12 @@ impl Cells {
         self.nothing_stored = true;
     }
 
-    /// In the air, cell count unknown.
     pub(super) fn lack(&mut self, now: Instant) {
         let (from, _) = *self.unknown.get_or_insert((now, now));
         self.unknown = Some((from, now));
     }
 
-    /// If the voltage raised no alarm for that reason.
+    /// Start of unknown cells, if the voltage raised no alarm for that reason.
     pub(super) fn unknown_since(&self, by: JudgedBy) -> Option<Instant> {
         self.unknown.filter(|_| self.are_unknown(by)).map(|(from, _)| from)
     }

@@ -11,7 +11,7 @@ pub const SETTLE: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
-    /// Of the next step; `None` before the first.
+    /// Time of the next step; `None` before the first.
     next: Option<Instant>,
     /// Sum of the gaps.
     behind: Span,
@@ -34,7 +34,7 @@ impl Clock {
         Some(now)
     }
 
-    /// If that is later; both times go on.
+    /// The next step's time, if that is later; both times go on.
     pub(super) fn skip_to(&mut self, at: Instant) {
         self.next = self.next.max(Some(whole(at)));
     }
@@ -52,7 +52,6 @@ impl Clock {
         self.reached
     }
 
-    /// Never falls.
     pub(super) fn monitor(&mut self, at: Instant) -> Instant {
         let behind = Instant::from_micros(at.as_micros().saturating_sub(self.behind.as_micros()));
         self.reached = self.reached.max(behind);

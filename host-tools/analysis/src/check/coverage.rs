@@ -12,10 +12,10 @@ use super::judged::JudgedBy;
 use super::problem::Problem;
 use crate::counters::tells_flight;
 
-/// Not judged until a receiver has had a fix.
+/// Checks not judged until a receiver has had a fix.
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
 const CELL_VOLTAGE: &str = "cell_voltage";
-/// Of checks of earlier flights and worn parts.
+/// Reason for checks of earlier flights and worn parts.
 const UNTOLD: &str = "only earlier flights (--past) or a monitor on board tell";
 /// Why a check without a limit is not judged.
 pub(super) const OFF: &str = "its limit is off";
@@ -100,7 +100,7 @@ pub(super) struct Recording<'a> {
     pub(super) on_the_wire: bool,
     /// Time armed.
     pub(super) armed: Span,
-    /// If not reported.
+    /// Reason, if arming is not reported.
     pub(super) arming: Option<&'a str>,
     /// It was in the air.
     pub(super) flew: bool,
@@ -196,7 +196,6 @@ impl Recording<'_> {
     }
 }
 
-/// At the ends of their range.
 fn is_off(check: &Check, params: &Params) -> bool {
     let off = |param: Param| {
         let (limit, spec) = (params.get(param), param.spec());

@@ -39,7 +39,7 @@ pub(super) struct Details {
     fix: Option<(Instant, Position)>,
     /// Metres, and when.
     jump: Option<(Instant, f64)>,
-    /// In order of appearance: component and id.
+    /// Batteries in order of appearance: component and id.
     batteries: Vec<(u8, u8)>,
     /// Those beyond them, up to [`BEYOND_MAX`].
     beyond: BTreeSet<(u8, u8)>,
@@ -66,7 +66,7 @@ const NO_AUTOPILOT: u8 = 8;
 
 /// Distinguished autopilots.
 const TOLD_APART_MAX: usize = 32;
-/// Beyond the followed ones: `ArduPilot` has 16.
+/// Batteries beyond the followed ones: `ArduPilot` has 16.
 const BEYOND_MAX: usize = 1_024;
 
 impl Details {
@@ -207,7 +207,7 @@ impl Details {
         }
     }
 
-    /// On vehicles, and parts beyond the monitor's room.
+    /// Remarks on vehicles, and parts beyond the monitor's room.
     pub(super) fn remarks(&self, judged: Option<u8>) -> Vec<String> {
         self.of_parts(judged).into_iter().chain(self.vehicles_of_parts()).collect()
     }
@@ -223,7 +223,7 @@ impl Details {
         remarks
     }
 
-    /// By recent texts and unhealthy sensors.
+    /// The alert's cause by recent texts and unhealthy sensors.
     fn tell_alert(&self, check: &str, problems: &mut Problems) {
         let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.name() == check) else { return };
         let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);
@@ -316,7 +316,6 @@ fn named(autopilots: &[Heard]) -> String {
 
 /// The check, and the report's value.
 pub(super) const EMERGENCY: (&str, f32) = (FAILSAFE, 6.0); // MAV_STATE_EMERGENCY
-/// After a processor's fault.
 pub(super) const PROCESSOR_FAULT: (&str, f32) = ("processor_alert", Urgency::Critical as u8 as f32);
 
 /// Begin and end of a report that is over at once; `None` below the limit. The debounce would miss it.

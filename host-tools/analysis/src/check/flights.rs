@@ -50,13 +50,13 @@ pub(super) struct Flights {
     /// Silence; not seen to fly since.
     unseen: bool,
     silence: Option<Silence>,
-    /// Since a possible landing; flight if it goes on.
+    /// Time since a possible landing; flight if it goes on.
     landing: Span,
     /// Last step, monitor's time.
     stepped_at: Option<Instant>,
 }
 
-/// Not known to be still on its flight.
+/// A silent vehicle, not known to be still on its flight.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
     /// The flight's end, when last received.
@@ -68,11 +68,10 @@ struct Silence {
 
 /// Between steps, also after a gap ([`SETTLE`]); longer silences are left out.
 const STEP_MAX: Span = Span::from_millis(SETTLE.as_millis() + 2 * TICK.as_millis());
-/// Of an impact's finding: the vehicle must lie still.
+/// Delay of an impact's finding: the vehicle must lie still.
 const FOUND_LATE: Span = Span::from_secs(5);
-/// Without a heartbeat.
 const SILENT: Span = Span::from_secs(5);
-/// In the air this long it is still on its flight: longer than a landing takes to be seen.
+/// A vehicle in the air this long is still on its flight: longer than a landing takes to be seen.
 const STILL_FLIES: Span = Span::from_secs(3);
 
 impl Flight {
@@ -109,7 +108,6 @@ pub(super) fn is_in_air(monitor: &Monitor) -> bool {
 }
 
 impl Flights {
-    /// Or seen in the air.
     pub(super) fn take_off(&mut self, now: Instant, from: Instant, took_off: bool) {
         self.open = self.list.len() < LISTED_MAX;
         if self.open {
@@ -173,7 +171,6 @@ impl Flights {
         self.list.len().checked_sub(1).filter(|_| self.open)
     }
 
-    /// On the ground, disarmed, or a mishap.
     pub(super) fn landing(&mut self) {
         let crashed = std::mem::take(&mut self.crashed);
         if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
@@ -225,7 +222,7 @@ impl Flights {
         }
     }
 
-    /// In the silence since then: no landing.
+    /// A mishap in the silence since then: no landing.
     pub(super) fn came_down(&mut self, at: Instant, is_impact: bool, from: Instant) {
         self.close();
         if let Some(flight) = self.list.last_mut() {

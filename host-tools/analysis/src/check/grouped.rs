@@ -95,7 +95,7 @@ fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
     None
 }
 
-/// By check and level, in order of the first.
+/// Problems by check and level, in order of the first.
 fn alike(problems: &[Problem]) -> Vec<Vec<&Problem>> {
     let mut alike: Vec<Vec<&Problem>> = Vec::new();
     for problem in problems {

@@ -47,7 +47,7 @@ const SILENT: Span = Span::from_secs(3);
 const NOT_WRITTEN: Span = Span::from_secs(2);
 /// Armed on the ground: may hide a flight.
 const HIDES_FLIGHT: Span = Span::from_secs(10);
-/// After a silence: longer than a landing takes to be seen.
+/// Flight seen after a silence: longer than a landing takes to be seen.
 const SEEN: Span = Span::from_secs(3);
 
 const DISARMED: &str = "disarmed_in_air";
@@ -88,7 +88,7 @@ impl Limits {
     }
 }
 
-/// And whether it was in the air.
+/// The last reception, and whether it was in the air.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     at: Instant,
@@ -107,11 +107,10 @@ struct Silence {
 /// Item by item.
 pub struct Judge {
     monitor: Box<Monitor>,
-    /// Of the file's last part with an autopilot.
+    /// The monitor of the file's last part with an autopilot.
     earlier: Option<Box<Monitor>>,
     limits: Limits,
     format: Format,
-    /// On the monitor's wire.
     wire: Option<Sequences>,
     clock: Clock,
     first: Option<Instant>,
@@ -322,7 +321,6 @@ impl Judge {
         }
     }
 
-    /// Until its meaning is known.
     fn doubt(&mut self, gap: Option<usize>, to: Instant, airborne: bool, length: Span) {
         self.settle();
         let hides =
@@ -462,7 +460,7 @@ impl Judge {
         self.monitor.begin_another_recording();
     }
 
-    /// Over at its report: motors stop, or the processor restarts.
+    /// An end at its report: motors stop, or the processor restarts.
     fn reported(&mut self, at: Instant, about: About, words: &str) {
         let is_emergency = about == About::Emergency;
         let what = if is_emergency { details::EMERGENCY } else { details::PROCESSOR_FAULT };
@@ -628,7 +626,6 @@ impl Judge {
         }
     }
 
-    /// In the air.
     fn ends_in_air(&mut self) -> Option<EndsInAir> {
         self.flights.going_on().filter(|_| is_in_air(&self.monitor))?;
         let steps = self.clock.monitor(self.last).into();

@@ -58,7 +58,6 @@ const STANDS_M: f32 = 3.0;
 const FALLING_MPS: f32 = 2.5;
 /// A metre at sea level; at 4,000 m 35 % too much, so a fall must be deeper.
 const HPA_PER_METRE: f32 = 0.12;
-/// After first reception.
 const FIRST: Span = Span::from_secs(10);
 /// Sinks are kept for this long.
 const WINDOW: Span = Span::from_millis(900);
@@ -220,7 +219,7 @@ impl LinkLoss {
         }
     }
 
-    /// After the monitor's step: an alarm that begins or ends.
+    /// A step after the monitor's: an alarm that begins or ends.
     pub(super) fn step(
         &mut self,
         now: Instant,
@@ -345,7 +344,7 @@ impl LinkLoss {
         (slow && lost_m > CAME_DOWN_M && (in_vain || fell)).then_some((IMPACT, None))
     }
 
-    /// By an attitude that no sensor contradicts, or on its back.
+    /// Whether it lies by an attitude that no sensor contradicts, or on its back.
     fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let tilts = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD;
         let is_tilted =
@@ -363,7 +362,7 @@ impl LinkLoss {
         self.stands_since = self.stands_since.or(slow.map(|_| now));
     }
 
-    /// For a second, without a fall's rising pressure.
+    /// Rest for a second, without a fall's rising pressure.
     fn rests(&self, now: Instant) -> bool {
         self.stands_since.is_some_and(|since| now.since(since) >= SETTLED)
             && self.is_sinking(now, FALLING_MPS) == Some(false)

@@ -185,7 +185,6 @@ fn logs(args: &Request<'_>) -> Result<(Found, usize)> {
     Ok((find(&good, args.salvage)?, args.inputs.len() - good.len()))
 }
 
-/// Or why it was not judged.
 struct Told {
     name: String,
     /// The name of its place.

@@ -22,7 +22,6 @@ impl Judged {
         self.forget(from, next, restarts).forget_unheard()
     }
 
-    /// Also everything with a duration.
     fn forget(mut self, from: Instant, to: Option<Instant>, restarts: &[Instant]) -> Self {
         let is_out = |at: Instant| at >= from && to.is_none_or(|to| at < to);
         self.restarts -= restarts.iter().filter(|at| is_out(**at)).count() as u64;

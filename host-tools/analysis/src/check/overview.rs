@@ -29,7 +29,6 @@ use crate::summary::{Contents, ExceedanceLine, Overview};
 const FEW_KINDS: usize = 16;
 /// Flight state after first reception, s.
 const SEEN_LATE_S: f64 = 3.0;
-/// Between looks at progress.
 const LOOK_EVERY: u32 = 4_096;
 
 /// Read and judged.

@@ -11,11 +11,11 @@ use crate::utc::moment;
 
 /// Further ones are counted.
 pub const LISTED_MAX: usize = 10_000;
-/// Of 140 possible ones; a log may name any.
+/// Parts of 140 possible ones; a log may name any.
 const FOLLOWED_MAX: usize = 1_000;
 
 pub(super) const IMPACT: &str = "impact";
-/// Before a box finds an impact.
+/// Stillness before a box finds an impact.
 const LIES_STILL: Span = Span::from_secs(1);
 
 /// There are 32 sensors.
@@ -55,7 +55,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Within a level: mishap and precursors first, due parts last, otherwise by time.
+    /// Order within a level: mishap and precursors first, due parts last, otherwise by time.
     pub(super) fn order(&self, mishaps: &[Instant]) -> (bool, bool, Instant) {
         (!self.is_mishap() && !self.leads_to(mishaps), part::is_due(&self.check), self.at)
     }
@@ -71,10 +71,10 @@ impl Problem {
     }
 }
 
-/// From a precursor to a mishap.
+/// Time from a precursor to a mishap.
 const LEADS: Span = Span::from_secs(10);
 
-/// For a radio gap, the last reception.
+/// Mishaps' starts; for a radio gap, the last reception.
 pub(super) fn mishaps(problems: &[Problem]) -> Vec<Instant> {
     let mishaps = problems.iter().filter(|problem| problem.is_mishap());
     mishaps.map(|problem| problem.unheard_from.unwrap_or(problem.at)).collect()
@@ -108,7 +108,7 @@ fn measured(check: &str, value: f32, limit: f32) -> f32 {
     if is_least { f32::NAN } else { value }
 }
 
-/// With the sum of gaps until then.
+/// Start with the sum of gaps until then.
 type Since = (Instant, Span);
 
 /// Joins changes of level.
@@ -206,7 +206,7 @@ impl Problems {
         }
     }
 
-    /// Of open problems, also among later ones: the consequence may come first.
+    /// Causes of open problems, also among later ones: the consequence may come first.
     fn explain(&mut self) {
         let open = || {
             self.open
@@ -262,7 +262,6 @@ impl Problems {
         self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))
     }
 
-    /// To an open check.
     pub(super) fn detail(&mut self, check: &str, name: &str) {
         let known = self.open.get_mut(&(check.to_owned(), 0)).filter(|followed| followed.since.is_some());
         let Some(OpenProblem { problem, .. }) = known else { return };
@@ -271,7 +270,6 @@ impl Problems {
         }
     }
 
-    /// Between two times.
     pub(super) fn unheard(&mut self, check: &str, from: Instant, to: Instant) {
         self.detail(check, &format!("not heard, between {} and {}", moment(from), moment(to)));
         if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
@@ -307,7 +305,7 @@ impl Problems {
         }
     }
 
-    /// By [`Problem::order`] within a level.
+    /// Problems by [`Problem::order`] within a level.
     pub(super) fn worst_first(self) -> Vec<Problem> {
         let mut problems: Vec<_> = self
             .open
@@ -322,7 +320,7 @@ impl Problems {
     }
 }
 
-/// By [`Problem::order`] within a level.
+/// Sorts by [`Problem::order`] within a level.
 pub(super) fn worst_first(problems: &mut [Problem]) {
     let mishaps = mishaps(problems);
     problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(&mishaps)));
@@ -351,7 +349,7 @@ pub fn began<'a>(
     }
 }
 
-/// Without gaps.
+/// Duration without gaps.
 fn lasted((from, before): Since, at: Instant, gaps: Span) -> Span {
     let between = gaps.as_micros().saturating_sub(before.as_micros());
     Span::from_micros(at.since(from).as_micros().saturating_sub(between))
@@ -361,7 +359,6 @@ fn lasted((from, before): Since, at: Instant, gaps: Span) -> Span {
 pub(super) mod tests {
     use super::*;
 
-    /// Of a battery's cell voltage.
     pub(in crate::check) fn change(at_s: u64, level: Level, value: f32) -> Finding {
         Finding {
             at: Instant::from_millis(at_s * 1000),

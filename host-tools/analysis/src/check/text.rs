@@ -27,14 +27,13 @@ use crate::states::{Shown, meaning, shown};
 use crate::summary::is_possible;
 use crate::utc::{clock, iso8601, moment};
 
-/// In words; the rest is one line.
+/// Problems in words; the rest is one line.
 const SHOWN_MAX: usize = 6;
 /// `--json` has them all.
 const LINES_MAX: usize = 8;
 
 /// Details in the verdict.
 const HEADLINE_DETAILS_MAX: usize = 2;
-/// Of a line's beginning.
 const CRITICAL: &str = "CRITICAL";
 
 /// `verbose`: with unjudged checks.
@@ -337,7 +336,6 @@ pub fn verdict(judged: &Judged) -> String {
     format!("{}; {what} ({counts})", headline(&judged.problems))
 }
 
-/// With value and time.
 fn headline(problems: &[Problem]) -> String {
     let groups = grouped(problems);
     let Some((group, first)) = groups.first().and_then(|group| Some((group, group.first()?))) else {
@@ -429,7 +427,7 @@ fn details(problem: &Problem, max: usize) -> String {
     if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
 }
 
-/// With units and the limit.
+/// The worst value with units and the limit.
 fn value(problem: &Problem) -> Option<(String, Option<String>)> {
     let Shown::Quantity(value, limit) = shown(&problem.check, problem.value, problem.limit) else {
         return None;
@@ -537,7 +535,6 @@ fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
     (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
 }
 
-/// As many digits as a limit; damage shows.
 fn short(value: f32) -> String {
     if !is_possible(&value) {
         return format!("{value:.0e}");

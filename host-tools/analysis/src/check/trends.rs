@@ -173,7 +173,7 @@ impl Baseline {
         self.flights = self.flights.saturating_add(1);
     }
 
-    /// Of an unchanged flight; `prior`: usual spread.
+    /// Spread of an unchanged flight; `prior`: usual spread.
     fn spread(&self, prior: f32) -> f32 {
         let flights = f32::from(self.flights.clamp(1, REMEMBERED));
         let squares = PRIOR_FLIGHTS * prior * prior + flights * self.variance;
@@ -227,7 +227,6 @@ impl Baselines {
         (flights >= FLIGHTS_MIN).then_some(value)
     }
 
-    /// From the baseline.
     fn off(&self, quantity: Quantity, flown: &Flown) -> Option<f32> {
         Some(flown.figure(quantity)? - self.known(quantity)?)
     }
@@ -287,7 +286,6 @@ impl Baselines {
         }
     }
 
-    /// With the quantity's terms.
     fn departures(&self, flown: &Flown, params: &Params) -> Vec<(Terms, f32)> {
         let heavier = self.heavier(flown, params);
         let mut all: Vec<(Terms, f32)> = Vec::new();

@@ -8,7 +8,7 @@ pub enum SessionBefore {
     NotNamed,
     /// It was read too.
     There,
-    /// Not among the inputs; old logs make room for new ones.
+    /// A session not among the inputs; old logs make room for new ones.
     NotLookedFor(u32),
     /// Missing although an older log of the card is there, or replaced in its files.
     Gone(u32),

@@ -31,7 +31,7 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     })
 }
 
-/// Also of a partition alone (`/dev/sdX1`).
+/// A card's layout, also of a partition alone (`/dev/sdX1`).
 fn layout(device: &ReadOnlyImage<impl Borrow<File>>) -> Result<Layout, LayoutError<io::Error>> {
     Layout::read(device).or_else(|error| Layout::volume(device).map_err(|_| error))
 }
@@ -111,7 +111,6 @@ pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()>
     Ok(())
 }
 
-/// And its damage.
 fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<CardFile>> {
     about.damage = walk.damage;
     about.lost_clusters = walk.lost_clusters;

@@ -365,7 +365,6 @@ enum Name<'a> {
 }
 
 impl Name<'_> {
-    /// Only directories and logs need extents.
     fn is_kept(&self) -> bool {
         match self {
             Self::Directory(_) => true,

@@ -99,7 +99,7 @@ fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// By folder; whether each is whole or a part.
+/// Segments by folder; whether each is whole or a part.
 type Segments = BTreeMap<PathBuf, Vec<(bool, SegmentName, Log)>>;
 
 /// However it is spelled.

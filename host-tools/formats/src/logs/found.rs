@@ -29,7 +29,7 @@ pub struct Found {
     left_out: bool,
     /// A link, a pipe or an incomplete file.
     passed_over: bool,
-    /// By device and number: two names of a file are one log.
+    /// Files by device and number: two names of a file are one log.
     seen: BTreeSet<FileId>,
 }
 

@@ -31,7 +31,6 @@ pub struct Groups<'a> {
     group: Group,
     ended: bool,
     ends_short: bool,
-    /// At the end of all files.
     foreign_at_end: u64,
     file: usize,
     /// Kept while blocks before it are given out.

@@ -219,7 +219,7 @@ struct Rest {
 struct Decoded<C> {
     collected: Option<C>,
     rest: Option<Rest>,
-    /// Before it; whether blocks there were damaged.
+    /// Sectors missing before it; whether blocks there were damaged.
     missing: u32,
     damaged: bool,
     sectors: u32,
@@ -229,7 +229,7 @@ struct Decoded<C> {
     frames_said: u32,
     /// First time and frames before it; `None` if it cannot be decoded.
     begun: Option<(Instant, u32)>,
-    /// Before the group, and up to its last sector.
+    /// Checks before the group, and up to its last sector.
     check_before: Option<u32>,
     check_end: Option<u32>,
     frames: u32,
@@ -238,11 +238,11 @@ struct Decoded<C> {
     fell: u64,
     error: Option<GroupError>,
     ends_partial: bool,
-    /// For such an end: damaged blocks, one perhaps the whole sector.
+    /// Damaged blocks at such an end, one perhaps the whole sector.
     damaged_partial: u32,
     closed: bool,
     marks: Marks,
-    /// By its last clock record, microseconds since 1970.
+    /// UTC by its last clock record, microseconds since 1970.
     epoch_us: Option<u64>,
 }
 
@@ -303,7 +303,7 @@ impl<C: Collect> Decoded<C> {
         }
     }
 
-    /// And the number of sound sectors.
+    /// The error, and the number of sound sectors.
     fn unsound(&self, rest: &Rest) -> Option<(GroupError, usize)> {
         let error = self.error.filter(|error| matches!(error, GroupError::Corrupt | GroupError::Altered))?;
         Some((error, rest.at.saturating_sub(1)))
@@ -341,7 +341,7 @@ impl<C: Collect> Decoded<C> {
     }
 }
 
-/// Only a frame's outline if that is enough.
+/// The next entry; only a frame's outline if that is enough.
 fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, GroupError>> {
     if counts { decoder.next_outline() } else { Some(decoder.next_entry()?.map(Outline::Whole)) }
 }
@@ -422,7 +422,7 @@ impl Stitch {
         Ok(())
     }
 
-    /// By the group's own count before it.
+    /// Missing frames by the group's own count before it.
     fn frames_missing(&self, before: u32) -> Option<u32> {
         let missing = before.wrapping_sub(self.expected.unwrap_or(0));
         Some(missing).filter(|missing| *missing < 1 << 31)

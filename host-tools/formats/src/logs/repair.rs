@@ -114,7 +114,7 @@ struct FileSectors {
     session: u32,
     /// `None` without a sector of the session.
     base: Option<u32>,
-    /// Of the session's whole sector in each block.
+    /// Numbers of the session's whole sector in each block.
     numbers: Vec<Option<u32>>,
     /// The one that ends the log in order.
     closed: Option<u32>,
@@ -187,13 +187,12 @@ impl FileSectors {
         (written, written - there.len() as u64)
     }
 
-    /// If it belongs there.
     fn in_place(&self, base: u32, at: u32) -> Option<u32> {
         let number = self.numbers.get(at as usize).copied().flatten();
         number.filter(|number| *number == base.wrapping_add(at))
     }
 
-    /// With parity and few enough losses, and the lost numbers.
+    /// Columns with parity and few enough losses, and the lost numbers.
     fn columns(&self, base: u32) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
         let mut columns = BTreeMap::new();
         for (one, block) in &self.parity {

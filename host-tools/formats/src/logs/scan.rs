@@ -38,7 +38,7 @@ struct Run {
 }
 
 impl Run {
-    /// After at most one group of other blocks.
+    /// Whether the run goes on after at most one group of other blocks.
     fn goes_on(&self, number: u32, at: u64) -> bool {
         let blocks = at.checked_sub(self.start);
         let numbers = number.checked_sub(self.number).map(u64::from);
@@ -92,7 +92,7 @@ impl Sessions {
 /// A sound file system's files, through which their logs are read.
 #[derive(Debug, Default)]
 pub(super) struct Files {
-    /// By first block: blocks of an extent, and its log's session.
+    /// Extents by first block: blocks, and its log's session.
     extents: BTreeMap<u64, (u64, u32)>,
 }
 

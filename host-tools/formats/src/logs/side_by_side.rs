@@ -7,7 +7,7 @@ use super::in_order::{in_order, workers};
 
 /// Writing one leaves its workers idle: a few fill the pauses.
 const AT_ONCE: usize = 4;
-/// In work, or done and waiting for an earlier one.
+/// Logs in work, or done and waiting for an earlier one.
 const AHEAD_MAX: usize = 16;
 
 /// Hands results of `work` to `tell` in the items' order. After an error of `tell` only begun items are

@@ -44,7 +44,7 @@ impl Strangers {
         }
     }
 
-    /// If it is sound.
+    /// A foreign sector, if it is sound.
     pub(super) fn other(&mut self, index: usize, at: u64, block: &[u8; SECTOR_BYTES]) {
         let (Some(file), Ok(header)) = (self.0.get_mut(index), Header::read(block)) else { return };
         let new = Strange { file: index, hollow: false, sectors: 0, first: at, session: header.session };
@@ -54,7 +54,6 @@ impl Strangers {
         }
     }
 
-    /// Once all blocks were seen.
     pub(super) fn strange(&self) -> Vec<Strange> {
         let strange = |(index, file): (usize, &File)| {
             let none = Strange { file: index, hollow: true, sectors: 0, first: 0, session: 0 };

@@ -87,7 +87,6 @@ pub fn peek(bytes: &[u8]) -> Peek<'_> {
     Peek::Frame(Frame { bytes: frame, id, sequence, system, component, payload })
 }
 
-/// By the header.
 fn length(bytes: &[u8]) -> Option<usize> {
     match *bytes {
         [MAGIC_V1, length, ..] => Some(6 + usize::from(length) + 2),

@@ -108,7 +108,7 @@ fn value<'a>(field: &Field, bytes: &'a [u8]) -> Value<'a> {
 }
 
 fn scalar(kind: Kind, bytes: &[u8]) -> Scalar {
-    /// Without a count at run time: a table has millions of values.
+    /// A known count, none at run time: a table has millions of values.
     fn these<const N: usize>(bytes: &[u8]) -> [u8; N] {
         bytes.first_chunk().copied().unwrap_or([0; N])
     }

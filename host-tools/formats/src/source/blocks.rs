@@ -7,10 +7,10 @@ use crate::plural::count;
 
 /// Bytes 0x00 or 0xff in a row: frames and lines are shorter (255 bytes of payload).
 const BLOCK_BYTES: u64 = 512;
-/// Without a frame: 5 s at 115,200 baud are foreign data, not noise.
+/// Bytes without a frame: 5 s at 115,200 baud are foreign data, not noise.
 const FOREIGN_BYTES: u64 = 64 * 1024;
 
-/// With the first one's place.
+/// A number, with the first one's place.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bytes {
     count: u64,

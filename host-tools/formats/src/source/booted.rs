@@ -70,7 +70,7 @@ fn extend(last_ms: u64, boot_ms: u32) -> u64 {
     }
 }
 
-/// Between two reports bytes come no faster.
+/// Baud of the fastest port: between two reports bytes come no faster.
 const PORT_BAUD: u64 = 921_600;
 
 /// Whole frames at [`BootTimes`], and between two as on the fastest port.
@@ -103,7 +103,7 @@ impl<S: Source> Booted<S> {
         }
     }
 
-    /// At the autopilot's time, or the line's.
+    /// Bytes at the autopilot's time, or the line's.
     fn chunk(&mut self, told_us: u64, bytes: Vec<u8>) -> Chunk {
         let baud = if self.times.is_known() { PORT_BAUD } else { u64::MAX };
         let line_us = (bytes.len() as u64).saturating_mul(10_000_000) / baud;

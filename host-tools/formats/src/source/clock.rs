@@ -96,7 +96,7 @@ struct Series {
     last_us: Option<u64>,
     /// Number of messages in a row without a pause.
     steady: u8,
-    /// Without a later time while the recording's time was this one.
+    /// Messages without a later time while the recording's time was this one.
     still: u8,
     still_at: Option<u64>,
     /// One has counted.
@@ -204,7 +204,7 @@ impl Clock {
         Reading::Wrong { known }
     }
 
-    /// After a set clock, this much time passed.
+    /// A valid time; after a set clock, this much time passed.
     fn count(&mut self, stamp: Stamp, passed_us: Option<u64>) -> Moment {
         if self.rules.from_first && !self.begun {
             self.timeline = Timeline::from_first(stamp.us);
@@ -246,7 +246,7 @@ impl Clock {
         self.series.get(series).copied().unwrap_or_default()
     }
 
-    /// Behind, without a later one of its topic.
+    /// A time behind, without a later one of its topic.
     fn is_old(&self, stamp: Stamp) -> bool {
         let Some(now) = self.timeline.recorded_us().filter(|_| self.rules.old_values) else { return false };
         let last_us = self.series(stamp.series).last_us;

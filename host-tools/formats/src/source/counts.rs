@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use super::item::{Amount, MessageCount};
 use crate::names::message_name;
 
-/// In a table: most ids are small.
+/// Ids in a table: most ids are small.
 const NEAR: usize = 1024;
 /// Counted one by one: there are 16 million.
 const FAR_MAX: usize = 4_096;
 
-/// And by whether the checksum matches our definition.
+/// Frames by id, and by whether the checksum matches our definition.
 #[derive(Debug)]
 pub(super) struct Counts {
     near: Vec<Amount>,
@@ -33,7 +33,6 @@ impl Counts {
         self.other.add(next.other);
     }
 
-    /// And the total beyond the limit.
     pub(super) fn messages(self) -> (Vec<MessageCount>, Amount) {
         let near = (0_u32..).zip(self.near).filter(|(_, amount)| amount.count > 0);
         let near = near.map(|(place, amount)| ((place >> 1, place & 1 != 0), amount));

@@ -7,7 +7,7 @@ use hums_link::{Frame, observe};
 use super::item::AUTOPILOT;
 use crate::mavlink::ids::SYSTEM_TIME;
 
-/// Of one clock: messages are late by tenths of a second.
+/// Difference within one clock: messages are late by tenths of a second.
 const SAME_US: u64 = 1_000_000;
 
 /// UTC at time zero, from `SYSTEM_TIME`. A clock set while running, as by a first fix, counts after two messages in a

@@ -17,7 +17,6 @@ pub const ASKED: usize = 24;
 pub const RUN: i32 = 8;
 /// Usual disorder of neighbours.
 pub const DISORDER_US: u64 = 200_000;
-/// Between times that go on.
 const GOES_ON_US: u64 = 500_000;
 /// Out of order up to here: slow topics come late.
 const FAR_US: u64 = 800_000;
@@ -26,9 +25,9 @@ const FAR_US: u64 = 800_000;
 const TIME: i32 = 10;
 /// Cost of a fall.
 const FALL: i32 = RUN * TIME + TIME / 2;
-/// Of disorder: a little more than a time's value.
+/// Cost of disorder: a little more than a time's value.
 const LATE: i32 = TIME + 2;
-/// Of two rows, the one with fewer pauses wins.
+/// Cost of a pause: of two rows, the one with fewer pauses wins.
 const PAUSE: i32 = 1;
 
 /// A compared time.
@@ -130,7 +129,7 @@ impl Question<'_> {
         if step > longest.max(self.usual_us.saturating_mul(2)) { self.fall() } else { PAUSE }
     }
 
-    /// With few times most of them decide.
+    /// The fall: with few times most of them decide.
     fn fall(&self) -> i32 {
         let most = self.times.len() as i32 * TIME / 2;
         if self.is_end { FALL } else { FALL.min(most) }

@@ -21,7 +21,7 @@ use crate::printable;
 
 /// Deeper directories are not walked.
 const DEPTH_MAX: usize = 16;
-/// Of one folder: each takes some hundred bytes.
+/// Recordings of one folder: each takes some hundred bytes.
 const WALKED_MAX: usize = 10_000;
 
 /// Named files.
@@ -38,7 +38,6 @@ pub struct Found {
     pub remarks: Vec<String>,
     /// Logs beyond the limit, or files named like a recording without one.
     pub is_cut: bool,
-    /// By device and number.
     seen: BTreeSet<FileId>,
 }
 
@@ -313,7 +312,6 @@ struct Walk {
     /// HUMS logs and cards.
     ours: BTreeSet<PathBuf>,
     others: u64,
-    /// By name.
     passed_over: Vec<String>,
     /// Archives and the like, with advice.
     hinted: Vec<String>,

@@ -14,7 +14,7 @@ use crate::archive;
 pub(super) const LOOK_BYTES: usize = 64 * 1024;
 /// Noise has a frame by chance once in a hundred times of this size: more are MAVLink.
 const BY_CHANCE_BYTES: usize = LOOK_BYTES / 2;
-/// For messages, besides HUMS logs.
+/// Other formats, for messages.
 pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
                      each also as .gz";
 
@@ -24,7 +24,7 @@ pub const STORE_SECTOR_BYTES: usize = 16 * 1024;
 /// The format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Format {
-    /// From a file, a card or an image.
+    /// A log from a file, a card or an image.
     Hums,
     /// A ground station's log.
     Tlog,
@@ -141,7 +141,6 @@ pub fn format_of(start: &[u8]) -> Option<Format> {
     detect(start).map(Detected::format)
 }
 
-/// Not a HUMS log.
 pub(super) fn is_recording(path: &Path) -> bool {
     detect(&start_of(path)).is_some()
 }

@@ -122,7 +122,7 @@ pub enum About {
     Recorder,
     /// Unresolved failsafes with `, ` between; empty without any.
     Failsafes,
-    /// By name: the motors stop at once.
+    /// A named emergency: the motors stop at once.
     Emergency,
     /// A restart after a fault, as a sentence.
     ProcessorFault,
@@ -320,7 +320,7 @@ pub enum Cause {
     Damaged,
     /// The file ends in the middle of something.
     Cut,
-    /// By the recorder's own record.
+    /// A loss by the recorder's own record.
     Lost,
     /// The recorder left it out on purpose.
     NotKept,

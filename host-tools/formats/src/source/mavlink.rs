@@ -217,7 +217,7 @@ impl Reader for RawReader {
 /// Outside of frames: a booting autopilot's text, and noise.
 #[derive(Default)]
 struct Strays {
-    /// Before a frame, the first ones.
+    /// Bytes before a frame, the first ones.
     latest: VecDeque<u8>,
     /// First frame.
     begun: Option<Instant>,
@@ -235,7 +235,7 @@ const BOOTS: Span = Span::from_secs(2);
 const HELD_BYTES: usize = 512;
 
 impl Strays {
-    /// With this total outside of frames.
+    /// Bytes with this total outside of frames.
     fn take(&mut self, at: Instant, place: u64, bytes: &[u8], counts: FramerCounts) {
         self.latest.extend(bytes);
         let kept = if self.begun.is_none() { WORDS_BYTES_MAX } else { HELD_BYTES };

@@ -248,7 +248,7 @@ struct Hand<'a, 'b> {
     want: Want<'a>,
     take: &'a mut Take<'b>,
     said: Said,
-    /// Until recording goes on: there is a record for each second.
+    /// Losses until recording goes on: there is a record for each second.
     lost: Option<(Instant, Loss)>,
 }
 
@@ -282,7 +282,6 @@ impl Deliver<Kept> for Hand<'_, '_> {
 }
 
 impl Hand<'_, '_> {
-    /// Also about the packed recording.
     fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
         (self.take)(at, Item::Record(record))?;
         if let Some((last, _)) = &mut self.lost {
@@ -327,7 +326,7 @@ impl Hand<'_, '_> {
     }
 }
 
-/// As a loss: the log itself is whole.
+/// Damage as a loss: the log itself is whole.
 fn of_packed(loss: &Loss) -> Gap {
     let (words, to) = match loss.what {
         // Over the whole recording.

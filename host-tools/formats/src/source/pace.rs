@@ -24,7 +24,7 @@ const BYTES_PER_S: u64 = 4 * 1024 * 1024;
 const BURST_BYTES: u64 = 192 * 1024;
 /// A clock this many times slower than another is wrong: simulators run at some tens of times.
 pub const SLOWER: u64 = 100;
-/// Of the other clock, until the slow one is reported.
+/// Time of the other clock, until the slow one is reported.
 const WITNESSED: Span = Span::from_secs(10);
 /// The other clock was set.
 const APART: Span = Span::from_secs(60);
@@ -33,7 +33,7 @@ const FALLS: u32 = 8;
 /// ... with less than this between: backwards.
 const BETWEEN: Span = Span::from_secs(5);
 
-/// In a row: first time and place, last time, number.
+/// Falls in a row: first time and place, last time, number.
 #[derive(Clone, Copy, Debug)]
 struct Falls {
     first: (Instant, u64),

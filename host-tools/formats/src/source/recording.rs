@@ -297,7 +297,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// With one definition and many messages.
+    /// A log with one definition and many messages.
     pub(in crate::source) fn dataflash() -> (Vec<u8>, Vec<u8>) {
         let mut fmt = [&[0xa3, 0x95, 128, 150, 13][..], b"ATT\0Qc"].concat();
         fmt.resize(3 + 2 + 4 + 16, 0);

@@ -81,7 +81,6 @@ impl Said {
     }
 }
 
-/// At the time of the first part.
 fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::Text))) -> Result<()> {
     let mut result = Ok(());
     make(&mut |text| {

@@ -41,7 +41,6 @@ pub trait Source: Send {
         self.inner().map_or(0, Source::damages)
     }
 
-    /// Once it has been read.
     fn remark(&self) -> Option<String> {
         self.inner()?.remark()
     }

@@ -23,7 +23,7 @@ pub enum Told {
         /// The table as of the session's start.
         start: bool,
     },
-    /// With all that it has run.
+    /// A part with all that it has run.
     Part {
         /// Its place, from 0.
         place: usize,
@@ -54,7 +54,7 @@ pub enum Told {
     CellsUnknown,
     /// The box has no data of earlier flights.
     StoreNew,
-    /// Only a monitor with checks writes it: its findings are complete.
+    /// A record that only a monitor with checks writes: its findings are complete.
     Checked,
 }
 

@@ -13,7 +13,7 @@ use crate::interrupt;
 
 /// Two minutes of a fast link, an hour of a usual one.
 const BYTES_MAX: usize = 64 * 1024 * 1024;
-/// At Ctrl-C, while a recording waits.
+/// Look at Ctrl-C, while a recording waits.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// A batch's result.

@@ -14,9 +14,8 @@ use super::batch::Batch;
 use super::queue::{Delivered, Queue};
 use super::target::Target;
 
-/// Until an answer.
 const LIMIT: Duration = Duration::from_secs(10);
-/// After a failure; doubles up to the longest.
+/// Wait after a failure; doubles up to the longest.
 const WAIT_MIN: Duration = Duration::from_millis(200);
 const WAIT_MAX: Duration = Duration::from_secs(5);
 /// Maximum number of bytes read from an answer.
@@ -71,7 +70,7 @@ fn write_all(agent: &Agent, target: &Target, queue: &Queue) {
     }
 }
 
-/// Until the database takes them; `None` when the time at the end is over.
+/// Writes until the database takes them; `None` when the time at the end is over.
 fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Option<Answer> {
     let mut wait = WAIT_MIN;
     loop {

@@ -19,13 +19,13 @@ use crate::source::Chunk;
 
 /// Sectors 1 and 2.
 const STORE: std::ops::Range<usize> = 16 * 1024..48 * 1024;
-/// Until the first byte: a start takes some 20 ms.
+/// Time until the first byte: a start takes some 20 ms.
 const LEAD: Ps = 30 * MS;
-/// Of a short power cut.
+/// Length of a short power cut.
 const AWAY: Ps = 100 * MS;
-/// At the end: a sector in progress waits 0.15 s (`hums_onboard::monitoring`).
+/// Wait at the end: a sector in progress waits 0.15 s (`hums_onboard::monitoring`).
 const LEAST: Ps = 2_400 * MS;
-/// Without a write on a slow card; before silence is a finding (3 s).
+/// Quiet without a write on a slow card; before silence is a finding (3 s).
 const QUIET: Ps = 200 * MS;
 const MOST: Ps = 3_000 * MS;
 /// The ports are looked after this often.
@@ -33,11 +33,11 @@ const STEP: Ps = 20 * MS;
 /// Autopilot's, and radio's until a parameter sets another.
 const BAUDS: [f64; 2] = [921_600.0, 57_600.0];
 
-/// Of the firmware's account; the first is idle.
+/// Stages of the firmware's account; the first is idle.
 const STAGES: [&str; 9] =
     ["idle", "tasks", "framer", "monitor", "encode", "observe", "summary", "tick", "storage"];
 const STAGE_CYCLES: &str = "STAGE_CYCLES";
-/// From the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
+/// Exceptions from the most urgent down (`firmware/app/src/executors.rs`; numbers: RM0090, table 62, and 16).
 const URGENCIES: [(&str, &[u16]); 7] = [
     ("watch", &[15, 17]),
     ("clock", &[44]),
@@ -180,7 +180,6 @@ impl Board {
         Ok(())
     }
 
-    /// Until all input is on the card.
     pub(super) fn settle(&mut self) -> Result<()> {
         self.run_until(self.lines[0].free.max(self.lines[1].free).max(self.chip.now()))?;
         let end = self.chip.now();
@@ -210,7 +209,7 @@ impl Board {
         }
     }
 
-    /// By program or watchdog; the first one in seconds since the first byte.
+    /// Resets by program or watchdog; the first one in seconds since the first byte.
     pub(super) fn resets(&self) -> Option<(u64, f64)> {
         let own = |(_, cause): &&Reset| matches!(cause, Cause::Software | Cause::Watchdog);
         let (at, _) = self.chip.resets.iter().find(own)?;
@@ -222,7 +221,7 @@ impl Board {
         self.load.worst
     }
 
-    /// Since the last start; `None` without the symbol.
+    /// Cycles since the last start; `None` without the symbol.
     pub(super) fn stage_cycles(&self) -> Option<serde_json::Value> {
         let symbol = self.chip.image().symbols.iter().find(|symbol| symbol.name == STAGE_CYCLES)?;
         let words = self.chip.memory(symbol.address, 8 * STAGES.len() as u32).as_chunks::<8>().0;

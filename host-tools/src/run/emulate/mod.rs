@@ -67,7 +67,6 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     finish(run, &arrivals, &ground, &report)
 }
 
-/// And the part of it on the card.
 fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     report.frames_in = traffic.frames_in;
     report.frames_logged = frames.min(traffic.frames_in);

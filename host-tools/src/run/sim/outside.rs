@@ -61,7 +61,6 @@ pub(super) struct Outside<'a, 'w> {
     pub(super) reboot_at_us: Option<u64>,
 }
 
-/// As the recorder sees it.
 pub(super) struct Slot<'a> {
     pub(super) card: &'a SimCard,
     pub(super) power_on_us: u64,

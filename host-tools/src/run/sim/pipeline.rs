@@ -23,7 +23,7 @@ use crate::source::Chunk;
 
 /// A line silent for this long will not finish its frame.
 const SILENCE: Span = Span::from_millis(20);
-/// Until storage looks for a card again.
+/// Time until storage looks for a card again.
 const NO_CARD_RETRY: Span = Span::from_millis(100);
 
 pub(super) struct Pipeline<'a, 'w> {
@@ -173,7 +173,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         Ok(true)
     }
 
-    /// Of several at once the most urgent.
+    /// The next event; of several at once the most urgent.
     fn next_event(&self) -> Option<(Instant, Event)> {
         let silence = self.silent_at.map(|at| (at, Event::Silence));
         let storage = self.storage_at.map(|at| (at, Event::Storage));
@@ -221,7 +221,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         self.send_gs()
     }
 
-    /// As much as the port had time for.
+    /// Bytes, as much as the port had time for.
     fn send_gs(&mut self) -> Result<()> {
         let mut frame = [0; FRAME_BYTES_MAX];
         while let Some(length) = self.ends.autopilot_out.take(&mut frame) {
@@ -255,7 +255,6 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         };
     }
 
-    /// At a chosen write.
     fn is_dead(&self) -> bool {
         self.outside.card.is_dead() || self.outside.flash.is_dead()
     }

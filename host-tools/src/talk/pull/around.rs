@@ -138,7 +138,7 @@ fn is_wanted(what: &Around, finding: &Finding) -> bool {
     }
 }
 
-/// With random access to sectors.
+/// A log with random access to sectors.
 struct RemoteLog<'a> {
     ftp: &'a mut Ftp,
     output: &'a Path,
@@ -153,7 +153,7 @@ struct RemoteLog<'a> {
 
 struct RemoteFile {
     name: String,
-    /// In the log; and number of sectors.
+    /// Place in the log; and number of sectors.
     first: u32,
     sectors: u32,
     partial: Option<PartialFile>,
@@ -244,7 +244,7 @@ impl<'a> RemoteLog<'a> {
         Ok(None)
     }
 
-    /// With unreadable sectors up to the place; from the log's beginning if no earlier one is readable.
+    /// The group before, with unreadable sectors up to the place; from the log's beginning if no earlier one is readable.
     fn group_before(&mut self, end: u32) -> Result<Range<u32>> {
         let mut place = end;
         while let Some(last) = place.checked_sub(1) {
@@ -256,7 +256,7 @@ impl<'a> RemoteLog<'a> {
         Ok(0..end)
     }
 
-    /// From a group that starts then or before, to one that starts later, or the end.
+    /// Places from a group that starts then or before, to one that starts later, or the end.
     fn before(&mut self, time: Instant) -> Result<Range<u32>> {
         let group = GROUP_SECTORS as u32;
         let (mut start, mut end) = (0, self.count());
@@ -273,7 +273,7 @@ impl<'a> RemoteLog<'a> {
         Ok(start..end)
     }
 
-    /// By the last clock record, microseconds since 1970.
+    /// UTC by the last clock record, microseconds since 1970.
     fn power_on_us(&mut self) -> Result<u64> {
         let last = self.group_before(self.count())?;
         let epoch_us = self.bring(last)?.ending.summary.epoch_us;
@@ -373,13 +373,11 @@ struct PartialFile {
     target: PathBuf,
     /// Downloaded sectors.
     has: Vec<bool>,
-    /// By its first sectors.
     session: Option<u32>,
     base: Option<u32>,
 }
 
 impl PartialFile {
-    /// Beside the whole file's path.
     fn begin(whole: &Path, sectors: u32, head: &[Sector]) -> Result<Self> {
         let target = part_name(whole);
         if target.symlink_metadata().is_ok() {
@@ -399,7 +397,6 @@ impl PartialFile {
         self.has.get(at as usize).is_some_and(|has| *has)
     }
 
-    /// From `at` on, at most `end`.
     fn end_of_missing(&self, at: u32, end: u32) -> u32 {
         let end = end.min(self.has.len() as u32);
         (at..end).find(|at| self.has(*at)).unwrap_or(end)

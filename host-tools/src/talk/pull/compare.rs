@@ -12,7 +12,7 @@ use super::ftp::Ftp;
 use crate::logs::board::{heading, known};
 use crate::logs::naming::{segment_name, session_name};
 
-/// Without checksums: the first sector (with the session's random number) and the last.
+/// Bytes compared without checksums: the first sector (with the session's random number) and the last.
 const SECTOR: u32 = 512;
 /// The box's record comes after at most three sectors of an earlier group.
 const HEADING_SECTORS: u32 = 8;
@@ -50,13 +50,11 @@ pub(super) fn compare(ftp: &mut Ftp, name: &str, path: &Path, bytes: u32) -> Res
 
 pub(super) struct Heading {
     pub(super) name: String,
-    /// If readable.
     pub(super) session: Option<u32>,
-    /// As far as looked at.
     pub(super) sectors: Vec<Sector>,
 }
 
-/// And the first sector's number, as far as known.
+/// Session and the first sector's number, as far as known.
 pub(super) fn beginning_of(head: &[Sector]) -> (Option<u32>, Option<u32>) {
     let headers =
         || (0..).zip(head).filter_map(|(at, sector)| Some((at, Header::read(sector.bytes()).ok()?)));

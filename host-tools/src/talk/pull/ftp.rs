@@ -155,7 +155,7 @@ impl Ftp {
         Err(silence("the board does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?"))
     }
 
-    /// Also the number of those that the card did not give.
+    /// Names and lengths, also the number of those that the card did not give.
     pub(super) fn list(&mut self) -> Result<(Vec<(String, u32)>, usize)> {
         let (mut logs, mut skipped) = (Vec::new(), 0);
         loop {
@@ -192,7 +192,7 @@ impl Ftp {
         Ok(opened.word())
     }
 
-    /// Of the first bytes (at least one), as [`hums_link::ftp::checksum`]; `None` for old firmware.
+    /// Checksum of the first bytes (at least one), as [`hums_link::ftp::checksum`]; `None` for old firmware.
     pub(super) fn checksum(&mut self, name: &str, bytes: u32) -> Result<Option<u32>> {
         let answer = self.ask(CHECKSUM, bytes, 0, format!("/{name}").as_bytes(), CHECKSUM_TRIES)?;
         match answer.opcode {

@@ -27,7 +27,7 @@ pub(super) struct LogJson {
     pub(super) is_new: bool,
     /// No fault, and a proved end if all files were requested.
     pub(super) whole: bool,
-    /// In the last file, as far as known.
+    /// The end in the last file, as far as known.
     pub(super) end: Option<EndJson>,
 }
 

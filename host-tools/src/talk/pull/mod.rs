@@ -222,7 +222,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     Ok(Some((path, true)))
 }
 
-/// Until it equals the board's; counts are bytes here and in all.
+/// Downloads until it equals the board's; counts are bytes here and in all.
 fn complete(
     ftp: &mut Ftp,
     name: &str,

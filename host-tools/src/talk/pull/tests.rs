@@ -13,7 +13,6 @@ use hums_recorder::card::SEGMENT_BYTES_MAX;
 use super::*;
 use crate::talk::tests::fake;
 
-/// As by `hums decode --format hum`.
 pub(super) fn packed(dir: &Path, name: &str) -> Vec<u8> {
     let input = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name);
     let output = dir.join(name);
@@ -107,7 +106,7 @@ fn board(log: Vec<u8>, other: Vec<u8>, mut reads: u32) -> Ftp {
     Ftp::new(client).expect("it answers")
 }
 
-/// And the name that `pull` gives the first.
+/// First sectors, and the name that `pull` gives the first.
 fn two_logs(dir: &Path) -> (Vec<u8>, Vec<u8>, String) {
     let [one, other] = ["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]
         .map(|name| packed(dir, name).get(..80 * SECTOR_BYTES).expect("a longer log").to_vec());
@@ -309,7 +308,6 @@ fn group_at(log: &[u8], second: u64) -> std::ops::Range<usize> {
     before.last().expect("it begins").0..after.first().map_or(log.len() / SECTOR_BYTES, |(place, _)| *place)
 }
 
-/// In all ways of a card.
 fn spoiled(log: &[u8], place: usize) -> Vec<Files> {
     let at = place * SECTOR_BYTES;
     let with = |sector: &[u8]| {
@@ -562,7 +560,6 @@ fn a_refusal_says_no_more_than_is_known() {
     }
 }
 
-/// Of this many groups each.
 fn files_of(log: &[u8], groups: usize) -> Files {
     let starts: Vec<usize> = (0..log.len() / SECTOR_BYTES)
         .filter(|place| {

@@ -14,7 +14,7 @@ use crate::duplex::{Duplex, Port};
 use crate::mavlink::ids::HEARTBEAT;
 use crate::talk::Client;
 
-/// To a frame: sender and packet.
+/// Answers to a frame: sender and packet.
 pub(in crate::talk) type Answers = Vec<(u8, Packet)>;
 
 struct Line {

@@ -27,7 +27,7 @@ use serde::Deserialize;
 
 use super::causes;
 
-/// Within this time before and after a crash it is that crash.
+/// A mishap within this time before and after a crash is that crash.
 const CRASH_BEFORE_S: f64 = 3.0;
 const CRASH_AFTER_S: f64 = 10.0;
 
@@ -97,7 +97,7 @@ impl Label {
             || (self.battery_low_s.is_some_and(|low_s| at_s >= low_s) && of(Subsystem::Power))
     }
 
-    /// Without version and brackets: `ArduCopter quad`.
+    /// The group without version and brackets: `ArduCopter quad`.
     pub(super) fn group(&self) -> String {
         let plain = self.vehicle.split('(').enumerate().map(|(place, part)| match part.split_once(')') {
             Some((_, rest)) if place > 0 => rest,

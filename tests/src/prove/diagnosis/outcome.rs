@@ -59,7 +59,6 @@ pub(super) struct Outcome {
     pub(super) vehicle: String,
     pub(super) class: &'static str,
     pub(super) what: String,
-    /// Without a fault.
     pub(super) air_s: f64,
     pub(super) alarms: Vec<False>,
     pub(super) fault: Option<Fault>,

@@ -18,7 +18,7 @@ const DEPTH_MAX: usize = 4;
 pub(super) struct Set {
     pub(super) name: String,
     pub(super) known: Known,
-    /// In the order of labels or names.
+    /// Flights in the order of labels or names.
     pub(super) flights: Vec<(Place, Option<Label>)>,
 }
 

@@ -439,7 +439,6 @@ impl Subject {
         Ok(written)
     }
 
-    /// In a file that was not overwritten.
     fn is_readable(&self, block: u32, wrong: &Blocks, made_room: &BTreeSet<&str>) -> bool {
         let Ok(header) = Header::read(&self.at(block, wrong)) else { return false };
         if header.session == self.session.sealed_as {
@@ -484,7 +483,7 @@ fn frames_by_session(found: &Found) -> Result<BTreeMap<u32, usize>> {
     Ok(frames)
 }
 
-/// For the card, the log, or the log after.
+/// Reported for the card, the log, or the log after.
 fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
     if found.images.iter().any(|image| !image.damage.is_empty()) {
         return Ok(true);

@@ -112,7 +112,7 @@ impl Distributions {
         symbol
     }
 
-    /// For a value that may be the first one.
+    /// The class of a value that may be the first one.
     #[inline]
     pub(super) fn class_or_first<C: Coder>(
         &mut self,

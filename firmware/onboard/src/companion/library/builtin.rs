@@ -19,7 +19,6 @@ pub(in crate::companion) enum BuiltinFile {
 }
 
 impl BuiltinFile {
-    /// With or without the directory before it.
     pub(super) fn named(path: &str) -> Option<Self> {
         match path.strip_prefix('/').unwrap_or(path) {
             "general.json" => Some(Self::General),

@@ -43,7 +43,7 @@ impl Places {
         self.download = None;
     }
 
-    /// With this many bytes read before; `None`: it is gone.
+    /// The log with this many bytes read before; `None`: it is gone.
     fn wanted(&self, id: u16, offset: u32) -> Option<Which> {
         let place = Which::At(id.saturating_sub(1));
         match self.download.filter(|download| download.id == id) {
@@ -91,7 +91,7 @@ impl List {
         (Which::At(self.next), What::Length)
     }
 
-    /// With a report if a log was left out.
+    /// The list's end, with a report if a log was left out.
     const fn end(&self) -> Step {
         if self.lacks { Step::End(Reply::LogsUnread) } else { Step::Done }
     }

@@ -112,7 +112,7 @@ impl Library {
         self.begin(asker, Kind::File(file));
     }
 
-    /// As far as answers and budget allow; returns a report of its end.
+    /// Goes on as far as answers and budget allow; returns a report of its end.
     pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();

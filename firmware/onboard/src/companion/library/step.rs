@@ -44,7 +44,6 @@ impl Out<'_, '_, '_> {
         self.say(&messages::file_transfer(system, component, payload), then)
     }
 
-    /// At this port.
     pub(super) fn file_data_max(&self) -> usize {
         self.ways.bulk_frame_max(self.asker.port).saturating_sub(FTP_FRAME).max(FTP_DATA_MIN)
     }

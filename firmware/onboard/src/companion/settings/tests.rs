@@ -47,7 +47,7 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
     run_with(&text(), cause, ticks_an_answer, comes)
 }
 
-/// On a card that answers every `ticks_an_answer`.
+/// The text on a card that answers every `ticks_an_answer`.
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let is = |params: &Params, param, value: f32| params.get(param).to_bits() == value.to_bits();
     after(text, cause, ticks_an_answer, comes, |monitor| {

@@ -103,12 +103,11 @@ fn each_check_is_judged_or_says_why_not() {
     assert_eq!(named, VOCABULARY.iter().chain(&WORDS).filter(meant).count());
 }
 
-/// At 30 m, disarmed at 20 s; falls or stays.
+/// A flight at 30 m, disarmed at 20 s; falls or stays.
 fn disarmed_high(falls: bool) -> Judged {
     disarmed_high_with(falls, None)
 }
 
-/// With this source of arming.
 fn disarmed_high_with(falls: bool, arming: Option<&str>) -> Judged {
     use crate::source::item::Fact;
     use hums_core::observation::GlobalPosition;
@@ -218,7 +217,6 @@ fn cells_that_nothing_tells_in_the_air_are_said_and_no_check_of_their_voltage_co
     );
 }
 
-/// Only the box's record has it.
 #[test]
 fn the_worst_value_of_a_check_of_the_box_is_that_of_its_record() {
     use hums_blackbox::record::Exceedance;

@@ -13,7 +13,7 @@ use crate::source::doubt::ASKED;
 /// More than [`ASKED`] of the longest messages, all definitions of today, some damage, and a second of the
 /// oldest logs, in which only GPS messages have times.
 pub(super) const AHEAD_BYTES: usize = 256 * 1_024;
-/// Without a message, the rest is erased memory.
+/// Bytes without a message: then the rest is erased memory.
 const ERASED_BYTES: usize = 4 * 1_024;
 /// Fields of a line that are looked at.
 const VALUES_MAX: usize = 32;

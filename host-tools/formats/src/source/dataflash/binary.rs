@@ -229,7 +229,7 @@ fn searched(rest: &[u8], ended: bool) -> &[u8] {
     rest.get(..limit).unwrap_or(rest)
 }
 
-/// At least one; none begins a message with another after it.
+/// Bytes, at least one, of which none begins a message with another after it.
 fn none(within: &[u8], rest: &[u8], ended: bool, lengths: &Lengths) -> usize {
     let mut at = 1;
     while let Some(found) = within.get(at..).and_then(|rest| rest.iter().position(|byte| *byte == HEAD[0])) {

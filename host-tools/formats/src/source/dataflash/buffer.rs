@@ -6,7 +6,7 @@ use crate::source::stream::read_some;
 
 /// First touches of pages cost a small log more than its messages.
 const CHUNK_BYTES: usize = 64 * 1024;
-/// Beyond a small request: the rest is not moved for each chunk.
+/// Bytes beyond a small request: the rest is not moved for each chunk.
 const MORE_BYTES: usize = 256 * 1024;
 
 pub(super) struct Buffer<R> {
@@ -48,14 +48,12 @@ impl<R: Read> Buffer<R> {
         self.take_before(bytes).0
     }
 
-    /// Also the buffered bytes after them.
     pub(super) fn take_before(&mut self, bytes: usize) -> (&[u8], &[u8]) {
         let start = self.at;
         self.at += bytes;
         (self.bytes.get(start..self.at).unwrap_or_default(), self.rest())
     }
 
-    /// Or the file ends.
     pub(super) fn fill(&mut self, wanted: usize) -> io::Result<()> {
         if self.ended || self.rest().len() >= wanted {
             return Ok(());

@@ -41,7 +41,6 @@ pub(super) struct When {
     pub(super) boot_us: Option<u64>,
     /// Validity of its own time.
     pub(super) own: Own,
-    /// By messages of this type.
     pub(super) stands: bool,
 }
 

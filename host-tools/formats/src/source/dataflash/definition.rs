@@ -6,7 +6,6 @@ use super::message::Message;
 /// 64 characters in a binary log; a text log may have been made of several.
 const DEFINITION_CHARACTERS_MAX: usize = 256;
 
-/// If it is an FMT.
 pub(super) fn definition(message: &Message<'_>) -> Option<Format> {
     let format = message.format();
     if format.role != Role::Fmt {

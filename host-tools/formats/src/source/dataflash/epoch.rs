@@ -1,6 +1,5 @@
 //! UTC at the log's time zero, by the autopilot's GPS.
 
-/// Beyond the receiver's delay.
 const DIFFERS_US: u64 = 1_500_000;
 
 #[derive(Clone, Copy, Debug, Default)]

@@ -16,7 +16,6 @@ pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES]
 /// The format string has 16 characters.
 const FIELDS_MAX: usize = 16;
 
-/// By format character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FieldKind {
     /// `b`
@@ -144,7 +143,7 @@ pub(super) struct Format {
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
-    /// By the fields, if it differs.
+    /// Length by the fields, if it differs.
     pub(super) fields_length: Option<u8>,
     /// Unreadable parts, until reported.
     odd: Option<String>,
@@ -255,7 +254,7 @@ impl Format {
     }
 }
 
-/// Before 2015 a GPS message's `TimeMS` is the time of week, and `T` the time since power-on.
+/// Time field: before 2015 a GPS message's `TimeMS` is the time of week, and `T` the time since power-on.
 fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
     let at = |label: &str, kinds: &[FieldKind]| {
         let found = fields.iter().position(|field| field.name == label && kinds.contains(&field.kind))?;
@@ -335,7 +334,7 @@ impl Formats {
         self.get(self.newest?)
     }
 
-    /// For a second reading: units and the clock are kept, messages are not.
+    /// State for a second reading: units and the clock are kept, messages are not.
     pub(super) fn begun_again(self) -> Self {
         let Self { units, unit_names, multipliers, has_boot_clock, .. } = self;
         Self { units, unit_names, multipliers, has_boot_clock, ..Self::new() }

@@ -60,7 +60,6 @@ impl<'a> Message<'a> {
         Some(single).filter(|single| single.is_finite())
     }
 
-    /// In a text log.
     pub(super) fn no_number(&self, column: usize) -> Option<&'a str> {
         match self.body {
             Body::Bytes(_) => None,
@@ -72,7 +71,6 @@ impl<'a> Message<'a> {
         matches!(self.body, Body::Words(_))
     }
 
-    /// Also behind a zero.
     pub(super) fn bytes(&self, column: usize) -> Option<&'a [u8]> {
         let field = self.field(column)?;
         match (self.body, field.kind) {

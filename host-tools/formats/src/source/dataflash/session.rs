@@ -37,11 +37,11 @@ pub(super) struct First {
     state: State,
     clock: Clock,
     handlers: Handlers,
-    /// By type: the next messages have no such facts either.
+    /// Types without such facts: the next messages have none either.
     idle: Vec<bool>,
     begins_us: Option<u64>,
     timed: bool,
-    /// Of a text log, before its first message.
+    /// Firmware of a text log, before its first message.
     banner: Option<String>,
 }
 
@@ -117,7 +117,7 @@ impl First {
     }
 }
 
-/// Also if only the receiver's.
+/// Whether it has a time, also if only the receiver's.
 fn tells_time(format: &Format) -> bool {
     format.time.is_some() || format.name == "GPS"
 }
@@ -127,7 +127,7 @@ fn begins_a_log(formats: &Formats, kind: u8, body: Body<'_>) -> bool {
     fmt.is_some_and(|format| is_of_itself(&Message::new(format, body)))
 }
 
-/// And its name until now.
+/// The type, and its name until now.
 fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String)> {
     let format = formats.get(kind).filter(|format| format.role == Role::Fmt)?;
     let of = u8::try_from(Message::new(format, body).unsigned(0)?).ok()?;
@@ -170,7 +170,7 @@ pub(super) struct Session<'w> {
     clock: Clock,
     handlers: Handlers,
     tables: Tables,
-    /// By type; unknown after a definition.
+    /// Needed types; unknown after a definition.
     needed: Vec<Option<bool>>,
     /// Messages and bytes by type, and by former names.
     counts: Vec<(u64, u64)>,
@@ -178,13 +178,11 @@ pub(super) struct Session<'w> {
     epoch: Epoch,
     firmware: String,
     rows_refused: bool,
-    /// Without a certain time: from the next certain one on.
+    /// Changes without a certain time: from the next certain one on.
     later: Option<Standing>,
     wrong: Wrong,
     pace: Pace,
-    /// Since a time was looked at.
     unpaced: u64,
-    /// In the present log.
     timed: bool,
     joints: u32,
 }
@@ -222,7 +220,6 @@ impl<'w> Session<'w> {
         self.is_timed() && begins_a_log(&self.formats, kind, body)
     }
 
-    /// In the present log.
     pub(super) const fn is_timed(&self) -> bool {
         self.timed && self.joints < JOINTS_MAX
     }
@@ -254,7 +251,6 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Before the first message.
     pub(super) fn tell_banner(&mut self, take: &mut Take<'_>) -> Result<()> {
         if self.firmware.is_empty() {
             return Ok(());
@@ -342,7 +338,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// At a type's first message: autopilots define messages wrongly that they never write.
+    /// Faults at a type's first message: autopilots define messages wrongly that they never write.
     fn tell_odd(&mut self, kind: u8, place: u64, take: &mut Take<'_>) -> Result<()> {
         match self.formats.take_odd(kind) {
             Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),
@@ -361,7 +357,6 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// And the autopilot's periodic reports.
     fn say(
         &mut self,
         (kind, body): (u8, Body<'_>),
@@ -469,7 +464,7 @@ impl<'w> Session<'w> {
         Some(table)
     }
 
-    /// Once, after too many definitions.
+    /// Reports once, after too many definitions.
     fn refuse_rows(&mut self, kind: u8, take: &mut Take<'_>) -> Result<()> {
         if std::mem::replace(&mut self.rows_refused, true) {
             return Ok(());

@@ -6,7 +6,6 @@ use crate::source::clock::Stamp;
 
 const WEEK_US: u64 = 7 * 86_400 * 1_000_000;
 
-/// To times since the first one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Week {
     first_us: Option<u64>,
@@ -39,7 +38,6 @@ pub(super) fn stamp(
     Some(Stamp { us, series: usize::from(message.format().kind) })
 }
 
-/// If the log has no other clock.
 pub(super) fn week_us(message: &Message<'_>, formats: &Formats) -> Option<u64> {
     let format = message.format();
     if formats.has_boot_clock || format.name != "GPS" {

@@ -7,12 +7,11 @@ use super::format::{ARRAY_LENGTH, FieldKind, Format};
 use super::message::Message;
 use crate::source::item::{Column, Columns, Kind, Table, Value};
 
-/// Of one name: a file may redefine it for ever.
+/// Tables of one name: a file may redefine it for ever.
 const VERSIONS_MAX: usize = 16;
 /// Of 256 types with changing definitions. Each is a Parquet file, with some 16 KiB of memory until its end.
 const TABLES_MAX: usize = 1_024;
 
-/// By message name.
 #[derive(Debug, Default)]
 pub(super) struct Tables {
     by_name: BTreeMap<String, Vec<Arc<Table>>>,

@@ -17,7 +17,7 @@ pub(super) struct Line<'a> {
     pub(super) bytes: u64,
     /// Invalid UTF-8 is read as ISO 8859-1.
     pub(super) words: Cow<'a, str>,
-    /// Only the last line may lack an end.
+    /// A line's end, which only the last line may lack.
     pub(super) whole: bool,
     /// Buffered after it.
     pub(super) after: &'a [u8],

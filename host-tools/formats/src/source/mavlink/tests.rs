@@ -115,7 +115,7 @@ fn clock_of(times: &[(u64, u64)]) -> String {
     clock_of_tenths(&tenths).0
 }
 
-/// In tenths, with the last one's time.
+/// A clock in tenths, with the last one's time.
 fn clock_of_tenths(times: &[(u64, u64)]) -> (String, u64) {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let record = |(recorded, boot): &(u64, u64)| {
@@ -296,7 +296,7 @@ fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_l
     assert!(times.len() == 3 && times[2] < 20 && restarts == 0, "no autopilot says so: {times:?}");
 }
 
-/// Also power-ons and recordings that begin there.
+/// Gaps, also power-ons and recordings that begin there.
 fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
     let mut told = Vec::new();
@@ -341,7 +341,7 @@ fn another_raw_recording_that_was_joined_on_is_told_from_a_restart() {
     assert_eq!(told_raw([attitudes(60..100), attitudes(3..40)].concat()), ["restart"]);
 }
 
-/// On for 60 to 260 s, ten a second, at times made of the passed seconds.
+/// Attitudes after 60 to 260 s, ten a second, at times made of the passed seconds.
 fn ten_a_second(recorded: impl Fn(f64) -> u64) -> Vec<u8> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let record = |tenth: u64| {

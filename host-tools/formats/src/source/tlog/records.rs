@@ -14,7 +14,7 @@ const BUFFER_BYTES: usize = 64 * 1024;
 const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
 /// Records that confirm a time, behind damage as well.
 const AHEAD_BYTES: usize = 256 * 1024;
-/// Without a record, the rest is not the log's.
+/// Bytes without a record: the rest is not the log's.
 const NOTHING_BYTES: usize = 64 * 1024;
 
 /// Earlier times count from a power-on.
@@ -61,7 +61,6 @@ impl<R: Read> Records<R> {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// Also whether no more follow.
     pub(in crate::source) fn times_after(&self) -> (Vec<u64>, bool) {
         let mut times = Vec::with_capacity(ASKED);
         let is_end = self.each_after(&mut |time_us, _| {
@@ -171,7 +170,7 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     counts.then_some((time_us, length))
 }
 
-/// After the frame's first byte.
+/// A record after the frame's first byte.
 fn has_record_in(frame: &[u8]) -> bool {
     (1..frame.len()).any(|at| {
         let record = frame.get(at..).unwrap_or_default();

@@ -41,7 +41,7 @@ struct Beside {
     /// Least lead over the autopilot's time.
     ahead_us: i64,
     stands: bool,
-    /// By the autopilot's clock alone, and its beginning.
+    /// Time by the autopilot's clock alone, and its beginning.
     passed_us: u64,
     began: Option<(Instant, u64)>,
 }

@@ -20,7 +20,7 @@ pub(super) fn slots(layout: &Layout, fields: &str) -> Vec<Option<Slot>> {
     fields.split(' ').map(slot).collect()
 }
 
-/// By place in `Topic::fields`.
+/// Values by place in `Topic::fields`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fields<'a> {
     slots: &'a [Option<Slot>],

@@ -65,7 +65,7 @@ impl Number {
         }
     }
 
-    /// As many bytes as the type has; the code of a character.
+    /// A value of as many bytes as the type has; the code of a character.
     pub(super) fn value(self, bytes: &[u8]) -> Option<Value<'static>> {
         Some(match self {
             Self::U8 | Self::Char => Value::Unsigned(u64::from(*bytes.first()?)),
@@ -83,7 +83,6 @@ impl Number {
     }
 }
 
-/// Or an array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Field {
     /// `esc[3].esc_rpm`, with the definitions around it.
@@ -103,7 +102,7 @@ pub(super) struct Layout {
     pub(super) fields: Vec<Field>,
     /// Bytes of its data.
     pub(super) bytes: usize,
-    /// Without padding at the end, which a writer leaves out.
+    /// Bytes without padding at the end, which a writer leaves out.
     pub(super) least_bytes: usize,
     /// Place of its time.
     pub(super) timestamp: Option<u32>,
@@ -309,7 +308,7 @@ pub(super) fn typed(text: &str) -> Option<((&str, Option<u32>), &str)> {
     split(text).filter(|(_, name)| is_name(name))
 }
 
-/// As [`typed`], for names with spaces (`char[11] Build Date`).
+/// A key as [`typed`], for names with spaces (`char[11] Build Date`).
 pub(super) fn typed_key(text: &str) -> Option<((&str, Option<u32>), &str)> {
     split(text).filter(|(_, name)| name.split(' ').all(is_name))
 }

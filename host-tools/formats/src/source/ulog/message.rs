@@ -13,7 +13,7 @@ pub(super) const MESSAGE_BYTES_MAX: usize = HEADER_BYTES + u16::MAX as usize;
 /// Magic, version, start of logging.
 pub(super) const FILE_HEADER_BYTES: usize = 16;
 pub(super) const MAGIC: [u8; 7] = [b'U', b'L', b'o', b'g', 0x01, 0x12, 0x35];
-/// Of the format's version in the header; PX4 writes 1, and wrote 0 before v1.8.
+/// Place of the format's version in the header; PX4 writes 1, and wrote 0 before v1.8.
 pub(super) const VERSION_AT: usize = MAGIC.len();
 pub(super) const VERSION_MAX: u8 = 1;
 /// In a search, other than data: checking 65,536 bytes for each byte would take seconds a megabyte.
@@ -87,7 +87,7 @@ impl<'a> Keyed<'a> {
     }
 }
 
-/// Up to the first NUL or invalid UTF-8 byte.
+/// Text up to the first NUL or invalid UTF-8 byte.
 pub(super) fn words(bytes: &[u8]) -> &str {
     let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
     bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid())
@@ -111,7 +111,6 @@ pub(super) struct Parser<'a> {
 }
 
 enum Belief<'a> {
-    /// Not made by chance.
     Sure(Message<'a>),
     /// It could be one, if the next one is.
     Likely(Message<'a>),
@@ -307,7 +306,6 @@ impl<'a> Iterator for DataAfter<'a> {
     }
 }
 
-/// In a file's header.
 pub(super) fn beginning(rest: &[u8]) -> Option<(u8, u64)> {
     let header = rest.first_chunk::<FILE_HEADER_BYTES>()?;
     header.starts_with(&MAGIC).then(|| (header[VERSION_AT], word(header.get(8..))))

@@ -45,7 +45,6 @@ pub(super) fn table_name(layout: &Layout) -> String {
     if is_taken { format!("topic_{name}") } else { name }
 }
 
-/// As many as columns.
 pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<Value<'a>> {
     let mut values = Vec::with_capacity(layout.fields.len() + 1);
     values.push(Value::Unsigned(u64::from(instance)));

@@ -117,7 +117,6 @@ struct Session<'a, 'b> {
     information: BTreeMap<&'static str, String>,
     told_facts: bool,
     told_hard_fault: bool,
-    /// To be read, in order.
     appended: Vec<u64>,
     /// The present log's place.
     base: u64,
@@ -126,7 +125,6 @@ struct Session<'a, 'b> {
     /// A topic and a logged string may repeat it.
     last_words: String,
     wrong: Wrong,
-    /// For further jumps of the time.
     asked_left: usize,
     pace: Pace,
 }
@@ -268,7 +266,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.gap(Cause::Damaged, Some(beginning + VERSION_AT as u64), 1, words)
     }
 
-    /// By the format unknown flags must be refused.
+    /// Unknown flags: by the format they must be refused.
     fn flags(&mut self, place: u64, incompatible: [u8; 8], appended: [u64; 3]) -> Result<()> {
         let unknown: Vec<String> = incompatible
             .iter()
@@ -432,7 +430,7 @@ impl<'a, 'b> Session<'a, 'b> {
         self.clock.recorded_us().unwrap_or(0)
     }
 
-    /// If its first data begin then; `true` if another log came before.
+    /// A log begins, if its first data begin then; `true` if another log came before.
     fn begin(&mut self, place: u64, time_us: u64, first: &[u64], is_end: bool) -> bool {
         let (time_us, is_wrong) = clock::beginning(time_us, first, is_end);
         let again = self.clock.begin_log(time_us);
@@ -474,7 +472,7 @@ impl<'a, 'b> Session<'a, 'b> {
         }
     }
 
-    /// From the autopilot's boot to time zero.
+    /// UTC from the autopilot's boot to time zero.
     fn epoch(&mut self, boot_us: i128) -> Result<()> {
         let zero_us = i128::from(self.recorded()) - i128::from(self.clock.now().as_micros());
         match u64::try_from(boot_us + zero_us) {

@@ -94,7 +94,7 @@ fn one_wrong_time_is_damage_and_changes_no_other_time() {
     assert_eq!(log(&after), (0, None, end + 5 * SECOND));
 }
 
-/// From 60 s on: old values of every third topic, then all every 20 ms.
+/// A log from 60 s on: old values of every third topic, then all every 20 ms.
 fn beginning(wrong: impl Fn(usize, u64) -> u64) -> Vec<u8> {
     let mut writer = Writer::new(60 * SECOND).format(POSITION);
     for id in 0..20 {

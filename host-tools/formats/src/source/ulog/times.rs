@@ -13,11 +13,11 @@ pub(super) const RULES: Rules =
     Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
 /// Definitions come before data, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
-/// After a jump, damage too.
+/// Bytes after a jump, damage too.
 pub(super) const AHEAD_BYTES: usize = 256 * 1024;
 /// Longer than any message: the rest is erased memory.
 const NOTHING_BYTES: usize = 2 * MESSAGE_BYTES_MAX;
-/// For all jumps together: a hostile file could ask for all of it each time.
+/// Bytes for all jumps together: a hostile file could ask for all of it each time.
 pub(super) const ASKED_BYTES: usize = 64 * 1024 * 1024;
 /// Looked at after one.
 const MESSAGES_MAX: usize = 1_024;
@@ -82,7 +82,6 @@ pub(super) fn first(bytes: &[u8]) -> Vec<u64> {
     messages.filter_map(time).take(4 * BEGINNING_ASKED).collect()
 }
 
-/// After the header.
 pub(super) fn first_in<R: Read>(window: &mut Window<R>) -> Vec<u64> {
     let times = first(window.rest());
     if times.len() >= BEGINNING_ASKED || window.ended() {

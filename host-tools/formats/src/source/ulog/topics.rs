@@ -24,11 +24,9 @@ const OTHERS: &str = "others";
 pub(super) struct Subscription {
     pub(super) layout: Arc<Layout>,
     pub(super) instance: u8,
-    /// With its fields' places.
     pub(super) topic: Option<(&'static Topic, Vec<Option<Slot>>)>,
     /// If rows are wanted.
     pub(super) table: Option<Arc<Table>>,
-    /// Of the last observed message.
     pub(super) observed_us: Option<u64>,
     count: u64,
     bytes: u64,

@@ -39,12 +39,11 @@ impl<R: Read> Window<R> {
         self.ended
     }
 
-    /// Once.
     pub(super) fn take_trouble(&mut self) -> Option<io::Error> {
         self.trouble.take()
     }
 
-    /// Until the rest is this long, or the input ends.
+    /// Reads until the rest is this long, or the input ends.
     pub(super) fn fill(&mut self, bytes: usize) {
         if self.rest().len() >= bytes || self.ended {
             return;

@@ -10,7 +10,7 @@ use hums_recorder::CardState;
 
 use super::Pipeline;
 
-/// At the end, for a card that is out.
+/// Wait at the end, for a card that is out.
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
 impl Pipeline<'_, '_> {
@@ -41,7 +41,7 @@ impl Pipeline<'_, '_> {
         Ok(self.ends.sectors_out.abandon())
     }
 
-    /// As fast as the store takes it.
+    /// Saves as fast as the store takes it.
     fn save_all(&mut self) {
         self.monitoring.save_signing(self.now, &mut self.handover);
         while !self.handover.finish(self.now, self.monitoring.monitor_mut()) && !self.is_dead() {

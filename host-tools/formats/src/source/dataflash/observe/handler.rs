@@ -120,7 +120,6 @@ impl Given<'_> {
         kind.is_some_and(FieldKind::is_integer)
     }
 
-    /// By column, otherwise by name.
     pub(super) fn instance(&self, slot: usize) -> u8 {
         self.byte(slot).unwrap_or(self.base)
     }

@@ -29,11 +29,11 @@ const FIX_2D: u8 = 2;
 const FIX_3D: u8 = 3;
 /// A week of the receiver's time.
 const WEEK_MS: u64 = 7 * 86_400_000;
-/// Of values in one MAVLink message.
+/// Ages of values in one MAVLink message.
 const TOGETHER: Span = Span::from_secs(2);
-/// Of a shock: below its lowest limit, above nearly all flights' forces.
+/// Force of a shock: below its lowest limit, above nearly all flights' forces.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
-/// Between sensors, in one shock.
+/// Time between sensors, in one shock.
 const AT_ONCE: Span = Span::from_millis(100);
 /// Larger angles are invalid.
 const TURN_DEG: f32 = 360.0;
@@ -84,7 +84,7 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));
 }
 
-/// Without the estimator's position the first place holds the receiver's: the second does not count either.
+/// Second estimate: without the estimator's position the first place holds the receiver's, so the second does not count either.
 fn second_estimate(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let angles =
         given.singles(0).filter(|angles: &[f32; 3]| angles.iter().all(|angle| angle.abs() <= TURN_DEG));
@@ -222,7 +222,7 @@ fn time(state: &mut State, given: &Given<'_>, fix: u8, out: &mut Out<'_>) {
     }
 }
 
-/// Before 2015 there is no POS: receiver's position, barometer's height.
+/// Position before 2015, without POS: receiver's position, barometer's height.
 fn position_of_gnss(state: &mut State, given: &Given<'_>, gnss: &Gnss, out: &mut Out<'_>) {
     let Some(Metres(altitude)) = gnss.altitude else { return };
     let first = *state.first_altitude.get_or_insert(altitude);
@@ -378,7 +378,7 @@ fn estimator(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     }));
 }
 
-/// Since 4.1 by sensor; `VIBRATION` has the first one's levels and all clips.
+/// Vibration, since 4.1 by sensor; `VIBRATION` has the first one's levels and all clips.
 fn vibration(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let count = |slot: usize| given.unsigned(slot).and_then(|count| u32::try_from(count).ok());
     let instance = usize::from(given.byte(0).unwrap_or(0));

@@ -83,7 +83,7 @@ pub(super) enum ToldArming {
     /// Nowhere, as far as the file is known.
     #[default]
     Nowhere,
-    /// In the file's first part; the first message's value.
+    /// A value in the file's first part; the first message's value.
     First(bool),
     /// Before the last power-on that the file holds.
     Before,
@@ -96,7 +96,7 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) craft: Craft,
     /// `FRAME_CLASS`
     pub(super) frame_class: Option<u8>,
-    /// By `MOT`, without `FRAME_CLASS`.
+    /// Motors by `MOT`, without `FRAME_CLASS`.
     pub(super) motors: Option<u8>,
     /// `Q_ENABLE` or `Q_AVAILABLE`.
     pub(super) quadplane: bool,
@@ -139,7 +139,7 @@ pub(in crate::source::dataflash) struct State {
     pub(super) arming: Arming,
     pub(super) landed: LandedState,
     pub(super) mode: u32,
-    /// In force, a bit for each subsystem of ERR.
+    /// Failsafes in force, a bit for each subsystem of ERR.
     pub(super) failsafes: u64,
     pub(super) load: Dated<f32>,
     pub(super) voltage: Dated<f32>,
@@ -156,7 +156,7 @@ pub(in crate::source::dataflash) struct State {
     pub(super) has_inertial: bool,
     /// Accuracy by receiver.
     pub(super) accuracy: [Dated<Metres>; INSTANCES],
-    /// By compass, until an inertial sensor's observation takes it along.
+    /// Fields by compass, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; INSTANCES],
     /// Estimator's north, east, down.
     pub(super) velocity: Dated<[f32; 3]>,
@@ -432,7 +432,7 @@ impl State {
         })
     }
 
-    /// With `MAV_TYPE`; `None` for other senders.
+    /// The kind with `MAV_TYPE`; `None` for other senders.
     fn kind(&self) -> Option<(VehicleKind, u8)> {
         let Facts { craft, frame_class, motors, quadplane, quadplane_type, .. } = self.facts;
         Some(match craft {

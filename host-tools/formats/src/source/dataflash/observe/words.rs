@@ -40,7 +40,7 @@ impl Craft {
         })
     }
 
-    /// By `SYSID_SW_TYPE`, before 2019 (`k_software_type`).
+    /// Software by `SYSID_SW_TYPE`, before 2019 (`k_software_type`).
     pub(super) const fn of_software(number: u8) -> Option<Self> {
         Some(match number {
             0 => Self::Plane,
@@ -52,7 +52,7 @@ impl Craft {
         })
     }
 
-    /// By VER's build number (`APM_BUILD_*`).
+    /// Software by VER's build number (`APM_BUILD_*`).
     pub(super) const fn of_build(number: u8) -> Option<Self> {
         Some(match number {
             1 => Self::Rover,
@@ -92,7 +92,6 @@ impl Craft {
         self.modes().find(|(known, _)| *known == number).map(|(_, name)| name)
     }
 
-    /// By a text log's name.
     pub(super) fn mode_number(self, name: &str) -> Option<u32> {
         let plain = |name: &str| name.chars().filter(char::is_ascii_alphanumeric).collect::<String>();
         let name = plain(name).to_ascii_uppercase();
@@ -223,7 +222,6 @@ pub(super) const CRASH_CHECK: u8 = 12;
 /// The estimator failed in flight.
 const EKF_FAILSAFE: u8 = 17;
 
-/// Or an emergency.
 pub(super) fn is_failsafe(subsystem: u8) -> bool {
     row(subsystem).is_some_and(|(.., is_failsafe)| *is_failsafe)
 }

@@ -19,7 +19,7 @@ use crate::source::recording::Place;
 /// Check, instance, level, seconds since the autopilot's power-on.
 type Change = (&'static str, u8, Level, f64);
 
-/// And the recording's beginning, seconds since power-on.
+/// Findings, and the recording's beginning, seconds since power-on.
 fn findings(name: &str) -> (Vec<Change>, f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/labelled").join(name);
     let recording = Place::file(&path).open().expect("a recording");
@@ -56,7 +56,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
     (changes, begins_s)
 }
 
-/// Not the link, not the recording's end.
+/// Findings not of the link, nor of the recording's end.
 fn is_of_vehicle((check, _, level, _): &Change) -> bool {
     *level != Level::Stale && !matches!(*check, "heartbeat" | "frames_lost")
 }

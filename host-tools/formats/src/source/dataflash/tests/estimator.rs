@@ -6,7 +6,6 @@ use hums_core::observation::Observation;
 
 use super::seen;
 
-/// In a log of 2014.
 fn figures(uses: u8) -> usize {
     let mut log = "ArduPlane V3.1.2beta1 (834f90e8)\n\
         FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\

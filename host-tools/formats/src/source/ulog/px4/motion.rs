@@ -11,7 +11,7 @@ use hums_core::units::{
 
 use super::state::{FAST_US, Home, Local, MEDIUM_US, Px4, Sample, Topic, topic};
 
-/// Of a shock: below its lowest limit, above nearly all flights' forces.
+/// Force of a shock: below its lowest limit, above nearly all flights' forces.
 const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 
 const VEHICLE_IMU: &str = "delta_velocity delta_velocity_dt delta_angle delta_angle_dt";
@@ -96,7 +96,7 @@ pub(super) const TOPICS: &[Topic] = &[
     topic("vehicle_imu_status", 3, 0, VEHICLE_IMU_STATUS, imu_status),
 ];
 
-/// With the compass of the same number, as in MAVLink.
+/// A sensor with the compass of the same number, as in MAVLink.
 fn inertial(px4: &mut Px4, instance: u8, acceleration: Option<[f32; 3]>, rate: Option<[f32; 3]>) {
     let field = px4.motion.fields.get_mut(usize::from(instance)).and_then(Option::take);
     px4.observe(Observation::Imu(Imu {
@@ -129,7 +129,6 @@ fn is_due(px4: &mut Px4, sample: &Sample<'_>) -> bool {
     false
 }
 
-/// Over a time in microseconds.
 fn other_imu(px4: &mut Px4, sample: &Sample<'_>) {
     let over = |delta: usize, dt: usize| {
         let dt_s = sample.fields.finite(dt).map(|us| us / 1e6).filter(|dt_s| *dt_s > 0.0)?;
@@ -177,7 +176,7 @@ fn air(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// From north, east, down to the body; real part first.
+/// Rotation from north, east, down to the body; real part first.
 fn attitude(px4: &mut Px4, sample: &Sample<'_>) {
     let Some([w, x, y, z]) = sample.fields.vector::<4>(0) else { return };
     let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
@@ -197,7 +196,7 @@ fn attitude(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// Beside an attitude setpoint: some modes lack one of the two.
+/// Age of rates beside an attitude setpoint: some modes lack one of the two.
 const RATES_AGE_US: u64 = 500_000;
 
 fn attitude_setpoint(px4: &mut Px4, sample: &Sample<'_>) {
@@ -276,7 +275,7 @@ pub(super) fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Pos
     (valid && !nowhere).then_some(Position { latitude_deg, longitude_deg })
 }
 
-/// Before the flag existed, any home is valid.
+/// Home: before the flag existed, any is valid.
 fn home(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let valid = fields.get(2).is_none_or(|flag| flag != 0.0);
@@ -341,7 +340,7 @@ fn test_ratios(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// Without `estimator_status`, as far as known.
+/// Flags without `estimator_status`, as far as known.
 fn estimator_flags(px4: &mut Px4, sample: &Sample<'_>) {
     const ATTITUDE: u16 = 1;
     const CONST_POS_MODE: u16 = 1 << 7;

@@ -13,7 +13,7 @@ pub(in crate::source::ulog) struct Topic {
     pub(in crate::source::ulog) instances: u8,
     /// Least microseconds between two messages.
     pub(in crate::source::ulog) every_us: u64,
-    /// Of all versions, with spaces between.
+    /// Fields of all versions, with spaces between.
     pub(in crate::source::ulog) fields: &'static str,
     pub(in crate::source::ulog) take: fn(&mut Px4, &Sample<'_>),
 }
@@ -33,7 +33,7 @@ pub(in crate::source::ulog) struct Sample<'a> {
     pub(in crate::source::ulog) at: Instant,
     /// Microseconds since the autopilot's boot.
     pub(in crate::source::ulog) recorded_us: u64,
-    /// From before the log, or long before the latest message.
+    /// A value from before the log, or long before the latest message.
     pub(in crate::source::ulog) is_old: bool,
     pub(in crate::source::ulog) instance: u8,
     pub(in crate::source::ulog) fields: Fields<'a>,
@@ -67,9 +67,9 @@ pub(in crate::source::ulog) enum Report {
     Failsafes(String),
 }
 
-/// Of a fast topic: the monitor's step (`hums_core::monitor::TICK`), and the board's rate of `HIGHRES_IMU`.
+/// Interval of a fast topic: the monitor's step (`hums_core::monitor::TICK`), and the board's rate of `HIGHRES_IMU`.
 pub(super) const FAST_US: u64 = 50_000;
-/// Of slow values; the board requests 1 to 5 a second.
+/// Interval of slow values; the board requests 1 to 5 a second.
 pub(super) const MEDIUM_US: u64 = 100_000;
 
 #[derive(Debug, Default)]
@@ -147,7 +147,7 @@ pub(super) struct Motion {
     pub(super) rate: Option<[f32; 3]>,
     /// Setpoints of roll and pitch, and when, microseconds.
     pub(super) rates_wanted: Option<(u64, [RadiansPerSecond; 3])>,
-    /// By compass, until an inertial sensor's observation takes it along.
+    /// Fields by compass, until an inertial sensor's observation takes it along.
     pub(super) fields: [Option<[Gauss; 3]>; 3],
     pub(super) local: Option<Local>,
     pub(super) home: Option<Home>,
@@ -159,7 +159,7 @@ pub(super) struct Motion {
     pub(super) motors: Option<f32>,
     /// The log has `estimator_status`.
     pub(super) estimator_status: bool,
-    /// As far as `estimator_status_flags` has them.
+    /// Flags as far as `estimator_status_flags` has them.
     pub(super) estimator_flags: u16,
     pub(super) estimator: u8,
     pub(super) accelerometer: Option<u64>,

@@ -62,7 +62,6 @@ impl System {
         self.status.is_some_and(|status| status.arming == ARMED)
     }
 
-    /// Until v1.13.
     pub(super) fn sensors(&self) -> Option<Sensors> {
         self.status?.sensors
     }
@@ -101,7 +100,6 @@ impl System {
         })
     }
 
-    /// As in PX4's stream.
     fn state(&self, status: Status) -> u8 {
         if self.terminated || (self.stopped && !status.hil) || status.nav == 13 {
             return TERMINATION;
@@ -271,7 +269,7 @@ fn radio(px4: &mut Px4, sample: &Sample<'_>) {
     }));
 }
 
-/// Until v1.8 `telemetry_status`, which links without a radio have too.
+/// The radio: until v1.8 `telemetry_status`, which links without a radio have too.
 fn telemetry(px4: &mut Px4, sample: &Sample<'_>) {
     if sample.fields.byte(0).is_some_and(|rssi| rssi > 0) {
         radio(px4, sample);

@@ -81,7 +81,7 @@ impl Writer {
     }
 }
 
-/// As texts: comparable and readable.
+/// Items as texts: comparable and readable.
 #[derive(Debug, Default)]
 pub(in crate::source::ulog) struct Read {
     pub(in crate::source::ulog) items: Vec<(u64, String)>,
