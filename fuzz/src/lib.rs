@@ -13,10 +13,9 @@
 //!    everything else. It gives any bytes to the reader, for instance a file's contents ([`file::with_file`] makes a file of
 //!    them), and asserts its rules. A panic of the reader itself needs no assertion.
 //! 2. Add `pub mod NAME;` and a row of [`TARGETS`] to this file.
-//! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are
-//!    generated, never taken from foreign recordings. Without a corpus the mutations begin from noise and reach
-//!    little. Inputs that our own writers can make come from `fuzz/src/corpus.rs`; `cargo run -p hums-fuzz --example
-//!    corpus` writes them.
+//! 3. Put a few small inputs that the reader understands into `fuzz/corpus/NAME/` (some kB in all). They are generated, never
+//!    taken from foreign recordings. Inputs that our own writers can make come from `fuzz/src/corpus.rs`; `cargo run -p
+//!    hums-fuzz --example corpus` writes them.
 //!
 //! An input that breaks a target is written to `target/fuzz/NAME-HASH`; it goes into the corpus with the fix.
 #![allow(clippy::missing_panics_doc, reason = "a target panics where something does not hold")]

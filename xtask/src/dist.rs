@@ -301,7 +301,6 @@ pub(crate) fn sums(files: &[File]) -> String {
     })
 }
 
-/// The names of files that differ.
 fn differences(one: &[File], other: &[File]) -> Vec<String> {
     let missing = |from: &[File], file: &File| !from.contains(file);
     let mut names: Vec<String> =

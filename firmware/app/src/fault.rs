@@ -194,7 +194,7 @@ pub(crate) fn silent(task: Option<Task>) {
     SILENT.store(task.map_or(0, |task| u32::from(exceptions::number_of(task))), Ordering::Relaxed);
 }
 
-/// The watchdog is about to bite. `interrupted` ran until now.
+/// `interrupted` ran until now.
 ///
 /// The cause is the task that missed its deadline. If none is known, the monitor itself no longer runs: it waits or is blocked. A
 /// hanging task blocks all less urgent ones. So the cause is the least urgent task that ran since the last feeding.

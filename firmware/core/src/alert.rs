@@ -27,8 +27,8 @@ pub const ENDED: f32 = -1.0;
 
 /// The alert in a text of the autopilot.
 ///
-/// `severity` is a `MAV_SEVERITY`; a notice, or less, does not count. It is `None` for a log that stores no severity.
-/// Then only known texts count that are severe by their words.
+/// `severity` is a `MAV_SEVERITY`; a notice, or less, does not count. It is `None` for a log that stores no severity. Then only
+/// known texts count that are severe by their words.
 ///
 /// `MAV_SEVERITY_ALERT` is treated as unknown. `ArduPilot` until 3.2 (2015) counted from 1 for low to 4 for critical,
 /// and sent "Reached Command #1" with it. Later versions use it for a parachute, a fuel cell's states and developers'
@@ -70,7 +70,7 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 ///
 /// - Both autopilots: 0 attitude, 3 and 4 position.
 /// - PX4: 10 GPS glitch, 11 accelerometer error.
-/// - ArduPilot: 15 GPS glitching. It also sets this one indoors without GPS, with beacons, optical flow or vision.
+/// - ArduPilot: 15 GPS glitching. It also sets this one indoors without GPS.
 pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
     let flags = estimator.flags;
     let (glitch, accelerometer) = match estimator.scale {
@@ -213,8 +213,6 @@ impl Alerts {
     /// - 0: the autopilot reports that it is over, or flags call it healthy.
     /// - [`ENDED`]: it is no longer reported.
     /// - `None`: it was never reported.
-    ///
-    /// In a mishap flags only echo the mishap.
     pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
         let is_judged = self.armed && !in_mishap;

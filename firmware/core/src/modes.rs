@@ -14,9 +14,9 @@ pub(crate) fn is_thrown(vehicle: &Vehicle) -> bool {
     })
 }
 
-/// Modes in which the pilot himself has the throttle, or which are made for falling: `ArduCopter`'s STABILIZE, ACRO, DRIFT, FLIP,
-/// THROW, AUTOROTATE; `ArduPlane`'s MANUAL, STABILIZE, TRAINING, ACRO, FBWA, AUTOTUNE, QSTABILIZE, QACRO, THERMAL; PX4's MANUAL,
-/// ACRO, STABILIZED. Of other autopilots nothing is known.
+/// Modes in which the pilot himself has the throttle, or which are made for falling: `ArduCopter`'s STABILIZE, ACRO, DRIFT,
+/// FLIP, THROW, AUTOROTATE; `ArduPlane`'s MANUAL, STABILIZE, TRAINING, ACRO, FBWA, AUTOTUNE, QSTABILIZE, QACRO, THERMAL; PX4's
+/// MANUAL, ACRO, STABILIZED.
 pub fn has_pilots_throttle(vehicle: &Vehicle) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
     match heartbeat.autopilot {

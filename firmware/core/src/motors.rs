@@ -32,9 +32,8 @@ use crate::vehicle::{Motor, Vehicle};
 
 /// A motor that never turned faster is not fitted.
 const TURNING_RPM: f32 = 100.0;
-/// An ESC is silent when it misses this many of its own intervals, or more if they are longer than [`SLOW_S`], as on
-/// a thin link. If a fifth of the messages is lost, three in a row are lost every two minutes, and five in a row
-/// every hour.
+/// An ESC is silent when it misses this many of its own intervals, or more if they are longer than [`SLOW_S`]. If a fifth of
+/// the messages is lost, three in a row are lost every two minutes, and five in a row every hour.
 const INTERVALS_MISSED: f32 = 3.0;
 const INTERVALS_MISSED_SLOW: f32 = 5.0;
 const SLOW_S: f32 = 0.7;
@@ -250,8 +249,8 @@ impl Motors {
     /// It is in percent of the middle speed, in steady flight. It is 0 for all but the motor furthest from the
     /// middle: if one is lost the others turn as they must to make up for it. `None` of a motor that is shut off.
     ///
-    /// A turn, a lean and a load on one side drive motors in twos, threes and fours: one sense of rotation, the
-    /// front, the upper ones of coaxial pairs. So a motor is off if no other one is near it, whatever the layout.
+    /// A turn, a lean and a load on one side drive motors in twos, threes and fours: one sense of rotation, the front, the
+    /// upper ones of coaxial pairs. So a motor is off if no other one is near it.
     pub(crate) fn imbalance(
         &self,
         now: Instant,

@@ -48,8 +48,8 @@ pub(crate) const JUDGED_MAX: usize = 8;
 const SMOOTHING_S: f32 = 2.0;
 /// What motors are given is a part of their range. One that does not turn is given no more than this.
 const IDLE: f32 = 0.15;
-/// Parts of the mean command of the others. An output that idled on the ground and has such a command in level flight
-/// is a motor too. A frame that is put together by parameters may still call itself a quadrotor.
+/// Parts of the mean command of the others. An output that idled on the ground and has such a command in level flight is a
+/// motor too.
 const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
 const SURELY_CARRIES: f32 = 0.3;
 /// Further above the others a change teaches nothing, percent.

@@ -447,9 +447,9 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
     ack.command == action.command() && ack.target.is_none_or(|target| target == us)
 }
 
-/// The critical check, of those that `PROT_CHECK` selects: 0 an empty battery (by its remaining charge or its cells),
-/// from 1 on any check of a subsystem. A check that becomes stale stays the reason: its silence does not improve its
-/// level. Batteries of avionics, of a payload or of an unknown consumer do not count.
+/// The critical check, of those that `PROT_CHECK` selects: 0 an empty battery (by its remaining charge or its cells), from 1 on
+/// any check of a subsystem. A check that becomes stale stays the reason. Batteries of avionics, of a payload or of an unknown
+/// consumer do not count.
 fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
     let Situation { vehicle, health, params, .. } = *situation;
     let chosen = params.get(Param::ProtCheck) as u8;

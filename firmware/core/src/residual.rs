@@ -158,9 +158,8 @@ impl Comparison {
     }
 }
 
-/// Pairs of sensors, by kind: the length of their difference. The difference itself is clamped. Motors shake
-/// accelerometers most. On wings a turn carries more than the weight. At a touchdown the legs shake one accelerometer
-/// more than the other.
+/// Pairs of sensors, by kind: the length of their difference. Motors shake accelerometers most. On wings a turn
+/// carries more than the weight. At a touchdown the legs shake one accelerometer more than the other.
 pub(crate) const PAIRS: [Row; 4] = {
     const PAIR: Row = Row {
         gates: gates::SETTLED | gates::ONE_FRAME | gates::STILL,

@@ -152,7 +152,6 @@ state! {
         boot_armed: bool,
         /// Since when it has called its flight terminated.
         pub terminated_since: Option<Instant>,
-        /// The climb that the autopilot wants.
         pub(crate) climb_wanted: Latest<MetresPerSecond>,
     }
 }

@@ -35,7 +35,6 @@ pub fn meaning(param: Param) -> Option<&'static str> {
     vocabulary(check.name).map(|words| words.meaning)
 }
 
-/// A text with a capital at its beginning.
 fn capital(text: &str) -> impl fmt::Display {
     let mut letters = text.chars();
     let first = letters.next().unwrap_or_default().to_ascii_uppercase();

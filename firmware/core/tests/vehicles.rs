@@ -237,9 +237,9 @@ const CLASSES: [(VehicleKind, u8); 8] = [
     (VehicleKind::Surface, 12),
 ];
 
-/// A minute and a half: five seconds disarmed; armed and away, banked to 70 degrees for five seconds, with an empty
-/// pack at the end; back and disarmed. `says_landed`: `EXTENDED_SYS_STATE` is sent, which on PX4 calls an armed rover
-/// "in air".
+/// A minute and a half: disarmed for five seconds; armed and away, banked to 70 degrees for five seconds, the pack
+/// empty at the end; disarmed. `says_landed`: `EXTENDED_SYS_STATE` is sent, which on PX4 calls an armed rover "in
+/// air".
 fn out_and_back(
     autopilot: Autopilot,
     (kind, type_number): (VehicleKind, u8),

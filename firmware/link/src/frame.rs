@@ -118,8 +118,7 @@ impl<'a> Frame<'a> {
     /// Reads `bytes` as exactly one frame. `None` without a start byte, with unknown flags, or if the length differs from the
     /// header's. Without a matching definition of the message the frame is [`Check::Unverified`].
     ///
-    /// For bytes from a log or from our encoder. Bytes from a line go through [`crate::framer::Framer`], which separates frames
-    /// from noise.
+    /// Bytes from a line go through [`crate::framer::Framer`], which separates frames from noise.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let header = Header::read(bytes).ok()?;
         if header.frame_len() != bytes.len() {

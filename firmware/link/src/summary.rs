@@ -469,8 +469,8 @@ fn quantity(value: f32, unit: &str) -> Text {
     }
 }
 
-/// The amount of a finite value in units of its last digit, at most two; from 2^40 on it is garbage, and stays there.
-/// Rounded like `{:.2}`: to the nearest, or the even one of two. That formatting would take 12 KB of flash.
+/// The amount of a finite value in units of its last digit, at most two; from 2^40 on it is garbage, and stays there. Rounded
+/// like `{:.2}`: to the nearest, or the even one of two. Formatting would take 12 KB of flash.
 fn scaled(value: f32, digits: u32) -> u64 {
     const LARGEST: f32 = (1_u64 << 40) as f32;
     const FRACTION: u32 = 23;

@@ -7,7 +7,7 @@ use hums_core::clock::Instant;
 /// Polls until the device is ready; `None` if it is not by `end`. The argument of `poll` is whether it may sleep
 /// until the next interrupt.
 ///
-/// The last poll begins at `end` or later: if more urgent tasks had the processor meanwhile, the device may be ready.
+/// The last poll begins at `end` or later: more urgent tasks may have had the processor meanwhile.
 pub fn until<T>(end: Instant, now: impl Fn() -> Instant, mut poll: impl FnMut(bool) -> Poll<T>) -> Option<T> {
     loop {
         let is_last = now() >= end;

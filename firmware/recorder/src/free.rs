@@ -233,8 +233,7 @@ fn free_in_block<D: CardDevice>(volume: &Volume<'_, D>, index: u32) -> Result<u3
 }
 
 /// Writes the information sector: the next search, on any computer, begins at this cluster. The free count is written
-/// as unknown, so that it can never be wrong. A damaged sector is repaired. A refused write is ignored: files need no
-/// hint.
+/// as unknown, so that it can never be wrong. A refused write is ignored: files need no hint.
 #[inline(never)]
 pub(crate) fn write_hint<D: CardDevice>(volume: &Volume<'_, D>, cluster: u32) {
     let mut block = [[0; BLOCK_BYTES]];

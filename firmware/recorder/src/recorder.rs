@@ -35,8 +35,8 @@ use trouble::may_work_elsewhere;
 
 /// How often a missing or failing card is looked for.
 const RETRY: Span = Span::from_secs(1);
-/// How often a sector is tried before the segment is given up. A card that refuses one block of five at random then
-/// needs a new segment once in 100,000 sectors. The device bounds the time of all tries together.
+/// How often a sector is tried before the segment is given up. A card that refuses one block of five at random then needs a new
+/// segment once in 100,000 sectors.
 const WRITE_TRIES: u32 = 8;
 
 /// Why to wait.

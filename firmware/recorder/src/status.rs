@@ -109,7 +109,6 @@ pub(crate) struct Counted {
     pub(crate) permille: u32,
     /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,
-    /// Total space, in MiB.
     pub(crate) total_mib: u32,
 }
 

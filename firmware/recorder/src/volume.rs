@@ -78,7 +78,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         self.write_fat(&block, cluster / ENTRIES)
     }
 
-    /// The FAT entry of one cluster.
     #[inline(never)]
     pub(crate) fn entry(&self, cluster: u32) -> Result<u32, CardError<D::Error>> {
         Ok(entry(&self.read_fat(cluster / ENTRIES)?[0], cluster))
@@ -89,7 +88,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         cluster >= 2 && cluster - 2 < self.layout.clusters
     }
 
-    /// The first block of a cluster.
     pub(crate) const fn block_of(&self, cluster: u32) -> u32 {
         self.layout.data_start + (cluster - 2) * self.layout.cluster_blocks
     }

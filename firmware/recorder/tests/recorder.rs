@@ -472,8 +472,7 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
     let reads = device.reads.get() - reads_before;
     // Some 80 of them are the FAT of the previous session, which is followed once in the search for room. Some 60 are
-    // the new session's, up to its parity. Clusters of one block, as on this small card, take 64 times the FAT of a
-    // large card.
+    // the new session's, up to its parity. Clusters of one block take 64 times the FAT of a large card.
     assert!(reads < 600, "{reads} blocks were read");
     for page in (1..all.len() as u32 / 8 - 1).step_by(3) {
         device.blocks.replace(whole.clone());
@@ -493,9 +492,8 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
 }
 
-/// Power fails at each write around the beginning of a file, on an empty card and on one full of older sessions. Old
-/// data of that file is never taken for the end. A frame both in a copy of a sector and in the next sector counts
-/// once.
+/// Power fails at each write around the beginning of a file, on an empty card and on one full of older sessions. A
+/// frame both in a copy of a sector and in the next sector counts once.
 #[test]
 fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     let (mut begun, mut fuller_copies) = (0, 0);

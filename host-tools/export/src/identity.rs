@@ -30,9 +30,9 @@ pub struct Identity {
     pub epochs: Epochs,
 }
 
-/// Vehicle, date and UTC of a recording. If `judges`, also the findings by the monitor here, as in
-/// `hums check`, unless one on board checked it. The recording is read once for it. Its `session` is taken
-/// from its files' names, so it does not depend on the messages that this version understands.
+/// Vehicle, date and UTC of a recording. If `judges`, also the findings by the monitor here, as in `hums
+/// check`, unless one on board checked it. Its `session` is taken from its files' names, so it does not
+/// depend on the messages that this version understands.
 pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identity, Option<Checked>)> {
     let (mut known, mut epochs) = (Known::default(), Epochs::default());
     let want = Want { observations: true, ..Want::default() };

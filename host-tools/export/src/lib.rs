@@ -11,8 +11,6 @@
 //! Recordings of every kind go the same way (`hums_formats::source::parts`); an autopilot's log has its own
 //! tables (`native`).
 //!
-//! `--split flights` cuts a log between its flights, and decodes each as a log of its own.
-//!
 //! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with
 //! `thesis`.
 

@@ -6,8 +6,8 @@ use std::sync::Mutex;
 use super::row::{Cell, CellType, Row};
 use crate::source::item::{self, Kind, Table, Value};
 
-/// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. A log that
-/// has more of them is not made by an autopilot; its further tables are left out, and counted.
+/// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. No
+/// autopilot's log has more: further tables are left out, and counted.
 const NAMES_BYTES_MAX: usize = 4 << 20;
 
 /// The names of one log's tables, and of their columns with units; `None` if there was no room for them.

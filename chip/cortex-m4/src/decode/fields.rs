@@ -20,7 +20,6 @@ impl Place {
     }
 }
 
-/// `width` bits from `low` on.
 pub(super) fn field(word: u32, low: u32, width: u32) -> u32 {
     word >> low & ((1 << width) - 1)
 }

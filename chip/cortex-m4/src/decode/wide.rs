@@ -148,7 +148,6 @@ pub(super) fn shifted_register(a: u32, b: u32) -> Op {
     }
 }
 
-/// Branches, and control of the processor.
 pub(super) fn branch_or_control(place: Place, a: u32, b: u32) -> Op {
     let sign = field(a, 10, 1);
     match (b >> 12 & 5, field(a, 7, 3)) {

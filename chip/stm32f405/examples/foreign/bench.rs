@@ -34,7 +34,6 @@ pub(crate) fn logged(machine: &Machine) -> u32 {
     channel(machine).map_or(0, |[.., written]| written)
 }
 
-/// A ring, since this place.
 pub(crate) fn logged_since(machine: &Machine, place: u32) -> Vec<u8> {
     let Some([buffer, ring, written]) = channel(machine) else { return Vec::new() };
     let bytes = (written + ring - place) % ring;

@@ -40,8 +40,7 @@ macro_rules! events {
 
 events! {
     // Severe by their level, but no fault of the vehicle: a mode that may not be flown now, or an arming that is
-    // refused. A flight termination is also a pilot's kill switch after a landing. HEARTBEAT reports it too, and
-    // decides whether it matters.
+    // refused. A flight termination is also a pilot's kill switch after a landing.
     fine:
         check_system_flight_term_active commander_kill_sw_engaged check_modes_angular_velocity
         check_modes_attitude check_modes_global_pos check_modes_local_alt check_modes_local_pos

@@ -36,8 +36,8 @@ pub(super) const fn after(warning_ms: u16, critical_ms: u16) -> [Debounce; 2] {
     [Debounce::millis(warning_ms), Debounce::millis(critical_ms)]
 }
 
-/// A row of a table of checks: its name, the row that it is like, its limits, and the fields in which it differs. The limits are those of a
-/// warning and of a critical level (`_`: none), and the hysteresis.
+/// A row of a table of checks: its name, the row that it is like, its limits, and the fields in which it differs. The limits:
+/// of a warning, of a critical level (`_`: none), and the hysteresis.
 macro_rules! row {
     (@limit _) => { None };
     (@limit $param:ident) => { Some($crate::params::Param::$param) };

@@ -196,7 +196,6 @@ impl Health {
         self.numbered_levels().map(|(_, check, instance, level)| (check, instance, level))
     }
 
-    /// Levels, each with a number of its own.
     pub(crate) fn numbered_levels(&self) -> impl Iterator<Item = (u16, &'static Check, u8, Level)> + Clone {
         let states = slots().zip(&self.states);
         states.filter_map(|((slot, check, instance), state)| {

@@ -208,7 +208,6 @@ mod tests {
         life([6, 3, 0, 0], value, (36_000_000.7, 6e9 + 0.001))
     }
 
-    /// Half an hour of a quad.
     fn half_an_hour() -> Session {
         let value = |form| match form {
             Form::Tenths => 1_800.5,

@@ -5,7 +5,6 @@ use crate::layout::{EXFAT_TYPE, LayoutError};
 use crate::status::CardState;
 use crate::{CardDevice, Trouble};
 
-/// The reported state of a card with this error.
 pub(super) fn state<D: CardDevice>(error: &CardError<D::Error>) -> CardState {
     match error {
         CardError::Device(error) => match D::trouble(error) {

@@ -8,8 +8,8 @@ use anyhow::{Context as _, Result};
 
 use super::paths::{begin, cannot_write};
 
-/// Opens a file that is updated in place, and locks it against other runs: two writers of one card or one store would
-/// destroy it. [`io::ErrorKind::ResourceBusy`] while another run has it. Everybody may read it meanwhile.
+/// Opens a file that is updated in place, and locks it against other runs: two writers of one card or one store would destroy
+/// it. [`io::ErrorKind::ResourceBusy`] while another run has it.
 pub fn open_in_place(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     let busy = || {
         io::Error::new(

@@ -103,7 +103,7 @@ impl Output {
     }
 
     /// Goes on with the bytes that an earlier run has left of a file. Dropped before its end it stays for the next one. In the
-    /// end it replaces a file of its name, whose bytes the caller has compared. One run at a time has it.
+    /// end it replaces a file of its name, whose bytes the caller has compared.
     pub fn resume(path: &Path) -> Result<Self> {
         let to = without_links(path);
         let from = begun_of(&to)?;

@@ -194,7 +194,6 @@ pub(crate) struct Ulog {
     file: Single,
     data: Spool,
     motion: Motion,
-    /// Numbers of topics and instances.
     numbers: BTreeMap<(Topic, u8), u16>,
     /// First values.
     parameters: BTreeMap<String, f64>,

@@ -17,8 +17,8 @@ const NAMED_MAX: usize = 3;
 
 impl Ending {
     /// Unknown blocks after the last sector, if the log's end is not proved before them. Damaged sectors of
-    /// the log look like that. Older data than the box's are larger than a card's page, and go on to the end
-    /// of the last file. An unsound head counts only without sound sectors of other sessions.
+    /// the log look like that. Older data are larger than a card's page, and go on to the end of the last
+    /// file. An unsound head counts only without sound sectors of other sessions.
     pub fn noise(&self) -> Option<String> {
         let behind = &self.summary.behind;
         let unsound = if behind.stale == 0 { behind.unsound } else { 0 };

@@ -27,7 +27,7 @@ pub type Rest = (usize, Vec<(f64, Cow<'static, str>)>);
 
 impl Spans {
     /// Enters this state. A span shorter than `shortest` is removed, and becomes part of the one before. So
-    /// does a span of zero length, also the first: a log's first message may report a state before its mode.
+    /// does a span of zero length, also the first.
     pub fn extend(&mut self, at: Instant, name: Cow<'static, str>, shortest: Span) {
         if let Some((begun, last)) = self.begun.last() {
             if *last == name || self.begun.len() >= SPANS_MAX {

@@ -22,8 +22,8 @@ use crate::boards::machine::Overrun;
 const LAST_LOOK: Duration = Duration::from_micros(100);
 const LAST_LOOKS: u32 = 30;
 
-/// Both halves of a port: reception into this ring, which is read at this interval, and transmission. `registers`
-/// must be those of `T`. The channels are its own, or it does not compile.
+/// Both halves of a port: reception into this ring, which is read at this interval, and transmission. `registers` must be those
+/// of `T`. The channels are its own.
 ///
 /// # Panics
 /// If the clocks do not allow the port's baud rate.

@@ -33,7 +33,6 @@ pub(super) struct Lines {
     tables: BTreeMap<Table, Vec<u8>>,
     unknown: UnknownLines,
     headers: BTreeMap<&'static str, Vec<&'static str>>,
-    /// Bytes in `tables`, with the tables' own memory.
     tables_bytes: usize,
 }
 

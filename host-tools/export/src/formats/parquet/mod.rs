@@ -10,12 +10,11 @@
 //! begins with `boot_s`, seconds since the monitor's power-on, and `utc`, null if unknown. Tables of frames
 //! go on with `system` and `component`.
 //!
-//! Memory is bounded. Rows wait as plain columns, 12 MiB in all; then the largest tables become row groups
-//! and are written. So an encoder, which costs far more than its rows, is open only for one row group. An
-//! open file takes memory for each of its columns, and for the description of its row groups, which is
-//! written at its end. The memory of open files is limited too: beyond the limit the largest are closed, and
-//! their tables go on in `ATTITUDE.2.parquet`. That happens in a session of days, and in a log of thousands
-//! of tables.
+//! Rows wait as plain columns, 12 MiB in all; then the largest tables become row groups and are written. So
+//! an encoder, which costs far more than its rows, is open only for one row group. An open file takes memory
+//! for each of its columns, and for the description of its row groups, which is written at its end. The
+//! memory of open files is limited too: beyond the limit the largest are closed, and their tables go on in
+//! `ATTITUDE.2.parquet`.
 
 mod batches;
 mod columns;

@@ -160,7 +160,6 @@ impl Subscriptions {
         self.living = 0;
     }
 
-    /// Counts of messages by name.
     pub(super) fn counts(mut self) -> Vec<MessageCount> {
         self.clear();
         let of = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };
