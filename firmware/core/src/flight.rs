@@ -419,9 +419,6 @@ impl Flight {
             || (is_given_up && (!self.arming.is_on || is_silent || (stands >= 2 && stands >= flies)));
         if is_down {
             (self.stage, self.flies_since) = (Stage::Down, Stamp::NONE);
-            if !self.motion.has_strayed(now) {
-                self.touch(now, self.motion.sink.greatest(now));
-            }
             self.place = Place::of(now, vehicle);
             return Some(Change::Down);
         }

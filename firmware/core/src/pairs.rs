@@ -24,8 +24,6 @@ const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
 const SETTLES_S: f32 = 1.5;
 /// Scale difference of gyros; autopilots calibrate only their offsets (MPU-6000: 3 %, data sheet).
 const GYRO_SCALE: f32 = 0.05;
-/// Factor on the effect of one sample until the baseline is known.
-const UNKNOWN_TIMES: f32 = 4.0;
 /// Within this time the turn of a vehicle makes no difference, even a fast one.
 const AT_ONCE_MS: u64 = 5;
 
@@ -102,12 +100,8 @@ impl Pair {
         }
         let row = kind.row();
         let step = self.residual.at().age(at);
-        let most = match (self.residual.excess(row), step) {
-            (Some(_), _) => row.hold(),
-            (None, Some(_)) => UNKNOWN_TIMES * row.hold(),
-            (None, None) => f32::INFINITY,
-        };
-        smooth(&mut self.difference, difference, step.map_or(1.0, |step| row.weight(step)), most);
+        let (weight, most) = step.map_or((1.0, f32::INFINITY), |step| (row.weight(step), row.hold()));
+        smooth(&mut self.difference, difference, weight, most);
         self.residual.take(row, at, norm(self.difference), 0.0);
     }
 
