@@ -7,7 +7,6 @@
 //! DCM takes accelerations off by the receiver's velocity: without an exact receiver nothing is compared. Even with one its attitude is off
 //! by 20 degrees in hard manoeuvres. Heights have an offset, which is learnt.
 
-use crate::gates::Gates;
 use crate::motion::ground_speed_mps;
 use crate::observation::SecondEstimate;
 use crate::residual::{AT_ONCE, Comparison, Residuals};
@@ -22,14 +21,8 @@ const POS_HORIZ_ABS: u16 = 16;
 /// A degree of latitude, m.
 const DEGREE_M: f64 = 111_320.0;
 
-pub(crate) fn take(
-    residuals: &mut Residuals,
-    at: Instant,
-    second: &SecondEstimate,
-    vehicle: &Vehicle,
-    gates: Gates,
-) {
-    if !residuals.is_due(Comparison::Ahrs2Tilt, at, gates, Span::ZERO) {
+pub(crate) fn take(residuals: &mut Residuals, at: Instant, second: &SecondEstimate, vehicle: &Vehicle) {
+    if !residuals.is_due(Comparison::Ahrs2Tilt, at, Span::ZERO) {
         return;
     }
     if let (Some(attitude), Some([roll, pitch, _])) = (vehicle.attitude.within(at, AT_ONCE), second.attitude)
@@ -38,18 +31,18 @@ pub(crate) fn take(
         let other = down([roll.0, pitch.0]);
         let chord = norm([0, 1, 2].map(|axis| one[axis] - other[axis]));
         let tilt_deg = (2.0 * libm::asinf((chord / 2.0).clamp(0.0, 1.0))).to_degrees();
-        residuals.take(Comparison::Ahrs2Tilt, at, gates, tilt_deg, 0.0);
+        residuals.take(Comparison::Ahrs2Tilt, at, tilt_deg, 0.0);
     }
     let Some(global) = vehicle.global.within(at, AT_ONCE) else { return };
     if let Some(altitude) = second.altitude {
-        residuals.take(Comparison::Ahrs2Height, at, gates, global.altitude.0 - altitude.0, 0.0);
+        residuals.take(Comparison::Ahrs2Height, at, global.altitude.0 - altitude.0, 0.0);
     }
     // A vehicle that flies by optical flow has its place from elsewhere.
     let absolute = vehicle.estimator.get().is_none_or(|estimator| estimator.flags & POS_HORIZ_ABS != 0);
     if let (Some(one), Some(other), true) = (global.position, second.position, absolute) {
         let late_m = LATE_S * ground_speed_mps(at, vehicle).unwrap_or(0.0);
         let apart_m = (distance_m(one, other) - late_m).max(0.0);
-        residuals.take(Comparison::Ahrs2Position, at, gates, apart_m, 0.0);
+        residuals.take(Comparison::Ahrs2Position, at, apart_m, 0.0);
     }
 }
 

@@ -13,14 +13,14 @@
 //!    barometer's by less than half as much, the receiver is wrong. A slow drift takes the estimator along and is
 //!    blamed on neither.
 
-use crate::gates::{self, Gates};
+use crate::gates;
 use crate::latest::Reading;
 use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{Comparison, LATE_S, RECEIVER_S, Residuals, smooth};
 use crate::time::{Instant, PAUSE, Span, Stamp};
-use crate::units::{GRAVITY, Hectopascals};
+use crate::units::GRAVITY;
 use crate::vehicle::Vehicle;
 
 /// Error of the standard atmosphere as a part of the climb, in air that is 28 K warmer or colder.
@@ -96,21 +96,14 @@ state! {
 }
 
 impl Heights {
-    pub(crate) fn take_pressure(
-        &mut self,
-        residuals: &mut Residuals,
-        at: Instant,
-        pressure: Hectopascals,
-        vehicle: &Vehicle,
-        gates: Gates,
-    ) {
-        if !gates.are(gates::SETTLED) || !pressure.0.is_finite() || pressure.0 <= 0.0 {
+    pub(crate) fn take_pressure(&mut self, to: &mut Residuals, at: Instant, hpa: f32, vehicle: &Vehicle) {
+        if !to.gates.are(gates::SETTLED) || !hpa.is_finite() || hpa <= 0.0 {
             return;
         }
         if self.first_hpa == 0.0 {
-            self.first_hpa = pressure.0;
+            self.first_hpa = hpa;
         }
-        let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / pressure.0);
+        let height_m = SCALE_HEIGHT_M * libm::logf(self.first_hpa / hpa);
         let before = self.sample;
         let step = before.at.age(at).filter(|step| *step <= PAUSE);
         let risen_m = height_m - before.height_m;
@@ -131,7 +124,7 @@ impl Heights {
             let off_m = libm::fabsf(risen_m - climb_mps * step_s);
             let changed_mps = libm::fabsf(climb_mps - before.climb_mps);
             let late_m = LATE_S * libm::fabsf(climb_mps) + step_s * changed_mps;
-            residuals.take(Comparison::BaroNoise, at, gates, (off_m - late_m).max(0.0), 0.0);
+            to.take(Comparison::BaroNoise, at, (off_m - late_m).max(0.0), 0.0);
         }
         let display = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb?.sane());
         // Zero is sent if no climb is known.
@@ -139,28 +132,21 @@ impl Heights {
             let missing_m = risen_m - step_s * climb_mps;
             let by_wind_m = libm::fabsf(wind_m - before.wind_m);
             let beyond_m = libm::copysignf((libm::fabsf(missing_m) - by_wind_m).max(0.0), missing_m);
-            residuals.take(Comparison::BaroClimb, at, gates, beyond_m / step_s, 0.0);
+            to.take(Comparison::BaroClimb, at, beyond_m / step_s, 0.0);
         }
     }
 
-    pub(crate) fn take_gnss(
-        &mut self,
-        residuals: &mut Residuals,
-        at: Instant,
-        gnss: &Gnss,
-        vehicle: &Vehicle,
-        gates: Gates,
-    ) {
+    pub(crate) fn take_gnss(&mut self, to: &mut Residuals, at: Instant, gnss: &Gnss, vehicle: &Vehicle) {
         let Some(altitude) = gnss.altitude.filter(|_| gnss.is_exact()) else { return };
         let climb = climb_mps(at, vehicle);
-        if gates.are(gates::SETTLED) {
+        if to.gates.are(gates::SETTLED) {
             self.leaps[1].take(at, altitude.0, climb);
         }
         let Sample { at: measured, height_m, .. } = self.sample;
         // Receivers are some tenths of a second late: in a climb the two heights are not of one moment.
         let climbs = climb.is_none_or(|climb| libm::fabsf(climb) > gates::LEVEL_MPS);
         let is_old = measured.age(at).is_none_or(|age| age > PAUSE);
-        if climbs || is_old || !residuals.is_due(Comparison::BaroGnss, at, gates, Span::ZERO) {
+        if climbs || is_old || !to.is_due(Comparison::BaroGnss, at, Span::ZERO) {
             return;
         }
         let airspeed = vehicle.hud.get().and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
@@ -170,7 +156,7 @@ impl Heights {
         let [up_m, faster_m] = [0, 1].map(|part| libm::fabsf(air[part] - usual[part]));
         let allowance_m = SCALE_PART * up_m + faster_m;
         let off_m = height_m - altitude.0;
-        let learnt_s = residuals.take(Comparison::BaroGnss, at, gates, off_m, allowance_m);
+        let learnt_s = to.take(Comparison::BaroGnss, at, off_m, allowance_m);
         smooth(usual, air, learnt_s / (AIR_S + learnt_s), f32::INFINITY);
     }
 

@@ -15,7 +15,7 @@
 
 use crate::baro_gnss::Heights;
 use crate::flight::Flight;
-use crate::gates::{self, Gates};
+use crate::gates;
 use crate::gnss_velocity_residual::GnssVelocity;
 use crate::imu_gnss::ImuGnssResidual;
 use crate::latest::Reading;
@@ -38,7 +38,6 @@ const EVERY: Span = Span::from_millis(100);
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Crosschecks {
-        pub(crate) gates: Gates,
         pub(crate) residuals: Residuals,
         pub(crate) pairs: [Pairs; Kind::COUNT],
         pub(crate) repeats: Repeats,
@@ -65,15 +64,15 @@ impl Crosschecks {
             Kind::Barometer => true,
         };
         let compared = if is_own { sample } else { NOT_COMPARED };
-        self.pairs[kind as usize].take(at, kind, usize::from(instance), compared, self.gates);
+        self.pairs[kind as usize].take(at, kind, usize::from(instance), compared, self.residuals.gates);
         // A barometer trembles on the ground too: one that freezes there is stuck in the air.
-        if kind == Kind::Barometer || self.gates.are(gates::AIRBORNE) {
+        if kind == Kind::Barometer || self.residuals.gates.are(gates::AIRBORNE) {
             self.repeats.take(at, kind, instance, sample);
         }
     }
 
     pub(crate) fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
-        let Self { gates, residuals, rate_setpoint, .. } = self;
+        let Self { residuals, rate_setpoint, .. } = self;
         match observation {
             Observation::Imu(imu) => self.take_imu(at, imu, vehicle),
             Observation::Air(air) => self.take_air(at, air, vehicle),
@@ -85,17 +84,17 @@ impl Crosschecks {
             }
             Observation::Gnss(gnss) => self.take_gnss(at, gnss, vehicle),
             Observation::Attitude(attitude) => {
-                rate_tracking::take_attitude(residuals, at, attitude, rate_setpoint, *gates);
+                rate_tracking::take_attitude(residuals, at, attitude, rate_setpoint);
             }
             Observation::Wanted(wanted) => {
                 rate_tracking::take_setpoint(rate_setpoint, at, wanted.rates, vehicle);
             }
             Observation::SecondEstimate(second) => {
-                ahrs2_residual::take(residuals, at, second, vehicle, *gates);
+                ahrs2_residual::take(residuals, at, second, vehicle);
             }
-            Observation::Hud(hud) => self.thrust.take(at, hud, vehicle, *gates),
+            Observation::Hud(hud) => self.thrust.take(at, hud, vehicle, residuals.gates.are(gates::SETTLED)),
             Observation::Estimator(estimator) => {
-                self.compass_use.take(at, estimator, gates.are(gates::AIRBORNE), residuals);
+                self.compass_use.take(at, estimator, residuals);
             }
             // On the scale that the vehicle knows.
             Observation::Vibration(_) => self.take_vibration(at, vehicle),
@@ -114,7 +113,7 @@ impl Crosschecks {
             self.imu_gnss.take_force(force);
         }
         if let (Some(field), 0) = (field, imu.instance) {
-            mag_heading_residual::take(&mut self.residuals, at, field, vehicle, self.gates);
+            mag_heading_residual::take(&mut self.residuals, at, field, vehicle);
         }
         for (kind, sample) in [
             (Kind::Accelerometer, force.filter(|_| is_fitted)),
@@ -131,24 +130,24 @@ impl Crosschecks {
         if let Some(pressure) = air.pressure.filter(|pressure| pressure.0 > 0.0) {
             self.take(at, Kind::Barometer, air.instance, [pressure.0, 0.0, 0.0]);
             if air.instance == 0 {
-                self.heights.take_pressure(&mut self.residuals, at, pressure, vehicle, self.gates);
+                self.heights.take_pressure(&mut self.residuals, at, pressure.0, vehicle);
             }
         }
     }
 
     fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle) {
-        let airborne = self.gates.are(gates::AIRBORNE);
+        let airborne = self.residuals.gates.are(gates::AIRBORNE);
         if airborne {
             self.repeats.take_gnss(at, gnss);
         }
         if let Some(velocity) = self.velocities.get_mut(usize::from(gnss.instance)) {
             velocity.take(at, gnss, airborne);
         }
-        gnss_constellation::take(&mut self.residuals, at, gnss, self.gates);
+        gnss_constellation::take(&mut self.residuals, at, gnss);
         if gnss.instance == 0 {
-            self.heights.take_gnss(&mut self.residuals, at, gnss, vehicle, self.gates);
+            self.heights.take_gnss(&mut self.residuals, at, gnss, vehicle);
             if !self.repeats.repeats_place(0) {
-                self.imu_gnss.take_gnss(at, gnss, vehicle, self.gates);
+                self.imu_gnss.take_gnss(at, gnss, vehicle, self.residuals.gates);
             }
         }
     }
@@ -156,19 +155,20 @@ impl Crosschecks {
     fn take_vibration(&mut self, at: Instant, vehicle: &Vehicle) {
         if let Some(level) = vehicle.vibration.get().and_then(Vibration::acceleration) {
             let lasting = level.min(core::mem::replace(&mut self.vibration, level));
-            self.residuals.take(vibration_of(vehicle), at, self.gates, lasting, 0.0);
+            self.residuals.take(vibration_of(vehicle), at, lasting, 0.0);
         }
     }
 
     /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
         self.pairs.iter_mut().for_each(Pairs::begin);
-        let Self { gates, pairs, selects, .. } = *self;
-        *self = Self { gates, pairs, selects, repeats: self.repeats.begun(), ..Self::default() };
+        let Self { pairs, selects, residuals: Residuals { gates, .. }, .. } = *self;
+        *self = Self { pairs, selects, repeats: self.repeats.begun(), ..Self::default() };
+        self.residuals.gates = gates;
     }
 
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
-        self.gates.step(now, vehicle, flight);
+        self.residuals.gates.step(now, vehicle, flight);
         let step = self.stepped_at.age(now);
         if !flight.airborne() || step.is_some_and(|step| step < EVERY) {
             return;
@@ -178,7 +178,7 @@ impl Crosschecks {
         self.imu_gnss.step(now, step_s, vehicle);
         // A vehicle that stands does not move, whatever an estimator makes of the touch-down.
         let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
-        if !(idles && self.gates.are(gates::HOVERS) && vehicle.inertial.is_level(now)) {
+        if !(idles && self.residuals.gates.are(gates::HOVERS) && vehicle.inertial.is_level(now)) {
             self.repeats.step(now, step_s, vehicle);
         }
     }

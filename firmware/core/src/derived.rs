@@ -111,7 +111,8 @@ impl Derived {
                 }
             }
             Observation::Outputs(outputs) => {
-                let level = self.crosschecks.gates.are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
+                let level =
+                    self.crosschecks.residuals.gates.are(gates::SETTLED | gates::CLEAR | gates::LEVEL);
                 self.motors.outputs.take(at, outputs, vehicle, flight, level);
             }
             Observation::Gnss(gnss) => {

@@ -4,7 +4,6 @@
 //! A sudden loss is not: a jammer, a loose cable or a blocked view. It is reported while enough satellites are left.
 //! Both figures are followed as logarithms, since the lost part counts.
 
-use crate::gates::Gates;
 use crate::latest::Reading;
 use crate::observation::Gnss;
 use crate::residual::{Comparison, Residuals};
@@ -14,12 +13,12 @@ use crate::time::Instant;
 const HDOP_IDEAL: f32 = 1.0;
 
 /// Takes a receiver's figures with a fix.
-pub(crate) fn take(residuals: &mut Residuals, at: Instant, gnss: &Gnss, gates: Gates) {
+pub(crate) fn take(residuals: &mut Residuals, at: Instant, gnss: &Gnss) {
     let fewer = gnss.satellites.filter(|count| *count > 0).map(|count| -libm::logf(count.into()));
     let hdop = gnss.hdop.filter(|hdop| hdop.is_finite()).map(|hdop| libm::logf(hdop.max(HDOP_IDEAL)));
     for (figure, of) in [(fewer, Comparison::SATELLITES), (hdop, Comparison::HDOP)] {
         if let (Some(figure), Some(of), true) = (figure, of.get(usize::from(gnss.instance)), gnss.fix >= 3) {
-            residuals.take(*of, at, gates, figure, 0.0);
+            residuals.take(*of, at, figure, 0.0);
         }
     }
 }
@@ -39,18 +38,19 @@ pub(crate) fn hdop_rise(residuals: &Residuals, now: Instant, receiver: u8) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gates;
+    use crate::gates::{self, Gates};
 
     /// The lost part and the rise of the dilution after seconds with these satellites and this dilution, five times a
     /// second.
     fn told(said: impl Iterator<Item = (usize, u8, f32)>) -> (Option<f32>, Option<f32>) {
         let (mut residuals, mut now) = (Residuals::default(), Instant::ZERO);
+        residuals.gates = Gates::open(gates::AIRBORNE);
         for (seconds, satellites, hdop) in said {
             for _ in 0..5 * seconds {
                 now = now + crate::time::Span::from_millis(200);
                 let fix = if satellites > 0 { 3 } else { 0 };
                 let gnss = Gnss { fix, satellites: Some(satellites), hdop: Some(hdop), ..Gnss::default() };
-                take(&mut residuals, now, &gnss, Gates::open(gates::AIRBORNE));
+                take(&mut residuals, now, &gnss);
             }
         }
         let tenths = |reading: Reading| (reading.value * 10.0).round() / 10.0;

@@ -3,7 +3,7 @@
 //! The residual includes the declination, which the baseline takes up. An estimator follows a wrong compass slowly,
 //! by its gyros.
 
-use crate::gates::Gates;
+use crate::gates;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale};
 use crate::residual::{AT_ONCE, Comparison, KNOWN_SAMPLES, Residuals};
@@ -18,14 +18,8 @@ const EVERY: Span = Span::from_millis(80);
 /// Least change of the heading, degrees, of an unused compass that is faulty.
 const MOVES_DEG: f32 = 2.0;
 
-pub(crate) fn take(
-    residuals: &mut Residuals,
-    at: Instant,
-    [x, y, z]: [f32; 3],
-    vehicle: &Vehicle,
-    gates: Gates,
-) {
-    if !residuals.is_due(Comparison::MagHeading, at, gates, EVERY) {
+pub(crate) fn take(residuals: &mut Residuals, at: Instant, [x, y, z]: [f32; 3], vehicle: &Vehicle) {
+    if !residuals.is_due(Comparison::MagHeading, at, EVERY) {
         return;
     }
     let Some(attitude) = vehicle.attitude.within(at, AT_ONCE) else { return };
@@ -38,7 +32,7 @@ pub(crate) fn take(
     let down = y * sin_roll + z * cos_roll;
     let ahead = x * libm::cosf(attitude.pitch.0) + down * libm::sinf(attitude.pitch.0);
     let off_deg = (attitude.yaw.0 - libm::atan2f(-across, ahead)).to_degrees();
-    residuals.take(Comparison::MagHeading, at, gates, off_deg, 0.0);
+    residuals.take(Comparison::MagHeading, at, off_deg, 0.0);
 }
 
 state! {
@@ -52,8 +46,8 @@ state! {
 
 impl CompassUse {
     /// PX4 sends no ratio of a compass that it does not fuse.
-    pub(crate) fn take(&mut self, at: Instant, estimator: &Estimator, airborne: bool, residuals: &Residuals) {
-        if estimator.scale != EstimatorScale::TestRatio || !airborne {
+    pub(crate) fn take(&mut self, at: Instant, estimator: &Estimator, residuals: &Residuals) {
+        if estimator.scale != EstimatorScale::TestRatio || !residuals.gates.are(gates::AIRBORNE) {
             return;
         }
         self.ratios = self.ratios.saturating_add(u8::from(estimator.compass.is_some()));

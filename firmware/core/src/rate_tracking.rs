@@ -7,7 +7,7 @@
 //!    that attitude by a quarter of a turn.
 //! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
 
-use crate::gates::{self, Gates, LEANS_RAD};
+use crate::gates::LEANS_RAD;
 use crate::latest::{Latest, Reading};
 use crate::modes::has_pilots_throttle;
 use crate::motion::{HANGS_MPS, climb_mps};
@@ -47,19 +47,13 @@ pub(crate) fn take_setpoint(
     setpoint.set(at, [roll, pitch]);
 }
 
-pub(crate) fn take_attitude(
-    residuals: &mut Residuals,
-    at: Instant,
-    attitude: &Attitude,
-    setpoint: &RateSetpoint,
-    gates: Gates,
-) {
+pub(crate) fn take_attitude(to: &mut Residuals, at: Instant, attitude: &Attitude, setpoint: &RateSetpoint) {
     let (Some(setpoint), Some([roll, pitch, _])) = (setpoint.within(at, FRESH), attitude.rates) else {
         return;
     };
     if setpoint.iter().chain(&[roll, pitch]).all(|rate| rate.sane().is_some()) {
         for ((of, setpoint), flown) in Comparison::RATES.into_iter().zip(setpoint).zip([roll, pitch]) {
-            residuals.take(of, at, gates, setpoint.0 - flown.0, LATE_PART * setpoint.0.abs());
+            to.take(of, at, setpoint.0 - flown.0, LATE_PART * setpoint.0.abs());
         }
     }
 }
@@ -74,7 +68,7 @@ state! {
 }
 
 impl Thrust {
-    pub(crate) fn take(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, gates: Gates) {
+    pub(crate) fn take(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, is_settled: bool) {
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
         let level = vehicle
             .attitude
@@ -92,7 +86,7 @@ impl Thrust {
             Some(false) => climb_mps < SINKS_MPS && !has_pilots_throttle(vehicle),
             None => false,
         };
-        let is_full = throttle.0 >= FULL && gates.are(gates::SETTLED);
+        let is_full = throttle.0 >= FULL && is_settled;
         self.full_at = Some(at);
         self.full_since = (is_full && in_vain).then(|| self.full_since.unwrap_or(at));
     }

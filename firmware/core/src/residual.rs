@@ -259,27 +259,22 @@ impl Residual {
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Residuals {
+        /// The conditions at the last step.
+        pub(crate) gates: Gates,
         each: [Residual; Comparison::COUNT],
     }
 }
 
 impl Residuals {
     /// Whether a sample counts now, and the last one is old enough.
-    pub(crate) fn is_due(&self, of: Comparison, at: Instant, gates: Gates, every: Span) -> bool {
-        of.row().is_open(gates) && self.each[of as usize].at.age(at).is_none_or(|age| age >= every)
+    pub(crate) fn is_due(&self, of: Comparison, at: Instant, every: Span) -> bool {
+        of.row().is_open(self.gates) && self.each[of as usize].at.age(at).is_none_or(|age| age >= every)
     }
 
     /// Takes a sample if its gates are open; returns the learnt part, s.
-    pub(crate) fn take(
-        &mut self,
-        of: Comparison,
-        at: Instant,
-        gates: Gates,
-        sample: f32,
-        allowance: f32,
-    ) -> f32 {
+    pub(crate) fn take(&mut self, of: Comparison, at: Instant, sample: f32, allowance: f32) -> f32 {
         let row = of.row();
-        if row.is_open(gates) { self.each[of as usize].take(row, at, sample, allowance) } else { 0.0 }
+        if row.is_open(self.gates) { self.each[of as usize].take(row, at, sample, allowance) } else { 0.0 }
     }
 
     pub(crate) fn excess(&self, of: Comparison) -> Option<f32> {
