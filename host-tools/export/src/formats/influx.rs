@@ -1,16 +1,5 @@
-//! The line protocol of `InfluxDB`, `VictoriaMetrics`, `QuestDB` and Telegraf:
-//! `measurement,tags fields nanoseconds`.
-//!
-//! * `HUMS`: the reference system's measurement with its field names, so that its dashboards keep working.
-//!   One point for each message with one of its quantities; an ESC's points carry the tag `motor`. All fields
-//!   are floats.
-//! * `ATTITUDE` and so on: a point for each frame, its fields as sent. Integers are integers. A `uint64_t`
-//!   with a unit is an integer too; one without (an id, a bit mask) is text, because the protocol's integers
-//!   are signed. NaN and the infinities do not exist in the protocol: such fields are left out.
-//! * `HUMS_FINDING`, `HUMS_GAP` and so on: the monitor's own records.
-//!
-//! Tags: `vehicle` and `session` on all; `system` and `component` (the sender) on frames; `motor` on values
-//! of one motor; `subsystem`, `check`, `counter` on records with them.
+//! The line protocol of `InfluxDB`, `VictoriaMetrics`, `QuestDB` and Telegraf: `measurement,tags fields nanoseconds`
+//! (`docs/decode.md`).
 //!
 //! A database keeps one point for a set of tags and a time. The record's clock has milliseconds, in which a
 //! message may come twice: the second one's time is a nanosecond later, so that both are kept.

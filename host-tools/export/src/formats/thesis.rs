@@ -1,11 +1,7 @@
-//! The reference system's four tables, `;` between the columns, one row a second: `flightvalues.csv`,
-//! `esc_status.csv`, `esc_info.csv` and `vfr_hud.csv`. The n-th rows of all four are of the same second.
+//! The reference system's four tables, one row a second, in its columns and formats (`docs/decode.md`).
 //!
-//! Its columns and formats are kept, also the units in the cells of `flightvalues.csv`. Only latitude and
-//! longitude have seven decimals (1 cm) instead of two (1 km). An empty cell means no value for ten seconds.
-//! The flight time counts whole seconds from the monitor's power-on, as the reference counts from its
-//! program's start. Seconds without messages of the vehicle, or in a gap of the log, have no row. There the
-//! flight time jumps, and `gaps.csv` names the gaps.
+//! Only latitude and longitude have seven decimals (1 cm) instead of two (1 km). The flight time counts whole
+//! seconds from the monitor's power-on, as the reference counts from its program's start; in a gap it jumps.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};

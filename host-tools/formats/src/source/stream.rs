@@ -41,6 +41,7 @@ pub trait Source: Send {
         self.inner().map_or(0, Source::damages)
     }
 
+    /// A remark on the input, once it has been read.
     fn remark(&self) -> Option<String> {
         self.inner()?.remark()
     }

@@ -1,13 +1,5 @@
-//! MCAP for Foxglove and `PlotJuggler`: each message in Protocol Buffers with its definition.
-//!
-//! | topic | schema |
-//! |---|---|
-//! | `/mavlink/SYSTEM/COMPONENT/NAME` | `mavlink.NAME`: the fields as sent |
-//! | `/hums/TABLE` | `hums.TABLE`: the monitor's own records, findings, gaps |
-//! | `/log/TABLE` | `log.TABLE`: messages of an autopilot's own log |
-//! | `/opaque` | frames without a known definition, as bytes |
-//! | `/position`, `/pose`, `/battery/ID` | `foxglove.LocationFix`, `foxglove.PoseInFrame`, `hums.Battery` |
-//! | `/texts` | `foxglove.Log`: texts of the vehicle, findings |
+//! MCAP for Foxglove and `PlotJuggler`: each message in Protocol Buffers with its definition (`docs/decode.md` has
+//! the topics).
 //!
 //! Times are UTC, or since power-on without UTC. Units of fields are in their channel's metadata.
 
