@@ -5,7 +5,7 @@
 pub struct Random(u64);
 
 impl Random {
-    /// Seeded.
+    /// A seed's sequence.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }

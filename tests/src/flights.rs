@@ -133,7 +133,7 @@ fn numbers(object: &Value) -> BTreeMap<u32, u64> {
     entries.map(|(key, value)| (key.parse().expect("an id"), value.as_u64().expect("a number"))).collect()
 }
 
-/// 2
+/// Exactly pymavlink's frames.
 #[track_caller]
 pub fn assert_found(found: &Found, frames: &[Frame<'_>]) {
     let mut frames_by_id = BTreeMap::new();

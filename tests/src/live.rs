@@ -177,7 +177,7 @@ impl Page {
     }
 }
 
-/// UDP or TCP.
+/// A free port.
 pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }

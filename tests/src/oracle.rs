@@ -171,7 +171,7 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "run", "script": script }))
     }
 
-    /// One after the other.
+    /// Presses keys.
     #[track_caller]
     pub fn press(&mut self, keys: &[&str]) {
         self.ask(&serde_json::json!({ "do": "press", "keys": keys }));

@@ -12,7 +12,7 @@ use hums_store::{Found, Store, param};
 pub struct Stored {
     /// Life counters with the last session.
     pub lifetime: Option<Lifetime>,
-    /// Set ones.
+    /// Set parameters.
     pub params: Vec<(String, f32)>,
 }
 
@@ -41,7 +41,7 @@ impl Stored {
         stored
     }
 
-    /// Must be there.
+    /// The counters.
     pub fn lifetime(&self) -> &Lifetime {
         self.lifetime.as_ref().unwrap()
     }

@@ -132,7 +132,7 @@ impl Art {
         }
     }
 
-    /// Their content stays.
+    /// Switches the caches.
     pub fn set_caches(&mut self, instructions: bool, data: bool) {
         self.on = (instructions, data);
     }

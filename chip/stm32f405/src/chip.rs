@@ -34,7 +34,7 @@ pub enum Trouble {
     StandsStill(usize),
 }
 
-/// Odd, and goes on.
+/// An oddity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Note {
     /// Reads give 0, writes are lost.
@@ -90,7 +90,7 @@ pub struct Chip {
     pub rng: Rng,
     /// The CRC unit.
     pub crc: Crc,
-    /// 96 bits.
+    /// Number, 96 bits.
     pub uid: [u32; 3],
     /// `DBGMCU_IDCODE`.
     pub idcode: u32,
@@ -171,7 +171,7 @@ impl Chip {
         chip
     }
 
-    /// All but the processor.
+    /// Reset without processor.
     pub fn reset(&mut self, cause: Cause, now: Now) {
         self.flash.reset(now.ps);
         let counts = self.art.counts;
@@ -229,7 +229,7 @@ impl Chip {
         self.attention = true;
     }
 
-    /// May have changed.
+    /// The clocks changed.
     pub fn apply_clocks(&mut self, now: Now) {
         let clocks = self.rcc.clocks(now.ps);
         if clocks != self.clocks {
@@ -410,7 +410,7 @@ impl Chip {
         }
     }
 
-    /// Use or level.
+    /// Pins changed.
     pub fn pins_changed(&mut self, now: Now) {
         if let Some((pin, level)) = self.bits.as_mut().and_then(|bits| bits.look(&self.gpio, now.ps)) {
             self.gpio.drive(pin, Some(level));
@@ -436,7 +436,7 @@ impl Chip {
         self.look_at_lines();
     }
 
-    /// Added characters.
+    /// Characters were added.
     pub fn line_changed(&mut self, number: usize) {
         self.schedule(USART + number);
     }

@@ -229,7 +229,7 @@ impl Stream {
 pub struct Dma {
     /// Its streams.
     pub streams: [Stream; 8],
-    /// A bit each.
+    /// Bits by stream.
     pub on: u8,
 }
 
@@ -245,12 +245,12 @@ impl Dma {
         Self { streams: [Stream { fcr: 0x21, ..Stream::default() }; 8], on: 0 }
     }
 
-    /// Served a request.
+    /// A request served.
     pub fn note(&mut self, stream: usize) {
         self.on = self.on & !(1 << stream) | u8::from(self.streams[stream].is_on()) << stream;
     }
 
-    /// A bit each.
+    /// Interrupts by stream.
     pub fn interrupts(&self) -> u8 {
         (0..8).map(|stream| u8::from(self.streams[stream].interrupts()) << stream).sum()
     }

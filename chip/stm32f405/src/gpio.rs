@@ -78,7 +78,7 @@ impl Gpio {
         Self { ports: std::array::from_fn(Port::new) }
     }
 
-    /// The outside stays.
+    /// Reset; outside stays.
     pub fn reset(&mut self) {
         for port in 0..PORTS {
             self.reset_port(port);

@@ -57,7 +57,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// One after the other.
+    /// Adds characters.
     pub fn extend(&mut self, chars: impl IntoIterator<Item = Char>) {
         self.chars.extend(chars);
     }

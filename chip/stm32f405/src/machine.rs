@@ -86,7 +86,7 @@ impl Machine {
         &self.image
     }
 
-    /// Reached so far.
+    /// Time so far.
     pub fn now(&self) -> Ps {
         self.now
     }
@@ -218,7 +218,7 @@ impl Machine {
         })
     }
 
-    /// Low and high.
+    /// Pulses the pin.
     pub fn reset_pin(&mut self) {
         if !self.is_off {
             self.reset(Cause::Pin, self.moment());
@@ -251,7 +251,7 @@ impl Machine {
         self.reset(Cause::Power, self.moment());
     }
 
-    /// Millivolts.
+    /// Supply, millivolts.
     pub fn set_supply(&mut self, mv: u32) {
         let changes = self.chip.pwr.set_supply(mv);
         if changes && self.chip.pwr.is_off {
@@ -263,7 +263,7 @@ impl Machine {
         }
     }
 
-    /// Swings or not.
+    /// The crystal's swing.
     pub fn set_crystal(&mut self, alive: bool) {
         self.nmi |= self.chip.rcc.set_crystal(alive, self.now);
         self.chip.attention = true;

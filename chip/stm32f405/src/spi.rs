@@ -106,7 +106,7 @@ impl Spi {
         }
     }
 
-    /// The outside stays.
+    /// Reset; outside stays.
     pub fn reset(&mut self) {
         let wire = std::mem::replace(&mut self.wire, Box::new(Nobody));
         *self =

@@ -15,7 +15,7 @@ pub const SECOND: Ps = 1_000 * MS;
 /// A moment that never comes.
 pub const NEVER: u64 = u64::MAX;
 
-/// Both ways.
+/// Moment, both ways.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Now {
     /// Processor cycles.
@@ -65,7 +65,7 @@ impl Timebase {
         Now { cycle, ps: self.ps(cycle) }
     }
 
-    /// Begins then or after.
+    /// First cycle then.
     pub fn cycle(&self, ps: Ps) -> u64 {
         if ps == NEVER {
             return NEVER;

@@ -25,7 +25,7 @@ const MESSAGE_HEAD_BYTES: usize = 6;
 /// The hash of this build's table: a constant, so that no flip of memory makes all groups of a session wrong.
 pub(crate) const CURRENT: u32 = Crc32c::of_constant(NEWEST);
 
-/// Piece by piece.
+/// Stores the table.
 pub fn store(mut out: impl FnMut(&[u8])) {
     for message in hums_dialect::messages() {
         let [low, middle, high, _] = message.id.to_le_bytes();

@@ -121,7 +121,7 @@ impl Sector {
         self.u32_at(7)
     }
 
-    /// Completed in it.
+    /// Completed frames.
     pub fn frames(&self) -> u16 {
         u16::from_le_bytes([self.bytes[5], self.bytes[6]])
     }
@@ -245,7 +245,7 @@ impl Header {
         })
     }
 
-    /// Begins here.
+    /// A group begins.
     pub const fn starts_group(&self) -> bool {
         self.since_first == 0
     }
@@ -255,7 +255,7 @@ impl Header {
         self.number.wrapping_sub(self.since_first as u32)
     }
 
-    /// Completed in it.
+    /// Completed entries.
     pub const fn entries(&self) -> u32 {
         self.frames as u32 + self.records as u32
     }

@@ -32,7 +32,7 @@ pub trait SectorSink {
     fn put(&mut self, sector: &Sector);
 }
 
-/// The writer is unchanged.
+/// A refused entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Full {
     /// The sink has no room for it.

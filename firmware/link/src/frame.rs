@@ -104,7 +104,7 @@ pub(crate) fn checksums(header: &Header, bytes: &[u8]) -> Option<(u16, u16)> {
     Some((computed, sent))
 }
 
-/// Complete and received.
+/// A received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     header: Header,

@@ -194,7 +194,7 @@ impl Outlet {
         }
     }
 
-    /// Now.
+    /// May go now.
     pub fn fits(&mut self, now: Instant, class: Class, bytes: usize) -> bool {
         self.fits_besides(now, class, bytes, 0)
     }

@@ -205,7 +205,7 @@ impl Replies {
         list.next = if list.next + 1 < count { list.next + 1 } else { 0 };
     }
 
-    /// The queue was full.
+    /// Dropped requests.
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }

@@ -139,7 +139,7 @@ pub struct Seal {
     key: Key,
     /// Tells this way from our others.
     link: u8,
-    /// Updated by the caller.
+    /// Our time.
     pub clock: Clock,
     last: u64,
 }

@@ -118,7 +118,7 @@ const fn interval_ms(index: usize) -> u32 {
     }) as u32
 }
 
-/// The box's.
+/// The box's state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnFigures {
     /// Processor load of the last second, percent; 0 if not measured.

@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::spi::SERVICE_MAX;
 
-/// Must report.
+/// Reporting tasks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
     /// Bytes to frames; it loops at least when the line is silent.

@@ -39,7 +39,7 @@ const RETRY: Span = Span::from_secs(1);
 /// segment once in 100,000 sectors.
 const WRITE_TRIES: u32 = 8;
 
-/// Why to wait.
+/// Reasons to wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotYet {
     /// The search for room goes on: call again at once.

@@ -131,7 +131,7 @@ pub struct CardReading {
     pub write_errors: u32,
     /// Frames in sectors that could not be written.
     pub frames_lost: u32,
-    /// Unwritten.
+    /// Unwritten sectors.
     pub sectors_lost: u32,
     /// Longest command, ms.
     pub stall_ms_max: u32,

@@ -48,7 +48,7 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         self.steps
     }
 
-    /// So far.
+    /// Erases so far.
     pub const fn erases(&self) -> u64 {
         self.erases
     }

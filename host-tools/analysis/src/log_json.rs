@@ -254,7 +254,7 @@ pub fn finite(value: f32) -> Option<f32> {
 }
 
 impl LogJson {
-    /// Read through.
+    /// A log's contents.
     pub fn new(log: &Overview) -> Self {
         let (summary, contents) = (&log.ending.summary, &log.contents);
         let utc = |at: Option<Instant>| at.and_then(|at| log.utc_us(at)).map(iso8601);

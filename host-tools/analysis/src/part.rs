@@ -26,7 +26,7 @@ pub fn name(kind: &str, number: u8, given: &str) -> String {
     format!("{kind}{number}{given}")
 }
 
-/// Reached first.
+/// The first limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     /// Use so far, in the limit's unit.
@@ -50,7 +50,7 @@ impl fmt::Display for Limit {
     }
 }
 
-/// `None` without one.
+/// Limit, if any.
 pub fn first_limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<Limit> {
     let is_powered = [Kind::Card, Kind::Other].iter().any(|of| of.name() == kind);
     let (run_s, how) =

@@ -141,14 +141,14 @@ pub struct FlightLine {
     pub to: Option<Instant>,
 }
 
-/// Wears.
+/// A wearing part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComponentLine {
     /// Its kind.
     pub kind: &'static str,
     /// Which of its kind, from 1; 0 is all.
     pub number: u8,
-    /// The operator's.
+    /// The operator's name.
     pub name: String,
     /// Its serial number.
     pub serial: String,
@@ -185,7 +185,7 @@ pub struct Contents {
     pub epoch_us: Option<u64>,
     /// Changes of level, in order, up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
-    /// All.
+    /// All findings.
     pub findings_count: u64,
     /// Its recorder ran no checks.
     pub checked_here: bool,
@@ -227,7 +227,7 @@ pub struct Contents {
     pub gap_words: Vec<(Option<u64>, String)>,
     /// No vehicle, judged here.
     pub unheard: Option<String>,
-    /// Sentences.
+    /// Remarks, as sentences.
     pub remarks: Vec<String>,
     /// Entries that are not frames.
     pub not_frames: u64,
@@ -324,7 +324,7 @@ impl Contents {
             || changes.any(|change| !is_ok(change) && change.at > from && to.is_none_or(|to| change.at <= to))
     }
 
-    /// Stored without this session.
+    /// Life before session.
     pub fn is_life_before(&self) -> bool {
         self.lifetime_at.zip(self.usage_at).is_some_and(|(life, usage)| usage.since(life) >= STORED_WITH)
     }
@@ -483,7 +483,7 @@ impl Deliver<Self> for Contents {
     }
 }
 
-/// Read through.
+/// A log's overview.
 #[derive(Clone, Debug, Default)]
 pub struct Overview {
     /// Counts and proofs.
@@ -552,7 +552,7 @@ impl Overview {
         }
     }
 
-    /// Parts of sentences.
+    /// Faults in words.
     pub fn faults(&self) -> Vec<String> {
         match (self.format, self.ending.summary.gaps) {
             (None, _) => self.ending.faults(),

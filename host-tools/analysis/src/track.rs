@@ -54,7 +54,7 @@ impl Track {
         full
     }
 
-    /// Oldest first.
+    /// Points, oldest first.
     pub fn points(&self) -> &[Point] {
         &self.points
     }

@@ -93,12 +93,12 @@ impl Companion {
         self.named
     }
 
-    /// While it is received.
+    /// Level while received.
     pub fn overall(&self, now: Instant) -> Option<Level> {
         self.overall.filter(|_| self.present(now))
     }
 
-    /// Unless too old.
+    /// Level, unless old.
     pub fn level(&self, now: Instant, subsystem: Subsystem) -> Option<Level> {
         let (at, levels) = self.levels.filter(|(at, _)| now.since(*at) <= LEVELS_AGE_MAX)?;
         // The levels of a silent one are out of date.

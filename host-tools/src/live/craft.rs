@@ -173,7 +173,7 @@ impl Craft {
         self.sequences = Sequences::new();
     }
 
-    /// Reported by its autopilot.
+    /// A reported parameter.
     pub fn parameter(&self, at: Instant, frame: &Frame<'_>, history: &mut Option<&mut History>) {
         if let Some(history) = history
             && let Some((name, value)) = parameter(frame, self.autopilot())
@@ -354,7 +354,7 @@ impl Craft {
         }
     }
 
-    /// Reported once.
+    /// Unknown cells, once.
     pub fn say_cells_unknown(&mut self, now: Instant, history: &mut Option<&mut History>) {
         self.cells_unknown = true;
         if !std::mem::replace(&mut self.cells_said, true)

@@ -55,7 +55,7 @@ impl Guard {
         })
     }
 
-    /// No foreign page's.
+    /// Own page's request.
     pub fn knows_origin(&self, headers: &HeaderMap) -> bool {
         let Some(origin) = headers.get(header::ORIGIN) else { return true };
         let ours = host(headers).map(|host| format!("http://{host}"));

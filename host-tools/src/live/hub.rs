@@ -67,7 +67,7 @@ impl Hub {
         self.state.subscribe()
     }
 
-    /// Held for moments.
+    /// The histories.
     pub fn histories(&self) -> MutexGuard<'_, Histories> {
         // Usable after a thread's panic.
         self.histories.lock().unwrap_or_else(PoisonError::into_inner)

@@ -33,11 +33,11 @@ pub struct Report {
     pub frames_lost: u64,
     /// Bytes that came in.
     pub bytes_in: u64,
-    /// Outside frames.
+    /// Bytes outside frames.
     pub bytes_not_frames: u64,
     /// Bytes of log on the card.
     pub bytes_logged: u64,
-    /// File system included.
+    /// 512-byte blocks written.
     pub blocks_written: u64,
     /// The fullest the sector queue was.
     pub queue_bytes_max: u64,

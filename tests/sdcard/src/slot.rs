@@ -87,7 +87,7 @@ impl Slot {
         self.0.borrow_mut().stop_at = bytes;
     }
 
-    /// Happens now.
+    /// Event now.
     pub fn event(&self, event: Event) {
         self.0.borrow_mut().happen(event);
     }
@@ -119,7 +119,7 @@ impl Slot {
         self.0.borrow().counts
     }
 
-    /// Their counts so far.
+    /// Violations so far.
     pub fn violations(&self) -> BTreeMap<String, u32> {
         self.0.borrow().violations.clone()
     }

@@ -15,7 +15,7 @@ use super::{BAUD, board_with, pin, usart, wired};
 pub struct Bench {
     /// The board's image.
     pub image: Image,
-    /// Sent over and over.
+    /// Repeated input frames.
     pub frames: Vec<Vec<u8>>,
 }
 

@@ -24,7 +24,7 @@ fn heading(columns: &[&str]) -> String {
     format!("| {} |", columns.join(" | "))
 }
 
-/// Labelled results.
+/// A campaign's results.
 #[derive(Debug, Clone)]
 pub struct Figures {
     labels: &'static Labels,

@@ -25,7 +25,7 @@ pub struct Part {
     pub campaign: &'static Campaign,
     /// Its results.
     pub figures: Figures,
-    /// Seconds.
+    /// Duration, seconds.
     pub seconds: f64,
 }
 

@@ -51,7 +51,7 @@ pub struct Before {
     pub found: Found,
     /// Beginning of its files' names.
     pub number: u32,
-    /// Named by its sectors.
+    /// The sectors' session.
     pub session: u32,
     /// Number of its last sector and one.
     pub sectors: u32,
@@ -73,7 +73,7 @@ impl Before {
 pub struct Boot<'a> {
     /// `0.1.0`.
     pub version: &'a str,
-    /// Built from it.
+    /// The commit.
     pub git: &'a str,
     /// The board's name.
     pub board: &'a str,

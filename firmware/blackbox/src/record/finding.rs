@@ -20,16 +20,16 @@ pub struct FindingRecord<'a> {
     pub level: Level,
     /// The level before.
     pub previous: Level,
-    /// Decided, in `unit`.
+    /// Value, in `unit`.
     pub value: f32,
-    /// Crossed, in `unit`.
+    /// Limit, in `unit`.
     pub limit: f32,
     /// The unit of both.
     pub unit: &'a str,
 }
 
 impl FindingRecord<'static> {
-    /// Found at about `now`.
+    /// A finding's record.
     pub fn new(now: Instant, finding: &Finding) -> Self {
         Self {
             at: Instant::of(finding.at, now),

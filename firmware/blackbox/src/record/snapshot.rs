@@ -23,7 +23,7 @@ pub struct Snapshot<'a> {
     pub check: &'a str,
     /// The finding's instance.
     pub instance: u8,
-    /// Decides the columns.
+    /// Its subsystem.
     pub subsystem: Subsystem,
     /// `false`: before the finding; `true`: after it.
     pub after: bool,
@@ -128,7 +128,7 @@ impl Default for SnapshotValues {
 /// A step of the protective action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
-    /// Requested of the autopilot.
+    /// Requested action.
     pub action: Action,
     /// The stage.
     pub stage: Stage,

@@ -111,7 +111,7 @@ pub struct Component<'a> {
     pub status: Status,
     /// How often the part in this place was replaced.
     pub replaced: u32,
-    /// The operator's.
+    /// The operator's name.
     pub name: &'a str,
     /// Its serial number.
     pub serial: &'a str,

@@ -72,7 +72,7 @@ impl<'a> Handover<'a> {
         self.put_params(monitor.params_mut()) && self.put_items(now, monitor)
     }
 
-    /// About the store.
+    /// Next store text.
     pub fn news(&mut self) -> Option<News> {
         let now = self.status.read();
         let Self { told, .. } = self;

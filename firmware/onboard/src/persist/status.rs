@@ -59,7 +59,7 @@ pub struct StoreReading {
     pub saved: u32,
     /// Waited: no erase was allowed.
     pub refused: u32,
-    /// Could not be saved.
+    /// Unsaved items.
     pub failed: u32,
     /// Erases while the autopilot talked: frames were lost with each.
     pub erased: u32,

@@ -36,7 +36,7 @@ type GsQueue = Churrasco<GS_QUEUE_BYTES>;
 type UplinkQueue = Churrasco<UPLINK_QUEUE_BYTES>;
 type AutopilotQueue = Churrasco<AUTOPILOT_QUEUE_BYTES>;
 
-/// One static.
+/// The firmware's queues.
 pub struct Queues {
     frames: FrameQueue,
     gs: GsQueue,
@@ -47,7 +47,7 @@ pub struct Queues {
     levels: [Level; 4],
 }
 
-/// Each for one task.
+/// Ends by task.
 pub struct Ends<'a> {
     /// For reception.
     pub frames_in: FramesIn<'a>,

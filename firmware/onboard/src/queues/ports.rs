@@ -64,12 +64,12 @@ impl GsIn<'_> {
         self.gs.bytes
     }
 
-    /// The queue was full.
+    /// Lost frames.
     pub const fn lost(&self) -> u64 {
         self.gs.lost
     }
 
-    /// Waited at once.
+    /// Most waiting bytes.
     pub fn bytes_max(&self) -> u32 {
         self.gs.level.max()
     }
@@ -108,7 +108,7 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         self.frames
     }
 
-    /// The queue was full.
+    /// Lost frames.
     pub const fn lost(&self) -> u64 {
         self.lost
     }

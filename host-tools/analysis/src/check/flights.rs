@@ -24,7 +24,7 @@ pub struct Flight {
     pub landed: bool,
     /// m above home, if disarmed in the air.
     pub disarmed_at_m: Option<f32>,
-    /// Ended it.
+    /// Mishap, if any.
     pub mishap: Option<Mishap>,
 }
 

@@ -661,7 +661,7 @@ impl Judge {
         }
     }
 
-    /// The judgement.
+    /// Ends the judging.
     pub fn end(mut self) -> Judged {
         self.step_to_end();
         self.settle();

@@ -17,7 +17,7 @@ use crate::source::item::{About, Cause, Gap};
 use crate::source::told::Finding;
 use crate::summary::{EndsInAir, JudgedChecks};
 
-/// Few checks had data.
+/// Verdict: little data.
 pub const TOO_LITTLE: &str = "too_little";
 
 /// Who judged.
@@ -96,7 +96,7 @@ pub struct Judged {
     pub episodes: Vec<Episode>,
     /// Systems by heartbeats, in order of ids.
     pub systems: Vec<u8>,
-    /// Sentences.
+    /// Remarks, as sentences.
     pub remarks: Vec<String>,
     /// Start of unknown cells in the air: no voltage alarm.
     pub cells_unknown: Option<Instant>,

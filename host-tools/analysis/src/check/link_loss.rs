@@ -65,7 +65,7 @@ const WINDOW: Span = Span::from_millis(900);
 /// How it came down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Verdict {
-    /// Found by this check.
+    /// Finding check.
     pub check: &'static str,
     /// `None` if not measured.
     value: Option<f32>,

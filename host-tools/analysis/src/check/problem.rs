@@ -40,13 +40,13 @@ pub struct Problem {
     pub lasted: Span,
     /// It was still so at the end.
     pub lasting: bool,
-    /// Worst known.
+    /// Worst known value.
     pub value: f32,
     /// The limit of the worst level.
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
-    /// Failsafes, sensors.
+    /// Names of parts.
     pub details: Vec<String>,
     /// Last reception, for a radio gap's mishap.
     pub unheard_from: Option<Instant>,

@@ -105,7 +105,7 @@ fn but(checked: &Checked) -> String {
     }
 }
 
-/// Added up.
+/// Logs, added up.
 #[derive(Debug, Default)]
 pub struct Table {
     levels: BTreeMap<&'static str, u64>,

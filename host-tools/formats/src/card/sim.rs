@@ -126,7 +126,7 @@ impl SimCard {
         self.trace.replace(Some(Vec::new()));
     }
 
-    /// Ends the trace.
+    /// Traced block writes.
     pub fn take_trace(&self) -> Vec<Written> {
         self.trace.take().unwrap_or_default()
     }

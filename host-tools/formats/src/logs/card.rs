@@ -51,11 +51,11 @@ pub fn on_card(path: &Path) -> Vec<Log> {
 pub struct Card {
     /// Known logs.
     pub logs: Vec<Log>,
-    /// The most important first.
+    /// Main damage.
     pub damage: Option<String>,
-    /// Bytes.
+    /// Free bytes.
     pub free: u64,
-    /// Bytes.
+    /// Total bytes.
     pub all: u64,
 }
 

@@ -43,7 +43,7 @@ const ATTRIBUTE_LONG_NAME: u8 = 0x0f;
 pub struct Extent {
     /// Bytes from the image's beginning.
     pub start: u64,
-    /// Bytes.
+    /// Length, bytes.
     pub length: u64,
 }
 

@@ -105,7 +105,7 @@ impl Found {
 pub struct Image {
     /// The file.
     pub path: PathBuf,
-    /// Sentences; empty if sound.
+    /// Damage, as sentences.
     pub damage: Vec<String>,
     /// Clusters without a file.
     pub lost_clusters: u64,

@@ -65,7 +65,7 @@ impl<'a> Groups<'a> {
         }
     }
 
-    /// `None` at the end.
+    /// Next group.
     pub fn next_group(&mut self) -> Result<Option<Group>> {
         loop {
             let Some(step) = self.assembler.next() else {

@@ -81,7 +81,7 @@ impl<'a> Blocks<'a> {
         self.log
     }
 
-    /// `None` at the end.
+    /// Next block.
     pub fn next_block(&mut self) -> Result<Option<&[u8; BLOCK_BYTES]>> {
         while self.at + BLOCK_BYTES > self.buffer.len() {
             if !self.refill()? {

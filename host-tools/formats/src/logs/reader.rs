@@ -62,9 +62,9 @@ pub struct Summary {
     pub groups: u64,
     /// Gaps.
     pub gaps: u64,
-    /// Reported by the recorder.
+    /// Reported losses.
     pub losses: u64,
-    /// Known number.
+    /// Missing frames.
     pub frames_missing: u64,
     /// Gaps with an unknown number.
     pub gaps_uncounted: u64,

@@ -29,7 +29,7 @@ pub struct Evidence {
     /// Certainly written parity sectors: a full stretch's before the next stretch, and the last at a proper
     /// end.
     pub written: u64,
-    /// Missing or unsound ones.
+    /// Missing parity sectors.
     pub missing: u64,
     /// Checked columns.
     pub columns: u64,

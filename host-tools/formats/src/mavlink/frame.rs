@@ -34,7 +34,7 @@ pub enum Peek<'a> {
     Frame(Frame<'a>),
 }
 
-/// Consistent in its length.
+/// A consistent frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// The frame from magic to checksum or signature.
@@ -43,16 +43,16 @@ pub struct Frame<'a> {
     pub id: u32,
     /// The sequence number.
     pub sequence: u8,
-    /// Sender.
+    /// Sender's system.
     pub system: u8,
-    /// Sender.
+    /// Sender's component.
     pub component: u8,
     /// The payload as sent: MAVLink 2 leaves trailing zeros out.
     pub payload: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// Looks at every byte.
+    /// Checks every byte.
     pub fn check(&self) -> Check {
         if self.message().is_none() {
             return Check::Unknown;

@@ -64,7 +64,7 @@ impl Checksums {
         self.damaged
     }
 
-    /// Damaged frames.
+    /// Damage as gap.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words = wrong_checksums(self.damaged);

@@ -40,7 +40,7 @@ pub struct Stamp {
 pub struct Ahead {
     /// Up to [`super::doubt::ASKED`] of the requested ones.
     pub stamps: Vec<Stamp>,
-    /// None follow.
+    /// No times follow.
     pub is_end: bool,
 }
 
@@ -303,7 +303,7 @@ impl Wrong {
         self.first.get_or_insert((at, place));
     }
 
-    /// `None` without wrong times.
+    /// Damage, if any.
     pub fn gap(&self) -> Option<Gap> {
         let (at, place) = self.first?;
         let words =

@@ -55,7 +55,7 @@ pub struct Question<'a> {
     pub before: Option<u64>,
     /// It, and up to [`ASKED`] after it.
     pub times: &'a [Time],
-    /// None follow.
+    /// No times follow.
     pub is_end: bool,
     /// Rules for the ends.
     pub ends: Ends,

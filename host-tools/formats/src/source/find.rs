@@ -34,7 +34,7 @@ pub struct Found {
     pub places: Vec<Place>,
     /// Facts from the file systems of cards and images.
     pub images: Vec<Image>,
-    /// Sentences.
+    /// Remarks, as sentences.
     pub remarks: Vec<String>,
     /// Logs beyond the limit, or files named like a recording without one.
     pub is_cut: bool,

@@ -261,7 +261,7 @@ pub struct Gap {
     pub cause: Cause,
     /// Bytes from the uncompressed file's beginning.
     pub place: Option<u64>,
-    /// Unreadable.
+    /// Unreadable bytes.
     pub bytes: u64,
     /// The end of a sentence: `a length of 3 bytes for FMT`.
     pub words: String,

@@ -84,7 +84,7 @@ impl Place {
         }
     }
 
-    /// A single file's.
+    /// A single file.
     pub fn path(&self) -> Option<&Path> {
         match &self.source {
             From::File(path) => Some(path),

@@ -64,7 +64,7 @@ impl Timeline {
         }
     }
 
-    /// Microseconds.
+    /// Takes microseconds.
     pub fn at(&mut self, recorded_us: u64) -> Moment {
         let Some((before, reached)) = self.last else {
             // The first may be damaged too.

@@ -9,13 +9,13 @@ pub struct Figures {
     pub written: u64,
     /// They wait.
     pub waiting: u64,
-    /// Refused as invalid.
+    /// Invalid points.
     pub rejected: u64,
-    /// Last reason.
+    /// Last refusal.
     pub refusal: String,
     /// Part of a recording that the user stopped; else empty.
     pub left_out: String,
-    /// Dropped for newer ones.
+    /// Dropped points.
     pub lost: u64,
     /// Last reason for not taking a batch; else empty.
     pub trouble: String,

@@ -102,7 +102,7 @@ impl Influx {
         }
     }
 
-    /// The world's findings.
+    /// Points for findings.
     pub fn found(&mut self, epoch_us: u64, world: &World) {
         for (at, system, finding) in &world.found {
             let tags = self.names.tags(*system, world);

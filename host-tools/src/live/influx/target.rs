@@ -14,7 +14,7 @@ use crate::outcome::usage;
 /// A database.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
-    /// Takes batches.
+    /// Address for batches.
     pub write: String,
     /// Creates the database: 1.x has no buckets to set up.
     pub create: Option<String>,

@@ -30,7 +30,7 @@ pub struct Rig {
     pub status: &'static CardStatus,
     pub texts: Vec<(Instant, String)>,
     pub acks: Vec<(u16, u8)>,
-    /// Message and payload.
+    /// Logs: message, payload.
     pub logs: Vec<(u32, Vec<u8>)>,
     pub findings: Vec<(Instant, &'static str, Level)>,
     pub armed: bool,

@@ -49,7 +49,7 @@ pub fn open(input: Input) -> Result<Box<dyn Reader>> {
     Ok(Box::new(Ulog::new(input)))
 }
 
-/// Read once.
+/// A log's reader.
 pub struct Ulog<R> {
     window: Window<R>,
 }
