@@ -9,6 +9,7 @@ use crate::loss;
 use crate::names::{autopilot_name, check_name, type_name};
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
+use crate::source::told::Finding;
 use crate::states;
 use crate::summary::{BootLine, Contents, FlightLine, Overview};
 use crate::utc::iso8601;
@@ -150,8 +151,9 @@ struct FlightJson {
     to_s: Option<f64>,
 }
 
+/// A check's change of level, in all JSON of the program.
 #[derive(Debug, Serialize)]
-struct FindingJson {
+pub struct FindingJson {
     subsystem: &'static str,
     check: String,
     instance: u8,
@@ -161,9 +163,33 @@ struct FindingJson {
     time_utc: Option<String>,
     /// `null` if the input stopped.
     value: Option<f32>,
+    /// The worst value of this check and part in the log; `null` in all findings but the one from which the problem
+    /// counts.
+    worst: Option<f32>,
+    /// The state in the value, if it is not a quantity.
     state: Option<&'static str>,
     limit: Option<f32>,
     unit: String,
+}
+
+impl FindingJson {
+    /// Of a finding at this UTC, microseconds since 1970.
+    pub fn new(finding: &Finding, utc_us: Option<u64>) -> Self {
+        Self {
+            subsystem: finding.subsystem.name(),
+            check: finding.check.clone(),
+            instance: finding.instance,
+            level: finding.level.name(),
+            previous: finding.previous.name(),
+            time_s: finding.at.as_secs_f64(),
+            time_utc: utc_us.map(iso8601),
+            value: finite(finding.value),
+            worst: finding.worst,
+            state: states::name(&finding.check, finding.value),
+            limit: finite(finding.limit),
+            unit: finding.unit.clone(),
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -343,19 +369,7 @@ fn losses(contents: &Contents) -> Vec<LossJson> {
 }
 
 fn findings(log: &Overview) -> Vec<FindingJson> {
-    let json = |finding: &crate::source::told::Finding| FindingJson {
-        subsystem: finding.subsystem.name(),
-        check: finding.check.clone(),
-        instance: finding.instance,
-        level: finding.level.name(),
-        previous: finding.previous.name(),
-        time_s: finding.at.as_secs_f64(),
-        time_utc: log.utc_us(finding.at).map(iso8601),
-        value: finite(finding.value),
-        state: states::name(&finding.check, finding.value),
-        limit: finite(finding.limit),
-        unit: finding.unit.clone(),
-    };
+    let json = |finding: &Finding| FindingJson::new(finding, log.utc_us(finding.at));
     log.contents.findings.iter().map(json).collect()
 }
 

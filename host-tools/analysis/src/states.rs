@@ -1,8 +1,11 @@
 //! A check's value: a quantity with its limit, or a state.
 
+use std::fmt::{self, Display, Formatter};
+
 use hums_core::health::check_named;
 
-use crate::names::vocabulary;
+use crate::names::{unit_name, vocabulary};
+use crate::summary::is_possible;
 
 /// Should be zero: a limit below one means "any", and is not shown.
 const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
@@ -26,7 +29,51 @@ pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
     Shown::Quantity(finite(value), finite(limit).filter(|_| !says_nothing))
 }
 
-/// `None` for a quantity.
+/// A number as people read it: two decimals at most. A value that no sensor can have is not written out.
+pub fn short(value: f32) -> String {
+    if !is_possible(&value) {
+        return format!("{value:.0e}");
+    }
+    let text = format!("{value:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A quantity with its unit.
+pub fn quantity(value: f32, unit: &str) -> String {
+    let unit = unit_name(unit);
+    let space = if matches!(unit, "" | "°") { "" } else { " " };
+    let doubt = if is_possible(&value) { "" } else { ", which no sensor can have" };
+    format!("{}{space}{unit}{doubt}", short(value))
+}
+
+/// The values of a problem with their unit. Values that are not known, and a worst that reads as the onset, are empty.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Values {
+    /// At its onset.
+    pub onset: String,
+    /// The worst, as `at worst 3.2 V`.
+    pub worst: String,
+}
+
+impl Values {
+    /// Of these numbers, which may be NaN.
+    pub fn new(onset: f32, worst: Option<f32>, unit: &str) -> Self {
+        let known = |value: &f32| value.is_finite();
+        let words = |value: f32| quantity(value, unit);
+        let onset = Some(onset).filter(known).map(words).unwrap_or_default();
+        let worst = worst.filter(known).map(words).filter(|worst| *worst != onset);
+        Self { onset, worst: worst.map_or_else(String::new, |worst| format!("at worst {worst}")) }
+    }
+}
+
+impl Display for Values {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        let between = if self.onset.is_empty() || self.worst.is_empty() { "" } else { ", " };
+        write!(formatter, "{}{between}{}", self.onset, self.worst)
+    }
+}
+
+/// The state that a value of a check is; `None` for a check of a quantity.
 pub fn name(check: &str, value: f32) -> Option<&'static str> {
     let names: &[&str] = match check {
         // MAV_STATE
@@ -149,6 +196,25 @@ mod tests {
             }
             assert_eq!(shown(check.name, f32::NAN, 0.5), Shown::State(None));
         }
+    }
+
+    #[test]
+    fn a_problem_has_the_value_of_its_onset_and_the_worst_if_that_reads_otherwise() {
+        let words = |onset, worst, unit| Values::new(onset, worst, unit).to_string();
+        for (onset, worst, unit, expected) in [
+            (10.223, Some(22.014), "times", "10.22 \u{d7} usual, at worst 22.01 \u{d7} usual"),
+            (3.4, Some(3.399), "V", "3.4 V"),
+            (3.4, None, "V", "3.4 V"),
+            (f32::NAN, Some(31.0), "deg", "at worst 31\u{b0}"),
+            (f32::NAN, Some(f32::NAN), "deg", ""),
+            (0.256, Some(3e38), "", "0.26, at worst 3e38, which no sensor can have"),
+        ] {
+            assert_eq!(words(onset, worst, unit), expected);
+        }
+        assert_eq!(
+            (short(-2.6e9), short(999_999.0), short(10.0)),
+            ("-3e9".into(), "999999".into(), "10".into())
+        );
     }
 
     #[test]

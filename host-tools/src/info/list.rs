@@ -182,7 +182,7 @@ fn found(log: &Overview) -> String {
 /// `None` if all is well.
 fn worst(log: &Overview) -> Option<WorstJson> {
     let contents = &log.contents;
-    let problems = problems(&contents.findings, contents.checked_by() == "board");
+    let problems = problems(&contents.findings, contents.checked_by() == "board", []);
     let groups = grouped(&problems);
     let group = groups.first()?;
     let first = group.first()?;
@@ -243,6 +243,7 @@ mod tests {
             level: Level::ALL.into_iter().find(|known| known.name() == level).expect("a level"),
             previous: Level::Ok,
             value: 1.0,
+            worst: None,
             limit: 2.0,
             unit: String::new(),
         }

@@ -9,7 +9,6 @@ use hums_blackbox::{Cause, Gap};
 use hums_core::clock::Instant;
 use hums_core::health::Level;
 
-use super::number::short;
 use super::{usage, wear};
 use crate::check::causes::causes;
 use crate::colour::level;
@@ -17,13 +16,13 @@ use crate::ending::{among_words, behind_words, copies_words, made_again_words, u
 use crate::logs;
 use crate::logs::naming::is_part;
 use crate::loss;
-use crate::names::{check_kind, check_name, unit_name};
+use crate::names::{check_kind, check_name};
 use crate::part;
 use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::item::MessageCount;
 use crate::source::told::Finding;
-use crate::states::{Shown, shown};
+use crate::states::{Shown, Values, quantity, shown};
 use crate::summary::{LISTED_MAX, Overview};
 use crate::utc::{clock, iso8601_ms, moment};
 use hums_analysis::log_json::{duration_s, vehicle};
@@ -206,24 +205,21 @@ fn silence(finding: &Finding) -> Option<&'static str> {
 
 /// A finding with its check, the due part and the cause.
 fn sentence(finding: &Finding, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
-    let Finding { subsystem, check, instance, previous, value, limit, unit, .. } = finding;
+    let Finding { subsystem, check, instance, previous, value, worst, limit, unit, .. } = finding;
     let mut sentence = format!("{}: {}", subsystem.name(), check_name(check, *instance));
     if let Some(due) = due {
         let _ = write!(sentence, ": {}", part::due_words(due));
     }
-    let (state, value, limit) = match shown(check, *value, *limit) {
-        Shown::State(state) => (state, None, None),
-        Shown::Quantity(value, limit) => (None, value, limit),
-    };
-    if let Some(state) = state {
-        let _ = write!(sentence, ", {state}");
-    }
-    if let Some(value) = value {
-        let _ = write!(sentence, ", {} {}", short(value.into()), unit_name(unit));
-        sentence.truncate(sentence.trim_end().len());
-    }
-    if let Some(limit) = limit {
-        let _ = write!(sentence, " (limit {})", short(limit.into()));
+    match shown(check, *value, *limit) {
+        Shown::State(state) => state.into_iter().for_each(|state| {
+            let _ = write!(sentence, ", {state}");
+        }),
+        Shown::Quantity(_, limit) => {
+            let values = Values::new(*value, *worst, unit).to_string();
+            let comma = if values.is_empty() { "" } else { ", " };
+            let limit = limit.map(|limit| format!(" (limit {})", quantity(limit, unit)));
+            let _ = write!(sentence, "{comma}{values}{}", limit.unwrap_or_default());
+        }
     }
     if finding.is_unjudged() {
         let _ = write!(sentence, "; {}", Finding::UNJUDGED);
@@ -366,6 +362,7 @@ mod tests {
             level: Level::Critical,
             previous: Level::Ok,
             value,
+            worst: None,
             limit,
             unit: unit.to_owned(),
         };
@@ -375,7 +372,7 @@ mod tests {
         let charge = sentence(finding("batt_state", 1.0, 0.5, ""));
         assert_eq!(charge, "computer: battery 1 charge state, low or unhealthy; was ok [batt_state]");
         let load = sentence(finding("load", 97.0, 95.0, "%"));
-        assert!(load.contains(", 97 % (limit 95); was ok"), "{load}");
+        assert!(load.contains(", 97 % (limit 95 %); was ok"), "{load}");
     }
 
     #[test]
@@ -388,6 +385,7 @@ mod tests {
             level,
             previous,
             value,
+            worst: None,
             limit: 1.0,
             unit: String::new(),
         };
@@ -427,6 +425,7 @@ mod tests {
             level: Level::Ok,
             previous: Level::Critical,
             value,
+            worst: None,
             limit: f32::NAN,
             unit: "V".to_owned(),
         };

@@ -5,11 +5,10 @@ use std::fmt::Write as _;
 use hums_core::clock::Instant;
 use hums_core::health::exceedance::Crossings;
 
-use super::number::short;
-use crate::names::{check_name, unit_name};
+use crate::names::check_name;
 use crate::plural::count;
 use crate::printable::word;
-use crate::states::{Shown, shown};
+use crate::states::{Shown, quantity, shown};
 use crate::summary::Overview;
 use crate::utc::moment;
 use hums_analysis::log_json::finite;
@@ -31,9 +30,7 @@ pub(super) fn text(text: &mut String, log: &Overview) {
             let seconds = |tenths: u32| moment(Instant::from_millis(u64::from(tenths) * 100));
             let worst = match shown(check, peak, f32::NAN) {
                 Shown::State(state) => state.unwrap_or_default().to_owned(),
-                Shown::Quantity(peak, _) => peak.map_or_else(String::new, |peak| {
-                    format!("{} {}", short(peak.into()), unit_name(&line.unit))
-                }),
+                Shown::Quantity(peak, _) => peak.map_or_else(String::new, |peak| quantity(peak, &line.unit)),
             };
             let _ = writeln!(
                 text,

@@ -10,6 +10,7 @@ use hums_core::clock::{Instant, Span};
 use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
+use hums_core::health::exceedance::Exceedance;
 use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, VOCABULARY, check_named};
 use hums_core::observation::{Autopilot, Feeds, Observation, Source};
 use hums_core::params::Params;
@@ -306,7 +307,11 @@ impl Craft {
             findings(finding);
         });
         for finding in found {
-            keep(history, now, Note::finding(now, &finding).of_part(self.due(&finding).as_ref()));
+            let mut peaks = self.monitor.exceedances().iter(now.into());
+            let is_it = |of: &Exceedance| (of.check.name, of.instance) == (finding.check, finding.instance);
+            let worst = peaks.find(is_it).map(|of| of.session.peak);
+            let note = Note::finding(now, &finding, worst).of_part(self.due(&finding).as_ref());
+            keep(history, now, note);
         }
         self.happenings(now, history);
         // Snapshots are not used here.

@@ -448,6 +448,7 @@ mod tests {
                         level: Level::Critical,
                         previous: Level::Ok,
                         value: 3.4,
+                        worst: None,
                         limit: 3.5,
                         unit: "V".to_owned(),
                     };

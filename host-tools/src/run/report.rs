@@ -4,10 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use hums_analysis::log_json::FindingJson;
 use hums_blackbox::record::Stats;
-use hums_core::clock::Instant;
-use hums_core::health::{self, Level};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::earlier::EarlierSessions;
 use crate::endpoint::Endpoint;
@@ -16,7 +15,7 @@ use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 use crate::plural::count;
-use crate::source::told;
+use crate::source::told::Finding;
 use crate::summary::Overview;
 use crate::utc::moment;
 
@@ -49,7 +48,8 @@ pub struct Report {
     pub gs_frames: u64,
     /// Bytes sent to the ground station.
     pub gs_bytes: u64,
-    /// Changes of level in order, up to [`FINDINGS_MAX`]; the log has all.
+    /// Changes of level, in order, up to [`FINDINGS_MAX`]; the log has all of them.
+    #[serde(serialize_with = "findings")]
     pub findings: Vec<Finding>,
     /// How many more there were.
     #[serde(skip_serializing_if = "is_none")]
@@ -105,62 +105,8 @@ fn is_none(count: &u64) -> bool {
     *count == 0
 }
 
-/// A change of level.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    /// The part of the vehicle.
-    pub subsystem: String,
-    /// The check.
-    pub check: String,
-    /// Which one of several.
-    pub instance: u8,
-    /// The new level.
-    pub level: String,
-    /// Seconds since the first input byte.
-    pub time_s: f64,
-    /// `null` if the input stopped.
-    pub value: Option<f64>,
-    /// Its unit.
-    pub unit: String,
-}
-
-impl Finding {
-    /// For people; `ok` without a value is an end, not health.
-    fn word(&self) -> &str {
-        if self.level == Level::Ok.name() && self.value.is_none() { "ended" } else { &self.level }
-    }
-}
-
-impl From<&health::Finding> for Finding {
-    fn from(finding: &health::Finding) -> Self {
-        Self {
-            subsystem: finding.subsystem.name().to_owned(),
-            check: finding.check.to_owned(),
-            instance: finding.instance,
-            level: finding.level.name().to_owned(),
-            time_s: finding.at.as_millis() as f64 / 1e3,
-            value: known(finding.value),
-            unit: finding.unit.to_owned(),
-        }
-    }
-}
-
-impl From<&told::Finding> for Finding {
-    fn from(finding: &told::Finding) -> Self {
-        Self {
-            subsystem: finding.subsystem.name().to_owned(),
-            check: finding.check.clone(),
-            instance: finding.instance,
-            level: finding.level.name().to_owned(),
-            time_s: finding.at.as_millis() as f64 / 1e3,
-            value: known(finding.value),
-            unit: finding.unit.clone(),
-        }
-    }
-}
-
-fn known(value: f32) -> Option<f64> {
-    value.is_finite().then_some(f64::from(value))
+fn findings<S: Serializer>(findings: &[Finding], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(findings.iter().map(|finding| FindingJson::new(finding, None)))
 }
 
 impl Report {
@@ -201,9 +147,7 @@ impl Report {
             self.log_files.extend(log.files.iter().cloned());
             self.usage =
                 overview.contents.usage.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
-            for finding in &overview.contents.findings {
-                self.findings.push(Finding::from(finding));
-            }
+            self.findings.extend(overview.contents.findings);
         }
         Ok((frames, on_card))
     }
@@ -268,10 +212,9 @@ impl Report {
             let _ = writeln!(text, "power    was cut, as asked");
         }
         for finding in &self.findings {
-            let Finding { subsystem, check, instance, time_s, .. } = finding;
-            let level = finding.word();
-            let at = moment(Instant::from_micros((time_s * 1e6).round() as u64));
-            let name = check_name(check, *instance);
+            let level = if finding.is_unjudged() { "ended" } else { finding.level.name() };
+            let (at, subsystem, check) = (moment(finding.at), finding.subsystem.name(), &finding.check);
+            let name = check_name(check, finding.instance);
             let _ = writeln!(text, "finding  {at:>9}  {level:<8}  {subsystem}: {name} [{check}]");
         }
         if self.findings_left_out > 0 {

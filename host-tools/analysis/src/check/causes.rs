@@ -79,6 +79,7 @@ mod tests {
             level: Level::ALL.into_iter().find(|known| known.name() == level).expect("a level"),
             previous: Level::Ok,
             value: 1.0,
+            worst: None,
             limit: 1.0,
             unit: String::new(),
         }

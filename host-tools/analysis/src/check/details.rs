@@ -331,6 +331,7 @@ pub(super) fn reported(at: Instant, (name, value): (&str, f32), params: &Params)
         level,
         previous,
         value,
+        worst: None,
         limit,
         unit: check.unit.name().to_owned(),
     };

@@ -8,9 +8,9 @@ use super::flights::Flight;
 use super::judged::{Judged, JudgedBy};
 use super::problem::Problem;
 use super::text::firmware;
+use crate::log_json::{FindingJson, finite};
 use crate::names::{autopilot_name, type_name, vocabulary};
 use crate::source::item::{About, Gap};
-use crate::source::told::Finding;
 use crate::states;
 use crate::utc::iso8601;
 
@@ -38,7 +38,7 @@ struct LogJson<'a> {
     clock_restarts: u64,
     problems: Vec<ProblemJson<'a>>,
     findings_count: u64,
-    findings: Vec<FindingJson<'a>>,
+    findings: Vec<FindingJson>,
     judged: &'a [&'static str],
     not_judged: Vec<NotJudgedJson<'a>>,
     remarks: &'a [String],
@@ -93,6 +93,7 @@ struct ProblemJson<'a> {
     seconds: f64,
     times: u32,
     to_the_end: bool,
+    onset: Option<f32>,
     value: Option<f32>,
     state: Option<&'static str>,
     limit: Option<f32>,
@@ -101,17 +102,6 @@ struct ProblemJson<'a> {
     detail: Option<String>,
     meaning: &'static str,
     action: &'static str,
-}
-
-#[derive(Serialize)]
-struct FindingJson<'a> {
-    subsystem: &'static str,
-    check: &'a str,
-    instance: u8,
-    level: &'static str,
-    time_s: f64,
-    value: Option<f32>,
-    unit: &'a str,
 }
 
 #[derive(Serialize)]
@@ -175,7 +165,11 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         clock_restarts: judged.restarts,
         problems: judged.problems.iter().map(|problem| self::problem(problem, utc(problem.at))).collect(),
         findings_count: judged.findings_count,
-        findings: judged.findings.iter().map(finding).collect(),
+        findings: judged
+            .findings
+            .iter()
+            .map(|finding| FindingJson::new(finding, judged.epochs.utc_us(finding.at)))
+            .collect(),
         judged: &judged.judged,
         not_judged: judged.not_judged.iter().map(|(check, why)| NotJudgedJson { check, why }).collect(),
         remarks: &judged.remarks,
@@ -193,11 +187,6 @@ pub fn error(log: &str, error: &anyhow::Error) -> String {
 
 fn seconds(span: hums_core::clock::Span) -> f64 {
     span.as_micros() as f64 / 1e6
-}
-
-/// A number that JSON has.
-fn known(value: f32) -> Option<f32> {
-    value.is_finite().then_some(value)
 }
 
 fn vehicle(judged: &Judged) -> Option<VehicleJson> {
@@ -242,26 +231,15 @@ fn problem(problem: &Problem, time_utc: Option<String>) -> ProblemJson<'_> {
         seconds: seconds(problem.lasted),
         times: problem.times,
         to_the_end: problem.lasting,
-        value: known(problem.value),
+        onset: finite(problem.onset),
+        value: finite(problem.value),
         state: states::name(&problem.check, problem.value),
-        limit: known(problem.limit),
+        limit: finite(problem.limit),
         unit: &problem.unit,
         because: problem.because.as_deref(),
         detail: (!problem.details.is_empty()).then(|| problem.details.join(", ")),
         meaning: states::meaning(&problem.check),
         action: words.map_or("", |words| words.action),
-    }
-}
-
-fn finding(finding: &Finding) -> FindingJson<'_> {
-    FindingJson {
-        subsystem: finding.subsystem.name(),
-        check: &finding.check,
-        instance: finding.instance,
-        level: finding.level.name(),
-        time_s: finding.at.as_secs_f64(),
-        value: known(finding.value),
-        unit: &finding.unit,
     }
 }
 

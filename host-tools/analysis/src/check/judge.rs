@@ -27,7 +27,7 @@ use super::details::{self, Details};
 use super::flights::{Flight, Flights, begin_in_air, is_in_air};
 use super::judged::{Holes, Judged, JudgedBy};
 use super::link_loss::{LinkLoss, Verdict};
-use super::problem::{IMPACT, LISTED_MAX, Problems};
+use super::problem::{IMPACT, LISTED_MAX, Problems, give_worst};
 use super::trends::{self, Episode, Flown};
 use crate::names::vocabulary;
 use crate::part;
@@ -698,6 +698,7 @@ impl Judge {
         // Impacts come after the vehicle lies still.
         findings.sort_by_key(|finding| finding.at);
         let worst_first = problems.worst_first();
+        give_worst(&mut findings, &worst_first);
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
             monitor: &self.monitor,

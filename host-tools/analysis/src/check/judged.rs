@@ -9,7 +9,7 @@ use hums_core::vehicle::Vehicle;
 
 use super::coverage::OFF;
 use super::flights::{Flight, begin_in_air};
-use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
+use super::problem::{LISTED_MAX, Problem, Problems, give_worst, rank, worst_first};
 use super::trends::{Baselines, Episode, because};
 use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
@@ -155,10 +155,12 @@ impl Judged {
             let new = judged.iter().filter(|check| !self.judged.contains(check)).copied();
             self.judged.extend(new.collect::<BTreeSet<_>>());
         }
-        self.findings.append(&mut trends.findings);
-        self.findings.sort_by_key(|finding| finding.at);
+        let mut findings = std::mem::take(&mut trends.findings);
         self.findings_count += trends.findings_count;
         let trends = trends.worst_first();
+        give_worst(&mut findings, &trends);
+        self.findings.append(&mut findings);
+        self.findings.sort_by_key(|finding| finding.at);
         for problem in &trends {
             // The box's check that is a trend too has the worse level.
             let is_same = |of: &Problem| (&of.check, of.instance) == (&problem.check, problem.instance);

@@ -88,6 +88,7 @@ impl Verdict {
             level,
             previous: if level == Level::Critical { Level::Ok } else { Level::Critical },
             value: self.value.unwrap_or(f32::NAN),
+            worst: None,
             limit,
             unit: check.unit.name().to_owned(),
         })

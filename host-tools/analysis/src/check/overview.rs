@@ -14,6 +14,7 @@ use hums_core::usage::UsageCounter;
 use super::flights::Flight;
 use super::judge::{Heard, Judge, Limits};
 use super::judged::Judged;
+use super::problem::{give_worst, problems};
 use crate::counters::is_told;
 use crate::ending::Ending;
 use crate::logs::groups::has_start;
@@ -82,12 +83,21 @@ pub fn overview(place: &Place) -> Result<Overview> {
         // A box may end its log in flight.
         let marks = &overview.ending.summary.marks;
         let breaks_off = marks.moved.is_some() || marks.took_off == Some(true);
+        if is_checked {
+            let contents = &mut overview.contents;
+            let peaks = contents.exceedances.iter();
+            let peaks = peaks.map(|((check, part), line)| (check.as_str(), *part, line.session.peak));
+            let problems = problems(&contents.findings, true, peaks);
+            give_worst(&mut contents.findings, &problems);
+        }
+        let contents = &overview.contents;
         if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
             let judged = match here {
                 Some(here) => here.end(),
                 None => judge(place, &limits, Heard::Somewhere, true)?.judged,
             };
             if is_checked && breaks_off {
+                give_worst(&mut overview.contents.findings, &judged.problems);
                 go_on(&mut overview, &judged);
             }
             if !is_checked {

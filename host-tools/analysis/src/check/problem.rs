@@ -40,7 +40,9 @@ pub struct Problem {
     pub lasted: Span,
     /// It was still so at the end.
     pub lasting: bool,
-    /// Worst known value.
+    /// The value at that time.
+    pub onset: f32,
+    /// The worst value that is known.
     pub value: f32,
     /// The limit of the worst level.
     pub limit: f32,
@@ -174,6 +176,7 @@ impl Problems {
             times: 0,
             lasted: Span::ZERO,
             lasting: false,
+            onset: finding.value,
             value: f32::NAN,
             limit: finding.limit,
             unit: finding.unit.clone(),
@@ -191,7 +194,8 @@ impl Problems {
         followed.level = finding.level;
         let OpenProblem { problem, since, unexplained, .. } = followed;
         if rank(finding.level) > rank(problem.level) {
-            (problem.level, problem.at, problem.limit) = (finding.level, finding.at, finding.limit);
+            (problem.level, problem.at) = (finding.level, finding.at);
+            (problem.onset, problem.limit) = (finding.value, finding.limit);
         }
         if bad {
             problem.value = worse(problem.value, finding.value, &finding.check);
@@ -326,16 +330,34 @@ pub(super) fn worst_first(problems: &mut [Problem]) {
     problems.sort_by_key(|problem| (std::cmp::Reverse(rank(problem.level)), problem.order(&mishaps)));
 }
 
-/// Worst first; findings of a box, or of this program.
-pub fn problems(findings: &[Finding], of_box: bool) -> Vec<Problem> {
+/// The problems from a log's findings, worst first. The findings are by a box or by this program; `peaks` are worst
+/// values by check and part.
+pub fn problems<'a>(
+    findings: &[Finding],
+    of_box: bool,
+    peaks: impl IntoIterator<Item = (&'a str, u8, f32)>,
+) -> Vec<Problem> {
     let mut problems = if of_box { Problems::of_box() } else { Problems::default() };
-    for finding in findings {
-        problems.take(finding, Span::ZERO);
-    }
+    findings.iter().for_each(|finding| problems.take(finding, Span::ZERO));
+    peaks.into_iter().for_each(|(check, instance, value)| problems.peak(check, instance, value));
     problems.worst_first()
 }
 
-/// Of a problem that a box found then, with other `open` ones. In a mishap it finds an impact at once.
+/// Gives the worst value of each problem to the finding from which it counts.
+pub(super) fn give_worst(findings: &mut [Finding], problems: &[Problem]) {
+    for problem in problems {
+        let is_it = |of: &&mut Finding| {
+            (of.at, of.level, of.instance) == (problem.at, problem.level, problem.instance)
+                && of.check == problem.check
+        };
+        if let Some(finding) = findings.iter_mut().find(is_it) {
+            finding.worst = problem.value.is_finite().then_some(problem.value);
+        }
+    }
+}
+
+/// Start of a problem that a box found at this time, while others are `open` since theirs. In an ongoing
+/// mishap it finds an impact at once.
 pub fn began<'a>(
     check: &str,
     found_at: Instant,
@@ -368,6 +390,7 @@ pub(super) mod tests {
             level,
             previous: Level::Ok,
             value,
+            worst: None,
             limit: if level == Level::Critical { 3.5 } else { 3.6 },
             unit: "V".to_owned(),
         }

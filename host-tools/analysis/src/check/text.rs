@@ -16,15 +16,14 @@ use super::judged::{Judged, JudgedBy};
 use super::problem::{Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
-use crate::names::{autopilot_name, type_name, unit_name, vocabulary};
+use crate::names::{autopilot_name, type_name, vocabulary};
 use crate::part;
 use crate::plural::count;
 use crate::printable::word;
 use crate::soundness::Soundness;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
-use crate::states::{Shown, meaning, shown};
-use crate::summary::is_possible;
+use crate::states::{Shown, Values, meaning, quantity, shown};
 use crate::utc::{clock, iso8601, moment};
 
 /// Problems in words; the rest is one line.
@@ -342,9 +341,12 @@ fn headline(problems: &[Problem]) -> String {
         return String::new();
     };
     let worst = worst_of(&group.members);
-    let value = worst.and_then(value).map_or_else(String::new, |(value, _)| format!(", {value}"));
     let details = worst.map_or_else(String::new, |worst| details(worst, HEADLINE_DETAILS_MAX));
-    format!("{}{value}{details} at {}", alarm(&group.members), moment(first.at))
+    let (onset, worst) =
+        worst.and_then(values).map(|(values, _)| (values.onset, values.worst)).unwrap_or_default();
+    let after_comma = |words: String| if words.is_empty() { words } else { format!(", {words}") };
+    let (onset, worst) = (after_comma(onset), after_comma(worst));
+    format!("{}{onset}{details} at {}{worst}", alarm(&group.members), moment(first.at))
 }
 
 fn problems(text: &mut String, problems: &[Problem]) {
@@ -427,26 +429,20 @@ fn details(problem: &Problem, max: usize) -> String {
     if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
 }
 
-/// The worst value with units and the limit.
-fn value(problem: &Problem) -> Option<(String, Option<String>)> {
-    let Shown::Quantity(value, limit) = shown(&problem.check, problem.value, problem.limit) else {
-        return None;
-    };
-    let unit = if problem.unit.is_empty() { String::new() } else { format!(" {}", unit_name(&problem.unit)) };
-    let value = match value? {
-        value if is_possible(&value) => format!("{}{unit}", short(value)),
-        value => format!("{}{unit}, which no sensor can have", short(value)),
-    };
-    Some((value, limit.map(|limit| format!("{}{unit}", short(limit)))))
+/// The values of a quantity, and its limit; `None` for a state.
+fn values(problem: &Problem) -> Option<(Values, Option<String>)> {
+    let Problem { check, onset, value, limit, unit, .. } = problem;
+    let Shown::Quantity(worst, limit) = shown(check, *value, *limit) else { return None };
+    Some((Values::new(*onset, worst, unit), limit.map(|limit| quantity(limit, unit))))
 }
 
-/// Fault, parts, worst value, limit, duration.
+/// The problem: the fault, the parts, the values, the limit, the duration.
 fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
     let mut text = alarm(group);
-    let (value, limit) = value(first).unzip();
-    if let Some(value) = value {
-        let _ = write!(text, ": {value}");
+    let (values, limit) = values(first).unzip();
+    if let Some(values) = values.map(|values| values.to_string()).filter(|values| !values.is_empty()) {
+        let _ = write!(text, ": {values}");
     }
     text.push_str(&details(first, usize::MAX));
     if let Some(limit) = limit.flatten().filter(|_| first.details.is_empty()) {
@@ -535,14 +531,6 @@ fn how_bad(gap: &Gap) -> (bool, bool, Reverse<u64>, Reverse<Span>) {
     (!gap.cause.is_damage(), gap.bytes > 0, Reverse(gap.bytes), Reverse(lasts))
 }
 
-fn short(value: f32) -> String {
-    if !is_possible(&value) {
-        return format!("{value:.0e}");
-    }
-    let text = format!("{value:.2}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use hums_core::clock::Instant;
@@ -560,6 +548,7 @@ mod tests {
             times: 1,
             lasted: Span::ZERO,
             lasting: false,
+            onset: value,
             value,
             limit: 10.0,
             unit: String::new(),
@@ -606,10 +595,6 @@ mod tests {
 
     #[test]
     fn a_number_that_no_sensor_can_have_is_not_shown_as_one() {
-        assert_eq!(
-            (short(3e38), short(-2.6e9), short(999_999.0)),
-            ("3e38".into(), "-3e9".into(), "999999".into())
-        );
         let (height_m, climb_mps) = (Some(-3e38), Some(1.0));
         let speed_mps = Some(f32::INFINITY);
         let place_deg = Some((47.397_742, -8.545_594));
@@ -668,10 +653,5 @@ mod tests {
         let unheard = Flight { mishap: hit.mishap.map(|it| Mishap { unheard_from, ..it }), ..hit };
         let words = ", which ended by an impact that nobody heard, between 1:25.0 and 1:31.5";
         assert_eq!(not_seen(&[unheard]), words);
-    }
-
-    #[test]
-    fn numbers_are_read_at_a_glance() {
-        assert_eq!((short(3.4), short(10.0), short(0.256)), ("3.4".into(), "10".into(), "0.26".into()));
     }
 }

@@ -326,6 +326,7 @@ impl Baselines {
                 level,
                 previous: Level::Ok,
                 value,
+                worst: None,
                 limit,
                 unit: "%".to_owned(),
             })

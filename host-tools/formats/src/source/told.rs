@@ -75,7 +75,9 @@ pub struct Finding {
     pub previous: Level,
     /// Decided; NaN if the input stopped.
     pub value: f32,
-    /// NaN without one.
+    /// The worst value of this check and part in the log, in the finding from which the problem counts.
+    pub worst: Option<f32>,
+    /// The limit it crossed; NaN without one.
     pub limit: f32,
     /// The unit of both.
     pub unit: String,
@@ -111,6 +113,7 @@ impl From<&FindingRecord<'_>> for Finding {
             level: finding.level,
             previous: finding.previous,
             value: finding.value,
+            worst: None,
             limit: finding.limit,
             unit: finding.unit.to_owned(),
         }

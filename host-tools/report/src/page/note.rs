@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::names::{check_name, unit_name, vocabulary};
 use crate::part;
 use crate::source::told;
-use crate::states::{Shown, meaning, shown};
+use crate::states::{Shown, Values, meaning, quantity, shown};
 use crate::statustext::Text;
 
 const OURS: &str = "HUMS: ";
@@ -58,6 +58,8 @@ pub struct Found {
     pub limit: Option<f32>,
     /// The unit of both, as people write it.
     pub unit: String,
+    /// State or values with their limit, and the level before, in words.
+    pub measured: String,
     /// Its meaning, as a sentence.
     pub meaning: &'static str,
     /// The recommended action, as a sentence.
@@ -116,6 +118,18 @@ fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
 
 const FEEDS: [Feeds; 3] = [Feeds::Vehicle, Feeds::Avionics, Feeds::Payload];
 
+/// The state or the values of a finding, the limit, and the level before.
+fn measured(finding: &told::Finding) -> String {
+    let told::Finding { check, value, worst, limit, unit, previous, .. } = finding;
+    let (value, limit) = match shown(check, *value, *limit) {
+        Shown::State(state) => (state.unwrap_or_default().to_owned(), None),
+        Shown::Quantity(_, limit) => (Values::new(*value, *worst, unit).to_string(), limit),
+    };
+    let limit = limit.map_or_else(String::new, |limit| format!("limit {}", quantity(limit, unit)));
+    let parts = [value, limit, format!("was {}", previous.name())];
+    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
+}
+
 impl Note {
     /// A finding of a check, and the check that explains it.
     pub fn found(finding: &told::Finding, because: Option<&str>) -> Self {
@@ -145,6 +159,7 @@ impl Note {
                 state,
                 limit,
                 unit: unit_name(&finding.unit).to_owned(),
+                measured: measured(finding),
                 meaning: if is_worry { meaning(&finding.check) } else { "" },
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
                 because: because.map(Cause::of),
@@ -164,9 +179,10 @@ impl Note {
         Self { from: "on board".to_owned(), ..Self::found(finding, None) }
     }
 
-    /// A finding of the checks here.
-    pub fn finding(now: Instant, finding: &Finding) -> Self {
-        let line = told::Finding::new(now, finding);
+    /// A finding of the checks here, with the worst value of its check so far, if it ends an alarm.
+    pub fn finding(now: Instant, finding: &Finding, worst: Option<f32>) -> Self {
+        let mut line = told::Finding::new(now, finding);
+        line.worst = worst.filter(|_| !line.is_bad());
         Self::found(&line, Some(finding.because).filter(|because| !because.is_empty()))
     }
 
@@ -214,6 +230,7 @@ impl Note {
                 state: None,
                 limit: None,
                 unit: String::new(),
+                measured: String::new(),
                 meaning: if is_worry { known.meaning } else { "" },
                 action: if is_worry { known.action } else { "" },
                 because: None,

@@ -12,9 +12,9 @@ use super::pipeline::Pipeline;
 use super::{PowerOn, identity};
 use crate::card::SimCard;
 use crate::run::Machine as _;
-use crate::run::report::Finding;
 use crate::run::store;
 use crate::source::Chunk;
+use crate::source::told::Finding;
 
 /// The signing key's item in the store.
 const ITEM_KEY: u8 = 32;

@@ -14,8 +14,8 @@ use hums_recorder::{Block, Buffers, CardDevice, CardStatus, Trouble};
 
 use crate::card::SimCard;
 use crate::card::sim::CardError;
-use crate::run::report::Finding;
 use crate::run::store::FileFlash;
+use crate::source::told::Finding;
 
 /// Everything static on the board.
 pub(super) struct Memory {

@@ -17,9 +17,9 @@ use hums_recorder::CardStatus;
 use super::outside::{Memory, Outside, Slot};
 use crate::files::settle;
 use crate::run::Machine;
-use crate::run::report::Finding;
 use crate::run::store::FileFlash;
 use crate::source::Chunk;
+use crate::source::told::Finding;
 
 /// A line silent for this long will not finish its frame.
 const SILENCE: Span = Span::from_millis(20);
@@ -200,10 +200,8 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Self { monitoring, ends, outside, now, .. } = self;
         let Outside { findings, power_on_us, .. } = outside;
         monitoring.tick(*now, &mut ends.sectors_in, &mut ends.gs_in, &mut |finding| {
-            findings(Finding {
-                time_s: power_on_us.saturating_add(now.as_micros()) as f64 / 1e6,
-                ..Finding::from(finding)
-            });
+            let at = Instant::from_micros(power_on_us.saturating_add(now.as_micros()));
+            findings(Finding { at, ..Finding::new(*now, finding) });
         });
         let frames = self.port_status.read().frames;
         self.handover.step(self.now, self.monitoring.monitor_mut(), frames);

@@ -4,15 +4,8 @@ import { badge } from "./badge.js";
 import { panel, toggle } from "./dom.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
-import { moment, plural, short } from "./text.js";
+import { moment, plural } from "./text.js";
 import { utc } from "./view.js";
-
-const quantity = (value, unit) => `${short(value)}${unit === "\u00b0" ? "" : " "}${unit}`.trim();
-// What a check measured, and against what.
-const measured = ({ value, state, limit, unit, previous }) =>
-  [state ?? (value == null ? "" : quantity(value, unit)), limit == null ? "" : `limit ${quantity(limit, unit)}`, `was ${previous}`]
-    .filter(Boolean)
-    .join(", ");
 
 // `rows` are on the page at most, the newest first or last. A click on one goes there.
 export const notes = ({ go, newestFirst, rows = Infinity }) => {
@@ -74,7 +67,7 @@ export const notes = ({ go, newestFirst, rows = Infinity }) => {
       ),
       level.node,
       el("span", { class: "words" }, note.words),
-      el("small", {}, [from, found && measured(found)].filter(Boolean).join(" \u00b7 ")),
+      el("small", {}, [from, found?.measured].filter(Boolean).join(" \u00b7 ")),
       found?.because ? el("p", { class: "why because" }, `Because of: ${found.because.words}`) : null,
       found?.meaning ? el("p", { class: "why" }, found.meaning, " ", el("b", {}, found.action)) : null,
       found ? follows(note) : null,
