@@ -8,7 +8,7 @@ use hums_blackbox::record::Lost;
 use serde::Serialize;
 
 use crate::cli;
-use crate::colour::level;
+use crate::colour::{level, warning};
 use crate::ending::{
     BlocksJson, EndJson, Ending, SessionBefore, among_words, behind_words, copies_words, made_again_words,
     unprotected_words,
@@ -27,6 +27,7 @@ use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
 use hums_analysis::log_json::images_json;
 use hums_analysis::manifest::Manifest;
+use hums_analysis::soundness::Soundness;
 
 const SCHEMA: Schema = Schema::first("hums-info-verify");
 
@@ -40,8 +41,14 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         note!("{remark}");
     }
     let mut ok = !found.is_cut();
-    let mut all =
-        Totals { logs: 0, worst: Verdict::Holds, made_again: 0, unprotected: 0, without_earlier: None };
+    let mut all = Totals {
+        logs: 0,
+        worst: Verdict::Holds,
+        soundness: Soundness::Whole,
+        made_again: 0,
+        unprotected: 0,
+        without_earlier: None,
+    };
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
         for words in words {
@@ -65,13 +72,17 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
         manifest.log(&overview.ending.name, Some(&overview.ending), &[]);
-        all.add(&overview.ending, log.verdict);
+        all.add(overview, log.verdict);
         if let Some(list) = &mut list {
             return list.element(&log);
         }
         let files = overview.ending.files.join(", ");
         output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
         print(&log.checks)?;
+        let lacks = overview.soundness().words();
+        if !lacks.is_empty() {
+            output::line(&format!("  state    {}", warning(lacks)))?;
+        }
         for words in came_damaged(&overview.contents).into_iter().chain(overview.ending.aside()) {
             output::line(&format!("  {}", word(&words)))?;
         }
@@ -100,7 +111,9 @@ struct Totals {
     /// Number of sessions.
     logs: u64,
     worst: Verdict,
-    /// Rebuilt, or missing parity: a damaged card without a lost frame.
+    /// The worst of them.
+    soundness: Soundness,
+    /// Sectors that were rebuilt, and missing ones with parity: a card is damaged, and no frame is lost.
     made_again: u64,
     unprotected: u64,
     /// The logs before it were not read.
@@ -108,8 +121,10 @@ struct Totals {
 }
 
 impl Totals {
-    fn add(&mut self, ending: &Ending, verdict: Verdict) {
+    fn add(&mut self, overview: &Overview, verdict: Verdict) {
+        let ending = &overview.ending;
         self.worst = self.worst.max(verdict);
+        self.soundness = self.soundness.max(overview.soundness());
         self.made_again += ending.made_again();
         self.unprotected += ending.unprotected();
         self.logs += u64::from(ending.is_counted());
@@ -132,7 +147,10 @@ impl Totals {
             (Verdict::Holds, true, true) => "nothing is lost",
             (Verdict::Holds, true, false) => "nothing is lost of what was read",
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
-            (Verdict::NotProved, ..) => "damage, losses or an end that is not proved: see above",
+            (Verdict::NotProved, ..) if self.soundness == Soundness::Whole => {
+                "not all could be read: see above"
+            }
+            (Verdict::NotProved, ..) => self.soundness.words(),
         };
         let earlier = self.without_earlier.as_ref();
         let more = [

@@ -162,7 +162,17 @@ pub struct ComponentLine {
     pub replaced: u32,
 }
 
-/// A part of a sentence, for other programs' recordings.
+/// How a box counts time in the air.
+pub const BOX_COUNTS: &str = "in the air: as the box counts it, to the time at which it recognised the landing; hums check says when it touched down";
+
+/// The seconds of one log, from a counter at its end and at its beginning, with the number of its first sector in the
+/// power-on.
+pub fn since_power_on(all: f64, before: f64, first_number: Option<u32>) -> f64 {
+    let is_later = first_number.is_some_and(|first| first > 0);
+    (all - if is_later { before } else { 0.0 }).max(0.0)
+}
+
+/// Why a recording of another program is not whole, as a part of a sentence.
 pub fn damaged_places(count: u64) -> String {
     format!("{} damaged or cut; hums check says where", are(count, "place"))
 }
@@ -585,17 +595,30 @@ impl Overview {
         self.contents.usage_at.filter(|at| last.since(*at) >= COUNTED_LATE)
     }
 
-    /// A sentence; `None` if they cover all.
-    pub fn counted_words(&self) -> Option<String> {
-        let at = moment(self.counted_until()?);
-        Some(if self.contents.is_recounted {
-            format!("counted here to the end of the log; the box had stored its own last at {at}")
-        } else {
-            format!("as the box stored it at {at}: the log goes on after that")
+    /// Time in the air by the usage counters, seconds. They count from power-on: a later log of one power-on begins with
+    /// the counts of the logs before it.
+    pub fn flight_s(&self) -> Option<f64> {
+        let contents = &self.contents;
+        contents.usage.get(UsageCounter::Flight.name()).map(|all| {
+            since_power_on(*all, contents.flight_before_s.unwrap_or(0.0), self.ending.summary.first_number)
         })
     }
 
-    /// A group is too new.
+    /// How the counters count, as a sentence; `None` if this program counted them all.
+    pub fn counted_words(&self) -> Option<String> {
+        let until = self.counted_until().map(moment);
+        match until {
+            Some(at) if self.contents.is_recounted => {
+                Some(format!("counted here to the end of the log; the box had stored its own last at {at}"))
+            }
+            Some(at) => Some(format!("as the box stored it at {at}: the log goes on after that")),
+            None => {
+                (self.contents.boot.is_some() && self.flight_s() > Some(0.0)).then(|| BOX_COUNTS.to_owned())
+            }
+        }
+    }
+
+    /// Whether a group could not be read because this program is too old for it.
     pub fn needs_newer_program(&self) -> bool {
         self.contents.gaps.iter().any(|gap| matches!(gap.cause, Cause::UnknownLayouts(_)))
     }

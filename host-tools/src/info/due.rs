@@ -9,7 +9,7 @@ use hums_analysis::log_json::finite;
 use serde::Serialize;
 
 use super::each::each;
-use super::list::{flight_s, start_utc_us};
+use super::list::start_utc_us;
 use super::number::short;
 use crate::cli;
 use crate::colour::level;
@@ -100,7 +100,7 @@ impl Log {
         Self {
             start_us: start_utc_us(log),
             order_us: 0,
-            flight_s: flight_s(log).unwrap_or(0.0),
+            flight_s: log.flight_s().unwrap_or(0.0),
             flights: contents.flights().len() as u64,
             parts: contents.components.iter().map(part).collect(),
             is_of_box: contents.boot.is_some(),
@@ -305,8 +305,9 @@ fn text(vehicle: &VehicleJson) -> String {
         _ => String::new(),
     };
     let time = clock(hums_core::clock::Span::from_micros((vehicle.flight_s * 1e6) as u64));
+    let by = if vehicle.is_of_box { " as the box counts" } else { "" };
     let mut text = format!(
-        "{}: {}, {}, {time} in the air{span}\n",
+        "{}: {}, {}, {time} in the air{by}{span}\n",
         word(&vehicle.vehicle),
         count(vehicle.logs, "log"),
         count(vehicle.flights, "flight"),

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
-use hums_core::usage::UsageCounter;
 use serde::Serialize;
 
 use super::each::each;
@@ -20,7 +19,7 @@ use crate::output::{self, JsonList, Schema};
 use crate::printable::word;
 use crate::source::find::find;
 use crate::source::recording::Format;
-use crate::summary::Overview;
+use crate::summary::{BOX_COUNTS, Overview};
 use crate::utc::{clock, date_and_time, iso8601};
 use hums_analysis::log_json::{duration_s, images_json};
 
@@ -40,14 +39,15 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&heading(width))?;
         }
     }
-    // A log without a start stays after the one before it.
-    let (mut lines, mut elements, mut begun_us) = (Vec::new(), Vec::new(), 0);
+    // In the order of their starts; a log without a start stays after the one before it.
+    let (mut lines, mut elements, mut begun_us, mut box_counts) = (Vec::new(), Vec::new(), 0, false);
     let read = each(&found, wanted, |overview| {
         begun_us = start_utc_us(overview).unwrap_or(begun_us);
         if args.json {
             elements.push((begun_us, LogJson::of(overview)));
         } else {
             lines.push((begun_us, line(overview, width)));
+            box_counts |= overview.contents.boot.is_some() && overview.flight_s() > Some(0.0);
         }
         Ok(())
     })?;
@@ -63,6 +63,8 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
         list.end()?;
     } else if found.places.is_empty() {
         output::line("no log is on it")?;
+    } else if box_counts {
+        output::line(BOX_COUNTS)?;
     }
     read.end()
 }
@@ -112,7 +114,7 @@ impl LogJson {
             files: log.ending.files.clone(),
             start_utc: start_utc_us(log).map(iso8601),
             duration_s: duration_s(log),
-            flight_s: flight_s(log),
+            flight_s: log.flight_s(),
             checked_by: log.contents.checked_by(),
             findings_count: log.contents.findings_count,
             worst: worst(log),
@@ -141,7 +143,7 @@ fn line(log: &Overview, width: usize) -> String {
     let is_least = log.counted_until().is_some() && !log.contents.is_recounted;
     let least = if is_least { ">" } else { "" };
     let air =
-        flight_s(log).map_or_else(|| "-".to_owned(), |seconds| format!("{least}{}", clock(span(seconds))));
+        log.flight_s().map_or_else(|| "-".to_owned(), |seconds| format!("{least}{}", clock(span(seconds))));
     let size = binary(bytes(log));
     let name = word(&log.ending.name);
     let mut text = format!("{name:<width$}  {date:<19}  {length:>8}  {air:>8}  {size:>10}  {}", found(log));
@@ -198,14 +200,7 @@ pub(super) fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 
-/// By usage counters from power-on: a later log of one power-on begins with the earlier counts.
-pub(super) fn flight_s(log: &Overview) -> Option<f64> {
-    let is_later = log.ending.summary.first_number.is_some_and(|first| first > 0);
-    let before = log.contents.flight_before_s.filter(|_| is_later).unwrap_or(0.0);
-    log.contents.usage.get(UsageCounter::Flight.name()).map(|all| (all - before).max(0.0))
-}
-
-/// Bytes without space allocated on a card.
+/// Size of the recording, without the space allocated for it on a card.
 fn bytes(log: &Overview) -> u64 {
     if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
 }
@@ -230,6 +225,7 @@ fn span(seconds: f64) -> Span {
 #[cfg(test)]
 mod tests {
     use hums_core::health::Subsystem;
+    use hums_core::usage::UsageCounter;
 
     use super::*;
     use crate::source::told::Finding;
@@ -293,7 +289,7 @@ mod tests {
         log.contents.flight_before_s = Some(308.0);
         for (first, expected) in [(None, 526.0), (Some(0), 526.0), (Some(700), 218.0)] {
             log.ending.summary.first_number = first;
-            assert_eq!(flight_s(&log), Some(expected), "{first:?}");
+            assert_eq!(log.flight_s(), Some(expected), "{first:?}");
         }
     }
 

@@ -11,7 +11,7 @@ use hums_core::health::Level;
 
 use super::{usage, wear};
 use crate::check::causes::causes;
-use crate::colour::level;
+use crate::colour::{level, warning};
 use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs;
 use crate::logs::naming::is_part;
@@ -70,6 +70,10 @@ fn heading(text: &mut String, log: &Overview) {
         }
         _ if messages(log) > 0 => {}
         _ => text.push_str("  nothing in it can be read\n"),
+    }
+    let lacks = log.soundness().words();
+    if !lacks.is_empty() {
+        let _ = writeln!(text, "  state    {}", warning(lacks));
     }
     if log.format.is_none() {
         ending(text, log);

@@ -109,7 +109,7 @@ fn damage_is_said_with_its_place_and_a_finding_is_exit_code_4_all_the_same() {
     assert!((999_600..1_000_200).contains(&place), "{place}");
     let screen = text(&run(dir.path(), "check hit.tlog", 4));
     let verdict = screen.lines().next().unwrap_or_default();
-    assert!(verdict.ends_with("; part of the log is missing or damaged, and was not judged"), "{screen}");
+    assert!(verdict.ends_with("; part of it is missing or damaged, and was not judged"), "{screen}");
 
     // A log whose recorder lost its power ends within a message: that is no damage.
     fs::write(dir.path().join("cut.tlog"), &bytes[..999_001]).expect("written");
@@ -133,7 +133,7 @@ fn a_log_whose_middle_is_gone_is_not_called_all_right_anywhere() {
     let from = log.len() / 1024 * 512;
     let missing = [&log[..from - 20 * 512], &log[from..]].concat();
     fs::write(dir.path().join("log.hum"), missing).expect("written");
-    let words = "; part of the log is missing or damaged, and was not judged";
+    let words = "; part of it is missing or damaged, and was not judged";
     let screen = text(&run(dir.path(), "check log.hum", 3));
     assert!(screen.contains(words), "{screen}");
     fs::copy(px4(), dir.path().join("calm.tlog")).expect("a copy");

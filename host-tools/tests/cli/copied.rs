@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use hums_analysis::soundness::Soundness;
 use hums_blackbox::Header;
 use hums_blackbox::parity::Parity;
 use tempfile::TempDir;
@@ -46,9 +47,21 @@ pub(crate) fn each_says(dir: &Path, inputs: &str, code: i32, words: &[&str]) {
     assert_said(readers(dir, inputs), code, words);
 }
 
+/// The states that a log has in the words of the program, as far as this prints them.
+fn states(said: &str) -> Vec<&'static str> {
+    use Soundness as S;
+    let all = [S::Repaired, S::Unprotected, S::NotProved, S::NotFrames, S::Lossy, S::Damaged];
+    all.map(Soundness::words).into_iter().filter(|words| said.contains(words)).collect()
+}
+
 #[track_caller]
 fn assert_said(ended: impl IntoIterator<Item = (&'static str, i32, String)>, code: i32, words: &[&str]) {
+    let mut known = None;
     for (command, ended, said) in ended {
+        if ["info --verify", "info", "check"].contains(&command) {
+            let states = states(&said);
+            assert_eq!(*known.get_or_insert_with(|| states.clone()), states, "hums {command}: {said}");
+        }
         assert_eq!(ended, code, "hums {command}: {said}");
         for words in words {
             assert!(said.contains(words), "hums {command}: `{words}` is not in {said}");

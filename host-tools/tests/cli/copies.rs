@@ -99,7 +99,7 @@ fn another_log_behind_a_copy_is_told_by_every_command() {
         format!("not of this log (the first at block {}, of session {session:08x})", one.len() / BLOCK);
     all_say(dir.path(), "copied", 3, &[&words, "00001 once more (not counted)"]);
     let said = text(&run(dir.path(), "info --verify copied", 3));
-    assert!(said.contains("FAILED  files ") && said.contains("1 session: damage"), "{said}");
+    assert!(said.contains("FAILED  files ") && said.contains("1 session: not proved to be whole"), "{said}");
     assert!(text(&run(dir.path(), "info --list copied", 3)).contains("not proved to be whole"));
     fs::write(at("all.hum"), &one).expect("written");
     all_say(dir.path(), "copied", 0, &["00001 once more (not counted)"]);

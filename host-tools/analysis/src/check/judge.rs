@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use hums_blackbox::Record;
+use hums_blackbox::record::Usage;
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause};
 use hums_core::clock::{Instant, Span};
@@ -25,7 +27,7 @@ use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::{Flight, Flights, begin_in_air, is_in_air};
-use super::judged::{Holes, Judged, JudgedBy};
+use super::judged::{BoxAir, Holes, Judged, JudgedBy};
 use super::link_loss::{LinkLoss, Verdict};
 use super::problem::{IMPACT, LISTED_MAX, Problems, give_worst};
 use super::trends::{self, Episode, Flown};
@@ -142,6 +144,8 @@ pub struct Judge {
     joints: Vec<Instant>,
     /// No times from here on.
     no_times: Option<Instant>,
+    /// See [`Judged::box_air`].
+    box_air: Option<BoxAir>,
 }
 
 impl Judge {
@@ -179,6 +183,7 @@ impl Judge {
             restarted: Vec::new(),
             joints: Vec::new(),
             no_times: None,
+            box_air: None,
         }
     }
 
@@ -252,6 +257,9 @@ impl Judge {
                 self.recorded_to = self.recorded_to.max(at);
                 if trends::is_change(record) {
                     self.episodes.push(Episode::Changed);
+                }
+                if let Record::Usage(usage) = record {
+                    self.box_counted(at, usage);
                 }
                 if let Some(told) = Told::of(record) {
                     self.told(&told);
@@ -382,6 +390,16 @@ impl Judge {
     fn tell(&mut self, check: &str) {
         self.details.tell(check, &mut self.here);
         self.details.tell(check, &mut self.board);
+    }
+
+    /// Takes the box's own count of the time in the air.
+    fn box_counted(&mut self, at: Instant, usage: &Usage<'_>) {
+        let mut counters = usage.iter();
+        if let Some((_, seconds)) = counters.find(|(number, _)| *number == UsageCounter::Flight as u8) {
+            let last_s = f64::from(seconds);
+            let first_s = self.box_air.map_or(last_s, |air| air.first_s);
+            self.box_air = Some(BoxAir { first_s, last_s, at });
+        }
     }
 
     fn told(&mut self, told: &Told) {
@@ -718,6 +736,7 @@ impl Judge {
             span: self.first.map(|first| (first, self.last)),
             armed,
             flights,
+            box_air: self.box_air,
             ends_in_air,
             findings_count,
             findings,

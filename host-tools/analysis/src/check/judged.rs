@@ -29,7 +29,18 @@ pub enum JudgedBy {
     Here,
 }
 
-/// Times without data, from and to: up to [`LISTED_MAX`].
+/// A box's counts of the time in the air since power-on.
+#[derive(Clone, Copy, Debug)]
+pub struct BoxAir {
+    /// The first count, s.
+    pub first_s: f64,
+    /// The last count, s.
+    pub last_s: f64,
+    /// The time of the last count.
+    pub at: Instant,
+}
+
+/// Times without data of the vehicle, from and to: up to [`LISTED_MAX`].
 #[derive(Clone, Debug, Default)]
 pub struct Holes {
     pauses: Vec<(Instant, Instant)>,
@@ -80,7 +91,9 @@ pub struct Judged {
     pub armed: Span,
     /// Flights, in order.
     pub flights: Vec<Flight>,
-    /// The last flight goes on.
+    /// Time in the air as a box counts it.
+    pub box_air: Option<BoxAir>,
+    /// The last of them goes on at the recording's end.
     pub ends_in_air: Option<EndsInAir>,
     /// Changes of level in order, up to [`super::problem::LISTED_MAX`].
     pub findings: Vec<Finding>,

@@ -24,6 +24,7 @@ use crate::soundness::Soundness;
 use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
 use crate::states::{Shown, Values, meaning, quantity, shown};
+use crate::summary::since_power_on;
 use crate::utc::{clock, iso8601, moment};
 
 /// Problems in words; the rest is one line.
@@ -44,7 +45,7 @@ pub fn screen(checked: &Checked, verbose: bool) -> String {
         let _ = writeln!(text, "  log      {}", checked.format.words());
         let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
         let _ = writeln!(text, "  when     {}", when(checked));
-        let _ = writeln!(text, "  in air   {}", in_air(judged));
+        let _ = writeln!(text, "  in air   {}", in_air(checked));
         text.push('\n');
     }
     problems(&mut text, &judged.problems);
@@ -98,7 +99,7 @@ fn but(checked: &Checked) -> String {
     let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
     match checked.soundness() {
         Soundness::Whole => ends.to_owned(),
-        Soundness::Damaged => format!("{ends}; part of the log is missing or damaged, and was not judged"),
+        what @ Soundness::Damaged => format!("{ends}; {}, and was not judged", what.words()),
         what @ (Soundness::NotFrames | Soundness::Lossy) => format!("{ends}; {}", what.words()),
         what => format!("{ends}; the log is {}", what.words()),
     }
@@ -242,7 +243,8 @@ fn when(checked: &Checked) -> String {
     format!("{utc}, {} recorded{restarts}{since}", clock(last.since(first)))
 }
 
-fn in_air(judged: &Judged) -> String {
+fn in_air(checked: &Checked) -> String {
+    let judged = &checked.judged;
     let told = judged.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
     if judged.worst().is_none() {
@@ -263,13 +265,29 @@ fn in_air(judged: &Judged) -> String {
                 String::new()
             };
             let time = format!("{}{lacks}", clock(judged.flown()));
-            format!("{time} in {}{}; armed {armed}", count(flights.len(), "flight"), not_seen(flights))
+            let counted = box_counted(checked).filter(|counted| *counted != clock(judged.flown()));
+            let counted =
+                counted.map_or_else(String::new, |counted| format!(", {counted} as the box counts"));
+            format!(
+                "{time} in {}{}{counted}; armed {armed}",
+                count(flights.len(), "flight"),
+                not_seen(flights)
+            )
         }
     };
     told.map_or(text.clone(), |told| format!("{text} ({told})"))
 }
 
-/// Unseen parts, and any other end of the last one.
+/// Time in the air as the box counted it, if it counted to the end of the last flight.
+fn box_counted(checked: &Checked) -> Option<String> {
+    let (judged, ending) = (&checked.judged, checked.ending.as_ref()?);
+    let landed = judged.flights.last().filter(|flight| flight.landed)?.to;
+    let air = judged.box_air.filter(|air| air.at >= landed)?;
+    let seconds = since_power_on(air.last_s, air.first_s, ending.summary.first_number);
+    Some(clock(Span::from_micros((seconds * 1e6) as u64)))
+}
+
+/// The unseen parts of flights, and any other end of the last one.
 fn not_seen(flights: &[Flight]) -> String {
     let last = flights.last();
     let ended = match last {

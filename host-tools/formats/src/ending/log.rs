@@ -98,15 +98,15 @@ impl Ending {
         let mut all = Vec::new();
         let (summary, blocks) = (&self.summary, &self.summary.blocks);
         let lost = summary.marks.lost;
-        if summary.gaps > 0 || blocks.damaged > 0 || lost > 0 {
-            all.push(format!(
-                "{}, {} missing, {}, {} or {} lost while recording",
-                count(summary.gaps, "gap"),
-                summary.missing_words(),
-                count(blocks.damaged, "damaged sector"),
-                count(lost, "frame"),
-                noun(lost, "record")
-            ));
+        let losses = [
+            (summary.gaps, format!("{}, {} missing", count(summary.gaps, "gap"), summary.missing_words())),
+            (blocks.damaged, count(blocks.damaged, "damaged sector")),
+            (lost, format!("{} or {} lost while recording", count(lost, "frame"), noun(lost, "record"))),
+        ];
+        let losses: Vec<String> =
+            losses.into_iter().filter(|(number, _)| *number > 0).map(|(_, words)| words).collect();
+        if !losses.is_empty() {
+            all.push(losses.join(", "));
         }
         if blocks.misplaced > 0 {
             all.push(format!("{} there twice, or where others belong", are(blocks.misplaced, "sector")));
