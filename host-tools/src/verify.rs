@@ -71,7 +71,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     let mut manifest = Manifest::default();
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
-        manifest.log(&overview.ending.name, Some(&overview.ending), &[]);
+        manifest.log(&overview.ending.name, overview.soundness(), Some(&overview.ending), &[]);
         all.add(overview, log.verdict);
         if let Some(list) = &mut list {
             return list.element(&log);
@@ -99,7 +99,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         output::line(&format!("{}: {words}", count(all.logs, "session")))?;
     }
     if let Some(to) = &args.manifest {
-        manifest.write(cli::PROGRAM, to, &read, &[], &inputs)?;
+        manifest.write(cli::PROGRAM, to, &args.inputs, &read, &[], &inputs)?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));

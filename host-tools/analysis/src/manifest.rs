@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result};
@@ -35,7 +35,7 @@ pub struct Manifest {
 /// A file and its content.
 #[derive(Debug, Serialize)]
 struct FileJson {
-    /// Its name without folders above the named one.
+    /// Its name from the given path on.
     file: String,
     bytes: u64,
     sha256: String,
@@ -59,8 +59,8 @@ struct LogJson {
 }
 
 impl Manifest {
-    /// With remarks; other programs' recordings have no ending.
-    pub fn log(&mut self, name: &str, ending: Option<&Ending>, remarks: &[String]) {
+    /// Adds a log that was read, with the remarks on it. Recordings of other programs have no ending.
+    pub fn log(&mut self, name: &str, soundness: Soundness, ending: Option<&Ending>, remarks: &[String]) {
         let summary = ending.map(|ending| &ending.summary);
         let faults = ending.map_or_else(Vec::new, Ending::faults);
         self.logs.push(LogJson {
@@ -70,12 +70,13 @@ impl Manifest {
             gaps: summary.map(|summary| summary.gaps),
             frames_missing: summary.map(|summary| summary.frames_missing),
             sectors_rebuilt: ending.map(Ending::made_again),
-            lacks: ending.map_or("", |ending| Soundness::of(ending).words()),
+            lacks: soundness.words(),
             faults: faults.into_iter().chain(remarks.iter().cloned()).collect(),
         });
     }
 
-    /// Hashes all files, and tells people. Outputs may be folders.
+    /// Hashes all files, tells people of them, and writes the manifest. Inputs are named from the `given` paths on.
+    /// Outputs may be folders.
     ///
     /// # Errors
     /// A file cannot be read or written.
@@ -83,13 +84,15 @@ impl Manifest {
         mut self,
         program: &'static str,
         to: &Path,
+        given: &[PathBuf],
         inputs: &BTreeSet<PathBuf>,
         outputs: &[PathBuf],
         refuse: &Inputs,
     ) -> Result<()> {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         (self.program, self.made_utc) = (program, iso8601(since_1970.as_micros() as u64));
-        self.inputs = inputs.iter().map(|path| hashed(path, path.parent())).collect::<Result<_>>()?;
+        self.inputs =
+            inputs.iter().map(|path| hashed(path, &name_below(path, given))).collect::<Result<_>>()?;
         for output in outputs {
             self.outputs.extend(below(output)?);
         }
@@ -119,18 +122,53 @@ fn below(output: &Path) -> Result<Vec<FileJson>> {
                 waiting.push(entry.with_context(context)?.path());
             }
         } else {
-            files.push(hashed(&path, output.parent())?);
+            files.push(hashed(&path, &name_below(&path, &[output.to_owned()]))?);
         }
     }
     files.sort_by(|one, other| one.file.cmp(&other.file));
     Ok(files)
 }
 
-/// Named from this folder on.
-fn hashed(path: &Path, from: Option<&Path>) -> Result<FileJson> {
+/// The name of a file from one of these paths on: with that path if it is relative, otherwise with its last part.
+fn name_below(file: &Path, given: &[PathBuf]) -> PathBuf {
+    let name = given.iter().find_map(|of| {
+        let rest = file.strip_prefix(of).ok()?;
+        let is_below = of.is_relative() && !of.components().any(|part| part == Component::ParentDir);
+        let base = if is_below { of.as_path() } else { Path::new(of.file_name()?) };
+        Some(base.components().chain(rest.components()).filter(|part| *part != Component::CurDir).collect())
+    });
+    name.unwrap_or_else(|| file.file_name().map_or_else(PathBuf::new, PathBuf::from))
+}
+
+/// A file's content, by this name.
+fn hashed(path: &Path, name: &Path) -> Result<FileJson> {
     let context = || format!("{}: cannot be read", path.display());
     let bytes = fs::metadata(path).with_context(context)?.len();
     let digest = digest(path).with_context(context)?;
-    let name = from.and_then(|from| path.strip_prefix(from).ok()).unwrap_or(path);
     Ok(FileJson { file: name.display().to_string(), bytes, sha256: hex(&digest) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_named_from_the_given_path_on_without_this_computers_folders() {
+        for (file, given, name) in [
+            ("logs/a/x.tlog", "logs", "logs/a/x.tlog"),
+            ("./logs/x.tlog", "./logs", "logs/x.tlog"),
+            ("./x.tlog", ".", "x.tlog"),
+            ("a/x.tlog", "a/x.tlog", "a/x.tlog"),
+            ("/home/me/logs/a/x.tlog", "/home/me/logs", "logs/a/x.tlog"),
+            ("/home/me/x.tlog", "/home/me/x.tlog", "x.tlog"),
+            ("../logs/a/x.tlog", "../logs", "logs/a/x.tlog"),
+            ("/home/me/y.tlog", "z", "y.tlog"),
+        ] {
+            assert_eq!(
+                name_below(Path::new(file), &[PathBuf::from(given)]),
+                Path::new(name),
+                "{file} {given}"
+            );
+        }
+    }
 }

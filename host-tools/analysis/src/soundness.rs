@@ -1,6 +1,7 @@
 //! Whether a log is whole, in the same words everywhere.
 
 use crate::ending::Ending;
+use crate::source::item::{Cause, Gap};
 
 /// The least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,7 +36,17 @@ impl Soundness {
         }
     }
 
-    /// A part of a sentence; empty if whole.
+    /// Of a recording of another program with this gap.
+    pub fn of_gap(gap: &Gap) -> Self {
+        match gap.cause {
+            cause if cause.is_damage() => Self::Damaged,
+            Cause::Lost if gap.is_noise() => Self::NotFrames,
+            Cause::Lost => Self::Lossy,
+            _ => Self::Whole,
+        }
+    }
+
+    /// As a part of a sentence about the log; empty if it is whole.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Whole => "",

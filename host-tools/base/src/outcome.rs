@@ -67,13 +67,35 @@ impl fmt::Display for ReaderGone {
 
 impl StdError for ReaderGone {}
 
+/// An output exists, and was not overwritten.
+#[derive(Debug)]
+pub struct Exists(String);
+
+impl fmt::Display for Exists {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl StdError for Exists {}
+
 /// The error of an output that exists; `has_force` if the command has a flag `--force`.
 pub fn exists(path: &Path, has_force: bool) -> anyhow::Error {
     let force = if has_force { ", or say --force, which overwrites it" } else { "" };
-    anyhow::anyhow!(
+    Exists(format!(
         "{}: exists, and was not overwritten; name another output, move it away{force}",
         path.display()
-    )
+    ))
+    .into()
+}
+
+/// A result of one of several logs: where its output exists, the remark on it, and the log is skipped.
+pub fn or_skipped<T>(result: anyhow::Result<T>) -> anyhow::Result<Result<T, String>> {
+    match result {
+        Ok(done) => Ok(Ok(done)),
+        Err(error) if error.is::<Exists>() => Ok(Err(format!("{error:#}"))),
+        Err(error) => Err(error),
+    }
 }
 
 /// An error of this type, however deep: a writer has it inside its `io::Error`.

@@ -1,6 +1,8 @@
 //! Vehicle and date of a log, known before the first byte is written. They are the tags of every point of the
 //! line protocol, and the path of the Parquet tables.
 
+use std::path::Path;
+
 use anyhow::Result;
 use hums_blackbox::Record;
 use hums_blackbox::record::Vehicle;
@@ -11,16 +13,21 @@ use super::checked::Checked;
 use crate::check::judge::{Judge, Limits};
 use crate::ending::Ending;
 use crate::hex::hex;
+use crate::names::{autopilot_name, type_name};
 use crate::source::epochs::Epochs;
 use crate::source::item::{Item, Want};
 use crate::source::recording::Place;
 use crate::utc::iso8601;
 
+/// Letters of a vehicle's name at most: a name in a file system has 255 bytes.
+const NAME_MAX: usize = 60;
+
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
-    /// `uid-0031002a3035510a` from the autopilot's unique id, otherwise `box-3f0042000d51373435363338` from
-    /// the board's own; without both `system-1` or `unknown`.
+    /// `uid-0031002a3035510a` from the autopilot's unique id. Without it the name that the user gave, otherwise
+    /// `box-3f0042000d51373435363338` from the board's own id. Without all of them `system-1-quadrotor-PX4-logs`, from the
+    /// system id, the kind, the autopilot and the log's folder, or `unknown`.
     pub vehicle: String,
     /// The day of its first entry, UTC: `2026-11-21`; `None` if unknown.
     pub date: Option<String>,
@@ -30,10 +37,15 @@ pub struct Identity {
     pub epochs: Epochs,
 }
 
-/// Vehicle, date and UTC of a recording. If `judges`, also the findings by the monitor here, as in `hums
-/// check`, unless one on board checked it. Its `session` is taken from its files' names, so it does not
-/// depend on the messages that this version understands.
-pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identity, Option<Checked>)> {
+/// Vehicle, date and UTC of a recording. If `judges`, also the findings by the monitor here, as in
+/// `hums check`, unless one on board checked it. The recording is read once for it. Its `session` is taken
+/// from its files' names, so it does not depend on the messages that this version understands.
+pub fn identity(
+    place: &Place,
+    session: String,
+    judges: bool,
+    given: Option<&str>,
+) -> Result<(Identity, Option<Checked>)> {
     let (mut known, mut epochs) = (Known::default(), Epochs::default());
     let want = Want { observations: true, ..Want::default() };
     let recording = place.open()?;
@@ -46,7 +58,7 @@ pub fn identity(place: &Place, session: String, judges: bool) -> Result<(Identit
         known.take(at, &item);
         Ok(())
     })?;
-    let vehicle = known.vehicle();
+    let vehicle = known.vehicle(place, given);
     let first = match &summary.ending {
         Some(Ending { summary, .. }) => {
             // One power-on has one clock, also if a packed recording has several.
@@ -68,8 +80,8 @@ struct Known {
     /// count too.
     recorded: Option<Vehicle>,
     board: Option<[u8; 12]>,
-    /// The first system whose autopilot sends a heartbeat.
-    heard: Option<u8>,
+    /// System id, type and autopilot of the first system whose autopilot sends a heartbeat.
+    heard: Option<(u8, u8, u8)>,
     uid: Option<u64>,
     first: Option<Instant>,
 }
@@ -84,8 +96,9 @@ impl Known {
             Item::Observation(source, observation) => {
                 self.first.get_or_insert(at);
                 match observation {
-                    Observation::Heartbeat(_) => {
-                        self.heard.get_or_insert(source.system);
+                    Observation::Heartbeat(heartbeat) => {
+                        let kind = (source.system, heartbeat.type_number, heartbeat.autopilot_number);
+                        self.heard.get_or_insert(kind);
                     }
                     Observation::Identity(told) if told.uid != 0 => {
                         self.uid.get_or_insert(told.uid);
@@ -97,14 +110,29 @@ impl Known {
         }
     }
 
-    fn vehicle(&self) -> String {
-        let system = self.recorded.map(|vehicle| vehicle.system).or(self.heard);
+    fn vehicle(&self, place: &Place, given: Option<&str>) -> String {
+        let recorded = self.recorded.map(|of| (of.system, of.vehicle_type, of.autopilot));
         let uid = self.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(self.uid);
-        match (uid, self.board, system) {
-            (Some(uid), _, _) => format!("uid-{uid:016x}"),
-            (None, Some(board), _) => format!("box-{}", hex(&board)),
-            (None, None, Some(system)) => format!("system-{system}"),
-            (None, None, None) => "unknown".to_owned(),
+        match (uid, given, self.board, recorded.or(self.heard)) {
+            (Some(uid), ..) => format!("uid-{uid:016x}"),
+            (None, Some(given), ..) => path_name(given),
+            (None, None, Some(board), _) => format!("box-{}", hex(&board)),
+            (None, None, None, Some((system, kind, autopilot))) => {
+                let folder = place.folder();
+                let folder =
+                    folder.as_deref().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+                let (kind, autopilot) = (type_name(kind), autopilot_name(autopilot));
+                path_name(&format!("system-{system}-{kind}-{autopilot}-{folder}"))
+            }
+            (None, None, None, None) => "unknown".to_owned(),
         }
     }
+}
+
+/// A name that every tool takes for a text, and every file system for a name.
+fn path_name(name: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || matches!(letter, '.' | '_' | '-');
+    let plain: String = name.chars().map(|letter| if is_plain(letter) { letter } else { '-' }).collect();
+    let plain: String = plain.trim_end_matches('-').chars().take(NAME_MAX).collect();
+    if plain.starts_with(char::is_alphabetic) { plain } else { format!("vehicle-{plain}") }
 }

@@ -22,6 +22,7 @@
 #[macro_use(note)]
 extern crate hums_base;
 
+use hums_analysis::soundness::Soundness;
 use hums_analysis::{check, manifest, reference, summary};
 use hums_base::{endpoint, files, hex, outcome, output, plural, printable, utc};
 use hums_formats::{ending, followed, logs, loss, mavlink, names, naming, source};
@@ -50,7 +51,7 @@ mod wear;
 mod works;
 pub mod write;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -75,7 +76,7 @@ use logs::side_by_side::side_by_side;
 use made::{LogJson, MadeJson, OutputFile};
 use manifest::Manifest;
 use naming::Named;
-use outcome::{Outcome, usage as usage_error};
+use outcome::{Outcome, or_skipped, usage as usage_error};
 use output::Schema;
 use plural::count;
 use selection::Selection;
@@ -120,6 +121,8 @@ pub struct Request {
     pub manifest: Option<PathBuf>,
     /// The name and version of this program, for the manifest.
     pub program: &'static str,
+    /// The vehicle of all logs without a unique id.
+    pub vehicle: Option<String>,
     /// Only messages of these names.
     pub messages: Vec<String>,
     /// Replace existing outputs.
@@ -162,6 +165,8 @@ pub fn run(args: &Request) -> Result<Outcome> {
         logs,
         has_findings: args.findings,
         offset_s: args.offset_s,
+        vehicle: args.vehicle.as_deref(),
+        there: sessions_there(&args.output),
     };
     let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
@@ -173,14 +178,14 @@ pub fn run(args: &Request) -> Result<Outcome> {
         }
         outcome = outcome.and(done.outcome());
         written |= done.written;
-        manifest.log(&done.name, done.ending.as_ref(), &done.remarks);
+        manifest.log(&done.name, done.soundness(), done.ending.as_ref(), &done.remarks);
         made.extend(done.made.iter().map(|made| made.path().to_owned()));
         done.tell(json.as_mut())
     };
     side_by_side(
         &works,
         |work| {
-            if is_wanted(&work.log.name) { task.decode(work, &works, &taken) } else { beside(work) }
+            if is_wanted(&work.log.name) { task.decode_or_skip(work, &works, &taken) } else { beside(work) }
         },
         |done| followed.push(done?).into_iter().try_for_each(&mut tell),
     )?;
@@ -188,7 +193,7 @@ pub fn run(args: &Request) -> Result<Outcome> {
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
-        manifest.write(args.program, to, &read, &made, &task.inputs)?;
+        manifest.write(args.program, to, &given, &read, &made, &task.inputs)?;
     }
     if !written {
         bail!("nothing of what was asked for is there, so nothing was written");
@@ -282,6 +287,10 @@ struct Task<'a> {
     /// A tlog has the findings as texts.
     has_findings: bool,
     offset_s: f64,
+    /// The vehicle of all logs without a unique id.
+    vehicle: Option<&'a str>,
+    /// Sessions of Parquet tables that are in the output, by their names.
+    there: BTreeMap<String, PathBuf>,
 }
 
 /// A log's outcome, reported in the logs' order.
@@ -290,6 +299,10 @@ struct Done {
     outcome: Outcome,
     /// The evidence of its end, for a HUMS log.
     ending: Option<Ending>,
+    /// What a recording of another program lacks.
+    lacks: Soundness,
+    /// Its outputs exist, and were not overwritten.
+    skipped: bool,
     /// Whether there was anything to write.
     written: bool,
     /// The files written.
@@ -301,16 +314,23 @@ struct Done {
 impl Done {
     fn of(log: &Place) -> Self {
         let (made, remarks) = (Vec::new(), Vec::new());
-        Self { name: log.name.clone(), outcome: Outcome::Done, ending: None, written: false, made, remarks }
+        let (name, lacks, outcome) = (log.name.clone(), Soundness::Whole, Outcome::Done);
+        Self { name, outcome, ending: None, lacks, skipped: false, written: false, made, remarks }
     }
 
     fn add(&mut self, next: Self) {
         self.outcome = self.outcome.and(next.outcome);
         self.ending = next.ending.or_else(|| self.ending.take());
         self.written |= next.written;
+        self.lacks = self.lacks.max(next.lacks);
         self.made.extend(next.made);
         let new = next.remarks.into_iter().filter(|remark| !self.remarks.contains(remark));
         self.remarks.extend(new.collect::<Vec<_>>());
+    }
+
+    /// What the log lacks.
+    fn soundness(&self) -> Soundness {
+        self.ending.as_ref().map_or(self.lacks, Soundness::of)
     }
 
     fn outcome(&self) -> Outcome {
@@ -329,7 +349,7 @@ impl Done {
         let Some(json) = json else {
             return self.made.iter().try_for_each(|made| output::line(&printable::word(&made.line())));
         };
-        let whole = self.outcome() == Outcome::Done;
+        let whole = self.outcome() == Outcome::Done && !self.skipped;
         json.logs.push(LogJson { name: self.name, whole, files: self.made });
         Ok(())
     }
@@ -360,6 +380,23 @@ fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
 }
 
 impl Task<'_> {
+    /// Decodes a log. One of several whose outputs exist is skipped, with a remark.
+    fn decode_or_skip(
+        &self,
+        work: &NamedLog<'_>,
+        all: &[NamedLog<'_>],
+        taken: &Mutex<BTreeSet<PathBuf>>,
+    ) -> Result<Done> {
+        let done = self.decode(work, all, taken);
+        if self.logs == 1 {
+            return done;
+        }
+        Ok(or_skipped(done)?.unwrap_or_else(|why| {
+            let remarks = vec![format!("{}: skipped: {why}", work.log.name)];
+            Done { skipped: true, written: true, remarks, ..Done::of(work.log) }
+        }))
+    }
+
     /// `taken` are the directories of Parquet tables that other logs of this command have.
     fn decode(
         &self,
@@ -404,7 +441,15 @@ impl Task<'_> {
         if self.formats.about().any(|about| matches!(about.files, Files::Partition(_)))
             && let Ok(mut taken) = taken.lock()
         {
-            let first = partition(self.output, &context.identity);
+            // A session stays where it is, so that no query counts it twice.
+            let mut first = partition(self.output, &context.identity);
+            if let Some(path) = self.there.get(&context.identity.session).filter(|path| **path != first) {
+                let (name, there) = (&log.name, path.display());
+                remarks.push(format!(
+                    "{name}: its tables are in {there}, and stay there; move them away for another place"
+                ));
+                first.clone_from(path);
+            }
             check_parent(&first)?;
             let dir = claim(&mut taken, &first, nth);
             if dir != first {
@@ -432,7 +477,7 @@ impl Task<'_> {
         }
         let not_checked = writers.checked(summary.span.map(|(_, last)| last), checked.as_ref())?;
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
-        let rows_left_out = writers.rows_left_out();
+        let (rows_left_out, lacks) = (writers.rows_left_out(), writers.lacks());
         let Finished { made, remarks: left_out } = writers.finish()?;
         let mut outcome = Outcome::Done;
         let ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
@@ -447,7 +492,7 @@ impl Task<'_> {
         remarks.extend(left_out.into_iter().map(|words| format!("{}: {words}", log.name)));
         outcome = outcome.and(Outcome::lossy(rows_left_out > 0));
         let made = if self.standard_output { Vec::new() } else { made };
-        Ok(Done { outcome, ending, written: true, made, remarks, ..Done::of(log) })
+        Ok(Done { outcome, ending, lacks, written: true, made, remarks, ..Done::of(log) })
     }
 
     /// The context of a log, needed before its first byte is written.
@@ -457,7 +502,7 @@ impl Task<'_> {
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
             offset_s: self.offset_s,
-            session: work.traits.identity(work.log),
+            session: work.traits.identity(),
             ..Context::default()
         };
         if self.has_findings {
@@ -473,7 +518,7 @@ impl Task<'_> {
             }
             _ => {
                 (context.identity, context.checked) =
-                    identity(work.log, work.traits.identity(work.log), judges)?;
+                    identity(work.log, work.traits.identity(), judges, self.vehicle)?;
                 context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
                 context.epochs = context.identity.epochs.clone();
             }
@@ -588,6 +633,19 @@ fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32) -> PathBuf {
     let claimed = claimed.unwrap_or_else(|| dir.to_owned());
     taken.insert(claimed.clone());
     claimed
+}
+
+/// The sessions of Parquet tables in a directory, whatever vehicle and date they have there.
+fn sessions_there(output: &Path) -> BTreeMap<String, PathBuf> {
+    let below = |of: &Path, name: &str| -> Vec<PathBuf> {
+        let entries = of.read_dir().into_iter().flatten().filter_map(std::io::Result::ok);
+        let is_it = |entry: &std::fs::DirEntry| entry.file_name().to_string_lossy().starts_with(name);
+        entries.filter(is_it).map(|entry| entry.path()).collect()
+    };
+    let dates = below(output, "vehicle=").into_iter().flat_map(|vehicle| below(&vehicle, "date="));
+    let sessions = dates.flat_map(|date| below(&date, "session="));
+    let name = |path: &PathBuf| Some(path.file_name()?.to_str()?.strip_prefix("session=")?.to_owned());
+    sessions.filter_map(|path| Some((name(&path)?, path))).collect()
 }
 
 /// The directory of a session's Parquet tables, named as the tools that read them expect.

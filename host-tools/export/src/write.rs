@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use anyhow::Result;
+use hums_analysis::soundness::Soundness;
 use hums_core::clock::Instant;
 
 use super::checked::{Checked, OnBoard};
@@ -28,6 +29,8 @@ pub struct Writers<'a> {
     on_board: OnBoard,
     /// Rows of tables without room for their names.
     rows_left_out: u64,
+    /// What the recording lacks, by its gaps.
+    lacks: Soundness,
 }
 
 impl<'a> Writers<'a> {
@@ -48,6 +51,7 @@ impl<'a> Writers<'a> {
             records: 0,
             on_board: OnBoard::default(),
             rows_left_out: 0,
+            lacks: Soundness::Whole,
         })
     }
 
@@ -102,6 +106,11 @@ impl<'a> Writers<'a> {
         self.frames == 0 && !has_records && self.files.iter().all(|writer| writer.is_empty())
     }
 
+    /// What the recording lacks, by its gaps.
+    pub fn lacks(&self) -> Soundness {
+        self.lacks
+    }
+
     /// Rows that were left out.
     pub fn rows_left_out(&self) -> u64 {
         self.rows_left_out
@@ -128,6 +137,7 @@ impl<'a> Writers<'a> {
 
 impl<'a> Deliver<Collected<'a>> for Writers<'a> {
     fn gap(&mut self, gap: &item::Gap) -> Result<()> {
+        self.lacks = self.lacks.max(Soundness::of_gap(gap));
         let gap = &gap.to_own();
         let mut collected = Collected::new(self.context);
         collected.gap(gap);

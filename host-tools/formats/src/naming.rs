@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 
-use crate::files::{Folder, content_identity, digest};
+use crate::files::{Folder, digest_of};
 use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
 use crate::logs::groups::Groups;
 use crate::logs::naming::{ends_with_identity, segment_name, session_name};
 use crate::logs::sessions::Sessions;
+use crate::source::input::Input;
 use crate::source::recording::Place;
 
 /// File systems allow 255 bytes, and at most 55 follow.
@@ -59,18 +60,17 @@ impl Traits {
     /// The name of the log's files.
     pub fn name(&self, place: &Place) -> String {
         let Some(log) = place.own() else {
-            return format!("{}-{}", file_name(place), self.identity(place));
+            return format!("{}-{}", file_name(place), self.identity());
         };
         session_name(&base(log), self.board.as_ref(), self.session)
     }
 
-    /// For tables, points and the end of file names. A HUMS log's session, `s1a2b3c4d`; otherwise by its bytes,
-    /// `r1a2b3c4d`.
-    pub fn identity(&self, place: &Place) -> String {
+    /// The session's name in tables and points, and at the end of its files' names. For a HUMS log it is the
+    /// number in its sectors, `s1a2b3c4d`; for any other recording a number made from its unpacked bytes, `r1a2b3c4d`.
+    pub fn identity(&self) -> String {
         let number = self.session.map(|session| format!("s{session:08x}"));
-        let content = || place.path().and_then(content_identity);
         let [a, b, c, d, ..] = self.fingerprint;
-        number.or_else(content).unwrap_or_else(|| format!("r{:08x}", u32::from_be_bytes([a, b, c, d])))
+        number.unwrap_or_else(|| format!("r{:08x}", u32::from_be_bytes([a, b, c, d])))
     }
 }
 
@@ -183,9 +183,10 @@ fn cut(mut name: String) -> String {
     name
 }
 
-/// Hash of all bytes of a file.
+/// Hash of all bytes of a recording, unpacked: a compressed copy is the same recording.
 fn fingerprint(path: &Path) -> Result<[u8; 16]> {
-    let digest = digest(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let digest =
+        digest_of(Input::open(path)?).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(digest.first_chunk().copied().unwrap_or_default())
 }
 

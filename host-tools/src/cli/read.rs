@@ -88,6 +88,9 @@ pub struct Decode {
         value_parser = offset
     )]
     pub offset: f64,
+    /// For parquet and influx: the vehicle of all logs that have no unique id
+    #[arg(long, value_name = "NAME")]
+    pub vehicle: Option<String>,
     /// Only these messages, by name; HUMS records and gaps stay
     #[arg(long, value_name = "NAME")]
     pub message: Vec<String>,
@@ -122,6 +125,7 @@ impl Decode {
             findings: self.findings,
             manifest: self.manifest.clone(),
             program: super::PROGRAM,
+            vehicle: self.vehicle.clone(),
             messages: self.message.clone(),
             force: self.force,
             json: self.json,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
 
 use anyhow::Result;
 use hums_analysis::log_json::finite;
@@ -69,8 +68,7 @@ fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
         return given.to_owned();
     }
     let place = found.places.iter().find(|place| place.name == log.ending.name);
-    let file = place.and_then(|place| place.path().or_else(|| own_file(place)));
-    let folder = file.and_then(|file| file.canonicalize().ok()?.parent().map(Path::to_owned));
+    let folder = place.and_then(Place::folder);
     let folder = folder.map_or_else(|| "no folder".to_owned(), |folder| folder.display().to_string());
     let kind = known.map_or_else(
         || "unknown vehicle".to_owned(),
@@ -79,10 +77,7 @@ fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
     format!("folder {folder}, {kind}")
 }
 
-fn own_file(place: &Place) -> Option<&Path> {
-    Some(place.own()?.pieces.first()?.path.as_path())
-}
-
+/// Figures of one log.
 struct Log {
     start_us: Option<u64>,
     order_us: u64,

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::support::{contents, flight, json, recorded, records, run, text};
+use super::support::{attempt, flight, json, recorded, records, run, text};
 
 #[test]
 fn a_manifest_names_each_file_with_its_hash() {
@@ -20,30 +20,7 @@ fn a_manifest_names_each_file_with_its_hash() {
     run(dir.path(), "info --verify card.img --manifest card.img", 2);
 }
 
-#[test]
-fn a_folder_that_is_decoded_again_and_again_has_each_session_once() {
-    let dir = tempfile::tempdir().expect("directory");
-    for name in ["ap_quad_faults.tlog", "ap_quad_guided.tlog", "px4_hil_quad_low.tlog", "ap_quad_signed.raw"]
-    {
-        fs::create_dir_all(dir.path().join("logs")).expect("a folder");
-        fs::copy(flight(name), dir.path().join("logs").join(name)).expect("a copy");
-    }
-    let mut first = Vec::new();
-    for (again, force) in [(0, ""), (1, " --force"), (2, " --force")] {
-        let line = format!("decode logs -o fleet --format parquet --message HEARTBEAT{force}");
-        let output = run(dir.path(), &line, 0);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!said.contains("other tables of a session"), "{said}");
-        let names = contents(&dir.path().join("fleet")).into_iter().map(|(name, _)| name);
-        let of_heartbeats: Vec<String> = names.filter(|name| name.contains("HEARTBEAT")).collect();
-        if again == 0 {
-            first.clone_from(&of_heartbeats);
-        }
-        assert_eq!((of_heartbeats.len(), &of_heartbeats), (4, &first), "run {again}");
-    }
-    run(dir.path(), "decode logs -o fleet --format parquet --message HEARTBEAT", 1);
-}
-
+/// The texts are those of the box, at the times of `hums check`; without them the frames are those of the recording.
 #[test]
 fn a_tlog_with_findings_has_them_as_texts_of_the_box() {
     let dir = tempfile::tempdir().expect("directory");
@@ -140,4 +117,44 @@ fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_n
     let named = vehicles("due . --json --vehicle mine");
     let [(name, 3, all_s)] = named.as_slice() else { panic!("{named:?}") };
     assert!(name == "mine" && (all_s - blue_s - red_s).abs() < 1e-6, "{named:?}");
+}
+
+#[test]
+fn a_shared_copy_says_how_many_of_how_many_were_removed() {
+    let dir = tempfile::tempdir().expect("directory");
+    let told = text(&run(
+        dir.path(),
+        &format!("share {} -o shared.tlog", flight("ap_quad_guided.tlog").display()),
+        0,
+    ));
+    let removed: Vec<(u64, u64, &str)> = told
+        .lines()
+        .filter_map(|line| line.strip_prefix("removed: "))
+        .map(|line| {
+            let (part, rest) = line.split_once(" of ").expect("a part");
+            let (all, what) = rest.split_once(' ').expect("of what");
+            (part.parse().expect("a number"), all.parse().expect("a number"), what)
+        })
+        .collect();
+    assert!(removed.iter().all(|(part, all, _)| (1..=*all).contains(part)), "{told}");
+    assert!(removed.iter().any(|(part, all, what)| *what == "STATUSTEXT" && part < all), "{told}");
+    assert!(removed.iter().any(|(.., what)| what.contains('.')), "a field: {told}");
+}
+
+/// A manifest says of a recording of another program what the list says.
+#[test]
+fn a_manifest_says_what_a_damaged_recording_lacks() {
+    let dir = tempfile::tempdir().expect("directory");
+    let whole = fs::read(flight("ap_quad_guided.tlog")).expect("a recording");
+    fs::create_dir(dir.path().join("logs")).expect("a folder");
+    let (first, last) = whole.split_at(whole.len() / 2);
+    fs::write(dir.path().join("logs/noisy.tlog"), [first, &[0x55; 3000], last].concat()).expect("written");
+    fs::write(dir.path().join("logs/whole.tlog"), &whole).expect("written");
+    let listed = text(&attempt(dir.path(), "info --list logs"));
+    attempt(dir.path(), "decode logs -o out --format jsonl --manifest made.json");
+    let made: serde_json::Value =
+        serde_json::from_slice(&fs::read(dir.path().join("made.json")).expect("a manifest")).expect("JSON");
+    let lacks = |log: usize| made["logs"][log]["lacks"].as_str().expect("words");
+    assert!(!lacks(0).is_empty() && listed.contains(lacks(0)), "{made} {listed}");
+    assert_eq!((lacks(1), &made["inputs"][0]["file"]), ("", &"logs/noisy.tlog".into()));
 }

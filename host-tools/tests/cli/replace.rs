@@ -1,16 +1,20 @@
 //! Existing files stay, and two sessions are never mixed.
 
+use std::collections::BTreeSet;
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::CommandFactory as _;
 use clap::builder::PossibleValue;
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use hums::cli::Cli;
 use tempfile::TempDir;
 
 use crate::inputs::{leaves, words};
 use crate::support::{
-    all_named, attempt, contents, end_of, frames_of, furnished, named, px4, run, stamps, text,
+    all_named, attempt, contents, end_of, flight, frames_of, furnished, named, px4, run, stamps, text,
 };
 
 fn two_cards() -> TempDir {
@@ -266,12 +270,106 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     fs::write(dir.path().join("notes.txt"), "mine").expect("written");
     fs::create_dir(dir.path().join("fleet")).expect("made");
-    fs::write(dir.path().join("fleet/vehicle=system-1"), "mine").expect("written");
+    fs::write(dir.path().join("fleet/vehicle=quad-7"), "mine").expect("written");
     for (output, format) in [("notes.txt/", "csv"), ("notes.txt/", "parquet"), ("fleet", "parquet")] {
-        let ended = attempt(dir.path(), &format!("decode log.hum -o {output} --format {format}"));
+        let ended =
+            attempt(dir.path(), &format!("decode log.hum -o {output} --format {format} --vehicle quad-7"));
         let told = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert_eq!(ended.status.code(), Some(1), "{output} {format}: {told}");
         assert!(told.contains("is a file, and a directory is needed there"), "{output} {format}: {told}");
     }
     assert_eq!(fs::read(dir.path().join("notes.txt")).expect("there"), b"mine");
+}
+
+/// The sessions of recordings are known by their bytes. Folders that are decoded again and again, in one call or in many,
+/// have each session once; so has a copy, and a compressed one.
+#[test]
+fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
+    let dir = tempfile::tempdir().expect("directory");
+    for folder in ["hexa", "quad", "spare"] {
+        fs::create_dir_all(dir.path().join("logs").join(folder)).expect("a folder");
+    }
+    let to = |path: &str| dir.path().join("logs").join(path);
+    for (name, path) in [
+        ("ap_quad_guided.tlog", "quad/a.tlog"),
+        ("px4_hil_quad_low.tlog", "quad/b.tlog"),
+        ("ap_quad_faults.tlog", "hexa/a.tlog"),
+    ] {
+        fs::rename(end_of(name, dir.path()), to(path)).expect("moved");
+    }
+    fs::copy(flight("ap_quad_signed.raw"), to("quad/c.raw")).expect("a copy");
+    fs::copy(to("quad/a.tlog"), to("spare/again.tlog")).expect("a copy");
+    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(&fs::read(to("quad/b.tlog")).expect("a recording")).expect("packed");
+    fs::write(to("spare/b.tlog.gz"), packed.finish().expect("packed")).expect("written");
+    let each =
+        ["quad/a.tlog", "quad/b.tlog", "hexa/a.tlog", "quad/c.raw", "spare/again.tlog", "spare/b.tlog.gz"];
+    let decode = |inputs: &str, more: &str| {
+        let ended = attempt(dir.path(), &format!("decode {inputs} -o fleet --format parquet {more}"));
+        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(!told.contains("counts twice"), "{told}");
+        (ended.status.code(), told)
+    };
+    let mut known = Vec::new();
+    for round in 0..3 {
+        let (code, told) = decode("logs", "");
+        assert_eq!(
+            (code, told.matches("skipped: ").count()),
+            (Some(0), if round == 0 { 0 } else { 4 }),
+            "{told}"
+        );
+        for path in each {
+            let (code, told) = decode(&format!("logs/{path}"), "");
+            assert!(code == Some(1) && told.contains("exists, and was not overwritten"), "{path}: {told}");
+        }
+        // The session is there under another vehicle.
+        let (code, told) = decode("logs", "--vehicle quad-7");
+        assert_eq!((code, told.matches("skipped: ").count()), (Some(0), 4), "{told}");
+        assert_eq!(decode("logs", "--force").0, Some(0));
+        let sessions = parquet_sessions(&dir.path().join("fleet"));
+        assert_eq!(sessions.len(), 4, "{sessions:?}");
+        if round > 0 {
+            assert_eq!(sessions, known);
+        }
+        known = sessions;
+    }
+    // Vehicles without an id are apart by folder and autopilot, and have the name that the user gives.
+    let vehicles = |sessions: &[PathBuf]| -> BTreeSet<String> {
+        let of = |path: &PathBuf| path.iter().next().expect("a vehicle").to_string_lossy().into_owned();
+        sessions.iter().map(of).collect()
+    };
+    let names: Vec<String> = vehicles(&known).into_iter().collect();
+    let expected = ["ArduPilot-hexa", "ArduPilot-quad", "PX4-quad"]
+        .map(|end| format!("vehicle=system-1-quadrotor-{end}"));
+    assert_eq!(names, expected);
+    run(dir.path(), "decode logs -o named --format parquet --vehicle 7/new", 0);
+    let names = vehicles(&parquet_sessions(&dir.path().join("named")));
+    assert_eq!(names.into_iter().collect::<Vec<_>>(), ["vehicle=vehicle-7-new"]);
+}
+
+/// A folder of pages gets those that it lacks; `--force` writes all of them.
+#[test]
+fn pages_that_exist_are_skipped_and_the_others_are_written() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::create_dir(dir.path().join("logs")).expect("a folder");
+    let add =
+        |name: &str| fs::rename(end_of(name, dir.path()), dir.path().join("logs").join(name)).expect("moved");
+    let report = |more: &str| {
+        let ended = attempt(dir.path(), &format!("report logs -o pages/ --json {more}"));
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        let told = String::from_utf8_lossy(&ended.stderr).into_owned();
+        let made = crate::support::json(&ended);
+        let count = |name: &str| made[name].as_array().expect("a list").len();
+        (count("pages"), count("skipped"), told.matches(": skipped: ").count())
+    };
+    add("ap_quad_guided.tlog");
+    assert_eq!(report(""), (2, 0, 0));
+    add("px4_hil_quad_low.tlog");
+    let mine = |name: &(String, Vec<u8>)| name.0.starts_with("ap_quad");
+    let before = contents(&dir.path().join("pages")).into_iter().find(mine);
+    assert_eq!(report(""), (2, 1, 1), "the new one, and the table");
+    assert_eq!(contents(&dir.path().join("pages")).into_iter().find(mine), before);
+    let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
+    assert!(table.contains("ap_quad_guided.tlog") && table.contains("px4_hil_quad_low.tlog"));
+    assert_eq!(report("--force"), (3, 0, 0));
 }

@@ -25,21 +25,18 @@ pub fn add_ends(hash: &mut Sha256, path: &Path) -> io::Result<()> {
 
 /// A digest of all bytes of a file.
 pub fn digest(path: &Path) -> io::Result<[u8; 32]> {
-    let (mut file, mut hash, mut buffer) = (File::open(path)?, Sha256::new(), vec![0; 64 * 1024]);
+    digest_of(File::open(path)?)
+}
+
+/// A digest of all bytes to the end.
+pub fn digest_of(mut bytes: impl io::Read) -> io::Result<[u8; 32]> {
+    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 64 * 1024]);
     loop {
-        match file.read(&mut buffer)? {
+        match bytes.read(&mut buffer)? {
             0 => return Ok(hash.finalize().into()),
             got => hash.update(buffer.get(..got).unwrap_or_default()),
         }
     }
-}
-
-/// A number that distinguishes a file from others, as in the names of its outputs: `r1a2b3c4d`; none if it is
-/// unreadable.
-pub fn content_identity(path: &Path) -> Option<String> {
-    let mut hash = Sha256::new();
-    add_ends(&mut hash, path).ok()?;
-    Some(format!("r{:08x}", short(hash)))
 }
 
 /// The first 32 bits of a digest.

@@ -20,7 +20,7 @@ mod paths;
 mod short;
 mod stamp;
 
-pub use ends::{add_ends, content_identity, digest, short};
+pub use ends::{add_ends, digest, digest_of, short};
 pub use folder::{Folder, FolderFile, buffered};
 pub use identity::{FileId, is_seekable};
 pub use in_place::{make_in_place, open_in_place};

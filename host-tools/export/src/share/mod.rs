@@ -38,6 +38,11 @@ use rules::{Rule, Rules};
 const PART_ITEMS: usize = 4_096;
 /// Names in the list of removed data.
 const REMOVED_MAX: usize = 2_000;
+const RECORDS: &str = "records of the board";
+/// With places, identities or texts.
+const OBSERVATIONS: &str = "observations";
+const TEXTS: &str = "texts";
+const PARAMETERS: &str = "parameters";
 const STATUSTEXT: u32 = 253;
 /// `GLOBAL_POSITION_INT`, which an autopilot sends once it knows where it is.
 const GLOBAL_POSITION_INT: u32 = 33;
@@ -90,6 +95,8 @@ struct Share {
     moved: Moved,
     /// Removed messages, fields, parameters and texts, with their numbers.
     removed: BTreeMap<String, u64>,
+    /// All messages, parameters and texts by the same names.
+    seen: BTreeMap<String, u64>,
     removed_others: u64,
     kept: u64,
     /// New system ids, by their first frame.
@@ -102,9 +109,18 @@ impl Share {
             rules: Rules::new(),
             moved: Moved::default(),
             removed: BTreeMap::new(),
+            seen: BTreeMap::new(),
             removed_others: 0,
             kept: 0,
             systems: BTreeMap::new(),
+        }
+    }
+
+    fn see(&mut self, what: &str) {
+        if let Some(number) = self.seen.get_mut(what) {
+            *number += 1;
+        } else if self.seen.len() < REMOVED_MAX {
+            self.seen.insert(what.to_owned(), 1);
         }
     }
 
@@ -133,7 +149,10 @@ impl Share {
                         self.kept += 1;
                     }
                 }
-                Item::Record(_) => self.remove("records of the board"),
+                Item::Record(_) => {
+                    self.see(RECORDS);
+                    self.remove(RECORDS);
+                }
                 Item::Gap(gap) => lossy |= gap.cause.is_damage(),
                 _ => {}
             }
@@ -146,6 +165,7 @@ impl Share {
     /// The frame with the fields that stay; `None` if nothing of it does.
     fn frame<'a>(&mut self, at: Instant, frame: &Frame<'_>, out: &'a mut Vec<u8>) -> Option<&'a [u8]> {
         let name = message_name(frame.id());
+        self.see(&name);
         let known = frame.check() == Check::Verified;
         let Some(fields) = self.rules.fields(frame.id()).filter(|_| known) else {
             self.remove(&name);
@@ -210,6 +230,12 @@ impl Share {
         let (mut story, mut lossy) = (Story::default(), false);
         let want = Want { observations: true, ..Want::default() };
         place.open()?.read(want, &mut |at, item| {
+            match &item {
+                Item::Observation(..) => self.see(OBSERVATIONS),
+                Item::Text(_) => self.see(TEXTS),
+                Item::Parameter(_) => self.see(PARAMETERS),
+                _ => {}
+            }
             match item {
                 Item::Observation(source, observation) => match self.moved.observation(observation) {
                     Some(observation) => {
@@ -217,10 +243,10 @@ impl Share {
                         let source = Source { system: self.system(source.system), ..source };
                         story.observed.push(Observed { at, source, observation });
                     }
-                    None => self.remove("observations with places, identities or texts"),
+                    None => self.remove(OBSERVATIONS),
                 },
-                Item::Text(text) if !self.rules.keeps_text(text.words) => self.remove("texts"),
-                Item::Parameter(told) if !self.rules.keeps_parameter(told.name) => self.remove("parameters"),
+                Item::Text(text) if !self.rules.keeps_text(text.words) => self.remove(TEXTS),
+                Item::Parameter(told) if !self.rules.keeps_parameter(told.name) => self.remove(PARAMETERS),
                 Item::Gap(gap) => lossy |= gap.cause.is_damage(),
                 item => story.said.extend(Said::of(at, &item)),
             }
@@ -242,7 +268,10 @@ impl Share {
             "moved: places to the Atlantic, altitudes to sea level, pressure to 1013.25 hPa, times to 2020",
         )?;
         for (what, number) in &self.removed {
-            line(&format!("removed: {what} ({number} times)"))?;
+            // A field is in as many messages as there are of its name.
+            let all = self.seen.get(what).or_else(|| self.seen.get(what.split('.').next()?));
+            let of = all.map_or_else(String::new, |all| format!("{number} of {all} "));
+            line(&format!("removed: {of}{what}"))?;
         }
         if self.removed_others > 0 {
             line(&format!("removed: {} of further names", count(self.removed_others, "message")))?;

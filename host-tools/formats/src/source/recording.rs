@@ -92,7 +92,13 @@ impl Place {
         }
     }
 
-    /// Whether it can be read only once.
+    /// Its folder, with all parents.
+    pub fn folder(&self) -> Option<PathBuf> {
+        let piece = || Some(self.own()?.pieces.first()?.path.as_path());
+        Some(self.path().or_else(piece)?.canonicalize().ok()?.parent()?.to_owned())
+    }
+
+    /// Whether it can be read but once.
     pub const fn is_standard(&self) -> bool {
         matches!(self.source, From::Standard)
     }

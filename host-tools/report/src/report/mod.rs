@@ -30,7 +30,7 @@ use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
 use crate::naming::{Named, Names, Traits, without_made};
-use crate::outcome::{Outcome, usage};
+use crate::outcome::{Outcome, or_skipped, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
@@ -44,6 +44,8 @@ const SCHEMA: Schema = Schema::first("hums-report");
 #[derive(Debug, Default, Serialize)]
 struct PagesJson {
     pages: Vec<PageJson>,
+    /// Pages of sessions that exist, and were not overwritten.
+    skipped: Vec<PathBuf>,
 }
 
 #[derive(Debug, Serialize)]
@@ -192,7 +194,21 @@ impl Making<'_> {
                     let of = self.places.get(of).map_or("another log", |place| &place.name);
                     note!("{}: is a copy of {of}, whose page is written once", place.name);
                 }
-                Named::As(name, _) => self.page(index, place, overview, &this, &name)?,
+                Named::As(name, _) => {
+                    let path = self.wanted.path(&name);
+                    let free = Output::check(&path, self.inputs);
+                    // A single page that cannot be written is an error, as any output.
+                    if self.wanted.sessions.end() <= self.wanted.sessions.start() {
+                        free?;
+                        self.page(index, place, overview, &this, &path)?;
+                    } else if let Err(why) = or_skipped(free)? {
+                        note!("{}: skipped: {why}", place.name);
+                        self.pages.insert(index, file_name(&path));
+                        self.made.skipped.push(path);
+                    } else {
+                        self.page(index, place, overview, &this, &path)?;
+                    }
+                }
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
@@ -211,21 +227,21 @@ impl Making<'_> {
         place: &Place,
         overview: &Overview,
         this: &trend::Session,
-        name: &str,
+        path: &Path,
     ) -> Result<()> {
-        let (path, overview) = (self.wanted.path(name), &without_folders(overview));
+        let overview = &without_folders(overview);
         let on_card = self.earlier.iter().zip(self.places).filter(|(_, other)| are_of_one_card(place, other));
         let before: Vec<trend::Session> = on_card.filter_map(|(session, _)| session.clone()).collect();
         let trend = trend::of(this, &before);
         let last = self.last_flight(this)?;
         let replay = replay::Replay::of(place, overview)?;
         let html = page::html(overview, &replay, &trend, last.as_ref());
-        let file = path.file_name().map_or_else(String::new, |file| file.to_string_lossy().into_owned());
+        let file = file_name(path);
         self.parameters = Some((
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        self.write(&path, &html, &What::Session(place), self.inputs)?;
+        self.write(path, &html, &What::Session(place), self.inputs)?;
         self.rows.push(index::Row::new(file.clone(), overview, &replay));
         self.pages.insert(index, file);
         Ok(())
@@ -328,7 +344,12 @@ impl Making<'_> {
     }
 }
 
-/// An overview with names of files alone: a page is given to others, and this computer's folders are not.
+/// The name of a page's file.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |file| file.to_string_lossy().into_owned())
+}
+
+/// The same with the names of files alone: a page is given to others, and this computer's folders are not.
 fn without_folders(overview: &Overview) -> Overview {
     let mut overview = overview.clone();
     for file in &mut overview.ending.files {

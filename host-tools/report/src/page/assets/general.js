@@ -1,4 +1,4 @@
-// The reference system's first row: General Information.
+// The reference system's row General Information, battery first.
 
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
@@ -21,11 +21,11 @@ export const general = () => {
     node: el(
       "section",
       { class: "row", id: "general" },
-      el("h2", {}, "General"),
+      el("h2", {}, "Battery and air"),
       el(
         "div",
         { class: "instruments" },
-        [time, percent, volts, pressure, celsius].map((part) => part.node),
+        [percent, volts, time, pressure, celsius].map((part) => part.node),
       ),
     ),
     update({ values, cells, now_s: now }) {

@@ -54,6 +54,7 @@ usually(() => {
 const overall = badge(),
   name = el("h1", {}, "HUMS"),
   facts = el("p", { class: "facts-line" }),
+  why = el("p", { class: "verdict", id: "why", hidden: true }),
   picture = badge();
 const armed = el("b", { class: "chip", "data-value": "armed" }),
   phase = el("b", { class: "chip", "data-value": "phase" });
@@ -68,12 +69,13 @@ document
     el("div", { class: "chips" }, armed, phase, picture.node),
     vehicles,
     el("div", { class: "tools" }, back, range, speak, asked),
+    why,
   );
 overall.node.id = "overall";
 picture.node.id = "source";
 
 // ---- Body.
-const rows = [general(), esc(), movement(), condition()],
+const rows = [movement(), general(), esc(), condition()],
   sides = [board(), usage(), link()],
   body = el("div", { class: "rows" });
 const wire = connect(take, (now, count, token) => {
@@ -102,10 +104,9 @@ main.append(body, el("aside", {}, sides[0].node, log.node, sides[2].node, sides[
 section("time", "Timeline", body).append(strip.node);
 const last = section("parameters", "Parameters", body);
 last.append(told.node);
-const others = plots(
-  (group, next) => section(group.toLowerCase(), group, body, next ?? last),
-  ["MotorAmperes", "MotorVolts", "Height", "Velocity"],
-);
+const others = plots((group, next) => section(group.toLowerCase(), group, body, next ?? last), {
+  elsewhere: ["MotorAmperes", "MotorVolts", "Height", "Velocity"],
+});
 
 const loud = () => {
   speaker.toggle();
@@ -228,6 +229,18 @@ const drawHead = () => {
   toggle(root, "cut", !connected || silent || source.phase === "lost");
 };
 
+// Why the level is bad, and what to do: of the worst subsystem, with the advice of its last finding.
+const drawWhy = () => {
+  const worst = ["critical", "warning"].includes(state.overall) ? state.board.find(({ level }) => level === state.overall) : null;
+  why.hidden = !connected || !worst?.reason;
+  if (why.hidden) return;
+  const last = flight.notes.findLast(
+    ({ subsystem, level, found }) => subsystem === worst.subsystem && level === worst.level && found && !found.because,
+  );
+  say(why, [`${worst.reason}.`, last?.found.action].filter(Boolean).join(" "));
+  attribute(why, "class", `verdict ${worst.level}`);
+};
+
 const drawState = () => {
   say(name, `${state.name}${state.firmware ? ` ${state.firmware}` : ""}`);
   if (connected) document.title = `${state.overall === "ok" ? "" : `${state.overall.toUpperCase()} \u00b7 `}${state.name} \u00b7 HUMS live`;
@@ -239,6 +252,7 @@ const drawState = () => {
     const level = state.overall_was ?? (isLast && state.overall === "ok" ? "stale" : state.overall);
     overall.set(level, isLast ? `${isCalm ? "" : `${words}; `}ends in the air` : words);
   }
+  drawWhy();
   if (!begun) {
     begun = true;
     flight.zero = flight.start = head.source.recording ? head.source.start_s : flight.begin;

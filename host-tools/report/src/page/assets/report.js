@@ -129,7 +129,7 @@ time.append(
   cursorTime,
 );
 usually(() => [flight.start, flight.end]);
-plots((group) => section(group.toLowerCase(), group)).update();
+plots((group) => section(group.toLowerCase(), group), { folds: true }).update();
 
 const told = parameters(data.before);
 told.update();
