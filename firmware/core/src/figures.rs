@@ -13,6 +13,7 @@
 use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
+use crate::health::Inputs;
 use crate::observation::{MOTORS_MAX, VehicleKind};
 use crate::params::Params;
 use crate::power_draw::drawn;
@@ -143,15 +144,8 @@ state! {
 
 impl Figures {
     /// One step, after flight and derived quantities.
-    pub(crate) fn step(
-        &mut self,
-        now: Instant,
-        vehicle: &Vehicle,
-        flight: &Flight,
-        event: Option<FlightEvent>,
-        derived: &Derived,
-        params: &Params,
-    ) {
+    pub(crate) fn step(&mut self, inputs: &Inputs<'_>, event: Option<FlightEvent>) {
+        let Inputs { now, vehicle, flight, derived, params, .. } = *inputs;
         match event {
             Some(FlightEvent::TakeOff) => *self = Self { charged: self.charged, ..Self::default() },
             Some(FlightEvent::Resumed) => *self = Self::default(),
@@ -178,7 +172,7 @@ impl Figures {
                 }
                 Quantity::Capacity(battery) => self.capacity_ah(vehicle, derived, params, battery),
                 _ if !steady => continue,
-                _ => sample(now, quantity, vehicle, derived, params),
+                _ => sample(quantity, inputs),
             };
             let track = self.tracks.get_mut(quantity.index());
             if let (Some(value), Some(track)) = (value.filter(|value| quantity.is_sane(*value)), track) {
@@ -210,18 +204,13 @@ fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
     level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
 }
 
-fn sample(
-    now: Instant,
-    quantity: Quantity,
-    vehicle: &Vehicle,
-    derived: &Derived,
-    params: &Params,
-) -> Option<f32> {
+fn sample(quantity: Quantity, inputs: &Inputs<'_>) -> Option<f32> {
+    let Inputs { now, vehicle, derived, .. } = *inputs;
     match quantity {
         Quantity::Vibration => vehicle.vibration.within(now, PAUSE)?.acceleration(),
         Quantity::HoverThrottle => {
             let throttle = vehicle.hud.within(now, PAUSE)?.throttle?.0;
-            Some(throttle * lift(now, vehicle, derived, params)?)
+            Some(throttle * lift(inputs)?)
         }
         Quantity::HoverPower => {
             let power_w = drawn(now, vehicle).power_w;
@@ -247,7 +236,8 @@ fn density(vehicle: &Vehicle) -> f32 {
 
 /// The factor that turns the throttle into that at [`CELL_V`] and sea level. `None` if the cell voltage is unknown; 1
 /// on wings.
-fn lift(now: Instant, vehicle: &Vehicle, derived: &Derived, params: &Params) -> Option<f32> {
+fn lift(inputs: &Inputs<'_>) -> Option<f32> {
+    let Inputs { now, vehicle, derived, params, .. } = *inputs;
     if vehicle.hovers(now) != Some(true) {
         return Some(1.0);
     }

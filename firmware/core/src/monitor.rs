@@ -181,8 +181,6 @@ impl Monitor {
         self.ticked_at = now;
         let event = self.step_flight(now);
         self.derived.step(now, &self.vehicle, &self.flight, event, recorder);
-        self.figures.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
-        self.usage.step(now, &self.vehicle, &self.flight, event, &self.derived, &self.params);
         self.step_wear();
         let inputs = Inputs {
             now,
@@ -194,6 +192,8 @@ impl Monitor {
             wear: &self.wear,
             params: &self.params,
         };
+        self.figures.step(&inputs, event);
+        self.usage.step(&inputs, event);
         self.snapshots.step(&inputs);
         let mut crossed = false;
         self.health.step(&inputs, &mut self.exceedances, &mut |finding| {

@@ -11,6 +11,7 @@ pub use totals::{MotorTotals, Totals, Wear};
 
 use crate::derived::Derived;
 use crate::flight::{Flight, FlightEvent, Phase};
+use crate::health::Inputs;
 use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;
@@ -104,15 +105,8 @@ impl Usage {
     }
 
     /// One step, at least every 50 ms, after the flight's own.
-    pub fn step(
-        &mut self,
-        now: Instant,
-        vehicle: &Vehicle,
-        flight: &Flight,
-        event: Option<FlightEvent>,
-        derived: &Derived,
-        params: &Params,
-    ) {
+    pub(crate) fn step(&mut self, inputs: &Inputs<'_>, event: Option<FlightEvent>) {
+        let Inputs { now, vehicle, flight, derived, params, .. } = *inputs;
         if event == Some(FlightEvent::TakeOff) {
             self.totals.add(UsageCounter::Flights, 1.0);
         }
