@@ -113,8 +113,8 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub struct Alerts {
         /// For each cause its urgency; until when a single report holds, ms; the time of the last report.
-        told: [Option<Urgency>; Cause::COUNT],
-        until_ms: [u32; Cause::COUNT],
+        told: [Option<Urgency>; Cause::COUNT] = [None; Cause::COUNT],
+        until_ms: [u32; Cause::COUNT] = [0; Cause::COUNT],
         told_at: Stamp,
         /// Last time of a cause that was not reported just before, or of an emergency state.
         began_at: Stamp,

@@ -114,7 +114,7 @@ state! {
     /// The cells of all batteries.
     #[derive(Clone, Copy, Debug)]
     pub struct Cells {
-        packs: [Pack; BATTERIES_MAX],
+        packs: [Pack; BATTERIES_MAX] = [Pack::default(); BATTERIES_MAX],
         /// By the battery's id and [`Setting`]; 0: unknown, or not set.
         settings: [[f32; SETTINGS]; SET_MAX],
     }

@@ -39,7 +39,7 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Crosschecks {
         pub(crate) residuals: Residuals,
-        pub(crate) pairs: [Pairs; Kind::COUNT],
+        pub(crate) pairs: [Pairs; Kind::COUNT] = [Pairs::default(); Kind::COUNT],
         pub(crate) repeats: Repeats,
         pub(crate) velocities: [GnssVelocity; RECEIVERS_MAX],
         pub(crate) imu_gnss: ImuGnssResidual,

@@ -38,7 +38,7 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub struct Derived {
         pub(crate) cells: Cells,
-        resistance: [Resistance; BATTERIES_MAX],
+        resistance: [Resistance; BATTERIES_MAX] = [Resistance::default(); BATTERIES_MAX],
         pub(crate) motors: Motors,
         pub(crate) crosschecks: Crosschecks,
         /// Of the last sample, and smoothed.

@@ -47,7 +47,7 @@ state! {
     /// The systems on the port, and which of them is the vehicle.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Election {
-        candidates: [Option<Candidate>; CANDIDATES_MAX],
+        candidates: [Option<Candidate>; CANDIDATES_MAX] = [None; CANDIDATES_MAX],
         window: Instant,
         /// When the first heartbeat was heard, or the vehicle was chosen anew.
         since: Option<Instant>,

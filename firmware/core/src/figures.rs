@@ -136,8 +136,8 @@ state! {
     /// The figures of a flight.
     #[derive(Clone, Copy, Debug)]
     pub struct Figures {
-        tracks: [Track; Quantity::COUNT],
-        charged: [Option<Charge>; BATTERIES_MAX],
+        tracks: [Track; Quantity::COUNT] = [Track::default(); Quantity::COUNT],
+        charged: [Option<Charge>; BATTERIES_MAX] = [None; BATTERIES_MAX],
         sampled_at: Stamp,
     }
 }

@@ -106,7 +106,7 @@ impl Track {
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Motors {
-        tracks: [Track; MOTORS_MAX],
+        tracks: [Track; MOTORS_MAX] = [Track::default(); MOTORS_MAX],
         /// What the autopilot gives them.
         pub(crate) outputs: MotorOutputs,
         /// The motor whose speed is furthest from the others'.

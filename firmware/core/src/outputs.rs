@@ -169,7 +169,7 @@ state! {
         /// How many motors there are in this flight; 0 before it is known.
         count: u8,
         range: Range = Range::Pulses,
-        outputs: [Output; JUDGED_MAX],
+        outputs: [Output; JUDGED_MAX] = [Output::default(); JUDGED_MAX],
         at: Stamp,
         /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
         summed: (u8, f32),

@@ -115,8 +115,8 @@ impl Pair {
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Pairs {
-        samples: [Sample; SENSORS_MAX],
-        pairs: [Pair; SENSORS_MAX],
+        samples: [Sample; SENSORS_MAX] = [Sample::default(); SENSORS_MAX],
+        pairs: [Pair; SENSORS_MAX] = [Pair::default(); SENSORS_MAX],
     }
 }
 

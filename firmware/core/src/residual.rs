@@ -261,7 +261,7 @@ state! {
     pub(crate) struct Residuals {
         /// The conditions at the last step.
         pub(crate) gates: Gates,
-        each: [Residual; Comparison::COUNT],
+        each: [Residual; Comparison::COUNT] = [Residual::default(); Comparison::COUNT],
     }
 }
 

@@ -111,11 +111,11 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub struct Snapshots {
         /// The newest is before `next`.
-        ring: [[u16; KEPT.len()]; SAMPLES],
+        ring: [[u16; KEPT.len()]; SAMPLES] = [[0; KEPT.len()]; SAMPLES],
         next: u8,
         filled: u8,
         newest: Instant,
-        pending: [Option<Pending>; PENDING_MAX],
+        pending: [Option<Pending>; PENDING_MAX] = [None; PENDING_MAX],
         left_out: u16,
     }
 }

@@ -160,7 +160,7 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Repeats {
         moved: Moved,
-        sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT],
+        sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT] = [[Stuck::default(); SENSORS_MAX]; Kind::COUNT],
         receivers: [Stuck; RECEIVERS_MAX],
     }
 }

@@ -107,7 +107,7 @@ state! {
         /// The autopilot's rails.
         pub rails: Latest<Rails>,
         /// Batteries in the order in which they were first seen.
-        pub batteries: [Latest<Battery>; BATTERIES_MAX],
+        pub batteries: [Latest<Battery>; BATTERIES_MAX] = [Latest::default(); BATTERIES_MAX],
         /// The component that each battery is told by: two components may both have a battery 0.
         battery_of: [u8; BATTERIES_MAX],
         /// The place of the battery that was told of last.
@@ -117,7 +117,7 @@ state! {
         /// Vibration.
         pub vibration: Latest<Vibration>,
         /// Motors by number.
-        pub motors: [Motor; MOTORS_MAX],
+        pub motors: [Motor; MOTORS_MAX] = [Motor::default(); MOTORS_MAX],
         /// The combustion engine.
         pub engine: Latest<Engine>,
         /// The generator.

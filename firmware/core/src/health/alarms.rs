@@ -26,9 +26,9 @@ state! {
     /// All of them.
     #[derive(Clone, Copy, Debug)]
     pub(super) struct Alarms {
-        standing: [Option<Standing>; ALARMS_MAX],
+        standing: [Option<Standing>; ALARMS_MAX] = [None; ALARMS_MAX],
         /// The states that are stale because of a silent link, a bit each.
-        silenced: [u32; STATES.div_ceil(32)],
+        silenced: [u32; STATES.div_ceil(32)] = [0; STATES.div_ceil(32)],
         /// The state whose alarm explains these, and when that ended.
         silence: Option<u16>,
         silence_ended: Option<Instant>,

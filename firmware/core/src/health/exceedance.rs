@@ -100,7 +100,7 @@ state! {
     /// All exceedances.
     #[derive(Clone, Copy, Debug)]
     pub struct Exceedances {
-        entries: [Option<Entry>; EXCEEDANCES_MAX],
+        entries: [Option<Entry>; EXCEEDANCES_MAX] = [None; EXCEEDANCES_MAX],
         left_out: u16,
     }
 }

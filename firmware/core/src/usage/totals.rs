@@ -28,7 +28,7 @@ state! {
             counters
         },
         /// Motors by number.
-        pub motors: [MotorTotals; MOTORS_MAX],
+        pub motors: [MotorTotals; MOTORS_MAX] = [MotorTotals::default(); MOTORS_MAX],
     }
 }
 
