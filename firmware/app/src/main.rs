@@ -30,11 +30,11 @@ use hums_core::Monitor;
 use hums_core::params::Params;
 use hums_onboard::persist::mailbox::MailboxOut;
 use hums_onboard::queues::{Ends, Queues};
-use hums_onboard::{Handover, Monitoring, ResetCause, StoreWriter};
+use hums_onboard::{Handover, Mailbox, Monitoring, ResetCause, StoreWriter};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use boards::board;
-use tasks::monitor;
+use tasks::{monitor, storage};
 
 static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 /// In CCM: the hottest data there is, and no DMA reads it (see `memory.x`).
@@ -42,7 +42,9 @@ static QUEUES: ConstStaticCell<Queues> = ConstStaticCell::new(Queues::new());
 static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: StaticCell<Monitor> = StaticCell::new();
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
+static ENDS: StaticCell<monitor::Ends> = StaticCell::new();
 static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
+static MAILBOX: ConstStaticCell<Mailbox> = ConstStaticCell::new(Mailbox::new());
 static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
 const ONCE: &str = "each task is spawned once";
@@ -74,7 +76,7 @@ fn start() -> board::Idle {
         before: Before::default(),
     };
     let monitor = Monitor::begin(MONITOR.uninit(), &Params::defaults());
-    let (items_in, items_out) = status::MAILBOX.split();
+    let (items_in, items_out) = MAILBOX.take().split();
     let store_writer = restore(parts.store, items_out, parts.boot.cause, monitor);
     let entropy = parts.boot.entropy.unwrap_or_else(|| counted(store_writer.mounts(), &identity));
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
@@ -85,16 +87,19 @@ fn start() -> board::Idle {
     let (autopilot_rx, autopilot_tx) = parts.autopilot;
     let (gs_rx, gs_tx) = parts.gs;
     on.reception.spawn(tasks::reception::run(autopilot_rx, frames_in).expect(ONCE));
-    let ends =
-        monitor::Ends { frames: frames_out, uplink: queues.uplink_out, sectors: sectors_in, gs: gs_in };
+    let ends = ENDS.init(monitor::Ends {
+        frames: frames_out,
+        uplink: queues.uplink_out,
+        sectors: sectors_in,
+        gs: gs_in,
+    });
     on.monitor
         .spawn(monitor::run(monitoring, ends, handover, parts.boot, parts.watchdog, parts.led).expect(ONCE));
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
-    on.storage.spawn(
-        tasks::storage::run(parts.card, entropy, sectors_out, queues.shelf, store_writer).expect(ONCE),
-    );
+    let storage = storage::body(parts.card, entropy, sectors_out, queues.shelf, store_writer);
+    on.storage.spawn(storage::run(storage).expect(ONCE));
     parts.idle
 }
 

@@ -1,6 +1,6 @@
 //! Shared status of the tasks: written by one, read by any at any time.
 
-use hums_onboard::{Mailbox, PortStatus, StoreStatus, Supervisor};
+use hums_onboard::{PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;
 
 pub(crate) static SUPERVISOR: Supervisor = Supervisor::new();
@@ -8,6 +8,4 @@ pub(crate) static SUPERVISOR: Supervisor = Supervisor::new();
 pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
 /// Counters of storage.
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
-/// Monitor to storage: items to store.
-pub(crate) static MAILBOX: Mailbox = Mailbox::new();
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();

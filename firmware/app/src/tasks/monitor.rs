@@ -41,14 +41,14 @@ pub(crate) struct Ends {
 #[embassy_executor::task]
 pub(crate) async fn run(
     body: &'static mut Monitoring<'static>,
-    mut ends: Ends,
+    ends: &'static mut Ends,
     handover: &'static mut Handover<'static>,
     boot: Boot,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
 ) -> ! {
     body.start(now(), &mut ends.sectors);
-    tell_fault(body, &mut ends, boot.cause);
+    tell_fault(body, ends, boot.cause);
     let mut told = [false; 6];
     wake_others();
     let mut ticker = Ticker::every(links::wait(TICK));
@@ -59,11 +59,11 @@ pub(crate) async fn run(
         let mut is_behind = false;
         // The tick first: if frames arrive faster than they are processed, they are always due.
         match select3(ticker.next(), links::FRAMES.wait(), links::UPLINK.wait()).await {
-            Either3::Second(()) => is_behind = drain(body, &mut ends),
-            Either3::Third(()) => uplink(body, &mut ends),
+            Either3::Second(()) => is_behind = drain(body, ends),
+            Either3::Third(()) => uplink(body, ends),
             Either3::First(()) => {
                 // Frames from before this tick.
-                is_behind = drain(body, &mut ends);
+                is_behind = drain(body, ends);
                 if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
                     let (stack_bytes_max, stack_bytes) = memory::stack_used();
                     let (stack_bytes_max, stack_bytes) = (stack_bytes_max as u32, stack_bytes as u32);
@@ -74,8 +74,8 @@ pub(crate) async fn run(
                         stack_bytes,
                     });
                 }
-                tick(body, &mut ends, handover);
-                tell_board(body, &mut ends, &mut told, boot.entropy.is_some());
+                tick(body, ends, handover);
+                tell_board(body, ends, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
                 fault::tick(now());

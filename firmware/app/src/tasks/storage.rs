@@ -19,68 +19,76 @@ use crate::links::{self, now};
 /// Check-in interval while idle.
 const REPORT: Duration = Duration::from_secs(1);
 
-type Body = Storage<'static, board::Card>;
+type Recording = Storage<'static, board::Card>;
+type Saving = &'static mut StoreWriter<'static, board::StoreFlash>;
 
-// Statics of their own: made within the task, both would take 8 and 1.5 KiB of its stack first.
-static HELD: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
+pub(crate) struct Body {
+    storage: Recording,
+    sectors: SectorsOut<'static>,
+    shelf: Server<'static>,
+    store_writer: Saving,
+}
+
+// SAFETY: `BUFFERS`, the only part that may not be shared, is lent to the one body.
+unsafe impl Send for Body {}
+
+static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
+// In a static of its own: a task's arguments take their room twice.
 static BODY: StaticCell<Body> = StaticCell::new();
 
 #[inline(never)]
-fn prepare(card: board::Card, entropy: u32) -> &'static mut Body {
-    BODY.init_with(|| Storage::new(card, &CARD_STATUS, HELD.take(), entropy))
+pub(crate) fn body(
+    card: board::Card,
+    entropy: u32,
+    sectors: SectorsOut<'static>,
+    shelf: Server<'static>,
+    store_writer: Saving,
+) -> &'static mut Body {
+    BODY.init_with(|| {
+        let storage = Storage::new(card, &CARD_STATUS, BUFFERS.take(), entropy);
+        Body { storage, sectors, shelf, store_writer }
+    })
 }
 
 #[embassy_executor::task]
-pub(crate) async fn run(
-    card: board::Card,
-    entropy: u32,
-    mut sectors: SectorsOut<'static>,
-    mut shelf: Server<'static>,
-    store_writer: &'static mut StoreWriter<'static, board::StoreFlash>,
-) -> ! {
-    let body = prepare(card, entropy);
+pub(crate) async fn run(body: &'static mut Body) -> ! {
     loop {
         SUPERVISOR.report(Task::Storage, now());
-        let begun = now();
-        let service = service(body, begun, &mut sectors);
-        keep(store_writer);
+        let service = service(body, now());
+        keep(body);
         match service {
             Service::Wrote => {}
-            Service::Idle if !sectors.is_empty() || serve(body, &mut shelf) => {}
-            Service::Idle => wait_for_work(&sectors, &shelf, store_writer).await,
+            Service::Idle if !body.sectors.is_empty() || serve(body) => {}
+            Service::Idle => wait_for_work(body).await,
             Service::NoCard => Timer::after(links::wait(NO_CARD_RETRY)).await,
         }
     }
 }
 
 /// Returns when there is a sector or a question.
-async fn wait_for_work(
-    sectors: &SectorsOut<'_>,
-    shelf: &Server<'_>,
-    store_writer: &mut StoreWriter<'static, board::StoreFlash>,
-) {
-    let mut asked = shelf.is_wanted();
-    while sectors.is_empty() && !asked {
+async fn wait_for_work(body: &mut Body) {
+    let mut asked = body.shelf.is_wanted();
+    while body.sectors.is_empty() && !asked {
         SUPERVISOR.report(Task::Storage, now());
-        keep(store_writer);
+        keep(body);
         let _ = with_timeout(REPORT, links::SECTORS.wait()).await;
-        asked = shelf.is_wanted();
+        asked = body.shelf.is_wanted();
     }
 }
 
 // Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
 #[inline(never)]
-fn service(body: &mut Body, begun: Instant, sectors: &mut SectorsOut<'static>) -> Service {
-    measure(Stage::Storage, || body.service(begun, sectors))
+fn service(body: &mut Body, begun: Instant) -> Service {
+    measure(Stage::Storage, || body.storage.service(begun, &mut body.sectors))
 }
 
 #[inline(never)]
-fn serve(body: &mut Body, shelf: &mut Server<'static>) -> bool {
-    measure(Stage::Storage, || body.serve(shelf))
+fn serve(body: &mut Body) -> bool {
+    measure(Stage::Storage, || body.storage.serve(&mut body.shelf))
 }
 
 #[inline(never)]
-fn keep(store_writer: &mut StoreWriter<'static, board::StoreFlash>) {
-    measure(Stage::Storage, || store_writer.service(false));
+fn keep(body: &mut Body) {
+    measure(Stage::Storage, || body.store_writer.service(false));
 }

@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn signed_changes_all_day_leave_what_a_landing_needs_of_the_store() {
         let mut flash = Flash::blank();
-        let (mailbox, status) = (Mailbox::new(), StoreStatus::new());
+        let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
         let (items_in, items_out) = mailbox.split();
         let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));

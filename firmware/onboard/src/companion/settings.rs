@@ -20,7 +20,7 @@ use crate::journal::{Arming, Logbook};
 use crate::notices::Notices;
 use crate::queues::SectorsIn;
 use crate::records;
-use crate::shelf::{DATA_MAX, Reader, Want, What, Which};
+use crate::shelf::{Reader, Want, What, Which};
 
 /// Enough for all parameters, each in the longest line.
 const BYTES_MAX: u32 = 16 * 1024;
@@ -127,25 +127,18 @@ impl Settings {
             }
             return false;
         };
-        let mut piece = heapless::Vec::<u8, DATA_MAX>::new();
-        let mut length = None;
-        shelf.answer(|answer, data| {
-            if answer.ticket == ticket {
-                length = Some(answer.bytes);
-                // Fits: an answer is never longer.
-                let _ = piece.extend_from_slice(data);
-            }
-            true
-        });
-        let Some(length) = length else { return false };
+        let Some((answer, piece)) = shelf.answer(ticket) else { return false };
+        let length = answer.bytes;
         self.ticket = None;
-        for byte in &piece {
+        for byte in piece {
             if self.take(*byte) {
                 self.line(now, book, sectors);
             }
         }
-        let next = offset + piece.len() as u32;
-        if !piece.is_empty() && next < length.min(BYTES_MAX) {
+        let count = piece.len() as u32;
+        shelf.release();
+        let next = offset + count;
+        if count > 0 && next < length.min(BYTES_MAX) {
             self.state = State::Reading(next);
             return false;
         }

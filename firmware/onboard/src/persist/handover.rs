@@ -114,14 +114,14 @@ impl<'a> Handover<'a> {
 
     /// An item of another owner; `false` without room.
     pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
-        self.items.put(key, value)
+        self.items.put(key, |bytes| copy(value, bytes))
     }
 
     /// Set ones; `false` without room.
     fn put_params(&mut self, params: &mut Params) -> bool {
         while let Some((index, spec, value)) = params.unsaved() {
             if let Some((bytes, length)) = param_value(spec.name, value)
-                && !self.items.put(Key::param(spec.name), bytes.get(..length).unwrap_or_default())
+                && !self.put(Key::param(spec.name), bytes.get(..length).unwrap_or_default())
             {
                 return false;
             }
@@ -133,15 +133,20 @@ impl<'a> Handover<'a> {
     /// `false` without room.
     fn put_items(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         while let Some(key) = monitor.save_due(now.into(), self.status.read().room) {
-            let mut bytes = [0; ITEM_BYTES_MAX];
-            let length = monitor.encode_item(key, &mut bytes);
-            if !self.items.put(Key::item(key.number()), bytes.get(..length).unwrap_or_default()) {
+            if !self.items.put(Key::item(key.number()), |bytes| monitor.encode_item(key, bytes)) {
                 return false;
             }
             monitor.saved(key);
         }
         true
     }
+}
+
+/// Copies an item that fits; returns its length.
+fn copy(value: &[u8], to: &mut [u8; ITEM_BYTES_MAX]) -> usize {
+    let Some(to) = to.get_mut(..value.len()) else { return 0 };
+    to.copy_from_slice(value);
+    value.len()
 }
 
 fn newer(told: &mut u32, now: u32) -> bool {

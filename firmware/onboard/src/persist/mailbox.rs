@@ -1,23 +1,20 @@
 //! Items on their way from the monitor's task to the storage task.
 
-use bbqueue::nicknames::Churrasco;
-use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use hums_core::lifetime::ITEM_BYTES_MAX;
 use hums_store::{Key, VALUE_BYTES_MAX};
 
-/// Its key.
-const KEY_BYTES: usize = 4;
-/// The longest item, and the queue's own two bytes.
-const PLACE_BYTES: usize = KEY_BYTES + ITEM_BYTES_MAX + 2;
-/// A queue of bytes must have room for the longest item before and behind its position; otherwise it can block for
-/// ever.
-const MAILBOX_BYTES: usize = (2 * PLACE_BYTES + 8).next_multiple_of(8);
+use crate::queues::ring::{In, Out, Ring};
+
 const _: () = assert!(ITEM_BYTES_MAX <= VALUE_BYTES_MAX);
 
-type Queue = Churrasco<MAILBOX_BYTES>;
+struct Item {
+    key: Key,
+    length: usize,
+    bytes: [u8; ITEM_BYTES_MAX],
+}
 
-/// Items on their way into the store; one static. When it is full the item stays with its owner.
-pub struct Mailbox(Queue);
+/// The item on its way into the store. While it waits, all others stay with their owners.
+pub struct Mailbox(Ring<Item, 1>);
 
 impl Default for Mailbox {
     fn default() -> Self {
@@ -28,49 +25,41 @@ impl Default for Mailbox {
 impl Mailbox {
     /// Empty.
     pub const fn new() -> Self {
-        Self(Queue::new())
+        Self(Ring::new([Item { key: Key::from_stored(0), length: 0, bytes: [0; ITEM_BYTES_MAX] }]))
     }
 
     /// Both ends, once.
-    pub fn split(&self) -> (MailboxIn<'_>, MailboxOut<'_>) {
-        (MailboxIn(self.0.framed_producer()), MailboxOut(self.0.framed_consumer()))
+    pub fn split(&mut self) -> (MailboxIn<'_>, MailboxOut<'_>) {
+        let (to, from) = self.0.split();
+        (MailboxIn(to), MailboxOut(from))
     }
 }
 
 /// The monitor's end.
-pub struct MailboxIn<'a>(FramedProducer<&'a Queue>);
+pub struct MailboxIn<'a>(In<'a, Item, 1>);
 
 impl MailboxIn<'_> {
-    /// `false` without room.
-    pub fn put(&mut self, key: Key, value: &[u8]) -> bool {
-        let length = KEY_BYTES + value.len();
-        let Ok(mut grant) = self.0.grant(length as u16) else { return false };
-        if let Some((place, rest)) = grant.split_at_mut_checked(KEY_BYTES) {
-            place.copy_from_slice(&key.stored().to_le_bytes());
-            if let Some(rest) = rest.get_mut(..value.len()) {
-                rest.copy_from_slice(value);
-            }
-        }
-        grant.commit(length as u16);
+    /// Hands over the item that `encode` writes, of the returned length; `false` if another one waits.
+    pub(super) fn put(&mut self, key: Key, encode: impl FnOnce(&mut [u8; ITEM_BYTES_MAX]) -> usize) -> bool {
+        let Some(item) = self.0.free() else { return false };
+        (item.key, item.length) = (key, encode(&mut item.bytes));
+        self.0.commit();
         true
     }
 }
 
 /// The store writer's end.
-pub struct MailboxOut<'a>(FramedConsumer<&'a Queue>);
+pub struct MailboxOut<'a>(Out<'a, Item, 1>);
 
 impl MailboxOut<'_> {
-    /// `take` returns whether it is finished; `None` if there is none.
-    pub(crate) fn oldest<R>(&mut self, take: impl FnOnce(Key, &[u8]) -> (R, bool)) -> Option<R> {
-        let grant = self.0.read().ok()?;
-        let Some((key, value)) = grant.split_first_chunk::<KEY_BYTES>() else {
-            grant.release();
-            return None;
-        };
-        let (result, done) = take(Key::from_stored(u32::from_le_bytes(*key)), value);
-        if done {
-            grant.release();
-        }
-        Some(result)
+    /// The waiting item.
+    pub(super) fn waiting(&mut self) -> Option<(Key, &[u8])> {
+        let item = self.0.waiting().first()?;
+        Some((item.key, item.bytes.get(..item.length).unwrap_or_default()))
+    }
+
+    /// The waiting item is finished.
+    pub(super) fn release(&mut self) {
+        self.0.release(1);
     }
 }

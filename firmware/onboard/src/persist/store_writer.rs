@@ -28,7 +28,7 @@ pub enum Saved {
     Took,
     /// There is nothing to do.
     Idle,
-    /// The oldest item waits until an erase is allowed.
+    /// The item waits until an erase is allowed.
     Waits,
 }
 
@@ -37,7 +37,7 @@ pub struct StoreWriter<'a, F: NorFlash> {
     store: Option<Store<F>>,
     items: MailboxOut<'a>,
     pub(crate) status: &'a StoreStatus,
-    /// The oldest item has been counted as waiting.
+    /// The item has been counted as waiting.
     waits: bool,
     /// The work of this calm time is done.
     turned: bool,
@@ -126,37 +126,29 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
             }
         }
         let Self { store, items, status, waits, .. } = self;
+        let Some((key, value)) = items.waiting() else { return Saved::Idle };
         let Some(store) = store else {
-            return items.oldest(|_, _| (Saved::Took, true)).unwrap_or(Saved::Idle);
+            items.release();
+            return Saved::Took;
         };
         if *waits && !may_erase && !erases {
             return Saved::Waits;
         }
         store.allow_erase(may_erase || calm == Calm::Silent);
-        let kept = items.oldest(|key, value| {
-            match store.save(key, value).or_else(|error| again(store, error, key, value)) {
-                Ok(_) => {
-                    count(&status.saved);
-                    (Saved::Took, true)
-                }
-                Err(Error::NotNow) => (Saved::Waits, false),
-                // After two failures its owner saves it again when it has changed.
-                Err(_) => {
-                    count(&status.failed);
-                    (Saved::Took, true)
-                }
-            }
-        });
+        let saved = store.save(key, value).or_else(|error| again(store, error, key, value));
         store.allow_erase(false);
-        let waited = core::mem::replace(waits, kept == Some(Saved::Waits));
-        if *waits && !waited {
-            count(&status.refused);
+        if matches!(saved, Err(Error::NotNow)) {
+            if !core::mem::replace(waits, true) {
+                count(&status.refused);
+            }
+            return Saved::Waits;
         }
-        let kept = kept.unwrap_or(Saved::Idle);
-        if kept == Saved::Took {
-            self.look_for_room();
-        }
-        kept
+        *waits = false;
+        // After two failures its owner saves it again when it has changed.
+        count(if saved.is_ok() { &status.saved } else { &status.failed });
+        items.release();
+        self.look_for_room();
+        Saved::Took
     }
 
     /// More than the reserve.

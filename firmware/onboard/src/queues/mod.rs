@@ -12,6 +12,7 @@ mod capacities;
 mod frames;
 mod level;
 mod ports;
+pub(crate) mod ring;
 mod sectors;
 
 use bbqueue::nicknames::Churrasco;
@@ -85,7 +86,7 @@ impl Queues {
             gs: Churrasco::new(),
             uplink: Churrasco::new(),
             autopilot: Churrasco::new(),
-            sectors: SectorQueue::new(),
+            sectors: sectors::sector_queue(),
             shelf: Shelf::new(),
             levels: [const { Level::new() }; 4],
         }
@@ -93,7 +94,7 @@ impl Queues {
 
     /// Hands out the ends, once.
     pub fn split(&mut self) -> Ends<'_> {
-        let (sectors_in, sectors_out) = self.sectors.split(SECTOR_RESERVE);
+        let (sectors_in, sectors_out) = sectors::split(&mut self.sectors, SECTOR_RESERVE);
         let (reader, shelf) = self.shelf.split();
         let [frames, gs, uplink, autopilot] = &self.levels;
         Ends {

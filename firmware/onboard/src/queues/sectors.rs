@@ -1,41 +1,26 @@
 //! The queue of sectors, with its reserve for records.
 
-use core::sync::atomic::{AtomicUsize, Ordering};
-
-use bbqueue::nicknames::Churrasco;
-use bbqueue::prod_cons::stream::{StreamConsumer, StreamProducer};
 use hums_blackbox::{Header, SECTOR_BYTES, Sector, SectorSink};
 use hums_recorder::Block;
 
 use super::capacities::SECTOR_QUEUE_SECTORS;
-
-// The queue keeps one place empty to tell full from empty.
-type Queue = Churrasco<{ (SECTOR_QUEUE_SECTORS + 1) * SECTOR_BYTES }>;
+use super::ring::{In, Out, Ring};
 
 /// Written to the card from where they lie.
-pub(super) struct SectorQueue {
-    queue: Queue,
-    len: AtomicUsize,
+pub(super) type SectorQueue = Ring<Block, SECTOR_QUEUE_SECTORS>;
+
+pub(super) const fn sector_queue() -> SectorQueue {
+    Ring::new([[0; SECTOR_BYTES]; SECTOR_QUEUE_SECTORS])
 }
 
-impl SectorQueue {
-    pub(super) const fn new() -> Self {
-        Self { queue: Queue::new(), len: AtomicUsize::new(0) }
-    }
-
-    pub(super) fn split(&self, reserve: usize) -> (SectorsIn<'_>, SectorsOut<'_>) {
-        let Self { queue, len } = self;
-        (
-            SectorsIn { queue: queue.stream_producer(), len, reserve, deepest: 0 },
-            SectorsOut { queue: queue.stream_consumer(), len },
-        )
-    }
+pub(super) fn split(queue: &mut SectorQueue, reserve: usize) -> (SectorsIn<'_>, SectorsOut<'_>) {
+    let (to, from) = queue.split();
+    (SectorsIn { queue: to, reserve, deepest: 0 }, SectorsOut { queue: from })
 }
 
 /// Refuses frames while only the reserve is left.
 pub struct SectorsIn<'a> {
-    queue: StreamProducer<&'a Queue>,
-    len: &'a AtomicUsize,
+    queue: In<'a, Block, SECTOR_QUEUE_SECTORS>,
     reserve: usize,
     deepest: usize,
 }
@@ -56,7 +41,7 @@ impl SectorsIn<'_> {
 
     /// Sectors waiting, with those that are being written.
     pub fn len(&self) -> usize {
-        self.len.load(Ordering::Acquire)
+        self.queue.len()
     }
 
     /// The most sectors that waited at once.
@@ -71,30 +56,25 @@ impl SectorSink for SectorsIn<'_> {
     }
 
     fn put(&mut self, sector: &Sector) {
-        // The writer asks for room first, so this does not fail.
-        if let Ok(mut grant) = self.queue.grant_exact(SECTOR_BYTES) {
-            grant.copy_from_slice(sector.bytes());
-            // Before the reader can take it out.
-            let before = self.len.fetch_add(1, Ordering::AcqRel);
-            self.deepest = self.deepest.max(before + 1);
-            grant.commit(SECTOR_BYTES);
+        // The writer asks for room first, so there is a place.
+        if let Some(place) = self.queue.free() {
+            place.copy_from_slice(sector.bytes());
+            self.queue.commit();
         }
+        self.deepest = self.deepest.max(self.len());
     }
 }
 
 /// Reading end.
 pub struct SectorsOut<'a> {
-    queue: StreamConsumer<&'a Queue>,
-    len: &'a AtomicUsize,
+    queue: Out<'a, Block, SECTOR_QUEUE_SECTORS>,
 }
 
 impl SectorsOut<'_> {
     /// Lends the oldest sectors in a row, or none. Those that `write` has finished are dropped.
     pub fn lend<E>(&mut self, write: impl FnOnce(&mut [Block]) -> Result<usize, E>) -> Result<usize, E> {
-        let Ok(mut grant) = self.queue.read() else { return write(&mut []) };
-        let done = write(grant.as_chunks_mut().0)?;
-        grant.release(done * SECTOR_BYTES);
-        self.len.fetch_sub(done, Ordering::AcqRel);
+        let done = write(self.queue.waiting())?;
+        self.queue.release(done);
         Ok(done)
     }
 
@@ -118,7 +98,7 @@ impl SectorsOut<'_> {
 
     /// Sectors waiting.
     pub fn len(&self) -> usize {
-        self.len.load(Ordering::Acquire)
+        self.queue.len()
     }
 
     /// Whether the queue is empty.

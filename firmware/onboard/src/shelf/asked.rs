@@ -4,8 +4,6 @@ use hums_recorder::LogName;
 
 /// Bytes of a log in one answer.
 pub const DATA_MAX: usize = 240;
-/// Bytes of an answer's head.
-pub(super) const HEAD: usize = 36;
 /// The identity of a log, independent of the card's directory: another log of the same name differs in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogId {
@@ -68,12 +66,7 @@ pub enum NoLog {
     Unread,
 }
 
-/// Outcomes in an answer's head.
-const FOUND: u16 = 0;
-const ABSENT: u16 = 1;
-const UNREAD: u16 = 2;
-
-/// Head of an answer.
+/// Storage's answer, without its data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// The request's ticket.
@@ -102,54 +95,5 @@ impl Answer {
 
     pub(super) const fn without(self, why: NoLog) -> Self {
         Self { found: Err(why), bytes: 0, ..self }
-    }
-
-    pub(super) fn write(&self) -> [u8; HEAD] {
-        let mut head = [0; HEAD];
-        head[..2].copy_from_slice(&self.ticket.to_le_bytes());
-        head[2..4].copy_from_slice(&self.count.to_le_bytes());
-        let found = match self.found {
-            Ok(()) => FOUND,
-            Err(NoLog::Absent) => ABSENT,
-            Err(NoLog::Unread) => UNREAD,
-        };
-        head[4..6].copy_from_slice(&found.to_le_bytes());
-        head[6] = self.log.name.segment as u8;
-        let words = [
-            self.log.name.session,
-            self.bytes,
-            self.offset,
-            self.log.session,
-            self.log.first,
-            self.directory,
-            self.utc_secs,
-        ];
-        for (to, word) in head[8..].chunks_exact_mut(4).zip(words) {
-            to.copy_from_slice(&word.to_le_bytes());
-        }
-        head
-    }
-
-    pub(super) fn read(head: &[u8; HEAD]) -> Self {
-        let u16_at = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
-        let word = |index: usize| {
-            let at = 8 + 4 * index;
-            u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]])
-        };
-        let name = LogName { session: word(0), segment: u32::from(head[6]) };
-        Self {
-            ticket: u16_at(0),
-            count: u16_at(2),
-            found: match u16_at(4) {
-                FOUND => Ok(()),
-                UNREAD => Err(NoLog::Unread),
-                _ => Err(NoLog::Absent),
-            },
-            log: LogId { name, session: word(3), first: word(4) },
-            bytes: word(1),
-            offset: word(2),
-            directory: word(5),
-            utc_secs: word(6),
-        }
     }
 }

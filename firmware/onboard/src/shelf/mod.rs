@@ -4,7 +4,7 @@
 //! | queue | from | to | capacity | when it is full |
 //! |---|---|---|---|---|
 //! | wants | monitor | storage | 2 | the monitor asks again |
-//! | answers | storage | monitor | [`ANSWER_BYTES`] | storage waits with the next one |
+//! | answers | storage | monitor | 1 | storage waits with the next one |
 //!
 //! A log's length is the recorded length, not the file's: storage finds the last sector of the first one's session
 //! (14 blocks of an 8 MiB segment). For the log in work it is the finished part, without copies of the sector in
@@ -18,42 +18,45 @@
 mod asked;
 mod on_card;
 
-use bbqueue::nicknames::Churrasco;
-use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
-use heapless::spsc;
 use hums_link::ftp;
 use hums_recorder::card::{LogEntry, Segment};
 use hums_recorder::{BLOCK_BYTES, Card, CardDevice, CardError, Recorder};
 
-use asked::HEAD;
+use crate::queues::ring::{In, Out, Ring};
 pub use asked::{Answer, DATA_MAX, LogId, NoLog, Want, What, Which};
 use on_card::{for_each_part, holds, in_work, measure};
 
-/// Room for the longest answer in one piece, with the queue's own two bytes, behind any position: twice its length.
-pub const ANSWER_BYTES: usize = 2 * (HEAD + DATA_MAX + 2) + 8;
+/// Requests at once.
+const WANTS: usize = 2;
 /// Blocks of a checksum at a call: some 5 ms of a card on SPI, as a small answer takes.
 const SUM_BLOCKS: u32 = 4;
 
+pub(crate) type Answered = (Answer, heapless::Vec<u8, DATA_MAX>);
+
 /// Part of the firmware's one static.
 pub struct Shelf {
-    wants: spsc::Queue<Want, 3>,
-    answers: Churrasco<ANSWER_BYTES>,
+    wants: Ring<Want, WANTS>,
+    answers: Ring<Answered, 1>,
 }
 
 impl Shelf {
     /// Empty.
     pub(crate) const fn new() -> Self {
-        Self { wants: spsc::Queue::new(), answers: Churrasco::new() }
+        const NONE: Want = Want { ticket: 0, which: Which::At(0), what: What::Length };
+        Self {
+            wants: Ring::new([NONE; WANTS]),
+            answers: Ring::new([(Answer::none(0), heapless::Vec::new())]),
+        }
     }
 
     pub(crate) fn split(&mut self) -> (Reader<'_>, Server<'_>) {
         let (wants_in, wants_out) = self.wants.split();
-        let reader = Reader { wants: wants_in, answers: self.answers.framed_consumer() };
+        let (answers_in, answers_out) = self.answers.split();
         (
-            reader,
+            Reader { wants: wants_in, answers: answers_out },
             Server {
                 wants: wants_out,
-                answers: self.answers.framed_producer(),
+                answers: answers_in,
                 last: None,
                 sum: None,
                 listed: Listed::default(),
@@ -65,34 +68,38 @@ impl Shelf {
 
 /// The monitor's ends.
 pub struct Reader<'a> {
-    wants: spsc::Producer<'a, Want>,
-    answers: FramedConsumer<&'a Churrasco<ANSWER_BYTES>>,
+    wants: In<'a, Want, WANTS>,
+    answers: Out<'a, Answered, 1>,
 }
 
 impl Reader<'_> {
     /// `false` without room.
     pub fn want(&mut self, want: Want) -> bool {
-        self.wants.enqueue(want).is_ok()
+        let Some(place) = self.wants.free() else { return false };
+        *place = want;
+        self.wants.commit();
+        true
     }
 
-    /// Removed if `look` returns `true`.
-    pub fn answer(&mut self, look: impl FnOnce(&Answer, &[u8]) -> bool) -> bool {
-        let Ok(grant) = self.answers.read() else { return false };
-        let done = match grant.split_first_chunk::<HEAD>() {
-            Some((head, data)) => look(&Answer::read(head), data),
-            None => true,
-        };
-        if done {
-            grant.release();
+    /// The answer to the request with this ticket, if it has come. It stays until [`Self::release`]; answers to other
+    /// requests are dropped.
+    pub(crate) fn answer(&mut self, ticket: u16) -> Option<&Answered> {
+        if self.answers.waiting().first().is_some_and(|(answer, _)| answer.ticket != ticket) {
+            self.release();
         }
-        true
+        self.answers.waiting().first().map(|answered| &*answered)
+    }
+
+    /// The answer that has come is used up.
+    pub(crate) fn release(&mut self) {
+        self.answers.release(1);
     }
 }
 
 /// Storage's ends.
 pub struct Server<'a> {
-    wants: spsc::Consumer<'a, Want>,
-    answers: FramedProducer<&'a Churrasco<ANSWER_BYTES>>,
+    wants: Out<'a, Want, WANTS>,
+    answers: In<'a, Answered, 1>,
     last: Option<Found>,
     sum: Option<Sum>,
     /// Found last, by place.
@@ -127,22 +134,23 @@ struct Sum {
 impl Server<'_> {
     /// Whether a request waits.
     pub fn is_wanted(&self) -> bool {
-        self.erases.is_some() || self.sum.is_some() || self.wants.ready()
+        self.erases.is_some() || self.sum.is_some() || self.wants.len() > 0
     }
 
     #[cfg(test)]
     pub(crate) fn serve_text(&mut self, text: &[u8]) {
-        let Some(Want { ticket, which: Which::Settings, what: What::Data(offset) }) = self.wants.dequeue()
+        let Some(&mut Want { ticket, which: Which::Settings, what: What::Data(offset) }) =
+            self.wants.waiting().first_mut()
         else {
             return;
         };
+        self.wants.release(1);
         let data = &text[(offset as usize).min(text.len())..];
         let data = &data[..data.len().min(DATA_MAX)];
         let answer = Answer { found: Ok(()), bytes: text.len() as u32, offset, ..Answer::none(ticket) };
-        let mut grant = self.answers.grant((HEAD + data.len()) as u16).expect("room for one answer");
-        grant[..HEAD].copy_from_slice(&answer.write());
-        grant[HEAD..HEAD + data.len()].copy_from_slice(data);
-        grant.commit((HEAD + data.len()) as u16);
+        let place = self.answers.free().expect("room for one answer");
+        *place = (answer, data.iter().copied().collect());
+        self.answers.commit();
     }
 
     /// Part of a request, if there is room for its answer; whether there was one.
@@ -152,9 +160,9 @@ impl Server<'_> {
             self.erases = erase_next(recorder, entry);
             return true;
         }
-        match self.wants.peek().copied() {
+        match self.wants.waiting().first().copied() {
             Some(Want { what: What::Erase, .. }) => {
-                let _ = self.wants.dequeue();
+                self.wants.release(1);
                 self.erases = Some(0);
                 true
             }
@@ -165,21 +173,20 @@ impl Server<'_> {
 
     /// Answers one request, or begins its checksum.
     fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
-        let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
-        let _ = self.wants.dequeue();
+        let Some((to, data)) = self.answers.free() else { return false };
+        self.wants.release(1);
         if want.which != Which::Settings {
             // One conversation at a time: a request for something else cancels a checksum.
             self.sum = None;
         }
         let log = find(recorder, want, self.last.take(), &mut self.listed);
         let mut answer = Answer { ticket: want.ticket, ..log.answer };
-        let mut data = 0;
+        data.clear();
         if let (Some(card), Some(mut segment)) = (recorder.card(), log.segment) {
             match want.what {
                 What::Data(offset) => {
                     answer.offset = offset;
-                    let to = grant.get_mut(HEAD..).unwrap_or_default();
-                    data = copy(card, &mut segment, &answer, to);
+                    copy(card, &mut segment, &answer, data);
                 }
                 What::Checksum(bytes) => {
                     let bytes = if bytes == 0 { answer.bytes } else { bytes.min(answer.bytes) };
@@ -192,13 +199,11 @@ impl Server<'_> {
                 .filter(|found| want.which != Which::Settings && found.answer.found.is_ok());
         }
         if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
-            // Its answer comes when it is finished; the uncommitted grant is returned.
+            // Its answer comes when it is finished.
             return true;
         }
-        if let Some(head) = grant.get_mut(..HEAD) {
-            head.copy_from_slice(&answer.write());
-        }
-        grant.commit((HEAD + data) as u16);
+        *to = answer;
+        self.answers.commit();
         true
     }
 
@@ -207,7 +212,7 @@ impl Server<'_> {
         let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
             return false;
         };
-        let Ok(mut grant) = self.answers.grant((HEAD + DATA_MAX) as u16) else { return false };
+        let Some(place) = self.answers.free() else { return false };
         let end = answer.offset.min(done.saturating_add(SUM_BLOCKS * BLOCK_BYTES as u32));
         let mut why = NoLog::Unread;
         let is_read = recorder.card().is_some_and(|card| {
@@ -227,11 +232,8 @@ impl Server<'_> {
         if !is_read {
             answer = answer.without(why);
         }
-        if let Some((head, to)) = grant.split_first_chunk_mut::<HEAD>() {
-            *head = answer.write();
-            to[..4].copy_from_slice(&so_far.to_le_bytes());
-        }
-        grant.commit((HEAD + 4) as u16);
+        *place = (answer, so_far.to_le_bytes().into_iter().collect());
+        self.answers.commit();
         true
     }
 }
@@ -316,15 +318,16 @@ fn at_place<D: CardDevice>(
     Ok(found.map(|(_, log)| log))
 }
 
-/// Bytes from the answer's offset on; returns their number.
-fn copy<D: CardDevice>(card: &Card<'_, D>, segment: &mut Segment, answer: &Answer, to: &mut [u8]) -> usize {
-    let end = answer.offset.saturating_add(to.len().min(DATA_MAX) as u32).min(answer.bytes);
-    let mut done = 0;
+/// Appends bytes from the answer's offset on, as many as fit.
+fn copy<D: CardDevice>(
+    card: &Card<'_, D>,
+    segment: &mut Segment,
+    answer: &Answer,
+    to: &mut heapless::Vec<u8, DATA_MAX>,
+) {
+    let end = answer.offset.saturating_add(DATA_MAX as u32).min(answer.bytes);
     for_each_part(card, segment, &answer.log, answer.offset..end, |part| {
-        if let Some(to) = to.get_mut(done..done + part.len()) {
-            to.copy_from_slice(part);
-            done += part.len();
-        }
+        // Fits: not more is read.
+        let _ = to.extend_from_slice(part);
     });
-    done
 }

@@ -22,7 +22,7 @@ use self::log::Places;
 use self::step::{Out, Step};
 use super::limiter::Asker;
 use super::ways::Ways;
-use crate::shelf::{Answer, DATA_MAX, Want, What, Which};
+use crate::shelf::{Answered, Want, What, Which};
 
 /// Answers looked at in one call. The port's budget limits them too.
 const LOOKS_MAX: usize = 64;
@@ -62,9 +62,6 @@ impl Kind {
         }
     }
 }
-
-/// A copy: sending needs all queues.
-type Answered = (Answer, heapless::Vec<u8, DATA_MAX>);
 
 impl Library {
     pub(crate) const fn new() -> Self {
@@ -120,7 +117,7 @@ impl Library {
         }
         for _ in 0..LOOKS_MAX {
             let Some(mut job) = self.job else {
-                while ways.queues.shelf.answer(|_, _| true) {}
+                ways.queues.shelf.release();
                 return None;
             };
             let answered = match job.kind.want() {
@@ -137,7 +134,7 @@ impl Library {
             }
             self.asked = false;
             if answered.is_some() {
-                ways.queues.shelf.answer(|_, _| true);
+                ways.queues.shelf.release();
             }
             if let Step::End(reply) = step {
                 return Some((job.asker.port, reply));
@@ -146,21 +143,9 @@ impl Library {
         None
     }
 
-    /// Stays in the queue; sends the request if still to do.
+    /// A copy: sending needs all queues. Sends the request if still to do.
     fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
-        let ticket = self.ticket;
-        let mut seen = None;
-        while seen.is_none()
-            && ways.queues.shelf.answer(|answer, data| {
-                if answer.ticket == ticket {
-                    // Fits: an answer is never longer.
-                    let mut copy = heapless::Vec::new();
-                    let _ = copy.extend_from_slice(data);
-                    seen = Some((*answer, copy));
-                }
-                answer.ticket != ticket
-            })
-        {}
+        let seen = ways.queues.shelf.answer(self.ticket).cloned();
         if seen.is_none() && !self.asked {
             let ticket = self.next_ticket();
             self.asked = ways.queues.shelf.want(Want { ticket, which, what });
