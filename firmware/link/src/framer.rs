@@ -28,8 +28,10 @@ use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
 use crate::frame::{self, Frame, Header, NoHeader};
 use crate::seen::{Extra, Seen};
 
-/// Bytes held: the longest frame, the byte after it, and as much again so that bytes are seldom moved.
-const BUFFER: usize = 2 * FRAME_BYTES_MAX;
+/// Bytes held: an undecided candidate, and room for more.
+const BUFFER: usize = FRAME_BYTES_MAX + ROOM_MIN;
+/// Least length of [`Framer::room`]: 2 ms of a line at 921,600 baud.
+pub const ROOM_MIN: usize = 192;
 
 /// Steps of the checksum that candidates which are not trusted may cost, for each byte received.
 const CREDIT_PER_BYTE: u32 = 4;
@@ -70,8 +72,7 @@ pub struct Framer {
     counts: FramerCounts,
 }
 
-const _: () = assert!(size_of::<Framer>() <= 1_280);
-const _: () = assert!(BUFFER > FRAME_BYTES_MAX + 1, "a decided candidate must always make room");
+const _: () = assert!(size_of::<Framer>() <= 1_152);
 
 enum Verdict {
     /// A frame, and its message if the checksum is ours.
@@ -107,20 +108,32 @@ impl Framer {
 
     /// Calls `sink` with every completed frame, in order.
     pub fn push(&mut self, bytes: &[u8], sink: &mut impl FnMut(Frame<'_>)) {
-        self.counts.bytes = self.counts.bytes.wrapping_add(bytes.len() as u64);
         let mut rest = bytes;
         while !rest.is_empty() {
-            if BUFFER - self.end < rest.len() {
-                self.buffer.copy_within(self.start..self.end, 0);
-                self.end -= self.start;
-                self.start = 0;
-            }
-            let (now, later) = rest.split_at(rest.len().min(BUFFER - self.end));
-            self.buffer[self.end..self.end + now.len()].copy_from_slice(now);
-            self.end += now.len();
+            let room = self.room();
+            let (now, later) = rest.split_at(rest.len().min(room.len()));
+            room[..now.len()].copy_from_slice(now);
+            self.received(now.len(), sink);
             rest = later;
-            self.scan(false, sink);
         }
+    }
+
+    /// Room for the next bytes, at least [`ROOM_MIN`]; [`Self::received`] takes them from there.
+    pub fn room(&mut self) -> &mut [u8] {
+        if BUFFER - self.end < ROOM_MIN {
+            self.buffer.copy_within(self.start..self.end, 0);
+            self.end -= self.start;
+            self.start = 0;
+        }
+        &mut self.buffer[self.end..]
+    }
+
+    /// Takes the first `count` bytes of [`Self::room`], and calls `sink` with every completed frame, in order.
+    pub fn received(&mut self, count: usize, sink: &mut impl FnMut(Frame<'_>)) {
+        let count = count.min(BUFFER - self.end);
+        self.counts.bytes = self.counts.bytes.wrapping_add(count as u64);
+        self.end += count;
+        self.scan(false, sink);
     }
 
     /// The line has been silent for longer than a pause inside a frame, or has ended: no more bytes are expected. An

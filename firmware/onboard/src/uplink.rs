@@ -38,7 +38,18 @@ impl Uplink {
         framer.push(bytes, &mut |frame| queue(now, &frame, frames, frames_lost));
     }
 
-    /// Silent: decides about bytes that wait for more.
+    /// Room for the next bytes; see [`Framer::room`].
+    pub fn room(&mut self) -> &mut [u8] {
+        self.framer.room()
+    }
+
+    /// Takes the first `count` bytes of [`Self::room`] as [`Self::bytes`] does.
+    pub fn received(&mut self, now: Instant, count: usize, frames: &mut UplinkIn) {
+        let Self { framer, frames_lost } = self;
+        framer.received(count, &mut |frame| queue(now, &frame, frames, frames_lost));
+    }
+
+    /// The line has been silent: decides about bytes that wait for more.
     pub fn idle(&mut self, now: Instant, frames: &mut UplinkIn) {
         let Self { framer, frames_lost } = self;
         framer.idle(&mut |frame| queue(now, &frame, frames, frames_lost));

@@ -5,10 +5,6 @@ use hums_onboard::ResetCause;
 /// Reload value of `SysTick`: all bits set, 0.1 s at 168 MHz.
 pub(crate) const SYSTICK_RELOAD: u32 = (1 << 24) - 1;
 
-/// Bytes that reception fetches at a time: 2.8 ms at 921,600 baud, nearly three times the input between two reads.
-/// After a delay it takes several, without a pause between them.
-pub(crate) const FETCH_BYTES: usize = 256;
-
 /// The receive buffer overflowed because the reception task ran too late. The number of lost bytes is unknown: at most those of
 /// this many milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,6 @@ use hums_onboard::queues::FramesIn;
 use hums_onboard::reception::{Reception, SILENCE};
 
 use crate::boards::board;
-use crate::boards::machine::FETCH_BYTES;
 use crate::costs::{Stage, measure};
 use crate::links::{self, now};
 use crate::status::{PORT_STATUS, SUPERVISOR};
@@ -14,13 +13,11 @@ use crate::status::{PORT_STATUS, SUPERVISOR};
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::PortRx, mut frames: FramesIn<'static>) -> ! {
     let mut body = Reception::new(&PORT_STATUS);
-    let mut bytes = [0; FETCH_BYTES];
     loop {
         SUPERVISOR.report(Task::Reception, now());
-        match with_timeout(links::wait(SILENCE), port.receive(&mut bytes)).await {
+        match with_timeout(links::wait(SILENCE), port.receive(body.room())).await {
             Ok(Ok(count)) => {
-                let bytes = bytes.get(..count).unwrap_or_default();
-                measure(Stage::Framer, || body.bytes(now(), bytes, &mut frames));
+                measure(Stage::Framer, || body.received(now(), count, &mut frames));
             }
             Ok(Err(overrun)) => PORT_STATUS.count_overrun(overrun.blind_ms),
             Err(_silence) => body.idle(now(), &mut frames),

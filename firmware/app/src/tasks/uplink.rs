@@ -7,23 +7,19 @@ use hums_onboard::uplink::{SILENCE, Uplink};
 use crate::boards::board;
 use crate::links::{self, now};
 
-/// Bytes fetched at a time: 22 ms at 57,600 baud.
-const FETCH_BYTES: usize = 128;
-
 #[embassy_executor::task]
 pub(crate) async fn run(mut port: board::PortRx, mut frames: UplinkIn<'static>) -> ! {
     let mut body = Uplink::new();
-    let mut bytes = [0; FETCH_BYTES];
     let mut begun = false;
     loop {
         let received = if begun {
-            with_timeout(links::wait(SILENCE), port.receive(&mut bytes)).await
+            with_timeout(links::wait(SILENCE), port.receive(body.room())).await
         } else {
-            Ok(port.receive(&mut bytes).await)
+            Ok(port.receive(body.room()).await)
         };
         begun = received.is_ok();
         match received {
-            Ok(Ok(count)) => body.bytes(now(), bytes.get(..count).unwrap_or_default(), &mut frames),
+            Ok(Ok(count)) => body.received(now(), count, &mut frames),
             // A checksum detects lost bytes, and the ground station repeats the message.
             Ok(Err(_overrun)) => {}
             Err(_silence) => body.idle(now(), &mut frames),
