@@ -62,8 +62,8 @@ pub struct InWork {
     pub blocks: u32,
 }
 
-/// Maximum blocks of log in one command: more gain little.
-pub const ROW_BLOCKS: usize = 8;
+/// Maximum blocks of log in one command. They keep their places in the queue until the card has taken all.
+pub const ROW_BLOCKS: usize = 4;
 
 /// The parity buffer, 8 KiB. It is lent, because the recorder is moved and would take it along on the firmware's
 /// stack.

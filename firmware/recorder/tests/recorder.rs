@@ -13,6 +13,7 @@ use hums_blackbox::record::{Before, Found};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::card::Card;
+use hums_recorder::recorder::ROW_BLOCKS;
 use hums_recorder::{BLOCK_BYTES, Block, CardDevice, CardState, CardStatus, LogName, NotYet, Recorder};
 
 struct Sink(Vec<Sector>);
@@ -306,7 +307,7 @@ fn sectors_that_wait_together_are_written_together() {
     let (blocks, commands) = (all.len() as u32 + PARITY_SECTORS, device.writes.get());
     assert_eq!((status.read().blocks_written, status.read().writes), (blocks, commands));
     println!("{blocks} blocks in {commands} commands");
-    assert!(commands * 7 < blocks, "{blocks} blocks in {commands} commands");
+    assert!(commands * (ROW_BLOCKS as u32 - 1) < blocks, "{blocks} blocks in {commands} commands");
 }
 
 /// A card that fails within a command: blocks that it took before are written again, at the same places.
