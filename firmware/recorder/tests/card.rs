@@ -428,6 +428,45 @@ fn free_clusters_that_no_log_lost_are_taken() {
     card.read(&mut segment, 3071, &mut block).expect("its chain is as it was");
 }
 
+/// The spare entries of the FAT's last block continue the chain of the card's last clusters.
+#[test]
+fn a_row_of_clusters_outside_of_the_card_is_refused() {
+    let mut device = MemCard::formatted(64 * MIB_BLOCKS);
+    let status = CardStatus::new();
+    let mut card = mount(&device, &status);
+    card.create(FIRST, 64 * 1024).expect("there is room");
+    let layout = *card.layout();
+    drop(card);
+    let (end, inside) = (layout.clusters + 2, 5);
+    let first = end - inside;
+    assert_ne!(end % 128, 0, "the FAT's last block has spare entries");
+    for cluster in first..end.next_multiple_of(128) {
+        let at = cluster as usize % 128 * 4;
+        change(&device, layout.fat_start + cluster / 128, |block| {
+            block[at..at + 4].copy_from_slice(&(cluster + 1).to_le_bytes());
+        });
+    }
+    for block in device.blocks.borrow_mut().values_mut() {
+        let entries = block.as_chunks_mut::<32>().0;
+        if let Some(entry) = entries.iter_mut().find(|entry| entry.starts_with(&FIRST.short())) {
+            entry[20..22].copy_from_slice(&((first >> 16) as u16).to_le_bytes());
+            entry[26..28].copy_from_slice(&(first as u16).to_le_bytes());
+        }
+    }
+    // Nothing else would refuse a block behind the volume.
+    device.size += MIB_BLOCKS;
+    let mut card = mount(&device, &status);
+    card.open(FIRST).expect("it is there");
+    device.journal.borrow_mut().clear();
+    let all: Vec<Block> = (0..64).map(pattern).collect();
+    let row = (inside * layout.cluster_blocks) as usize;
+    assert_eq!(card.write(0, &all), Ok(row));
+    assert_eq!(card.write(row as u32, &all[row..]), Err(CardError::Damaged));
+    let behind = layout.data_start + layout.clusters * layout.cluster_blocks;
+    let written: Vec<u32> = device.journal.borrow().iter().map(|(at, _)| *at).collect();
+    assert_eq!(written, (behind - row as u32..behind).collect::<Vec<_>>());
+}
+
 /// Free clusters one by one, too few before the FAT's end, and more in blocks from its beginning. A segment takes
 /// each free one, in both copies of the FAT, and no other.
 #[test]

@@ -714,3 +714,25 @@ fn a_card_that_logs_fill_is_not_searched() {
         recorder.finish();
     }
 }
+
+/// The command comes while the slot has a card that cannot be recorded on; before the recorder looks, it has a good one.
+#[test]
+fn a_command_to_format_is_not_for_a_card_that_is_mounted_by_then() {
+    let device = MemCard::formatted(64 * MIB_BLOCKS);
+    let formatted = std::mem::take(&mut *device.blocks.borrow_mut());
+    let status = CardStatus::new();
+    let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
+    assert_eq!(recorder.write(Instant::ZERO, &mut []), Err(NotYet::Later));
+    assert!(status.read().state.wants_format(), "{:?}", status.read().state);
+    status.want_format();
+    *device.blocks.borrow_mut() = formatted;
+    let all = sectors(200);
+    let now = Instant::from_millis(2_000);
+    for sector in &all {
+        assert_eq!(put(&mut recorder, now, sector), Ok(1));
+        assert!(!recorder.format(now), "a mounted card is formatted");
+        status.want_format();
+    }
+    assert_eq!(status.read().state, CardState::Recording);
+    assert_eq!(numbers(&device), (0..all.len() as u32).collect::<Vec<_>>());
+}

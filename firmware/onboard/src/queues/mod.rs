@@ -120,10 +120,11 @@ impl Queues {
 #[cfg(test)]
 mod tests {
     use super::frames::STAMP_BYTES;
-    use hums_blackbox::{Sector, SectorSink as _};
+    use hums_blackbox::{SECTOR_BYTES, Sector, SectorSink as _};
     use hums_link::encode::Encoder;
     use hums_link::frame::Frame;
     use hums_link::packet::Packet;
+    use hums_recorder::recorder::ROW_BLOCKS;
 
     use super::*;
 
@@ -196,6 +197,55 @@ mod tests {
         assert_eq!(ends.sectors_in.len(), SECTOR_QUEUE_SECTORS - SECTOR_RESERVE);
         assert_eq!(ends.sectors_in.with_reserve(|sink| sink.room()), SECTOR_RESERVE);
         assert_eq!(ends.sectors_in.room(), 0);
+    }
+
+    #[test]
+    fn while_the_card_takes_a_row_there_is_room_for_a_stall_of_2_5_s() {
+        // 921,600 baud, compressed 3.5 times. The last sector is still the writer's.
+        let sectors = (92_160 * 5 / 2 * 2 / 7_usize).div_ceil(SECTOR_BYTES) - 1;
+        let mut queues = Box::new(Queues::new());
+        let Ends { mut sectors_in, mut sectors_out, .. } = queues.split();
+        let sector = Sector::zeroed();
+        for _ in 0..ROW_BLOCKS {
+            sectors_in.put(&sector);
+        }
+        let written = sectors_out.lend(|row| {
+            assert_eq!(row.len(), ROW_BLOCKS);
+            for index in 0..sectors {
+                assert!(sectors_in.room() > 0, "sector {index} of {sectors}");
+                sectors_in.put(&sector);
+            }
+            Ok::<_, ()>(row.len())
+        });
+        assert_eq!((written, sectors_out.len()), (Ok(ROW_BLOCKS), sectors));
+    }
+
+    /// From any position in the queue, while it holds the frame that is being sent.
+    #[test]
+    fn the_outlets_frames_fit_behind_a_frame_that_is_being_sent() {
+        let waiting = (hums_link::summary::WAITING_BYTES + hums_link::outlet::FINDINGS) as usize;
+        let frame = [7; 92];
+        for shift in 0..GS_QUEUE_BYTES {
+            let mut queues = Box::new(Queues::new());
+            let Ends { mut gs_in, mut gs_out, .. } = queues.split();
+            let mut out = [0; FRAME_BYTES_MAX];
+            for len in [shift / 8, shift % 8].into_iter().filter(|len| *len > 0) {
+                for _ in 0..if len == shift / 8 { 8 } else { 1 } {
+                    gs_in.put(&vec![0; len][..]);
+                    gs_out.take(&mut out);
+                }
+            }
+            gs_in.put(&[7; FRAME_BYTES_MAX]);
+            let sent = gs_out.lend(async |_| {
+                // The queue puts two bytes before each frame.
+                for _ in 0..waiting / (frame.len() + 2) {
+                    gs_in.put(&frame);
+                }
+            });
+            let mut context = core::task::Context::from_waker(core::task::Waker::noop());
+            assert!(core::pin::pin!(sent).poll(&mut context).is_ready());
+            assert_eq!(gs_in.lost(), 0, "from byte {shift} on");
+        }
     }
 
     #[test]
