@@ -158,7 +158,7 @@ with_parts! {
     EngEgtCrit "ENG_EGT_CRIT" "degC" 2000.0 0.0 2000.0 "by engine; off until set";
     EngFuelWarn "ENG_FUEL_WARN" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
     EngFuelCrit "ENG_FUEL_CRIT" "hPa" 0.0 0.0 20_000.0 "by engine; off until set";
-    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated" is "GPS jamming and spoofing: warning above this state";
+    GpsJamWarn "GPS_JAM_WARN" "" 1.5 0.0 4.0 "GNSS_INTEGRITY: 2 is mitigated" is "GPS spoofing: warning above this state";
     GpsJamCrit "GPS_JAM_CRIT" "" 2.5 0.0 4.0 "GNSS_INTEGRITY: 3 is detected" is "GPS jamming and spoofing: critical above this state";
     Latch "HEALTH_LATCH" "" 0.0 0.0 1.0 "no: a warning ends when its value is good again" is "Warnings stay until the vehicle disarms" of "no" | "yes";
     BatResWarn "BAT_RES_WARN" "%" 30.0 0.0 1000.0 "LogHat: internal resistance above its baseline";

@@ -44,6 +44,11 @@ fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
 }
 
 #[test]
+fn jamming_that_the_receiver_mitigates_is_no_finding() {
+    assert_eq!(fly(|_, quad| quad.integrity.jamming = 2), []);
+}
+
+#[test]
 fn a_motor_is_lost_by_its_share_of_the_others_current_while_thrust_is_asked_for() {
     // Each ESC's amperes, the throttle, and the share of motor 1 that is too little, percent.
     let cases = [

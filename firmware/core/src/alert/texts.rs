@@ -65,6 +65,8 @@ texts! {
     (mild): "tune";
     (fine): "motor test" "cruise learn" "yaw re-aligned";
     (warning GroundStation): "mission computer lost";
+    // A plan that is not flown, and a log without a hard-fault dump.
+    (fine): "mission update failed" "mission check failed" "hardfault handler";
     (mild): "mission";
     (fine): "mode change" "requires position";
     (mild): "param";

@@ -115,7 +115,8 @@ pub(super) const CHECKS: &[Check] = &[
     row!("gyro_mismatch" MISMATCH, above(GyroMismWarn _ 0.02),
         role: Role::of(Group::GyroMismatch, Group::GyroFault.bit() | VIBRATION), unit: Unit::of("rad/s"),
         debounce: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
-    row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, 0),
+    // What shakes the accelerometer shakes the gyro.
+    row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, VIBRATION),
         unit: Unit::of("rad/s"), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate)),
     // It goes by the attitude and a receiver too.
@@ -200,7 +201,8 @@ pub(super) const CHECKS: &[Check] = &[
     row!("gps_fix" GNSS, below(_ GpsFixCrit 0.0), role: Role::of(Group::GnssLost, 0), unit: Unit::FLAG,
         debounce: after(2_000, 200),
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix)))),
-    row!("gps_jamming" GNSS, above(GpsJamWarn GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
+    // A receiver that mitigates jamming has a good fix.
+    row!("gps_jamming" GNSS, above(_ GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
         unit: Unit::FLAG, when: When::Always,
         read: |inputs, receiver| integrity(inputs, receiver, |known| known.jamming)),
     row!("gps_spoofing" GNSS, above(GpsJamWarn GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),

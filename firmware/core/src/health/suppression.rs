@@ -287,6 +287,8 @@ mod tests {
             ("autopilot_alert w0", "gps_fix c0, vibration w0, heartbeat w0", ""),
             // As bad or worse.
             ("ekf_failsafe c0", "gps_fix c0, vibration w0", "gps_fix"),
+            ("gyro_noise w0", "vibration_px4 w0", "vibration_px4"),
+            ("vibration_px4 w0", "gyro_noise w0", ""),
             ("accel_mismatch w0", "vibration w0", "vibration"),
             ("accel_mismatch c0", "vibration w0", ""),
             ("failsafe_alert c0", "gps_fix c0, vibration w0", "gps_fix"),
