@@ -1,9 +1,9 @@
 //! The results, as `docs/diagnosis.md`, by one run on one commit.
 
 use super::alarms::{self, BY_CHECK};
-use super::by_hand::{self, BY_HAND};
 use super::faults::{self, BY_CLASS, EACH, SETS};
 use super::judged::Judged;
+use super::real::{self, RATES, Results};
 use super::summary;
 
 pub(super) const HEAD: &str = "\
@@ -13,8 +13,8 @@ pub(super) const HEAD: &str = "\
 prints these tables, and each fault; `--write` writes this page. `cargo xtask test` judges the flights of the repository. It fails if
 fewer faults are found or more false alarms come than before.
 
-* `prove diagnosis FOLDER` also judges the flights of a folder: those of each `labels.json`, or all recordings, without labels.
-  `--unseen FOLDER` is for flights that nobody who chose the limits has seen. `HUMS_FLIGHTS` names a folder of further recordings.
+* `prove diagnosis FOLDER` also judges the flights of a folder: real flights of `labels*.csv`
+  (`tests/src/prove/diagnosis/real.rs` has the columns), those of each `labels.json`, or all recordings. `--unseen FOLDER` is for flights that nobody who chose the limits has seen. `HUMS_FLIGHTS` names a folder of further recordings.
 * [labels.json](../tests/labelled/README.md) says what was done to a flight, and when. No check knows a label or a flight.
 * Figures of known flights show that nothing got worse. Only flights that are not known, and real recordings, measure the box.
 * A fault is told if a check rises to a warning or to critical while the fault lasts. Its cause is named if one of these checks is of
@@ -75,24 +75,24 @@ repository. Together, of simulated flights: 624 of 680 faults told (92 %), and n
 | 100 recordings, at ea3e47e | real vehicles | 7 crashes | 5 | - | - | 0.39 | 2 | 1 |
 ";
 
-pub(super) fn text(judged: &[Judged]) -> String {
+pub(super) fn text(real: &[Results], judged: &[Judged]) -> String {
     [
+        RATES.section(&real::rates(real, judged)),
         summary::section(judged),
         SETS.section(&faults::sets(judged)),
         BY_CLASS.section(&faults::by_class(judged)),
         BY_CHECK.section(&alarms::by_check(judged)),
-        BY_HAND.section(&by_hand::rows(judged)),
         LIMITS.to_owned(),
     ]
     .join("\n")
 }
 
 /// Each fault, wrong count and alarm without labels: printed, not in the page.
-pub(super) fn details(judged: &[Judged]) -> String {
+pub(super) fn details(real: &[Results], judged: &[Judged]) -> String {
     let wrong = alarms::wrong_counts(judged);
     [
         format!("## Flights, landings, mishaps: wrong of\n\n{}\n", wrong.join("\n")),
-        by_hand::EACH_BY_HAND.section(&by_hand::each(judged)),
+        real::EACH.section(&real::each(real)),
         EACH.section(&faults::each(judged)),
     ]
     .join("\n")
@@ -113,7 +113,7 @@ mod tests {
             "`cargo xtask prove diagnosis --write` writes it"
         );
         for line in
-            [&SETS, &BY_CLASS, &BY_CHECK, &BY_HAND].into_iter().flat_map(super::super::table::Form::lines)
+            [&RATES, &SETS, &BY_CLASS, &BY_CHECK].into_iter().flat_map(super::super::table::Form::lines)
         {
             assert!(text.lines().any(|of_page| of_page == line), "{line}");
         }

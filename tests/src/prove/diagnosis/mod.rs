@@ -1,12 +1,11 @@
 //! The judge of the diagnosis: the monitor's findings on known faults, their delays, and its false alarms.
 //!
 //! Flights are recordings with labels (`labels`), in sets by whether they were known when the limits were chosen
-//! (`sets`); `verdicts` judges foreign ones by hand. It is not a campaign of `docs/proof.md`: those test promises,
+//! (`sets`); `real` judges real flights, whose findings have labels. It is not a campaign of `docs/proof.md`: those test promises,
 //! and this one measures an imperfect diagnosis.
 
 mod alarms;
 mod bound;
-mod by_hand;
 mod causes;
 mod document;
 mod faults;
@@ -15,11 +14,11 @@ mod labels;
 mod options;
 mod outcome;
 mod rates;
+mod real;
 mod sets;
 mod short;
 mod summary;
 mod table;
-mod verdicts;
 
 use std::fs;
 
@@ -40,12 +39,13 @@ pub fn run(flights: &Flights, commit: impl FnOnce() -> Result<String>) -> Result
         return short::run();
     }
     let commit = if flights.write { Some(commit()?) } else { None };
+    let real = sets::find_real(flights)?.iter().map(real::judge).collect::<Result<Vec<_>>>()?;
     let judged = sets::find_all(flights)?.iter().map(judge_all).collect::<Result<Vec<_>>>()?;
-    let text = document::text(&judged);
+    let text = document::text(&real, &judged);
     if let Some(commit) = commit {
         let path = root().join("docs/diagnosis.md");
         let whole = format!("{}\nCommit {commit}.\n\n{text}", document::HEAD);
         fs::write(&path, whole).with_context(|| path.display().to_string())?;
     }
-    Ok(format!("{text}\n{}", document::details(&judged)))
+    Ok(format!("{text}\n{}", document::details(&real, &judged)))
 }

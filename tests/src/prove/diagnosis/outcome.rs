@@ -1,6 +1,6 @@
 //! One judged flight.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use hums::check::flights::Flight;
@@ -9,11 +9,11 @@ use hums::check::judged::Judged;
 use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::Place;
+use hums::source::told::Finding;
 use hums_core::health::Level;
 
 use super::causes;
 use super::labels::Label;
-use super::verdicts::{self, Recording};
 
 /// It waits for its debounce, and belongs to the air.
 const AFTER_LANDING_S: f64 = 3.0;
@@ -64,8 +64,6 @@ pub(super) struct Outcome {
     pub(super) fault: Option<Fault>,
     /// True and counted; none without a truth.
     pub(super) counts: Option<(Counts, Counts)>,
-    /// The verdict on a recording without a label.
-    pub(super) by_hand: Option<Recording>,
 }
 
 pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Level, in_air: bool) -> u64 {
@@ -81,8 +79,7 @@ pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
     if !past.is_empty() {
         judged.judge_trends(&mut learn(past)?);
     }
-    let by_hand = if label.is_none() { verdicts::find(Path::new(&place.title))? } else { None };
-    Ok(Outcome { by_hand, ..of(&judged, &place.name, label) })
+    Ok(of(&judged, &place.name, label))
 }
 
 fn learn(past: &[PathBuf]) -> Result<Baselines> {
@@ -120,7 +117,6 @@ fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
             .collect(),
         fault: label.and_then(|label| fault(&alarms, label)),
         counts: label.and_then(|label| Some((truth(label)?, counted(judged)))),
-        by_hand: None,
     }
 }
 
@@ -137,9 +133,13 @@ const fn rank(level: Level) -> u8 {
     }
 }
 
+/// Rises of a level to a warning or to critical, in order.
+pub(super) fn rises(judged: &Judged) -> impl Iterator<Item = &Finding> {
+    judged.findings.iter().filter(|finding| rank(finding.level) > rank(finding.previous))
+}
+
 fn alarms(judged: &Judged) -> Vec<Alarm> {
-    let rises = judged.findings.iter().filter(|finding| rank(finding.level) > rank(finding.previous));
-    rises
+    rises(judged)
         .map(|finding| Alarm {
             check: finding.check.clone(),
             level: finding.level,

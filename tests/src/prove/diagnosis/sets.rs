@@ -9,6 +9,7 @@ use hums::source::recording::Place;
 
 use super::labels::{self, FILE, Label};
 use super::options::{Flights, Known};
+use super::real;
 use crate::flights;
 
 /// Depth of the search for labels in folders.
@@ -35,7 +36,9 @@ pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
         repository("first recordings", "tests/flights")?,
     ];
     for (folder, known) in &options.folders {
-        sets.push(given(folder, *known)?);
+        if real::find(folder, *known)?.is_none() {
+            sets.push(given(folder, *known)?);
+        }
     }
     if options.short {
         return Ok(sets);
@@ -47,6 +50,12 @@ pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
     }
     sets.sort_by_key(|set| !set.is_labelled());
     Ok(sets)
+}
+
+/// The folders of real flights.
+pub(super) fn find_real(options: &Flights) -> Result<Vec<real::Set>> {
+    let folders = options.folders.iter().map(|(folder, known)| real::find(folder, *known));
+    folders.filter_map(Result::transpose).collect()
 }
 
 fn repository(name: &str, folder: &str) -> Result<Set> {

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use hums_core::health::Level;
 
-use super::by_hand;
 use super::judged::Judged;
 use super::options::Known;
 use super::outcome::{Fault, Outcome, count};
@@ -29,18 +28,10 @@ pub(super) fn section(sets: &[Judged]) -> String {
         sets.iter().filter(|set| !set.is_labelled).flat_map(|set| &set.outcomes).collect();
     let mut text = format!("{TITLE}\n\n* Simulator flights, {who}: {}", found(&faulty));
     let _ = write!(text, "* Simulator flights, {whose}, while nothing was wrong: {}", alarms(&quiet));
-    let flown: Vec<&Outcome> = further.iter().copied().filter(|one| by_hand::is_vehicle(one)).collect();
-    if !flown.is_empty() {
-        let alarms = by_hand::alarms(&flown);
-        let _ = write!(
-            text,
-            "* Recordings of other people's vehicles, judged by hand by whoever chose the limits: {alarms}"
-        );
-    }
-    let rest: Vec<&Outcome> = further.into_iter().filter(|one| !by_hand::is_vehicle(one)).collect();
-    if !rest.is_empty() {
-        let words = "Other recordings without labels (simulators of other people among them), where an alarm may be true";
-        let _ = write!(text, "* {words}: {}", alarms(&rest));
+    if !further.is_empty() {
+        let words =
+            "Recordings without labels (simulators of other people among them), where an alarm may be true";
+        let _ = write!(text, "* {words}: {}", alarms(&further));
     }
     text
 }

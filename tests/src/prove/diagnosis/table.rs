@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use anyhow::{Context as _, Result, ensure};
+
 /// A test compares the document with this constant part.
 #[derive(Debug)]
 pub(super) struct Form {
@@ -33,6 +35,32 @@ impl Form {
     }
 }
 
+/// The rows of a table of comma-separated values (RFC 4180).
+///
+/// # Errors
+/// A quotation does not end.
+pub(super) fn records(text: &str) -> Result<Vec<Vec<String>>> {
+    let mut rows = vec![vec![String::new()]];
+    let mut is_quoted = false;
+    let mut characters = text.chars().filter(|character| *character != '\r').peekable();
+    while let Some(character) = characters.next() {
+        let cell = rows.last_mut().and_then(|row| row.last_mut()).context("a table has a cell")?;
+        match character {
+            '"' if is_quoted && characters.peek() == Some(&'"') => {
+                cell.push('"');
+                characters.next();
+            }
+            '"' => is_quoted = !is_quoted,
+            ',' if !is_quoted => rows.last_mut().context("a table has a row")?.push(String::new()),
+            '\n' if !is_quoted => rows.push(vec![String::new()]),
+            other => cell.push(other),
+        }
+    }
+    ensure!(!is_quoted, "a quotation does not end");
+    rows.retain(|row| row.iter().any(|cell| !cell.is_empty()));
+    Ok(rows)
+}
+
 fn row(cells: &[impl AsRef<str>]) -> String {
     let cells: Vec<String> = cells.iter().map(|cell| cell.as_ref().replace('|', "/")).collect();
     format!("| {} |", cells.join(" | "))
@@ -41,6 +69,13 @@ fn row(cells: &[impl AsRef<str>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn comma_separated_cells_may_have_commas_quotes_and_ends_of_lines() {
+        let rows = records("a,b\r\n\"1, \"\"two\"\"\",\n\n,\"x\ny\"\n").unwrap();
+        assert_eq!(rows, [["a", "b"], ["1, \"two\"", ""], ["", "x\ny"]]);
+        assert!(records("a\n\"b").is_err());
+    }
 
     #[test]
     fn a_section_has_its_heading_its_words_and_its_rows() {

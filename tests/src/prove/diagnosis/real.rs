@@ -1,0 +1,437 @@
+//! Real flights: recordings of vehicles, with labels by people who read the data.
+//!
+//! A folder of real flights has tables `labels*.csv` with a header. Other columns than these are ignored:
+//!
+//! | column | in the row of a flight | in the row of a finding |
+//! |---|---|---|
+//! | `file` | the recording, relative to the folder | the same |
+//! | `check` | empty | the check's name |
+//! | `instance` | empty | which one of several, from 0; empty is 0 |
+//! | `onset` | when the known fault began | when the level rose first; as `time_s` of `hums check --json`; empty is the beginning |
+//! | `label` | `flight` | `true`, `needless` (true, and no pilot, mechanic or owner would act on it) or `false` |
+//! | `cause` | the class of the known fault ([`super::causes::CLASSES`]); empty for an ordinary flight | the evidence |
+//!
+//! Recordings without a row of the flight are not judged. A label holds for its check and instance from
+//! [`EARLIER_S`] before its onset to the next label of them.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use hums::check::judge::{Heard, Limits};
+use hums::check::judged::Judged as Judgement;
+use hums::names::vocabulary;
+use hums::source::recording::Place;
+use hums_core::health::Level;
+use rayon::prelude::*;
+
+use super::causes::{self, Class};
+use super::judged::{Judged, with_label};
+use super::options::Known;
+use super::outcome::{count, rises};
+use super::rates::{an_hour, hours, share};
+use super::table::{Form, records};
+
+/// A finding may come this much earlier than its label's onset, in seconds, after a check has become faster.
+const EARLIER_S: f64 = 10.0;
+
+/// The beginning and the end of a table's name.
+const TABLE: (&str, &str) = ("labels", ".csv");
+
+const COLUMNS: [&str; 6] = ["file", "check", "instance", "onset", "label", "cause"];
+
+pub(super) const RATES: Form = Form {
+    title: "Real flights",
+    about: "Findings that a pilot is told: rises of a level without a cause among the other findings. Rates are by the armed hour. \
+            A needless finding is true, and no pilot, mechanic or owner would act on it. Of known faults: how often the first \
+            finding was of the part that failed. Hours of simulators are in the air without a fault; each alarm is false.",
+    columns: &[
+        "flights",
+        "judged",
+        "recordings",
+        "hours",
+        "level",
+        "true",
+        "needless",
+        "false",
+        "unlabelled",
+        "false an hour",
+        "at most",
+        "needless an hour",
+        "at most",
+        "fault first",
+    ],
+};
+
+pub(super) const EACH: Form = Form {
+    title: "Each finding of a real flight",
+    about: "Except true ones.",
+    columns: &["recording", "check", "level", "at s", "label", "evidence"],
+};
+
+/// The truth of a told finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    True,
+    Needless,
+    False,
+    Unlabelled,
+}
+
+impl Verdict {
+    const ALL: [Self; 4] = [Self::True, Self::Needless, Self::False, Self::Unlabelled];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::True => "true",
+            Self::Needless => "needless",
+            Self::False => "false",
+            Self::Unlabelled => "unlabelled",
+        }
+    }
+
+    fn parse(word: &str) -> Result<Self> {
+        let mut labels = Self::ALL.into_iter().filter(|one| *one != Self::Unlabelled);
+        labels.find(|one| one.name() == word).with_context(|| format!("{word} is no label of a finding"))
+    }
+}
+
+/// The known fault of a flight.
+#[derive(Clone, Copy, Debug)]
+struct Fault {
+    class: &'static Class,
+    onset_s: f64,
+}
+
+/// A label of a finding.
+#[derive(Clone, Debug)]
+struct Label {
+    onset_s: f64,
+    verdict: Verdict,
+    evidence: String,
+}
+
+/// The labels of one recording.
+#[derive(Debug)]
+struct Flight {
+    path: PathBuf,
+    name: String,
+    fault: Option<Fault>,
+    /// By check and instance, in order of their onsets.
+    labels: BTreeMap<(String, u8), Vec<Label>>,
+}
+
+impl Flight {
+    fn label(&self, check: &str, instance: u8, at_s: f64) -> Option<&Label> {
+        let labels = self.labels.get(&(check.to_owned(), instance))?;
+        labels.iter().rev().find(|label| label.onset_s - EARLIER_S <= at_s)
+    }
+}
+
+/// Labelled recordings that are counted together.
+#[derive(Debug)]
+pub(super) struct Set {
+    name: String,
+    known: Known,
+    flights: Vec<Flight>,
+}
+
+/// A told finding.
+#[derive(Debug)]
+struct Told {
+    check: String,
+    level: Level,
+    at_s: f64,
+    verdict: Verdict,
+    evidence: String,
+}
+
+/// The result of one recording.
+#[derive(Debug)]
+struct Outcome {
+    name: String,
+    armed_s: f64,
+    fault: Option<Fault>,
+    told: Vec<Told>,
+}
+
+/// The results of a set.
+#[derive(Debug)]
+pub(super) struct Results {
+    name: String,
+    known: Known,
+    outcomes: Vec<Outcome>,
+}
+
+/// The set of a folder that has tables of labels.
+pub(super) fn find(folder: &Path, known: Known) -> Result<Option<Set>> {
+    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let mut tables = Vec::new();
+    for entry in entries {
+        let entry = entry.with_context(|| folder.display().to_string())?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with(TABLE.0) && name.ends_with(TABLE.1) {
+            tables.push(entry.path());
+        }
+    }
+    tables.sort();
+    let mut flights = BTreeMap::new();
+    for table in &tables {
+        let text = fs::read_to_string(table).with_context(|| table.display().to_string())?;
+        read(folder, &text, &mut flights).with_context(|| table.display().to_string())?;
+    }
+    let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let name = name.file_name().map_or_else(|| "given".into(), |name| name.to_string_lossy().into_owned());
+    let set = Set { name, known, flights: flights.into_values().collect() };
+    Ok(Some(set).filter(|_| !tables.is_empty()))
+}
+
+/// Adds a table's rows. Rows of findings follow the row of their flight.
+fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Result<()> {
+    let mut rows = records(text)?.into_iter();
+    let header = rows.next().context("the table is empty")?;
+    let place = |column: &str| {
+        header.iter().position(|name| name == column).with_context(|| format!("no column {column}"))
+    };
+    let places = COLUMNS.iter().map(|column| place(column)).collect::<Result<Vec<_>>>()?;
+    for (number, row) in (2..).zip(rows) {
+        let cells: Vec<&str> =
+            places.iter().map(|place| row.get(*place).map_or("", String::as_str)).collect();
+        let [file, check, instance, onset, label, cause] = cells[..] else { bail!("a row has no cells") };
+        let context = || format!("row {number}, {file}");
+        let number = |text: &str| if text.is_empty() { Ok(0.0) } else { text.parse::<f64>() };
+        let onset_s = number(onset).with_context(|| format!("{}: onset {onset}", context()))?;
+        if label == "flight" {
+            ensure!(check.is_empty(), "{}: the row of a flight names a check", context());
+            let class = causes::of(cause);
+            ensure!(cause.is_empty() || class.is_some(), "{}: no class {cause}", context());
+            let fault = class.map(|class| Fault { class, onset_s });
+            let (path, name) = (folder.join(file), file.to_owned());
+            ensure!(path.is_file(), "{}: no such recording", context());
+            let flight = Flight { path, name, fault, labels: BTreeMap::new() };
+            let double = flights.insert(file.to_owned(), flight).is_some();
+            ensure!(!double, "{}: the flight has two rows", context());
+        } else {
+            let flight =
+                flights.get_mut(file).with_context(|| format!("{}: the flight has no row", context()))?;
+            ensure!(vocabulary(check).is_some(), "{}: there is no check {check}", context());
+            let instance = number(instance).with_context(|| format!("{}: instance {instance}", context()))?;
+            let verdict = Verdict::parse(label).with_context(context)?;
+            let labels = flight.labels.entry((check.to_owned(), instance as u8)).or_default();
+            labels.push(Label { onset_s, verdict, evidence: cause.to_owned() });
+            labels.sort_by(|one, other| one.onset_s.total_cmp(&other.onset_s));
+        }
+    }
+    Ok(())
+}
+
+/// Judges a set as `hums check` does.
+pub(super) fn judge(set: &Set) -> Result<Results> {
+    let outcomes = set.flights.par_iter().with_max_len(1).map(|flight| {
+        let place = Place::file(&flight.path);
+        let recording = hums::check::recording(&place, &Limits::default(), Heard::Somewhere);
+        Ok(of(flight, &recording.with_context(|| flight.name.clone())?.judged))
+    });
+    Ok(Results { name: set.name.clone(), known: set.known, outcomes: outcomes.collect::<Result<_>>()? })
+}
+
+fn of(flight: &Flight, judged: &Judgement) -> Outcome {
+    let is_explained = |check: &str, instance: u8| {
+        let mut problems = judged.problems.iter();
+        problems.any(|one| one.check == check && one.instance == instance && one.because.is_some())
+    };
+    let told = rises(judged).filter(|finding| !is_explained(&finding.check, finding.instance));
+    let told = told.map(|finding| {
+        let at_s = finding.at.as_secs_f64();
+        let label = flight.label(&finding.check, finding.instance, at_s);
+        Told {
+            check: finding.check.clone(),
+            level: finding.level,
+            at_s,
+            verdict: label.map_or(Verdict::Unlabelled, |label| label.verdict),
+            evidence: label.map_or_else(String::new, |label| label.evidence.clone()),
+        }
+    });
+    Outcome {
+        name: flight.name.clone(),
+        armed_s: judged.armed.as_millis() as f64 / 1e3,
+        fault: flight.fault,
+        told: told.collect(),
+    }
+}
+
+const fn judged_when(known: Known) -> &'static str {
+    match known {
+        Known::No => "once",
+        Known::Yes | Known::Seen => "often",
+    }
+}
+
+/// Two rows for each set of real flights, then two for the simulators.
+pub(super) fn rates(real: &[Results], sets: &[Judged]) -> Vec<Vec<String>> {
+    let levels = [(Level::Warning, "warning"), (Level::Critical, "critical")];
+    let mut rows = Vec::new();
+    for set in real {
+        let armed_s = set.outcomes.iter().map(|one| one.armed_s).sum::<f64>();
+        let faulty = set.outcomes.iter().filter_map(|one| Some(is_right_first(&one.told, one.fault?)));
+        let right = right_first(faulty);
+        for (level, name) in levels {
+            let of = |wanted| {
+                let told = set.outcomes.iter().flat_map(|one| &one.told);
+                told.filter(|one| one.level == level && one.verdict == wanted).count() as u64
+            };
+            let mut row = head(&set.name, judged_when(set.known), set.outcomes.len(), armed_s, name);
+            row.extend(Verdict::ALL.map(|wanted| of(wanted).to_string()));
+            row.extend(an_hour(of(Verdict::False), armed_s));
+            row.extend(an_hour(of(Verdict::Needless), armed_s));
+            row.push(right.clone());
+            rows.push(row);
+        }
+    }
+    for (known, name) in [(Known::Yes, "often"), (Known::No, "once")] {
+        let flown: Vec<_> =
+            with_label(sets, true).filter(|set| set.known == known).flat_map(|set| &set.outcomes).collect();
+        if flown.is_empty() {
+            continue;
+        }
+        let air_s = flown.iter().map(|one| one.air_s).sum::<f64>();
+        let faults = flown.iter().filter_map(|one| one.fault.as_ref()).filter(|fault| fault.visible);
+        let right = right_first(faults.map(|fault| fault.told.is_some() && fault.told == fault.named));
+        for (level, level_name) in levels {
+            let alarms = count(flown.iter().flat_map(|one| &one.alarms), level, true);
+            let mut row = head("simulators", name, flown.len(), air_s, level_name);
+            row.extend(["-".to_owned(), "-".to_owned(), alarms.to_string(), "-".to_owned()]);
+            row.extend(an_hour(alarms, air_s));
+            row.extend(["-".to_owned(), "-".to_owned(), right.clone()]);
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn head(name: &str, judged: &str, recordings: usize, seconds: f64, level: &str) -> Vec<String> {
+    vec![name.to_owned(), judged.to_owned(), recordings.to_string(), hours(seconds), level.to_owned()]
+}
+
+/// How many of the faults were told first by a finding of the part that failed.
+fn right_first(faults: impl Iterator<Item = bool>) -> String {
+    let faults: Vec<bool> = faults.collect();
+    let (right, all) = (faults.iter().filter(|is_right| **is_right).count(), faults.len());
+    let [part, least] = share(right as u64, all as u64);
+    format!("{right} of {all} ({part}, at least {least})")
+}
+
+/// Whether the first told finding since a fault is of the part that failed.
+fn is_right_first(told: &[Told], fault: Fault) -> bool {
+    let first = told.iter().find(|one| fault.onset_s - EARLIER_S <= one.at_s);
+    first.is_some_and(|first| fault.class.checks.contains(&first.check.as_str()))
+}
+
+/// Each finding that is not true.
+pub(super) fn each(real: &[Results]) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
+    for outcome in real.iter().flat_map(|set| &set.outcomes) {
+        for told in outcome.told.iter().filter(|told| told.verdict != Verdict::True) {
+            rows.push(vec![
+                outcome.name.clone(),
+                told.check.clone(),
+                if told.level == Level::Critical { "critical" } else { "warning" }.to_owned(),
+                format!("{:.1}", told.at_s),
+                told.verdict.name().to_owned(),
+                told.evidence.clone(),
+            ]);
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use tempfile::TempDir;
+
+    use super::*;
+    use crate::flights::root;
+
+    const HEAD: &str = "file,check,instance,onset,label,cause\n";
+
+    fn folder(labels: &str) -> TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["ap_quad_faults.tlog", "px4_hil_quad_low.tlog"] {
+            fs::copy(root().join("tests/flights").join(name), folder.path().join(name)).unwrap();
+        }
+        fs::write(folder.path().join("labels-mine.csv"), format!("{HEAD}{labels}")).unwrap();
+        folder
+    }
+
+    fn refusal(labels: &str) -> String {
+        format!("{:#}", find(folder(labels).path(), Known::Yes).unwrap_err())
+    }
+
+    /// The vibration of 86 s is the flight's first finding; low voltage follows, with its consequences.
+    #[test]
+    fn two_recordings_give_counts_rates_and_whether_the_cause_came_first() {
+        let folder = folder(
+            "ap_quad_faults.tlog,,,,flight,vibration\n\
+             ap_quad_faults.tlog,vibration_rise,0,86.5,needless,\"small, and over soon\"\n\
+             ap_quad_faults.tlog,cell_voltage,0,,true,10.2 V\n\
+             px4_hil_quad_low.tlog,,,,flight,\n",
+        );
+        let set = find(folder.path(), Known::No).unwrap().unwrap();
+        let results = [judge(&set).unwrap()];
+        let outcomes = &results[0].outcomes;
+        let armed_s = outcomes.iter().map(|one| one.armed_s).sum::<f64>();
+        assert!((armed_s - 554.0).abs() < 2.0, "{armed_s}");
+        let rows = rates(&results, &[]);
+        assert_eq!(rows[0][1..9], ["once", "2", "0.15", "warning", "0", "1", "0", "0"], "{outcomes:?}");
+        assert_eq!(rows[1][4..9], ["critical", "1", "0", "0", "0"]);
+        assert_eq!(
+            rows[0][9..13],
+            an_hour(0, armed_s).into_iter().chain(an_hour(1, armed_s)).collect::<Vec<_>>()
+        );
+        assert_eq!(rows[0][13], "1 of 1 (100 %, at least 5 %)");
+        assert_eq!(each(&results)[0][4..], ["needless", "small, and over soon"]);
+    }
+
+    #[test]
+    fn a_finding_without_a_label_has_its_own_column() {
+        let folder =
+            folder("ap_quad_faults.tlog,,,,flight,gnss\nap_quad_faults.tlog,cell_voltage,,300,false,late\n");
+        let results = [judge(&find(folder.path(), Known::Yes).unwrap().unwrap()).unwrap()];
+        let rows = rates(&results, &[]);
+        assert_eq!(rows[0][2..9], ["1", "0.09", "warning", "0", "0", "0", "1"]);
+        assert_eq!(rows[1][4..9], ["critical", "0", "0", "0", "1"], "the label begins later");
+        assert_eq!(rows[0][13], "0 of 1 (0 %, at least 0 %)", "vibration is not of the receiver");
+    }
+
+    #[test]
+    fn the_first_finding_is_the_first_since_the_fault() {
+        let right = |flight: &str| {
+            let folder = folder(&format!("ap_quad_faults.tlog,,,{flight}\n"));
+            rates(&[judge(&find(folder.path(), Known::Yes).unwrap().unwrap()).unwrap()], &[])[0][13][..1]
+                .to_owned()
+        };
+        assert_eq!((right(",flight,power"), right("225.6,flight,power")), ("0".into(), "1".into()));
+    }
+
+    #[test]
+    fn tables_that_are_wrong_are_refused_with_their_row() {
+        for (labels, said) in [
+            ("nowhere.tlog,,,,flight,\n", "row 2, nowhere.tlog: no such recording"),
+            ("ap_quad_faults.tlog,,,,flight,luck\n", "no class luck"),
+            ("ap_quad_faults.tlog,roll,,,true,\n", "the flight has no row"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,,,,flight,\n", "row 3"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,luck,,,true,\n", "no check luck"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,,,maybe,\n", "maybe is no label"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,,soon,true,\n", "onset soon"),
+        ] {
+            let error = refusal(labels);
+            assert!(error.contains(said) && error.contains("labels-mine.csv"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_folder_without_a_table_is_of_another_kind() {
+        assert!(find(&root().join("tests/flights"), Known::Yes).unwrap().is_none());
+    }
+}
