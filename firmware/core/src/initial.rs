@@ -15,7 +15,6 @@ macro_rules! state {
 
         impl Default for $name {
             // A call that is not inlined returns a large structure over the stack.
-            #[expect(clippy::inline_always, reason = "large structures are built in their place")]
             #[inline(always)]
             fn default() -> Self {
                 Self { $($field: state!(@initial $type $(, $value)?),)* }

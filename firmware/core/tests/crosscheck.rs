@@ -95,7 +95,7 @@ impl Fitted {
         let (attitude_noise, gps_until_ms, speed, speaks) = (0.01, u64::MAX, 1.0, [true; 3]);
         let (wants, places) = (true, true);
         let sensors = Self { quad, force, rate, field, pressure, pulses, turns, altitude, ..Self::default() };
-        Self { attitude_noise, gps_until_ms, speed, speaks, wants, places, ..sensors }
+        Self { wants, attitude_noise, gps_until_ms, speed, places, speaks, ..sensors }
     }
 
     fn says(&self, now_ms: u64) -> Vec<Observation> {
@@ -221,6 +221,9 @@ fn only(findings: &[Finding]) -> (&'static str, u8, u64) {
 /// A step of a sensor or motor of a number.
 type Fault = fn(u64, &mut Fitted, usize);
 
+/// `MAV_TYPE`, the check that finds a fault, its instance, and the fault.
+type Leg = (u8, &'static str, u8, fn(&mut Fitted));
+
 /// The moment of the fault.
 fn held() -> Fitted {
     Fitted::healthy(FAULT_MS)
@@ -231,8 +234,11 @@ fn since_s(now_ms: u64) -> f32 {
     now_ms.saturating_sub(FAULT_MS) as f32 / 1_000.0
 }
 
-/// Check, instances, level, time until it, ms, and fault. Each is found alone.
-const FOUND: &[(&str, &[usize], Level, u64, Fault)] = &[
+/// Check, instances, level, time until it, ms, and fault.
+type Found = (&'static str, &'static [usize], Level, u64, Fault);
+
+/// Each is found alone.
+const FOUND: &[Found] = &[
     // Of three sensors the one that comes apart. The first barometer leaves the height of GPS too.
     ("accel_mismatch", &[0, 1, 2], Warning, 3_200, |_, it, of| it.force[of][2] += 3.0),
     ("gyro_mismatch", &[0, 1, 2], Warning, 1_000, |_, it, of| it.rate[of][0] += 0.4),
@@ -288,8 +294,11 @@ fn a_fault_is_found_in_time_under_its_own_name_and_number_and_no_other() {
     }
 }
 
-/// What happens, from the beginning on, without any finding.
-const QUIET: &[(&str, fn(u64, &mut Fitted))] = &[
+/// Its name, and a script from the beginning on.
+type Quiet = (&'static str, fn(u64, &mut Fitted));
+
+/// None has a finding.
+const QUIET: &[Quiet] = &[
     ("offsets from the beginning", |_, it| {
         (it.force[1][0], it.rate[1][0]) = (it.force[1][0] + 3.0, it.rate[1][0] + 0.4);
         (it.field[1], it.pressure[1]) = ([0.5, 0.0, -0.1], it.pressure[1] + 5.0);
@@ -701,7 +710,7 @@ fn what_was_so_before_a_hole_is_not_held_through_it_and_sensors_are_not_stuck_af
 fn on_a_fast_leg_sensors_and_vibration_are_judged_too() {
     const QUADROTOR: u8 = 2;
     const HELICOPTER: u8 = 4;
-    let cases: [(u8, &str, u8, fn(&mut Fitted)); 3] = [
+    let cases: [Leg; 3] = [
         (QUADROTOR, "accel_mismatch", 1, |it| it.force[1][2] += 3.0),
         (HELICOPTER, "gyro_mismatch", 2, |it| it.rate[2][0] += 0.4),
         (HELICOPTER, "vibration_rise", 0, |it| it.quad.vibration.levels[0] = Some(18.0)),

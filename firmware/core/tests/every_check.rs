@@ -265,7 +265,7 @@ fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad
             fault(quad, more);
         }
     });
-    let mine = run.of_check(name).filter(|finding| finding.instance == instance);
+    let mut mine = run.of_check(name).filter(|finding| finding.instance == instance);
     let found = mine.clone().find(|finding| finding.level == level);
     let found = found.unwrap_or_else(|| panic!("{name} {instance} never {level:?}: {:?}", run.findings));
     let debounce_ms = check.debounce[usize::from(level == Level::Critical)].span().as_millis();
@@ -278,7 +278,7 @@ fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad
     let others = run.findings.iter().filter(|one| one.check != name && one.because.is_empty());
     let mut alarms = others.filter(|one| matches!(one.level, Level::Warning | Level::Critical));
     assert!(alarms.all(|one| WITH.contains(&(name, one.check))), "{name}: {:?}", run.findings);
-    let last = mine.last().expect("there is one");
+    let last = mine.next_back().expect("there is one");
     // An alert holds for ten seconds, and speeds are smoothed. Counts are forgotten earlier.
     let is_late = name.ends_with("_alert") || name == "motor_imbalance";
     let good_ms = END_MS + CLEAR.as_millis() + if is_late { 10_000 } else { 100 };

@@ -1,5 +1,4 @@
 //! Scripted faults in a simulated flight: silences, restarts, counters, hysteresis, and alarms that explain others.
-#![expect(clippy::panic, reason = "that is how a test fails")]
 
 use crate::common::{Quad, Run};
 use hums_core::Monitor;

@@ -203,8 +203,8 @@ impl Run {
     }
 
     /// The same with a monitor that has a past.
-    pub fn of(monitor: Monitor) -> Self {
-        Self { monitor, ..Self::new(&Params::defaults()) }
+    pub fn of(monitor: &Monitor) -> Self {
+        Self { monitor: *monitor, ..Self::new(&Params::defaults()) }
     }
 
     fn tick(&mut self, now_ms: u64, quad: &Quad) {
