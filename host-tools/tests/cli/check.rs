@@ -913,3 +913,24 @@ fn a_finding_has_one_onset_and_one_worst_value_in_every_command() {
     let [first, .., last] = rises.as_slice() else { panic!("{rises:?}") };
     assert!((first - last).abs() < 0.1 * first, "{rises:?}");
 }
+
+/// A log with the samples of its inertial sensor at 1 kHz has their spectrum on its page; one at 100 Hz has none.
+#[test]
+fn a_page_has_the_spectrum_of_vibration_where_the_log_has_the_rate() {
+    let dir = tempfile::tempdir().expect("directory");
+    for (name, rate_hz) in [("fast", 1_000_u32), ("slow", 100)] {
+        let mut log = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+             FMT, 152, 35, IMU, Qffffff, TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ\n"
+            .to_owned();
+        for place in 0..rate_hz * 4 {
+            let second = f64::from(place) / f64::from(rate_hz);
+            let shaking = (std::f64::consts::TAU * 40.0 * second).sin();
+            log += &format!("IMU, {}, 0, 0, 0.1, 0, {shaking}, -9.8\n", (second * 1e6) as u64);
+        }
+        fs::write(dir.path().join(format!("{name}.log")), log).expect("written");
+        run(dir.path(), &format!("report {name}.log"), 0);
+        let page = fs::read_to_string(dir.path().join(format!("{name}.html"))).expect("a page");
+        assert_eq!(page.contains("\"spectra\":[]"), name == "slow");
+        assert_eq!(page.contains("\"unit\":\"m/s²/√Hz\""), name == "fast");
+    }
+}

@@ -24,3 +24,4 @@ pub mod plots;
 pub mod program;
 pub mod samples;
 pub mod spans;
+pub mod spectrum;

@@ -106,26 +106,26 @@ fn channel(line: u8, pulse_us: f32, put: &mut Put<'_>) {
     }
 }
 
+/// Names of the rows that have something of this, and of those of parameters with their defaults.
+pub const NAMES: [&str; 12] = [
+    "RCIN",
+    "XKF2",
+    "NKF2",
+    "ATT",
+    "CTUN",
+    "PARM",
+    "input_rc",
+    "wind",
+    "wind_estimate",
+    "vehicle_attitude_setpoint",
+    "vehicle_local_position_setpoint",
+    "default_parameters",
+];
+
 /// The rows that have something of this, and those of parameters with their defaults.
 pub fn rows() -> Rows<'static> {
-    static NAMES: LazyLock<Vec<String>> = LazyLock::new(|| {
-        let names = [
-            "RCIN",
-            "XKF2",
-            "NKF2",
-            "ATT",
-            "CTUN",
-            "PARM",
-            "input_rc",
-            "wind",
-            "wind_estimate",
-            "vehicle_attitude_setpoint",
-            "vehicle_local_position_setpoint",
-            "default_parameters",
-        ];
-        names.map(str::to_owned).to_vec()
-    });
-    Rows::Named(&NAMES)
+    static ALL: LazyLock<Vec<String>> = LazyLock::new(|| NAMES.map(str::to_owned).to_vec());
+    Rows::Named(&ALL)
 }
 
 /// The values in a row of `ArduPilot`'s `DataFlash` or of PX4's topics, by the names there.
@@ -249,7 +249,7 @@ fn double(value: &Value<'_>) -> Option<f64> {
     }
 }
 
-fn number(row: &Row<'_>, name: &str) -> Option<f32> {
+pub(super) fn number(row: &Row<'_>, name: &str) -> Option<f32> {
     value_of(row, name).and_then(double).map(|number| number as f32).filter(|number| number.is_finite())
 }
 
@@ -257,7 +257,7 @@ fn flag(row: &Row<'_>, name: &str) -> bool {
     matches!(value_of(row, name), Some(Value::Flag(true)))
 }
 
-fn is_first(row: &Row<'_>) -> bool {
+pub(super) fn is_first(row: &Row<'_>) -> bool {
     number(row, "multi_id").is_none_or(|instance| instance < 0.5)
 }
 

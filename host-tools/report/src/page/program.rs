@@ -17,7 +17,7 @@ modules! {
     // Any page.
     "badge" "canvas" "colours" "dom" "elements" "flight" "layout" "map" "notes" "parameters" "plot" "plots" "text" "timeline" "view"
     // The whole one.
-    "data" "recorder" "report" "summary" "trend" "usage"
+    "data" "recorder" "report" "spectrum" "summary" "trend" "usage"
     // The table of a folder's pages, and the comparison of flights.
     "index" "compare"
     // The check in a browser, and its worker.

@@ -15,6 +15,7 @@ use crate::log_json::LogJson;
 use crate::page::history::{Cursor, Part};
 use crate::page::json::embedded;
 use crate::page::program::{STYLE, UPLOT, program};
+use crate::page::spectrum::SpectrumJson;
 use crate::summary::{JudgedChecks, Overview};
 
 const TEMPLATE: &str = include_str!("../page/assets/report.html");
@@ -48,6 +49,8 @@ struct Data<'a> {
     /// The airframe's life is without this session.
     life_before: bool,
     stats: Option<StatsJson>,
+    /// Spectra of the inertial sensor.
+    spectra: &'a [SpectrumJson],
     trend: &'a Trend,
     /// The flight before of the same airframe.
     before: Option<&'a Before>,
@@ -123,6 +126,7 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         life_before: log.contents.is_life_before(),
         counters: counters::of(&log.contents.usage, &log.contents.lifetime),
         stats: log.contents.stats.as_ref().map(StatsJson::from),
+        spectra: &replay.spectra,
         trend,
         before,
     };

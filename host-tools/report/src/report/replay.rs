@@ -1,5 +1,7 @@
 //! A recording read in order: the vehicle's reports become the history of its flight, and flights.
 
+use std::sync::LazyLock;
+
 use anyhow::Result;
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
@@ -14,14 +16,19 @@ use crate::check::judged::Judged;
 use crate::check::text::verdict;
 use crate::counters::tells_flight;
 use crate::page::history::History;
-use crate::page::more::{More, rows};
+use crate::page::more::{More, NAMES as MORE};
 use crate::page::note::Note;
 use crate::page::parameters::Parameters;
+use crate::page::spectrum::{ROWS, Spectra, SpectrumJson};
 use crate::reference::Reference;
-use crate::source::item::{Cause, Item, Text, Want};
+use crate::source::item::{Cause, Item, Rows, Text, Want};
 use crate::source::recording::Place;
 use crate::statustext;
 use crate::summary::{EndsInAir, JudgedChecks, Overview};
+
+/// The rows that are shown.
+static NAMES: LazyLock<Vec<String>> =
+    LazyLock::new(|| MORE.iter().chain(&ROWS).map(|name| (*name).to_owned()).collect());
 
 /// Texts kept at most; beyond this they are only counted.
 const TEXTS_MAX: usize = 1_000;
@@ -54,6 +61,8 @@ pub struct Replay {
     pub missing: Vec<Missing>,
     /// Number of checks with a critical problem, and with a warning.
     pub found: (usize, usize),
+    /// Spectra of its inertial sensor.
+    pub spectra: Vec<SpectrumJson>,
     /// The verdict of `hums check`, as a sentence.
     pub verdict: String,
     /// Its texts.
@@ -78,15 +87,20 @@ impl Replay {
     /// Reads a recording with this overview.
     pub fn of(place: &Place, overview: &Overview) -> Result<Self> {
         let mut replay = Self::default();
-        let want = Want { frames: true, observations: true, rows: rows(), ..Want::default() };
+        let want = Want { frames: true, observations: true, rows: Rows::Named(&NAMES), ..Want::default() };
+        let mut spectra = Spectra::default();
         let recording = place.open()?;
         let mut judge = Judge::new(&Limits::default(), recording.format);
         recording.read(want, &mut |at, item| {
             judge.item(at, item);
+            if let Item::Row(row) = &item {
+                spectra.row(at, row);
+            }
             replay.item(at, item, &judge);
             Ok(())
         })?;
         replay.history.judged_by(judge.params(), judge.cell_count());
+        replay.spectra = spectra.end();
         let judged = judge.end();
         replay.flights = replay.extents.flights(&judged.flights);
         replay.judged = judged.worst().map(|_| judged.checks());

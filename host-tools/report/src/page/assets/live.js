@@ -75,7 +75,7 @@ overall.node.id = "overall";
 picture.node.id = "source";
 
 // ---- Body.
-const rows = [movement(), general(), esc(), condition()],
+const rows = [general(), movement(), esc(), condition()],
   sides = [board(), usage(), link()],
   body = el("div", { class: "rows" });
 const wire = connect(take, (now, count, token) => {

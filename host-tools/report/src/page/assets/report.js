@@ -10,6 +10,7 @@ import { parameters } from "./parameters.js";
 import { charts } from "./plot.js";
 import { plots } from "./plots.js";
 import { recorderSection } from "./recorder.js";
+import { spectrumSection } from "./spectrum.js";
 import { summary } from "./summary.js";
 import { counted, fixed, moment, plural, span, whole } from "./text.js";
 import { timeline } from "./timeline.js";
@@ -112,7 +113,7 @@ found.append(
             : "Nothing was found.",
     unlisted > 0 ? `And ${plural(unlisted, "finding")} more.` : "",
     unsaid > 0 ? `And ${plural(unsaid, "text")} more.` : "",
-    log.checked_by === "hums" ? "These checks were made with this page: what recorded the flight ran none." : "",
+    log.checked_by === "hums" ? "HUMS checked this log now; its recorder ran no checks." : "",
   ]
     .filter(Boolean)
     .map((text) => el("p", { class: "dim" }, text)),
@@ -130,6 +131,7 @@ time.append(
 );
 usually(() => [flight.start, flight.end]);
 plots((group) => section(group.toLowerCase(), group), { folds: true }).update();
+spectrumSection();
 
 const told = parameters(data.before);
 told.update();
