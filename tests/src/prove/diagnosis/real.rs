@@ -43,8 +43,8 @@ const COLUMNS: [&str; 6] = ["file", "check", "instance", "onset", "label", "caus
 
 pub(super) const RATES: Form = Form {
     title: "Real flights",
-    about: "Findings that a pilot is told: rises of a level without a cause among the other findings. Rates are by the armed hour. \
-            A needless finding is true, and no pilot, mechanic or owner would act on it. Of known faults: how often the first \
+    about: "Findings that a pilot is told: rises of a level without a cause among the other findings. Rates are by the armed hour, \
+            without unlabelled findings. A needless finding is true, and no pilot, mechanic or owner would act on it. Of known faults: how often the first \
             finding was of the part that failed. Hours of simulators are in the air without a fault; each alarm is false.",
     columns: &[
         "flights",
@@ -67,7 +67,7 @@ pub(super) const RATES: Form = Form {
 pub(super) const EACH: Form = Form {
     title: "Each finding of a real flight",
     about: "Except true ones.",
-    columns: &["recording", "check", "level", "at s", "label", "evidence"],
+    columns: &["recording", "check", "instance", "level", "at s", "label", "evidence"],
 };
 
 /// The truth of a told finding.
@@ -141,6 +141,7 @@ pub(super) struct Set {
 #[derive(Debug)]
 struct Told {
     check: String,
+    instance: u8,
     level: Level,
     at_s: f64,
     verdict: Verdict,
@@ -247,6 +248,7 @@ fn of(flight: &Flight, judged: &Judgement) -> Outcome {
         let label = flight.label(&finding.check, finding.instance, at_s);
         Told {
             check: finding.check.clone(),
+            instance: finding.instance,
             level: finding.level,
             at_s,
             verdict: label.map_or(Verdict::Unlabelled, |label| label.verdict),
@@ -336,6 +338,7 @@ pub(super) fn each(real: &[Results]) -> Vec<Vec<String>> {
             rows.push(vec![
                 outcome.name.clone(),
                 told.check.clone(),
+                told.instance.to_string(),
                 if told.level == Level::Critical { "critical" } else { "warning" }.to_owned(),
                 format!("{:.1}", told.at_s),
                 told.verdict.name().to_owned(),
@@ -390,7 +393,9 @@ mod tests {
             an_hour(0, armed_s).into_iter().chain(an_hour(1, armed_s)).collect::<Vec<_>>()
         );
         assert_eq!(rows[0][13], "1 of 1 (100 %, at least 5 %)");
-        assert_eq!(each(&results)[0][4..], ["needless", "small, and over soon"]);
+        let each = each(&results);
+        assert_eq!(each[0][1..4], ["vibration_rise", "0", "warning"]);
+        assert_eq!(each[0][5..], ["needless", "small, and over soon"]);
     }
 
     #[test]
