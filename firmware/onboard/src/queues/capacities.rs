@@ -19,9 +19,11 @@ pub const UPLINK_QUEUE_BYTES: usize = 1024;
 /// A round of requests to the autopilot (9 commands of 45 bytes, signed 58), two frames that pass through, and the frame being sent.
 pub const AUTOPILOT_QUEUE_BYTES: usize = 1100 + FRAME_BYTES_MAX;
 
-/// 2.5 s of a stalled card at 921,600 baud: 92 kB/s, compressed 3.5 times, is 66 KB, 132 sectors; and the row that
-/// the card is taking.
-pub const SECTOR_QUEUE_SECTORS: usize = 132 + ROW_BLOCKS;
+/// 2.5 s of a stalled card at 921,600 baud: 92 kB/s, compressed 3.6 times.
+const STALL_SECTORS: usize = 125;
+
+/// A stall, with the reserve, the room that the writer asks for, and the row that the card is taking.
+pub const SECTOR_QUEUE_SECTORS: usize = STALL_SECTORS + SECTOR_RESERVE + ENTRY_SECTORS_MAX + ROW_BLOCKS;
 
 /// Sectors for findings and losses when frames are refused already: two of them, as the last must have room for the
 /// longest entry.

@@ -33,7 +33,6 @@ impl<T, const PLACES: usize> Ring<T, PLACES> {
 
     /// # Safety
     /// These places must lie in the ring and belong to the caller for `'a`.
-    #[expect(clippy::mut_from_ref, reason = "the caller has these places alone")]
     unsafe fn places<'a>(&self, from: usize, count: usize) -> &'a mut [T] {
         // SAFETY: by this function's contract.
         unsafe { slice::from_raw_parts_mut(self.places.get().cast::<T>().add(from), count) }

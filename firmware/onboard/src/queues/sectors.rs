@@ -9,6 +9,7 @@ use super::ring::{In, Out, Ring};
 /// Written to the card from where they lie.
 pub(super) type SectorQueue = Ring<Block, SECTOR_QUEUE_SECTORS>;
 
+#[expect(clippy::large_stack_arrays, reason = "of a static, made at compile time")]
 pub(super) const fn sector_queue() -> SectorQueue {
     Ring::new([[0; SECTOR_BYTES]; SECTOR_QUEUE_SECTORS])
 }

@@ -87,7 +87,7 @@ impl Reader<'_> {
         if self.answers.waiting().first().is_some_and(|(answer, _)| answer.ticket != ticket) {
             self.release();
         }
-        self.answers.waiting().first().map(|answered| &*answered)
+        self.answers.waiting().first()
     }
 
     /// The answer that has come is used up.
