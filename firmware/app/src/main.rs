@@ -44,6 +44,8 @@ static MONITOR: StaticCell<Monitor> = StaticCell::new();
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
 static ENDS: StaticCell<monitor::Ends> = StaticCell::new();
 static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
+/// In CCM too: no DMA reads it.
+#[unsafe(link_section = ".bss.ccm.mailbox")]
 static MAILBOX: ConstStaticCell<Mailbox> = ConstStaticCell::new(Mailbox::new());
 static HANDOVER: StaticCell<Handover<'static>> = StaticCell::new();
 
