@@ -68,7 +68,8 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 /// The causes of the estimator's flags (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`). A glitch counts if the
 /// estimator had attitude and position before, and a receiver has a fix.
 ///
-/// - Both autopilots: 0 attitude, 3 and 4 position.
+/// - Both autopilots: 0 attitude, 3 and 4 position, 8 and 9 a position as soon as it is needed. `ArduPilot` holds its position fixed
+///   from a landing to the disarming, and says by these two that it has not lost it.
 /// - PX4: 10 GPS glitch, 11 accelerometer error.
 /// - ArduPilot: 15 GPS glitching. It also sets this one indoors without GPS.
 pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
@@ -85,7 +86,7 @@ pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Cau
 
 const fn has_both(flags: u16) -> bool {
     const ATTITUDE: u16 = 1;
-    const POSITION: u16 = 1 << 3 | 1 << 4;
+    const POSITION: u16 = 1 << 3 | 1 << 4 | 1 << 8 | 1 << 9;
     flags & ATTITUDE != 0 && flags & POSITION != 0
 }
 

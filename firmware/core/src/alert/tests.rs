@@ -30,6 +30,7 @@ fn texts_are_told_by_what_they_mean() {
         (3, "Airspeed sensor 1 failure. Disabling", warn(Cause::Airspeed)),
         (2, "Vibration compensation ON", warn(Cause::Vibration)),
         (2, "Vibration compensation OFF", over(Cause::Vibration)),
+        (3, "DISARMING MOTORS", None),
         (2, "Auto mission changed, restarted command", None),
         (3, "[navigator] mission update failed", None),
         (3, "[logger] Failed to register ULog file to the hardfault handler (-2)", None),
@@ -234,4 +235,9 @@ fn the_estimators_flags_are_read_on_either_scale() {
     assert_eq!(says(ardupilot, [GOOD, GOOD | 1 << 15, GOOD | 1 << 15]), (true, false, false));
     assert_eq!(says(ardupilot, [GOOD, 0xA7, 0xA7]), (false, false, true), "position lost");
     assert_eq!(says(ardupilot, [0xA7; 3]), (false, false, false), "it had none from the beginning");
+    for landed in [0x1A5, 0x2A5, 0x3A5] {
+        let said = says(ardupilot, [GOOD, landed, landed]);
+        assert_eq!(said, (false, false, false), "{landed:#x}: position held fixed after a landing");
+    }
+    assert_eq!(says(ardupilot, [GOOD, 0x3A4, 0x3A4]), (false, false, true), "attitude lost");
 }

@@ -45,7 +45,7 @@ const FAILURES: [&str; 8] =
     ["failed", "failure", "fail:", "error", "lost", "timeout", " fault", "unsuccessful"];
 
 texts! {
-    (fine): "^prearm" "^arm:" "^arming" "disarm denied" "disarming denied";
+    (fine): "^prearm" "^arm:" "^arming" "^disarming motors" "disarm denied" "disarming denied";
     (over RemoteControl): "radio failsafe clear" "throttle failsafe off";
     (over GroundStation): "gcs failsafe clear";
     (over Estimator): "ekf failsafe clear";
