@@ -88,7 +88,7 @@ const AHRS2: Row = Row {
 };
 /// A part of the satellites is lost, or the dilution has grown, by more than the logarithm of 1.2.
 const CONSTELLATION: Row = Row { gates: gates::AIRBORNE, learn: Learn::Level, hold: 0.182, ..ROW };
-/// The lower of two messages. The hold is the least rise, m/s2.
+/// The hold is the least rise, m/s2.
 const VIBRATION: Row =
     Row { gates: gates::SETTLED | gates::CLEAR | gates::ROTORS, smoothing_s: 0.25, hold: 2.5, ..ROW };
 const RATE: Row = Row {
