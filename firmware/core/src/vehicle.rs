@@ -152,6 +152,8 @@ state! {
         boot_armed: bool,
         /// Since when it has called its flight terminated.
         pub terminated_since: Option<Instant>,
+        /// The mildest `MAV_STATE` since arming, 0 if the arming was not received. Whoever arms a vehicle in a failsafe knows of it.
+        pub state_since_arming: u8,
         pub(crate) climb_wanted: Latest<MetresPerSecond>,
     }
 }
@@ -348,6 +350,10 @@ impl Vehicle {
     fn take_heartbeat(&mut self, at: Instant, heartbeat: Heartbeat) {
         self.alerts.take_armed(at, heartbeat.armed);
         self.alerts.take_state(at, heartbeat.state);
+        if heartbeat.armed && self.heartbeat.get().is_some_and(|before| !before.armed) {
+            self.state_since_arming = heartbeat.state;
+        }
+        self.state_since_arming = self.state_since_arming.min(heartbeat.state);
         let terminated = heartbeat.state == Heartbeat::TERMINATED;
         self.terminated_since = terminated.then(|| self.terminated_since.unwrap_or(at));
         self.heartbeat.set(at, heartbeat);

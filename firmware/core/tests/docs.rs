@@ -106,7 +106,7 @@ gcs_alert: STATUSTEXT, EVENT; HIGH_LATENCY2
 load: SYS_STATUS
 mcu_temperature: MCU_STATUS
 autopilot_reboot: ATTITUDE, SYSTEM_TIME: a boot time that falls while it is armed, for 30 s; not after 10 s of silence
-autopilot_state: HEARTBEAT: MAV_STATE
+autopilot_state: HEARTBEAT: MAV_STATE, if it is worse than at the arming
 processor_alert: STATUSTEXT, EVENT
 logging_alert: STATUSTEXT, EVENT; SYS_STATUS
 fence_alert: STATUSTEXT, EVENT; SYS_STATUS; HIGH_LATENCY2

@@ -384,3 +384,38 @@ fn what_has_no_data_when_a_silence_is_over_is_told_then() {
     let of_battery = ["batt_remaining", "cell_voltage", "batt_fault", "batt_temperature"];
     assert!(stale.iter().all(|(check, ..)| of_battery.contains(check)), "{stale:?}");
 }
+
+#[test]
+fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_received() {
+    // The `MAV_STATE` while disarmed, armed, and armed from 30 s on.
+    let critical_ms = |disarmed: Option<u8>, [first, then]: [u8; 2]| {
+        let mut monitor = Monitor::new(Params::defaults());
+        let mut told = Vec::new();
+        for now_ms in (0..60_000).step_by(50) {
+            let now = Instant::from_millis(now_ms);
+            let mut quad = Quad::healthy();
+            quad.armed = disarmed.is_none() || now_ms >= 10_000;
+            let armed_state = if now_ms < 30_000 { first } else { then };
+            quad.state = disarmed.filter(|_| !quad.armed).unwrap_or(armed_state);
+            if now_ms.is_multiple_of(100) {
+                for observation in quad.says(now_ms) {
+                    monitor.observe(now, AUTOPILOT, &observation);
+                }
+            }
+            let link = LinkReading { frames_lost: Some(quad.lost), at: now };
+            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
+                if finding.check == "autopilot_state" && finding.level == Level::Critical {
+                    told.push(now_ms);
+                }
+            });
+        }
+        told.first().copied()
+    };
+    assert_eq!(critical_ms(Some(5), [5, 5]), None, "it stood at the arming");
+    assert!(critical_ms(Some(3), [4, 5]).is_some_and(|ms| (30_000..34_000).contains(&ms)));
+    assert!(
+        critical_ms(Some(5), [4, 5]).is_some_and(|ms| (30_000..34_000).contains(&ms)),
+        "it ended between"
+    );
+    assert!(critical_ms(None, [5, 5]).is_some_and(|ms| ms < 5_000), "first received in the air");
+}

@@ -44,7 +44,7 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Other as usize }>(Subsystem::Computer, Role::NONE),
 ];
 
-/// `MAV_STATE`. PX4's kill switch is a termination, and pilots press it after a touchdown. A vehicle that was terminated in the air falls,
+/// `MAV_STATE`, without a failsafe that stands since before the arming. PX4's kill switch is a termination, and pilots press it after a touchdown. A vehicle that was terminated in the air falls,
 /// glides or hangs on a parachute after [`COMES_TO_REST`].
 fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     const ACTIVE: u8 = 4;
@@ -56,7 +56,8 @@ fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
             && slow(ground_speed_mps(now, vehicle))
     };
     let ended = vehicle.terminated_since.is_some_and(|since| now.since(since) >= COMES_TO_REST) && !rests();
-    let counts = |state| if state == Heartbeat::TERMINATED && !ended { ACTIVE } else { state };
+    let stands = |state| state <= vehicle.state_since_arming || state == Heartbeat::TERMINATED && !ended;
+    let counts = |state| if stands(state) { ACTIVE.min(state) } else { state };
     vehicle.heartbeat.read(|heartbeat| Some(f32::from(counts(heartbeat.state))))
 }
 
