@@ -95,6 +95,7 @@ impl Derived {
         let pause_s = pause_s.unwrap_or(0.0).min(PAUSE_MAX_S);
         self.pause_s = pause_s.max(self.pause_s * (1.0 - PAUSE_FADES));
         self.heard = Some(at);
+        self.motors.hear();
     }
 
     /// Takes an observation that the vehicle took.

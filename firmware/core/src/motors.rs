@@ -37,6 +37,8 @@ const TURNING_RPM: f32 = 100.0;
 const INTERVALS_MISSED: f32 = 3.0;
 const INTERVALS_MISSED_SLOW: f32 = 5.0;
 const SLOW_S: f32 = 0.7;
+/// Of more messages between two of an ESC some are of a list of parameters.
+const MESSAGES_MAX: u16 = 1_000;
 /// Below this part of their highest speed motors do not carry a vehicle (thrust goes by the square).
 const FLYING_PART: f32 = 0.2;
 /// Below this part of the middle speed a motor is lost; no control in steady flight drives it there.
@@ -109,16 +111,27 @@ state! {
         tracks: [Track; MOTORS_MAX] = [Track::default(); MOTORS_MAX],
         /// What the autopilot gives them.
         pub(crate) outputs: MotorOutputs,
+        /// Messages of the vehicle since the last one of any ESC, and eight times their smoothed number between two.
+        messages: u16,
+        interval_messages: u16,
         /// The motor whose speed is furthest from the others'.
         furthest: u8,
     }
 }
 
 impl Motors {
+    /// Counts any message of the vehicle.
+    pub(crate) const fn hear(&mut self) {
+        self.messages = self.messages.saturating_add(1);
+    }
+
     pub(crate) fn take(&mut self, at: Instant, group: &EscGroup, vehicle: &Vehicle, airborne: bool) {
         if !vehicle.armed() {
             self.tracks.iter_mut().for_each(|track| track.role = Role::Unknown);
         }
+        let messages = core::mem::take(&mut self.messages).min(MESSAGES_MAX);
+        let usual = self.interval_messages;
+        self.interval_messages = if usual == 0 { 8 * messages } else { usual - usual / 8 + messages };
         let first = usize::from(group.first);
         let of_group = self.tracks.iter_mut().zip(&vehicle.motors).skip(first);
         for ((track, motor), esc) in of_group.zip(&group.escs) {
@@ -173,12 +186,17 @@ impl Motors {
     }
 
     /// Seconds since an ESC last sent speed or current, once it has missed some of its own intervals; 0 before. Up to when the vehicle was
-    /// received last, since the link resumed: a silent link says nothing about an ESC.
+    /// received last, since the link resumed: a silent link says nothing about an ESC, nor does a slow one that delivers as few other messages.
     pub(crate) fn silence_s(&self, heard: Instant, resumed: Instant, motor: u8) -> Option<f32> {
         let track = self.track(motor)?;
         let silence_s = heard.since(track.last.instant(heard)?.later(resumed)).as_secs_f32();
         let intervals = if track.interval_s > SLOW_S { INTERVALS_MISSED_SLOW } else { INTERVALS_MISSED };
-        let missed = track.interval_s > 0.0 && silence_s > intervals * track.interval_s;
+        let age = |track: &Track| track.last.age(heard);
+        let others_come = self.tracks.iter().filter_map(age).any(|other| Some(other) < age(track));
+        let missed = track.interval_s > 0.0
+            && silence_s > intervals * track.interval_s
+            && (others_come
+                || 8.0 * f32::from(self.messages) > intervals * f32::from(self.interval_messages));
         Some(if missed { silence_s } else { 0.0 })
     }
 

@@ -404,3 +404,25 @@ fn a_temperature_that_is_no_longer_in_the_message_is_no_longer_known() {
     let told: Vec<_> = px4_escs(info).iter().map(|one| (one.check, one.level)).collect();
     assert_eq!(told, [("esc_temperature", Level::Stale); 4]);
 }
+
+#[test]
+fn escs_on_a_link_that_slows_all_messages_alike_are_not_silent() {
+    // ESCs report five times a second, other parts ten times. After 30 s all report an eighth as often, or the ESCs stop.
+    let silent = |is_slowed: bool| {
+        let mut run = Run::new(&Params::defaults());
+        run.says(0..60_000, |now_ms| {
+            let is_late = now_ms >= 30_000;
+            let times = if is_late && is_slowed { 8 } else { 1 };
+            let quad = Quad::healthy();
+            let is_of_escs = |said: &Observation| matches!(said, Observation::Escs(_));
+            let mut said = if now_ms % (100 * times) == 0 { quad.says(now_ms) } else { Vec::new() };
+            said.retain(|one| !is_of_escs(one));
+            let reports = now_ms % (200 * times) == 0 && (is_slowed || !is_late);
+            said.extend(reports.then_some(Observation::Escs(EscGroup { first: 0, escs: quad.escs })));
+            said
+        });
+        run.of_check("esc_silent").any(|one| matches!(one.level, Level::Warning | Level::Critical))
+    };
+    assert!(!silent(true));
+    assert!(silent(false));
+}
