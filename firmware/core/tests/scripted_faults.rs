@@ -2,6 +2,7 @@
 
 use crate::common::{Quad, Run};
 use hums_core::Monitor;
+use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::observation::{Autopilot, EstimatorScale, Observation, Sensors, SystemTime, VehicleKind};
 use hums_core::params::Params;
@@ -389,27 +390,14 @@ fn what_has_no_data_when_a_silence_is_over_is_told_then() {
 fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_received() {
     // The `MAV_STATE` while disarmed, armed, and armed from 30 s on.
     let critical_ms = |disarmed: Option<u8>, [first, then]: [u8; 2]| {
-        let mut monitor = Monitor::new(Params::defaults());
-        let mut told = Vec::new();
-        for now_ms in (0..60_000).step_by(50) {
-            let now = Instant::from_millis(now_ms);
-            let mut quad = Quad::healthy();
+        let mut run = Run::new(&Params::defaults());
+        run.flies(0..60_000, |now_ms, quad, _| {
             quad.armed = disarmed.is_none() || now_ms >= 10_000;
             let armed_state = if now_ms < 30_000 { first } else { then };
             quad.state = disarmed.filter(|_| !quad.armed).unwrap_or(armed_state);
-            if now_ms.is_multiple_of(100) {
-                for observation in quad.says(now_ms) {
-                    monitor.observe(now, AUTOPILOT, &observation);
-                }
-            }
-            let link = LinkReading { frames_lost: Some(quad.lost), at: now };
-            monitor.tick(now, &link, &quad.recorder, &mut |finding| {
-                if finding.check == "autopilot_state" && finding.level == Level::Critical {
-                    told.push(now_ms);
-                }
-            });
-        }
-        told.first().copied()
+        });
+        let mut critical = run.of_check("autopilot_state").filter(|one| one.level == Level::Critical);
+        critical.next().map(|one| one.at.as_millis())
     };
     assert_eq!(critical_ms(Some(5), [5, 5]), None, "it stood at the arming");
     assert!(critical_ms(Some(3), [4, 5]).is_some_and(|ms| (30_000..34_000).contains(&ms)));
@@ -418,4 +406,21 @@ fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_recei
         "it ended between"
     );
     assert!(critical_ms(None, [5, 5]).is_some_and(|ms| ms < 5_000), "first received in the air");
+}
+
+#[test]
+fn what_the_autopilot_says_of_gnss_counts_from_the_first_fix_on() {
+    let told = |had_fix: bool| {
+        let mut run = Run::new(&Params::defaults());
+        run.flies(0..60_000, |now_ms, quad, more| {
+            quad.gnss.fix = if had_fix && now_ms < FAULT_MS { 3 } else { 1 };
+            let says = now_ms == FAULT_MS + 5_000;
+            more.extend(
+                says.then(|| Observation::Alert(Alert { cause: Cause::Gnss, urgency: Urgency::Warning })),
+            );
+        });
+        run.of_check("gnss_alert").any(|one| one.level == Level::Warning)
+    };
+    assert!(told(true));
+    assert!(!told(false), "it flies indoors");
 }

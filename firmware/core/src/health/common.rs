@@ -63,12 +63,15 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) 
         alarm_only: true,
         unit: Unit::FLAG,
         role,
-        read: |inputs, _| {
-            let level = inputs.vehicle.alerts.level(inputs.now, Cause::ALL[CAUSE], inputs.flight.in_mishap());
-            inputs.reading(level?)
-        },
+        read: |inputs, _| said(inputs, Cause::ALL[CAUSE]),
         ..PLAIN
     }
+}
+
+/// What the autopilot says of a cause.
+pub(super) fn said(inputs: &Inputs<'_>, cause: Cause) -> Option<Reading> {
+    let level = inputs.vehicle.alerts.level(inputs.now, cause, inputs.flight.in_mishap());
+    inputs.reading(level?)
 }
 
 /// Of a subsystem's components, the one that is nearest to its limit.

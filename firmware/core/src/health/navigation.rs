@@ -1,7 +1,7 @@
 //! Estimator and GNSS.
 
 use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, alert, row, vibration};
+use super::common::{PLAIN, STALE, after, alert, row, said, vibration};
 use super::finding::Subsystem;
 use super::inputs::Inputs;
 use super::suppression::{
@@ -213,10 +213,13 @@ pub(super) const CHECKS: &[Check] = &[
     alert::<{ Cause::Compass as usize }>(Subsystem::Navigation, Role::of(Group::CompassFault, TURNS)),
     alert::<{ Cause::Barometer as usize }>(Subsystem::Navigation, Role::of(Group::BaroFault, 0)),
     alert::<{ Cause::Airspeed as usize }>(Subsystem::Navigation, Role::of(Group::Sensor, 0)),
-    alert::<{ Cause::Gnss as usize }>(
-        Subsystem::Navigation,
-        Role::of(Group::GnssWord, WRONG_RECEIVERS | INERTIAL | Group::ImuGnss.bit() | VIBRATION),
-    ),
+    Check {
+        read: |inputs, _| said(inputs, Cause::Gnss).filter(|_| is_gnss_judged(inputs)),
+        ..alert::<{ Cause::Gnss as usize }>(
+            Subsystem::Navigation,
+            Role::of(Group::GnssWord, WRONG_RECEIVERS | INERTIAL | Group::ImuGnss.bit() | VIBRATION),
+        )
+    },
     alert::<{ Cause::Ranging as usize }>(Subsystem::Navigation, Role::NONE),
     alert::<{ Cause::Terrain as usize }>(Subsystem::Navigation, Role::NONE),
     alert::<{ Cause::Estimator as usize }>(
@@ -259,6 +262,12 @@ fn second_largest(estimator: &Estimator) -> Option<f32> {
     let fold = |[first, second]: [f32; 2], value: f32| [first.max(value), second.max(first.min(value))];
     let [_, second] = known.fold([f32::NEG_INFINITY; 2], fold);
     Some(second).filter(|second| second.is_finite())
+}
+
+/// Whether a receiver had a fix, or none reports: before its first fix a vehicle stands, or flies without GNSS, under a roof or water.
+fn is_gnss_judged(inputs: &Inputs<'_>) -> bool {
+    let reports = inputs.vehicle.gnss.iter().any(|gnss| gnss.get().is_some());
+    !reports || inputs.derived.had_fix.contains(&true)
 }
 
 /// A second receiver that never had a fix is not fitted; it says nothing.
