@@ -20,6 +20,10 @@ pub const TAG: &str = "hums-board:";
 /// End of the board's name in the image.
 pub const TAG_END: char = ';';
 
+/// D- and D+ of the USB plug: the chip has its full-speed port on no other pins (DS8626, table 9).
+const USB: [(&str, Pin); 2] =
+    [("usb-dm", Pin { port: 0, number: 11 }), ("usb-dp", Pin { port: 0, number: 12 })];
+
 /// Multiples of this frequency divide down to the input of the chip's PLL.
 const CRYSTAL_STEP_HZ: u32 = 2_000_000;
 /// A crystal of the chip (DS8626, table 36).
@@ -47,6 +51,8 @@ pub struct Board {
     pub card: Card,
     /// The LED.
     pub led: Led,
+    /// A button for the owner: held at power-on it starts the card-reader mode.
+    pub button: Option<Button>,
     /// Pins at a fixed level, set before the first clock to the card.
     #[serde(default)]
     pub hold: Hold,
@@ -130,6 +136,18 @@ pub struct Led {
     pub pin: Pin,
     /// Level at which it is lit.
     pub lit: Level,
+}
+
+/// A button.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Button {
+    /// Its pin.
+    pub pin: Pin,
+    /// The maker's name of it.
+    pub name: String,
+    /// Level while it is pressed.
+    pub pressed: Level,
 }
 
 /// Pins at a fixed level, with the part that each belongs to.
@@ -279,7 +297,7 @@ impl Board {
 
     /// Every pin with its function. A pin that two functions share appears twice.
     pub fn pins(&self) -> Vec<(&'static str, Pin)> {
-        let Self { autopilot, radio, card, led, hold, .. } = self;
+        let Self { autopilot, radio, card, led, button, hold, .. } = self;
         let mut pins = vec![
             ("autopilot-tx", autopilot.tx.pin),
             ("autopilot-rx", autopilot.rx.pin),
@@ -296,6 +314,11 @@ impl Board {
             Level::High => ("detect-high", detect.pin),
         });
         pins.extend(detect);
+        pins.extend(USB);
+        pins.extend(button.iter().map(|button| match button.pressed {
+            Level::Low => ("button-low", button.pin),
+            Level::High => ("button-high", button.pin),
+        }));
         pins.extend(hold.high.keys().map(|pin| ("hold-high", *pin)));
         pins.extend(hold.low.keys().map(|pin| ("hold-low", *pin)));
         pins.extend(hold.pull_up.keys().map(|pin| ("pull-up", *pin)));

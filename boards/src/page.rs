@@ -15,7 +15,7 @@ settings. The wiring tables here are made from the files in [`boards/`](../board
 you have tried a board, please report it.
 
 * A flight controller is used here as a recorder only. Its own sensors, OSD and motor outputs stay unused. Do not connect motors.
-* The USB plug loads the firmware. The box does not talk over USB.
+* The USB plug loads the firmware, and shows the card as a [read-only disk](runbook.md#read-the-card-over-usb).
 * 5 V: *documented* means that the maker names a pad as an input for 5 V. On the others the 5 V pad is the output of the board's own
   regulator; ask the maker before you feed it.
 ";
@@ -61,7 +61,7 @@ fn anchor(title: &str) -> String {
 }
 
 fn section(page: &mut String, board: &Board) -> std::fmt::Result {
-    let Board { name, title, crystal_hz, autopilot, radio, card, led, hold, owner } = board;
+    let Board { name, title, crystal_hz, autopilot, radio, card, led, button, hold, owner } = board;
     write!(page, "\n## {title}\n`cargo xtask flash --dfu --board {name}`\n\n")?;
     page.push_str("| | pad | pin of the chip |\n|---|---|---|\n");
     let ports = [("autopilot's telemetry port", autopilot), ("radio", radio)];
@@ -79,6 +79,14 @@ fn section(page: &mut String, board: &Board) -> std::fmt::Result {
     }
     let waits = if led.pin.is_debug() { "; a debug probe can connect in the first second only" } else { "" };
     writeln!(page, "| LED | on the board | {}, lit when {}{waits} |", led.pin, led.lit.name())?;
+    if let Some(button) = button {
+        let (pin, pressed) = (button.pin, button.pressed.name());
+        writeln!(
+            page,
+            "| button for the [card reader](runbook.md#read-the-card-over-usb) | {} | {pin}, {pressed} when pressed |",
+            button.name
+        )?;
+    }
     for (level, pins) in [("held high", &hold.high), ("held low", &hold.low), ("pulled up", &hold.pull_up)] {
         if !pins.is_empty() {
             let pins: Vec<_> = pins.iter().map(|(pin, part)| format!("{pin} ({part})")).collect();
