@@ -77,6 +77,11 @@ impl Buffers {
     pub const fn new() -> Self {
         Self { parity: RefCell::new(Parity::new()) }
     }
+
+    /// The memory as plain blocks, for a program without a recorder.
+    pub fn blocks(&mut self) -> &mut [Block] {
+        self.parity.get_mut().lend()
+    }
 }
 
 /// The storage task's state.

@@ -1,0 +1,28 @@
+//! The card as a read-only disk of a USB host (*card-reader mode*).
+//!
+//! ```text
+//! host -> bulk OUT -> Transport (wrappers, lengths) -> Disk (SCSI commands) -> CardDevice
+//! host <- bulk IN  <-
+//! ```
+//! [`transport`] and [`scsi`] have no I/O: command block in, data and status out. [`class`] moves their bytes through any driver of
+//! `embassy_usb`; [`guard`] keeps requests of a hostile host from that driver.
+//!
+//! Rules:
+//! * The disk cannot be written. Writes are refused as protected, and hosts are told so by MODE SENSE.
+//! * Each address and length of a host is checked against the card before the card is read.
+//! * A read error of the card is a medium error. Data is sent only after the card has given it without an error.
+//! * An unknown command gets sense data.
+//!
+//! Sources: USB Mass Storage Class Bulk-Only Transport 1.0 (*BOT*), SPC-4, SBC-3.
+#![cfg_attr(not(test), no_std)]
+
+pub mod class;
+pub mod guard;
+pub mod scsi;
+pub mod transport;
+
+pub use embassy_usb::driver;
+pub use embassy_usb::{Builder, Config};
+
+/// Bytes of a packet on a bulk endpoint at full speed.
+pub const PACKET_BYTES: usize = 64;

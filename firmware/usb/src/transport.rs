@@ -1,0 +1,162 @@
+//! Bulk-Only Transport: command wrappers in, data and status wrappers out.
+//!
+//! A host announces direction and length of the data, and so does the command block. BOT 6.7 lists the thirteen cases of both:
+//!
+//! | case | host | command | data on the bus | status |
+//! |---|---|---|---|---|
+//! | 1 | none | none | none | the command's |
+//! | 2, 3 | none | in, out | none | phase error |
+//! | 4, 5, 6 | in | none, less, as much | the command's, ended by a short packet | the command's, with residue |
+//! | 7 | in | more | as much as the host wants | phase error |
+//! | 8 | in | out | none, ended by a short packet | phase error |
+//! | 9, 11 to 13 | out | none, out | taken and dropped | the command's, with residue |
+//! | 10 | out | in | taken and dropped | phase error |
+//!
+//! No command of this disk takes data: a write is refused, which is case 3, 8, 9 or 11 to 13 with the status of a refused command.
+//! A refused command has no data. In place of a short packet BOT wants padding or a halted endpoint. Linux's gadget ends the data in
+//! the same way if its controller cannot halt.
+
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
+
+use crate::PACKET_BYTES;
+use crate::scsi::{Answer, Disk};
+
+/// Bytes of a command wrapper (BOT, 5.1).
+pub const WRAPPER_BYTES: usize = 31;
+/// Bytes of a status wrapper (BOT, 5.2).
+pub const STATUS_BYTES: usize = 13;
+const COMMAND_SIGNATURE: [u8; 4] = *b"USBC";
+const STATUS_SIGNATURE: [u8; 4] = *b"USBS";
+/// Longest command block.
+const BLOCK_MAX: usize = 16;
+/// The bit of the wrapper's flags for data to the host.
+const TO_HOST: u8 = 0x80;
+
+/// The packet is no command wrapper, or one for another unit. Only a reset by the host ends this state (BOT, 6.6.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Invalid;
+
+/// The next action on the bus.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Step<'a> {
+    /// Send these bytes in packets of [`PACKET_BYTES`]; none is one empty packet.
+    Send(&'a [u8]),
+    /// Take a packet and report its length to [`Transport::taken`].
+    Take,
+    /// Send this status wrapper. The command is over.
+    Status([u8; STATUS_BYTES]),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Status {
+    Passed = 0,
+    Failed = 1,
+    PhaseError = 2,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// This many bytes of the disk's reply.
+    Reply(u32),
+    /// This many bytes of the card, from this block on.
+    Blocks(u32, u32),
+    /// The data is over: a short packet, if none was sent.
+    End,
+    /// This many bytes of the host are still to be taken.
+    Take(u32),
+    Status,
+}
+
+/// A command in work.
+pub struct Transport {
+    tag: [u8; 4],
+    /// Bytes that the host expects or sends.
+    expected: u32,
+    /// Bytes sent to the host.
+    sent: u32,
+    status: Status,
+    stage: Stage,
+}
+
+impl Transport {
+    /// Begins the command of a packet. `scratch` is overwritten.
+    pub fn begin<D: CardDevice>(
+        packet: &[u8],
+        disk: &mut Disk<D>,
+        scratch: &mut Block,
+    ) -> Result<Self, Invalid> {
+        let wrapper: &[u8; WRAPPER_BYTES] = packet.try_into().map_err(|_| Invalid)?;
+        let [s0, s1, s2, s3, t0, t1, t2, t3, e0, e1, e2, e3, flags, unit, length, block @ ..] = *wrapper;
+        let block = block.get(..usize::from(length)).filter(|block| !block.is_empty()).ok_or(Invalid)?;
+        if [s0, s1, s2, s3] != COMMAND_SIGNATURE || flags & !TO_HOST != 0 || unit != 0 {
+            return Err(Invalid);
+        }
+        const { assert!(WRAPPER_BYTES == 15 + BLOCK_MAX) };
+        let expected = u32::from_le_bytes([e0, e1, e2, e3]);
+        let answer = disk.command(block, scratch);
+        let wants_data = expected > 0 && flags == TO_HOST;
+        // Bytes of the command's data.
+        let has = match answer {
+            Some(Answer::Reply(bytes)) => bytes as u64,
+            Some(Answer::Blocks { count, .. }) => u64::from(count) * BLOCK_BYTES as u64,
+            Some(Answer::Done) | None => 0,
+        };
+        let status = match answer {
+            None => Status::Failed,
+            Some(_) if has > if wants_data { expected.into() } else { 0 } => Status::PhaseError,
+            Some(_) => Status::Passed,
+        };
+        let bytes = u32::try_from(has).unwrap_or(u32::MAX).min(expected);
+        let stage = match answer {
+            _ if expected == 0 => Stage::Status,
+            _ if !wants_data => Stage::Take(expected),
+            Some(Answer::Reply(_)) => Stage::Reply(bytes),
+            Some(Answer::Blocks { first, .. }) => Stage::Blocks(first, bytes),
+            Some(Answer::Done) | None => Stage::End,
+        };
+        Ok(Self { tag: [t0, t1, t2, t3], expected, sent: 0, status, stage })
+    }
+
+    /// The next action. `buffer` is for blocks of the card: at least one.
+    pub fn step<'a, D: CardDevice>(&mut self, disk: &'a mut Disk<D>, buffer: &'a mut [Block]) -> Step<'a> {
+        match self.stage {
+            Stage::Reply(bytes) if bytes > 0 => {
+                (self.stage, self.sent) = (Stage::End, bytes);
+                return Step::Send(disk.reply().get(..bytes as usize).unwrap_or_default());
+            }
+            Stage::Blocks(first, left) if left > 0 => {
+                let count = left.div_ceil(BLOCK_BYTES as u32).min(buffer.len() as u32);
+                let blocks = buffer.get_mut(..count as usize).unwrap_or_default();
+                if !blocks.is_empty() && disk.read(first, blocks) {
+                    let bytes = left.min(count * BLOCK_BYTES as u32);
+                    self.stage = Stage::Blocks(first + count, left - bytes);
+                    self.sent += bytes;
+                    return Step::Send(blocks.as_flattened().get(..bytes as usize).unwrap_or_default());
+                }
+                self.status = Status::Failed;
+            }
+            Stage::Take(left) if left > 0 => return Step::Take,
+            Stage::Reply(_) | Stage::Blocks(..) | Stage::End | Stage::Take(_) => {}
+            Stage::Status => return Step::Status(self.wrapper()),
+        }
+        let is_open = !matches!(self.stage, Stage::Take(_))
+            && self.sent < self.expected
+            && self.sent.is_multiple_of(PACKET_BYTES as u32);
+        self.stage = Stage::Status;
+        if is_open { Step::Send(&[]) } else { Step::Status(self.wrapper()) }
+    }
+
+    /// A packet of the host was taken. A short one ends the data.
+    pub fn taken(&mut self, bytes: usize) {
+        if let Stage::Take(left) = self.stage {
+            let is_short = bytes < PACKET_BYTES;
+            self.stage = Stage::Take(if is_short { 0 } else { left.saturating_sub(bytes as u32) });
+        }
+    }
+
+    fn wrapper(&self) -> [u8; STATUS_BYTES] {
+        let ([t0, t1, t2, t3], [s0, s1, s2, s3]) = (self.tag, STATUS_SIGNATURE);
+        let [r0, r1, r2, r3] = (self.expected - self.sent).to_le_bytes();
+        [s0, s1, s2, s3, t0, t1, t2, t3, r0, r1, r2, r3, self.status as u8]
+    }
+}
