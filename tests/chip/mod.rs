@@ -23,6 +23,8 @@ mod power;
 mod program;
 #[cfg(feature = "chip")]
 mod recompute;
+#[cfg(feature = "chip")]
+mod usb;
 
 /// In the list of ignored tests: an untested part is not a success.
 #[cfg(not(feature = "chip"))]

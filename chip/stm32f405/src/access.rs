@@ -17,6 +17,9 @@ use crate::time::Now;
 /// Embassy reads other chips' DCKCFGR, and writes 0: reserved here, harmless.
 const RESERVED: u32 = 0x4002_388C;
 
+/// A read of this register of the USB port takes a packet's status out of its FIFO.
+const GRXSTSP: u32 = 0x20;
+
 enum Place {
     Flash(u32),
     Sram(u32),
@@ -90,7 +93,7 @@ impl Chip {
             self.note(Note::NoClock(word));
             return 0;
         }
-        let offset = word & 0x3FF;
+        let offset = if unit == Unit::Otg { word - map::OTG } else { word & 0x3FF };
         let value = match unit {
             Unit::Tim(number) => self.tims[number as usize].read(offset, now.cycle),
             Unit::Tim11 => self.tim11.read(offset, self.tim11_input(now)),
@@ -106,6 +109,7 @@ impl Chip {
             Unit::Flash => self.flash.read(offset),
             Unit::Dma(number) => self.dmas[number as usize].read(offset),
             Unit::Rng => self.rng.read(offset, now.ps, self.clocks.pll48),
+            Unit::Otg => self.otg.read(offset),
             Unit::Dbgmcu => self.read_dbgmcu(offset),
         };
         let Some(value) = value else {
@@ -129,7 +133,7 @@ impl Chip {
             self.note(Note::NoClock(word));
             return None;
         }
-        let offset = word & 0x3FF;
+        let offset = if unit == Unit::Otg { word - map::OTG } else { word & 0x3FF };
         let value = match (unit, size) {
             (_, Size::Word)
             | (Unit::Usart(_) | Unit::Spi(_) | Unit::Tim(_) | Unit::Tim11 | Unit::Iwdg, _)
@@ -186,6 +190,7 @@ impl Chip {
                 done
             }
             Unit::Rng => self.rng.write(offset, value, now.ps),
+            Unit::Otg => self.otg.write(offset, value),
             Unit::Dbgmcu => {
                 *self.dbgmcu.get_mut((offset as usize).checked_sub(4)? / 4)? = value;
                 // The processor's counter may count in sleep.
@@ -249,6 +254,7 @@ impl Chip {
             Unit::Crc => self.crc = crate::small::Crc::new(),
             Unit::Dma(number) => self.dmas[number as usize] = crate::dma::Dma::new(),
             Unit::Rng => self.rng.reset(),
+            Unit::Otg => self.otg.reset(),
             Unit::Iwdg | Unit::Exti | Unit::Rcc | Unit::Flash | Unit::Dbgmcu => {}
         }
         self.settle(unit, now);
@@ -275,10 +281,14 @@ impl Bus for Chip {
                     0x4001 => 2 * self.clocks.hclk.checked_div(self.clocks.pclk[1]).unwrap_or(1),
                     _ => 1,
                 };
-                if let Some((unit @ (Unit::Usart(_) | Unit::Spi(_) | Unit::Rng), _)) = map::unit_at(address)
-                    && address & 0xC != 0
-                {
-                    self.settle(unit, self.moment);
+                match map::unit_at(address) {
+                    Some((unit @ (Unit::Usart(_) | Unit::Spi(_) | Unit::Rng), _)) if address & 0xC != 0 => {
+                        self.settle(unit, self.moment);
+                    }
+                    Some((Unit::Otg, _)) if address == map::OTG + GRXSTSP => {
+                        self.settle(Unit::Otg, self.moment);
+                    }
+                    _ => {}
                 }
                 Some(value)
             }

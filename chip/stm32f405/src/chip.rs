@@ -12,6 +12,7 @@ use crate::flash::Flash;
 use crate::gpio::{Exti, Gpio, Pin};
 use crate::map::{self, Unit};
 use crate::memory::{CCM, Memory, SRAM, garbage};
+use crate::otg::Otg;
 use crate::pwr::Pwr;
 use crate::rcc::{Cause, Clocks, Rcc};
 use crate::small::{Crc, Iwdg, Rng};
@@ -52,7 +53,8 @@ const USART: usize = 4;
 const SPI: usize = 10;
 const TIM: usize = 13;
 const DMA: usize = 18;
-const SLOTS: usize = 20;
+const OTG: usize = 20;
+const SLOTS: usize = 21;
 
 /// The chip.
 pub struct Chip {
@@ -88,6 +90,8 @@ pub struct Chip {
     pub iwdg: Iwdg,
     /// Random numbers.
     pub rng: Rng,
+    /// USB.
+    pub otg: Otg,
     /// The CRC unit.
     pub crc: Crc,
     /// Number, 96 bits.
@@ -142,6 +146,7 @@ impl Chip {
             dmas: [Dma::new(), Dma::new()],
             iwdg: Iwdg::new(lsi_hz),
             rng: Rng::new(seed),
+            otg: Otg::new(),
             crc: Crc::new(),
             uid: [0x0031_0045, 0x3136_510E, 0x3336_3734],
             // Revision Y of the STM32F405 and F407.
@@ -188,6 +193,7 @@ impl Chip {
         self.dmas = [Dma::new(), Dma::new()];
         self.iwdg.reset();
         self.rng.reset();
+        self.otg.reset();
         self.crc = Crc::new();
         if cause == Cause::Power {
             self.dbgmcu = [0; 3];
@@ -276,6 +282,7 @@ impl Chip {
             USART..SPI => time.cycle(self.usarts[slot - USART].deadline()),
             SPI..TIM => self.spis[slot - SPI].deadline(),
             TIM..DMA => self.tims[slot - TIM].deadline(),
+            OTG => time.cycle(self.otg.deadline()),
             _ => self.copies[slot - DMA],
         };
         self.deadlines[slot] = at;
@@ -299,6 +306,7 @@ impl Chip {
                 USART..SPI => Unit::Usart((slot - USART) as u8),
                 SPI..TIM => Unit::Spi((slot - SPI) as u8),
                 TIM..DMA => Unit::Tim((slot - TIM) as u8),
+                OTG => Unit::Otg,
                 _ => Unit::Dma((slot - DMA) as u8),
             };
             self.device_happens(unit, now);
@@ -328,6 +336,13 @@ impl Chip {
             Unit::Spi(number) => self.spis[number as usize].advance(now, &self.time),
             Unit::Tim(number) => self.tims[number as usize].advance(now.cycle),
             Unit::Dma(number) => self.copy(number as usize),
+            Unit::Otg => {
+                let (function, pins) = map::OTG_PINS;
+                // A device's clock may be off by 0.25 % (USB 2.0, 7.1.11).
+                self.otg.is_wired = self.clocks.pll48.abs_diff(48_000_000) <= 120_000
+                    && pins.iter().all(|pin| self.gpio.is_routed(*pin, function));
+                self.otg.happen(now.ps);
+            }
             _ => {}
         }
     }
@@ -345,6 +360,7 @@ impl Chip {
             Unit::Rcc => self.schedule(RCC),
             Unit::Iwdg => self.schedule(IWDG),
             Unit::Rng => self.schedule(RNG),
+            Unit::Otg => self.schedule(OTG),
             Unit::Usart(number) => self.schedule(USART + number as usize),
             Unit::Spi(number) => self.schedule(SPI + number as usize),
             Unit::Tim(number) => self.schedule(TIM + number as usize),
@@ -366,6 +382,7 @@ impl Chip {
     pub(crate) fn look_at(&mut self, unit: Unit, now: Now) {
         match unit {
             Unit::Flash => self.line(map::FLASH, self.flash.interrupts()),
+            Unit::Otg => self.line(map::OTG_LINE, self.otg.interrupts()),
             Unit::Rng => self.line(map::RNG, self.rng.interrupts(now.ps, self.clocks.pll48)),
             Unit::Usart(number) => {
                 let number = number as usize;
@@ -434,6 +451,11 @@ impl Chip {
             self.schedule(slot);
         }
         self.look_at_lines();
+    }
+
+    /// A host was plugged in.
+    pub fn host_plugged(&mut self) {
+        self.schedule(OTG);
     }
 
     /// Characters were added.

@@ -13,6 +13,7 @@ pub mod line;
 pub mod machine;
 pub mod map;
 pub mod memory;
+pub mod otg;
 pub mod pwr;
 pub mod rcc;
 pub mod report;

@@ -12,6 +12,7 @@ use crate::image::Image;
 use crate::line::{Char, chars};
 use crate::map;
 use crate::memory::{CCM, FLASH, SRAM, garbage};
+use crate::otg::Host;
 use crate::rcc::Cause;
 use crate::report::Report;
 use crate::spi::Wire;
@@ -303,6 +304,12 @@ impl Machine {
     /// Connects something to pins that the program moves itself.
     pub fn connect_pins(&mut self, pins: Pins, wire: Box<dyn Wire>) {
         self.chip.bits = Some(Bits::new(pins, wire));
+    }
+
+    /// Plugs a host into the USB port.
+    pub fn plug(&mut self, host: Box<dyn Host>) {
+        self.chip.otg.connect(host, self.now);
+        self.chip.host_plugged();
     }
 
     /// Other ends of buses.

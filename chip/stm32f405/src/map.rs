@@ -35,6 +35,8 @@ pub enum Unit {
     Dma(u8),
     /// The random number generator.
     Rng,
+    /// USB OTG FS.
+    Otg,
     /// The debugger's identity.
     Dbgmcu,
 }
@@ -42,6 +44,9 @@ pub enum Unit {
 /// Clock and reset.
 pub type Gate = (Bank, u8);
 
+/// USB OTG FS: registers and FIFOs.
+pub const OTG: u32 = 0x5000_0000;
+const OTG_END: u32 = 0x5004_0000;
 /// Ports of pins.
 const GPIO: u32 = 0x4002_0000;
 
@@ -77,6 +82,7 @@ pub fn unit_at(address: u32) -> Option<(Unit, Option<Gate>)> {
         0x4002_3C00 => (Unit::Flash, None),
         0x4002_6000 => (Unit::Dma(0), Some((Ahb1, 21))),
         0x4002_6400 => (Unit::Dma(1), Some((Ahb1, 22))),
+        OTG..OTG_END => (Unit::Otg, Some((Ahb2, 7))),
         0x5006_0800 => (Unit::Rng, Some((Ahb2, 6))),
         0xE004_2000 => (Unit::Dbgmcu, None),
         _ => return None,
@@ -90,7 +96,7 @@ pub fn unit_of(gate: Gate) -> Option<Unit> {
 }
 
 /// Devices with a gate.
-const BASES: [u32; 30] = [
+const BASES: [u32; 31] = [
     0x4001_4800,
     0x4000_1800,
     0x4000_0000,
@@ -120,6 +126,7 @@ const BASES: [u32; 30] = [
     0x4002_3000,
     0x4002_6000,
     0x4002_6400,
+    OTG,
     0x5006_0800,
 ];
 
@@ -133,6 +140,10 @@ pub const PVD: u16 = 1;
 pub const FLASH: u16 = 4;
 /// The random number generator's.
 pub const RNG: u16 = 80;
+/// The USB port's.
+pub const OTG_LINE: u16 = 67;
+/// Its pins, and their alternate function.
+pub const OTG_PINS: (u8, [Pin; 2]) = (10, [pin('A', 11), pin('A', 12)]);
 
 /// The interrupt of a port.
 pub const USART: [u16; 6] = [37, 38, 39, 52, 53, 71];

@@ -3,6 +3,7 @@
 
 pub mod record;
 pub mod rig;
+pub mod usb;
 
 use std::collections::VecDeque;
 use std::path::Path;

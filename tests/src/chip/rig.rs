@@ -191,7 +191,12 @@ pub fn set(name: &str, value: f32, sequence: u8) -> Vec<u8> {
 
 /// A heartbeat of a disarmed quadrotor of ArduPilot's.
 pub fn heartbeat(sequence: u8) -> Vec<u8> {
-    let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, 0x51, 3, 3], 50, sequence);
+    heartbeat_in(0x51, sequence)
+}
+
+/// The same in this `base_mode`.
+pub fn heartbeat_in(base_mode: u8, sequence: u8) -> Vec<u8> {
+    let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, base_mode, 3, 3], 50, sequence);
     // From the autopilot's own component.
     frame[5] = 1;
     frame[6] = 1;

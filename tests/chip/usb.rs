@@ -1,0 +1,241 @@
+//! Card-reader mode: a USB host at the board's plug, from the command to the next record.
+
+use anyhow::{Result, ensure};
+use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
+use hums_link::messages;
+use hums_sdcard::{Event, Kind, Model};
+use hums_tests::chip::rig::{Rig, heartbeat, heartbeat_in};
+use hums_tests::chip::usart;
+use hums_tests::chip::usb::{Bus, Disk, host};
+use stm32f405_model::machine::Board;
+use stm32f405_model::otg::{Action, Reply};
+use stm32f405_model::rcc::Cause;
+use stm32f405_model::time::{MS, Ps, SECOND};
+
+use super::bench;
+
+/// `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`
+const RESTART: u16 = 246;
+/// In kB/s. The first guess of a person's patience: an hour's log in a minute and a half.
+const READ_KBPS_MIN: u64 = 600;
+
+/// A second of records and a second of a quiet line, with heartbeats of a disarmed vehicle.
+fn on_the_ground() -> Rig {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let begin = rig.machine.now() + SECOND;
+    rig.run(begin, false).unwrap();
+    for second in 0..3_u8 {
+        let now = rig.machine.now();
+        let beat = heartbeat(second);
+        let end = rig.machine.send(usart(&rig.wired.autopilot), &beat, now, 921_600.0);
+        rig.sent.push((end, beat));
+        rig.run(now + SECOND, false).unwrap();
+    }
+    rig
+}
+
+/// A command of the ground station's.
+fn command(rig: &mut Rig, action: f32) {
+    let mut out = [0; FRAME_BYTES_MAX];
+    let packet = messages::command_long(RESTART, &[action], 1, COMPONENT);
+    let frame = Encoder::of(255, 190).frame(&mut out, &packet).to_vec();
+    let now = rig.machine.now();
+    rig.machine.send(usart(&rig.wired.radio), &frame, now, 57_600.0);
+}
+
+/// A board in card-reader mode, and the number of its resets.
+fn reading() -> (Rig, usize) {
+    let mut rig = on_the_ground();
+    let resets = rig.machine.resets.len();
+    command(&mut rig, 5.0);
+    let now = rig.machine.now();
+    rig.run(now + 3 * SECOND, false).unwrap();
+    assert_eq!(
+        rig.machine.resets[resets..].iter().map(|(_, cause)| *cause).collect::<Vec<_>>(),
+        [Cause::Software]
+    );
+    (rig, resets + 1)
+}
+
+/// Plugs a host in, runs its program to the end, and returns its result.
+fn use_host<T: Send + 'static>(
+    rig: &mut Rig,
+    limit: Ps,
+    program: impl FnOnce(&mut Bus) -> Result<T> + Send + 'static,
+) -> T {
+    let (host, thread) = host(program);
+    let end = rig.machine.now() + limit;
+    rig.machine.plug(host);
+    while !thread.is_finished() {
+        assert!(rig.machine.now() < end, "the host is not done");
+        rig.run(rig.machine.now() + 10 * MS, false).unwrap();
+    }
+    thread.join().unwrap().unwrap_or_else(|why| panic!("at {} ms: {why:#}", rig.machine.ms()))
+}
+
+#[test]
+fn the_card_reader_shows_the_card_as_it_is_and_the_board_records_after_the_eject() {
+    let (mut rig, resets) = reading();
+    let (card, writes) = (rig.medium.content(), rig.medium.writes());
+    let there = card.clone();
+    let (kbps, blocks) = use_host(&mut rig, 60 * SECOND, move |bus| {
+        let mut disk = Disk::attach(bus)?;
+        ensure!(disk.command(&[0x12, 0, 0, 0, 36, 0], 36)?.data[8..12] == *b"HUMS");
+        ensure!(disk.command(&[0; 6], 0)?.status == 0, "not ready");
+        ensure!(disk.command(&[0x1A, 0, 0x3F, 0, 192, 0], 192)?.data == [3, 0, 0x80, 0]);
+        let blocks = disk.blocks()?;
+        // Boot record, file system, directory, logs: with single blocks and with long transfers.
+        for (first, count) in [(0, 1), (8_192, 1), (blocks - 1, 1), (8_192, 100), (16_000, 128)] {
+            let done = disk.read(first, count)?;
+            ensure!((done.status, done.residue) == (0, 0), "{first}: status {}", done.status);
+            let block = |at| there.get(&at).copied().unwrap_or([0; 512]);
+            let wanted: Vec<u8> = (first..first + u32::from(count)).flat_map(block).collect();
+            ensure!(done.data == wanted, "{count} blocks from {first} are others");
+        }
+        for (at, block) in there {
+            ensure!(disk.read(at, 1)?.data == block, "block {at} is another one");
+        }
+        let (begun, count) = (disk.bus.now, 500);
+        disk.read(20_000, count)?;
+        let kbps = u64::from(count) * 512 * MS / (disk.bus.now - begun);
+        // A write changes nothing.
+        let done = disk.write(&[0x2A, 0, 0, 0, 0, 0, 0, 0, 2, 0], &[0x55; 1_024])?;
+        ensure!((done.status, done.residue, disk.sense()?) == (1, 1_024, (0x07, 0x27)), "{done:?}");
+        ensure!(disk.command(&[0x5E; 10], 512)?.status == 1 && disk.sense()? == (0x05, 0x20));
+        disk.eject()?;
+        Ok((kbps, blocks))
+    });
+    println!("{kbps} kB/s");
+    assert!(kbps >= READ_KBPS_MIN, "{kbps} kB/s");
+    assert_eq!(blocks, hums_tests::chip::BLOCKS);
+    assert!(rig.medium.content() == card && rig.medium.writes() == writes, "the card was written");
+
+    let now = rig.machine.now();
+    rig.run(now + 4 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets + 1, "{:?}", rig.machine.resets);
+    rig.run(now + 5 * SECOND, true).unwrap();
+    rig.run(now + 7 * SECOND, false).unwrap();
+    let compared = rig.compared();
+    assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
+    let texts: Vec<_> = rig.sessions().into_iter().flat_map(|session| session.texts).collect();
+    assert!(texts.iter().all(|text| !text.starts_with("fault")), "{texts:?}");
+    assert!(rig.slot.violations().is_empty(), "{:?}", rig.slot.violations());
+}
+
+#[test]
+fn no_cable_and_no_other_command_stops_a_record() {
+    /// `MAV_MODE_FLAG_SAFETY_ARMED`, with the flags of a disarmed heartbeat.
+    const ARMED: u8 = 0xD1;
+    let mut rig = on_the_ground();
+    let resets = rig.machine.resets.len();
+    let answers = use_host(&mut rig, 10 * SECOND, |bus| {
+        bus.act(Action::Wait(SECOND))?;
+        bus.act(Action::Reset)?;
+        bus.act(Action::Setup(0, [0x80, 6, 0, 1, 0, 0, 18, 0]))
+    });
+    assert_eq!(answers, Reply::Nothing);
+    // A restart of another kind; card-reader mode while armed.
+    command(&mut rig, 1.0);
+    let now = rig.machine.now();
+    rig.run(now + SECOND, false).unwrap();
+    let armed = heartbeat_in(ARMED, 9);
+    let now = rig.machine.now();
+    let end = rig.machine.send(usart(&rig.wired.autopilot), &armed, now, 921_600.0);
+    rig.sent.push((end, armed));
+    rig.run(now + 100 * MS, false).unwrap();
+    command(&mut rig, 5.0);
+    rig.run(now + 3 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+    let compared = rig.compared();
+    assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
+}
+
+#[test]
+fn a_hostile_host_gets_the_card_after_it_behaves() {
+    let (mut rig, resets) = reading();
+    let writes = rig.medium.writes();
+    let first = rig.medium.get(0).to_vec();
+    use_host(&mut rig, 60 * SECOND, move |bus| {
+        let mut disk = Disk::attach(bus)?;
+        let (to, from) = disk.endpoints;
+        // Requests about endpoints that there are not, and halts of those that there are.
+        for endpoint in [1, 2, 3, 4, 15, 0x81, 0x83, 0x84, 0x8F, 0xFF] {
+            for request in [1, 3] {
+                disk.bus.control(2, request, 0, endpoint)?;
+            }
+            disk.bus.control_in(2, 0, 0, endpoint, 2)?;
+        }
+        disk.bus.clear_halt(to)?;
+        disk.bus.clear_halt(0x80 | from)?;
+        ensure!(disk.read(0, 1)?.data == first, "halts of the host");
+        // No command wrapper: both endpoints halt, and stay so until the class is reset (BOT, 6.6.1).
+        for garbage in [&[0x55; 31][..], b"USBC", &[0; 64]] {
+            disk.bus.write(to, garbage)?;
+            disk.bus.act(Action::Wait(10 * MS))?;
+            ensure!(disk.bus.read(from, 13)?.is_none(), "no halt");
+            disk.bus.control(2, 1, 0, u16::from(0x80 | from))?;
+            ensure!(disk.bus.read(from, 13)?.is_none(), "the halt was cleared without a reset");
+            ensure!(disk.bus.control(0x21, 0xFF, 0, 0)?, "no reset of the class");
+            disk.bus.clear_halt(to)?;
+            disk.bus.clear_halt(0x80 | from)?;
+            ensure!(disk.read(0, 1)?.data == first, "after garbage");
+        }
+        // Unknown requests of all kinds.
+        for kind in [0x00, 0x01, 0x02, 0x03, 0x20, 0x21, 0x22, 0x40, 0x41, 0x5F] {
+            for request in [0, 2, 7, 9, 11, 0x22, 0xFD, 0xFE] {
+                disk.bus.control(kind, request, 0xFFFF, 0xFFFF)?;
+                disk.bus.control_in(kind, request, 0xFFFF, 0xFFFF, 64)?;
+            }
+        }
+        ensure!(disk.read(0, 1)?.data == first, "after unknown requests");
+        // A host that goes away in the middle of a command.
+        let mut wrapper = b"USBC\x01\0\0\0\0\x80\0\0\x80\0\x0A\x28\0\0\0\0\0\0\0\x40".to_vec();
+        wrapper.resize(31, 0);
+        disk.bus.write(to, &wrapper)?;
+        disk.bus.read(from, 640)?;
+        ensure!(disk.bus.control(0x21, 0xFF, 0, 0)?, "no reset of the class");
+        disk.bus.clear_halt(to)?;
+        disk.bus.clear_halt(0x80 | from)?;
+        ensure!(disk.read(0, 1)?.data == first, "after a reset within the data");
+        disk.bus.write(to, &wrapper)?;
+        disk.bus.read(from, 640)?;
+        let mut disk = Disk::attach(disk.bus)?;
+        ensure!(disk.read(0, 1)?.data == first, "after a reset of the bus");
+        Ok(())
+    });
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+    assert_eq!(rig.medium.writes(), writes, "the card was written");
+}
+
+#[test]
+fn a_pulled_card_is_told_and_read_again_when_it_is_back() {
+    let (mut rig, resets) = reading();
+    let slot = rig.slot.clone();
+    slot.event(Event::Pull);
+    use_host(&mut rig, 60 * SECOND, |bus| {
+        let mut disk = Disk::attach(bus)?;
+        let done = disk.read(0, 8)?;
+        ensure!((done.status, done.data.len(), disk.sense()?.0) == (1, 0, 0x02), "{done:?}");
+        Ok(())
+    });
+    slot.event(Event::Insert(Model::new(Kind::Sdhc, rig.medium.clone())));
+    let first = rig.medium.get(0).to_vec();
+    use_host(&mut rig, 60 * SECOND, move |bus| {
+        let mut disk = Disk::attach(bus)?;
+        ensure!(disk.read(0, 1)?.status == 1 && disk.sense()? == (0x06, 0x28), "the change is not told");
+        ensure!(disk.read(0, 1)?.data == first, "the card is back");
+        Ok(())
+    });
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+}
+
+#[test]
+#[ignore = "ten minutes of a busy processor: `cargo xtask prove chip`"]
+fn without_a_host_the_board_records_again_after_ten_minutes() {
+    let (mut rig, resets) = reading();
+    let now = rig.machine.now();
+    rig.run(now + 590 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+    rig.run(now + 610 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets + 1, "{:?}", rig.machine.resets);
+}
