@@ -37,7 +37,7 @@ fn main() -> Result<(), String> {
 
 /// The board as a call of the macro in `src/boards/board.rs`, by the names of `embassy_stm32`.
 fn code(board: &Board) -> String {
-    let Board { name, crystal_hz, autopilot, radio, card, led, hold, .. } = board;
+    let Board { name, crystal_hz, autopilot, radio, card, led, button, hold, .. } = board;
     let port = |port: &Port| {
         let [rx, tx] = [channel(port.rx.dma), channel(port.tx.dma)];
         format!("{} {{ {} {} }} {{ {rx} {tx} }}", port.peripheral(), port.rx.pin, port.tx.pin)
@@ -47,6 +47,9 @@ fn code(board: &Board) -> String {
         || format!("pins {{ {pins} }}"),
         |bus| format!("SPI{} {{ {pins} }} {{ {} {} }}", bus.spi, channel(bus.tx), channel(bus.rx)),
     );
+    let button = button
+        .as_ref()
+        .map_or_else(String::new, |button| format!("{} {}", button.pin, level(button.pressed)));
     let held = |pins: &BTreeMap<Pin, String>| pins.keys().map(Pin::to_string).collect::<Vec<_>>().join(" ");
     let streams = board
         .streams()
@@ -59,20 +62,24 @@ fn code(board: &Board) -> String {
     let tag = format!("{}{name}{}", hums_boards::TAG, hums_boards::TAG_END);
     format!(
         "board! {{\n tag {tag:?} {skip} {end};\n crystal {crystal} DIV{divider};\n autopilot {autopilot};\n gs {gs};\n card {{ {card} }};\n \
-         led {led} {lit} {wait};\n high {{ {high} }} low {{ {low} }} pull {{ {pull} }}\n streams {{ {streams} }}\n}}\n",
+         led {led} {lit} {wait};\n button {{ {button} }};\n high {{ {high} }} low {{ {low} }} pull {{ {pull} }}\n streams {{ {streams} }}\n}}\n",
         skip = hums_boards::TAG.len(),
         end = hums_boards::TAG.len() + name.len(),
         divider = crystal_hz / PLL_INPUT_HZ,
         autopilot = port(autopilot),
         gs = port(radio),
         led = led.pin,
-        lit = if led.lit == Level::High { "High" } else { "Low" },
+        lit = level(led.lit),
         wait = led.pin.is_debug(),
         high = held(&hold.high),
         low = held(&hold.low),
         pull = held(&hold.pull_up),
         streams = streams.collect::<Vec<_>>().join(" "),
     )
+}
+
+fn level(level: Level) -> &'static str {
+    if level == Level::High { "High" } else { "Low" }
 }
 
 fn channel(stream: Stream) -> String {

@@ -11,6 +11,7 @@
 #![no_main]
 
 mod boards;
+mod card_reader;
 mod costs;
 mod exceptions;
 mod executors;
@@ -64,6 +65,19 @@ fn start() -> board::Idle {
     let boots = fault::count_start();
     let parts = board::take();
     log::log!(info, "start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
+
+    let is_button = parts.button && !parts.boot.cause.may_be_in_flight();
+    if card_reader::is_asked(parts.boot.cause) || is_button {
+        // Ports stay as they are: nothing reads them.
+        core::mem::forget((parts.autopilot, parts.gs));
+        card_reader::run(
+            parts.card,
+            parts.usb,
+            parts.led,
+            parts.boot.id,
+            tasks::storage::BUFFERS.take().blocks(),
+        );
+    }
 
     let queues = QUEUES.take().split();
     let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;

@@ -1,5 +1,7 @@
 //! Shared status of the tasks: written by one, read by any at any time.
 
+use core::sync::atomic::AtomicBool;
+
 use hums_onboard::{PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;
 
@@ -9,3 +11,7 @@ pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
 /// Counters of storage.
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();
+/// Monitor to storage: after the last sector the log ends.
+pub(crate) static LOG_ENDS: AtomicBool = AtomicBool::new(false);
+/// The log has ended, or no card is there.
+pub(crate) static LOG_ENDED: AtomicBool = AtomicBool::new(false);

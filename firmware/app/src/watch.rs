@@ -3,6 +3,9 @@
 //! A watchdog reset leaves no trace. So `SysTick`, the most urgent exception, counts the time since the last feeding. Before the
 //! timeout it leaves a note of the interrupted code with its registers, so it catches a hanging task of any urgency. Only code
 //! that masks all interrupts leaves no note; the next start reports that too.
+//!
+//! In card-reader mode `SysTick` itself feeds the watchdog for some time ([`allow`]): no task runs that could do so while the
+//! card's driver blocks.
 
 use core::arch::naked_asm;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -17,6 +20,14 @@ const NEVER: u32 = u32::MAX;
 
 /// Turns of `SysTick`.
 static SINCE_FED: AtomicU32 = AtomicU32::new(NEVER);
+/// Turns that `SysTick` itself feeds the watchdog for.
+static ALLOWED: AtomicU32 = AtomicU32::new(0);
+
+/// For this many turns without [`fed`] the watchdog is fed here.
+pub(crate) fn allow(turns: u32) {
+    ALLOWED.store(turns, Ordering::Relaxed);
+    fed();
+}
 
 pub(crate) fn fed() {
     let since = SINCE_FED.swap(0, Ordering::Relaxed);
@@ -41,7 +52,9 @@ extern "C" fn turn(interrupted: *const ExceptionFrame) {
     }
     let since = since.saturating_add(1).min(NEVER - 1);
     SINCE_FED.store(since, Ordering::Relaxed);
-    if since >= board::LATE_TURNS {
+    if since < ALLOWED.load(Ordering::Relaxed) {
+        board::feed_watchdog();
+    } else if since >= board::LATE_TURNS {
         fault::late(frame);
     }
 }

@@ -115,6 +115,8 @@ pub enum Reply {
     Preflight,
     /// Recording was stopped, as a text.
     Stopped,
+    /// The board restarts in card-reader mode, as a text.
+    CardReader,
     /// Logs are being erased, as a text.
     Erased,
     /// Text: the downloaded log has left the card.

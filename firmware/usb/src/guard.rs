@@ -16,7 +16,7 @@ use embassy_usb::driver::{
     self, Direction, EndpointAddress, EndpointAllocError, EndpointType, Event, Unsupported,
 };
 
-/// State that class, control requests and bus share. One static.
+/// State that class, control requests and bus share.
 pub struct Link {
     /// The host has reset class or bus: the command in work is over.
     pub(crate) abort: Signal<CriticalSectionRawMutex, ()>,

@@ -5,6 +5,7 @@
 
 use embassy_stm32::gpio::{self, Flex, Level, Output, Pin, Speed};
 use embassy_stm32::usart::Uart;
+use embassy_stm32::usb;
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, peripherals, rcc};
 use hums_recorder::SpiCard;
 use static_cell::ConstStaticCell;
@@ -16,8 +17,8 @@ use super::stm32f4::{
     random_number, reset_cause, start,
 };
 pub(crate) use super::stm32f4::{
-    Idle, LATE_TURNS, Led, PortRx, PortTx, StoreFlash, Watchdog, chip_is_wrong, crystal_failed,
-    crystal_is_wrong, restart,
+    Idle, LATE_TURNS, Led, PortRx, PortTx, StoreFlash, Watchdog, begin_with_data0, chip_is_wrong,
+    crystal_failed, crystal_is_wrong, feed_watchdog, restart,
 };
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
@@ -30,7 +31,10 @@ pub(crate) struct Parts {
     pub(crate) card: Card,
     /// Two sectors.
     pub(crate) store: Option<StoreFlash>,
+    pub(crate) usb: Usb,
     pub(crate) led: Led,
+    /// The button for the card reader was held at the start.
+    pub(crate) button: bool,
     pub(crate) watchdog: Watchdog,
     pub(crate) idle: Idle,
     pub(crate) boot: Boot,
@@ -38,6 +42,26 @@ pub(crate) struct Parts {
 
 /// Pins of the backup domain, which some boards select the card with, allow 2 MHz only (DS8626, table 7).
 const SELECT_SPEED: Speed = Speed::Low;
+
+/// A pull-up or pull-down of the chip charges a wire in this time: 1 ms.
+#[allow(dead_code, reason = "not every board has a button")]
+const PULL_CYCLES: u32 = 168_000;
+
+/// The USB port, which is off until it is used.
+pub(crate) struct Usb {
+    port: Peri<'static, peripherals::USB_OTG_FS>,
+    plus: Peri<'static, peripherals::PA12>,
+    minus: Peri<'static, peripherals::PA11>,
+}
+
+impl Usb {
+    /// The port's driver. `packets` is for one received packet of each endpoint.
+    pub(crate) fn driver(self, packets: &mut [u8]) -> usb::Driver<'_, peripherals::USB_OTG_FS> {
+        // Without the bus's voltage at PA9, which is a port's pin on most boards.
+        let config = usb::Config::default();
+        usb::Driver::new_fs(self.port, Irqs, self.plus, self.minus, packets, config)
+    }
+}
 
 /// A port's halves: `port!(parts, USART1 { rx pin, tx pin } { rx stream, tx stream } ...)`.
 macro_rules! port {
@@ -69,6 +93,19 @@ macro_rules! card {
     }};
 }
 
+/// Whether the board has a button, and it is pressed.
+macro_rules! button {
+    ($p:ident) => {
+        false
+    };
+    ($p:ident $pin:ident $pressed:ident) => {{
+        let idle = if bool::from(Level::$pressed) { gpio::Pull::Down } else { gpio::Pull::Up };
+        let pin = gpio::Input::new($p.$pin, idle);
+        cortex_m::asm::delay(PULL_CYCLES);
+        pin.get_level() == Level::$pressed
+    }};
+}
+
 macro_rules! board {
     (
         tag $tag:literal $skip:literal $end:literal;
@@ -77,6 +114,7 @@ macro_rules! board {
         gs $gs:ident $gs_pins:tt $gs_dma:tt;
         card { $($card:tt)* };
         led $led:ident $lit:ident $waits:literal;
+        button { $($button:tt)* };
         high { $($high:ident)* } low { $($low:ident)* } pull { $($pull:ident)* }
         streams { $($stream:ident $channel:ident)* }
     ) => {
@@ -89,7 +127,7 @@ macro_rules! board {
         /// The microSD card. Nothing less urgent runs while its driver waits for the card: only the least urgent task may use it.
         pub(crate) type Card = SpiCard<card!(type $($card)*)>;
 
-        bind_interrupts!(struct Irqs { $($stream => dma::InterruptHandler<peripherals::$channel>;)* });
+        bind_interrupts!(struct Irqs { $($stream => dma::InterruptHandler<peripherals::$channel>;)* OTG_FS => usb::InterruptHandler<peripherals::USB_OTG_FS>; });
 
         pub(crate) fn take() -> Parts {
             let (cause, cause_register) = reset_cause();
@@ -106,6 +144,8 @@ macro_rules! board {
                 gs,
                 card: Card::new(card!(p $($card)*)),
                 store: Some(StoreFlash::new()),
+                usb: Usb { port: p.USB_OTG_FS, plus: p.PA12, minus: p.PA11 },
+                button: button!(p $($button)*),
                 led: Led::new(Flex::new(p.$led), Level::$lit, $waits),
                 watchdog: Watchdog::new(),
                 idle: Idle(()),

@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Duration, Ticker, Timer};
+use hums_core::clock::Span;
 use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
 use hums_onboard::{Handover, ResetCause, Task};
@@ -13,18 +14,22 @@ use hums_recorder::CardState;
 use super::downlink::{AUTOPILOT_STOOD_STILL, BAUD_AUTOPILOT, BAUD_GS, GS_STOOD_STILL};
 use crate::boards::board;
 use crate::boards::machine::Boot;
+use crate::card_reader;
 use crate::costs::{self, Stage, measure};
 use crate::fault::{self, Fault};
 use crate::links::{self, now};
 use crate::log::log;
 use crate::memory;
-use crate::status::{CARD_STATUS, PORT_STATUS, SUPERVISOR};
+use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, PORT_STATUS, SUPERVISOR};
 use crate::watch;
 
 /// Ticks of one half of the LED's blinking while the card records: 0.5 s.
 const BLINK_RECORDING: u32 = 10;
 /// The same while it does not: 0.1 s.
 const BLINK_TROUBLE: u32 = 2;
+
+/// Longest time from the end of the record to the restart in card-reader mode. A card may stall for 2.5 s.
+const END_MAX: Span = Span::from_secs(5);
 
 /// Frames in a row before other tasks run: some 10 ms of work.
 const DRAINED_MAX: usize = 64;
@@ -75,6 +80,9 @@ pub(crate) async fn run(
                     });
                 }
                 tick(body, ends, handover);
+                if body.wants_card_reader(now()) {
+                    leave(body, ends, handover, &mut watchdog).await;
+                }
                 tell_board(body, ends, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);
                 led.set(lit(ticks));
@@ -95,6 +103,43 @@ pub(crate) async fn run(
             Timer::after(REST).await;
         }
     }
+}
+
+/// Ends the log, saves what the store keeps, and restarts in card-reader mode. A card that does not take the end in time is left
+/// as at a power cut.
+async fn leave(
+    body: &mut Monitoring<'static>,
+    ends: &mut Ends,
+    handover: &mut Handover<'static>,
+    watchdog: &mut board::Watchdog,
+) -> ! {
+    finish(body, ends);
+    let end = now() + END_MAX;
+    while now() < end {
+        let is_saved = save(body, handover);
+        if is_saved && LOG_ENDED.load(Ordering::Relaxed) {
+            break;
+        }
+        watchdog.feed();
+        watch::fed();
+        wake_others();
+        Timer::after(links::wait(TICK)).await;
+    }
+    card_reader::restart()
+}
+
+#[inline(never)]
+fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
+    body.finish(now(), &mut ends.sectors, &ends.gs);
+    LOG_ENDS.store(true, Ordering::Relaxed);
+}
+
+/// Hands over what the store keeps; whether that is all.
+#[inline(never)]
+fn save(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) -> bool {
+    let is_all = handover.finish(now(), body.monitor_mut());
+    body.save_signing(now(), handover);
+    is_all
 }
 
 /// The previous start's end, for record and ground station.

@@ -1,6 +1,8 @@
 //! Storage: writes sectors to the card and, between them, items to the store. It is the least urgent task, because the card's
 //! driver blocks the processor and may delay only idle.
 
+use core::sync::atomic::Ordering;
+
 use embassy_time::{Duration, Timer, with_timeout};
 use hums_core::clock::Instant;
 use hums_onboard::queues::SectorsOut;
@@ -10,7 +12,7 @@ use hums_onboard::{Service, Storage, StoreWriter, Task};
 use hums_recorder::Buffers;
 use static_cell::{ConstStaticCell, StaticCell};
 
-use crate::status::{CARD_STATUS, SUPERVISOR};
+use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, SUPERVISOR};
 
 use crate::boards::board;
 use crate::costs::{Stage, measure};
@@ -18,6 +20,9 @@ use crate::links::{self, now};
 
 /// Check-in interval while idle.
 const REPORT: Duration = Duration::from_secs(1);
+
+/// Period after the end of the log.
+const END_LOOK: Duration = Duration::from_millis(10);
 
 type Recording = Storage<'static, board::Card>;
 type Saving = &'static mut StoreWriter<'static, board::StoreFlash>;
@@ -32,7 +37,7 @@ pub(crate) struct Body {
 // SAFETY: `BUFFERS`, the only part that may not be shared, is lent to the one body.
 unsafe impl Send for Body {}
 
-static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
+pub(crate) static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 // In a static of its own: a task's arguments take their room twice.
 static BODY: StaticCell<Body> = StaticCell::new();
 
@@ -56,6 +61,12 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
         SUPERVISOR.report(Task::Storage, now());
         let service = service(body, now());
         keep(body);
+        if service != Service::Wrote && LOG_ENDS.load(Ordering::Relaxed) {
+            end(body);
+            // For items of the store.
+            Timer::after(END_LOOK).await;
+            continue;
+        }
         match service {
             Service::Wrote => {}
             Service::Idle if !body.sectors.is_empty() || serve(body) => {}
@@ -65,10 +76,19 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
     }
 }
 
-/// Returns when there is a sector or a question.
+/// Ends the log, once.
+#[inline(never)]
+fn end(body: &mut Body) {
+    if !LOG_ENDED.load(Ordering::Relaxed) {
+        body.storage.finish();
+        LOG_ENDED.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Returns when there is a sector or a question, or the log ends.
 async fn wait_for_work(body: &mut Body) {
     let mut asked = body.shelf.is_wanted();
-    while body.sectors.is_empty() && !asked {
+    while body.sectors.is_empty() && !asked && !LOG_ENDS.load(Ordering::Relaxed) {
         SUPERVISOR.report(Task::Storage, now());
         keep(body);
         let _ = with_timeout(REPORT, links::SECTORS.wait()).await;

@@ -2,6 +2,7 @@
 //!
 //! | `MAV_CMD` | does |
 //! |---|---|
+//! | 246 `PREFLIGHT_REBOOT_SHUTDOWN`, param 1 = 5 | ends the log and restarts in card-reader mode: while disarmed |
 //! | 401 `RUN_PREARM_CHECKS` | tells what stands against a flight; accepted when nothing does |
 //! | 512 `REQUEST_MESSAGE` | `HEARTBEAT`, `AUTOPILOT_VERSION`, `PROTOCOL_VERSION`, `COMPONENT_METADATA` |
 //! | 519, 520 | the same by their older commands |
@@ -12,7 +13,7 @@
 
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
-use hums_core::clock::Instant;
+use hums_core::clock::{Instant, Span};
 use hums_core::component::Label;
 use hums_core::health::{self, Level};
 use hums_core::observation::Feeds;
@@ -36,6 +37,11 @@ const CAPABILITIES: u16 = 520;
 /// `MAV_CMD_REQUEST_MESSAGE`
 pub(crate) const MESSAGE: u16 = 512;
 const PREFLIGHT: u16 = 401;
+const RESTART: u16 = 246;
+/// `REBOOT_SHUTDOWN_ACTION_REBOOT_TO_MASS_STORAGE`, as ArduPilot has it.
+const MASS_STORAGE: u32 = 5;
+/// From the command to the end of the log: time for our answer.
+const ANSWERED: Span = Span::from_millis(500);
 const RECORD: u16 = 2510;
 const STOP: u16 = 2511;
 const FORMAT: u16 = 526;
@@ -68,11 +74,13 @@ pub(crate) struct Commands {
     limits: [Limiter; 2],
     /// Recording is stopped by command.
     stopped: bool,
+    /// When a station asked for card-reader mode.
+    card_reader_asked: Option<Instant>,
 }
 
 impl Commands {
     pub(crate) const fn new() -> Self {
-        Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false }
+        Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false, card_reader_asked: None }
     }
 
     pub(crate) fn allows(&mut self, now: Instant, port: Port) -> bool {
@@ -81,6 +89,12 @@ impl Commands {
 
     pub(crate) const fn stopped(&self) -> bool {
         self.stopped
+    }
+
+    /// Whether the board is to restart in card-reader mode: our answer was sent, and the vehicle is still disarmed.
+    pub(crate) fn wants_card_reader(&mut self, now: Instant, is_armed: bool) -> bool {
+        self.card_reader_asked = self.card_reader_asked.filter(|_| !is_armed);
+        self.card_reader_asked.is_some_and(|asked| now.since(asked) >= ANSWERED)
     }
 
     /// Returns its `MAV_RESULT`.
@@ -110,7 +124,9 @@ impl Commands {
             (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
             // Likewise: the ground station's button without numbers must not reset the baselines.
             (REPLACED, 0) if params[0].to_bits() != 0 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
-            (RECORD | STOP | FORMAT | REPLACED | CANCEL, number) => {
+            // Other restarts are the autopilot's.
+            (RESTART, action) if action != MASS_STORAGE => UNSUPPORTED,
+            (RECORD | STOP | FORMAT | REPLACED | CANCEL | RESTART, number) => {
                 if !self.allows(now, asker.port) {
                     return TEMPORARILY_REJECTED;
                 }
@@ -135,8 +151,16 @@ impl Commands {
                 book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
                 if cancelled { ACCEPTED } else { FAILED }
             }
-            STOP | FORMAT | REPLACED if book.may_fly(now) => TEMPORARILY_REJECTED,
+            STOP | FORMAT | REPLACED | RESTART if book.may_fly(now) => TEMPORARILY_REJECTED,
             FORMAT => format(now, by, book, sectors),
+            RESTART => {
+                if self.card_reader_asked.is_none() {
+                    self.card_reader_asked = Some(now);
+                    book.journal.by_hand(now, format_args!("card reader by {}/{}", by.0, by.1), sectors);
+                    self.replies.push(asker.port, Reply::CardReader);
+                }
+                ACCEPTED
+            }
             REPLACED if number == 0 => {
                 book.journal.by_hand(now, format_args!("{PARTS_CHANGED} by {}/{}", by.0, by.1), sectors);
                 ACCEPTED
@@ -244,6 +268,9 @@ pub(crate) fn packet(now: Instant, reply: Reply, monitor: &Monitor, identity: &B
         }
         Reply::LogsUnread => {
             messages::status_text(Severity::Warning, "HUMS: card did not give all logs: list again")
+        }
+        Reply::CardReader => {
+            messages::status_text(Severity::Warning, "HUMS: card reader, nothing is recorded")
         }
         Reply::Stopped => messages::status_text(Severity::Warning, "HUMS: recording stopped by command"),
     }

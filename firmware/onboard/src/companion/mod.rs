@@ -94,6 +94,11 @@ impl Companion {
         self.commands.stopped()
     }
 
+    /// Whether the board is to restart in card-reader mode.
+    pub(crate) fn wants_card_reader(&mut self, now: Instant, monitor: &Monitor) -> bool {
+        self.commands.wants_card_reader(now, monitor.vehicle().armed())
+    }
+
     pub(crate) const fn passed_lost(&self) -> u32 {
         self.pass.lost
     }

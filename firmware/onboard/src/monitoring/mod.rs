@@ -294,6 +294,11 @@ impl<'a> Monitoring<'a> {
         sectors.with_reserve(|sink| self.book.journal.writer().finish(sink));
     }
 
+    /// Whether a station wants the card-reader mode. The board then calls [`Self::finish`], and restarts.
+    pub fn wants_card_reader(&mut self, now: Instant) -> bool {
+        self.companion.wants_card_reader(now, self.book.monitor)
+    }
+
     /// The monitor.
     pub const fn monitor(&self) -> &Monitor {
         self.book.monitor

@@ -9,6 +9,7 @@ mod random;
 mod reset;
 mod supply;
 mod time;
+mod usb;
 mod watchdog;
 
 use core::ptr;
@@ -25,7 +26,8 @@ pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
-pub(crate) use watchdog::Watchdog;
+pub(crate) use usb::begin_with_data0;
+pub(crate) use watchdog::{Watchdog, reload as feed_watchdog};
 
 use crate::boards::machine::SYSTICK_RELOAD;
 

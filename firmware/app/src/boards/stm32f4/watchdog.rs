@@ -29,7 +29,7 @@ pub(super) fn start() {
 const TRIES_MAX: u32 = 20_000;
 
 /// Restarts its time.
-pub(super) fn reload() {
+pub(crate) fn reload() {
     IWDG.kr().write(|w| w.set_key(Key::RESET));
 }
 

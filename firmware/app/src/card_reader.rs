@@ -1,0 +1,131 @@
+//! Card-reader mode: the card as a read-only USB disk. Nothing is recorded.
+//!
+//! The mode is a start of its own. A station's command ends the log, leaves a mark in memory that survives a reset, and resets the
+//! board. So no task of a recording runs beside USB, and its memory and stack are free. A fault, the watchdog, an eject or ten
+//! minutes without a host reset the board again: it then records. Plugging a cable in never starts the mode, because a charger in
+//! the field must not stop a recording.
+//!
+//! There is one loop, without an executor: it polls the USB stack and the disk. The card's driver blocks it for at most 8 s.
+//! Meanwhile [`watch`] feeds the watchdog.
+
+use core::future::poll_fn;
+use core::sync::atomic::{AtomicU32, Ordering};
+use core::task::Poll;
+
+use embassy_futures::block_on;
+use embassy_futures::select::select3;
+use hums_core::clock::{Instant, Span};
+use hums_onboard::ResetCause;
+use hums_recorder::Block;
+use hums_usb::class::{Control, MassStorage};
+use hums_usb::guard::{Guarded, Link};
+use hums_usb::scsi::{Disk, SERIAL_BYTES};
+use hums_usb::{Builder, Config, PACKET_BYTES};
+
+use crate::boards::board;
+use crate::links::now;
+use crate::watch;
+
+/// The mode ends after this time without a host.
+const HOST_MAX: Span = Span::from_secs(600);
+/// After an eject the host still fetches its status.
+const PARTING: Span = Span::from_secs(1);
+/// `SysTick` feeds the watchdog for this many turns without the loop: 10 s, of which the card's driver has 8.
+const LOOP_TURNS_MAX: u32 = 100;
+/// How often the LED's pin is set: a pin of the debug port is not the LED's at first.
+const LED_EVERY: Span = Span::from_millis(100);
+
+/// The test number of pid.codes: the project has none of its own.
+const VENDOR: u16 = 0x1209;
+const PRODUCT: u16 = 0x0001;
+
+/// Says that the mode was asked for.
+const MARK: u32 = 0x5553_4244;
+
+struct Asked {
+    mark: AtomicU32,
+    not_mark: AtomicU32,
+}
+
+#[unsafe(link_section = ".uninit.card_reader")]
+static ASKED: Asked = Asked { mark: AtomicU32::new(0), not_mark: AtomicU32::new(0) };
+
+/// Restarts the board in card-reader mode.
+pub(crate) fn restart() -> ! {
+    ASKED.mark.store(MARK, Ordering::Relaxed);
+    ASKED.not_mark.store(!MARK, Ordering::Relaxed);
+    board::restart()
+}
+
+/// Whether this start is the card reader's. True once for each [`restart`].
+pub(crate) fn is_asked(cause: ResetCause) -> bool {
+    let words = [&ASKED.mark, &ASKED.not_mark].map(|word| word.swap(0, Ordering::Relaxed));
+    // At another start memory may hold anything.
+    words == [MARK, !MARK] && cause == ResetCause::Software
+}
+
+/// The mode, until the board restarts. `buffer` is for blocks on their way.
+#[inline(never)]
+pub(crate) fn run(
+    card: board::Card,
+    usb: board::Usb,
+    led: board::Led,
+    id: [u8; 12],
+    buffer: &mut [Block],
+) -> ! {
+    watch::allow(LOOP_TURNS_MAX);
+    let link = Link::new();
+    let serial = digits(id);
+    let mut disk = Disk::new(card, serial);
+    // One packet of each endpoint: control and class.
+    let mut packets = [0; 2 * PACKET_BYTES];
+    let driver = Guarded::new(usb.driver(&mut packets), &link, board::begin_with_data0);
+    // Some hosts take the class from the interface only.
+    let mut config = Config::new(VENDOR, PRODUCT);
+    (config.device_class, config.device_sub_class, config.device_protocol) = (0, 0, 0);
+    config.composite_with_iads = false;
+    config.self_powered = true;
+    config.manufacturer = Some("HUMS");
+    config.product = Some("HUMS card reader");
+    config.serial_number = core::str::from_utf8(&serial).ok();
+    let (mut descriptor, mut bos, mut control_data) = ([0; 64], [0; 16], [0; 64]);
+    let mut control = Control::new(&link);
+    let mut builder = Builder::new(driver, config, &mut descriptor, &mut bos, &mut [], &mut control_data);
+    let mut class = MassStorage::new(&mut builder, &mut control);
+    let mut device = builder.build();
+    let serve = async {
+        class.run(&mut disk, buffer).await;
+        let end = now() + PARTING;
+        poll_fn(|_| if now() < end { Poll::Pending } else { Poll::Ready(()) }).await;
+    };
+    block_on(select3(device.run(), serve, supervise(led, &link)));
+    board::restart()
+}
+
+/// Reports to the watch, lights the LED, and ends when no host was there for long enough.
+async fn supervise(mut led: board::Led, link: &Link) {
+    let (mut seen, mut lit) = (now(), Instant::ZERO);
+    poll_fn(|_| {
+        watch::fed();
+        let now = now();
+        if now.since(lit) >= LED_EVERY {
+            lit = now;
+            led.set(true);
+        }
+        if link.has_host() {
+            seen = now;
+        }
+        if now.since(seen) < HOST_MAX { Poll::Pending } else { Poll::Ready(()) }
+    })
+    .await;
+}
+
+/// The chip's unique id in hexadecimal, as the class wants a serial number (BOT, 4.1.1).
+fn digits(id: [u8; 12]) -> [u8; SERIAL_BYTES] {
+    let mut digits = [0; SERIAL_BYTES];
+    let nibbles = id.into_iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    for (digit, nibble) in digits.iter_mut().zip(nibbles) {
+        *digit = if nibble < 10 { b'0' + nibble } else { b'A' + nibble - 10 };
+    }
+    digits
+}
