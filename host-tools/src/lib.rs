@@ -75,6 +75,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
             BoxAction::Pull(args) => talk::pull::run(args),
             BoxAction::Params(args) => talk::params::run(args),
             BoxAction::Replaced(args) => talk::replaced::run(args),
+            BoxAction::CardReader(args) => talk::card_reader::run(args),
             BoxAction::FormatCard(args) => talk::format::run(args),
         },
         Command::Completions(args) => shell::completions(args),

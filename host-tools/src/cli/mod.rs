@@ -14,7 +14,9 @@ pub use live::Live;
 pub use read::{Decode, Due, Info, Report, Share, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
-pub use talk::{Around, BoxAction, BoxArgs, FormatCard, Link, Params, ParamsAction, Pull, Replaced};
+pub use talk::{
+    Around, BoxAction, BoxArgs, CardReader, FormatCard, Link, Params, ParamsAction, Pull, Replaced,
+};
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
 

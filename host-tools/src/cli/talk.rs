@@ -1,4 +1,4 @@
-//! The commands that talk with the board: `hums box pull`, `hums box params`, `hums box format-card`.
+//! The commands that talk with the board: `hums box pull`, `hums box params`, `hums box card-reader`, `hums box format-card`.
 
 use std::path::PathBuf;
 
@@ -15,6 +15,7 @@ const BOX_EXAMPLES: &str = "Examples:
   hums box pull --link serial:/dev/ttyUSB0:57600 -o logs
   hums box params list --link serial:/dev/ttyUSB0:57600
   hums box replaced motor 3 --serial 4711 --link serial:/dev/ttyUSB0:57600
+  hums box card-reader --link serial:/dev/ttyUSB0:57600
   hums box format-card --yes --link serial:/dev/ttyUSB0:57600";
 
 /// `hums box`
@@ -35,6 +36,8 @@ pub enum BoxAction {
     Params(Params),
     /// Say that a part was replaced: over the link, or by a file on the card
     Replaced(Replaced),
+    /// Have the board show its card to a PC as a read-only USB disk
+    CardReader(CardReader),
     /// Have the board format a card that it cannot record on
     FormatCard(FormatCard),
 }
@@ -262,6 +265,25 @@ pub struct FormatCard {
     /// Yes, everything on the card may be lost
     #[arg(long)]
     pub yes: bool,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+const CARD_READER_EXAMPLES: &str = "Examples:
+  hums box card-reader --link serial:/dev/ttyUSB0:57600
+  hums box card-reader --link udpin:0.0.0.0:14550
+
+Only while the vehicle is disarmed. The board ends its log and restarts as a USB disk that cannot be written. It records again
+after the disk is ejected, after power is switched, and after 10 minutes without a PC.";
+
+/// `hums box card-reader`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = CARD_READER_EXAMPLES)]
+pub struct CardReader {
+    /// The address of the board.
+    #[command(flatten)]
+    pub at: Link,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,

@@ -1,5 +1,6 @@
 //! Talking with a board like a ground station.
 
+pub mod card_reader;
 pub mod format;
 pub mod params;
 pub mod pull;

@@ -1,0 +1,95 @@
+//! `hums box card-reader`: the board restarts as a USB card reader.
+
+use std::time::Duration;
+
+use anyhow::{Context as _, Result, bail};
+use hums_link::messages;
+use hums_link::packet::Fields;
+use serde::Serialize;
+
+use super::{Client, is_for_us};
+use crate::cli;
+use crate::mavlink::ids::COMMAND_ACK;
+use crate::outcome::Outcome;
+use crate::output::{self, Schema};
+
+/// `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`
+const RESTART: u16 = 246;
+/// `REBOOT_SHUTDOWN_ACTION_REBOOT_TO_MASS_STORAGE`
+const MASS_STORAGE: f32 = 5.0;
+const ANSWER: Duration = Duration::from_millis(400);
+/// The board restarts half a second after its answer, which may be lost.
+const TRIES: usize = 3;
+
+/// Output of `hums box card-reader --json`.
+const SCHEMA: Schema = Schema::first("hums-card-reader");
+
+#[derive(Debug, Serialize)]
+struct CardReaderJson {
+    system: u8,
+    restarts: bool,
+}
+
+/// Runs `hums box card-reader`.
+pub fn run(args: &cli::CardReader) -> Result<Outcome> {
+    let mut client = Client::connect_alone(&args.at)?;
+    let system = client.system();
+    tell(&mut client).with_context(|| format!("system {system}"))?;
+    if args.json {
+        output::json(SCHEMA, &CardReaderJson { system, restarts: true })?;
+    } else {
+        output::line(&format!(
+            "system {system}: restarts as a card reader and records nothing until the disk is ejected, power is switched, or no PC \
+             was there for 10 minutes"
+        ))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// Tells the board, and waits for its answer.
+fn tell(client: &mut Client) -> Result<()> {
+    let (system, component) = client.target();
+    let packet = messages::command_long(RESTART, &[MASS_STORAGE], system, component);
+    let answer = client.ask(&packet, ANSWER, TRIES, |frame| {
+        let fields = Fields(frame.payload());
+        let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == RESTART;
+        (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
+    })?;
+    match answer.context("no answer; look whether the PC has a new disk, otherwise say this again")? {
+        0 => Ok(()),
+        1 => bail!("not now: the vehicle is armed, or too much was asked of the board at once"),
+        2 => bail!("the board refused: the command is not signed as GS_SIGN asks"),
+        3 => bail!("the board has no card reader; is its firmware as new as this program?"),
+        result => bail!("the board refused (MAV_RESULT {result})"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::messages::command_ack;
+
+    use super::*;
+    use crate::talk::tests::fake::found;
+
+    #[test]
+    fn the_board_is_told_once_more_and_its_refusal_is_said() {
+        let mut asked = 0;
+        let mut client = found(&[1], move |frame| {
+            let fields = Fields(frame.payload());
+            if (frame.id(), fields.u16(28), fields.f32(0).to_bits()) != (76, RESTART, MASS_STORAGE.to_bits())
+            {
+                return Vec::new();
+            }
+            asked += 1;
+            // The first answer is lost.
+            if asked == 1 { Vec::new() } else { vec![(1, command_ack(RESTART, 0, 255, 190))] }
+        });
+        tell(&mut client).expect("accepted");
+        let refusals = [(1, "armed"), (2, "GS_SIGN"), (3, "no card reader"), (9, "MAV_RESULT 9")];
+        for (result, wanted) in refusals {
+            let mut client = found(&[1], move |_| vec![(1, command_ack(RESTART, result, 255, 190))]);
+            let error = tell(&mut client).expect_err("refused").to_string();
+            assert!(error.contains(wanted), "{error}");
+        }
+    }
+}
