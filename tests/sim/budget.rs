@@ -8,6 +8,7 @@ use hums::card::{Faults, SimCard, image};
 use hums::endpoint::Endpoint;
 use hums::run::sim::both_ports::{Board, Outcome, Side, run};
 use hums::source::{self, Chunk, Timing};
+use hums_core::health::Level;
 use hums_core::params::Params;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::{Fields, Packet};
@@ -154,8 +155,8 @@ fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is(
         let critical: Vec<u64> = outcome
             .findings
             .iter()
-            .filter(|finding| finding.level == "critical")
-            .map(|finding| (finding.time_s * 1e6) as u64)
+            .filter(|finding| finding.level == Level::Critical)
+            .map(|finding| finding.at.as_micros())
             .collect();
         // An explained finding has none.
         assert!(texts.len() <= critical.len(), "{}", recording.display());

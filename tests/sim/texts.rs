@@ -7,7 +7,7 @@ use hums::card::{Faults, SimCard, image};
 use hums::endpoint::Endpoint;
 use hums::run::sim::both_ports::{Board, Side, run};
 use hums::source::{self, Chunk, Timing};
-use hums_core::health::{self, Subsystem};
+use hums_core::health::{self, Level, Subsystem};
 use hums_core::params::Params;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame};
@@ -58,8 +58,8 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
             said.push(Said { at_s: at_us as f64 / 1e6, severity: fields.u8(0), text });
         }
     });
-    let critical = outcome.unwrap().findings.into_iter().filter(|finding| finding.level == "critical");
-    (said, critical.map(|finding| finding.time_s).collect())
+    let critical = outcome.unwrap().findings.into_iter().filter(|finding| finding.level == Level::Critical);
+    (said, critical.map(|finding| finding.at.as_micros() as f64 / 1e6).collect())
 }
 
 /// Attitude belongs to the motors.
