@@ -59,7 +59,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
         }
     });
     let critical = outcome.unwrap().findings.into_iter().filter(|finding| finding.level == Level::Critical);
-    (said, critical.map(|finding| finding.at.as_micros() as f64 / 1e6).collect())
+    (said, critical.map(|finding| finding.at.as_secs_f64()).collect())
 }
 
 /// Attitude belongs to the motors.

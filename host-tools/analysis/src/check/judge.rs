@@ -29,7 +29,7 @@ use super::details::{self, Details};
 use super::flights::{Flight, Flights, begin_in_air, is_in_air};
 use super::judged::{BoxAir, Holes, Judged, JudgedBy};
 use super::link_loss::{LinkLoss, Verdict};
-use super::problem::{IMPACT, LISTED_MAX, Problems, give_worst};
+use super::problem::{IMPACT, LISTED_MAX, Problems};
 use super::trends::{self, Episode, Flown};
 use crate::names::vocabulary;
 use crate::part;
@@ -253,18 +253,7 @@ impl Judge {
             Item::Fact(fact) => {
                 self.facts.insert(fact.about, fact.words.to_owned());
             }
-            Item::Record(record) => {
-                self.recorded_to = self.recorded_to.max(at);
-                if trends::is_change(record) {
-                    self.episodes.push(Episode::Changed);
-                }
-                if let Record::Usage(usage) = record {
-                    self.box_counted(at, usage);
-                }
-                if let Some(told) = Told::of(record) {
-                    self.told(&told);
-                }
-            }
+            Item::Record(record) => self.record(at, record),
             Item::Gap(gap) => self.gap(gap),
             Item::Restart => self.restart(at),
             Item::Joint => self.joint(at),
@@ -390,6 +379,19 @@ impl Judge {
     fn tell(&mut self, check: &str) {
         self.details.tell(check, &mut self.here);
         self.details.tell(check, &mut self.board);
+    }
+
+    fn record(&mut self, at: Instant, record: &Record<'_>) {
+        self.recorded_to = self.recorded_to.max(at);
+        if trends::is_change(record) {
+            self.episodes.push(Episode::Changed);
+        }
+        if let Record::Usage(usage) = record {
+            self.box_counted(at, usage);
+        }
+        if let Some(told) = Told::of(record) {
+            self.told(&told);
+        }
     }
 
     /// Takes the box's own count of the time in the air.
@@ -711,12 +713,7 @@ impl Judge {
             JudgedBy::Here => (self.here, self.last, self.clock.behind()),
         };
         problems.end(end, behind);
-        let findings_count = problems.findings_count;
-        let mut findings = std::mem::take(&mut problems.findings);
-        // Impacts come after the vehicle lies still.
-        findings.sort_by_key(|finding| finding.at);
-        let worst_first = problems.worst_first();
-        give_worst(&mut findings, &worst_first);
+        let (findings_count, findings, worst_first) = problems.all();
         let (judged, not_judged) = self.coverage.lists(&Recording {
             by,
             monitor: &self.monitor,

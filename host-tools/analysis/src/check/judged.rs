@@ -9,7 +9,7 @@ use hums_core::vehicle::Vehicle;
 
 use super::coverage::OFF;
 use super::flights::{Flight, begin_in_air};
-use super::problem::{LISTED_MAX, Problem, Problems, give_worst, rank, worst_first};
+use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
 use super::trends::{Baselines, Episode, because};
 use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
@@ -168,10 +168,8 @@ impl Judged {
             let new = judged.iter().filter(|check| !self.judged.contains(check)).copied();
             self.judged.extend(new.collect::<BTreeSet<_>>());
         }
-        let mut findings = std::mem::take(&mut trends.findings);
-        self.findings_count += trends.findings_count;
-        let trends = trends.worst_first();
-        give_worst(&mut findings, &trends);
+        let (count, mut findings, trends) = trends.all();
+        self.findings_count += count;
         self.findings.append(&mut findings);
         self.findings.sort_by_key(|finding| finding.at);
         for problem in &trends {

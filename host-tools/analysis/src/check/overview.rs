@@ -84,11 +84,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
         let marks = &overview.ending.summary.marks;
         let breaks_off = marks.moved.is_some() || marks.took_off == Some(true);
         if is_checked {
-            let contents = &mut overview.contents;
-            let peaks = contents.exceedances.iter();
-            let peaks = peaks.map(|((check, part), line)| (check.as_str(), *part, line.session.peak));
-            let problems = problems(&contents.findings, true, peaks);
-            give_worst(&mut contents.findings, &problems);
+            peaks(&mut overview.contents);
         }
         let contents = &overview.contents;
         if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
@@ -138,6 +134,14 @@ pub fn overview(place: &Place) -> Result<Overview> {
         bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
     })
+}
+
+/// Gives findings of a box the worst values that it recorded.
+fn peaks(contents: &mut Contents) {
+    let peaks = contents.exceedances.iter();
+    let peaks = peaks.map(|((check, part), line)| (check.as_str(), *part, line.session.peak));
+    let problems = problems(&contents.findings, true, peaks);
+    give_worst(&mut contents.findings, &problems);
 }
 
 /// Lists the systems that are there.

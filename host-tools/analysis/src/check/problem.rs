@@ -309,6 +309,16 @@ impl Problems {
         }
     }
 
+    /// The number of findings, the findings in order of time, and the problems, worst first.
+    pub(super) fn all(mut self) -> (u64, Vec<Finding>, Vec<Problem>) {
+        let (count, mut findings) = (self.findings_count, std::mem::take(&mut self.findings));
+        // An impact is reported after the vehicle lies still.
+        findings.sort_by_key(|finding| finding.at);
+        let problems = self.worst_first();
+        give_worst(&mut findings, &problems);
+        (count, findings, problems)
+    }
+
     /// Problems by [`Problem::order`] within a level.
     pub(super) fn worst_first(self) -> Vec<Problem> {
         let mut problems: Vec<_> = self
@@ -338,8 +348,12 @@ pub fn problems<'a>(
     peaks: impl IntoIterator<Item = (&'a str, u8, f32)>,
 ) -> Vec<Problem> {
     let mut problems = if of_box { Problems::of_box() } else { Problems::default() };
-    findings.iter().for_each(|finding| problems.take(finding, Span::ZERO));
-    peaks.into_iter().for_each(|(check, instance, value)| problems.peak(check, instance, value));
+    for finding in findings {
+        problems.take(finding, Span::ZERO);
+    }
+    for (check, instance, value) in peaks {
+        problems.peak(check, instance, value);
+    }
     problems.worst_first()
 }
 
