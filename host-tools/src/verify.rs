@@ -76,17 +76,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         if let Some(list) = &mut list {
             return list.element(&log);
         }
-        let files = overview.ending.files.join(", ");
-        output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
-        print(&log.checks)?;
-        let lacks = overview.soundness().words();
-        if !lacks.is_empty() {
-            output::line(&format!("  state    {}", warning(lacks)))?;
-        }
-        for words in came_damaged(&overview.contents).into_iter().chain(overview.ending.aside()) {
-            output::line(&format!("  {}", word(&words)))?;
-        }
-        Ok(())
+        print_log(&log, overview)
     })?;
     if !ok || failed > 0 {
         all.worst = Verdict::NotProved;
@@ -215,6 +205,21 @@ pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
         failed.push(("log", log.faults().join("; ")));
     }
     failed
+}
+
+/// A session, its checks and its state.
+fn print_log(log: &LogJson, overview: &Overview) -> Result<()> {
+    let files = overview.ending.files.join(", ");
+    output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
+    print(&log.checks)?;
+    let lacks = overview.soundness().words();
+    if !lacks.is_empty() {
+        output::line(&format!("  state    {}", warning(lacks)))?;
+    }
+    for words in came_damaged(&overview.contents).into_iter().chain(overview.ending.aside()) {
+        output::line(&format!("  {}", word(&words)))?;
+    }
+    Ok(())
 }
 
 fn print(checks: &[Check]) -> Result<()> {

@@ -1,5 +1,6 @@
 //! `hums check`: one verdict from every kind of recording.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
@@ -925,7 +926,8 @@ fn a_page_has_the_spectrum_of_vibration_where_the_log_has_the_rate() {
         for place in 0..rate_hz * 4 {
             let second = f64::from(place) / f64::from(rate_hz);
             let shaking = (std::f64::consts::TAU * 40.0 * second).sin();
-            log += &format!("IMU, {}, 0, 0, 0.1, 0, {shaking}, -9.8\n", (second * 1e6) as u64);
+            let time_us = (second * 1e6) as u64;
+            let _ = writeln!(log, "IMU, {time_us}, 0, 0, 0.1, 0, {shaking}, -9.8");
         }
         fs::write(dir.path().join(format!("{name}.log")), log).expect("written");
         run(dir.path(), &format!("report {name}.log"), 0);
