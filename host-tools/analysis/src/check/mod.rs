@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 
 pub use clock::SETTLE;
-pub use overview::overview;
+pub use overview::{overview, overview_telling};
 
 use crate::ending::Ending;
 use crate::followed::{EndResolver, HasEnding};

@@ -22,7 +22,7 @@ use crate::logs::reader;
 use crate::names::counter_name;
 use crate::outcome::usage;
 use crate::progress;
-use crate::source::item::{Gap, Item, Summary, Want};
+use crate::source::item::{Gap, Item, Summary, Take, Want};
 use crate::source::recording::{Format, Place};
 use crate::summary::{Contents, ExceedanceLine, Overview};
 
@@ -46,6 +46,17 @@ pub(super) struct Read {
 
 /// `shows`: progress.
 pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
+    judge_telling(place, limits, heard, shows, &mut |_, _| Ok(()))
+}
+
+/// Judges a recording, and hands on its content in order.
+fn judge_telling(
+    place: &Place,
+    limits: &Limits,
+    heard: Heard,
+    shows: bool,
+    take: &mut Take<'_>,
+) -> Result<Read> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
@@ -57,7 +68,7 @@ pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -
         if items.is_multiple_of(LOOK_EVERY) {
             bar.set_position(progress.taken());
         }
-        Ok(())
+        take(at, item)
     })?;
     bar.finish_and_clear();
     Ok(Read { format, judged: judge.end(), summary, taken: progress.taken() })
@@ -65,18 +76,34 @@ pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -
 
 /// Checked here if no monitor did.
 pub fn overview(place: &Place) -> Result<Overview> {
+    read(place, None).map(|(overview, _)| overview)
+}
+
+/// The same, and hands on the recording's content in order: one reading for both. Returns the judgement too, if the monitor
+/// here checked the recording.
+pub fn overview_telling(place: &Place, take: &mut Take<'_>) -> Result<(Overview, Option<Judged>)> {
+    read(place, Some(take))
+}
+
+fn read(place: &Place, mut take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
     let limits = Limits::default();
+    let is_told = take.is_some();
     if let Some(log) = place.own() {
         // A monitor ran: not judged here.
         let has_start = has_start(log);
         let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
-        let mut overview = match &mut here {
-            Some(here) => Overview::told(log, place.system, &mut |at, item| {
-                here.item(at, item);
-                Ok(())
-            })?,
-            None => Overview::of(log)?,
+        let mut overview = if here.is_none() && !is_told {
+            Overview::of(log)?
+        } else {
+            Overview::told(log, place.system, &mut |at, item| {
+                if let Some(here) = &mut here {
+                    here.item(at, item);
+                }
+                take.as_mut().map_or(Ok(()), |take| take(at, item))
+            })?
         };
+        let here = here.map(Judge::end);
+        let kept = here.clone().filter(|_| is_told);
         overview.ending.name.clone_from(&place.name);
         let contents = &overview.contents;
         let (is_checked, is_little) = (contents.is_checked(), contents.messages.len() < FEW_KINDS);
@@ -89,7 +116,7 @@ pub fn overview(place: &Place) -> Result<Overview> {
         let contents = &overview.contents;
         if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
             let judged = match here {
-                Some(here) => here.end(),
+                Some(here) => here,
                 None => judge(place, &limits, Heard::Somewhere, true)?.judged,
             };
             if is_checked && breaks_off {
@@ -102,9 +129,12 @@ pub fn overview(place: &Place) -> Result<Overview> {
                 look(&mut overview.contents, &judged);
             }
         }
-        return Ok(overview);
+        return Ok((overview, kept));
     }
-    let Read { format, judged, summary, taken } = judge(place, &limits, Heard::Somewhere, true)?;
+    let mut nothing = |_, _: Item<'_>| Ok(());
+    let take = take.unwrap_or(&mut nothing);
+    let Read { format, judged, summary, taken } =
+        judge_telling(place, &limits, Heard::Somewhere, true, take)?;
     is_heard(place, judged.vehicle().source.is_some())?;
     let mut contents = Contents {
         messages: summary.messages,
@@ -126,14 +156,16 @@ pub fn overview(place: &Place) -> Result<Overview> {
         ..reader::Summary::default()
     };
     let (name, files) = (place.name.clone(), vec![place.title.clone()]);
+    let kept = is_told.then(|| judged.clone());
     fill(&mut contents, judged);
-    Ok(Overview {
+    let overview = Overview {
         ending: Ending { name, files, summary, ..Ending::default() },
         format: Some(format),
         epochs,
         bytes_on_card: if place.is_standard() { taken } else { place.bytes() },
         contents,
-    })
+    };
+    Ok((overview, kept))
 }
 
 /// Gives findings of a box the worst values that it recorded.

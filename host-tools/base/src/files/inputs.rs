@@ -40,11 +40,13 @@ impl Inputs {
         self
     }
 
-    pub(super) fn may_replace(&self) -> bool {
+    /// Whether outputs may replace files.
+    pub fn may_replace(&self) -> bool {
         self.force == Some(true)
     }
 
-    pub(super) const fn can_replace(&self) -> bool {
+    /// Whether the command has a flag with which they may.
+    pub const fn can_replace(&self) -> bool {
         self.force.is_some()
     }
 
