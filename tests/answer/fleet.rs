@@ -1,5 +1,6 @@
 //! A folder of cards as one table: the queries of `docs/fleet.md` return the content of the cards.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -130,14 +131,51 @@ fn the_documents_queries_answer_what_the_cards_say() {
     );
     assert_eq!(printed[1].matches("('").count(), 4, "a row for each session with attitudes: {}", printed[1]);
 
+    let printed = oracle::snippets(&root().join("docs/fleet.md"), dir.path());
+    let printed: Vec<&str> = printed.as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let flown: f64 = logs.iter().filter_map(|log| log["usage"]["flight_time_s"].as_f64()).sum();
+    let [printed] = printed.as_slice() else { panic!("{printed:?}") };
+    let sum: f64 = printed.trim().rsplit(' ').next().unwrap().parse().unwrap();
+    assert!((sum - flown).abs() < 0.1 && flown > 600.0, "{printed}: {flown} s");
+
     let recorders = rows(&results, "How the recorders did");
     let frames: u64 = recorders.iter().map(|row| row["frames_in"].as_u64().unwrap()).sum();
     let expected: u64 = on_board().map(|log| log["frames"].as_u64().unwrap()).sum();
     assert_eq!(frames, expected);
 }
 
+/// The summary says the same as the tables of records.
 #[track_caller]
 fn assert_all_are_told(results: &Value, logs: &[Value]) {
+    assert_eq!(rows(results, "Sessions and their checks"), rows(results, "Who was checked"));
+    // The summary has the counters of recordings without a box, too.
+    let ran: f64 = logs.iter().filter_map(|log| log["usage"]["motor0_run_time_s"].as_f64()).sum();
+    let first_motor = rows(results, "Hours by motor").into_iter().filter(|row| row["motor"] == 1);
+    let hours: f64 = first_motor.filter_map(|row| row["hours"].as_f64()).sum();
+    assert!((hours * 3600.0 - ran).abs() < 1.0, "motor 1 ran {hours} h, by info {ran} s");
+    let frames = |heading| -> Vec<Value> {
+        let count = |row: &Value| serde_json::json!([row["session"], row["frames_in"], row["frames_lost"]]);
+        rows(results, heading).iter().map(count).collect()
+    };
+    assert_eq!(frames("Recorders"), frames("How the recorders did"));
+    let sum = |heading, column: &str| {
+        rows(results, heading).iter().filter_map(|row| row[column].as_f64()).sum::<f64>()
+    };
+    let flights: usize = logs.iter().map(|log| log["flights"].as_array().unwrap().len()).sum();
+    assert_eq!(sum("Hours and flights by vehicle", "sessions"), logs.len() as f64);
+    assert_eq!(sum("Hours and flights by vehicle", "flights"), flights as f64);
+    let attention = rows(results, "What needs attention");
+    let problems = rows(results, "Problems of the fleet");
+    let key = |row: &Value| format!("{} {} {}", row["session"], row["check"], row["instance"]);
+    let keys = |rows: &[Value]| rows.iter().map(key).collect::<BTreeSet<_>>();
+    assert_eq!(keys(&problems), keys(&attention));
+    let of_battery = |heading| rows(results, heading).len();
+    assert_eq!(of_battery("Batteries by session"), of_battery("Battery ageing"));
+    let worst =
+        |heading| rows(results, heading).iter().filter_map(|row| row["worst"].as_f64()).fold(0.0, f64::max);
+    let shaken = worst("Vehicles that shake more than others");
+    assert!((shaken - worst("Worst vibration by airframe")).abs() < 0.1, "{shaken}");
+    assert!(!rows(results, "One vehicle").is_empty() && rows(results, "Parts that are due").is_empty());
     let mut checked: Vec<(String, String, u64)> = rows(results, "Who was checked").iter().map(told).collect();
     let mut expected: Vec<(String, String, u64)> = logs
         .iter()
@@ -162,5 +200,7 @@ fn word(value: &Value) -> String {
 
 /// A session, the source of its checks, and its number of findings.
 fn told(row: &Value) -> (String, String, u64) {
-    (word(&row["session"]), word(&row["checked_by"]), row["findings"].as_u64().unwrap())
+    let session = word(&row["session"]);
+    let short = session.split_once('-').expect("a unique name").0;
+    (short.to_owned(), word(&row["checked_by"]), row["findings"].as_u64().unwrap())
 }

@@ -22,7 +22,7 @@ def main():
     os.chdir(sys.argv[2])
     results, heading = [], ""
     connection = duckdb.connect()
-    for found in re.finditer(r"^## ([^\n]+)$|^```sql\n(.*?)^```", document, re.MULTILINE | re.DOTALL):
+    for found in re.finditer(r"^##+ ([^\n]+)$|^```sql\n(.*?)^```", document, re.MULTILINE | re.DOTALL):
         if found.group(1):
             heading = found.group(1)
             continue

@@ -384,12 +384,12 @@ def main():
         })
     folder = sys.argv[3]
     one = lambda pattern: next(iter(glob.glob(os.path.join(folder, pattern))))
-    parquet = glob.glob(os.path.join(folder, "vehicle=*/date=*/session=*/*.parquet"))
+    parquet = glob.glob(os.path.join(folder, "*/date=*/bucket=*/*.parquet"))
     out = {
         "tables": os.path.dirname(one("*/HEARTBEAT.csv")),
         "jsonl": one("*.jsonl"),
         "influx": one("*.lp"),
-        "parquet": {os.path.basename(path).removesuffix(".parquet"): path for path in parquet},
+        "parquet": {path.split(os.sep)[-4]: path for path in parquet},
     }
     comparison = Comparison(arrival)
     compare_csv(out, expected, comparison)

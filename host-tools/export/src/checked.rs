@@ -7,7 +7,9 @@ use hums_core::health::Level;
 
 use super::row::{Cell, CellType, Row};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
+use crate::check::problem::{Problem, problems};
 use crate::source::told::Finding;
+use crate::summary::Contents;
 
 /// Word for the monitor on board, as `checked_by` in `hums info --json`.
 pub const BOARD: &str = "board";
@@ -140,6 +142,30 @@ pub fn finding_row(finding: &Finding, by: &str) -> Row {
             ("checked_by", text(by)),
         ],
     )
+}
+
+/// The problems of a log, worst first, with their worst values.
+pub(crate) fn problems_of(contents: &Contents) -> Vec<Problem> {
+    let peaks = contents.exceedances.iter();
+    let peaks = peaks.map(|((check, instance), line)| (check.as_str(), *instance, line.session.peak));
+    problems(&contents.findings, contents.checked_by() == "board", peaks)
+}
+
+/// A problem in words, as [`finding_words`].
+pub fn problem_words(problem: &Problem) -> String {
+    let Problem { check, instance, level, value, limit, unit, subsystem, at, .. } = problem;
+    finding_words(&Finding {
+        at: *at,
+        subsystem: *subsystem,
+        check: check.clone(),
+        instance: *instance,
+        level: *level,
+        previous: Level::Ok,
+        value: *value,
+        worst: None,
+        limit: *limit,
+        unit: unit.clone(),
+    })
 }
 
 /// A finding in words: `cell_voltage 1 critical: 3.4 V (limit 3.5 V)`.

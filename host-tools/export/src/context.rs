@@ -1,10 +1,13 @@
 //! The request, and the context common to all parts of a log's decoding.
 
+use std::sync::Arc;
+
 use super::checked::Checked;
 use super::findings::Findings;
-use super::format::{About, Files, Format, Part, Way};
+use super::fleet::Fleet;
+use super::format::{self, Files, Format, Part, Way};
 use super::formats::influx::Tags;
-use super::identity::Identity;
+use super::identity::{About, Identity};
 use super::native::Tables;
 use super::selection::Selection;
 use crate::files::Inputs;
@@ -26,12 +29,12 @@ impl Formats {
     }
 
     /// Their descriptions.
-    pub fn about(&self) -> impl Iterator<Item = &'static About> {
+    pub fn about(&self) -> impl Iterator<Item = &'static format::About> {
         self.formats.iter().map(|format| &format.about)
     }
 
     /// Those that are made in parts.
-    pub fn ways(&self) -> impl Iterator<Item = (&'static About, &'static Way)> {
+    pub fn ways(&self) -> impl Iterator<Item = (&'static format::About, &'static Way)> {
         self.formats.iter().map(|format| (&format.about, &format.way))
     }
 
@@ -70,6 +73,10 @@ pub struct Context {
     pub selection: Selection,
     /// Vehicle and date, if a format needs them.
     pub identity: Identity,
+    /// The content of the recording, if a format needs the identity.
+    pub about: Option<About>,
+    /// The tables of all sessions in the output's folder.
+    pub(crate) fleet: Option<Arc<Fleet>>,
     /// The same for the line protocol.
     pub tags: Tags,
     /// The session, for the stamps of its folders.

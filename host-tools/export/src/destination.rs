@@ -26,10 +26,10 @@ impl Destination {
         Self::Named(output.join(name))
     }
 
-    /// The path of a format's file or folder; `None` is standard output, or a folder by vehicle, date and session.
+    /// The path of a format's file or folder; `None` is standard output, or the folder of a fleet.
     pub fn path(&self, files: Files) -> Option<PathBuf> {
         match (self, files) {
-            (Self::Standard, _) | (_, Files::Partition(_)) => None,
+            (Self::Standard, _) | (_, Files::Fleet(_)) => None,
             (Self::File(path), _) => Some(path.clone()),
             (Self::Named(name), Files::One(extension) | Files::Tables(Some(extension), _)) => {
                 Some(appended(name, extension))

@@ -29,8 +29,8 @@ pub enum Files {
     One(&'static str),
     /// A folder of tables, with this extension if it has one; the files' own extension.
     Tables(Option<&'static str>, &'static str),
-    /// A folder by vehicle, date and session; the files' own extension.
-    Partition(&'static str),
+    /// A folder for each table, by date and bucket; the files' own extension.
+    Fleet(&'static str),
 }
 
 /// A format, for help, documentation, and the reading of a log.
@@ -76,7 +76,7 @@ impl About {
     /// The extension of its files.
     pub const fn extension(&self) -> &'static str {
         match self.files {
-            Files::One(extension) | Files::Tables(_, extension) | Files::Partition(extension) => extension,
+            Files::One(extension) | Files::Tables(_, extension) | Files::Fleet(extension) => extension,
         }
     }
 }

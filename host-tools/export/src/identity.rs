@@ -4,19 +4,24 @@
 use std::path::Path;
 
 use anyhow::Result;
+use hums_analysis::track::Track;
 use hums_blackbox::Record;
 use hums_blackbox::record::Vehicle;
 use hums_core::clock::Instant;
 use hums_core::observation::Observation;
+use hums_core::units::Position;
 
 use super::checked::Checked;
-use crate::check::judge::{Judge, Limits};
-use crate::ending::Ending;
+use crate::check::overview_telling;
 use crate::hex::hex;
+use crate::motion::{Fix, Motion};
 use crate::names::{autopilot_name, type_name};
+use crate::naming::Traits;
 use crate::source::epochs::Epochs;
-use crate::source::item::{Item, Want};
+use crate::source::item::Item;
 use crate::source::recording::Place;
+use crate::story::Observed;
+use crate::summary::Overview;
 use crate::utc::iso8601;
 
 /// Letters of a vehicle's name at most: a name in a file system has 255 bytes.
@@ -33,49 +38,80 @@ pub struct Identity {
     pub date: Option<String>,
     /// `s1a2b3c4d`: the session number of a HUMS log; `r1a2b3c4d`: a number made of a recording's bytes.
     pub session: String,
+    /// A name that no other recording has, for the tables of a fleet: `s1a2b3c4d-3f0042000d51373435363338`.
+    pub recording: String,
     /// UTC by the clock of each part.
     pub epochs: Epochs,
 }
 
-/// Vehicle, date and UTC of a recording. If `judges`, also the findings by the monitor here, as in
-/// `hums check`, unless one on board checked it. The recording is read once for it. Its `session` is taken
-/// from its files' names, so it does not depend on the messages that this version understands.
-pub fn identity(
-    place: &Place,
-    session: String,
-    judges: bool,
-    given: Option<&str>,
-) -> Result<(Identity, Option<Checked>)> {
-    let (mut known, mut epochs) = (Known::default(), Epochs::default());
-    let want = Want { observations: true, ..Want::default() };
-    let recording = place.open()?;
-    let mut judge = judges.then(|| Judge::new(&Limits::default(), recording.format));
-    let summary = recording.read(want, &mut |at, item| {
-        if let Some(judge) = &mut judge {
-            judge.item(at, item);
-        }
+/// The content of a recording, for a row of the table of sessions and for logbooks.
+#[derive(Clone, Debug, Default)]
+pub struct About {
+    /// Counts, findings, usage.
+    pub overview: Overview,
+    /// The way of the vehicle; its heights are above mean sea level.
+    pub track: Track,
+    /// The same places with the speed over ground in place of the height, m/s.
+    pub speeds: Track,
+    /// Unique id of the box.
+    pub board: Option<[u8; 12]>,
+    /// Hash of its sectors' numbers and checksums; of another recording, of all its bytes.
+    pub fingerprint: [u8; 16],
+}
+
+/// A recording, read once before the first byte is written.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// Its names.
+    pub identity: Identity,
+    /// The findings by the monitor here, as in `hums check`; `None` if one on board checked it.
+    pub checked: Option<Checked>,
+    /// Its content.
+    pub about: About,
+}
+
+/// Vehicle, date, UTC and content of a recording. If `judges`, also the findings by the monitor here. The recording is read
+/// once for it. Its `session` is taken from its files' names, so it does not depend on the messages that this version
+/// understands.
+pub fn identity(place: &Place, traits: &Traits, judges: bool, given: Option<&str>) -> Result<Known> {
+    let (mut sources, mut epochs) = (Sources::default(), Epochs::default());
+    let (mut motion, mut track, mut speeds) = (Motion::default(), Track::default(), Track::default());
+    let (overview, judged) = overview_telling(place, &mut |at, item| {
         epochs.take(at, &item);
-        known.take(at, &item);
+        sources.take(at, &item);
+        if let Item::Observation(source, observation) = item {
+            let observed = Observed { at, source, observation: *observation };
+            if motion.observe(&observed)
+                && let Some(fix) = motion.fix_by(&observed.observation)
+            {
+                let Fix { latitude_deg, longitude_deg, altitude_m, .. } = fix;
+                let position = Position { latitude_deg, longitude_deg };
+                track.push(at, position, Some(altitude_m));
+                speeds.push(at, position, motion.velocity().map(|[north, east, _]| north.hypot(east)));
+            }
+        }
         Ok(())
     })?;
-    let vehicle = known.vehicle(place, given);
-    let first = match &summary.ending {
-        Some(Ending { summary, .. }) => {
+    let vehicle = sources.vehicle(place, given);
+    let first = match place.own() {
+        Some(_) => {
             // One power-on has one clock, also if a packed recording has several.
-            epochs = Epochs::of(summary.epoch_us);
-            summary.first
+            epochs = Epochs::of(overview.ending.summary.epoch_us);
+            overview.ending.summary.first
         }
-        None => known.first,
+        None => sources.first,
     };
     // A recording without an observation begins at time zero.
     let utc_us = epochs.utc_us(first.unwrap_or(Instant::ZERO));
     let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
-    let checked = judge.and_then(|judge| Checked::new(judge.end()));
-    Ok((Identity { vehicle, date, session, epochs }, checked))
+    let checked = judged.filter(|_| judges).and_then(Checked::new);
+    let (session, recording) = (traits.identity(), traits.unique(place, &vehicle));
+    let about = About { overview, track, speeds, board: traits.board(), fingerprint: traits.fingerprint() };
+    Ok(Known { identity: Identity { vehicle, date, session, recording, epochs }, checked, about })
 }
 
 #[derive(Default)]
-struct Known {
+struct Sources {
     /// The monitor's record of the vehicle. A packed log has no such record, so the vehicle's own messages
     /// count too.
     recorded: Option<Vehicle>,
@@ -86,7 +122,7 @@ struct Known {
     first: Option<Instant>,
 }
 
-impl Known {
+impl Sources {
     fn take(&mut self, at: Instant, item: &Item<'_>) {
         match item {
             Item::Record(Record::Vehicle(vehicle)) => self.recorded = Some(*vehicle),

@@ -33,6 +33,7 @@ pub mod context;
 pub mod destination;
 pub mod field_names;
 pub mod findings;
+pub mod fleet;
 pub mod format;
 pub mod formats;
 pub mod identity;
@@ -51,9 +52,9 @@ mod wear;
 mod works;
 pub mod write;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use hums_core::clock::Instant;
@@ -64,13 +65,14 @@ use collect::Collected;
 use context::{Context, Formats};
 use destination::Destination;
 use ending::Ending;
-use files::{Inputs, check_parent, means_standard_output, says_directory};
+use files::{Inputs, means_standard_output, says_directory};
 use findings::Findings;
+use fleet::Fleet;
 use followed::{EndResolver, HasEnding};
 use format::{Files, Finished, Way};
 use formats::FORMATS;
 use formats::influx::Tags;
-use identity::{Identity, identity};
+use identity::identity;
 use logs::reader;
 use logs::side_by_side::side_by_side;
 use made::{LogJson, MadeJson, OutputFile};
@@ -166,9 +168,8 @@ pub fn run(args: &Request) -> Result<Outcome> {
         has_findings: args.findings,
         offset_s: args.offset_s,
         vehicle: args.vehicle.as_deref(),
-        there: sessions_there(&args.output),
+        fleet: Arc::new(Fleet::new(&args.output)),
     };
-    let taken = Mutex::new(BTreeSet::new());
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);
     let (mut manifest, mut made) = (Manifest::default(), Vec::new());
@@ -185,7 +186,7 @@ pub fn run(args: &Request) -> Result<Outcome> {
     side_by_side(
         &works,
         |work| {
-            if is_wanted(&work.log.name) { task.decode_or_skip(work, &works, &taken) } else { beside(work) }
+            if is_wanted(&work.log.name) { task.decode_or_skip(work, &works) } else { beside(work) }
         },
         |done| followed.push(done?).into_iter().try_for_each(&mut tell),
     )?;
@@ -207,6 +208,12 @@ fn check_request(args: &Request) -> Result<()> {
     }
     if args.manifest.is_some() && args.formats.iter().any(|format| matches!(format.way, Way::Alone(_))) {
         return Err(usage_error("--manifest: a log of one recording has none; hums info --verify makes it"));
+    }
+    let is_of_fleet = |format: &&format::Format| matches!(format.about.files, Files::Fleet(_));
+    if args.split && args.formats.iter().any(is_of_fleet) {
+        return Err(usage_error(
+            "--split flights: the tables of a fleet hold whole sessions; leave out parquet",
+        ));
     }
     if args.manifest.as_ref() == Some(&args.output) {
         return Err(usage_error("--manifest and -o are one file: the manifest would replace the output"));
@@ -289,8 +296,8 @@ struct Task<'a> {
     offset_s: f64,
     /// The vehicle of all logs without a unique id.
     vehicle: Option<&'a str>,
-    /// Sessions of Parquet tables that are in the output, by their names.
-    there: BTreeMap<String, PathBuf>,
+    /// The tables of the output's folder.
+    fleet: Arc<Fleet>,
 }
 
 /// A log's outcome, reported in the logs' order.
@@ -381,13 +388,8 @@ fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
 
 impl Task<'_> {
     /// Decodes a log. One of several whose outputs exist is skipped, with a remark.
-    fn decode_or_skip(
-        &self,
-        work: &NamedLog<'_>,
-        all: &[NamedLog<'_>],
-        taken: &Mutex<BTreeSet<PathBuf>>,
-    ) -> Result<Done> {
-        let done = self.decode(work, all, taken);
+    fn decode_or_skip(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
+        let done = self.decode(work, all);
         if self.logs == 1 {
             return done;
         }
@@ -397,23 +399,17 @@ impl Task<'_> {
         }))
     }
 
-    /// `taken` are the directories of Parquet tables that other logs of this command have.
-    fn decode(
-        &self,
-        work: &NamedLog<'_>,
-        all: &[NamedLog<'_>],
-        taken: &Mutex<BTreeSet<PathBuf>>,
-    ) -> Result<Done> {
+    fn decode(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
         let log = work.log;
-        let (name, nth) = match &work.named {
-            Named::As(name, nth) => (name, *nth),
+        let name = match &work.named {
+            Named::As(name, _) => name,
             Named::Copy(of) => {
                 return copy(log, all.get(*of).map_or("another log", |work| &work.log.name));
             }
         };
         let flights = if self.formats.split { flights(log)? } else { Vec::new() };
         if flights.is_empty() {
-            return self.decode_part(work, (name, nth), self.context(work)?, taken);
+            return self.decode_part(work, name, self.context(work)?);
         }
         let mut done = Done::of(log);
         for (number, span) in (1..).zip(flights) {
@@ -422,53 +418,21 @@ impl Task<'_> {
             context.identity.session = format!("{}-flight{number}", context.identity.session);
             context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
             let name = format!("{name}-flight{number}");
-            done.add(self.decode_part(work, (&name, nth), context, taken)?);
+            done.add(self.decode_part(work, &name, context)?);
         }
         Ok(done)
     }
 
-    fn decode_part(
-        &self,
-        work: &NamedLog<'_>,
-        (name, nth): (&str, u32),
-        mut context: Context,
-        taken: &Mutex<BTreeSet<PathBuf>>,
-    ) -> Result<Done> {
+    fn decode_part(&self, work: &NamedLog<'_>, name: &str, mut context: Context) -> Result<Done> {
         let log = work.log;
         let mut remarks = Vec::new();
         remarks.extend(check_clock(&log.name, &context)?);
-        let mut partitioned = None;
-        if self.formats.about().any(|about| matches!(about.files, Files::Partition(_)))
-            && let Ok(mut taken) = taken.lock()
-        {
-            // A session stays where it is, so that no query counts it twice.
-            let mut first = partition(self.output, &context.identity);
-            if let Some(path) = self.there.get(&context.identity.session).filter(|path| **path != first) {
-                let (name, there) = (&log.name, path.display());
-                remarks.push(format!(
-                    "{name}: its tables are in {there}, and stay there; move them away for another place"
-                ));
-                first.clone_from(path);
-            }
-            check_parent(&first)?;
-            let dir = claim(&mut taken, &first, nth);
-            if dir != first {
-                remarks.push(format!(
-                    "{}: {} has other tables of a session of this number; these go to {}: a query over both counts \
-                     twice what both have",
-                    log.name,
-                    first.display(),
-                    dir.display()
-                ));
-            }
-            partitioned = Some(dir);
-        }
-        let mut read = self.read(log, name, &context, partitioned.as_deref());
+        let mut read = self.read(log, name, &context);
         if let Some(epoch_us) = self.better_epoch(log, &context, &read) {
             // Only its last group knew better: all of it again, with that.
             drop(read);
             context.epochs = Epochs::of(epoch_us);
-            read = self.read(log, name, &context, partitioned.as_deref());
+            read = self.read(log, name, &context);
         }
         let (summary, mut writers, checked) = read?;
         if writers.is_empty() && context.selection.is_part() {
@@ -502,6 +466,7 @@ impl Task<'_> {
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
             offset_s: self.offset_s,
+            fleet: Some(self.fleet.clone()),
             session: work.traits.identity(),
             ..Context::default()
         };
@@ -517,8 +482,9 @@ impl Task<'_> {
                 context.judges = judges;
             }
             _ => {
-                (context.identity, context.checked) =
-                    identity(work.log, work.traits.identity(), judges, self.vehicle)?;
+                let known = identity(work.log, &work.traits, judges, self.vehicle)?;
+                (context.identity, context.checked) = (known.identity, known.checked);
+                context.about = Some(known.about);
                 context.tags = Tags::new(&context.identity.session, &context.identity.vehicle);
                 context.epochs = context.identity.epochs.clone();
             }
@@ -539,19 +505,13 @@ impl Task<'_> {
         Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole())
     }
 
-    fn read<'a>(
-        &self,
-        place: &Place,
-        name: &str,
-        context: &'a Context,
-        partition: Option<&Path>,
-    ) -> Result<Read<'a>> {
+    fn read<'a>(&self, place: &Place, name: &str, context: &'a Context) -> Result<Read<'a>> {
         let destination = if self.standard_output {
             Destination::Standard
         } else {
             Destination::new(self.output, name, self.logs, &self.formats)
         };
-        let mut writers = Writers::new(context, &destination, partition)?;
+        let mut writers = Writers::new(context, &destination, self.output)?;
         let formats = &self.formats;
         let rows = match context.selection.names() {
             [] if formats.has_records() => Rows::All,
@@ -617,43 +577,4 @@ fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
         seconds(summary.span.map(|(first, _)| first)),
         seconds(summary.span.map(|(_, last)| last))
     )
-}
-
-/// A directory for a session's tables. A further log with the same session in one command (a shortened copy,
-/// a board without a source of randomness) gets a number.
-fn claim(taken: &mut BTreeSet<PathBuf>, dir: &Path, nth: u32) -> PathBuf {
-    let numbered = |number: u32| {
-        let mut name = dir.to_owned().into_os_string();
-        if number > 1 {
-            name.push(format!("-{number}"));
-        }
-        PathBuf::from(name)
-    };
-    let claimed = (nth..u32::MAX).map(numbered).find(|path| !taken.contains(path));
-    let claimed = claimed.unwrap_or_else(|| dir.to_owned());
-    taken.insert(claimed.clone());
-    claimed
-}
-
-/// The sessions of Parquet tables in a directory, whatever vehicle and date they have there.
-fn sessions_there(output: &Path) -> BTreeMap<String, PathBuf> {
-    let below = |of: &Path, name: &str| -> Vec<PathBuf> {
-        let entries = of.read_dir().into_iter().flatten().filter_map(std::io::Result::ok);
-        let is_it = |entry: &std::fs::DirEntry| entry.file_name().to_string_lossy().starts_with(name);
-        entries.filter(is_it).map(|entry| entry.path()).collect()
-    };
-    let dates = below(output, "vehicle=").into_iter().flat_map(|vehicle| below(&vehicle, "date="));
-    let sessions = dates.flat_map(|date| below(&date, "session="));
-    let name = |path: &PathBuf| Some(path.file_name()?.to_str()?.strip_prefix("session=")?.to_owned());
-    sessions.filter_map(|path| Some((name(&path)?, path))).collect()
-}
-
-/// The directory of a session's Parquet tables, named as the tools that read them expect.
-fn partition(output: &Path, identity: &Identity) -> PathBuf {
-    // Hive's word for "null", known to every reader of this layout.
-    let date = identity.date.as_deref().unwrap_or("__HIVE_DEFAULT_PARTITION__");
-    output
-        .join(format!("vehicle={}", identity.vehicle))
-        .join(format!("date={date}"))
-        .join(format!("session={}", identity.session))
 }

@@ -12,7 +12,7 @@ use super::checked::{Checked, OnBoard};
 use super::collect::Collected;
 use super::context::Context;
 use super::destination::Destination;
-use super::format::{AnyWriter, Finished, Totals, Way};
+use super::format::{AnyWriter, Files, Finished, Totals, Way};
 use super::story::Said;
 use crate::plural::count;
 use crate::source::item;
@@ -34,14 +34,17 @@ pub struct Writers<'a> {
 }
 
 impl<'a> Writers<'a> {
-    /// Opens the files that are always written; a table is opened for its first row. `partition` is the folder of this
-    /// session.
-    pub fn new(context: &'a Context, destination: &Destination, partition: Option<&Path>) -> Result<Self> {
+    /// Opens the files that are always written; a table is opened for its first row. `fleet` is the folder of the tables of
+    /// all sessions.
+    pub fn new(context: &'a Context, destination: &Destination, fleet: &Path) -> Result<Self> {
         let mut files = Vec::new();
         for (about, way) in context.formats.ways() {
             let Way::Parts { open, .. } = way else { continue };
-            let path = destination.path(about.files).or_else(|| partition.map(Path::to_owned));
-            files.push(open(context, &path.unwrap_or_else(|| PathBuf::from("-")))?);
+            let path = match about.files {
+                Files::Fleet(_) => fleet.to_owned(),
+                files => destination.path(files).unwrap_or_else(|| PathBuf::from("-")),
+            };
+            files.push(open(context, &path)?);
         }
         Ok(Self {
             context,

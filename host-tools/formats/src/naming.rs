@@ -6,8 +6,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use sha2::{Digest as _, Sha256};
 
 use crate::files::{Folder, digest_of};
+use crate::hex::hex;
 use crate::logs::Log;
 use crate::logs::board::{HEADING_GROUPS, board_of};
 use crate::logs::fingerprint::{Fingerprint, Fingerprinter};
@@ -63,6 +65,29 @@ impl Traits {
             return format!("{}-{}", file_name(place), self.identity());
         };
         session_name(&base(log), self.board.as_ref(), self.session)
+    }
+
+    /// The name of a recording in the tables of a fleet, which no other recording has: its [`identity`](Self::identity), and 96
+    /// bits of the box, of the vehicle (for a log without the record of a box's start), or of the bytes of another recording.
+    pub fn unique(&self, place: &Place, vehicle: &str) -> String {
+        let of_vehicle = || Sha256::digest(vehicle.as_bytes()).first_chunk().copied().unwrap_or_default();
+        let of_bytes = || self.fingerprint.first_chunk().copied().unwrap_or_default();
+        let unique: [u8; 12] = match (self.board, place.own()) {
+            (Some(board), _) => board,
+            (None, Some(_)) => of_vehicle(),
+            (None, None) => of_bytes(),
+        };
+        format!("{}-{}", self.identity(), hex(&unique))
+    }
+
+    /// Hash of its sectors' numbers and checksums; of another recording, of all its bytes.
+    pub const fn fingerprint(&self) -> [u8; 16] {
+        self.fingerprint
+    }
+
+    /// The unique id of its box, if it begins with the record of the box's start.
+    pub const fn board(&self) -> Option<[u8; 12]> {
+        self.board
     }
 
     /// The session's name in tables and points, and at the end of its files' names. For a HUMS log it is the
@@ -142,7 +167,7 @@ pub fn without_made(inputs: &[PathBuf]) -> (Vec<PathBuf>, Vec<String>) {
 pub fn is_made(path: &Path) -> bool {
     let name = path.file_name().map_or_else(Default::default, |name| name.to_string_lossy());
     if path.is_dir() {
-        return Folder::is_ours(path) || name.starts_with("vehicle=");
+        return Folder::is_ours(path) || name == ".hums-fleet" || is_table(path);
     }
     if name.ends_with(".html") && says_report(path) {
         return true;
@@ -151,6 +176,13 @@ pub fn is_made(path: &Path) -> bool {
     let gaps = name.strip_suffix(".tlog.gaps.csv");
     let other = || name.rsplit_once('.').filter(|(_, ending)| !RECORDINGS.contains(ending));
     gaps.or_else(|| Some(other()?.0)).is_some_and(ends_with_identity)
+}
+
+/// Whether a folder is a table of a fleet: it has a folder for each date and nothing else.
+fn is_table(folder: &Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    let mut names = entries.filter_map(|entry| Some(entry.ok()?.file_name())).peekable();
+    names.peek().is_some() && names.all(|name| name.to_string_lossy().starts_with("date="))
 }
 
 /// `decode` makes some of them.

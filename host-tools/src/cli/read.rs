@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
+use crate::decode::fleet::compact;
 use crate::decode::format::Format;
 use crate::decode::formats::{FORMATS, find};
 use crate::decode::{Request, share};
@@ -25,7 +26,7 @@ const DECODE_EXAMPLES: &str = "Examples:
 
 Where files go: -o names the file where there is one log and one format of a single file (all but csv, parquet and
 thesis), unless it is a directory; otherwise it is a directory with OUT/LOG.tlog, OUT/LOG.jsonl, OUT/LOG.lp and, for tables,
-OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/vehicle=V/date=D/session=S/ATTITUDE.parquet and so on.
+OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/ATTITUDE/date=D/bucket=B/SESSION.parquet and so on.
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
 An output that exists is overwritten with --force only, once all of the new one is written. An output that is an input,
 and a folder that holds another session's tables, are refused.
@@ -239,6 +240,28 @@ pub struct Due {
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
+}
+
+const COMPACT_EXAMPLES: &str = "Examples:
+  hums compact fleet
+
+The folder is that of hums decode --format parquet. Sessions of one date and bucket share a file for each table afterwards, sorted by
+vehicle and session. New sessions may be added at any time; run it again for them. docs/fleet.md";
+
+/// `hums compact`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = COMPACT_EXAMPLES)]
+pub struct Compact {
+    /// The folder of the tables
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+}
+
+impl Compact {
+    /// The request that the arguments make.
+    pub fn request(&self) -> compact::Request {
+        compact::Request { folder: self.folder.clone() }
+    }
 }
 
 const REPORT_EXAMPLES: &str = "Examples:

@@ -75,6 +75,7 @@ fn furnished() -> TempDir {
     copy(&path("card.img"), &path("cards/card.img"));
     run(dir.path(), "decode --format hum flight.tlog -o 00001_00.HUM", 0);
     run(dir.path(), "decode --format ulog flight.tlog -o flight.ulg", 0);
+    run(dir.path(), "decode --format parquet flight.tlog -o fleet", 0);
     fs::create_dir_all(path("flights/may")).expect("a directory");
     for copy in ["flights/may/flight.tlog", "flights/june.bin", "before.tlog", "after.tlog"] {
         fs::copy(px4(), path(copy)).expect("a copy");
@@ -125,6 +126,7 @@ fn every_example_that_needs_nobody_works_as_it_is_typed() {
     }
     let commands = [
         "check",
+        "compact",
         "completions",
         "decode",
         "due",

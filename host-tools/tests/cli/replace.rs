@@ -10,6 +10,7 @@ use clap::builder::PossibleValue;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use hums::cli::Cli;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use tempfile::TempDir;
 
 use crate::inputs::{leaves, words};
@@ -30,7 +31,7 @@ fn two_cards() -> TempDir {
 fn parquet_sessions(fleet: &Path) -> Vec<PathBuf> {
     let mut sessions: Vec<PathBuf> = contents(fleet)
         .into_iter()
-        .filter_map(|(name, _)| name.strip_suffix("/HEARTBEAT.parquet").map(PathBuf::from))
+        .filter_map(|(name, _)| name.strip_prefix("HEARTBEAT/").map(PathBuf::from))
         .collect();
     sessions.sort();
     sessions
@@ -270,7 +271,7 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
     fs::write(dir.path().join("notes.txt"), "mine").expect("written");
     fs::create_dir(dir.path().join("fleet")).expect("made");
-    fs::write(dir.path().join("fleet/vehicle=quad-7"), "mine").expect("written");
+    fs::write(dir.path().join("fleet/HEARTBEAT"), "mine").expect("written");
     for (output, format) in [("notes.txt/", "csv"), ("notes.txt/", "parquet"), ("fleet", "parquet")] {
         let ended =
             attempt(dir.path(), &format!("decode log.hum -o {output} --format {format} --vehicle quad-7"));
@@ -279,6 +280,16 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
         assert!(told.contains("is a file, and a directory is needed there"), "{output} {format}: {told}");
     }
     assert_eq!(fs::read(dir.path().join("notes.txt")).expect("there"), b"mine");
+    // None of the other tables is there either.
+    assert!(contents(&dir.path().join("fleet")).iter().all(|(name, _)| !name.ends_with(".parquet")));
+}
+
+/// The vehicle of a table.
+fn vehicle(path: &Path) -> String {
+    let file = SerializedFileReader::new(fs::File::open(path).expect("a file")).expect("a table");
+    let about = file.metadata().file_metadata().key_value_metadata().expect("metadata");
+    let vehicle = about.iter().find(|about| about.key == "hums.vehicle").expect("a vehicle");
+    vehicle.value.clone().expect("a name")
 }
 
 /// The sessions of recordings are known by their bytes. Folders that are decoded again and again, in one call or in many,
@@ -334,17 +345,16 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
         known = sessions;
     }
     // Vehicles without an id are apart by folder and autopilot, and have the name that the user gives.
-    let vehicles = |sessions: &[PathBuf]| -> BTreeSet<String> {
-        let of = |path: &PathBuf| path.iter().next().expect("a vehicle").to_string_lossy().into_owned();
-        sessions.iter().map(of).collect()
+    let vehicles = |fleet: &str| -> BTreeSet<String> {
+        let table = dir.path().join(fleet).join("HEARTBEAT");
+        parquet_sessions(&dir.path().join(fleet)).iter().map(|path| vehicle(&table.join(path))).collect()
     };
-    let names: Vec<String> = vehicles(&known).into_iter().collect();
-    let expected = ["ArduPilot-hexa", "ArduPilot-quad", "PX4-quad"]
-        .map(|end| format!("vehicle=system-1-quadrotor-{end}"));
+    let names: Vec<String> = vehicles("fleet").into_iter().collect();
+    let expected =
+        ["ArduPilot-hexa", "ArduPilot-quad", "PX4-quad"].map(|end| format!("system-1-quadrotor-{end}"));
     assert_eq!(names, expected);
     run(dir.path(), "decode logs -o named --format parquet --vehicle 7/new", 0);
-    let names = vehicles(&parquet_sessions(&dir.path().join("named")));
-    assert_eq!(names.into_iter().collect::<Vec<_>>(), ["vehicle=vehicle-7-new"]);
+    assert_eq!(vehicles("named").into_iter().collect::<Vec<_>>(), ["vehicle-7-new"]);
 }
 
 /// A folder of pages gets those that it lacks; `--force` writes all of them.

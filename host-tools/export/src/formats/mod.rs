@@ -48,7 +48,7 @@ fn table() -> String {
             Files::One(extension) => format!("OUT/LOG.{extension}"),
             Files::Tables(None, extension) => format!("OUT/LOG/TABLE.{extension}"),
             Files::Tables(Some(folder), extension) => format!("OUT/LOG.{folder}/TABLE.{extension}"),
-            Files::Partition(extension) => format!("OUT/vehicle=V/date=D/session=S/TABLE.{extension}"),
+            Files::Fleet(extension) => format!("OUT/TABLE/date=D/bucket=B/SESSION.{extension}"),
         };
         let (name, help, omits) = (about.name, about.help, about.omits);
         writeln!(table, "| [`{name}`](#{name}) | {help} | `{file}` | {omits} |").expect("a string");

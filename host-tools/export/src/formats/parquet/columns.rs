@@ -17,11 +17,16 @@ use crate::mavlink::values::{Payload, Scalar, Value};
 use crate::row::{Cell, CellType, Row, plain_name};
 use crate::table::Table;
 
+/// The first two columns of every table: the vehicle, and the unique name of the recording.
+pub(super) const NAMES: [&str; 2] = ["vehicle", "session"];
 /// Names that every table has: its own first columns, and those that its place among the directories adds.
-const TAKEN: [&str; 5] = ["boot_s", "utc", "vehicle", "date", "session"];
+const TAKEN: [&str; 6] = ["boot_s", "utc", "vehicle", "date", "session", "bucket"];
 /// Names that tables of frames have: those, and who sent the frame.
-pub(crate) const TAKEN_FRAMES: [&str; 7] =
-    ["boot_s", "utc", "vehicle", "date", "session", "system", "component"];
+pub(crate) const TAKEN_FRAMES: [&str; 8] =
+    ["boot_s", "utc", "vehicle", "date", "session", "bucket", "system", "component"];
+/// Digits of seconds, and those behind the point.
+const SECONDS_PRECISION: i32 = 18;
+const SECONDS_SCALE: i32 = 6;
 /// Texts that are handed to the encoder at once: each takes some 40 bytes there.
 const TEXTS_AT_ONCE: usize = 1024;
 
@@ -35,6 +40,8 @@ enum Kind {
     Text,
     /// Microseconds of UTC.
     Utc,
+    /// Seconds as a decimal number with six decimals: a sixth of the bytes that a binary fraction takes.
+    Seconds,
 }
 
 impl Kind {
@@ -54,10 +61,11 @@ impl Kind {
         }
     }
 
-    /// A column `value` holds quantities, whole ones too.
+    /// A column `value` holds quantities, whole ones too; `end_utc` is microseconds since 1970.
     fn of_cell(name: &str, cell: CellType) -> Self {
         match cell {
             CellType::Count if name == "value" => Self::Double,
+            CellType::Count if name == "end_utc" => Self::Utc,
             CellType::Count => Self::Unsigned(64),
             CellType::Signed => Self::Signed(64),
             CellType::Single => Self::Single,
@@ -69,7 +77,7 @@ impl Kind {
 
     fn values(self) -> Values {
         match self {
-            Self::Unsigned(64) | Self::Signed(64) | Self::Utc => Values::Longs(Vec::new()),
+            Self::Unsigned(64) | Self::Signed(64) | Self::Utc | Self::Seconds => Values::Longs(Vec::new()),
             Self::Unsigned(_) | Self::Signed(_) => Values::Integers(Vec::new()),
             Self::Single => Values::Singles(Vec::new()),
             Self::Double => Values::Doubles(Vec::new()),
@@ -86,6 +94,7 @@ impl Kind {
             Self::Unsigned(bits) => Some(LogicalType::integer(bits, false)),
             Self::Text => Some(LogicalType::String),
             Self::Utc => Some(LogicalType::timestamp(true, TimeUnit::MICROS)),
+            Self::Seconds => Some(LogicalType::decimal(SECONDS_SCALE, SECONDS_PRECISION)),
         }
     }
 }
@@ -209,6 +218,9 @@ impl Column {
         };
         let plain = |name, repetition| {
             let plain = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+            let (precision, scale) =
+                if self.kind == Kind::Seconds { (SECONDS_PRECISION, SECONDS_SCALE) } else { (-1, -1) };
+            let plain = plain.with_precision(precision).with_scale(scale);
             plain.with_logical_type(self.kind.logical_type()).build()
         };
         if self.length == 0 {
@@ -245,6 +257,7 @@ impl Column {
                 return self.push_text(&String::from_utf8_lossy(&digits));
             }
             (Kind::Unsigned(_), Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
+            (Kind::Utc, Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
             (Kind::Signed(_), Some(Cell::Signed(value))) => Some(Scalar::Signed(*value)),
             (Kind::Single, Some(Cell::Single(value))) => Some(Scalar::Single(*value)),
             (Kind::Double, Some(Cell::Double(value))) => Some(Scalar::Double(*value)),
@@ -346,6 +359,27 @@ impl Column {
     }
 }
 
+/// The type of one of the [`NAMES`].
+pub(super) fn name_type(name: &str) -> Result<Type> {
+    let text = Type::primitive_type_builder(name, Physical::BYTE_ARRAY).with_repetition(Repetition::REQUIRED);
+    text.with_logical_type(Some(LogicalType::String)).build()
+}
+
+/// Writes a name for each of these rows.
+pub(super) fn write_name(
+    writer: &mut SerializedColumnWriter<'_>,
+    name: &ByteArray,
+    rows: usize,
+) -> Result<()> {
+    let names = vec![name.clone(); rows.min(TEXTS_AT_ONCE)];
+    let writer = writer.typed::<ByteArrayType>();
+    for begin in (0..rows).step_by(TEXTS_AT_ONCE) {
+        let some = names.get(..names.len().min(rows - begin)).unwrap_or_default();
+        writer.write_batch(some, None, None)?;
+    }
+    Ok(())
+}
+
 #[derive(Debug)]
 pub(crate) struct TableRows {
     columns: Vec<Column>,
@@ -356,7 +390,7 @@ pub(crate) struct TableRows {
 
 impl TableRows {
     fn new(columns: impl IntoIterator<Item = Column>, has_frames: bool) -> Self {
-        let boot = Column { units: "s", ..Column::new("boot_s", Kind::Double) };
+        let boot = Column { units: "s", ..Column::new("boot_s", Kind::Seconds) };
         let times = [boot, Column::new("utc", Kind::Utc).optional()];
         Self { columns: times.into_iter().chain(columns).collect(), rows: 0, has_frames }
     }
@@ -387,7 +421,7 @@ impl TableRows {
         self.rows += 1;
         let mut columns = self.columns.iter_mut();
         if let Some(boot) = columns.next() {
-            boot.push_scalar(Scalar::Double(at.as_secs_f64()));
+            boot.push_scalar(Scalar::Signed(at.as_micros() as i64));
         }
         if let Some(utc) = columns.next() {
             match utc_us.and_then(|utc_us| i64::try_from(utc_us).ok()) {
@@ -493,7 +527,7 @@ mod tests {
                 column.parquet_type().expect("a type");
             }
             let mut names: Vec<&str> = all.columns.iter().map(|column| column.name.as_str()).collect();
-            names.extend(["vehicle", "date", "session"]);
+            names.extend(["vehicle", "date", "session", "bucket"]);
             let count = names.len();
             names.sort_unstable();
             names.dedup();

@@ -1,20 +1,19 @@
 //! Typed columns for the tools that read a whole fleet as one table: `DuckDB`, Spark, `DataFusion`, pandas.
 //!
 //! ```text
-//! OUT/vehicle=uid-0031002a3035510a/date=2026-11-21/session=s1a2b3c4d/ATTITUDE.parquet
+//! OUT/ATTITUDE/date=2026-11-21/bucket=07/s1a2b3c4d-3f0042000d51373435363338.parquet
 //! ```
 //!
-//! One file for each message type and for each table of the monitor's own, in a path that identifies the
-//! session. These tools read `vehicle`, `date` and `session` as columns. Columns keep the sent type (arrays
-//! are lists, `char` arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table
-//! begins with `boot_s`, seconds since the monitor's power-on, and `utc`, null if unknown. Tables of frames
-//! go on with `system` and `component`.
+//! A folder for each message type and for each table of the monitor's own ([`crate::fleet`]). Columns keep the sent type
+//! (arrays are lists, `char` arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table begins with
+//! `vehicle` and `session`. Then come `boot_s`, seconds since the monitor's power-on, and `utc`, null if unknown. Tables
+//! of frames go on with `system` and `component`.
 //!
 //! Rows wait as plain columns, 12 MiB in all; then the largest tables become row groups and are written. So
 //! an encoder, which costs far more than its rows, is open only for one row group. An open file takes memory
 //! for each of its columns, and for the description of its row groups, which is written at its end. The
 //! memory of open files is limited too: beyond the limit the largest are closed, and their tables go on in
-//! `ATTITUDE.2.parquet`.
+//! `SESSION.2.parquet`.
 
 mod batches;
 mod columns;
@@ -24,26 +23,32 @@ pub(crate) use columns::TAKEN_FRAMES;
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result, bail};
 use hums_core::clock::Instant;
 use parquet::basic::{Compression, Repetition};
+use parquet::data_type::ByteArray;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
 use crate::context::Context;
-use crate::files::{Folder, FolderFile, cannot_write};
+use crate::files::cannot_write;
+use crate::fleet::{SESSIONS, Session, sessions};
 use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
+use crate::identity::Identity;
 use crate::logs::in_order::{in_order, workers};
 use crate::row::Row;
 use crate::story::Story;
 use crate::table::Table;
+use crate::utc::iso8601;
 use batches::{Batches, TimedRow};
-use columns::{Column, TableRows};
+use columns::{Column, NAMES, TableRows, name_type, write_name};
 
 /// Memory limits: some 55 MiB with the reading.
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
@@ -59,6 +64,9 @@ const OPEN_FILE_BYTES: usize = 10 << 10;
 const OPEN_COLUMN_BYTES: usize = 1_000;
 /// Memory of each column of a written row group.
 const CHUNK_BYTES: usize = 800;
+/// No recording is older than MAVLink.
+const MAVLINK_SINCE: &str = "2009";
+const DAY_US: u64 = 86_400_000_000;
 /// Tables that are written before it is looked at how many are open.
 const AT_ONCE: usize = 16;
 
@@ -69,7 +77,7 @@ struct Limits {
 }
 
 struct ParquetTables {
-    folder: Folder,
+    session: Session,
     limits: Limits,
     properties: Properties,
     tables: BTreeMap<Table, TableFile>,
@@ -78,6 +86,8 @@ struct ParquetTables {
 struct Properties {
     writer: WriterPropertiesBuilder,
     about: Vec<KeyValue>,
+    /// Vehicle and session, the first columns.
+    names: [ByteArray; 2],
 }
 
 struct TableFile {
@@ -90,15 +100,16 @@ struct TableFile {
 
 struct Open {
     path: PathBuf,
-    writer: SerializedFileWriter<FolderFile>,
+    writer: SerializedFileWriter<File>,
     bytes: usize,
 }
 
 impl ParquetTables {
-    /// Tables in a folder; `about` goes into each file's metadata.
-    fn new(folder: Folder, about: &[(&str, String)]) -> Self {
-        let about =
-            about.iter().map(|(name, value)| KeyValue::new((*name).to_owned(), value.clone())).collect();
+    /// Tables of a session of a vehicle.
+    fn new(session: Session, identity: &Identity) -> Self {
+        let names = [("vehicle", &identity.vehicle), ("session", &identity.recording)];
+        let about = names.map(|(name, value)| KeyValue::new(format!("hums.{name}"), value.clone())).into();
+        let names = names.map(|(_, value)| ByteArray::from(value.as_str()));
         let writer = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
             .set_data_page_size_limit(PAGE_BYTES)
@@ -108,7 +119,8 @@ impl ParquetTables {
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
             .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned());
-        Self { folder, limits: LIMITS, properties: Properties { writer, about }, tables: BTreeMap::new() }
+        let properties = Properties { writer, about, names };
+        Self { session, limits: LIMITS, properties, tables: BTreeMap::new() }
     }
 
     fn put(&mut self, batches: Batches) -> Result<()> {
@@ -123,9 +135,9 @@ impl ParquetTables {
             let new = || TableFile::new(table, TableRows::of_rows(first));
             self.tables.entry(table).or_insert_with(new).rows(&rows)?;
         }
-        let Self { folder, properties, tables, .. } = self;
+        let Self { session, properties, tables, .. } = self;
         for file in tables.values_mut().filter(|file| file.columns.rows() >= GROUP_ROWS) {
-            file.write_group(folder, properties)?;
+            file.write_group(session, properties)?;
         }
         let pending_bytes: usize = self.tables.values().map(|table| table.pending_bytes).sum();
         if pending_bytes > self.limits.pending_bytes {
@@ -146,10 +158,10 @@ impl ParquetTables {
         });
         sizes.truncate(enough.map_or(sizes.len(), |last| last + 1));
         for few in sizes.chunks(AT_ONCE) {
-            let Self { folder, properties, tables, .. } = self;
+            let Self { session, properties, tables, .. } = self;
             let is_one = |table: &Table| few.iter().any(|(_, few)| few == table);
             let mut few = tables.iter_mut().filter(|(table, _)| is_one(table));
-            let write = |(_, file): (&Table, &mut TableFile)| file.write_group(folder, properties);
+            let write = |(_, file): (&Table, &mut TableFile)| file.write_group(session, properties);
             in_order(workers(), AT_ONCE, || Ok(few.next()), write, |written| written)?;
             self.close_largest()?;
         }
@@ -172,19 +184,17 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// The folder gets its name; returns it and the number of tables.
-    fn finish(mut self) -> Result<(PathBuf, usize)> {
+    /// Returns the session, and the number of tables.
+    fn finish(mut self) -> Result<(Session, usize)> {
         let count = self.tables.len();
-        let (folder, properties) = (&self.folder, &self.properties);
+        let (session, properties) = (&self.session, &self.properties);
         let mut tables = std::mem::take(&mut self.tables).into_values();
         let write = |mut table: TableFile| {
-            table.write_group(folder, properties)?;
+            table.write_group(session, properties)?;
             table.end_file()
         };
         in_order(workers(), AT_ONCE, || Ok(tables.next()), write, |written| written)?;
-        let path = self.folder.path().to_owned();
-        self.folder.finish()?;
-        Ok((path, count))
+        Ok((self.session, count))
     }
 }
 
@@ -209,41 +219,57 @@ impl Writer for Parquet {
         needs_identity: true,
         ..About::new(
             "parquet",
-            "Typed columns by vehicle, date and session, for DuckDB, Spark, pandas",
-            Files::Partition("parquet"),
+            "Typed columns of a whole fleet, for DuckDB, Spark, pandas",
+            Files::Fleet("parquet"),
         )
     };
     type Part = Batches;
 
-    fn open(context: &Context, path: &Path) -> Result<Self> {
-        let identity = &context.identity;
-        let about = [("hums.vehicle", identity.vehicle.clone()), ("hums.session", identity.session.clone())];
-        Ok(Self(ParquetTables::new(Folder::create(path, &context.inputs, &context.session)?, &about)))
+    fn open(context: &Context, _: &Path) -> Result<Self> {
+        Ok(Self(ParquetTables::new(Session::begin(context)?, &context.identity)))
     }
 
     fn part(&mut self, _: &Context, part: Batches, _: &Story) -> Result<()> {
         self.0.put(part)
     }
 
-    fn finish(self, _: &Context, totals: Totals) -> Result<Finished> {
-        let (dir, tables) = self.0.finish()?;
-        Ok(totals.of_tables(dir, "parquet", tables).into())
-    }
-}
-
-/// The name of a table's `part`th file, from 1: `ATTITUDE.*parquet` is all of them.
-fn file_name(table: Table, part: u32) -> String {
-    match part {
-        ..=1 => format!("{}.parquet", table.name()),
-        part => format!("{}.{part}.parquet", table.name()),
+    fn finish(mut self, context: &Context, totals: Totals) -> Result<Finished> {
+        if let Some(about) = &context.about {
+            let mut row = Batches::default();
+            let first = about.overview.ending.summary.first.unwrap_or(Instant::ZERO);
+            row.row(first, context.epochs.utc_us(first), &sessions::row(context, about));
+            self.0.put(row)?;
+        }
+        let (session, tables) = self.0.finish()?;
+        let path = session.path(SESSIONS, 1);
+        if session.finish(context, totals.frames)? {
+            let finished = Finished::from(totals.of_tables(path, "parquet", tables));
+            let today_us =
+                SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |now| now.as_micros() as u64);
+            let tomorrow = iso8601(today_us + DAY_US);
+            let date = context.identity.date.as_deref();
+            let wrong = date.filter(|date| *date < MAVLINK_SINCE || *date > tomorrow.as_str());
+            let why = wrong
+                .map(|date| format!("its clock says {date}, which cannot be; its tables have that date"));
+            return Ok(Finished { remarks: why.into_iter().collect(), ..finished });
+        }
+        let why = "another log of this session has more frames, and is in the tables instead";
+        Ok(Finished { made: Vec::new(), remarks: vec![why.to_owned()] })
     }
 }
 
 impl Open {
-    fn new(folder: &Folder, name: &str, columns: &[Column], properties: &Properties) -> Result<Self> {
-        let path = folder.path().join(name);
+    fn new(
+        session: &Session,
+        table: &str,
+        part: u32,
+        columns: &[Column],
+        properties: &Properties,
+    ) -> Result<Self> {
+        let path = session.path(table, part);
         // Files of numbers are a sixth smaller without a dictionary; texts gain by it.
         let texts = columns.iter().filter_map(Column::text_name).take(DICTIONARIES_MAX);
+        let texts = NAMES.into_iter().chain(texts);
         let writer = texts.fold(properties.writer.clone(), |writer, name| {
             writer.set_column_dictionary_enabled(vec![name.to_owned()].into(), true)
         });
@@ -251,12 +277,12 @@ impl Open {
         let about = about.map(|(name, value)| KeyValue::new(name, value.to_owned()));
         let writer =
             writer.set_key_value_metadata(Some(properties.about.iter().cloned().chain(about).collect()));
-        let types: parquet::errors::Result<Vec<_>> =
-            columns.iter().map(|column| column.parquet_type().map(Arc::new)).collect();
+        let types = NAMES.into_iter().map(name_type).chain(columns.iter().map(Column::parquet_type));
+        let types: parquet::errors::Result<Vec<_>> = types.map(|made| made.map(Arc::new)).collect();
         let schema = types.and_then(|types| {
             Type::group_type_builder("hums").with_repetition(Repetition::REQUIRED).with_fields(types).build()
         });
-        let file = folder.file(name)?;
+        let file = session.file(table, part)?;
         let writer = schema
             .and_then(|schema| SerializedFileWriter::new(file, Arc::new(schema), Arc::new(writer.build())))
             .with_context(|| cannot_write(&path))?;
@@ -264,8 +290,15 @@ impl Open {
         Ok(Self { path, writer, bytes })
     }
 
-    fn write(&mut self, columns: &[Column]) -> parquet::errors::Result<()> {
+    fn write(&mut self, rows: &TableRows, properties: &Properties) -> parquet::errors::Result<()> {
+        let columns = rows.columns();
         let mut group = self.writer.next_row_group()?;
+        for name in &properties.names {
+            if let Some(mut writer) = group.next_column()? {
+                write_name(&mut writer, name, rows.rows())?;
+                writer.close()?;
+            }
+        }
         for column in columns {
             if let Some(mut writer) = group.next_column()? {
                 column.write(&mut writer)?;
@@ -310,7 +343,7 @@ impl TableFile {
         self.open.as_ref().map_or(0, |open| open.bytes)
     }
 
-    fn write_group(&mut self, folder: &Folder, properties: &Properties) -> Result<()> {
+    fn write_group(&mut self, session: &Session, properties: &Properties) -> Result<()> {
         if self.columns.rows() == 0 {
             return Ok(());
         }
@@ -320,11 +353,10 @@ impl TableFile {
             Some(open) => open,
             none => {
                 self.parts += 1;
-                let name = file_name(self.table, self.parts);
-                none.insert(Open::new(folder, &name, rows.columns(), properties)?)
+                none.insert(Open::new(session, &self.table.name(), self.parts, rows.columns(), properties)?)
             }
         };
-        open.write(rows.columns()).with_context(|| cannot_write(&open.path))
+        open.write(&rows, properties).with_context(|| cannot_write(&open.path))
     }
 
     /// Later rows go into a further file.
@@ -336,13 +368,12 @@ impl TableFile {
 
 #[cfg(test)]
 mod tests {
-    use std::fs::File;
-
     use parquet::file::reader::SerializedFileReader;
     use parquet::record::RowAccessor as _;
 
     use super::*;
     use crate::files::Inputs;
+    use crate::fleet::Fleet;
     use crate::mavlink::frame::Frame;
     use crate::mavlink::values::Payload;
 
@@ -353,11 +384,19 @@ mod tests {
     #[test]
     fn a_session_of_many_row_groups_goes_on_in_further_files_and_no_row_is_lost() {
         let dir = tempfile::tempdir().expect("a directory");
-        let decode = |limits| {
-            let path = dir.path().join("session=s1");
-            let inputs = Inputs::none().forcing(true);
-            let folder = Folder::create(&path, &inputs, "a session").expect("a folder");
-            let mut tables = ParquetTables::new(folder, &[]);
+        let decode = |limits, name: &str| {
+            let context = Context {
+                fleet: Some(Arc::new(Fleet::new(dir.path()))),
+                inputs: Inputs::none().forcing(true),
+                identity: Identity {
+                    vehicle: "uid-1".to_owned(),
+                    recording: name.to_owned(),
+                    ..Identity::default()
+                },
+                ..Context::default()
+            };
+            let session = Session::begin(&context).expect("a session");
+            let mut tables = ParquetTables::new(session, &context.identity);
             tables.limits = limits;
             for second in 0..2000_u32 {
                 let mut batches = Batches::default();
@@ -373,24 +412,29 @@ mod tests {
                 }
                 tables.put(batches).expect("put");
             }
-            assert_eq!(tables.finish().expect("finish").1, 2);
+            let (session, count) = tables.finish().expect("finish");
+            assert_eq!(count, 2);
+            let paths: Vec<PathBuf> = (1..100).map(|part| session.path("ATTITUDE", part)).collect();
+            assert!(session.finish(&context, 4000).expect("finish"));
             let mut seconds = Vec::new();
-            let files = (1..).map(|part| path.join(file_name(Table::Message(30), part)));
-            let files: Vec<PathBuf> = files.take_while(|path| path.exists()).collect();
+            let files: Vec<PathBuf> = paths.into_iter().take_while(|path| path.exists()).collect();
             for path in &files {
                 let file = File::open(path).expect("a file");
                 let reader = SerializedFileReader::new(file).expect("a Parquet file");
                 seconds.extend(reader.into_iter().map(|row| {
                     let row = row.expect("a row");
-                    row.get_double(0).expect("seconds")
+                    assert_eq!(row.get_string(1).expect("a session"), name);
+                    let digits = row.get_decimal(2).expect("seconds").data();
+                    i64::from_be_bytes(digits.try_into().expect("eight bytes"))
                 }));
             }
-            assert!(seconds.iter().copied().eq((0..2000_u32).map(f64::from)), "{seconds:?}");
+            assert!(seconds.iter().copied().eq((0..2000).map(|second| second * 1_000_000)), "{seconds:?}");
             files.len()
         };
         // The whole in fewer row groups has fewer bytes: it is written first.
-        assert_eq!(decode(LIMITS), 1);
-        let few = decode(Limits { pending_bytes: 20_000, open_bytes: 80_000 });
+        assert_eq!(decode(LIMITS, "s00000001-000000000000000000000000"), 1);
+        let few = Limits { pending_bytes: 20_000, open_bytes: 80_000 };
+        let few = decode(few, "s00000002-000000000000000000000000");
         assert!(few > 3, "{few}");
     }
 }

@@ -1,0 +1,274 @@
+//! `hums compact`: the files of many sessions become few files, sorted by vehicle and session.
+//!
+//! A date and bucket is one change ([`super::transaction`]): of all its tables together, so a session is in files of its own
+//! or in files of several, never in both. Columns have the encoding that makes them smallest in a sample.
+
+mod column;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use parquet::basic::{Compression, GzipLevel};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::printer::print_schema;
+use parquet::schema::types::TypePtr;
+use sha2::{Digest as _, Sha256};
+
+use super::transaction::{self, OWN, Transaction};
+use super::{EXTENSION, SESSIONS, folders, names, session_of};
+use crate::hex::hex;
+use crate::logs::in_order::{in_order, workers};
+use crate::outcome::{Outcome, usage};
+use crate::output;
+use crate::plural::count;
+use crate::printable::word;
+use column::Input;
+
+/// How the names of files of several sessions begin.
+const PREFIX: &str = "compact-";
+/// A larger file of several sessions stays as it is, and new sessions go into a further one.
+const LARGE_BYTES: u64 = 256 << 20;
+/// Rows of a row group at most.
+const GROUP_ROWS: usize = 256 * 1024;
+/// Tables that are written at once.
+const AT_ONCE: usize = 4;
+
+/// The request of `hums compact`.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The folder of the tables.
+    pub folder: PathBuf,
+}
+
+/// Files and bytes before and after.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    files: u64,
+    bytes: u64,
+    new_files: u64,
+    new_bytes: u64,
+    sessions: u64,
+}
+
+/// Runs `hums compact`.
+pub fn run(args: &Request) -> Result<Outcome> {
+    let root = args.folder.as_path();
+    if !root.join(OWN).is_dir() {
+        return Err(usage(format!(
+            "{}: has no tables of hums; hums decode --format parquet writes them",
+            root.display()
+        )));
+    }
+    let mut partitions = BTreeSet::new();
+    let tables = folders(root)?;
+    for table in &tables {
+        for date in folders(&root.join(table))? {
+            let buckets = folders(&root.join(table).join(&date))?;
+            partitions.extend(buckets.into_iter().map(|bucket| format!("{date}/{bucket}")));
+        }
+    }
+    let (mut sum, mut failed) = (Sum::default(), 0);
+    for partition in &partitions {
+        match of_partition(root, &tables, partition) {
+            Ok(part) => {
+                sum.files += part.files;
+                sum.bytes += part.bytes;
+                sum.new_files += part.new_files;
+                sum.new_bytes += part.new_bytes;
+                sum.sessions += part.sessions;
+            }
+            Err(error) => {
+                failed += 1;
+                note!("{partition}: {error:#}; its files stay as they are");
+            }
+        }
+    }
+    let parts =
+        names(&root.join(OWN))?.into_iter().filter(|name| name.ends_with(transaction::PART)).count() as u64;
+    if parts > 0 {
+        note!(
+            "{}: {} of runs that did not end; if no hums runs there, they can be deleted",
+            root.join(OWN).display(),
+            count(parts, "folder")
+        );
+    }
+    output::line(&word(&format!(
+        "{}: {} in {}, {} bytes, from {}, {} bytes",
+        root.display(),
+        count(sum.sessions, "session"),
+        count(sum.new_files, "file"),
+        sum.new_bytes,
+        count(sum.files, "file"),
+        sum.bytes
+    )))?;
+    if failed > 0 {
+        bail!("{} of {} could not be compacted", failed, count(partitions.len() as u64, "partition"));
+    }
+    Ok(Outcome::Done)
+}
+
+/// Compacts a date and bucket of all tables.
+fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> {
+    let lock = transaction::lock(root)?;
+    let (mut work, mut new) = (Vec::new(), BTreeSet::new());
+    for table in tables {
+        let folder = root.join(table).join(partition);
+        let (mut paths, mut has_new) = (Vec::new(), false);
+        for name in names(&folder)? {
+            let path = folder.join(&name);
+            let is_compacted = name.starts_with(PREFIX) && name.ends_with(EXTENSION);
+            match session_of(&name) {
+                Some(session) if path.is_file() => {
+                    has_new = true;
+                    if table == SESSIONS {
+                        new.insert(session.to_owned());
+                    }
+                    paths.push(path);
+                }
+                None if is_compacted => {
+                    if fs::metadata(&path)?.len() < LARGE_BYTES {
+                        paths.push(path);
+                    }
+                }
+                _ => note!("{}: is not of hums, and stays as it is", path.display()),
+            }
+        }
+        if has_new {
+            work.push((table.as_str(), paths));
+        }
+    }
+    if work.is_empty() {
+        return Ok(Sum::default());
+    }
+    let transaction = Transaction::begin(root)?;
+    let mut sum = Sum { sessions: new.len() as u64, ..Sum::default() };
+    let mut replaced = BTreeSet::new();
+    for path in work.iter().flat_map(|(_, paths)| paths) {
+        sum.files += 1;
+        sum.bytes += fs::metadata(path)?.len();
+        let place = path.strip_prefix(root).unwrap_or(path).components();
+        let place: Vec<_> = place.map(|part| part.as_os_str().to_string_lossy()).collect();
+        replaced.insert(place.join("/"));
+    }
+    let mut work = work.into_iter();
+    in_order(
+        workers(),
+        AT_ONCE,
+        || Ok(work.next()),
+        |(table, paths)| of_table(&transaction, &format!("{table}/{partition}"), &paths),
+        |made| {
+            let (files, bytes) = made?;
+            sum.new_files += files;
+            sum.new_bytes += bytes;
+            Ok(())
+        },
+    )?;
+    let new: Vec<String> = new.into_iter().collect();
+    transaction.commit(&lock, &replaced, &new)?;
+    Ok(sum)
+}
+
+/// Writes the rows of a table's files into one file for each set of columns. Returns the number of files and their bytes.
+fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result<(u64, u64)> {
+    let mut by_schema: BTreeMap<String, Vec<Input>> = BTreeMap::new();
+    for path in paths {
+        let input = Input::open(path)?;
+        let mut schema = Vec::new();
+        print_schema(&mut schema, &input.schema());
+        by_schema.entry(String::from_utf8_lossy(&schema).into_owned()).or_default().push(input);
+    }
+    let mut sum = (0, 0);
+    for (schema, inputs) in by_schema {
+        let mut hash = Sha256::new();
+        hash.update(&schema);
+        for segment in inputs.iter().flat_map(Input::segments) {
+            hash.update(&segment.session);
+            hash.update(segment.rows.to_le_bytes());
+        }
+        let name = format!("{PREFIX}{}{EXTENSION}", hex(&hash.finalize()[..12]));
+        let path = transaction.path(&format!("{place}/{name}"));
+        path.parent().map_or(Ok(()), fs::create_dir_all)?;
+        let rows = merge(&inputs, &path).with_context(|| place.to_owned())?;
+        // What is removed afterwards must be here.
+        let expected: usize = inputs.iter().map(Input::rows).sum();
+        let written = SerializedFileReader::new(File::open(&path)?)?.metadata().file_metadata().num_rows();
+        if rows != expected || written != expected as i64 {
+            bail!("{place}: {written} rows were written of {expected}");
+        }
+        sum = (sum.0 + 1, sum.1 + fs::metadata(&path)?.len());
+    }
+    Ok(sum)
+}
+
+/// A part of an input's rows: the input's index, the first row, the number of rows.
+pub(super) type Rows = (usize, usize, usize);
+
+/// Row groups of inputs in the order of vehicles and sessions.
+fn groups(inputs: &[Input]) -> Vec<Vec<Rows>> {
+    let mut segments: Vec<_> = inputs
+        .iter()
+        .enumerate()
+        .flat_map(|(index, input)| input.segments().iter().map(move |segment| (segment, index)))
+        .collect();
+    segments.sort_by_key(|(segment, _)| (&segment.vehicle, &segment.session, segment.part, segment.from));
+    let (mut groups, mut group, mut room) = (Vec::new(), Vec::new(), GROUP_ROWS);
+    for (segment, index) in segments {
+        let (mut from, mut left) = (segment.from, segment.rows);
+        while left > 0 {
+            let rows = left.min(room);
+            group.push((index, from, rows));
+            (from, left, room) = (from + rows, left - rows, room - rows);
+            if room == 0 {
+                groups.push(std::mem::take(&mut group));
+                room = GROUP_ROWS;
+            }
+        }
+    }
+    groups.extend(Some(group).filter(|group| !group.is_empty()));
+    groups
+}
+
+/// Merges inputs of equal columns. Returns the number of rows.
+fn merge(inputs: &[Input], path: &Path) -> Result<usize> {
+    let groups = groups(inputs);
+    let (Some(first), Some(group)) = (inputs.first(), groups.first()) else { return Ok(0) };
+    let schema: TypePtr = Arc::new(first.schema());
+    let mut properties = base();
+    for column in 0..first.columns() {
+        properties = column::read(inputs, group, column)?.encoded(&schema, column, properties)?;
+    }
+    let is_of_session = |known: &&KeyValue| !known.key.starts_with("hums.");
+    let about = first.about().iter().filter(is_of_session).cloned().collect();
+    let properties = properties.set_key_value_metadata(Some(about)).build();
+    let mut writer = SerializedFileWriter::new(File::create_new(path)?, schema, Arc::new(properties))?;
+    let mut rows = 0;
+    for group in &groups {
+        let mut to = writer.next_row_group()?;
+        let mut column = 0;
+        while let Some(mut writer) = to.next_column()? {
+            column::read(inputs, group, column)?.write(&mut writer)?;
+            writer.close()?;
+            column += 1;
+        }
+        to.close()?;
+        rows += group.iter().map(|(_, _, rows)| rows).sum::<usize>();
+    }
+    writer.close()?;
+    Ok(rows)
+}
+
+/// Properties of the files.
+fn base() -> parquet::file::properties::WriterPropertiesBuilder {
+    WriterProperties::builder()
+        .set_compression(Compression::GZIP(GzipLevel::default()))
+        .set_dictionary_enabled(false)
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_offset_index_disabled(true)
+        .set_created_by(concat!("hums ", env!("CARGO_PKG_VERSION")).to_owned())
+}

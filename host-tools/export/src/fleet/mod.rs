@@ -1,0 +1,243 @@
+//! A fleet's tables as files: a folder for each table, in it a folder for each date and bucket of vehicles.
+//!
+//! ```text
+//! FLEET/ATTITUDE/date=2026-11-21/bucket=07/s1a2b3c4d-3f0042000d51373435363338.parquet
+//! FLEET/sessions/date=2026-11-21/bucket=07/s1a2b3c4d-3f0042000d51373435363338.parquet
+//! FLEET/.hums-fleet/
+//! ```
+//!
+//! The files of a session have the name of its recording, so the same recording twice is the same files. All files of a
+//! session take their places in one [`transaction`]. The table `sessions` has a row for
+//! each session, and its file tells that the session is there.
+
+pub mod compact;
+pub(crate) mod sessions;
+#[cfg(test)]
+mod tests;
+pub(crate) mod transaction;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::{self, BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context as _, Result, bail};
+use sha2::{Digest as _, Sha256};
+
+use crate::context::Context;
+use crate::files::{Inputs, cannot_write, make_directory};
+use crate::hex::hex;
+use crate::outcome::exists;
+use transaction::{OWN, Transaction};
+
+/// The table with a row for each session.
+pub(crate) const SESSIONS: &str = "sessions";
+/// The extension of tables.
+const EXTENSION: &str = ".parquet";
+/// Hive's word for "null", known to every reader of this layout.
+const NO_DATE: &str = "__HIVE_DEFAULT_PARTITION__";
+
+/// The bucket of a vehicle, from 0 to 15: the first hexadecimal digit of the SHA-256 of its name.
+pub fn bucket(vehicle: &str) -> u8 {
+    Sha256::digest(vehicle.as_bytes()).first().map_or(0, |byte| byte >> 4)
+}
+
+/// The folder of a vehicle's sessions of a day, in the folder of each table.
+fn partition(vehicle: &str, date: Option<&str>) -> String {
+    format!("date={}/bucket={:02}", date.unwrap_or(NO_DATE), bucket(vehicle))
+}
+
+/// The name of a session's `part`th file of a table, from 1.
+fn file_name(session: &str, part: u32) -> String {
+    match part {
+        ..=1 => format!("{session}{EXTENSION}"),
+        part => format!("{session}.{part}{EXTENSION}"),
+    }
+}
+
+/// The session of a file of this name; `None` for the file of another program, or of several sessions.
+fn session_of(name: &str) -> Option<&str> {
+    let stem = name.strip_suffix(EXTENSION)?;
+    let session = stem.split_once('.').map_or(stem, |(session, _)| session);
+    let (short, unique) = session.split_once('-')?;
+    let is_hex = |text: &str| text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+    let number = short.strip_prefix(['s', 'r'])?;
+    (number.len() == 8 && is_hex(number) && unique.len() == 24 && is_hex(unique)).then_some(session)
+}
+
+/// The tables of a fleet in a folder, and the sessions that this call has written there.
+#[derive(Debug)]
+pub(crate) struct Fleet {
+    root: PathBuf,
+    /// The number of frames of each session.
+    written: Mutex<BTreeMap<String, u64>>,
+}
+
+/// The place of a session.
+enum Found {
+    /// In a file of its own, in this partition.
+    Alone(String),
+    /// In a file of several sessions.
+    Compacted,
+}
+
+impl Fleet {
+    /// In a folder, which need not be there.
+    pub(crate) fn new(root: &Path) -> Self {
+        Self { root: root.to_owned(), written: Mutex::default() }
+    }
+
+    /// Looks for a session, in any date and bucket.
+    fn find(&self, session: &str) -> Result<Option<Found>> {
+        let name = file_name(session, 1);
+        for date in folders(&self.root.join(SESSIONS))? {
+            for bucket in folders(&self.root.join(SESSIONS).join(&date))? {
+                let partition = format!("{date}/{bucket}");
+                if self.root.join(SESSIONS).join(&partition).join(&name).exists() {
+                    return Ok(Some(Found::Alone(partition)));
+                }
+            }
+        }
+        let index = self.root.join(OWN).join("compacted").join(shard(session));
+        let file = match File::open(index) {
+            Ok(file) => BufReader::new(file),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(error.into()),
+        };
+        for line in file.lines() {
+            if line? == session {
+                return Ok(Some(Found::Compacted));
+            }
+        }
+        Ok(None)
+    }
+
+    fn is_written(&self, session: &str) -> Option<u64> {
+        self.written.lock().unwrap_or_else(PoisonError::into_inner).get(session).copied()
+    }
+
+    /// Refuses a session that is there, unless it may be replaced.
+    fn check(&self, session: &str, found: &Found, inputs: &Inputs) -> Result<()> {
+        match found {
+            Found::Compacted => {
+                let why = format!("session {session} is in a file of several sessions, which stays as it is");
+                Err(exists(&self.root.join(SESSIONS), false).context(why))
+            }
+            Found::Alone(partition) if !inputs.may_replace() => {
+                let path = self.root.join(SESSIONS).join(partition).join(file_name(session, 1));
+                Err(exists(&path, inputs.can_replace()))
+            }
+            Found::Alone(_) => Ok(()),
+        }
+    }
+
+    /// All files of a session in a partition, relative to the root.
+    fn files(&self, session: &str, partition: &str) -> Result<BTreeSet<String>> {
+        let mut files = BTreeSet::new();
+        for table in folders(&self.root)? {
+            for name in names(&self.root.join(&table).join(partition))? {
+                if session_of(&name) == Some(session) {
+                    files.insert(format!("{table}/{partition}/{name}"));
+                }
+            }
+        }
+        Ok(files)
+    }
+}
+
+/// The file of the index that has a session of a file of several.
+fn shard(session: &str) -> String {
+    hex(&Sha256::digest(session.as_bytes())[..1])
+}
+
+/// The names of a folder's entries; none if the folder is missing.
+fn names(folder: &Path) -> Result<Vec<String>> {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            return Ok(Vec::new());
+        }
+        Err(error) => return Err(error).with_context(|| format!("{}: cannot be read", folder.display())),
+    };
+    let mut names = Vec::new();
+    for entry in entries {
+        let entry = entry.with_context(|| format!("{}: cannot be read", folder.display()))?;
+        names.extend(entry.file_name().into_string().ok());
+    }
+    names.sort_unstable();
+    Ok(names)
+}
+
+/// The names of a folder's folders, without those of this program alone and hidden ones.
+fn folders(folder: &Path) -> Result<Vec<String>> {
+    let names = names(folder)?.into_iter();
+    Ok(names.filter(|name| !name.starts_with('.') && folder.join(name).is_dir()).collect())
+}
+
+/// The tables of one session, open.
+pub(crate) struct Session {
+    transaction: Transaction,
+    partition: String,
+    /// The unique name of the recording.
+    name: String,
+}
+
+impl Session {
+    /// Begins a session's tables.
+    pub(crate) fn begin(context: &Context) -> Result<Self> {
+        let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
+        let identity = &context.identity;
+        context.inputs.refuse(&fleet.root)?;
+        make_directory(&fleet.root)?;
+        transaction::recover(&fleet.root)?;
+        let name = identity.recording.clone();
+        if fleet.is_written(&name).is_none()
+            && let Some(found) = fleet.find(&name)?
+        {
+            fleet.check(&name, &found, &context.inputs)?;
+        }
+        let partition = partition(&identity.vehicle, identity.date.as_deref());
+        Ok(Self { transaction: Transaction::begin(&fleet.root)?, partition, name })
+    }
+
+    /// The place of a table's file, relative to the root.
+    fn place(&self, table: &str, part: u32) -> String {
+        format!("{table}/{}/{}", self.partition, file_name(&self.name, part))
+    }
+
+    /// The path that a table's file will have.
+    pub(crate) fn path(&self, table: &str, part: u32) -> PathBuf {
+        self.transaction.root().join(self.place(table, part))
+    }
+
+    /// A new file of a table.
+    pub(crate) fn file(&self, table: &str, part: u32) -> Result<File> {
+        let path = self.transaction.path(&self.place(table, part));
+        let made = path.parent().map_or(Ok(()), fs::create_dir_all);
+        let file = made.and_then(|()| File::options().write(true).create_new(true).open(&path));
+        file.with_context(|| cannot_write(&self.path(table, part)))
+    }
+
+    /// All files are there and closed: they take their places. Of two recordings of one session in one call the longer one
+    /// stays; `false` if that is the other one.
+    pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<bool> {
+        let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
+        let Self { transaction, name, .. } = self;
+        let lock = transaction::lock(&fleet.root)?;
+        let mut written = fleet.written.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = fleet.find(&name)?;
+        match (written.get(&name), &found) {
+            (Some(other), _) if *other >= frames => return Ok(false),
+            (None, Some(found)) => fleet.check(&name, found, &context.inputs)?,
+            _ => {}
+        }
+        let replaced = match found {
+            Some(Found::Alone(partition)) => fleet.files(&name, &partition)?,
+            _ => BTreeSet::new(),
+        };
+        transaction.commit(&lock, &replaced, &[])?;
+        written.insert(name, frames);
+        Ok(true)
+    }
+}

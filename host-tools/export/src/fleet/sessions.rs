@@ -1,0 +1,199 @@
+//! The table `sessions`: a row for each session, which answers a fleet's common questions by itself.
+
+use std::sync::LazyLock;
+
+use hums_analysis::log_json::{VehicleJson, duration_s, finite, vehicle};
+use hums_core::component::Figures;
+use hums_core::figures::Quantity;
+use hums_core::health::Level;
+use hums_core::usage::{CounterName, counter_name as meaning};
+use serde::Serialize;
+
+use super::SESSIONS;
+use crate::check::grouped::grouped;
+use crate::checked::{Checked, OnBoard, problems_of};
+use crate::context::Context;
+use crate::hex::hex;
+use crate::identity::About;
+use crate::names::counter_name;
+use crate::row::{Cell, CellType, Row};
+use crate::source::recording::Format;
+use crate::summary::BootLine;
+
+/// The counters with a column: of the vehicle, the motors' running times, and the figures of steady flight.
+static COUNTERS: LazyLock<Vec<String>> = LazyLock::new(|| {
+    let has_column = |number: &u8| match meaning(*number) {
+        Some(CounterName::Vehicle(_) | CounterName::Motor("run_time_s", _)) => true,
+        Some(CounterName::Figure(figure)) => {
+            !matches!(figure, Quantity::MotorSpeed(_) | Quantity::MotorOutput(_))
+        }
+        _ => false,
+    };
+    (0..=u8::MAX).filter(has_column).map(counter_name).collect()
+});
+
+/// A check that found something.
+#[derive(Serialize)]
+struct ProblemJson<'a> {
+    level: &'static str,
+    check: &'a str,
+    instance: u8,
+    /// Number of changes from good to a warning or worse.
+    times: u32,
+    /// Time of the worst level, s since power-on.
+    at_s: f64,
+    /// Worst value; `null` if the input stopped.
+    value: Option<f32>,
+    limit: Option<f32>,
+    unit: &'a str,
+}
+
+/// A part with a limited life.
+#[derive(Serialize)]
+struct PartJson<'a> {
+    part: String,
+    serial: &'a str,
+    status: &'a str,
+    /// `null` without a limit.
+    used_percent: Option<f32>,
+    limit: Option<String>,
+    flight_s: f64,
+    flights: f64,
+    cycles: f64,
+}
+
+fn text(text: impl Into<String>) -> Cell {
+    Cell::Text(text.into())
+}
+
+fn count(number: impl Into<u64>) -> Cell {
+    Cell::Count(number.into())
+}
+
+/// A cell of this type, null if the value is not known.
+fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: CellType) -> Cell {
+    value.map_or(Cell::Unknown(unknown), cell)
+}
+
+/// The row of a recording. It describes the whole recording, also if only a part of it is decoded.
+pub(crate) fn row(context: &Context, about: &About) -> Row {
+    let About { overview, board, fingerprint, track, .. } = about;
+    let summary = &overview.ending.summary;
+    let place = track.points().first();
+    let end_utc_us = summary.last.and_then(|last| context.epochs.utc_us(last));
+    let mut cells = vec![
+        ("fingerprint", text(hex(fingerprint))),
+        ("format", text(overview.format.map_or("hums", Format::name))),
+        ("end_utc", known(end_utc_us, Cell::Count, CellType::Count)),
+        ("duration[s]", Cell::Double(duration_s(overview))),
+        ("latitude[deg]", known(place.map(|place| place.latitude_deg), Cell::Double, CellType::Double)),
+        ("longitude[deg]", known(place.map(|place| place.longitude_deg), Cell::Double, CellType::Double)),
+        ("box", known(board.map(|board| hex(&board)), Cell::Text, CellType::Text)),
+    ];
+    cells.extend(machines(about));
+    cells.extend(record(about));
+    cells.extend(health(context, about));
+    let counter = |name: &'static String| {
+        let value = overview.contents.usage.get(name).copied();
+        (name.as_str(), known(value, Cell::Double, CellType::Double))
+    };
+    cells.extend(COUNTERS.iter().map(counter));
+    Row::new(SESSIONS, cells)
+}
+
+/// The vehicle, and the firmware of both machines.
+fn machines(about: &About) -> Vec<(&'static str, Cell)> {
+    let vehicle = vehicle(&about.overview);
+    let of_vehicle = |of: fn(&VehicleJson) -> Option<String>| {
+        known(vehicle.as_ref().and_then(of), Cell::Text, CellType::Text)
+    };
+    let boot = about.overview.contents.boot.as_ref();
+    let of_box =
+        |of: fn(&BootLine) -> &String| known(boot.map(|boot| of(boot).clone()), Cell::Text, CellType::Text);
+    vec![
+        ("autopilot", of_vehicle(|vehicle| Some(vehicle.autopilot.clone()))),
+        ("type", of_vehicle(|vehicle| Some(vehicle.r#type.clone()))),
+        ("firmware", of_vehicle(|vehicle| vehicle.firmware.clone())),
+        ("box_version", of_box(|boot| &boot.version)),
+        ("box_git", of_box(|boot| &boot.git)),
+        ("box_board", of_box(|boot| &boot.board)),
+    ]
+}
+
+/// The record itself: its size, its losses, its recorder.
+fn record(about: &About) -> Vec<(&'static str, Cell)> {
+    let overview = &about.overview;
+    let bytes = if overview.format.is_some() { overview.bytes_on_card } else { overview.log_bytes() };
+    let stats = overview.contents.stats.as_ref();
+    let number = |value: Option<u64>| known(value, Cell::Count, CellType::Count);
+    let queue = stats
+        .filter(|stats| stats.queue_bytes_capacity > 0)
+        .map(|stats| 100.0 * stats.queue_bytes_max as f64 / stats.queue_bytes_capacity as f64);
+    vec![
+        ("whole", Cell::Flag(overview.is_sound())),
+        ("gaps", count(overview.ending.summary.gaps + overview.ending.summary.losses)),
+        ("frames", count(overview.contents.frames())),
+        ("log_bytes", count(bytes)),
+        ("compression_ratio", known(overview.ratio(), Cell::Double, CellType::Double)),
+        ("frames_in", number(stats.map(|stats| stats.frames_in.into()))),
+        ("frames_lost", number(stats.map(|stats| stats.frames_lost.into()))),
+        ("queue[%]", known(queue, Cell::Double, CellType::Double)),
+        ("longest_stall[ms]", number(stats.map(|stats| stats.sd_stall_ms_max.into()))),
+    ]
+}
+
+/// Findings, parts, and who checked.
+fn health(context: &Context, about: &About) -> Vec<(&'static str, Cell)> {
+    let contents = &about.overview.contents;
+    let checked = context.checked.as_ref().map_or_else(
+        || {
+            let mut on_board = OnBoard::default();
+            contents.findings.iter().for_each(|finding| on_board.add(finding.level));
+            on_board.row()
+        },
+        |checked: &Checked| checked.row(None),
+    );
+    let mut cells = checked.cells;
+    let problems = problems_of(contents);
+    let of_level = |level: Level| problems.iter().filter(|problem| problem.level == level).count() as u64;
+    let groups = grouped(&problems);
+    let worst = groups.first().and_then(|group| group.first());
+    let json: Vec<ProblemJson<'_>> = problems
+        .iter()
+        .map(|problem| ProblemJson {
+            level: problem.level.name(),
+            check: &problem.check,
+            instance: problem.instance,
+            times: problem.times,
+            at_s: problem.at.as_secs_f64(),
+            value: finite(problem.value),
+            limit: finite(problem.limit),
+            unit: &problem.unit,
+        })
+        .collect();
+    let parts: Vec<PartJson<'_>> = contents
+        .components
+        .iter()
+        .map(|(place, line)| {
+            let (part, limit) = contents.part(*place, line);
+            let used_percent = finite(line.used_percent).filter(|_| limit.is_some());
+            let (serial, status) = (line.serial.as_str(), line.status);
+            let Figures { flight_s, flights, cycles, .. } = line.figures;
+            PartJson { part, serial, status, used_percent, limit, flight_s, flights, cycles }
+        })
+        .collect();
+    let due = parts.iter().filter(|part| part.used_percent.is_some());
+    let due = due
+        .max_by(|one, other| one.used_percent.unwrap_or(0.0).total_cmp(&other.used_percent.unwrap_or(0.0)));
+    cells.extend([
+        ("criticals", count(of_level(Level::Critical))),
+        ("warnings", count(of_level(Level::Warning))),
+        ("worst_check", known(worst.map(|worst| worst.check.clone()), Cell::Text, CellType::Text)),
+        ("worst_level", known(worst.map(|worst| worst.level.name().to_owned()), Cell::Text, CellType::Text)),
+        ("problems", text(serde_json::to_string(&json).unwrap_or_default())),
+        ("most_used_part", known(due.map(|part| part.part.clone()), Cell::Text, CellType::Text)),
+        ("most_used[%]", known(due.and_then(|part| part.used_percent), Cell::Single, CellType::Single)),
+        ("parts", text(serde_json::to_string(&parts).unwrap_or_default())),
+    ]);
+    cells
+}

@@ -1,0 +1,229 @@
+//! Changes of a fleet's files that happen as a whole, also if the program or the computer stops at any step.
+//!
+//! 1. The new files are written in a hidden folder, by the places that they will have.
+//! 2. The folder gets the list of the files that they replace. It is renamed: from here on the change counts.
+//! 3. The replaced files are removed, and the new ones are moved to their places.
+//!
+//! Whoever comes next does the rest of step 3 ([`recover`]). Before step 2 is done, the old files are untouched. One program
+//! at a time changes a fleet: it holds a lock.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use tempfile::TempDir;
+
+use super::{names, shard};
+use crate::files::{check_parent, settle};
+
+/// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
+pub(crate) const OWN: &str = ".hums-fleet";
+/// How the names of changes that count begin.
+const COMMIT: &str = "commit-";
+/// How the names of unfinished changes end.
+pub(crate) const PART: &str = ".hums-part";
+/// The new files in a change's folder, the list of replaced ones, and the list of sessions that share a file from now on.
+const FILES: &str = "files";
+const REPLACED: &str = "replaced";
+const COMPACTED: &str = "compacted";
+
+/// Steps at which a test stops a change.
+#[cfg(test)]
+pub(crate) mod stop {
+    use std::cell::Cell;
+    use std::io;
+
+    thread_local! {
+        /// Steps until the stop.
+        static LEFT: Cell<Option<u32>> = const { Cell::new(None) };
+    }
+
+    /// Stops this thread's changes after so many steps.
+    pub(crate) fn after(steps: Option<u32>) {
+        LEFT.set(steps);
+    }
+
+    pub(super) fn step() -> io::Result<()> {
+        match LEFT.get() {
+            Some(0) => Err(io::Error::other("stopped")),
+            left => {
+                LEFT.set(left.map(|left| left - 1));
+                Ok(())
+            }
+        }
+    }
+}
+
+#[cfg(not(test))]
+mod stop {
+    /// A program that runs is not stopped.
+    #[expect(clippy::unnecessary_wraps, reason = "the test's steps fail")]
+    pub(super) fn step() -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The right to change a fleet's files, until it is dropped.
+pub(crate) struct Lock(#[expect(dead_code, reason = "holds the lock")] File);
+
+/// Waits for other programs that change the fleet, and completes a change that one of them began.
+pub(crate) fn lock(root: &Path) -> Result<Lock> {
+    let own = root.join(OWN);
+    settle(fs::create_dir_all(&own), &own)?;
+    let path = own.join("lock");
+    let file = settle(File::options().create(true).truncate(false).write(true).open(&path), &path)?;
+    match file.lock() {
+        // Without locks of the file system, two runs cannot be distinguished.
+        Err(error) if error.kind() != io::ErrorKind::Unsupported => {
+            return Err(error).with_context(|| format!("{}: cannot be locked", path.display()));
+        }
+        _ => {}
+    }
+    let lock = Lock(file);
+    for name in names(&own)?.iter().filter(|name| name.starts_with(COMMIT)) {
+        note!("{}: a change that an earlier run began is completed", root.display());
+        settle(apply(root, &own.join(name)), root)?;
+    }
+    Ok(lock)
+}
+
+/// Completes a change that an ended run began.
+pub(crate) fn recover(root: &Path) -> Result<()> {
+    let is_begun = names(&root.join(OWN))?.iter().any(|name| name.starts_with(COMMIT));
+    if is_begun { lock(root).map(|_| ()) } else { Ok(()) }
+}
+
+/// A change that does not count yet. Dropped, it leaves nothing.
+#[derive(Debug)]
+pub(crate) struct Transaction {
+    root: PathBuf,
+    part: TempDir,
+}
+
+impl Transaction {
+    /// Begins a change of the fleet in this folder.
+    pub(crate) fn begin(root: &Path) -> Result<Self> {
+        let own = root.join(OWN);
+        let part = fs::create_dir_all(&own)
+            .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own));
+        Ok(Self { root: root.to_owned(), part: settle(part, root)? })
+    }
+
+    /// The fleet's folder.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The path of a new file until its move, by its place in the fleet's folder.
+    pub(crate) fn path(&self, place: &str) -> PathBuf {
+        self.part.path().join(FILES).join(place)
+    }
+
+    /// The change counts from here on, and is carried out. `replaced` are the places of files that go, `compacted` the
+    /// sessions that are in a file of several.
+    pub(crate) fn commit(self, _: &Lock, replaced: &BTreeSet<String>, compacted: &[String]) -> Result<()> {
+        let Self { root, part } = self;
+        let mut places = Vec::new();
+        let listed = each(&part.path().join(FILES), "", &mut |place| {
+            places.push(root.join(place));
+            Ok(())
+        });
+        settle(listed, &root)?;
+        // A change that counts must be possible.
+        for place in places {
+            check_parent(&place)?;
+            if place.is_dir() {
+                bail!("{}: is a directory, and a file is needed there; move it away", place.display());
+            }
+        }
+        let committed = Self::count(&root, part, replaced, compacted);
+        settle(committed.and_then(|folder| apply(&root, &folder)), &root)
+    }
+
+    fn count(
+        root: &Path,
+        part: TempDir,
+        replaced: &BTreeSet<String>,
+        compacted: &[String],
+    ) -> io::Result<PathBuf> {
+        // A new file of the same place replaces the old one by its move.
+        let files = part.path().join(FILES);
+        let replaced: Vec<&String> = replaced.iter().filter(|place| !files.join(place).exists()).collect();
+        let lines = |lines: &mut dyn Iterator<Item = &String>| {
+            lines.map(|line| format!("{line}\n")).collect::<String>()
+        };
+        for (name, text) in
+            [(REPLACED, lines(&mut replaced.iter().copied())), (COMPACTED, lines(&mut compacted.iter()))]
+        {
+            stop::step()?;
+            let mut file = File::create(part.path().join(name))?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+        }
+        if !replaced.is_empty() {
+            sync_all(&files)?;
+        }
+        let unique = part.path().file_name().unwrap_or_default().to_string_lossy();
+        let unique = unique.trim_matches('.').trim_end_matches(PART);
+        let folder = root.join(OWN).join(format!("{COMMIT}{unique}"));
+        stop::step()?;
+        fs::rename(part.path(), &folder)?;
+        // It has its name, under which nothing removes it.
+        let _ = part.keep();
+        Ok(folder)
+    }
+}
+
+/// Writes all files of a folder to the disk: the files that they replace are removed soon.
+fn sync_all(folder: &Path) -> io::Result<()> {
+    each(folder, "", &mut |place| File::open(folder.join(place))?.sync_all())
+}
+
+/// Carries out a change, or the rest of it: each step may have been done before.
+fn apply(root: &Path, folder: &Path) -> io::Result<()> {
+    let files = folder.join(FILES);
+    for place in fs::read_to_string(folder.join(REPLACED))?.lines() {
+        stop::step()?;
+        match fs::remove_file(root.join(place)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    each(&files, "", &mut |place| {
+        stop::step()?;
+        let to = root.join(place);
+        to.parent().map_or(Ok(()), fs::create_dir_all)?;
+        fs::rename(files.join(place), to)
+    })?;
+    // A session twice in the index is harmless.
+    for session in fs::read_to_string(folder.join(COMPACTED))?.lines() {
+        let index = root.join(OWN).join(COMPACTED);
+        fs::create_dir_all(&index)?;
+        let mut index = File::options().create(true).append(true).open(index.join(shard(session)))?;
+        writeln!(index, "{session}")?;
+    }
+    stop::step()?;
+    // Without its lists it could not be carried out again.
+    let done = folder.with_extension("hums-part");
+    fs::rename(folder, &done)?;
+    stop::step()?;
+    fs::remove_dir_all(done)
+}
+
+/// Calls `take` with the place of each file below a folder.
+fn each(folder: &Path, prefix: &str, take: &mut dyn FnMut(&str) -> io::Result<()>) -> io::Result<()> {
+    let mut entries = fs::read_dir(folder.join(prefix))?.collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let place = if prefix.is_empty() { name } else { format!("{prefix}/{name}") };
+        if entry.file_type()?.is_dir() {
+            each(folder, &place, take)?;
+        } else {
+            take(&place)?;
+        }
+    }
+    Ok(())
+}
