@@ -70,6 +70,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
         Command::Share(args) => decode::share::run(&args.request()),
         Command::Info(args) => info::run(args),
         Command::Due(args) => info::due::run(args),
+        Command::Logbook(args) => decode::logbook::run(&args.request()),
         Command::Compact(args) => decode::fleet::compact::run(&args.request()),
         Command::Sim(args) => run::sim::run(args),
         Command::Box(args) => match &args.action {

@@ -38,6 +38,7 @@ pub mod format;
 pub mod formats;
 pub mod identity;
 mod journey;
+pub mod logbook;
 pub mod made;
 mod motion;
 mod native;

@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub use check::Check;
 pub use live::Live;
-pub use read::{Compact, Decode, Due, Info, Report, Share, Split};
+pub use read::{Compact, Decode, Due, Info, Logbook, Report, Share, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{
@@ -72,6 +72,8 @@ pub enum Command {
     Info(Info),
     /// Say which parts are due: used, limit, left at the present rate; and the hours of each vehicle
     Due(Due),
+    /// Write a logbook of flights, batteries and parts with their defects: a page, CSV, or JSON of GUTMA
+    Logbook(Logbook),
     /// Make few large files of a fleet's Parquet tables; may be stopped and started again at any time
     Compact(Compact),
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use crate::decode::fleet::compact;
 use crate::decode::format::Format;
 use crate::decode::formats::{FORMATS, find};
-use crate::decode::{Request, share};
+use crate::decode::{Request, logbook, share};
 use crate::endpoint::without_slash;
 use crate::report;
 use crate::utc::When;
@@ -240,6 +240,42 @@ pub struct Due {
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
+}
+
+const LOGBOOK_EXAMPLES: &str = "Examples:
+  hums logbook cards/ -o logbook.csv
+  hums logbook cards/ -o logbook.csv -o logbook.html --force
+  hums logbook flight.tlog -o flight.json
+  hums logbook cards/ -o flights/
+
+The ending of -o says what to write: .csv, .html (a page to print), .json (one flight for GUTMA's exchange), or a folder (such a
+file for each flight). A CSV that exists is continued: its flights stay, and so do the cells that people wrote (pilot, remarks,
+columns of their own). With a CSV in the same call, page and JSON have these cells too. docs/logbook.md";
+
+/// `hums logbook`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = LOGBOOK_EXAMPLES)]
+pub struct Logbook {
+    /// Cards, card images, logs, recordings, or directories with such
+    #[arg(required = true, value_name = "CARD|LOG|DIR", value_parser = input())]
+    pub inputs: Vec<PathBuf>,
+    /// The file to write, or a folder; may be given several times
+    #[arg(short, long, value_name = "OUT", required = true)]
+    pub output: Vec<PathBuf>,
+    /// The aircraft of all logs that have no unique id
+    #[arg(long, value_name = "NAME")]
+    pub vehicle: Option<String>,
+    /// Overwrite pages and JSON that exist
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl Logbook {
+    /// The request that the arguments make.
+    pub fn request(&self) -> logbook::Request {
+        let Self { inputs, output, vehicle, force } = self.clone();
+        logbook::Request { inputs, outputs: output, vehicle, force }
+    }
 }
 
 const COMPACT_EXAMPLES: &str = "Examples:

@@ -133,6 +133,7 @@ fn every_example_that_needs_nobody_works_as_it_is_typed() {
         "flight.tlog",
         "info",
         "live",
+        "logbook",
         "man",
         "report",
         "share",

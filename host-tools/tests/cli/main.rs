@@ -16,6 +16,7 @@ mod in_place;
 mod inputs;
 mod json;
 mod killed;
+mod logbook;
 mod mixed;
 mod pairs;
 mod px4_pair;

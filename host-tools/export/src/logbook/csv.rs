@@ -1,0 +1,287 @@
+//! The logbook as CSV, which people continue.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail};
+
+use super::{BY_HAND, Book, Entry, Life, Spot};
+use crate::files::{Inputs, Output, make_parent, settle};
+use crate::text::push_csv_text;
+
+/// The columns of the recordings. The first one names a flight.
+const COLUMNS: [&str; 18] = [
+    "flight",
+    "aircraft",
+    "type",
+    "firmware",
+    "take_off_utc",
+    "landing_utc",
+    "duration_s",
+    "take_off_latitude_deg",
+    "take_off_longitude_deg",
+    "landing_latitude_deg",
+    "landing_longitude_deg",
+    "charge_ah",
+    "voltage_min_v",
+    "total_flights",
+    "total_hours",
+    "incident",
+    "defects",
+    "record",
+];
+
+/// Adds the flights of an earlier CSV, and the cells of people in it. A flight of this call has its own cells besides.
+pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
+    let text = match fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(error).with_context(|| format!("{}: cannot be read", path.display())),
+    };
+    let rows = rows(text.trim_start_matches('\u{feff}'));
+    let mut rows = rows.into_iter();
+    let heading = rows.next().unwrap_or_default();
+    if heading.first().map(String::as_str) != Some("flight") || !heading.iter().any(|name| name == "aircraft")
+    {
+        bail!("{}: exists and is no logbook of this command; name another output", path.display());
+    }
+    for (line, row) in (2..).zip(rows) {
+        let cells: BTreeMap<&str, &str> =
+            heading.iter().map(String::as_str).zip(row.iter().map(|cell| plain(cell))).collect();
+        let cell = |name: &str| cells.get(name).copied().unwrap_or_default();
+        if row.iter().all(String::is_empty) {
+            continue;
+        }
+        if row.len() > heading.len() || cell("flight").is_empty() || cell("aircraft").is_empty() {
+            bail!(
+                "{}: line {line} has not the cells of a flight; mend it, or name another output",
+                path.display()
+            );
+        }
+        let is_of_people = |name: &&&str| !COLUMNS.contains(*name);
+        let by_hand =
+            cells.keys().filter(is_of_people).map(|name| ((*name).to_owned(), cell(name).to_owned()));
+        let by_hand: BTreeMap<String, String> = by_hand.collect();
+        let known = book.values_mut().flat_map(|aircraft| &mut aircraft.entries);
+        if let Some(entry) = known.into_iter().find(|entry| entry.key == cell("flight")) {
+            entry.by_hand = by_hand;
+            continue;
+        }
+        let aircraft = book.entry(cell("aircraft").to_owned()).or_default();
+        aircraft.entries.push(entry(&cell, by_hand));
+    }
+    for aircraft in book.values_mut() {
+        aircraft.entries.sort_by(|one, other| one.take_off.cmp(&other.take_off));
+    }
+    Ok(())
+}
+
+/// A flight of an earlier CSV.
+fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>) -> Entry {
+    let text = |name: &str| cell(name).to_owned();
+    let some = |name: &str| Some(text(name)).filter(|text| !text.is_empty());
+    let number = |name: &str| cell(name).replace(',', ".").parse::<f64>().ok();
+    let spot = |name: &str| {
+        let part = |axis: &str| number(&format!("{name}_{axis}_deg"));
+        Some(Spot { latitude_deg: part("latitude")?, longitude_deg: part("longitude")? })
+    };
+    Entry {
+        key: text("flight"),
+        aircraft: text("aircraft"),
+        kind: text("type"),
+        firmware: text("firmware"),
+        take_off: some("take_off_utc"),
+        landing: some("landing_utc"),
+        duration_s: number("duration_s").unwrap_or(0.0),
+        from: spot("take_off"),
+        to: spot("landing"),
+        charge_ah: number("charge_ah"),
+        voltage_min_v: number("voltage_min_v"),
+        incident: text("incident"),
+        defects: text("defects"),
+        record: text("record"),
+        by_hand,
+        span: None,
+        utc_us: None,
+        session: None,
+    }
+}
+
+/// Writes the logbook. Cells of people have their columns at the end.
+pub(super) fn write(book: &Book, path: &Path) -> Result<()> {
+    let entries = || book.values().flat_map(|aircraft| &aircraft.entries);
+    let mut by_hand: Vec<&str> = BY_HAND.to_vec();
+    for name in entries().flat_map(|entry| entry.by_hand.keys()) {
+        if !by_hand.contains(&name.as_str()) {
+            by_hand.push(name);
+        }
+    }
+    let mut text = Vec::new();
+    line(&mut text, COLUMNS.iter().chain(&by_hand).map(|name| (*name).to_owned()));
+    for aircraft in book.values() {
+        let mut sum = Life { flights: 0.0, flight_s: 0.0 };
+        for entry in &aircraft.entries {
+            if entry.is_flight() {
+                sum = Life { flights: sum.flights + 1.0, flight_s: sum.flight_s + entry.duration_s };
+            }
+            let cell = |name: &&str| entry.by_hand.get(*name).cloned().unwrap_or_default();
+            line(&mut text, cells(entry, sum).into_iter().chain(by_hand.iter().map(cell)));
+        }
+    }
+    make_parent(path)?;
+    // What the existing file has is in the new one.
+    let mut output = Output::create(path, &Inputs::none().forcing(true))?;
+    settle(output.write_all(&text), path)?;
+    output.finish()
+}
+
+fn cells(entry: &Entry, sum: Life) -> [String; COLUMNS.len()] {
+    let number = |value: Option<f64>, decimals: usize| {
+        value.map_or_else(String::new, |value| format!("{value:.decimals$}"))
+    };
+    let text = |text: &Option<String>| text.clone().unwrap_or_default();
+    [
+        entry.key.clone(),
+        entry.aircraft.clone(),
+        entry.kind.clone(),
+        entry.firmware.clone(),
+        text(&entry.take_off),
+        text(&entry.landing),
+        number(Some(entry.duration_s), 1),
+        number(entry.from.map(|spot| spot.latitude_deg), 7),
+        number(entry.from.map(|spot| spot.longitude_deg), 7),
+        number(entry.to.map(|spot| spot.latitude_deg), 7),
+        number(entry.to.map(|spot| spot.longitude_deg), 7),
+        number(entry.charge_ah, 3),
+        number(entry.voltage_min_v, 2),
+        number(Some(sum.flights), 0),
+        number(Some(sum.flight_s / 3600.0), 4),
+        entry.incident.clone(),
+        entry.defects.clone(),
+        entry.record.clone(),
+    ]
+}
+
+fn line(text: &mut Vec<u8>, cells: impl Iterator<Item = String>) {
+    for (index, cell) in cells.enumerate() {
+        if index > 0 {
+            text.push(b',');
+        }
+        // A number is no formula.
+        if cell.parse::<f64>().is_ok() {
+            text.extend_from_slice(cell.as_bytes());
+        } else {
+            push_csv_text(text, cell.as_bytes());
+        }
+    }
+    text.push(b'\n');
+}
+
+/// A cell without the apostrophe before a text that a spreadsheet could run.
+fn plain(cell: &str) -> &str {
+    cell.strip_prefix('\'').unwrap_or(cell)
+}
+
+/// The cells of a table, with the separator that its first line has: a spreadsheet of another language writes `;`.
+fn rows(text: &str) -> Vec<Vec<String>> {
+    let heading = text.lines().next().unwrap_or_default();
+    let separator =
+        [',', ';', '\t'].into_iter().max_by_key(|sign| heading.matches(*sign).count()).unwrap_or(',');
+    let (mut rows, mut row, mut cell, mut is_quoted) = (Vec::new(), Vec::new(), String::new(), false);
+    let mut signs = text.chars().peekable();
+    while let Some(sign) = signs.next() {
+        match sign {
+            '"' if is_quoted && signs.peek() == Some(&'"') => {
+                signs.next();
+                cell.push('"');
+            }
+            '"' if is_quoted || cell.is_empty() => is_quoted = !is_quoted,
+            _ if is_quoted => cell.push(sign),
+            '\r' => {}
+            '\n' => {
+                row.push(std::mem::take(&mut cell));
+                rows.push(std::mem::take(&mut row));
+            }
+            _ if sign == separator => row.push(std::mem::take(&mut cell)),
+            _ => cell.push(sign),
+        }
+    }
+    if !cell.is_empty() || !row.is_empty() {
+        row.push(cell);
+        rows.push(row);
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Aircraft;
+    use super::*;
+
+    fn flight(key: &str, take_off: &str) -> Entry {
+        Entry {
+            key: key.to_owned(),
+            aircraft: "uid-1".to_owned(),
+            take_off: Some(take_off.to_owned()),
+            duration_s: 1800.0,
+            from: Some(Spot { latitude_deg: 51.5, longitude_deg: -0.25 }),
+            defects: "cell_voltage 1 critical: 3.4 V; more, \"and\" so on".to_owned(),
+            ..Entry::default()
+        }
+    }
+
+    fn book(entries: Vec<Entry>) -> Book {
+        Book::from([("uid-1".to_owned(), Aircraft { entries, ..Aircraft::default() })])
+    }
+
+    /// Whatever a person writes comes back, also through a spreadsheet with other separators.
+    #[test]
+    fn cells_of_people_and_earlier_flights_stay() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("logbook.csv");
+        let mut first = flight("s1-1", "2026-05-01T10:00:00Z");
+        let said = ["A. Pilot", "=not a formula", "two\nlines, \"quoted\"; and 'more'", "-5", "'apostrophe"];
+        for (name, said) in BY_HAND[1..].iter().zip(said) {
+            first.by_hand.insert((*name).to_owned(), said.to_owned());
+        }
+        first.by_hand.insert("own column".to_owned(), "7,5".to_owned());
+        write(&book(vec![first.clone()]), &path).expect("written");
+        for separator in [",", ";"] {
+            if separator == ";" {
+                let quoted = |row: Vec<String>| {
+                    let cells: Vec<String> =
+                        row.iter().map(|cell| format!("\"{}\"", cell.replace('"', "\"\""))).collect();
+                    cells.join(";") + "\r\n"
+                };
+                let text = fs::read_to_string(&path).expect("text");
+                let text: String = rows(&text).into_iter().map(quoted).collect();
+                fs::write(&path, format!("\u{feff}{text}")).expect("written");
+            }
+            let mut next = book(vec![flight("s2-1", "2026-05-02T10:00:00Z")]);
+            merge(&mut next, &path).expect("merged");
+            let entries = &next["uid-1"].entries;
+            assert_eq!(entries.iter().map(|entry| entry.key.as_str()).collect::<Vec<_>>(), ["s1-1", "s2-1"]);
+            for (name, said) in &first.by_hand {
+                assert_eq!(entries[0].by_hand.get(name), Some(said), "{name} {separator}");
+            }
+            assert_eq!((entries[0].from, &entries[0].defects), (first.from, &first.defects));
+            // Made again from the first card: the same once.
+            let mut again = book(vec![flight("s1-1", "2026-05-01T10:00:00Z")]);
+            merge(&mut again, &path).expect("merged");
+            assert_eq!(again["uid-1"].entries.len(), 1);
+            assert_eq!(again["uid-1"].entries[0].by_hand.get("pilot").map(String::as_str), Some("A. Pilot"));
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_no_logbook_is_refused() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("mine.csv");
+        for text in ["a,b\n1,2\n", "", "flight,aircraft\n,uid-1\n", "flight,aircraft\ns1-1,uid-1,3\n"] {
+            fs::write(&path, text).expect("written");
+            merge(&mut Book::new(), &path).expect_err(text);
+        }
+    }
+}

@@ -1,0 +1,414 @@
+//! `hums logbook`: the flights of aircraft, with their batteries, parts and defects.
+//!
+//! The fields are those of the UK CAA's AMC1 UAS.SPEC.050(1)(g), as far as a recording knows them. The others have empty
+//! columns in the CSV, which people fill in. A CSV that exists is continued: its flights and the cells of people stay.
+
+mod csv;
+mod gutma;
+mod page;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use hums_analysis::log_json::vehicle;
+use hums_core::clock::Instant;
+use hums_core::health::{Level, Subsystem};
+use hums_core::usage::UsageCounter;
+
+use crate::check::problem::Problem;
+use crate::checked::{problem_words, problems_of};
+use crate::files::{Inputs, says_directory};
+use crate::identity::{About, Known, identity};
+use crate::logs::side_by_side::side_by_side;
+use crate::naming::{self, Named};
+use crate::outcome::{Outcome, usage as usage_error};
+use crate::output;
+use crate::plural::count;
+use crate::printable::word;
+use crate::source::find::{find, sessions_of};
+use crate::utc::iso8601;
+use crate::works::works;
+
+/// The columns that people fill in, after those of the recordings.
+pub(crate) const BY_HAND: [&str; 6] =
+    ["aircraft_details", "pilot", "activity", "pre_flight_inspection", "rectification", "remarks"];
+
+/// The request of `hums logbook`.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Logs, images, recordings, and folders of them.
+    pub inputs: Vec<PathBuf>,
+    /// The files to write, by their endings; a folder gets GUTMA's JSON.
+    pub outputs: Vec<PathBuf>,
+    /// The vehicle of all logs without a unique id.
+    pub vehicle: Option<String>,
+    /// Replace existing pages and JSON.
+    pub force: bool,
+}
+
+/// A place over ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spot {
+    pub(crate) latitude_deg: f64,
+    pub(crate) longitude_deg: f64,
+}
+
+/// A flight, or a session with defects and without a flight.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Entry {
+    /// Its name: the recording's, and the number of the flight in it, from 1; 0 without a flight.
+    pub(crate) key: String,
+    pub(crate) aircraft: String,
+    pub(crate) kind: String,
+    pub(crate) firmware: String,
+    pub(crate) take_off: Option<String>,
+    pub(crate) landing: Option<String>,
+    /// From take-off to landing, or to the end of the record.
+    pub(crate) duration_s: f64,
+    pub(crate) from: Option<Spot>,
+    pub(crate) to: Option<Spot>,
+    pub(crate) charge_ah: Option<f64>,
+    pub(crate) voltage_min_v: Option<f64>,
+    pub(crate) incident: String,
+    pub(crate) defects: String,
+    pub(crate) record: String,
+    /// The cells of people, by column.
+    pub(crate) by_hand: BTreeMap<String, String>,
+    /// Times of it in the recording; `None` from an earlier CSV.
+    pub(crate) span: Option<(Instant, Instant)>,
+    /// The same in microseconds since 1970, if known.
+    pub(crate) utc_us: Option<(u64, u64)>,
+    /// The recording's index.
+    pub(crate) session: Option<usize>,
+}
+
+/// A part of an aircraft as its last record has it.
+#[derive(Clone, Debug)]
+pub(crate) struct PartLine {
+    pub(crate) name: String,
+    pub(crate) is_battery: bool,
+    pub(crate) serial: String,
+    pub(crate) status: &'static str,
+    pub(crate) used_percent: Option<f32>,
+    pub(crate) limit: Option<String>,
+    pub(crate) flight_s: f64,
+    pub(crate) flights: f64,
+    pub(crate) cycles: f64,
+}
+
+/// Counters of the box over the life of an aircraft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Life {
+    pub(crate) flights: f64,
+    pub(crate) flight_s: f64,
+}
+
+/// An aircraft with its flights in order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Aircraft {
+    pub(crate) entries: Vec<Entry>,
+    pub(crate) parts: Vec<PartLine>,
+    pub(crate) life: Option<Life>,
+}
+
+impl Aircraft {
+    /// Flights and their seconds in the logbook.
+    pub(crate) fn totals(&self) -> Life {
+        let flights = self.entries.iter().filter(|entry| entry.is_flight());
+        flights.fold(Life { flights: 0.0, flight_s: 0.0 }, |sum, entry| Life {
+            flights: sum.flights + 1.0,
+            flight_s: sum.flight_s + entry.duration_s,
+        })
+    }
+}
+
+impl Entry {
+    pub(crate) fn is_flight(&self) -> bool {
+        !self.key.ends_with("-0")
+    }
+}
+
+/// The logbook, by aircraft.
+pub(crate) type Book = BTreeMap<String, Aircraft>;
+
+/// Runs `hums logbook`.
+pub fn run(args: &Request) -> Result<Outcome> {
+    let forms = args.outputs.iter().map(|path| Ok((Form::of(path)?, path.as_path())));
+    let forms = forms.collect::<Result<Vec<_>>>()?;
+    let (given, mut remarks) = naming::without_made(&args.inputs);
+    let found = find(&given, false)?;
+    remarks.extend(found.remarks.iter().cloned());
+    let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
+    args.outputs.iter().try_for_each(|path| inputs.refuse(path))?;
+    let sessions = sessions_of(&found.places);
+    let works = works(&found.places, &sessions)?;
+    let mut outcome = Outcome::lossy(found.is_lossy());
+    let mut read: BTreeMap<String, (String, Known)> = BTreeMap::new();
+    side_by_side(
+        &works,
+        |work| match &work.named {
+            Named::As(..) => identity(work.log, &work.traits, false, args.vehicle.as_deref()).map(Some),
+            Named::Copy(_) => Ok(None),
+        },
+        |known| {
+            let Some(known) = known? else { return Ok(()) };
+            let overview = &known.about.overview;
+            outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
+            // Of two records of one session the longer one counts.
+            let frames = |known: &Known| known.about.overview.contents.frames();
+            let recording = known.identity.recording.clone();
+            let is_longer = read.get(&recording).is_none_or(|(_, other)| frames(other) < frames(&known));
+            if is_longer {
+                let name = overview.ending.files.first().cloned().unwrap_or_default();
+                read.insert(recording, (name, known));
+            } else {
+                remarks.push(format!("{recording}: is there twice, and is counted once"));
+            }
+            Ok(())
+        },
+    )?;
+    for remark in &remarks {
+        note!("{remark}");
+    }
+    let sessions: Vec<(String, Known)> = read.into_values().collect();
+    let mut book = book(&sessions);
+    // A system id is no proof that two flights at once are of one aircraft.
+    for (_, aircraft) in book.iter_mut().filter(|(name, _)| name.starts_with("uid-")) {
+        for (once, again) in count_once(&mut aircraft.entries) {
+            note!("{again}: is the flight of {once}, by another recorder; it is counted once");
+        }
+    }
+    for (_, path) in forms.iter().filter(|(form, _)| *form == Form::Csv) {
+        csv::merge(&mut book, path)?;
+    }
+    let flights: u64 = book.values().map(|aircraft| aircraft.totals().flights as u64).sum();
+    if book.is_empty() {
+        bail!("no flight is in there, so nothing was written");
+    }
+    for (form, path) in forms {
+        match form {
+            Form::Csv => csv::write(&book, path)?,
+            Form::Page => page::write(&book, path, &inputs)?,
+            Form::Gutma => gutma::write(&book, &sessions, path, &inputs)?,
+        }
+        let flights = count(flights, "flight");
+        output::line(&word(&format!("{}: {} aircraft, {flights}", path.display(), book.len())))?;
+    }
+    Ok(outcome)
+}
+
+/// The form of an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Csv,
+    Page,
+    /// JSON of one flight, or a folder with one for each flight.
+    Gutma,
+}
+
+impl Form {
+    fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            _ if says_directory(path) => Ok(Self::Gutma),
+            Some("csv") => Ok(Self::Csv),
+            Some("html") => Ok(Self::Page),
+            Some("json") => Ok(Self::Gutma),
+            _ => Err(usage_error(format!(
+                "-o {}: the ending says what to write: .html, .csv, .json (one flight), or a folder (a JSON file for each flight)",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// The logbook of these sessions.
+fn book(sessions: &[(String, Known)]) -> Book {
+    let mut order: Vec<usize> = (0..sessions.len()).collect();
+    let start = |index: &usize| {
+        let (_, known) = sessions.get(*index)?;
+        let first = known.about.overview.ending.summary.first?;
+        known.identity.epochs.utc_us(first)
+    };
+    order.sort_by_key(start);
+    let mut book = Book::new();
+    for index in order {
+        let Some((name, known)) = sessions.get(index) else { continue };
+        let entries = entries(index, name, known);
+        let contents = &known.about.overview.contents;
+        if entries.is_empty() && contents.components.is_empty() {
+            continue;
+        }
+        let aircraft = book.entry(known.identity.vehicle.clone()).or_default();
+        aircraft.entries.extend(entries);
+        if !contents.components.is_empty() {
+            aircraft.parts = parts(&known.about);
+        }
+        let counter = |counter: UsageCounter| contents.lifetime.get(counter.name()).copied();
+        if let (Some(flights), Some(flight_s)) =
+            (counter(UsageCounter::Flights), counter(UsageCounter::Flight))
+        {
+            aircraft.life = Some(Life { flights, flight_s });
+        }
+    }
+    book
+}
+
+/// The type of the vehicle, and its autopilot.
+fn kind(about: &About) -> String {
+    vehicle(&about.overview).map_or_else(String::new, |of| format!("{}, {}", of.r#type, of.autopilot))
+}
+
+fn parts(about: &About) -> Vec<PartLine> {
+    let contents = &about.overview.contents;
+    let line = |(place, line): (&u8, &crate::summary::ComponentLine)| {
+        let (name, limit) = contents.part(*place, line);
+        PartLine {
+            name,
+            is_battery: line.kind == "battery",
+            serial: line.serial.clone(),
+            status: line.status,
+            used_percent: Some(line.used_percent).filter(|used| used.is_finite() && limit.is_some()),
+            limit,
+            flight_s: line.figures.flight_s,
+            flights: line.figures.flights,
+            cycles: line.figures.cycles,
+        }
+    };
+    contents.components.iter().map(line).collect()
+}
+
+/// The flights of a session, or its defects alone.
+fn entries(session: usize, record: &str, known: &Known) -> Vec<Entry> {
+    let (identity, about) = (&known.identity, &known.about);
+    let contents = &about.overview.contents;
+    let summary = &about.overview.ending.summary;
+    let last = summary.last.unwrap_or(Instant::ZERO);
+    let flights = contents.flights();
+    let problems = problems_of(contents);
+    let is_told = |problem: &&Problem| matches!(problem.level, Level::Warning | Level::Critical);
+    let problems: Vec<&Problem> = problems.iter().filter(is_told).collect();
+    let machine = vehicle(&about.overview);
+    let firmware = machine.and_then(|of| of.firmware).unwrap_or_default();
+    let utc = |at: Instant| identity.epochs.utc_us(at).map(iso8601);
+    let whole =
+        |counter: UsageCounter| contents.usage.get(counter.name()).copied().filter(|_| flights.len() <= 1);
+    let of_session = Entry {
+        aircraft: identity.vehicle.clone(),
+        kind: kind(about),
+        firmware,
+        charge_ah: whole(UsageCounter::Charge),
+        voltage_min_v: whole(UsageCounter::VoltageMin),
+        record: record.to_owned(),
+        session: Some(session),
+        ..Entry::default()
+    };
+    // A problem belongs to the flight before whose end it began; one after the last flight to that.
+    let ends: Vec<Instant> = flights.iter().map(|flight| flight.to.unwrap_or(last)).collect();
+    let flight_of = |problem: &Problem| {
+        ends.iter().position(|end| problem.at <= *end).unwrap_or(ends.len().saturating_sub(1))
+    };
+    let told = |mut entry: Entry, mine: &[&&Problem]| {
+        let (incidents, defects): (Vec<_>, Vec<_>) =
+            mine.iter().partition(|problem| problem.subsystem == Subsystem::Mishap);
+        let words = |problems: Vec<&&&Problem>| {
+            problems.iter().map(|problem| problem_words(problem)).collect::<Vec<_>>().join("; ")
+        };
+        (entry.incident, entry.defects) = (words(incidents), words(defects));
+        entry
+    };
+    if flights.is_empty() {
+        let key = format!("{}-0", identity.recording);
+        let all: Vec<&&Problem> = problems.iter().collect();
+        let entry = Entry { key, take_off: summary.first.and_then(utc), ..of_session };
+        return if all.is_empty() { Vec::new() } else { vec![told(entry, &all)] };
+    }
+    let entry = |(index, flight): (usize, &crate::summary::FlightLine)| {
+        let to = flight.to.unwrap_or(last);
+        let entry = Entry {
+            key: format!("{}-{}", identity.recording, index + 1),
+            take_off: utc(flight.from),
+            landing: flight.to.and_then(utc),
+            duration_s: to.since(flight.from).as_micros() as f64 / 1e6,
+            from: spot(about, flight.from),
+            to: flight.to.and_then(|to| spot(about, to)),
+            span: Some((flight.from, to)),
+            utc_us: identity.epochs.utc_us(flight.from).zip(identity.epochs.utc_us(to)),
+            ..of_session.clone()
+        };
+        let mine: Vec<&&Problem> = problems.iter().filter(|problem| flight_of(problem) == index).collect();
+        let mut entry = told(entry, &mine);
+        if flight.to.is_none() {
+            let open = "the record ends in the air";
+            let parts = [entry.incident.as_str(), open];
+            entry.incident = parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ");
+        }
+        entry
+    };
+    flights.iter().enumerate().map(entry).collect()
+}
+
+/// Removes flights at the time of another flight of the same aircraft: two recorders recorded it. The longer record stays.
+/// Returns the names of each pair.
+fn count_once(entries: &mut Vec<Entry>) -> Vec<(String, String)> {
+    let mut pairs = Vec::new();
+    let mut kept: Vec<Entry> = Vec::new();
+    for entry in std::mem::take(entries) {
+        let is_same = |other: &Entry| {
+            entry.session != other.session
+                && entry
+                    .utc_us
+                    .zip(other.utc_us)
+                    .is_some_and(|((from, to), (begin, end))| from < end && begin < to)
+        };
+        match kept.iter().position(is_same).and_then(|index| kept.get_mut(index)) {
+            Some(other) if other.duration_s >= entry.duration_s => pairs.push((other.key.clone(), entry.key)),
+            Some(other) => {
+                pairs.push((entry.key.clone(), other.key.clone()));
+                *other = entry;
+            }
+            None => kept.push(entry),
+        }
+    }
+    *entries = kept;
+    pairs
+}
+
+/// The place at a time: the last known before it, else the first after it.
+fn spot(about: &About, at: Instant) -> Option<Spot> {
+    let points = about.track.points();
+    let after = points.partition_point(|point| point.at <= at);
+    let point = points.get(after.saturating_sub(1))?;
+    Some(Spot { latitude_deg: point.latitude_deg, longitude_deg: point.longitude_deg })
+}
+
+/// Hours and minutes of seconds.
+fn hours(seconds: f64) -> String {
+    let minutes = (seconds / 60.0).round() as u64;
+    format!("{}:{:02}", minutes / 60, minutes % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A box and a ground station, or two boxes, record the same flight.
+    #[test]
+    fn a_flight_that_two_recorders_recorded_counts_once() {
+        let entry = |session: usize, from_s: u64, to_s: u64| Entry {
+            key: format!("s{session}-{from_s}"),
+            duration_s: (to_s - from_s) as f64,
+            utc_us: Some((from_s * 1_000_000, to_s * 1_000_000)),
+            session: Some(session),
+            ..Entry::default()
+        };
+        let mut entries = vec![entry(1, 100, 200), entry(2, 90, 201), entry(2, 300, 400), entry(1, 400, 500)];
+        // Without the time of day nothing is known of it.
+        entries.push(Entry { utc_us: None, ..entry(3, 100, 200) });
+        let pairs = count_once(&mut entries);
+        assert_eq!(pairs, [("s2-90".to_owned(), "s1-100".to_owned())]);
+        let kept: Vec<&str> = entries.iter().map(|entry| entry.key.as_str()).collect();
+        assert_eq!(kept, ["s2-90", "s2-300", "s1-400", "s3-100"]);
+    }
+}
