@@ -68,9 +68,12 @@ impl Traits {
     }
 
     /// The name of a recording in the tables of a fleet, which no other recording has: its [`identity`](Self::identity), and 96
-    /// bits of the box, of the vehicle (for a log without the record of a box's start), or of the bytes of another recording.
+    /// bits of the box, of the vehicle's unique id (for a log without the record of a box's start), or of the bytes of another
+    /// recording.
     pub fn unique(&self, place: &Place, vehicle: &str) -> String {
-        let of_vehicle = || Sha256::digest(vehicle.as_bytes()).first_chunk().copied().unwrap_or_default();
+        // Another name of a vehicle is of the log's place, which a copy of the log does not share.
+        let uid = vehicle.starts_with("uid-").then(|| Sha256::digest(vehicle.as_bytes()));
+        let of_vehicle = || uid.and_then(|hash| hash.first_chunk().copied()).unwrap_or_default();
         let of_bytes = || self.fingerprint.first_chunk().copied().unwrap_or_default();
         let unique: [u8; 12] = match (self.board, place.own()) {
             (Some(board), _) => board,

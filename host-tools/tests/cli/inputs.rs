@@ -22,10 +22,12 @@ fn role(arg: &Arg) -> Role {
         "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
         "output" | "sd" | "gs" | "tap" | "store" | "manifest" => Role::Output,
         "around" | "bucket" | "number" | "part" | "serial" | "card" | "card_out" | "command"
-        | "card_size" | "cut_after_writes" | "cut_store_after" | "format" | "from" | "influx" | "last"
-        | "line_rate" | "link" | "listen" | "listen_token" | "message" | "name" | "names" | "noise"
-        | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session" | "shell" | "span" | "speed"
-        | "split" | "stall" | "system" | "to" | "token" | "value" | "vehicle" | "write_error" => Role::Other,
+        | "card_size" | "cut_after_writes" | "cut_store_after" | "folder" | "format" | "from" | "influx"
+        | "last" | "line_rate" | "link" | "listen" | "listen_token" | "message" | "name" | "names"
+        | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session" | "shell" | "span"
+        | "speed" | "split" | "stall" | "system" | "to" | "token" | "value" | "vehicle" | "write_error" => {
+            Role::Other
+        }
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
@@ -42,12 +44,13 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
 )];
 
 /// Commands without a pair of input and output to try, with the reason.
-const NO_PAIRS: [(&str, &str); 11] = [
+const NO_PAIRS: [(&str, &str); 12] = [
     ("check", "prints"),
     ("live", "shows and sends"),
     ("completions", "prints"),
     ("man", "prints"),
     ("due", "prints"),
+    ("compact", "changes its folder"),
     ("box replaced", "talks with a board"),
     ("box format-card", "talks with a board"),
     ("box params list", "talks with a board"),
@@ -66,6 +69,9 @@ pub(crate) fn value(command: &str, arg: &str) -> &'static str {
         (_, "key") => "key.txt",
         (_, "firmware") => "hums.elf",
         (_, "sd") => "new.img",
+        ("logbook", "inputs") => "flight.tlog",
+        ("logbook", "output") => "new.html",
+        ("compact", "folder") => "folder",
         (_, "output") => "new.out",
         (_, "format") => "tlog",
         (_, "link") => "tcp:127.0.0.1:1",

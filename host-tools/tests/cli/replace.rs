@@ -13,7 +13,7 @@ use hums::cli::Cli;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use tempfile::TempDir;
 
-use crate::inputs::{leaves, words};
+use crate::inputs::{leaves, value, words};
 use crate::support::{
     all_named, attempt, contents, end_of, flight, frames_of, furnished, named, px4, run, stamps, text,
 };
@@ -132,9 +132,10 @@ fn every_command_with_the_flag_makes_the_same_again_with_it() {
         let output = of("output").expect("what it writes");
         let dir = furnished();
         let out = dir.path().join("new");
-        let name = if of("format").is_some() { "new/" } else { "new/out" };
+        let file = format!("new/{}", value(path[0], "output"));
+        let name = if of("format").is_some() { "new/".to_owned() } else { file };
         fs::create_dir(&out).expect("made");
-        let mut given = vec![(output, name.to_owned())];
+        let mut given = vec![(output, name)];
         given.extend(of("format").map(|arg| {
             let all = arg.get_possible_values();
             // A log is written alone.
@@ -151,7 +152,7 @@ fn every_command_with_the_flag_makes_the_same_again_with_it() {
         assert!(contents(&out) == made, "{line}");
         tried.push(path[0]);
     }
-    assert_eq!(tried, ["report", "decode", "share"]);
+    assert_eq!(tried, ["report", "decode", "share", "logbook"]);
 }
 
 #[test]

@@ -134,13 +134,13 @@ pub(crate) type Book = BTreeMap<String, Aircraft>;
 
 /// Runs `hums logbook`.
 pub fn run(args: &Request) -> Result<Outcome> {
-    let forms = args.outputs.iter().map(|path| Ok((Form::of(path)?, path.as_path())));
-    let forms = forms.collect::<Result<Vec<_>>>()?;
     let (given, mut remarks) = naming::without_made(&args.inputs);
     let found = find(&given, false)?;
     remarks.extend(found.remarks.iter().cloned());
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
     args.outputs.iter().try_for_each(|path| inputs.refuse(path))?;
+    let forms = args.outputs.iter().map(|path| Ok((Form::of(path)?, path.as_path())));
+    let forms = forms.collect::<Result<Vec<_>>>()?;
     let sessions = sessions_of(&found.places);
     let works = works(&found.places, &sessions)?;
     let mut outcome = Outcome::lossy(found.is_lossy());

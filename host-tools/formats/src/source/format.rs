@@ -129,9 +129,11 @@ pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
     const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
     const STORE: &str = "is the memory of a simulated board (--store), and no recording; it may stay there";
     const OWN: &str = "is a log of HUMS in another file, compressed or joined; unpack it (gzip -dk)";
+    const TABLE: &str = "is a Parquet table, which hums decode makes of a recording; give the recording";
     let is_own = || start.first_chunk().is_some_and(|block| Header::read(block).is_ok());
     archive::hint(start)
         .or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))
+        .or_else(|| start.starts_with(b"PAR1").then_some(TABLE))
         .or_else(|| is_own().then_some(OWN))
         .or_else(|| is_store::<STORE_SECTOR_BYTES>(start).then_some(STORE))
 }
