@@ -17,6 +17,7 @@ use super::judged::Judged;
 use super::problem::{give_worst, problems};
 use crate::counters::is_told;
 use crate::ending::Ending;
+use crate::logs::Log;
 use crate::logs::groups::has_start;
 use crate::logs::reader;
 use crate::names::counter_name;
@@ -85,52 +86,60 @@ pub fn overview_telling(place: &Place, take: &mut Take<'_>) -> Result<(Overview,
     read(place, Some(take))
 }
 
-fn read(place: &Place, mut take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
-    let limits = Limits::default();
-    let is_told = take.is_some();
-    if let Some(log) = place.own() {
-        // A monitor ran: not judged here.
-        let has_start = has_start(log);
-        let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
-        let mut overview = if here.is_none() && !is_told {
-            Overview::of(log)?
-        } else {
-            Overview::told(log, place.system, &mut |at, item| {
-                if let Some(here) = &mut here {
-                    here.item(at, item);
-                }
-                take.as_mut().map_or(Ok(()), |take| take(at, item))
-            })?
-        };
-        let here = here.map(Judge::end);
-        let kept = here.clone().filter(|_| is_told);
-        overview.ending.name.clone_from(&place.name);
-        let contents = &overview.contents;
-        let (is_checked, is_little) = (contents.is_checked(), contents.messages.len() < FEW_KINDS);
-        // A box may end its log in flight.
-        let marks = &overview.ending.summary.marks;
-        let breaks_off = marks.moved.is_some() || marks.took_off == Some(true);
-        if is_checked {
-            peaks(&mut overview.contents);
-        }
-        let contents = &overview.contents;
-        if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
-            let judged = match here {
-                Some(here) => here,
-                None => judge(place, &limits, Heard::Somewhere, true)?.judged,
-            };
-            if is_checked && breaks_off {
-                give_worst(&mut overview.contents.findings, &judged.problems);
-                go_on(&mut overview, &judged);
-            }
-            if !is_checked {
-                fill(&mut overview.contents, judged);
-            } else if is_little {
-                look(&mut overview.contents, &judged);
-            }
-        }
-        return Ok((overview, kept));
+fn read(place: &Place, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+    match place.own() {
+        Some(log) => read_own(place, log, take),
+        None => read_other(place, take),
     }
+}
+
+fn read_own(place: &Place, log: &Log, mut take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+    let (limits, is_told) = (Limits::default(), take.is_some());
+    // A monitor ran: not judged here.
+    let has_start = has_start(log);
+    let mut here = (!has_start).then(|| Judge::new(&limits, Format::Hums));
+    let mut overview = if here.is_none() && !is_told {
+        Overview::of(log)?
+    } else {
+        Overview::told(log, place.system, &mut |at, item| {
+            if let Some(here) = &mut here {
+                here.item(at, item);
+            }
+            take.as_mut().map_or(Ok(()), |take| take(at, item))
+        })?
+    };
+    let here = here.map(Judge::end);
+    let kept = here.clone().filter(|_| is_told);
+    overview.ending.name.clone_from(&place.name);
+    let contents = &overview.contents;
+    let (is_checked, is_little) = (contents.is_checked(), contents.messages.len() < FEW_KINDS);
+    // A box may end its log in flight.
+    let marks = &overview.ending.summary.marks;
+    let breaks_off = marks.moved.is_some() || marks.took_off == Some(true);
+    if is_checked {
+        peaks(&mut overview.contents);
+    }
+    let contents = &overview.contents;
+    if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
+        let judged = match here {
+            Some(here) => here,
+            None => judge(place, &limits, Heard::Somewhere, true)?.judged,
+        };
+        if is_checked && breaks_off {
+            give_worst(&mut overview.contents.findings, &judged.problems);
+            go_on(&mut overview, &judged);
+        }
+        if !is_checked {
+            fill(&mut overview.contents, judged);
+        } else if is_little {
+            look(&mut overview.contents, &judged);
+        }
+    }
+    Ok((overview, kept))
+}
+
+fn read_other(place: &Place, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+    let (limits, is_told) = (Limits::default(), take.is_some());
     let mut nothing = |_, _: Item<'_>| Ok(());
     let take = take.unwrap_or(&mut nothing);
     let Read { format, judged, summary, taken } =

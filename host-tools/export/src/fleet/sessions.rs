@@ -10,7 +10,7 @@ use hums_core::usage::{CounterName, counter_name as meaning};
 use serde::Serialize;
 
 use super::SESSIONS;
-use crate::check::grouped::grouped;
+use crate::check::grouped::{Group, grouped};
 use crate::checked::{Checked, OnBoard, problems_of};
 use crate::context::Context;
 use crate::hex::hex;
@@ -135,10 +135,10 @@ fn record(about: &About) -> Vec<(&'static str, Cell)> {
         ("frames", count(overview.contents.frames())),
         ("log_bytes", count(bytes)),
         ("compression_ratio", known(overview.ratio(), Cell::Double, CellType::Double)),
-        ("frames_in", number(stats.map(|stats| stats.frames_in.into()))),
-        ("frames_lost", number(stats.map(|stats| stats.frames_lost.into()))),
+        ("frames_in", number(stats.map(|stats| stats.frames_in))),
+        ("frames_lost", number(stats.map(|stats| stats.frames_lost))),
         ("queue[%]", known(queue, Cell::Double, CellType::Double)),
-        ("longest_stall[ms]", number(stats.map(|stats| stats.sd_stall_ms_max.into()))),
+        ("longest_stall[ms]", number(stats.map(|stats| stats.sd_stall_ms_max))),
     ]
 }
 
@@ -157,7 +157,7 @@ fn health(context: &Context, about: &About) -> Vec<(&'static str, Cell)> {
     let problems = problems_of(contents);
     let of_level = |level: Level| problems.iter().filter(|problem| problem.level == level).count() as u64;
     let groups = grouped(&problems);
-    let worst = groups.first().and_then(|group| group.first());
+    let worst = groups.first().and_then(Group::first);
     let json: Vec<ProblemJson<'_>> = problems
         .iter()
         .map(|problem| ProblemJson {

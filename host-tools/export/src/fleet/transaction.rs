@@ -152,7 +152,7 @@ impl Transaction {
         let files = part.path().join(FILES);
         let replaced: Vec<&String> = replaced.iter().filter(|place| !files.join(place).exists()).collect();
         let lines = |lines: &mut dyn Iterator<Item = &String>| {
-            lines.map(|line| format!("{line}\n")).collect::<String>()
+            lines.fold(String::new(), |text, line| text + line + "\n")
         };
         for (name, text) in
             [(REPLACED, lines(&mut replaced.iter().copied())), (COMPACTED, lines(&mut compacted.iter()))]

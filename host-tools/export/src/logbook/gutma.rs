@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use hums_core::clock::Instant;
 use serde_json::{Value, json};
 
 use super::{Book, Entry, hours};
@@ -57,39 +58,7 @@ fn exchange(entry: &Entry, known: &Known) -> Option<Value> {
     let epochs = &known.identity.epochs;
     let start_us = epochs.utc_us(from)?;
     let about = &known.about;
-    let points = about.track.points();
-    let speeds = about.speeds.points();
-    let begin = points.partition_point(|point| point.at < from).saturating_sub(1);
-    let (mut features, mut items) = (Vec::new(), Vec::new());
-    for (point, speed) in points.iter().zip(speeds).skip(begin).take_while(|(point, _)| point.at <= to) {
-        let Some(utc_us) = epochs.utc_us(point.at) else { continue };
-        let (altitude, speed) = (rounded(point.height_m, 2), rounded(speed.height_m, 2));
-        let place = [point.longitude_deg, point.latitude_deg].map(|axis| (axis * 1e8).round() / 1e8);
-        features.push(json!({
-            "type": "Feature",
-            "properties": {"time": milliseconds(utc_us), "altitude": altitude, "groundspeed": speed, "ground_speed": speed},
-            "geometry": {"type": "Point", "coordinates": place},
-        }));
-        // The last place before the take-off is the place of the take-off.
-        let seconds = (utc_us.saturating_sub(start_us) / 1000) as f64 / 1000.0;
-        items.push(json!([seconds, place[0], place[1], altitude, speed]));
-    }
-    let mark = |feature: Option<&mut Value>, info: &str| {
-        if let Some(properties) = feature.and_then(|feature| feature.get_mut("properties")) {
-            properties["event_type"] = json!("CONTROLER_EVENT");
-            properties["event_info"] = json!(info);
-        }
-    };
-    mark(features.first_mut(), "TAKE-OFF");
-    let mut events =
-        vec![json!({"event_type": "CONTROLER_EVENT", "event_info": "TAKE-OFF", "event_timestamp": "0.000"})];
-    if entry.landing.is_some() {
-        mark(features.last_mut(), "LANDING");
-        let seconds = format!("{:.3}", entry.duration_s);
-        events.push(
-            json!({"event_type": "CONTROLER_EVENT", "event_info": "LANDING", "event_timestamp": seconds}),
-        );
-    }
+    let Way { features, items, events } = way(entry, known, (from, to), start_us);
     let overview = &about.overview;
     let serial = known.identity.vehicle.strip_prefix("uid-").unwrap_or(&known.identity.vehicle);
     let by_hand = |name: &str| entry.by_hand.get(name).cloned().unwrap_or_default();
@@ -136,12 +105,57 @@ fn exchange(entry: &Entry, known: &Known) -> Option<Value> {
     }}))
 }
 
+/// The places of a flight in both forms of the protocol, and its events.
+struct Way {
+    features: Vec<Value>,
+    items: Vec<Value>,
+    events: Vec<Value>,
+}
+
+fn way(entry: &Entry, known: &Known, (from, to): (Instant, Instant), start_us: u64) -> Way {
+    let (about, epochs) = (&known.about, &known.identity.epochs);
+    let points = about.track.points();
+    let speeds = about.speeds.points();
+    let begin = points.partition_point(|point| point.at < from).saturating_sub(1);
+    let (mut features, mut items) = (Vec::new(), Vec::new());
+    for (point, speed) in points.iter().zip(speeds).skip(begin).take_while(|(point, _)| point.at <= to) {
+        let Some(utc_us) = epochs.utc_us(point.at) else { continue };
+        let (altitude, speed) = (rounded(point.height_m, 2), rounded(speed.height_m, 2));
+        let place = [point.longitude_deg, point.latitude_deg].map(|axis| (axis * 1e8).round() / 1e8);
+        features.push(json!({
+            "type": "Feature",
+            "properties": {"time": milliseconds(utc_us), "altitude": altitude, "groundspeed": speed, "ground_speed": speed},
+            "geometry": {"type": "Point", "coordinates": place},
+        }));
+        // The last place before the take-off is the place of the take-off.
+        let seconds = (utc_us.saturating_sub(start_us) / 1000) as f64 / 1000.0;
+        items.push(json!([seconds, place[0], place[1], altitude, speed]));
+    }
+    let mark = |feature: Option<&mut Value>, info: &str| {
+        if let Some(properties) = feature.and_then(|feature| feature.get_mut("properties")) {
+            properties["event_type"] = json!("CONTROLER_EVENT");
+            properties["event_info"] = json!(info);
+        }
+    };
+    mark(features.first_mut(), "TAKE-OFF");
+    let mut events =
+        vec![json!({"event_type": "CONTROLER_EVENT", "event_info": "TAKE-OFF", "event_timestamp": "0.000"})];
+    if entry.landing.is_some() {
+        mark(features.last_mut(), "LANDING");
+        let seconds = format!("{:.3}", entry.duration_s);
+        events.push(
+            json!({"event_type": "CONTROLER_EVENT", "event_info": "LANDING", "event_timestamp": seconds}),
+        );
+    }
+    Way { features, items, events }
+}
+
 /// A time to the millisecond, as the protocol wants it.
 fn milliseconds(utc_us: u64) -> String {
     let text = iso8601(utc_us / 1000 * 1000);
     let (second, fraction) =
         text.trim_end_matches('Z').split_once('.').unwrap_or((text.trim_end_matches('Z'), ""));
-    format!("{second}.{:0<3.3}Z", fraction)
+    format!("{second}.{fraction:0<3.3}Z")
 }
 
 fn rounded(value: Option<f32>, decimals: i32) -> f64 {

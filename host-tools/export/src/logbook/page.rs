@@ -101,13 +101,17 @@ fn of_aircraft(page: &mut String, name: &str, aircraft: &Aircraft) {
         ],
         &flights(&aircraft.entries),
     );
+    parts(page, aircraft);
+}
+
+fn parts(page: &mut String, aircraft: &Aircraft) {
     let (batteries, others): (Vec<&PartLine>, Vec<&PartLine>) =
         aircraft.parts.iter().partition(|part| part.is_battery);
     for (title, parts) in [("Batteries", batteries), ("Components", others)] {
         if parts.is_empty() {
             continue;
         }
-        let _ = write!(page, "<h3>{title}</h3>\n");
+        let _ = writeln!(page, "<h3>{title}</h3>");
         let rows: Vec<Vec<String>> = parts.into_iter().map(of_part).collect();
         table(
             page,

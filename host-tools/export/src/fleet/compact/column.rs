@@ -74,7 +74,7 @@ impl Input {
             let (Column::Texts(vehicles), Column::Texts(sessions)) = (read(0)?, read(1)?) else {
                 bail!("the names of vehicles and sessions are no texts");
             };
-            for (row, (vehicle, session)) in vehicles.values.iter().zip(&sessions.values).enumerate() {
+            for (row, (vehicle, session)) in vehicles.present.iter().zip(&sessions.present).enumerate() {
                 match segments.last_mut() {
                     Some(last)
                         if last.session.as_bytes() == session.data()
@@ -117,16 +117,16 @@ impl Input {
     }
 }
 
-/// Values of one type, and the levels of their column.
+/// Values of one type without the nulls, and the levels of their column.
 pub(super) struct Values<T: DataType> {
-    values: Vec<T::T>,
+    present: Vec<T::T>,
     definition: Vec<i16>,
     repetition: Vec<i16>,
 }
 
 impl<T: DataType> Default for Values<T> {
     fn default() -> Self {
-        Self { values: Vec::new(), definition: Vec::new(), repetition: Vec::new() }
+        Self { present: Vec::new(), definition: Vec::new(), repetition: Vec::new() }
     }
 }
 
@@ -200,7 +200,7 @@ impl<T: DataType> Values<T> {
         while left > 0 {
             let (definition, repetition) = (&mut self.definition, &mut self.repetition);
             let (read, ..) =
-                reader.read_records(left, Some(definition), Some(repetition), &mut self.values)?;
+                reader.read_records(left, Some(definition), Some(repetition), &mut self.present)?;
             if read == 0 {
                 bail!("a column ends early");
             }
@@ -213,7 +213,7 @@ impl<T: DataType> Values<T> {
         let levels = |levels: &'_ Vec<i16>| if levels.is_empty() { None } else { Some(levels.clone()) };
         let (definition, repetition) = (levels(&self.definition), levels(&self.repetition));
         let writer = writer.typed::<T>();
-        writer.write_batch(&self.values, definition.as_deref(), repetition.as_deref()).map(|_| ())
+        writer.write_batch(&self.present, definition.as_deref(), repetition.as_deref()).map(|_| ())
     }
 
     /// The first rows.
@@ -231,8 +231,8 @@ impl<T: DataType> Values<T> {
             _ if most == 0 => 0,
             _ => definition.iter().filter(|level| **level == most).count(),
         };
-        let values = self.values.get(..values.min(self.values.len())).unwrap_or_default().to_vec();
-        Self { values, definition, repetition }
+        let present = self.present.get(..values.min(self.present.len())).unwrap_or_default().to_vec();
+        Self { present, definition, repetition }
     }
 
     /// Adds the encoding that makes a sample smallest.

@@ -256,8 +256,7 @@ impl Column {
                 push_hex(&mut digits, bytes);
                 return self.push_text(&String::from_utf8_lossy(&digits));
             }
-            (Kind::Unsigned(_), Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
-            (Kind::Utc, Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
+            (Kind::Unsigned(_) | Kind::Utc, Some(Cell::Count(value))) => Some(Scalar::Unsigned(*value)),
             (Kind::Signed(_), Some(Cell::Signed(value))) => Some(Scalar::Signed(*value)),
             (Kind::Single, Some(Cell::Single(value))) => Some(Scalar::Single(*value)),
             (Kind::Double, Some(Cell::Double(value))) => Some(Scalar::Double(*value)),
