@@ -2,7 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{Read as _, Write as _};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::thread;
 
 use hums_tests::flights::{Manifest, own};
 use hums_tests::frames::build_v2;
@@ -688,4 +692,76 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     page.wait("return document.documentElement.dataset.ready === 'true'", 20);
     shoot(&mut page, "report-phone");
     assert_eq!(page.console(), serde_json::json!([]));
+}
+
+/// Answers every request with a tile, and sends the path of each.
+fn tile_server() -> (String, mpsc::Receiver<String>) {
+    const TILE: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" width="256" height="256"/>"#;
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = server.local_addr().unwrap().to_string();
+    let (asked, paths) = mpsc::channel();
+    thread::spawn(move || {
+        for stream in server.incoming() {
+            let (mut stream, mut head) = (stream.unwrap(), [0; 4096]);
+            let length = stream.read(&mut head).unwrap();
+            let head = String::from_utf8_lossy(&head[..length]).into_owned();
+            let _ = write!(
+                stream,
+                "HTTP/1.1 200 OK\r\nContent-Type: image/svg+xml\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{TILE}",
+                TILE.len()
+            );
+            if asked.send(head.split(' ').nth(1).unwrap_or_default().to_owned()).is_err() {
+                break;
+            }
+        }
+    });
+    (address, paths)
+}
+
+#[test]
+fn the_map_has_tiles_of_the_server_that_the_user_named_at_the_place_of_the_flight() {
+    let (address, paths) = tile_server();
+    let dir = tempfile::tempdir().unwrap();
+    let page = dir.path().join("report.html");
+    let map = format!("http://{address}/{{z}}/{{x}}/{{y}}.png");
+    let flight = own("ap_quad_guided.tlog");
+    hums([
+        "report".as_ref(),
+        flight.as_os_str(),
+        "-o".as_ref(),
+        page.as_os_str(),
+        "--map".as_ref(),
+        map.as_ref(),
+    ])
+    .expect_code(&[0]);
+    let mut shown = LivePage::start();
+    shown.open(&format!("file://{}", page.display()), "light", 1280, 900);
+    let legend = "return document.querySelector('.legend')?.textContent.includes('map tiles from')";
+    shown.wait(legend, 20);
+    let first = paths.recv_timeout(std::time::Duration::from_secs(20)).unwrap();
+    let numbers: Vec<f64> = first
+        .trim_matches('/')
+        .trim_end_matches(".png")
+        .split('/')
+        .map(|part| part.parse().unwrap())
+        .collect();
+    let [zoom, x, y] = numbers[..] else { panic!("{first}") };
+    // The flight begins at home; a tile is no further away than the map is wide.
+    let begins =
+        shown.run("return document.querySelector('.legend').textContent").as_str().unwrap().to_owned();
+    let place: Vec<f64> = begins
+        .split("begins at ")
+        .nth(1)
+        .unwrap()
+        .split([',', ' ', 'e'])
+        .filter_map(|part| part.parse().ok())
+        .take(2)
+        .collect();
+    let count = zoom.exp2();
+    let wanted = [
+        (place[1] + 180.0) / 360.0 * count,
+        (1.0 - place[0].to_radians().tan().asinh() / std::f64::consts::PI) / 2.0 * count,
+    ];
+    assert!((x - wanted[0]).abs() < 6.0 && (y - wanted[1]).abs() < 6.0, "{first}, home is at {wanted:?}");
+    assert_eq!(shown.console(), serde_json::json!([]), "the policy refuses a tile");
 }

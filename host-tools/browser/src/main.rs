@@ -59,8 +59,16 @@ fn check(inputs: &[PathBuf]) -> Result<Outcome> {
 
 fn report(inputs: &[PathBuf], compare: bool) -> Result<Outcome> {
     let output = Some(Path::new("pages/"));
-    let request =
-        report::Request { inputs, output, session: None, compare, system: None, force: false, json: false };
+    let request = report::Request {
+        inputs,
+        output,
+        session: None,
+        compare,
+        system: None,
+        map: None,
+        force: false,
+        json: false,
+    };
     report::run_into(&request, &mut |path, what, html, _| {
         let log = if let What::Session(place) = what { Some(&place.title) } else { None };
         output::json_line(

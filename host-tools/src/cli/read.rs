@@ -11,6 +11,7 @@ use crate::decode::formats::{FORMATS, find};
 use crate::decode::{Request, logbook, share};
 use crate::endpoint::without_slash;
 use crate::report;
+use crate::report::tiles::Tiles;
 use crate::utc::When;
 
 const DECODE_EXAMPLES: &str = "Examples:
@@ -329,6 +330,9 @@ pub struct Report {
     /// Of several vehicles in a recording only this one, by its system id
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
+    /// Show map tiles of this server under the track: an address with {z}, {x} and {y}; a page asks no server without it
+    #[arg(long, value_name = "URL")]
+    pub map: Option<Tiles>,
     /// Overwrite outputs that exist
     #[arg(long)]
     pub force: bool,
@@ -346,6 +350,7 @@ impl Report {
             session: self.session.as_deref(),
             compare: self.compare,
             system: self.system,
+            map: self.map.as_ref(),
             force: self.force,
             json: self.json,
         }

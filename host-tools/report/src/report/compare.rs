@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::flights::Flight;
 use super::page::whole;
 use super::replay::Replay;
+use super::tiles::Tiles;
 use super::trend::airframe;
 use crate::check;
 use crate::names::{autopilot_name, type_name};
@@ -66,7 +67,7 @@ struct FlightJson {
 }
 
 /// A page of the last flights in recordings, in order; `None` for fewer than two.
-pub fn html(recordings: &[Candidate<'_>]) -> Result<Option<String>> {
+pub fn html(recordings: &[Candidate<'_>], tiles: Option<&Tiles>) -> Result<Option<String>> {
     let (mut recorded, mut count) = (Vec::new(), 0);
     for &candidate in recordings.iter().rev() {
         if count >= FLIGHTS_MAX {
@@ -100,7 +101,7 @@ pub fn html(recordings: &[Candidate<'_>]) -> Result<Option<String>> {
         flights: json.collect(),
         parameters: differing(&flights.iter().map(|(one, _)| &one.replay).collect::<Vec<_>>()),
     };
-    Ok(Some(whole("compare", &data)))
+    Ok(Some(whole("compare", &data, tiles)))
 }
 
 impl Recorded<'_> {

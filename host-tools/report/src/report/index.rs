@@ -90,7 +90,7 @@ impl Pages {
 
     /// The page of the table.
     pub fn html(self) -> String {
-        whole("index", &Self { version: env!("CARGO_PKG_VERSION").to_owned(), ..self })
+        whole("index", &Self { version: env!("CARGO_PKG_VERSION").to_owned(), ..self }, None)
     }
 }
 

@@ -13,6 +13,7 @@ pub mod flights;
 pub mod index;
 pub mod page;
 pub mod replay;
+pub mod tiles;
 pub mod trend;
 
 use std::collections::BTreeMap;
@@ -69,6 +70,8 @@ pub struct Request<'a> {
     pub compare: bool,
     /// Only this vehicle.
     pub system: Option<u8>,
+    /// Server of map tiles; without it a page asks for nothing.
+    pub map: Option<&'a tiles::Tiles>,
     /// Replace pages that exist.
     pub force: bool,
     /// Print JSON.
@@ -125,6 +128,7 @@ pub fn run_into(args: &Request<'_>, put: &mut Put<'_>) -> Result<Outcome> {
         outcome: Outcome::lossy(found.is_lossy()),
         parameters: None,
         json: args.json,
+        tiles: args.map,
         made: PagesJson::default(),
         put,
     };
@@ -173,6 +177,7 @@ struct Making<'a> {
     outcome: Outcome,
     parameters: Option<(usize, Vec<(String, f64)>)>,
     json: bool,
+    tiles: Option<&'a tiles::Tiles>,
     made: PagesJson,
     put: &'a mut Put<'a>,
 }
@@ -235,7 +240,7 @@ impl Making<'_> {
         let trend = trend::of(this, &before);
         let last = self.last_flight(this)?;
         let replay = replay::Replay::of(place, overview)?;
-        let html = page::html(overview, &replay, &trend, last.as_ref());
+        let html = page::html(overview, &replay, &trend, last.as_ref(), self.tiles);
         let file = file_name(path);
         self.parameters = Some((
             index,
@@ -324,7 +329,7 @@ impl Making<'_> {
                 Some(compare::Candidate { place: self.places.get(*index)?, page })
             };
             let candidates: Vec<_> = sessions.iter().filter_map(candidate).collect();
-            let Some(html) = compare::html(&candidates)? else { continue };
+            let Some(html) = compare::html(&candidates, self.tiles)? else { continue };
             let file = format!("compare-{airframe}.html");
             let path = if self.wanted.directory {
                 self.wanted.output.join(&file)

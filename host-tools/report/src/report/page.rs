@@ -9,6 +9,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::flights::Flight;
 use super::replay::{Missing, Replay};
+use super::tiles::Tiles;
 use super::trend::Trend;
 use crate::counters::{self, Counters};
 use crate::log_json::LogJson;
@@ -105,7 +106,13 @@ impl From<&Stats> for StatsJson {
 }
 
 /// A session's page.
-pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Before>) -> String {
+pub fn html(
+    log: &Overview,
+    replay: &Replay,
+    trend: &Trend,
+    before: Option<&Before>,
+    tiles: Option<&Tiles>,
+) -> String {
     let data = Data {
         version: env!("CARGO_PKG_VERSION"),
         log: LogJson::new(log),
@@ -130,17 +137,19 @@ pub fn html(log: &Overview, replay: &Replay, trend: &Trend, before: Option<&Befo
         trend,
         before,
     };
-    whole("report", &data)
+    whole("report", &data, tiles)
 }
 
-/// A self-contained page: the program of `entry`, and its data.
-pub fn whole(entry: &str, data: &impl Serialize) -> String {
+/// A self-contained page: the program of `entry`, and its data. With `tiles` it asks their server for images, and no other.
+pub fn whole(entry: &str, data: &impl Serialize, tiles: Option<&Tiles>) -> String {
     let program = program(entry);
     let programs = [UPLOT, program.as_str()];
     fill(
         TEMPLATE,
         &[
+            ("{{images}}", &tiles.map(Tiles::policy).unwrap_or_default()),
             ("{{scripts}}", &policy(&programs)),
+            ("{{tiles}}", &tiles.map(Tiles::element).unwrap_or_default()),
             ("{{style}}", &STYLE.concat()),
             ("{{uplot}}", UPLOT),
             ("{{program}}", &program),
@@ -170,7 +179,9 @@ mod tests {
     #[test]
     fn each_mark_of_the_template_stands_once() {
         let program = program("report");
-        for mark in ["{{scripts}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"] {
+        for mark in
+            ["{{images}}", "{{scripts}}", "{{tiles}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"]
+        {
             assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
             assert!(
                 !UPLOT.contains(mark) && !program.contains(mark) && !STYLE.concat().contains(mark),

@@ -1,4 +1,4 @@
-// The track over ground, to scale and without tiles: no network is needed for it. Its colour is the height.
+// The track over ground, to scale. Its colour is the height. Tiles lie under it only if the user named a server of them.
 
 import { FONT, canvas } from "./canvas.js";
 import { PHASES, colour, whenColoursChange } from "./colours.js";
@@ -6,6 +6,7 @@ import { attribute } from "./dom.js";
 import { el } from "./elements.js";
 import { flight, place } from "./flight.js";
 import { fixed } from "./text.js";
+import { drawTiles, tilesFrom } from "./tiles.js";
 import { view, whenCursorMoves, whenViewChanges } from "./view.js";
 
 const EVERY_MS = 100,
@@ -31,6 +32,11 @@ const bounds = (row) =>
 
 // As a search engine and a map take it.
 const degrees = ([, north, east]) => `${north.toFixed(7)}, ${east.toFixed(7)}`;
+// The place that is so many metres east and north of one.
+const beyond = ([, lat0, lon0], e, n) => [
+  lon0 + e / (METRES * Math.cos((lat0 * Math.PI) / 180)),
+  Math.min(Math.max(lat0 + n / METRES, -85), 85),
+];
 // Places as metres east and north of one.
 const around = ([, lat0, lon0]) => {
   const shrink = Math.cos((lat0 * Math.PI) / 180);
@@ -59,6 +65,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
   let drawn = "",
     drawnAt = 0,
     here = null;
+  const again = () => self.update(here, true);
   const paint = () => {
     const width = node.clientWidth || 300,
       height = node.clientHeight || 220,
@@ -74,6 +81,20 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
     const scale = Math.min((width - 2 * MARGIN) / Math.max(wide, SPAN_MIN_M), (height - 2 * MARGIN) / Math.max(tall, SPAN_MIN_M));
     const x = (e) => width / 2 + (e - (west + east) / 2) * scale,
       y = (n) => height / 2 - (n - (south + north) / 2) * scale;
+    const corner = (px, py) =>
+      beyond(track[0], (west + east) / 2 + (px - width / 2) / scale, (south + north) / 2 - (py - height / 2) / scale);
+    const [left, top] = corner(0, 0),
+      [right, bottom] = corner(width, height);
+    drawTiles(
+      ctx,
+      { west: left, east: right, south: bottom, north: top },
+      scale,
+      (lon, lat) => {
+        const [e, n] = [(lon - track[0][2]) * METRES * Math.cos((track[0][1] * Math.PI) / 180), (lat - track[0][1]) * METRES];
+        return [x(e), y(n)];
+      },
+      again,
+    );
     // Squares of a round size, for a feeling of distance.
     const power = 10 ** Math.floor(Math.log10(90 / scale)),
       square = [5, 2, 1].map((n) => n * power).find((n) => n <= 90 / scale) ?? power;
@@ -195,6 +216,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
           : `ends at ${degrees(track[track.length - 1])}`,
       ),
       el("span", { class: "dim" }, "north is up"),
+      tilesFrom ? el("span", { class: "dim" }, `map tiles from ${tilesFrom}`) : "",
     );
     const words = [...legend.children].map((part) => [...part.childNodes].map((node) => node.textContent).join(" "));
     attribute(surface, "aria-label", `${name}: ${words.join("; ")}`);
@@ -211,7 +233,6 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
       paint();
     },
   };
-  const again = () => self.update(here, true);
   whenViewChanges(again);
   whenCursorMoves(again);
   whenColoursChange(again);
