@@ -91,7 +91,7 @@ fn report(path: &Path) {
     let overview = Overview::of(&found.logs[0]).expect("a file that can be read");
     let place = Place::log("log".to_owned(), found.logs[0].clone());
     let replay = Replay::of(&place, &overview).expect("a file that can be read");
-    let html = page::html(&overview, &replay, &trend::of(&trend::Session::of(&overview), &[]), None);
+    let html = page::html(&overview, &replay, &trend::of(&trend::Session::of(&overview), &[]), None, None);
     let (_, data) = html.split_once(BEGINS).expect("it has data");
     let (data, after) = data.split_once('<').expect("the element ends");
     assert!(after.starts_with("/script>"), "something in the data begins an element");
