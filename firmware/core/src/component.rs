@@ -44,7 +44,7 @@ impl Label {
 numbered! {
     /// The kind of a component. The numbers are those of `CMPn_KIND`, and are stored.
     #[derive(Default)]
-    pub enum Kind {
+    pub enum ComponentKind {
         /// No component.
         #[default]
         None "none",
@@ -67,7 +67,7 @@ numbered! {
     }
 }
 
-impl Kind {
+impl ComponentKind {
     /// The part of the vehicle whose health it is.
     pub const fn subsystem(self) -> Option<Subsystem> {
         match self {
@@ -91,7 +91,7 @@ impl Kind {
 
 /// Wear figures of a component.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Figures {
+pub struct ComponentFigures {
     /// Seconds powered.
     pub powered_s: f64,
     /// Seconds in the air.
@@ -104,7 +104,7 @@ pub struct Figures {
     pub cycles: f64,
 }
 
-impl Figures {
+impl ComponentFigures {
     fn zip(self, other: Self, with: fn(f64, f64) -> f64) -> Self {
         Self {
             powered_s: with(self.powered_s, other.powered_s),
@@ -116,8 +116,8 @@ impl Figures {
     }
 
     /// The figures of a part of this kind and number in one session.
-    pub fn after(wear: &Wear<'_>, kind: Kind, number: u8) -> Self {
-        if kind == Kind::None {
+    pub fn after(wear: &Wear<'_>, kind: ComponentKind, number: u8) -> Self {
+        if kind == ComponentKind::None {
             return Self::default();
         }
         let total = |counter| wear.totals.value(counter).unwrap_or(0.0);
@@ -129,7 +129,7 @@ impl Figures {
             _ => motors.iter().fold(0.0, |longest: f64, motor| longest.max(motor.seconds)),
         };
         let cycles = match usize::from(number) {
-            number if kind == Kind::Battery && number > 0 => {
+            number if kind == ComponentKind::Battery && number > 0 => {
                 wear.battery_cycles.get(number - 1).copied().unwrap_or(0.0)
             }
             _ => total(UsageCounter::BatteryCycles),
@@ -210,25 +210,26 @@ pub struct Component {
     /// Its serial number.
     pub serial: Label,
     /// Its kind.
-    pub kind: Kind,
+    pub kind: ComponentKind,
     /// Which of its kind, from 1; 0 is all of them, or the only one.
     pub number: u8,
     /// How often the part in this place was replaced.
     pub replaced: u16,
-    base: Figures,
+    base: ComponentFigures,
     /// The power-on before which `base` counts; stored items only.
     as_of: u32,
 }
 
 impl Component {
     /// Its figures over its life.
-    pub fn figures(&self, wear: &Wear<'_>) -> Figures {
-        self.base.zip(Figures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
+    pub fn figures(&self, wear: &Wear<'_>) -> ComponentFigures {
+        self.base
+            .zip(ComponentFigures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
     }
 
     /// The part of its life that is used, percent, by the limit that trips first; `None` if it has no limit.
     pub fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
-        if self.kind == Kind::None {
+        if self.kind == ComponentKind::None {
             return None;
         }
         let figures = self.figures(wear);
@@ -260,12 +261,13 @@ impl Component {
 
     /// `true` if kind or number changed; the figures stay.
     pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
-        let kind = Kind::from_number(Setting::Kind.of(place, params) as u8).unwrap_or_default();
+        let kind = ComponentKind::from_number(Setting::Kind.of(place, params) as u8).unwrap_or_default();
         let number = (Setting::Number.of(place, params) as u8).min(MOTORS_MAX as u8);
         if (kind, number) == (self.kind, self.number) {
             return false;
         }
-        self.base = self.figures(wear).zip(Figures::after(wear, kind, number), |ran, counted| ran - counted);
+        self.base =
+            self.figures(wear).zip(ComponentFigures::after(wear, kind, number), |ran, counted| ran - counted);
         (self.kind, self.number) = (kind, number);
         true
     }
@@ -275,24 +277,24 @@ impl Component {
         let old = Self { base: self.figures(wear), ..*self };
         self.serial = serial;
         self.replaced = self.replaced.saturating_add(1);
-        self.base = Figures::default()
-            .zip(Figures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
+        self.base = ComponentFigures::default()
+            .zip(ComponentFigures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
         old
     }
 
     /// Figures of a component from [`crate::Monitor`], to which no session adds.
-    pub const fn ran(&self) -> Figures {
+    pub const fn ran(&self) -> ComponentFigures {
         self.base
     }
 
     /// The same component with these figures.
-    pub const fn having_run(self, ran: Figures) -> Self {
+    pub const fn having_run(self, ran: ComponentFigures) -> Self {
         Self { base: ran, ..self }
     }
 
     /// The same component in a session that has counted a part of its figures already.
     pub(crate) fn in_session(self, wear: &Wear<'_>) -> Self {
-        let counted = Figures::after(wear, self.kind, self.number);
+        let counted = ComponentFigures::after(wear, self.kind, self.number);
         self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
     }
 
@@ -324,12 +326,12 @@ impl Item for Component {
     const BYTES: usize = 65;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-        let Figures { powered_s, flight_s, motor_s, flights, cycles } = &mut self.base;
+        let ComponentFigures { powered_s, flight_s, motor_s, flights, cycles } = &mut self.base;
         let mut kind = self.kind as u8;
         let mut ran = [*powered_s, *flight_s, *motor_s].map(|seconds| libm::round(seconds * 10.0) as i32);
         let mut flown = *flights as i32;
         fields!(fields: kind, self.number, self.replaced, self.name.0, self.serial.0, ran, flown, cycles, self.as_of);
-        self.kind = Kind::from_number(kind).unwrap_or_default();
+        self.kind = ComponentKind::from_number(kind).unwrap_or_default();
         [self.name, self.serial] = [self.name, self.serial].map(|label| Label::of(label.0.into_iter()));
         [*powered_s, *flight_s, *motor_s] = ran.map(|tenths| f64::from(tenths) / 10.0);
         *flights = f64::from(flown);

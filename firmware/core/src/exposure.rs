@@ -10,7 +10,7 @@ pub const BINS: usize = 8;
 
 numbered! {
     /// A quantity that ages a part.
-    pub enum Quantity {
+    pub enum ExposureQuantity {
         /// The hottest ESC.
         EscTemperature "esc_temperature",
         /// The hottest battery.
@@ -24,7 +24,7 @@ numbered! {
     }
 }
 
-impl Quantity {
+impl ExposureQuantity {
     /// The unit of its ranges, as names spell it.
     pub const fn unit(self) -> &'static str {
         match self {
@@ -69,7 +69,7 @@ impl Quantity {
 }
 
 /// Tenths of a second in each range of each quantity.
-pub(crate) type Tenths = [[u32; BINS]; Quantity::ALL.len()];
+pub(crate) type Tenths = [[u32; BINS]; ExposureQuantity::ALL.len()];
 
 state! {
     /// Time in ranges.
@@ -100,7 +100,7 @@ impl Exposure {
         if step > PAUSE {
             return;
         }
-        for (quantity, bins) in Quantity::ALL.into_iter().zip(&mut self.session) {
+        for (quantity, bins) in ExposureQuantity::ALL.into_iter().zip(&mut self.session) {
             if let Some(value) = quantity.value(now, vehicle, current_a) {
                 let bin = quantity.edges().iter().take_while(|edge| value >= **edge).count();
                 bins[bin] = bins[bin].saturating_add(tenths);
@@ -109,12 +109,12 @@ impl Exposure {
     }
 
     /// Every range that the session was in: quantity, range, seconds.
-    pub fn for_each(&self, each: impl FnMut(Quantity, usize, f64)) {
+    pub fn for_each(&self, each: impl FnMut(ExposureQuantity, usize, f64)) {
         visit(&self.session, each);
     }
 
     /// Every range that the airframe was in, this session included.
-    pub fn for_each_of_life(&self, each: impl FnMut(Quantity, usize, f64)) {
+    pub fn for_each_of_life(&self, each: impl FnMut(ExposureQuantity, usize, f64)) {
         visit(&self.lifetime(), each);
     }
 
@@ -163,8 +163,8 @@ fn add(sums: &mut Tenths, more: &Tenths) {
     }
 }
 
-fn visit(tenths: &Tenths, mut each: impl FnMut(Quantity, usize, f64)) {
-    for (quantity, bins) in Quantity::ALL.into_iter().zip(tenths) {
+fn visit(tenths: &Tenths, mut each: impl FnMut(ExposureQuantity, usize, f64)) {
+    for (quantity, bins) in ExposureQuantity::ALL.into_iter().zip(tenths) {
         for (bin, tenths) in bins.iter().enumerate().filter(|(_, tenths)| **tenths > 0) {
             each(quantity, bin, f64::from(*tenths) / 10.0);
         }
@@ -192,7 +192,7 @@ mod tests {
     fn seen(exposure: &Exposure) -> Vec<(usize, f64)> {
         let mut seen = Vec::new();
         exposure.for_each_of_life(|quantity, bin, seconds| {
-            assert_eq!(quantity, Quantity::McuTemperature);
+            assert_eq!(quantity, ExposureQuantity::McuTemperature);
             seen.push((bin, seconds));
         });
         seen
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn ranges_ascend() {
-        for quantity in Quantity::ALL {
+        for quantity in ExposureQuantity::ALL {
             assert!(quantity.edges().is_sorted(), "{quantity:?}");
         }
     }

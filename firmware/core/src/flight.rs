@@ -26,7 +26,7 @@
 //! Surface vehicles never fly (PX4 calls an armed rover "in air").
 //!
 //! Signs of a mishap (`signs`) count while the vehicle is armed and for 10 s afterwards; docs/health.md has their
-//! table. Outside of a flight they are reported once for each arming ([`Change::OnBench`]), but a vehicle that its
+//! table. Outside of a flight they are reported once for each arming ([`MishapChange::OnBench`]), but a vehicle that its
 //! own rotors turned over has had a mishap. `hums check` judges a fall during a loss of the link, and of a vehicle
 //! that was off before its first message.
 
@@ -36,7 +36,7 @@ mod touchdown;
 mod witness;
 
 use crate::latest::{Latest, Reading};
-use crate::mishap::{Change, Kind, Place, Report};
+use crate::mishap::{MishapChange, MishapKind, Place, Report};
 use crate::motion::{Kinematics, MOVES_MPS, OFF, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
 use crate::params::Params;
@@ -277,7 +277,7 @@ impl Flight {
         now: Instant,
         vehicle: &Vehicle,
         params: &Params,
-    ) -> (Option<Change>, Option<FlightEvent>) {
+    ) -> (Option<MishapChange>, Option<FlightEvent>) {
         self.note_power(now, vehicle, params);
         self.motion.step(now, vehicle);
         self.note_support(now, vehicle, params);
@@ -361,7 +361,7 @@ impl Flight {
     fn note_still(&mut self, now: Instant, vehicle: &Vehicle) {
         let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
         let speed_mps = ground_mps.max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
-        let was_hit = self.signs.worst[Kind::Impact as usize] > 0.0 || self.was_dropped();
+        let was_hit = self.signs.worst[MishapKind::Impact as usize] > 0.0 || self.was_dropped();
         let is_slow = speed_mps < STILL_MPS
             || (!self.arming.is_on && on_rotors(now, vehicle))
             || self.lies_on_its_back(vehicle)
@@ -383,34 +383,41 @@ impl Flight {
         self.still_since.age(now).is_some_and(|age| age >= STILL)
     }
 
-    fn judge_sign(&mut self, now: Instant, vehicle: &Vehicle, kind: Kind, params: &Params) -> Option<Change> {
-        let is_own = self.is_open() || kind == Kind::Disarmed || self.is_turned_over(now, vehicle, kind);
+    fn judge_sign(
+        &mut self,
+        now: Instant,
+        vehicle: &Vehicle,
+        kind: MishapKind,
+        params: &Params,
+    ) -> Option<MishapChange> {
+        let is_own =
+            self.is_open() || kind == MishapKind::Disarmed || self.is_turned_over(now, vehicle, kind);
         if !is_own {
-            self.signs.worst = [0.0; Kind::COUNT];
+            self.signs.worst = [0.0; MishapKind::COUNT];
             if !self.arming.is_on {
                 return None;
             }
             let is_told = core::mem::replace(&mut self.arming.on_bench, true);
-            return (!is_told).then_some(Change::OnBench(kind));
+            return (!is_told).then_some(MishapChange::OnBench(kind));
         }
-        self.stage = if kind == Kind::Impact { Stage::Impacted } else { Stage::Falling };
+        self.stage = if kind == MishapKind::Impact { Stage::Impacted } else { Stage::Falling };
         self.place = Place::of(now, vehicle);
-        if kind != Kind::Impact {
+        if kind != MishapKind::Impact {
             self.touch_mps = 0.0;
         }
         let before_m = self.watch.take().and_then(|watch| watch.height_m);
-        if let Some(height_m) = before_m.filter(|_| kind == Kind::Disarmed) {
+        if let Some(height_m) = before_m.filter(|_| kind == MishapKind::Disarmed) {
             self.place.height_m = height_m as i16;
         }
         // A vehicle that turned over right after a shock hit something first.
-        if let Some(shock) = self.shock.filter(|_| kind == Kind::Overturned) {
+        if let Some(shock) = self.shock.filter(|_| kind == MishapKind::Overturned) {
             self.touch(now, shock.sink_mps);
-            self.see(now, Kind::Impact, shock.load_g, params);
+            self.see(now, MishapKind::Impact, shock.load_g, params);
         }
-        Some(Change::Began(kind))
+        Some(MishapChange::Began(kind))
     }
 
-    fn judge_mishap(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
+    fn judge_mishap(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<MishapChange> {
         let passed = now.since(self.signs.seen_at);
         let (is_long, is_given_up) = (passed >= RECOVERED, passed >= GIVEN_UP);
         let (flies, stands) = votes.count();
@@ -420,22 +427,22 @@ impl Flight {
         if is_down {
             (self.stage, self.flies_since) = (Stage::Down, Stamp::NONE);
             self.place = Place::of(now, vehicle);
-            return Some(Change::Down);
+            return Some(MishapChange::Down);
         }
         let flies_on = self.arming.is_on && ((is_long && flies >= 2 && flies > stands) || is_given_up);
         flies_on.then(|| {
             self.calm();
-            Change::FliesOn
+            MishapChange::FliesOn
         })
     }
 
     /// Whether it has taken off again.
-    fn judge_wreck(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Change> {
+    fn judge_wreck(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<MishapChange> {
         let is_flying =
             self.arming.is_on && self.takes_off(now, vehicle, votes).is_some() && votes.count().0 >= 2;
         self.flies_since.run(is_flying, now, TAKEN_OFF).then(|| {
             self.calm();
-            Change::FliesAgain
+            MishapChange::FliesAgain
         })
     }
 
@@ -446,7 +453,7 @@ impl Flight {
             (None, Some(_)) => Stage::Touched,
             (None, None) => Stage::Ground,
         };
-        (self.signs.worst, self.signs.seen) = ([0.0; Kind::COUNT], None);
+        (self.signs.worst, self.signs.seen) = ([0.0; MishapKind::COUNT], None);
         self.watch = None;
         (self.shock, self.touch_mps, self.still_since, self.flies_since) =
             (None, 0.0, Stamp::NONE, Stamp::NONE);
@@ -568,7 +575,7 @@ impl Flight {
     }
 
     /// A check's reading: the worst of this mishap, 0 while there is none; `None` if the vehicle does not tell enough to see it.
-    pub(crate) fn reading(&self, kind: Kind, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
+    pub(crate) fn reading(&self, kind: MishapKind, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
         let value = self.signs.worst[kind as usize];
         if value > 0.0 {
             return Some(Reading { at: now, value });
@@ -580,20 +587,20 @@ impl Flight {
             })
         };
         let at = match kind {
-            Kind::FreeFall | Kind::Overturned if vehicle.kind() == VehicleKind::Plane => None,
-            Kind::FreeFall | Kind::Impact => forces(),
-            Kind::Overturned => measured(attitude, |it| (it.roll.0 + it.pitch.0).is_finite()),
-            Kind::Tumbling => measured(attitude, |it| {
+            MishapKind::FreeFall | MishapKind::Overturned if vehicle.kind() == VehicleKind::Plane => None,
+            MishapKind::FreeFall | MishapKind::Impact => forces(),
+            MishapKind::Overturned => measured(attitude, |it| (it.roll.0 + it.pitch.0).is_finite()),
+            MishapKind::Tumbling => measured(attitude, |it| {
                 it.rates.is_some_and(|axes| norm(axes.map(|axis| axis.0)).is_finite())
             }),
-            Kind::Disarmed => heartbeat.at(),
-            Kind::Sinking => climb_mps(now, vehicle).map(|_| now),
+            MishapKind::Disarmed => heartbeat.at(),
+            MishapKind::Sinking => climb_mps(now, vehicle).map(|_| now),
         };
         Reading::new(at.filter(|_| vehicle.kind() != VehicleKind::Surface), Some(0.0))
     }
 
     /// The report of a change to the ground, at the tick of the change.
-    pub fn report(&self, change: Change) -> Report {
+    pub fn report(&self, change: MishapChange) -> Report {
         Report { change, place: self.place, touch: (self.touch_mps * 10.0) as u16 }
     }
 
@@ -604,7 +611,7 @@ impl Flight {
 
     /// When it first hit something in this mishap; `None` where it did not.
     pub fn struck_at(&self) -> Option<Instant> {
-        (self.signs.worst[Kind::Impact as usize] > 0.0).then_some(self.hit_at)
+        (self.signs.worst[MishapKind::Impact as usize] > 0.0).then_some(self.hit_at)
     }
 
     /// The height above home of the last place that was told, metres.

@@ -27,7 +27,7 @@ pub enum Happening {
     /// The number of cells is unknown: cell voltage raises no alarm.
     CellsUnknown,
     /// A mishap began, ended, or was seen on the bench.
-    Mishap(mishap::Change),
+    Mishap(mishap::MishapChange),
     /// A step of the protective action.
     Protect(protect::Step),
 }

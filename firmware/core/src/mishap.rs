@@ -11,7 +11,7 @@ use crate::vehicle::Vehicle;
 
 numbered! {
     /// What was seen. The numbers are those of the checks in their table.
-    pub enum Kind {
+    pub enum MishapKind {
         /// Nothing carries the vehicle; in seconds.
         FreeFall "free_fall",
         /// It hit something; load factor in g.
@@ -27,7 +27,7 @@ numbered! {
     }
 }
 
-impl Kind {
+impl MishapKind {
     /// The limit that it is above.
     pub(crate) const fn limit(self) -> Param {
         match self {
@@ -61,9 +61,9 @@ impl Place {
 
 /// A mishap begins or ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
+pub enum MishapChange {
     /// It was seen in a flight.
-    Began(Kind),
+    Began(MishapKind),
     /// The vehicle is down.
     Down,
     /// It flies on.
@@ -71,14 +71,14 @@ pub enum Change {
     /// A vehicle that was down flies again.
     FliesAgain,
     /// It was seen, but not in a flight.
-    OnBench(Kind),
+    OnBench(MishapKind),
 }
 
 /// A report to the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Report {
     /// What happened.
-    pub change: Change,
+    pub change: MishapChange,
     /// Where.
     pub place: Place,
     /// How fast it touched, tenths of a metre a second.
@@ -94,13 +94,13 @@ impl Report {
         let mut text = String::new();
         let Self { change, place, touch } = self;
         let words = match change {
-            Change::Began(_) => "mishap at",
-            Change::Down => "down at",
-            Change::FliesOn => "mishap over, it flies on",
-            Change::FliesAgain => "it flies again, KEEP CLEAR",
-            Change::OnBench(kind) => kind.name(),
+            MishapChange::Began(_) => "mishap at",
+            MishapChange::Down => "down at",
+            MishapChange::FliesOn => "mishap over, it flies on",
+            MishapChange::FliesAgain => "it flies again, KEEP CLEAR",
+            MishapChange::OnBench(kind) => kind.name(),
         };
-        if !matches!(change, Change::Began(_) | Change::Down) {
+        if !matches!(change, MishapChange::Began(_) | MishapChange::Down) {
             return String::try_from(words).unwrap_or_default();
         }
         let degrees = |e7: i32| {
@@ -117,8 +117,8 @@ impl Report {
             None => write!(text, "{words} unknown place"),
         };
         let _ = match change {
-            Change::Down if *touch == 0 => Ok(()),
-            Change::Down => write!(text, " {}.{} m/s", touch / 10, touch % 10),
+            MishapChange::Down if *touch == 0 => Ok(()),
+            MishapChange::Down => write!(text, " {}.{} m/s", touch / 10, touch % 10),
             _ => write!(text, " {} m", place.height_m),
         };
         text

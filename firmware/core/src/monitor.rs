@@ -7,7 +7,7 @@ use core::mem::MaybeUninit;
 
 use crate::apart::{apart, place};
 use crate::cells;
-use crate::component::{COMPONENTS_MAX, Component, Kind};
+use crate::component::{COMPONENTS_MAX, Component, ComponentKind};
 use crate::derived::Derived;
 use crate::exposure::Exposure;
 use crate::figures::{Figures, Quantity};
@@ -366,7 +366,7 @@ impl Monitor {
         if component.describe(place, &wear, params) {
             saving.hurry(key);
         }
-        if component.kind != Kind::None && component.begin(boots) {
+        if component.kind != ComponentKind::None && component.begin(boots) {
             saving.change(key);
         }
     }

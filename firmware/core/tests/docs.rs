@@ -317,7 +317,7 @@ fn every_counter_is_documented() {
         let cell = format!("| `{}` |", counter.name());
         assert!(text.contains(&cell), "docs/usage.md does not say what {} is", counter.name());
     }
-    for quantity in exposure::Quantity::ALL {
+    for quantity in exposure::ExposureQuantity::ALL {
         assert!(text.contains(&format!("`{}_", quantity.name())), "docs/usage.md does not know {quantity:?}");
     }
 }

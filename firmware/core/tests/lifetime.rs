@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::Monitor;
-use hums_core::component::{Kind, Label, Status};
+use hums_core::component::{ComponentKind, Label, Status};
 use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::observation::{
     AutopilotIdentity, Battery, Esc, EscGroup, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
@@ -236,7 +236,7 @@ fn another_airframe_begins_its_own_life() {
 #[test]
 fn a_component_wears_over_sessions_and_is_replaced_at_once() {
     let mut params = Params::defaults();
-    params.set("CMP3_KIND", f32::from(Kind::Airframe as u8)).unwrap();
+    params.set("CMP3_KIND", f32::from(ComponentKind::Airframe as u8)).unwrap();
     params.set("CMP3_FLIGHTS", 2.0).unwrap();
     let mut store = Store::default();
     for status in [Status::Green, Status::Red] {

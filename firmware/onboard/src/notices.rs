@@ -5,7 +5,7 @@
 
 use hums_blackbox::record::{Note, Record};
 use hums_core::clock::{Instant, Span};
-use hums_core::mishap::{Change, Report};
+use hums_core::mishap::{MishapChange, Report};
 use hums_core::protect::Step;
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
@@ -111,7 +111,7 @@ impl Notice {
                 (Class::Critical, messages::status_text(severity, &text))
             }
             Self::Mishap(report) => {
-                let flies = report.change == Change::FliesOn;
+                let flies = report.change == MishapChange::FliesOn;
                 let severity = if flies { Severity::Notice } else { Severity::Critical };
                 let text = Text::new(format_args!("HUMS: {}", report.text()));
                 (Class::Critical, messages::status_text(severity, text.as_str()))

@@ -5,7 +5,7 @@ use hums_blackbox::record::{
     Record, USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord, Why,
 };
 use hums_core::clock::Instant;
-use hums_core::component::{COMPONENTS_MAX, Component, Figures, Label, Status};
+use hums_core::component::{COMPONENTS_MAX, Component, ComponentFigures, Label, Status};
 
 use crate::journal::{By, Logbook};
 use crate::queues::SectorsIn;
@@ -218,7 +218,7 @@ pub(crate) fn replace_component(
 fn component_record(
     of: &Component,
     place: usize,
-    figures: Figures,
+    figures: ComponentFigures,
     status: Status,
     used_percent: Option<f32>,
     why: Why,

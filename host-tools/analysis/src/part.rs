@@ -3,7 +3,7 @@
 use std::fmt;
 
 use hums_core::Monitor;
-use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
+use hums_core::component::{COMPONENTS_MAX, ComponentFigures, ComponentKind};
 use hums_core::health::Subsystem;
 
 /// Hours, flights, battery cycles, motor hours; 0 without a limit.
@@ -51,8 +51,8 @@ impl fmt::Display for Limit {
 }
 
 /// Limit, if any.
-pub fn first_limit(kind: &str, figures: &Figures, limits: &Limits) -> Option<Limit> {
-    let is_powered = [Kind::Card, Kind::Other].iter().any(|of| of.name() == kind);
+pub fn first_limit(kind: &str, figures: &ComponentFigures, limits: &Limits) -> Option<Limit> {
+    let is_powered = [ComponentKind::Card, ComponentKind::Other].iter().any(|of| of.name() == kind);
     let (run_s, how) =
         if is_powered { (figures.powered_s, "powered") } else { (figures.flight_s, "in the air") };
     let run = [
@@ -109,7 +109,12 @@ mod tests {
 
     #[test]
     fn a_part_is_named_with_the_limit_that_it_reaches_first() {
-        let figures = Figures { flight_s: 3_600.0, motor_s: 7_200.0, flights: 3.0, ..Figures::default() };
+        let figures = ComponentFigures {
+            flight_s: 3_600.0,
+            motor_s: 7_200.0,
+            flights: 3.0,
+            ..ComponentFigures::default()
+        };
         let limit = |kind, limits| first_limit(kind, &figures, &limits).map(|limit| limit.to_string());
         assert_eq!(limit("motor", [10.0, 50.0, 0.0, 4.0]).as_deref(), Some("4 h turning"));
         assert_eq!(limit("airframe", [1.5, 50.0, 0.0, 0.0]).as_deref(), Some("1.5 h in the air"));

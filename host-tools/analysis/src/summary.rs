@@ -7,7 +7,7 @@ use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, Stats, Vehicle, Why};
 use hums_blackbox::{Cause, Gap, Record};
 use hums_core::clock::{Instant, Span};
-use hums_core::component::{COMPONENTS_MAX, Figures, Kind};
+use hums_core::component::{COMPONENTS_MAX, ComponentFigures, ComponentKind};
 use hums_core::health::Level;
 use hums_core::health::exceedance::Crossings;
 use hums_core::usage::UsageCounter;
@@ -157,7 +157,7 @@ pub struct ComponentLine {
     /// The part of its life that is used.
     pub used_percent: f32,
     /// Its figures.
-    pub figures: Figures,
+    pub figures: ComponentFigures,
     /// Replacements.
     pub replaced: u32,
 }
@@ -315,8 +315,8 @@ impl Contents {
     /// `None` for another check.
     pub fn due(&self, finding: &Finding) -> Option<(String, Option<String>)> {
         let of = |line: &ComponentLine| {
-            let kind = Kind::ALL.into_iter().find(|kind| kind.name() == line.kind);
-            kind.and_then(Kind::subsystem) == Some(finding.subsystem)
+            let kind = ComponentKind::ALL.into_iter().find(|kind| kind.name() == line.kind);
+            kind.and_then(ComponentKind::subsystem) == Some(finding.subsystem)
         };
         let mine = self.components.iter().filter(|(_, line)| part::is_due(&finding.check) && of(line));
         let (place, line) =

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use hums_core::clock::Span;
-use hums_core::component::Kind;
+use hums_core::component::ComponentKind;
 use hums_core::health::Level;
 
 use crate::endpoint::Endpoint;
@@ -217,7 +217,7 @@ card's PARAMS.TXT does it at the next start of the box, once: the box compares t
 pub struct Replaced {
     /// The kind of part: airframe, battery, motor, propeller, esc, card, engine, other
     #[arg(value_name = "PART", value_parser = kind)]
-    pub part: Kind,
+    pub part: ComponentKind,
     /// Which one of its kind, from 1, as `CMPn_NUMBER` has it
     #[arg(value_name = "N", default_value_t = 0)]
     pub number: u8,
@@ -241,10 +241,10 @@ pub struct Replaced {
     pub json: bool,
 }
 
-fn kind(text: &str) -> Result<Kind, String> {
-    let known = || Kind::ALL.into_iter().filter(|kind| *kind != Kind::None);
+fn kind(text: &str) -> Result<ComponentKind, String> {
+    let known = || ComponentKind::ALL.into_iter().filter(|kind| *kind != ComponentKind::None);
     known().find(|kind| kind.name() == text).ok_or_else(|| {
-        let names: Vec<&str> = known().map(Kind::name).collect();
+        let names: Vec<&str> = known().map(ComponentKind::name).collect();
         format!("there is no such kind of part: {}", names.join(", "))
     })
 }

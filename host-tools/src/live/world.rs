@@ -298,7 +298,7 @@ impl World {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::component::{Figures, Kind, Status};
+    use hums_core::component::{ComponentFigures, ComponentKind, Status};
     use hums_core::health::Level;
     use hums_core::observation::{Battery, Heartbeat, LandedState, Source, VtolState};
     use hums_core::units::Volts;
@@ -517,8 +517,8 @@ mod tests {
     /// Has turned nine and a half of them.
     fn motor() -> Told {
         let mut component = Component::default();
-        (component.kind, component.number) = (Kind::Motor, 2);
-        let ran = Figures { motor_s: 9.5 * 3_600.0, ..Figures::default() };
+        (component.kind, component.number) = (ComponentKind::Motor, 2);
+        let ran = ComponentFigures { motor_s: 9.5 * 3_600.0, ..ComponentFigures::default() };
         Told::Part { place: 0, component: component.having_run(ran) }
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
-use hums_core::component::{COMPONENTS_MAX, Kind, LABEL_BYTES};
+use hums_core::component::{COMPONENTS_MAX, ComponentKind, LABEL_BYTES};
 use hums_link::messages;
 use hums_link::packet::Fields;
 use hums_link::param_line::{self, Line};
@@ -80,8 +80,12 @@ pub fn run(args: &cli::Replaced) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, number: u8) -> Result<usize> {
-    let known: Vec<_> = known.into_iter().filter(|(_, kind, _)| *kind != Kind::None).collect();
+fn place_of(
+    known: impl IntoIterator<Item = (usize, ComponentKind, u8)>,
+    part: ComponentKind,
+    number: u8,
+) -> Result<usize> {
+    let known: Vec<_> = known.into_iter().filter(|(_, kind, _)| *kind != ComponentKind::None).collect();
     let mut mine = known.iter().filter(|(_, kind, of)| *kind == part && *of == number);
     match (mine.next(), mine.next()) {
         (Some((place, ..)), None) => Ok(*place),
@@ -102,12 +106,12 @@ fn place_of(known: impl IntoIterator<Item = (usize, Kind, u8)>, part: Kind, numb
 }
 
 /// The place of a part by the board's parameters.
-fn on_board(client: &mut Client, part: Kind, number: u8) -> Result<usize> {
+fn on_board(client: &mut Client, part: ComponentKind, number: u8) -> Result<usize> {
     let mut known = Vec::new();
     for place in 1..=COMPONENTS_MAX {
         let kind = params::value(client, &format!("CMP{place}_KIND"))?;
         let number = params::value(client, &format!("CMP{place}_NUMBER"))?;
-        known.push((place, Kind::from_number(kind as u8).unwrap_or_default(), number as u8));
+        known.push((place, ComponentKind::from_number(kind as u8).unwrap_or_default(), number as u8));
     }
     place_of(known, part, number)
 }
@@ -142,7 +146,7 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
 }
 
 /// Place and serial number, by the newest log with components.
-fn on_card(card: &Path, part: Kind, number: u8) -> Result<(usize, String)> {
+fn on_card(card: &Path, part: ComponentKind, number: u8) -> Result<(usize, String)> {
     if !card.is_dir() {
         return Err(usage(format!(
             "--card {}: is no folder; mount the card, and name its root",
@@ -153,8 +157,9 @@ fn on_card(card: &Path, part: Kind, number: u8) -> Result<(usize, String)> {
     for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
         let components = check::overview(place)?.contents.components;
         if !components.is_empty() {
-            let kind =
-                |name: &str| Kind::ALL.into_iter().find(|kind| kind.name() == name).unwrap_or_default();
+            let kind = |name: &str| {
+                ComponentKind::ALL.into_iter().find(|kind| kind.name() == name).unwrap_or_default()
+            };
             let known =
                 components.iter().map(|(place, line)| (usize::from(*place), kind(line.kind), line.number));
             let place = place_of(known, part, number)?;
@@ -207,10 +212,10 @@ mod tests {
             let value = if name.ends_with("KIND") { kinds[place] } else { numbers[place] };
             vec![(1, Packet::new(PARAM_VALUE).f32(0, value).u16(4, 16).text(8, 16, name))]
         });
-        let place = on_board(&mut client, Kind::Motor, 3).expect("it is there");
+        let place = on_board(&mut client, ComponentKind::Motor, 3).expect("it is there");
         assert_eq!(place, 3);
         tell(&mut client, place, "A-4711").expect("accepted");
-        let refused = on_board(&mut client, Kind::Motor, 2).expect_err("no such part").to_string();
+        let refused = on_board(&mut client, ComponentKind::Motor, 2).expect_err("no such part").to_string();
         assert!(
             refused.contains("no component motor 2") && refused.contains("airframe, motor 1, motor 3"),
             "{refused}"

@@ -162,7 +162,7 @@ impl<'a> Record<'a> {
 #[cfg(test)]
 mod tests {
     use hums_core::clock::Instant;
-    use hums_core::component::{Figures, Kind, Status};
+    use hums_core::component::{ComponentFigures, ComponentKind, Status};
     use hums_core::health::exceedance::Crossings;
     use hums_core::health::{Level, Subsystem};
     use hums_core::protect::{Action, Stage};
@@ -262,13 +262,13 @@ mod tests {
         reads_back(Record::Component(Component {
             why: Why::Replaced,
             place: 7,
-            kind: Kind::Propeller,
+            kind: ComponentKind::Propeller,
             number: 4,
             status: Status::Red,
             replaced: 3,
             name: "prop 4",
             serial: "SN 1",
-            figures: Figures { flight_s: 3_600.5, flights: 12.0, ..Figures::default() },
+            figures: ComponentFigures { flight_s: 3_600.5, flights: 12.0, ..ComponentFigures::default() },
             used_percent: 101.0,
             by: (255, 190),
             new_serial: "SN 2",

@@ -1,6 +1,6 @@
 //! Records of exceeded limits and of components.
 
-use hums_core::component::{Figures, Kind, Status};
+use hums_core::component::{ComponentFigures, ComponentKind, Status};
 use hums_core::health::exceedance::{self, Crossings};
 
 use super::Moment;
@@ -104,7 +104,7 @@ pub struct Component<'a> {
     /// Its place, from 0.
     pub place: u8,
     /// Its kind.
-    pub kind: Kind,
+    pub kind: ComponentKind,
     /// Which of its kind, from 1; 0 is all.
     pub number: u8,
     /// Green, yellow or red.
@@ -116,7 +116,7 @@ pub struct Component<'a> {
     /// Its serial number.
     pub serial: &'a str,
     /// Accumulated use.
-    pub figures: Figures,
+    pub figures: ComponentFigures,
     /// Percent; NaN without a limit.
     pub used_percent: f32,
     /// MAVLink system and component id; 0, 0 for the monitor.
@@ -128,7 +128,7 @@ pub struct Component<'a> {
 impl<'a> Component<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
         sink.head(14).u32(self.replaced);
-        let Figures { powered_s, flight_s, motor_s, flights, cycles } = self.figures;
+        let ComponentFigures { powered_s, flight_s, motor_s, flights, cycles } = self.figures;
         for figure in [powered_s, flight_s, motor_s, flights, cycles] {
             sink.f64(figure);
         }
@@ -141,13 +141,13 @@ impl<'a> Component<'a> {
         Self {
             why: Why::from_number(fields.u8()),
             place: fields.u8(),
-            kind: Kind::from_number(fields.u8()).unwrap_or_default(),
+            kind: ComponentKind::from_number(fields.u8()).unwrap_or_default(),
             number: fields.u8(),
             status: Status::from_number(fields.u8()),
             replaced: fields.u32(),
             name: fields.text(),
             serial: fields.text(),
-            figures: Figures {
+            figures: ComponentFigures {
                 powered_s: fields.f64(),
                 flight_s: fields.f64(),
                 motor_s: fields.f64(),

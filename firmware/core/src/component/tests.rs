@@ -29,7 +29,7 @@ fn the_limit_that_trips_first_decides() {
     ] {
         let totals = flown(hours, flights);
         let wear = Wear { totals: &totals, battery_cycles: &[] };
-        component.kind = Kind::Airframe;
+        component.kind = ComponentKind::Airframe;
         assert_eq!(component.status(1, &wear, &params), status, "{hours} h, {flights} flights");
     }
     let totals = flown(1e6, 1e6);
@@ -48,7 +48,7 @@ fn a_replaced_part_has_run_nothing_and_the_old_ones_figures_are_told() {
     assert_eq!(component.status(0, &wear, &params), Status::Red);
     let old = component.replace(Label::new("SN 2"), &wear);
     assert_eq!((old.serial, old.ran().flights), (Label::default(), 5.0));
-    assert_eq!((component.figures(&wear), component.serial.as_str()), (Figures::default(), "SN 2"));
+    assert_eq!((component.figures(&wear), component.serial.as_str()), (ComponentFigures::default(), "SN 2"));
     assert_eq!(component.status(0, &wear, &params), Status::Green);
 }
 
@@ -60,16 +60,19 @@ fn a_component_reads_back_and_the_session_is_added_once() {
     let none = Totals::default();
     let mut component = Component { name: Label::new("pack A"), ..Component::default() };
     component.describe(0, &Wear { totals: &none, battery_cycles: &[] }, &params);
-    let ran = Figures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 };
+    let ran =
+        ComponentFigures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 };
     let mut replaced = component;
     replaced.replace(Label::new("pack B"), &wear);
-    for (component, boots, expected) in
-        [(component, 5, ran), (component, 6, Figures::default()), (replaced, 5, Figures::default())]
-    {
+    for (component, boots, expected) in [
+        (component, 5, ran),
+        (component, 6, ComponentFigures::default()),
+        (replaced, 5, ComponentFigures::default()),
+    ] {
         let mut stored = [0; Component::BYTES];
         component.as_of(boots).encode(&mut stored);
         let mut read = Component::decode(&stored).expect("readable");
-        assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", Kind::Battery, 1));
+        assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", ComponentKind::Battery, 1));
         read.add(5, &wear);
         assert_eq!(read.ran(), expected, "as of power-on {boots}");
         for cut in 0..Component::BYTES {

@@ -5,7 +5,7 @@
 
 use super::witness::on_rotors;
 use super::{Flight, STILL};
-use crate::mishap::Kind;
+use crate::mishap::MishapKind;
 use crate::motion::{STILL_MPS, WINGS_MPS, WindowMax, climb_mps, ground_speed_mps};
 use crate::params::{Param, Params};
 use crate::time::{Instant, PAUSE, Span};
@@ -63,7 +63,7 @@ impl Flight {
         watch.stood |= stands && self.felt.at.since(watch.since) >= STILL;
         self.watch = Some(watch);
         if self.was_in_air(now, vehicle, &watch) || (!stands && self.is_lost_off(now, vehicle, &watch)) {
-            self.see(now, Kind::Disarmed, watch.height_m.unwrap_or(0.0), params);
+            self.see(now, MishapKind::Disarmed, watch.height_m.unwrap_or(0.0), params);
         } else if now.since(watch.since) > WATCH || (watch.stood && !vehicle.armed()) {
             self.watch = None;
         }

@@ -6,7 +6,7 @@ use super::{DRIVEN, Flight, RECOVERED, Stage, WATCHED};
 use crate::derived::load_factor_g;
 use crate::gates::LEANS_RAD;
 use crate::inertial::LIES;
-use crate::mishap::Kind;
+use crate::mishap::MishapKind;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
 use crate::motion::{STILL_MPS, TILTED_RAD, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::{Attitude, EstimatorScale, Imu, Observation, VehicleKind};
@@ -90,9 +90,9 @@ impl Lasting {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
     /// The worst of each sign, in its own unit; 0 for none.
-    pub(super) worst: [f32; Kind::COUNT],
+    pub(super) worst: [f32; MishapKind::COUNT],
     /// A sign of this step; the time of the last one.
-    pub(super) seen: Option<Kind>,
+    pub(super) seen: Option<MishapKind>,
     pub(super) seen_at: Instant,
     /// Since when an inertial sensor has fallen or turned while the others say that it flies.
     doubted_since: Stamp,
@@ -197,8 +197,8 @@ impl Flight {
         self.signs.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
     }
 
-    pub(super) fn see(&mut self, at: Instant, kind: Kind, value: f32, params: &Params) {
-        let is_felt = matches!(kind, Kind::FreeFall | Kind::Tumbling);
+    pub(super) fn see(&mut self, at: Instant, kind: MishapKind, value: f32, params: &Params) {
+        let is_felt = matches!(kind, MishapKind::FreeFall | MishapKind::Tumbling);
         if is_felt && self.signs.doubted_since.older_than(at, RECOVERED) {
             return;
         }
@@ -206,11 +206,11 @@ impl Flight {
         let worst = &mut self.signs.worst[kind as usize];
         *worst = worst.max(value);
         // A vehicle that was disarmed in the air may tumble first.
-        if self.signs.seen.is_none() || kind == Kind::Disarmed {
+        if self.signs.seen.is_none() || kind == MishapKind::Disarmed {
             self.signs.seen = Some(kind);
         }
         self.signs.seen_at = at;
-        if kind == Kind::Impact && self.stage == Stage::Falling {
+        if kind == MishapKind::Impact && self.stage == Stage::Falling {
             self.stage = Stage::Impacted;
         }
     }
@@ -233,7 +233,7 @@ impl Flight {
         if let Some(span) = self.signs.falls.take(at, falls)
             && span.as_secs_f32() >= least_s
         {
-            self.see(at, Kind::FreeFall, span.as_secs_f32(), params);
+            self.see(at, MishapKind::FreeFall, span.as_secs_f32(), params);
         }
         self.signs.unloaded.take(at, load_g < UNLOADED_G);
         if self.signs.unloaded.lasts(at, UNLOADED)
@@ -247,7 +247,7 @@ impl Flight {
             && self.thrust.was_driven(at, DRIVEN)
             && on_rotors(at, vehicle)
         {
-            self.see(at, Kind::Overturned, tilt_deg, params);
+            self.see(at, MishapKind::Overturned, tilt_deg, params);
         }
     }
 
@@ -270,7 +270,7 @@ impl Flight {
                 dropped: self.shock.is_some_and(|shock| shock.dropped)
                     || (self.signs.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle)),
             });
-            if self.shock.is_none() && self.signs.worst[Kind::Impact as usize] == 0.0 {
+            if self.shock.is_none() && self.signs.worst[MishapKind::Impact as usize] == 0.0 {
                 self.hit_at = at;
             }
             // The greatest of several: what hits something bounces.
@@ -278,7 +278,7 @@ impl Flight {
             self.shock = Some(Shock { load_g: greatest_g, ..shock });
             let pulled_out = !on_rotors(at, vehicle) && load_g <= PULL_OUT_G;
             if matches!(self.stage, Stage::Falling | Stage::Impacted) && !pulled_out {
-                self.see(at, Kind::Impact, load_g, params);
+                self.see(at, MishapKind::Impact, load_g, params);
             }
         }
     }
@@ -293,7 +293,7 @@ impl Flight {
         let tumbles = rate_dps > params.get(Param::MisTumble) && !is_made_to_turn(vehicle);
         let least = if on_rotors(at, vehicle) { LASTS } else { TUMBLES_ON_WINGS };
         if self.signs.tumbles.take(at, tumbles).is_some_and(|span| span >= least) {
-            self.see(at, Kind::Tumbling, rate_dps, params);
+            self.see(at, MishapKind::Tumbling, rate_dps, params);
         }
     }
 
@@ -314,7 +314,7 @@ impl Flight {
             && !is_made_to_turn(vehicle)
             && !vehicle.inertial.contradicts(at);
         if self.signs.overturned.take(at, over).is_some_and(|span| span >= LIES) {
-            self.see(at, Kind::Overturned, tilt_deg, params);
+            self.see(at, MishapKind::Overturned, tilt_deg, params);
         }
     }
 
@@ -367,7 +367,7 @@ impl Flight {
         let believed = || self.pressure.follows(at, -sink_mps).unwrap_or_else(by_display);
         let sinks = sinks && self.arming.is_on && believed();
         if self.signs.sinks.take(at, sinks).is_some_and(|span| span >= LASTS) {
-            self.see(at, Kind::Sinking, sink_mps, params);
+            self.see(at, MishapKind::Sinking, sink_mps, params);
         }
     }
 
@@ -410,7 +410,7 @@ impl Flight {
         if has_hit && rests && self.hangs_not(now, vehicle, power) {
             self.touch_mps =
                 if self.stage.is_mishap() { self.touch_mps.max(shock.sink_mps) } else { shock.sink_mps };
-            self.see(now, Kind::Impact, shock.load_g, params);
+            self.see(now, MishapKind::Impact, shock.load_g, params);
             self.shock = None;
         }
     }
@@ -424,10 +424,10 @@ impl Flight {
             || matches!(power, Some(Power::Idle | Power::Full))
     }
 
-    pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: Kind) -> bool {
+    pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: MishapKind) -> bool {
         self.thrust.was_driven(now, DRIVEN)
             && on_rotors(now, vehicle)
-            && (kind == Kind::Tumbling || self.lies_turned(now, vehicle).is_some())
+            && (kind == MishapKind::Tumbling || self.lies_turned(now, vehicle).is_some())
     }
 
     /// How far it lies over, rad, if it stood level while it was armed and turned since.

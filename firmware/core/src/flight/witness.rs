@@ -13,7 +13,7 @@
 
 use super::{Flight, Stage};
 use crate::gates::TURNED;
-use crate::mishap::Kind;
+use crate::mishap::MishapKind;
 use crate::motion::{
     CLEAR_M, LOW_M, MOVES_MPS, STILL_MPS, TILTED_RAD, WINGS_MPS, airspeed_mps, climb_mps, ground_speed_mps,
     throttle,
@@ -306,7 +306,7 @@ impl Flight {
             && (self.pressure.sank_at() + TURNED).is_after(since)
         {
             self.hit_at = since;
-            self.see(now, Kind::Impact, 0.0, params);
+            self.see(now, MishapKind::Impact, 0.0, params);
         }
     }
 }

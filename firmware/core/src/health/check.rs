@@ -330,7 +330,7 @@ const _: () = assert!(size_of::<Check>() <= if cfg!(target_pointer_width = "32")
 
 /// A change of level.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
+pub struct LevelChange {
     /// The new level.
     pub level: Level,
     /// The level before; [`Level::Ok`] where it was not known.
@@ -356,7 +356,13 @@ impl Check {
         if level == Level::Critical || warn.is_nan() { critical } else { warn }
     }
 
-    pub(super) const fn finding(&self, instance: u8, at: Instant, change: Change, feeds: Feeds) -> Finding {
+    pub(super) const fn finding(
+        &self,
+        instance: u8,
+        at: Instant,
+        change: LevelChange,
+        feeds: Feeds,
+    ) -> Finding {
         Finding {
             at,
             subsystem: self.subsystem,
@@ -450,12 +456,12 @@ impl State {
         reading: Option<Reading>,
         applies: bool,
         params: &Params,
-    ) -> Option<Change> {
+    ) -> Option<LevelChange> {
         if !applies {
             // A check that no longer applies is neither bad nor known to be good: it has no level.
             let previous = self.level.filter(|level| *level != Level::Ok);
             *self = Self::default();
-            return previous.map(|previous| Change {
+            return previous.map(|previous| LevelChange {
                 level: Level::Ok,
                 previous,
                 value: f32::NAN,
@@ -476,7 +482,7 @@ impl State {
     }
 
     /// After a step, where levels are not to fall: a warning stays one, and what grew old comes back as what it was.
-    pub(super) fn hold(&mut self, before: &Self, change: Option<Change>) -> Option<Change> {
+    pub(super) fn hold(&mut self, before: &Self, change: Option<LevelChange>) -> Option<LevelChange> {
         self.held = before.held;
         let change = change?;
         let known = [before.held, Some(change.previous), Some(change.level)];
@@ -488,7 +494,7 @@ impl State {
         match self.held {
             Some(held) if change.level != Level::Stale && change.level != held => {
                 *self = Self { level: Some(held), held: Some(held), ..*before };
-                (change.previous != held).then_some(Change { level: held, ..change })
+                (change.previous != held).then_some(LevelChange { level: held, ..change })
             }
             _ => Some(change),
         }
@@ -522,7 +528,7 @@ impl State {
         value: f32,
         measured: bool,
         params: &Params,
-    ) -> Option<Change> {
+    ) -> Option<LevelChange> {
         let level = self.level.unwrap_or(Level::Ok);
         let [warn, critical] = check.limits.values(params);
         let beyond = |limit: f32, margin: f32| check.limits.is_beyond(value, limit, margin);
@@ -557,7 +563,7 @@ impl State {
     }
 
     /// Changes the level. A first level that is good counts as no change.
-    fn go(&mut self, level: Level, value: f32, limit: f32) -> Option<Change> {
+    fn go(&mut self, level: Level, value: f32, limit: f32) -> Option<LevelChange> {
         let before = self.level.replace(level);
         let previous = before.unwrap_or(Level::Ok);
         if previous == level {
@@ -565,7 +571,7 @@ impl State {
         }
         self.repeats.note(previous, level);
         self.better = Stamp::NONE;
-        Some(Change { level, previous, value, limit })
+        Some(LevelChange { level, previous, value, limit })
     }
 }
 

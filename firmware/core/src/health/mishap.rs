@@ -8,25 +8,28 @@ use super::inputs::Inputs;
 use super::suppression::Role;
 use crate::cause::Cause;
 use crate::latest::Reading;
-use crate::mishap::Kind;
+use crate::mishap::MishapKind;
 
 pub(super) const CHECKS: &[Check] = &[
-    sign(Kind::FreeFall, "s", |inputs, _| reading(inputs, Kind::FreeFall)),
-    sign(Kind::Impact, "g", |inputs, _| reading(inputs, Kind::Impact)),
-    sign(Kind::Tumbling, "deg/s", |inputs, _| reading(inputs, Kind::Tumbling)),
-    Check { alarm_only: true, ..sign(Kind::Disarmed, "m", |inputs, _| reading(inputs, Kind::Disarmed)) },
-    sign(Kind::Sinking, "m/s", |inputs, _| reading(inputs, Kind::Sinking)),
-    sign(Kind::Overturned, "deg", |inputs, _| reading(inputs, Kind::Overturned)),
+    sign(MishapKind::FreeFall, "s", |inputs, _| reading(inputs, MishapKind::FreeFall)),
+    sign(MishapKind::Impact, "g", |inputs, _| reading(inputs, MishapKind::Impact)),
+    sign(MishapKind::Tumbling, "deg/s", |inputs, _| reading(inputs, MishapKind::Tumbling)),
+    Check {
+        alarm_only: true,
+        ..sign(MishapKind::Disarmed, "m", |inputs, _| reading(inputs, MishapKind::Disarmed))
+    },
+    sign(MishapKind::Sinking, "m/s", |inputs, _| reading(inputs, MishapKind::Sinking)),
+    sign(MishapKind::Overturned, "deg", |inputs, _| reading(inputs, MishapKind::Overturned)),
     alert::<{ Cause::Crash as usize }>(Subsystem::Mishap, Role::NONE),
 ];
 
-const fn sign(kind: Kind, unit: &str, read: Read) -> Check {
+const fn sign(kind: MishapKind, unit: &str, read: Read) -> Check {
     let limits = Limits::above(None, Some(kind.limit()), 0.0);
     let (subsystem, unit) = (Subsystem::Mishap, Unit::of(unit));
     Check { name: kind.name(), subsystem, unit, limits, stale_s: STALE, read, ..PLAIN }
 }
 
-fn reading(inputs: &Inputs<'_>, kind: Kind) -> Option<Reading> {
+fn reading(inputs: &Inputs<'_>, kind: MishapKind) -> Option<Reading> {
     inputs.flight.reading(kind, inputs.now, inputs.vehicle)
 }
 
@@ -45,7 +48,7 @@ pub(super) fn orders(check: &Check, inputs: &Inputs<'_>, has_lost_drive: impl Fn
     if check.name == "autopilot_state" && vehicle.terminated_since.is_some() {
         return Orders::Disarm;
     }
-    if check.name == Kind::Sinking.name() {
+    if check.name == MishapKind::Sinking.name() {
         let in_vain = derived.crosschecks.thrust.in_vain().is_some_and(|full| full.value > 0.0);
         return match vehicle.hovers(now) {
             Some(true) if !flight.has_tilted(now) && !in_vain && !has_lost_drive() => Orders::Own,

@@ -26,7 +26,7 @@ mod vocabulary;
 pub use check::{
     CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Limits, Side, State, Unit, When,
 };
-use check::{Change, How, Reported};
+use check::{How, LevelChange, Reported};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
@@ -141,7 +141,7 @@ impl Health {
         check: &Check,
         instance: u8,
         inputs: &Inputs<'_>,
-        change: Change,
+        change: LevelChange,
         because: &'static str,
     ) -> Finding {
         let feeds = power::feeds(check, inputs, instance);
@@ -182,7 +182,7 @@ impl Health {
             let value = Some((check.read)(inputs, instance)?.value).filter(|value| value.is_finite())?;
             (value, check.limit(level, inputs.params))
         };
-        let change = Change { level, previous: level, value, limit };
+        let change = LevelChange { level, previous: level, value, limit };
         Some(self.finding(check, instance, inputs, change, ""))
     }
 

@@ -22,11 +22,11 @@
 
 use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
 use crate::bytes::{Fields, fields};
-use crate::exposure::{BINS, Exposure, Quantity, Tenths};
+use crate::exposure::{BINS, Exposure, ExposureQuantity, Tenths};
 use crate::usage::{Form, Totals, UsageCounter, Wear};
 use crate::vehicle::BATTERIES_MAX;
 
-const RANGE_BYTES: usize = (BINS * Quantity::ALL.len()).div_ceil(8);
+const RANGE_BYTES: usize = (BINS * ExposureQuantity::ALL.len()).div_ceil(8);
 
 /// A session as it was stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,14 +1,15 @@
 //! The vehicle's components in the monitor, and their replacement.
 
 use super::Monitor;
-use crate::component::{Component, Figures, Kind, Label, Status};
+use crate::component::{Component, ComponentFigures, ComponentKind, Label, Status};
 use crate::lifetime::ItemKey;
 use crate::vehicle::BATTERIES_MAX;
 
 impl Monitor {
     /// Figures and status of a component.
-    pub fn component_figures(&self, place: usize) -> Option<(Figures, Status)> {
-        let component = self.components.get(place).filter(|component| component.kind != Kind::None)?;
+    pub fn component_figures(&self, place: usize) -> Option<(ComponentFigures, Status)> {
+        let component =
+            self.components.get(place).filter(|component| component.kind != ComponentKind::None)?;
         let wear = self.usage.wear();
         Some((component.figures(&wear), component.status(place, &wear, &self.params)))
     }
@@ -30,10 +31,11 @@ impl Monitor {
     /// is no such component.
     pub fn replace_component(&mut self, place: usize, serial: Label) -> Option<Component> {
         let Self { usage, components, saving, .. } = self;
-        let component = components.get_mut(place).filter(|component| component.kind != Kind::None)?;
+        let component =
+            components.get_mut(place).filter(|component| component.kind != ComponentKind::None)?;
         let old = component.replace(serial, &usage.wear());
         saving.hurry(ItemKey::Component(place as u8));
-        if old.kind == Kind::Battery {
+        if old.kind == ComponentKind::Battery {
             (0..BATTERIES_MAX)
                 .filter(|battery| old.number == 0 || usize::from(old.number) == battery + 1)
                 .for_each(|battery| self.derived.forget_resistance(battery));

@@ -1,6 +1,6 @@
 //! The counters: their stored numbers, their names, which carry the unit, and how they add up over sessions.
 
-use crate::exposure::{BINS, Quantity as Exposed};
+use crate::exposure::{BINS, ExposureQuantity};
 use crate::figures::Quantity as Steady;
 use crate::observation::MOTORS_MAX;
 
@@ -161,7 +161,7 @@ pub const EXPOSURE_FIRST: u8 = 140;
 /// Figures of a flight: from this number on, by [`crate::figures::Quantity::index`].
 pub const FIGURE_FIRST: u8 = 200;
 
-const _: () = assert!(EXPOSURE_FIRST as usize + BINS * Exposed::ALL.len() <= FIGURE_FIRST as usize);
+const _: () = assert!(EXPOSURE_FIRST as usize + BINS * ExposureQuantity::ALL.len() <= FIGURE_FIRST as usize);
 const _: () = assert!(FIGURE_FIRST as usize + Steady::COUNT <= 256);
 
 /// The meaning of a stored counter number.
@@ -172,13 +172,13 @@ pub enum CounterName {
     /// A counter of one motor, numbered from 0: name and motor.
     Motor(&'static str, u8),
     /// Seconds that a quantity stood from the first figure to the second; infinite where the range has no end.
-    Exposure(Exposed, f32, f32),
+    Exposure(ExposureQuantity, f32, f32),
     /// A figure of a flight.
     Figure(Steady),
 }
 
 /// The number of the time that a quantity stood in a range.
-pub const fn exposure_number(quantity: Exposed, bin: usize) -> u8 {
+pub const fn exposure_number(quantity: ExposureQuantity, bin: usize) -> u8 {
     EXPOSURE_FIRST + quantity as u8 * BINS as u8 + bin as u8
 }
 
@@ -200,7 +200,7 @@ pub fn counter_name(number: u8) -> Option<CounterName> {
         return Steady::from_index(usize::from(quantity)).map(CounterName::Figure);
     }
     if let Some(range) = number.checked_sub(EXPOSURE_FIRST) {
-        let quantity = Exposed::ALL.get(usize::from(range) / BINS)?;
+        let quantity = ExposureQuantity::ALL.get(usize::from(range) / BINS)?;
         let (edges, bin) = (quantity.edges(), usize::from(range) % BINS);
         let from = bin.checked_sub(1).map_or(f32::NEG_INFINITY, |below| edges[below]);
         let to = edges.get(bin).copied().unwrap_or(f32::INFINITY);
@@ -218,11 +218,11 @@ mod tests {
 
     #[test]
     fn ranges_and_figures_are_named_by_their_numbers() {
-        let first = exposure_number(Exposed::Vibration, 0);
+        let first = exposure_number(ExposureQuantity::Vibration, 0);
         let name = counter_name(first);
-        assert_eq!(name, Some(CounterName::Exposure(Exposed::Vibration, f32::NEG_INFINITY, 1.0)));
-        let last = counter_name(exposure_number(Exposed::Current, BINS - 1));
-        assert_eq!(last, Some(CounterName::Exposure(Exposed::Current, 160.0, f32::INFINITY)));
+        assert_eq!(name, Some(CounterName::Exposure(ExposureQuantity::Vibration, f32::NEG_INFINITY, 1.0)));
+        let last = counter_name(exposure_number(ExposureQuantity::Current, BINS - 1));
+        assert_eq!(last, Some(CounterName::Exposure(ExposureQuantity::Current, 160.0, f32::INFINITY)));
         let motor = Steady::MotorSpeed(11);
         assert_eq!(counter_name(figure_number(motor)), Some(CounterName::Figure(motor)));
     }
@@ -238,7 +238,7 @@ mod tests {
         }
         assert_eq!(
             count,
-            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * Exposed::ALL.len() + Steady::COUNT
+            UsageCounter::ALL.len() + 2 * MOTORS_MAX + BINS * ExposureQuantity::ALL.len() + Steady::COUNT
         );
     }
 }

@@ -14,7 +14,9 @@ fn a_fall_with_the_motors_asked_for_thrust_ends_the_flight_with_its_touch() {
         let told = outcome.told();
         assert_eq!(told.first(), Some(&"free_fall"), "{of:?}: {told:?}");
         assert!(told.contains(&"impact"), "{of:?}: {told:?}");
-        let [(began_ms, Change::Began(Kind::FreeFall)), (down_ms, Change::Down)] = outcome.changes[..] else {
+        let [(began_ms, MishapChange::Began(MishapKind::FreeFall)), (down_ms, MishapChange::Down)] =
+            outcome.changes[..]
+        else {
             panic!("{of:?}: {:?}", outcome.changes)
         };
         let (place, touch) = (outcome.reports[0].place, outcome.reports[1].touch);
@@ -132,7 +134,11 @@ fn what_was_wrong_before_a_mishap_ends_when_it_lies_disarmed_and_when_it_is_sile
             }
             (quad.armed, quad.silent) = (ms < off_ms, ms >= silent_ms);
         });
-        assert!(outcome.changes.iter().any(|(_, change)| *change == Change::Down), "{:?}", outcome.changes);
+        assert!(
+            outcome.changes.iter().any(|(_, change)| *change == MishapChange::Down),
+            "{:?}",
+            outcome.changes
+        );
         let vibration = outcome.findings.iter().filter(|finding| finding.check == "vibration");
         let levels: Vec<_> = vibration.map(|it| (it.level, it.at.as_millis() - AT_MS)).collect();
         let is_right = match (&levels[..], good_ms) {
@@ -148,20 +154,20 @@ fn what_was_wrong_before_a_mishap_ends_when_it_lies_disarmed_and_when_it_is_sile
 fn every_text_of_a_mishap_fits() {
     let place = |height_m| Place { position: Some((-899_999_999, -1_799_999_999)), height_m };
     let unknown = Place { position: None, height_m: -12_345 };
-    let began = Change::Began(Kind::Sinking);
+    let began = MishapChange::Began(MishapKind::Sinking);
     for (change, place, end) in [
         (began, place(-999), " m"),
         (began, place(12_345), " m"),
         (began, unknown, " m"),
-        (Change::Down, place(0), "999.9 m/s"),
-        (Change::FliesOn, unknown, ""),
-        (Change::OnBench(Kind::Disarmed), unknown, ""),
+        (MishapChange::Down, place(0), "999.9 m/s"),
+        (MishapChange::FliesOn, unknown, ""),
+        (MishapChange::OnBench(MishapKind::Disarmed), unknown, ""),
     ] {
         let text = Report { change, place, touch: 9_999 }.text();
         assert!(!text.is_empty() && text.ends_with(end) && "HUMS: ".len() + text.len() <= 50, "{text}");
     }
     let place = Place { position: Some((473_977_420, -85_455_940)), height_m: 30 };
-    let report = Report { change: Change::Began(Kind::Impact), place, touch: 0 };
+    let report = Report { change: MishapChange::Began(MishapKind::Impact), place, touch: 0 };
     assert_eq!(report.text(), "mishap at 47.397742,-8.545594 30 m");
 }
 
@@ -222,7 +228,8 @@ fn what_comes_down_under_a_parachute_is_down_when_it_is_on_the_ground() {
             motion.pressure_hpa = Some(950.0 + 0.12 * down_m.min(80.0) + (ms / 50 % 3) as f32 * 0.01);
         });
         assert_eq!(outcome.told().first(), Some(&"disarmed_in_air"), "{of:?}");
-        let down_ms = outcome.changes.iter().find(|(_, change)| *change == Change::Down).map(|(ms, _)| *ms);
+        let down_ms =
+            outcome.changes.iter().find(|(_, change)| *change == MishapChange::Down).map(|(ms, _)| *ms);
         let lands_ms = AT_MS + 16_000;
         assert!(down_ms.is_some_and(|ms| (lands_ms..lands_ms + 5_000).contains(&ms)), "{of:?}: {down_ms:?}");
     }

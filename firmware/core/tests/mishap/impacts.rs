@@ -218,8 +218,10 @@ fn what_lies_over_with_running_motors_never_flies_on() {
             }
         });
         assert!(outcome.told().starts_with(&["sinking", "impact"]), "{of:?}: {:?}", outcome.told());
-        let is_over =
-            outcome.changes.iter().any(|(_, change)| matches!(change, Change::FliesOn | Change::FliesAgain));
+        let is_over = outcome
+            .changes
+            .iter()
+            .any(|(_, change)| matches!(change, MishapChange::FliesOn | MishapChange::FliesAgain));
         assert!(!is_over, "{of:?}: {:?}", outcome.changes);
         assert_eq!(outcome.flights(), (1, 0, 1), "{of:?}: {:?}", outcome.changes);
         let upright = fly(&hovering(*of), hits_and_runs_on);
@@ -242,7 +244,10 @@ fn strays(ms: u64, quad: &mut Quad, motion: &mut Motion, receiver_mps: Option<f3
 #[test]
 fn what_an_estimate_moves_and_the_receiver_does_not_never_flies_on() {
     let moves = |outcome: &Outcome| {
-        outcome.changes.iter().any(|(_, change)| matches!(change, Change::FliesOn | Change::FliesAgain))
+        outcome
+            .changes
+            .iter()
+            .any(|(_, change)| matches!(change, MishapChange::FliesOn | MishapChange::FliesAgain))
     };
     for of in &ROTORS[..2] {
         let rests = fly(&hovering(*of), |ms, quad, motion| strays(ms, quad, motion, Some(0.1)));
@@ -361,7 +366,7 @@ fn what_holds_its_place_in_the_air_after_a_knock_flies_on() {
                 });
                 let what = (height, throttle, knock_g, landed, &outcome.changes);
                 assert_eq!(outcome.flights(), (1, 0, 0), "{what:?}");
-                assert!(matches!(outcome.changes.last(), Some((_, Change::FliesOn))), "{what:?}");
+                assert!(matches!(outcome.changes.last(), Some((_, MishapChange::FliesOn))), "{what:?}");
                 assert!(outcome.monitor.flight().airborne(), "{what:?}");
             }
         }
@@ -376,7 +381,7 @@ fn a_silence_after_a_knock_ends_no_flight_of_what_hangs_in_the_air() {
         motion.unheard = (1_000..9_000).contains(&ms);
     });
     assert!(
-        matches!(outcome.changes.last(), Some((_, Change::FliesOn | Change::FliesAgain))),
+        matches!(outcome.changes.last(), Some((_, MishapChange::FliesOn | MishapChange::FliesAgain))),
         "{:?}",
         outcome.changes
     );

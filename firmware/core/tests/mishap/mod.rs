@@ -9,7 +9,7 @@ mod turns;
 use crate::common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
-use hums_core::mishap::{Change, Kind, Place, Report};
+use hums_core::mishap::{MishapChange, MishapKind, Place, Report};
 use hums_core::observation::{
     Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source, TelemetryRadio,
     VehicleKind, VtolState, Wanted,
@@ -71,7 +71,7 @@ type Script = fn(u64, &mut Quad, &mut Motion);
 struct Outcome {
     monitor: Monitor,
     findings: Vec<Finding>,
-    changes: Vec<(u64, Change)>,
+    changes: Vec<(u64, MishapChange)>,
     reports: Vec<Report>,
 }
 

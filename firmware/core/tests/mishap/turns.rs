@@ -10,7 +10,9 @@ fn turns(rates: [f32; 3], lasts_ms: u64) -> impl Fn(u64, &mut Quad, &mut Motion)
 fn tumbling_is_told_by_body_rates_and_a_vehicle_that_recovers_has_one_flight() {
     judge(rotors(), "tumbles", (&["tumbling"], FLIES), turns([15.0, 2.0, 0.0], 1_500));
     let outcome = fly(&hovering(ROTORS[0]), turns([15.0, 2.0, 0.0], 1_500));
-    let [(began_ms, Change::Began(Kind::Tumbling)), (over_ms, Change::FliesOn)] = outcome.changes[..] else {
+    let [(began_ms, MishapChange::Began(MishapKind::Tumbling)), (over_ms, MishapChange::FliesOn)] =
+        outcome.changes[..]
+    else {
         panic!("{:?}", outcome.changes)
     };
     assert!(began_ms <= AT_MS + 700 && (AT_MS + 6_000..AT_MS + 7_000).contains(&over_ms), "{over_ms}");
@@ -48,7 +50,11 @@ fn on_the_bench_it_is_an_event_for_each_arming_and_not_told() {
         }
     });
     assert!(outcome.told().is_empty(), "{:?}", outcome.findings);
-    assert!(matches!(outcome.changes[..], [(_, Change::OnBench(Kind::Tumbling))]), "{:?}", outcome.changes);
+    assert!(
+        matches!(outcome.changes[..], [(_, MishapChange::OnBench(MishapKind::Tumbling))]),
+        "{:?}",
+        outcome.changes
+    );
     let disarmed = Quad { armed: false, ..on_ground(ROTORS[0]) };
     assert!(fly(&disarmed, fall).changes.is_empty(), "nobody watches what is carried about");
 }

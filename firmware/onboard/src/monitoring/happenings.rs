@@ -3,7 +3,7 @@
 use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
-use hums_core::mishap::Change;
+use hums_core::mishap::MishapChange;
 
 use super::marks::Marks;
 use crate::journal::Logbook;
@@ -76,17 +76,17 @@ pub(super) fn record(
 /// Marks the log, reports the place to the ground station, and writes all data to the card at once.
 fn mishap(
     now: Instant,
-    change: Change,
+    change: MishapChange,
     book: &mut Logbook<'_>,
     notices: &mut Notices,
     marks: &mut Marks,
     sectors: &mut SectorsIn,
 ) {
     let number = match change {
-        Change::Began(_) => 15,
-        Change::Down => 16,
-        Change::FliesOn | Change::FliesAgain => 17,
-        Change::OnBench(kind) => {
+        MishapChange::Began(_) => 15,
+        MishapChange::Down => 16,
+        MishapChange::FliesOn | MishapChange::FliesAgain => 17,
+        MishapChange::OnBench(kind) => {
             let event = Event { number: 18, text: kind.name() };
             book.journal.record(now, &Record::Event(event), sectors);
             return;
@@ -95,7 +95,7 @@ fn mishap(
     let report = book.monitor.flight().report(change);
     book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
     // The beginning is reported as a finding.
-    if !matches!(change, Change::Began(_)) {
+    if !matches!(change, MishapChange::Began(_)) {
         notices.announce(Notice::Mishap(report));
     }
     marks.at_once(Resting::Mishap);

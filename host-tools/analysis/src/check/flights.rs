@@ -2,7 +2,7 @@
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::mishap::{Change, Kind};
+use hums_core::mishap::{MishapChange, MishapKind};
 use hums_onboard::monitoring::TICK;
 
 use super::clock::SETTLE;
@@ -194,18 +194,18 @@ impl Flights {
     /// Began or ended.
     pub(super) fn mishap(
         &mut self,
-        change: Change,
+        change: MishapChange,
         now: Instant,
         hit_at: Option<Instant>,
         monitor: &Monitor,
     ) {
         match change {
-            Change::Began(Kind::Disarmed) => {
+            MishapChange::Began(MishapKind::Disarmed) => {
                 if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
                     flight.disarmed_at_m = Some(f32::from(monitor.flight().height_m()));
                 }
             }
-            Change::Down => {
+            MishapChange::Down => {
                 self.crashed = self.open;
                 if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
                     let (at, is_impact) = (hit_at.unwrap_or(now), hit_at.is_some());
@@ -213,12 +213,12 @@ impl Flights {
                 }
             }
             // It was caught in time.
-            Change::FliesOn => {
+            MishapChange::FliesOn => {
                 if let Some(flight) = self.list.last_mut().filter(|_| self.open) {
                     flight.disarmed_at_m = None;
                 }
             }
-            Change::Began(_) | Change::FliesAgain | Change::OnBench(_) => {}
+            MishapChange::Began(_) | MishapChange::FliesAgain | MishapChange::OnBench(_) => {}
         }
     }
 

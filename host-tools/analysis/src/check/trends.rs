@@ -21,7 +21,7 @@ use hums_blackbox::Record;
 use hums_blackbox::record::Why;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
-use hums_core::component::Kind;
+use hums_core::component::ComponentKind;
 use hums_core::figures::Quantity;
 use hums_core::health::{Level, Subsystem};
 use hums_core::observation::Autopilot;
@@ -57,7 +57,7 @@ pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
 /// A part that a figure depends on was changed.
 pub(super) fn is_change(record: &Record<'_>) -> bool {
     match record {
-        Record::Component(part) => part.why == Why::Replaced && part.kind != Kind::Card,
+        Record::Component(part) => part.why == Why::Replaced && part.kind != ComponentKind::Card,
         Record::Event(event) => event.text.starts_with(PARTS_CHANGED),
         _ => false,
     }

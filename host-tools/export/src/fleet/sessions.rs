@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use hums_analysis::log_json::{VehicleJson, duration_s, finite, vehicle};
-use hums_core::component::Figures;
+use hums_core::component::ComponentFigures;
 use hums_core::figures::Quantity;
 use hums_core::health::Level;
 use hums_core::usage::{CounterName, counter_name as meaning};
@@ -178,7 +178,7 @@ fn health(context: &Context, about: &About) -> Vec<(&'static str, Cell)> {
             let (part, limit) = contents.part(*place, line);
             let used_percent = finite(line.used_percent).filter(|_| limit.is_some());
             let (serial, status) = (line.serial.as_str(), line.status);
-            let Figures { flight_s, flights, cycles, .. } = line.figures;
+            let ComponentFigures { flight_s, flights, cycles, .. } = line.figures;
             PartJson { part, serial, status, used_percent, limit, flight_s, flights, cycles }
         })
         .collect();

@@ -125,8 +125,8 @@ fn a_change_tells_its_value_and_the_limit_it_crossed() {
             let value = if now_ms <= 2_000 { value } else { 10.0 };
             told.extend(state.step(check, at, Some(Reading { at, value }), true, &Params::defaults()));
         }
-        let rises = Change { level, previous: Level::Ok, value, limit };
-        let falls = Change { level: Level::Ok, previous: level, value: 10.0, limit: falls_below };
+        let rises = LevelChange { level, previous: Level::Ok, value, limit };
+        let falls = LevelChange { level: Level::Ok, previous: level, value: 10.0, limit: falls_below };
         assert_eq!(told, [rises, falls]);
     }
 }
