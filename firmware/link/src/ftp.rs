@@ -86,7 +86,7 @@ pub enum Operation<'a> {
 
 /// A client's message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked<'a> {
+pub struct FtpRequest<'a> {
     /// Counts up with each message, the answer's included.
     pub sequence: u16,
     /// The session that it is about.
@@ -98,7 +98,7 @@ pub struct Asked<'a> {
 }
 
 /// Reads a client's message.
-pub fn read(payload: &[u8]) -> Asked<'_> {
+pub fn read(payload: &[u8]) -> FtpRequest<'_> {
     let fields = Fields(payload);
     let (size, offset) = (fields.u8(4), fields.u32(8));
     let text = || fields.text(HEAD, usize::from(size)).unwrap_or_default();
@@ -115,12 +115,12 @@ pub fn read(payload: &[u8]) -> Asked<'_> {
         6..=13 => Operation::Write,
         _ => Operation::Unknown,
     };
-    Asked { sequence: fields.u16(0), session: fields.u8(2), opcode: fields.u8(3), operation }
+    FtpRequest { sequence: fields.u16(0), session: fields.u8(2), opcode: fields.u8(3), operation }
 }
 
 /// An answer; its data is added by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reply {
+pub struct FtpReply {
     /// One more than the message's that it answers, or than the answer's before it in a burst.
     pub sequence: u16,
     /// The session.
@@ -133,9 +133,9 @@ pub struct Reply {
     pub complete: bool,
 }
 
-impl Reply {
+impl FtpReply {
     /// A reply to `asked`.
-    pub const fn to(asked: &Asked<'_>) -> Self {
+    pub const fn to(asked: &FtpRequest<'_>) -> Self {
         Self {
             sequence: asked.sequence.wrapping_add(1),
             session: asked.session,
@@ -176,7 +176,7 @@ mod tests {
         let asked = read(&asked);
         assert_eq!((asked.sequence, asked.operation), (7, Operation::Read(0x2010, 100)));
         let mut buffer = [0; HEAD + DATA_MAX];
-        let reply = Reply { offset: 0x2010, ..Reply::to(&asked) };
+        let reply = FtpReply { offset: 0x2010, ..FtpReply::to(&asked) };
         assert_eq!(reply.ack(&[1, 2], &mut buffer), [8, 0, 0, 128, 2, 5, 0, 0, 0x10, 0x20, 0, 0, 1, 2]);
         assert_eq!(reply.nak(Error::EndOfFile, &mut buffer)[3..5], [129, 1]);
     }

@@ -53,7 +53,7 @@ pub enum Request<'a> {
 
 /// A request and its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Asked<'a> {
+pub struct AddressedRequest<'a> {
     /// System and component; 0 is all.
     pub target: (u8, u8),
     /// The request.
@@ -61,7 +61,7 @@ pub struct Asked<'a> {
 }
 
 /// The request in a frame, for any target; `None` if we have no answer to it.
-pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
+pub fn read<'a>(frame: &Frame<'a>) -> Option<AddressedRequest<'a>> {
     if frame.check() != Check::Verified {
         return None;
     }
@@ -93,7 +93,7 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<Asked<'a>> {
         256 => (target(8), Request::Key(Key(fields.bytes(10)), fields.u64(0))),
         _ => return None,
     };
-    Some(Asked { target, request })
+    Some(AddressedRequest { target, request })
 }
 
 /// A queued answer.
@@ -226,7 +226,7 @@ mod tests {
         Some((bytes, some))
     }
 
-    fn with(packet: &Packet, look: impl FnOnce(&Asked<'_>)) {
+    fn with(packet: &Packet, look: impl FnOnce(&AddressedRequest<'_>)) {
         let (bytes, some) = asked(packet).expect("a frame");
         assert!(some, "{}", packet.id());
         look(&read(&Frame::parse(&bytes).expect("a frame")).expect("a request"));

@@ -26,7 +26,7 @@ use hums_link::frame::Frame;
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::Fields;
-use hums_link::request::{self, Asked, Port, Reply, Request};
+use hums_link::request::{self, AddressedRequest, Port, Reply, Request};
 use hums_link::signing::{Key, Seal};
 use hums_link::summary::{self, Summary};
 
@@ -236,7 +236,7 @@ impl Companion {
         now: Instant,
         asker: Asker,
         trust: Trust,
-        asked: &Asked<'_>,
+        asked: &AddressedRequest<'_>,
         book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
     ) {

@@ -27,7 +27,7 @@ pub(super) enum Open {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Job {
-    reply: ftp::Reply,
+    reply: ftp::FtpReply,
     kind: Kind,
 }
 
@@ -60,8 +60,8 @@ enum Kind {
 }
 
 impl Job {
-    pub(super) fn new(asked: &ftp::Asked<'_>, open: &mut Option<Open>) -> Self {
-        let mut reply = ftp::Reply::to(asked);
+    pub(super) fn new(asked: &ftp::FtpRequest<'_>, open: &mut Option<Open>) -> Self {
+        let mut reply = ftp::FtpReply::to(asked);
         let kind = match asked.operation {
             Operation::None => Kind::Say(None),
             Operation::End => {
