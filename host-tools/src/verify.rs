@@ -17,7 +17,7 @@ use crate::files::Inputs;
 use crate::followed::EndResolver;
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
-use crate::logs::{self, Found, find::Image};
+use crate::logs::{self, FoundLogs, find::Image};
 use crate::loss;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
@@ -155,7 +155,7 @@ impl Totals {
 }
 
 /// Hands each log on in order, with the others' evidence. Returns the number of unreadable ones, which are reported.
-pub fn verify_each(found: &Found, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
+pub fn verify_each(found: &FoundLogs, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
     let named = found.logs.iter().map(|log| (log.name.as_str(), log));
     let mut followed = EndResolver::new(Sessions::of(named));
     let mut failed = 0;

@@ -2,27 +2,27 @@
 
 use std::io::Write as _;
 
-use hums::source::item::{Item, Row, Rows, Value, Want};
+use hums::source::item::{CellValue, Item, Row, Rows, Want};
 use hums::source::recording::Place;
 use hums_tests::{flights, oracle};
 use serde_json::Value as Json;
 
-fn same(ours: &Value<'_>, theirs: &Json) -> bool {
+fn same(ours: &CellValue<'_>, theirs: &Json) -> bool {
     match ours {
-        Value::Unknown => theirs.is_null(),
-        Value::Unsigned(value) => theirs.as_u64() == Some(*value),
-        Value::Signed(value) => theirs.as_i64() == Some(*value),
+        CellValue::Unknown => theirs.is_null(),
+        CellValue::Unsigned(value) => theirs.as_u64() == Some(*value),
+        CellValue::Signed(value) => theirs.as_i64() == Some(*value),
         // JSON has no number for it.
-        Value::Single(value) if !value.is_finite() => theirs.is_null(),
-        Value::Double(value) if !value.is_finite() => theirs.is_null(),
-        Value::Single(value) => theirs.as_f64().map(|theirs| theirs as f32) == Some(*value),
+        CellValue::Single(value) if !value.is_finite() => theirs.is_null(),
+        CellValue::Double(value) if !value.is_finite() => theirs.is_null(),
+        CellValue::Single(value) => theirs.as_f64().map(|theirs| theirs as f32) == Some(*value),
         // `serde_json` reads a number to its last bit but one.
-        Value::Double(value) => {
+        CellValue::Double(value) => {
             theirs.as_f64().is_some_and(|theirs| (theirs - value).abs() <= 2.0 * f64::EPSILON * value.abs())
         }
-        Value::Flag(value) => theirs.as_bool() == Some(*value),
-        Value::Text(value) => theirs.as_str() == Some(value),
-        Value::Bytes(bytes) => {
+        CellValue::Flag(value) => theirs.as_bool() == Some(*value),
+        CellValue::Text(value) => theirs.as_str() == Some(value),
+        CellValue::Bytes(bytes) => {
             let theirs = theirs.as_str().unwrap_or_default().as_bytes();
             let digits = |(pair, byte): (&[u8], &u8)| pair == format!("{byte:02x}").as_bytes();
             theirs.len() == 2 * bytes.len() && theirs.chunks(2).zip(bytes.iter()).all(digits)

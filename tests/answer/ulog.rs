@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use hums::source::item::{Cause, Item, Row, Rows, Value, Want};
+use hums::source::item::{Cause, CellValue, Item, Row, Rows, Want};
 use hums::source::recording::Place;
 use hums_tests::{flights, oracle};
 use serde_json::json;
@@ -28,12 +28,12 @@ fn write(log: &Path, folder: &Path) {
     let want = Want { rows: Rows::All, ..Want::default() };
     let take = &mut |_, item: Item<'_>| {
         match item {
-            Item::Row(Row { table, values: &[Value::Text(name), Value::Double(value)] })
+            Item::Row(Row { table, values: &[CellValue::Text(name), CellValue::Double(value)] })
                 if table.name == "parameters" =>
             {
                 parameters.insert(name.to_owned(), value);
             }
-            Item::Row(Row { table, values: &[.., Value::Text(words)] })
+            Item::Row(Row { table, values: &[.., CellValue::Text(words)] })
                 if table.name == "logged_messages" =>
             {
                 texts.push(words.to_owned());
@@ -65,13 +65,13 @@ fn write(log: &Path, folder: &Path) {
     }
 }
 
-fn bits(value: &Value<'_>) -> u64 {
+fn bits(value: &CellValue<'_>) -> u64 {
     match *value {
-        Value::Unknown | Value::Text(_) | Value::Bytes(_) => 0,
-        Value::Unsigned(number) => number,
-        Value::Signed(number) => number as u64,
-        Value::Single(number) => u64::from(number.to_bits()),
-        Value::Double(number) => number.to_bits(),
-        Value::Flag(flag) => u64::from(flag),
+        CellValue::Unknown | CellValue::Text(_) | CellValue::Bytes(_) => 0,
+        CellValue::Unsigned(number) => number,
+        CellValue::Signed(number) => number as u64,
+        CellValue::Single(number) => u64::from(number.to_bits()),
+        CellValue::Double(number) => number.to_bits(),
+        CellValue::Flag(flag) => u64::from(flag),
     }
 }

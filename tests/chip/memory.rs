@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use hums::logs::on_card;
-use hums::logs::reader::{Collect, Deliver, read};
+use hums::logs::reader::{EntryCollector, GroupReceiver, read};
 use hums_blackbox::record::Record;
 use hums_blackbox::{Entry, Gap};
 use hums_tests::chip;
@@ -29,7 +29,7 @@ struct Read {
 #[derive(Default)]
 struct Group(Read);
 
-impl Collect for Group {
+impl EntryCollector for Group {
     fn entry(&mut self, entry: &Entry<'_>) {
         match entry {
             Entry::Frame { bytes, .. } => self.0.frames.push(bytes.to_vec()),
@@ -45,7 +45,7 @@ impl Collect for Group {
     }
 }
 
-impl Deliver<Group> for Read {
+impl GroupReceiver<Group> for Read {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         *self.gaps.entry(gap.cause.name()).or_default() += 1;
         Ok(())

@@ -26,7 +26,7 @@ use crate::soundness::Soundness;
 use crate::source::epochs::Epochs;
 use crate::source::item::{self, Amount, Item, MessageCount, Take, Want};
 use crate::source::own::OwnReader;
-use crate::source::parts::{Collect, Deliver};
+use crate::source::parts::{ItemCollector, PartReceiver};
 use crate::source::recording::Format;
 use crate::source::told::Finding;
 use crate::utc::moment;
@@ -460,7 +460,7 @@ fn add_loss(losses: &mut BTreeMap<&'static str, Loss>, loss: &Loss) {
     sum.to = sum.to.max(loss.to);
 }
 
-impl Collect for Contents {
+impl ItemCollector for Contents {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         match item {
             Item::Record(record) => self.record(at, record),
@@ -479,7 +479,7 @@ impl Collect for Contents {
     }
 }
 
-impl Deliver<Self> for Contents {
+impl PartReceiver<Self> for Contents {
     fn gap(&mut self, gap: &item::Gap) -> Result<()> {
         if self.gaps.len() < LISTED_MAX {
             self.gaps.push(gap.to_own());

@@ -13,7 +13,7 @@ use super::story::{Observed, Said, Story};
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::item::Item;
-use crate::source::parts::Collect;
+use crate::source::parts::ItemCollector;
 use crate::source::told::Finding;
 
 /// One group in each format.
@@ -83,7 +83,7 @@ impl<'a> Collected<'a> {
     }
 }
 
-impl Collect for Collected<'_> {
+impl ItemCollector for Collected<'_> {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         // Always: later items depend on the vehicle's earlier state.
         if let Item::Observation(source, observation) = item {

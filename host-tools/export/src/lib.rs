@@ -84,8 +84,8 @@ use output::Schema;
 use plural::count;
 use selection::Selection;
 use source::epochs::Epochs;
-use source::find::{Found, find, sessions_of};
-use source::item::{Rows, Summary, Want};
+use source::find::{FoundRecordings, find, sessions_of};
+use source::item::{RecordingSummary, Rows, Want};
 use source::recording::{Format, Place};
 use story::Said;
 use summary::{Overview, damaged_places};
@@ -222,7 +222,7 @@ fn check_request(args: &Request) -> Result<()> {
     Ok(())
 }
 
-fn remark(found: &Found, remarks: &[String]) {
+fn remark(found: &FoundRecordings, remarks: &[String]) {
     for remark in remarks.iter().chain(&found.remarks) {
         note!("{remark}");
     }
@@ -283,7 +283,7 @@ fn check_output(args: &Request, logs: usize, formats: &Formats) -> Result<bool> 
 
 /// A log that was read into its still incomplete files, with this program's findings if it was judged in the
 /// same reading.
-type Read<'a> = (Summary, Writers<'a>, Option<Checked>);
+type Read<'a> = (RecordingSummary, Writers<'a>, Option<Checked>);
 
 struct Task<'a> {
     formats: Formats,
@@ -565,7 +565,7 @@ fn copy(log: &Place, of: &str) -> Result<Done> {
 }
 
 /// The message for a log without the requested data, with the log's own times.
-fn nothing_of(log: &Place, summary: &Summary, selection: &Selection) -> String {
+fn nothing_of(log: &Place, summary: &RecordingSummary, selection: &Selection) -> String {
     let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
     let names = selection.names().join(", ");
     if !selection.has_limits() {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 
 use super::row::{Cell, CellType, Row};
-use crate::source::item::{self, Kind, Table, Value};
+use crate::source::item::{self, CellValue, ColumnType, Table};
 
 /// Names of tables and columns of all logs together, bytes: they are kept for as long as the program runs. No
 /// autopilot's log has more: further tables are left out, and counted.
@@ -61,28 +61,28 @@ fn kept(name: &str) -> Option<&'static str> {
     Some(name)
 }
 
-fn cell(kind: Kind, value: Value<'_>) -> Cell {
+fn cell(kind: ColumnType, value: CellValue<'_>) -> Cell {
     match value {
-        Value::Unsigned(value) => Cell::Count(value),
-        Value::Signed(value) => Cell::Signed(value),
-        Value::Single(value) => Cell::Single(value),
-        Value::Double(value) => Cell::Double(value),
-        Value::Flag(value) => Cell::Flag(value),
-        Value::Text(words) if kind == Kind::Text => Cell::Text(words.to_owned()),
-        Value::Text(words) => Cell::Words(words.to_owned(), cell_type(kind)),
-        Value::Bytes(bytes) => Cell::Hex(bytes.to_owned()),
-        Value::Unknown => Cell::Unknown(cell_type(kind)),
+        CellValue::Unsigned(value) => Cell::Count(value),
+        CellValue::Signed(value) => Cell::Signed(value),
+        CellValue::Single(value) => Cell::Single(value),
+        CellValue::Double(value) => Cell::Double(value),
+        CellValue::Flag(value) => Cell::Flag(value),
+        CellValue::Text(words) if kind == ColumnType::Text => Cell::Text(words.to_owned()),
+        CellValue::Text(words) => Cell::Words(words.to_owned(), cell_type(kind)),
+        CellValue::Bytes(bytes) => Cell::Hex(bytes.to_owned()),
+        CellValue::Unknown => Cell::Unknown(cell_type(kind)),
     }
 }
 
-const fn cell_type(kind: Kind) -> CellType {
+const fn cell_type(kind: ColumnType) -> CellType {
     match kind {
-        Kind::Unsigned => CellType::Count,
-        Kind::Signed => CellType::Signed,
-        Kind::Single => CellType::Single,
-        Kind::Double => CellType::Double,
-        Kind::Flag => CellType::Flag,
-        Kind::Text => CellType::Text,
-        Kind::Bytes => CellType::Hex,
+        ColumnType::Unsigned => CellType::Count,
+        ColumnType::Signed => CellType::Signed,
+        ColumnType::Single => CellType::Single,
+        ColumnType::Double => CellType::Double,
+        ColumnType::Flag => CellType::Flag,
+        ColumnType::Text => CellType::Text,
+        ColumnType::Bytes => CellType::Hex,
     }
 }

@@ -7,7 +7,7 @@
 
 use hums_dialect::{Field, Kind, Message};
 
-use crate::mavlink::values::{Payload, Scalar, Value};
+use crate::mavlink::values::{FieldValue, Payload, Scalar};
 
 /// The names of a message's columns, with units: `alt[mm]`, `voltages[3][mV]`.
 pub fn columns(message: &Message) -> Vec<String> {
@@ -56,17 +56,17 @@ pub fn push_csv_text(out: &mut Vec<u8>, text: &[u8]) {
 pub fn push_csv_cells(out: &mut Vec<u8>, payload: &Payload) {
     for (_, value) in payload.fields() {
         match value {
-            Value::Scalar(scalar) => {
+            FieldValue::Scalar(scalar) => {
                 out.push(b',');
                 push_csv_number(out, scalar);
             }
-            Value::Array(array) => {
+            FieldValue::Array(array) => {
                 for scalar in array.iter() {
                     out.push(b',');
                     push_csv_number(out, scalar);
                 }
             }
-            Value::Text(text) => {
+            FieldValue::Text(text) => {
                 out.push(b',');
                 push_csv_text(out, text);
             }
@@ -117,9 +117,9 @@ pub fn push_json_object(out: &mut Vec<u8>, payload: &Payload) {
         push_json_text(out, field.name.as_bytes());
         out.push(b':');
         match value {
-            Value::Scalar(scalar) => push_json_number(out, scalar),
-            Value::Text(text) => push_json_text(out, text),
-            Value::Array(array) => {
+            FieldValue::Scalar(scalar) => push_json_number(out, scalar),
+            FieldValue::Text(text) => push_json_text(out, text),
+            FieldValue::Array(array) => {
                 let mut separator = b'[';
                 for scalar in array.iter() {
                     out.push(separator);

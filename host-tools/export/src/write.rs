@@ -16,7 +16,7 @@ use super::format::{AnyWriter, Files, Finished, Totals, Way};
 use super::story::Said;
 use crate::plural::count;
 use crate::source::item;
-use crate::source::parts::Deliver;
+use crate::source::parts::PartReceiver;
 
 /// The open files of one log.
 pub struct Writers<'a> {
@@ -138,7 +138,7 @@ impl<'a> Writers<'a> {
     }
 }
 
-impl<'a> Deliver<Collected<'a>> for Writers<'a> {
+impl<'a> PartReceiver<Collected<'a>> for Writers<'a> {
     fn gap(&mut self, gap: &item::Gap) -> Result<()> {
         self.lacks = self.lacks.max(Soundness::of_gap(gap));
         let gap = &gap.to_own();

@@ -6,7 +6,7 @@ use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
 
 use crate::mavlink::ids::STATUSTEXT;
-use crate::mavlink::values::{Payload, Value};
+use crate::mavlink::values::{FieldValue, Payload};
 
 /// Wait for the next part, without which a text ends.
 const PATIENCE: Span = Span::from_secs(1);
@@ -19,7 +19,7 @@ const PART_BYTES: usize = 50;
 
 /// A text, or one message's part.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Text {
+pub struct StatusText {
     /// When its first part came.
     pub at: Instant,
     /// Who says it.
@@ -36,7 +36,7 @@ pub struct Text {
     ends: bool,
 }
 
-impl Text {
+impl StatusText {
     /// A whole text.
     pub fn whole(at: Instant, source: Source, severity: u8, words: &str) -> Self {
         Self { at, source, severity, words: words.to_owned(), alert: None, id: 0, ends: true }
@@ -51,7 +51,7 @@ impl Text {
     pub fn of(at: Instant, source: Source, payload: &[u8]) -> Option<Self> {
         let payload = Payload::new(hums_dialect::message(STATUSTEXT)?, payload);
         let bytes = payload.fields().find_map(|(_, value)| match value {
-            Value::Text(bytes) => Some(bytes),
+            FieldValue::Text(bytes) => Some(bytes),
             _ => None,
         })?;
         let id = payload.number("id").unwrap_or(0.0) as u16;
@@ -75,11 +75,11 @@ pub fn level(severity: u8) -> &'static str {
 
 /// Joins texts, one of each sender at a time.
 #[derive(Clone, Debug, Default)]
-pub struct Texts(Vec<Text>);
+pub struct Texts(Vec<StatusText>);
 
 impl Texts {
     /// Hands on whole texts.
-    pub fn take(&mut self, next: Text, whole: &mut impl FnMut(Text)) {
+    pub fn take(&mut self, next: StatusText, whole: &mut impl FnMut(StatusText)) {
         self.pass(next.at, whole);
         let (source, id, ends) = (next.source, next.id, next.ends);
         let is_full = self.0.len() >= SENDERS_MAX;
@@ -93,16 +93,16 @@ impl Texts {
     }
 
     /// Ends texts that waited long enough.
-    pub fn pass(&mut self, now: Instant, whole: &mut impl FnMut(Text)) {
+    pub fn pass(&mut self, now: Instant, whole: &mut impl FnMut(StatusText)) {
         self.complete(whole, |open| now.since(open.at) > PATIENCE);
     }
 
     /// Nothing follows.
-    pub fn end(&mut self, whole: &mut impl FnMut(Text)) {
+    pub fn end(&mut self, whole: &mut impl FnMut(StatusText)) {
         self.complete(whole, |_| true);
     }
 
-    fn complete(&mut self, whole: &mut impl FnMut(Text), is_complete: impl Fn(&Text) -> bool) {
+    fn complete(&mut self, whole: &mut impl FnMut(StatusText), is_complete: impl Fn(&StatusText) -> bool) {
         for mut text in self.0.extract_if(.., |open| is_complete(open)) {
             text.alert = alert::of_text(Some(text.severity), text.words.as_bytes());
             whole(text);
@@ -116,17 +116,17 @@ mod tests {
 
     const SOURCE: Source = Source { system: 1, component: 1 };
 
-    fn part(at_ms: u64, id: u16, words: &str) -> Text {
+    fn part(at_ms: u64, id: u16, words: &str) -> StatusText {
         let mut payload = vec![4];
         payload.extend_from_slice(words.as_bytes());
         payload.resize(51, 0);
         payload.extend_from_slice(&id.to_le_bytes());
-        Text::of(Instant::from_millis(at_ms), SOURCE, &payload).expect("a text")
+        StatusText::of(Instant::from_millis(at_ms), SOURCE, &payload).expect("a text")
     }
 
-    fn told(parts: impl IntoIterator<Item = Text>) -> Vec<String> {
+    fn told(parts: impl IntoIterator<Item = StatusText>) -> Vec<String> {
         let (mut texts, mut told) = (Texts::default(), Vec::new());
-        let mut take = |text: Text| told.push(text.words);
+        let mut take = |text: StatusText| told.push(text.words);
         parts.into_iter().for_each(|part| texts.take(part, &mut take));
         texts.end(&mut take);
         told
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn two_senders_may_talk_at_the_same_time() {
         let long = "a".repeat(50);
-        let other = |text: Text| Text { source: Source { system: 1, component: 191 }, ..text };
+        let other = |text: StatusText| StatusText { source: Source { system: 1, component: 191 }, ..text };
         let parts = [part(0, 7, &long), other(part(1, 7, &long)), part(2, 7, "b"), other(part(3, 7, "c"))];
         assert_eq!(told(parts), [format!("{long}b"), format!("{long}c")]);
     }

@@ -18,7 +18,7 @@ use crate::output::{self, Schema};
 use crate::part::Limit;
 use crate::plural::count;
 use crate::printable::word;
-use crate::source::find::{Found, find};
+use crate::source::find::{FoundRecordings, find};
 use crate::source::recording::Place;
 use crate::summary::{ComponentLine, Overview};
 use crate::utc::{clock, iso8601};
@@ -59,7 +59,7 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
 }
 
 /// The vehicle by its unique id, else by the user's name, else by folder, kind and autopilot.
-fn vehicle(log: &Overview, found: &Found, given: Option<&str>) -> String {
+fn vehicle(log: &Overview, found: &FoundRecordings, given: Option<&str>) -> String {
     let known = log.contents.vehicle;
     if let Some(vehicle) = known.filter(|vehicle| vehicle.uid != 0) {
         return format!("uid {:016x}, {}", vehicle.uid, type_name(vehicle.vehicle_type));

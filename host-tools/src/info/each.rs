@@ -7,7 +7,7 @@ use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::side_by_side::side_by_side;
 use crate::outcome::Outcome;
 use crate::plural::count;
-use crate::source::find::{Found, sessions_of};
+use crate::source::find::{FoundRecordings, sessions_of};
 use crate::summary::Overview;
 
 pub(super) struct Read {
@@ -28,7 +28,7 @@ impl Read {
 
 /// Shows each with the others' evidence about its end, for which those beside one session are read too.
 pub(super) fn each(
-    found: &Found,
+    found: &FoundRecordings,
     wanted: Option<usize>,
     mut show: impl FnMut(&Overview) -> Result<()>,
 ) -> Result<Read> {

@@ -28,7 +28,7 @@ use crate::part;
 use crate::reference::{Quantity, Reference};
 use crate::source::parameter;
 use crate::source::told;
-use crate::statustext::{Text, Texts};
+use crate::statustext::{StatusText, Texts};
 
 /// A HUMS on board has reported itself by then.
 const SETTLE: Span = Span::from_secs(5);
@@ -155,7 +155,7 @@ impl Craft {
         }
         if frame.id() == STATUSTEXT && frame.check() == Check::Verified {
             let source = Source { system: frame.system(), component: frame.component() };
-            if let Some(text) = Text::of(at, source, frame.payload()) {
+            if let Some(text) = StatusText::of(at, source, frame.payload()) {
                 self.texts.take(text, &mut |text| say(history, text));
             }
         }
@@ -188,7 +188,7 @@ impl Craft {
     }
 
     /// A text of the vehicle.
-    pub fn text(&mut self, text: Text, history: &mut Option<&mut History>) {
+    pub fn text(&mut self, text: StatusText, history: &mut Option<&mut History>) {
         self.texts.take(text, &mut |text| say(history, text));
     }
 
@@ -433,6 +433,6 @@ fn keep(history: &mut Option<&mut History>, at: Instant, note: Note) {
     }
 }
 
-fn say(history: &mut Option<&mut History>, text: Text) {
+fn say(history: &mut Option<&mut History>, text: StatusText) {
     keep(history, text.at, Note::text(text));
 }

@@ -12,7 +12,7 @@ use hums_core::observation::{Observation, Source};
 use crate::page::more::{More, rows};
 use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::Place;
-use crate::statustext::Text;
+use crate::statustext::StatusText;
 
 /// Entries of a batch, and waiting batches.
 const BATCH: usize = 256;
@@ -24,7 +24,7 @@ pub enum Entry {
     /// An observation of the vehicle.
     Observation(Source, Box<Observation>),
     /// A text of the vehicle.
-    Text(Text),
+    Text(StatusText),
     /// A parameter and its value.
     Parameter(String, f64),
     /// Further values for plots.
@@ -38,7 +38,9 @@ impl Entry {
     pub fn of(at: Instant, item: &Item<'_>) -> Option<Self> {
         match *item {
             Item::Observation(source, observation) => Some(Self::Observation(source, Box::new(*observation))),
-            Item::Text(text) => Some(Self::Text(Text::whole(at, text.source, text.severity, text.words))),
+            Item::Text(text) => {
+                Some(Self::Text(StatusText::whole(at, text.source, text.severity, text.words)))
+            }
             Item::Parameter(parameter) => Some(Self::Parameter(parameter.name.to_owned(), parameter.value)),
             Item::Row(ref row) => More::of(row).map(Self::More),
             Item::Gap(gap) => gap.from.zip(gap.to).map(|(from, to)| Self::Gap(from, to)),

@@ -17,7 +17,7 @@ use super::rate::{PUBLISH, Rate};
 use super::recording::{self, Content, Opened};
 use super::show::{self, Around, SourceJson};
 use super::spool::{Spool, SpoolWriter, Spooled};
-use super::told::{Limits, Told};
+use super::told::{Limits, MonitorRecord};
 use super::world::World;
 use crate::interrupt;
 
@@ -47,7 +47,7 @@ struct Copy {
 #[derive(Debug)]
 struct Loaded {
     played: Played,
-    told: Vec<(Instant, Told)>,
+    told: Vec<(Instant, MonitorRecord)>,
     told_next: usize,
     copies: Vec<Copy>,
     start: Instant,
@@ -114,8 +114,8 @@ fn copied(copies: &[Copy]) -> usize {
 }
 
 /// Copies made before a gap was known take it too.
-fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what: &Told) {
-    let at = if let Told::Missing { from, .. } = what { at.min(*from) } else { at };
+fn keep(told: &mut Vec<(Instant, MonitorRecord)>, copies: &mut [Copy], at: Instant, what: &MonitorRecord) {
+    let at = if let MonitorRecord::Missing { from, .. } = what { at.min(*from) } else { at };
     let place = told.partition_point(|(known, _)| *known <= at);
     told.insert(place, (at, what.clone()));
     for copy in copies.iter_mut().filter(|copy| copy.at > at) {
@@ -124,7 +124,7 @@ fn keep(told: &mut Vec<(Instant, Told)>, copies: &mut [Copy], at: Instant, what:
     }
 }
 
-fn tell(told: &[(Instant, Told)], next: &mut usize, by: Instant, world: &mut World) {
+fn tell(told: &[(Instant, MonitorRecord)], next: &mut usize, by: Instant, world: &mut World) {
     while let Some((at, what)) = told.get(*next).filter(|(at, _)| *at <= by) {
         world.told(*at, what, None);
         *next += 1;

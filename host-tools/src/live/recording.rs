@@ -8,7 +8,7 @@ use hums_core::clock::Instant;
 use hums_link::Frame;
 
 use super::native::{self, Entry, Native};
-use super::told::Told;
+use super::told::MonitorRecord;
 use crate::ending::Ending;
 use crate::endpoint::Endpoint;
 use crate::logs::groups::has_start;
@@ -94,7 +94,7 @@ pub enum Content<'a> {
     /// An entry of an autopilot's own log.
     Entry(&'a Entry),
     /// Another report.
-    Told(&'a Told),
+    Told(&'a MonitorRecord),
 }
 
 /// Time, UTC of time zero if known, part read (0 to 1), item. `false` ends the reading.
@@ -111,8 +111,8 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> 
     let summary = recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };
         let told = match item {
-            Item::Record(record) => Told::of(record),
-            Item::Gap(gap) if !native => Told::missing(gap),
+            Item::Record(record) => MonitorRecord::of(record),
+            Item::Gap(gap) if !native => MonitorRecord::missing(gap),
             _ => None,
         };
         let content = match item {
@@ -122,7 +122,7 @@ pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> 
             }
             Item::Frame(frame) => Content::Frame(frame),
             Item::Record(_) | Item::Gap(_) if !native => match &told {
-                Some(Told::Checked | Told::Peak { .. }) | None => return Ok(()),
+                Some(MonitorRecord::Checked | MonitorRecord::Peak { .. }) | None => return Ok(()),
                 Some(told) => Content::Told(told),
             },
             // As the player counts them.

@@ -8,7 +8,7 @@ use hums_link::packet::Fields;
 use hums_link::{Check, Frame};
 
 use crate::mavlink::ids::PARAM_VALUE;
-pub use crate::source::told::Told;
+pub use crate::source::told::MonitorRecord;
 
 /// The user's, and the box's for all others.
 #[derive(Clone, Debug, Default)]

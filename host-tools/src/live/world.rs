@@ -11,7 +11,7 @@ use hums_onboard::monitoring::TICK;
 
 use super::craft::Craft;
 use super::native::Entry;
-use super::told::{Limits, Told, parameter, place_of};
+use super::told::{Limits, MonitorRecord, parameter, place_of};
 use crate::check::SETTLE;
 use crate::mavlink::ids::PARAM_VALUE;
 use crate::page::history::History;
@@ -206,13 +206,13 @@ impl World {
     }
 
     /// Another report of a log.
-    pub fn told(&mut self, at: Instant, told: &Told, mut histories: Option<&mut Histories>) {
-        if let Told::Missing { from, to, frames } = told {
+    pub fn told(&mut self, at: Instant, told: &MonitorRecord, mut histories: Option<&mut Histories>) {
+        if let MonitorRecord::Missing { from, to, frames } = told {
             return self.miss(*from, *to, *frames, histories);
         }
         self.advance(at, histories.as_deref_mut());
         match told {
-            Told::Parameter { name, value, start } => {
+            MonitorRecord::Parameter { name, value, start } => {
                 self.limits.learn(name, *value);
                 // Each file repeats the table. At the start it comes before parts with hours: others have run
                 // zero.
@@ -224,16 +224,19 @@ impl World {
                     self.limits.take(craft.monitor.params_mut(), name, *value);
                 }
             }
-            Told::Part { place, component } => self.part(*place, *component),
-            Told::Finding(finding) => self.found_on_board(finding, histories),
-            Told::CellsUnknown => {
+            MonitorRecord::Part { place, component } => self.part(*place, *component),
+            MonitorRecord::Finding(finding) => self.found_on_board(finding, histories),
+            MonitorRecord::CellsUnknown => {
                 let owner = self.owner.and_then(|owner| Some((owner, self.crafts.get_mut(&owner)?)));
                 if let Some((owner, craft)) = owner {
                     let mut history = histories.map(|histories| histories.entry(owner).or_default());
                     craft.say_cells_unknown(at, &mut history);
                 }
             }
-            Told::Checked | Told::StoreNew | Told::Peak { .. } | Told::Missing { .. } => {}
+            MonitorRecord::Checked
+            | MonitorRecord::StoreNew
+            | MonitorRecord::Peak { .. }
+            | MonitorRecord::Missing { .. } => {}
         }
     }
 
@@ -382,7 +385,7 @@ mod tests {
         for second in 0..20 {
             hear(&mut world, &mut histories, at(second * 1_000), &heartbeat(1));
         }
-        let lost = Told::Missing { from: at(19_100), to: at(39_900), frames: 3_591 };
+        let lost = MonitorRecord::Missing { from: at(19_100), to: at(39_900), frames: 3_591 };
         world.told(at(39_950), &lost, Some(&mut histories));
         for second in 40..60 {
             hear(&mut world, &mut histories, at(second * 1_000), &heartbeat(1));
@@ -452,7 +455,7 @@ mod tests {
                         limit: 3.5,
                         unit: "V".to_owned(),
                     };
-                    world.told(at, &Told::Finding(Box::new(finding)), Some(&mut histories));
+                    world.told(at, &MonitorRecord::Finding(Box::new(finding)), Some(&mut histories));
                 }
             }
             let now = Instant::from_millis(5_000);
@@ -509,17 +512,17 @@ mod tests {
     /// Ten hours, as in a log's parameters.
     fn tell_limits(world: &mut World) {
         for (name, value) in [("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 10.0)] {
-            let told = Told::Parameter { name: name.to_owned(), value, start: true };
+            let told = MonitorRecord::Parameter { name: name.to_owned(), value, start: true };
             world.told(Instant::from_millis(1), &told, None);
         }
     }
 
     /// Has turned nine and a half of them.
-    fn motor() -> Told {
+    fn motor() -> MonitorRecord {
         let mut component = Component::default();
         (component.kind, component.number) = (ComponentKind::Motor, 2);
         let ran = ComponentFigures { motor_s: 9.5 * 3_600.0, ..ComponentFigures::default() };
-        Told::Part { place: 0, component: component.having_run(ran) }
+        MonitorRecord::Part { place: 0, component: component.having_run(ran) }
     }
 
     #[test]

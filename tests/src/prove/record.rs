@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use hums::logs::Log;
-use hums::logs::reader::{Collect, Deliver, Summary, read};
+use hums::logs::reader::{EntryCollector, GroupReceiver, LogSummary, read};
 use hums_blackbox::{Entry, Gap};
 
 use super::stream::hash;
@@ -20,7 +20,7 @@ pub(super) struct Record {
     pub(super) groups: Vec<usize>,
     /// Each gap with the number of frames before it.
     pub(super) gaps: Vec<(usize, Gap)>,
-    pub(super) summary: Summary,
+    pub(super) summary: LogSummary,
 }
 
 impl Record {
@@ -35,7 +35,7 @@ impl Record {
 #[derive(Default)]
 struct Group(Vec<Frame>);
 
-impl Collect for Group {
+impl EntryCollector for Group {
     fn entry(&mut self, entry: &Entry<'_>) {
         if let Entry::Frame { at, bytes, .. } = entry {
             self.0.push(Frame { at_ms: at.as_millis(), hash: hash(bytes) });
@@ -48,7 +48,7 @@ impl Collect for Group {
     }
 }
 
-impl Deliver<Group> for Record {
+impl GroupReceiver<Group> for Record {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         self.gaps.push((self.frames.len(), *gap));
         Ok(())

@@ -37,7 +37,7 @@ use crate::source::epochs::Epochs;
 use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::repairs::Repairs;
-use crate::source::told::{Finding, Told};
+use crate::source::told::{Finding, MonitorRecord};
 use crate::summary::EndsInAir;
 
 /// Longer than each debounce and stale time.
@@ -389,7 +389,7 @@ impl Judge {
         if let Record::Usage(usage) = record {
             self.box_counted(at, usage);
         }
-        if let Some(told) = Told::of(record) {
+        if let Some(told) = MonitorRecord::of(record) {
             self.told(&told);
         }
     }
@@ -404,24 +404,24 @@ impl Judge {
         }
     }
 
-    fn told(&mut self, told: &Told) {
+    fn told(&mut self, told: &MonitorRecord) {
         match told {
-            Told::Parameter { name, value, .. } if !self.limits.given.contains(&name.as_str()) => {
+            MonitorRecord::Parameter { name, value, .. } if !self.limits.given.contains(&name.as_str()) => {
                 // Unknown or out of range: no change.
                 let _ = self.monitor.params_mut().set(name, *value);
             }
-            Told::Finding(finding) => {
+            MonitorRecord::Finding(finding) => {
                 self.checked_on_board = true;
                 let at = self.hit_at(finding);
                 self.board.take(&Finding { at, ..Finding::clone(finding) }, Span::ZERO);
                 self.details.tell(&finding.check, &mut self.board);
             }
-            Told::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
-            Told::Checked => self.checked_on_board = true,
-            Told::CellsUnknown => self.cells.told_unknown(),
-            Told::StoreNew => self.cells.nothing_stored(),
-            Told::Part { place, component } => self.monitor.learn_component(*place, *component),
-            Told::Parameter { .. } | Told::Missing { .. } => {}
+            MonitorRecord::Peak { check, instance, value } => self.board.peak(check, *instance, *value),
+            MonitorRecord::Checked => self.checked_on_board = true,
+            MonitorRecord::CellsUnknown => self.cells.told_unknown(),
+            MonitorRecord::StoreNew => self.cells.nothing_stored(),
+            MonitorRecord::Part { place, component } => self.monitor.learn_component(*place, *component),
+            MonitorRecord::Parameter { .. } | MonitorRecord::Missing { .. } => {}
         }
     }
 

@@ -38,7 +38,7 @@ use crate::outcome::{Outcome, Usage};
 use crate::output;
 use crate::params;
 use crate::progress;
-use crate::source::find::{Found, find, sessions_of};
+use crate::source::find::{FoundRecordings, find, sessions_of};
 use crate::source::recording::Place;
 use checked::Checked;
 use judge::{Heard, Limits};
@@ -164,7 +164,7 @@ fn vehicles(place: &Place, told: &Told) -> Vec<Place> {
 }
 
 /// And the number of inputs without a log; with `--json` these have an object too.
-fn logs(args: &Request<'_>) -> Result<(Found, usize)> {
+fn logs(args: &Request<'_>) -> Result<(FoundRecordings, usize)> {
     let error = match find(args.inputs, args.salvage) {
         Ok(found) => return Ok((found, 0)),
         Err(error) => error,

@@ -23,7 +23,7 @@ use crate::logs::reader;
 use crate::names::counter_name;
 use crate::outcome::usage;
 use crate::progress;
-use crate::source::item::{Gap, Item, Summary, Take, Want};
+use crate::source::item::{Gap, Item, RecordingSummary, Take, Want};
 use crate::source::recording::{Format, Place};
 use crate::summary::{Contents, ExceedanceLine, Overview};
 
@@ -40,7 +40,7 @@ pub(super) struct Read {
     /// The judgement.
     pub(super) judged: Judged,
     /// Summary of the data read.
-    pub(super) summary: Summary,
+    pub(super) summary: RecordingSummary,
     /// Bytes of the file that were read.
     taken: u64,
 }
@@ -155,14 +155,14 @@ fn read_other(place: &Place, take: Option<&mut Take<'_>>) -> Result<(Overview, O
     };
     let (first, last) = judged.span.unzip();
     let epochs = judged.epochs.clone();
-    let summary = reader::Summary {
+    let summary = reader::LogSummary {
         epoch_us: judged.epochs.whole(),
         frames: contents.frames(),
         gaps: judged.damages,
         losses: judged.losses,
         first,
         last,
-        ..reader::Summary::default()
+        ..reader::LogSummary::default()
     };
     let (name, files) = (place.name.clone(), vec![place.title.clone()]);
     let kept = is_told.then(|| judged.clone());

@@ -19,7 +19,7 @@ use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::mavlink::frame::Frame;
 use crate::mavlink::ids::ACTUATOR_OUTPUT_STATUS;
-use crate::mavlink::values::{Payload, Scalar, Value};
+use crate::mavlink::values::{FieldValue, Payload, Scalar};
 use crate::reference::{Quantity, Reference};
 use crate::row::{Cell, Row};
 use crate::source::epochs::Epochs;
@@ -127,7 +127,7 @@ impl Lines {
         let Some(active) = payload.number("active") else { return };
         self.reference(tags, at, None, [("Actuator Output Status".to_owned(), Scalar::Double(active))]);
         let values = payload.fields().find_map(|(field, value)| match value {
-            Value::Array(values) if field.name == "actuator" => Some(values),
+            FieldValue::Array(values) if field.name == "actuator" => Some(values),
             _ => None,
         });
         for (place, value) in values.into_iter().flat_map(|values| values.iter().enumerate()) {
@@ -240,12 +240,12 @@ impl<'a> Fields<'a> {
         }
     }
 
-    fn value(&mut self, field: &Field, value: Value<'_>) {
+    fn value(&mut self, field: &Field, value: FieldValue<'_>) {
         let name = free_name(field.name, &TAKEN);
         match value {
-            Value::Scalar(scalar) => self.scalar(field, &name, scalar),
-            Value::Text(text) => self.text(&name, &String::from_utf8_lossy(text)),
-            Value::Array(values) => {
+            FieldValue::Scalar(scalar) => self.scalar(field, &name, scalar),
+            FieldValue::Text(text) => self.text(&name, &String::from_utf8_lossy(text)),
+            FieldValue::Array(values) => {
                 for (place, scalar) in values.iter().enumerate() {
                     self.scalar(field, &format!("{name}[{place}]"), scalar);
                 }

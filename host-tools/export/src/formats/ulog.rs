@@ -19,7 +19,7 @@ use crate::context::Context;
 use crate::format::{About, Entry, Files, Finished, Part, Single, Spool, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::ids::RC_CHANNELS;
-use crate::mavlink::values::{Scalar, Value};
+use crate::mavlink::values::{FieldValue, Scalar};
 use crate::motion::{Motion, quaternion};
 use crate::plural::count;
 use crate::source::told::Finding;
@@ -90,8 +90,8 @@ impl Part for Words {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let Some(payload) = entry.known.filter(|_| entry.frame.id == RC_CHANNELS) else { return };
         let number = |name: &str| payload.number(name).unwrap_or(0.0);
-        let channel = |(field, value): (&hums_dialect::Field, Value<'_>)| match value {
-            Value::Scalar(Scalar::Unsigned(value))
+        let channel = |(field, value): (&hums_dialect::Field, FieldValue<'_>)| match value {
+            FieldValue::Scalar(Scalar::Unsigned(value))
                 if field.name.starts_with("chan") && field.units == "us" =>
             {
                 Some(value as u16)

@@ -7,7 +7,7 @@ use hums_blackbox::{BlockCounts, PAGE_SECTORS};
 use super::log::Ending;
 use super::proof::Proof;
 use crate::logs::naming::is_part;
-use crate::logs::reader::Summary;
+use crate::logs::reader::LogSummary;
 use crate::logs::segment_name;
 use crate::logs::strangers::Strange;
 use crate::plural::count;
@@ -146,7 +146,7 @@ pub fn behind_words(behind: &BlockCounts) -> String {
 }
 
 /// Foreign blocks before its last sector: an earlier file may not have been full.
-pub fn among_words(summary: &Summary) -> String {
+pub fn among_words(summary: &LogSummary) -> String {
     let (all, behind) = (&summary.blocks, &summary.behind);
     let foreign = all.foreign - behind.foreign;
     words_of(&[
@@ -176,7 +176,7 @@ mod tests {
     fn sectors_of_another_log_are_counted_with_the_first_ones_place() {
         let words = |hollow, proof| {
             let strange = vec![Strange { file: 0, hollow, sectors: 300, first: 1, session: 0x1a2b_3c4d }];
-            let summary = Summary { session: Some(7), strange, ..Summary::default() };
+            let summary = LogSummary { session: Some(7), strange, ..LogSummary::default() };
             let names = ["00001_00.HUM".to_owned()];
             Ending { files: names.to_vec(), summary, proof, ..Ending::default() }.strange().join("; ")
         };
@@ -189,7 +189,7 @@ mod tests {
     fn files_that_are_not_there_are_named() {
         let words = |names: &[&str], files_gone| {
             let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
-            let summary = Summary { session: Some(7), files_gone, ..Summary::default() };
+            let summary = LogSummary { session: Some(7), files_gone, ..LogSummary::default() };
             Ending { files: names.clone(), summary, ..Ending::default() }.strange().join("; ")
         };
         assert_eq!(words(&["00001_03.HUM"], 3), "files 00 to 02 of this log are not there");
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn a_number_that_no_file_has_is_no_finding_where_the_card_took_nothing_and_nothing_is_missing() {
         let strange = |second: &str, card_out, gaps| {
-            let mut summary = Summary { session: Some(7), gaps, ..Summary::default() };
+            let mut summary = LogSummary { session: Some(7), gaps, ..LogSummary::default() };
             summary.marks.card_out = card_out;
             let names = ["00001_00.HUM", second].map(str::to_owned);
             Ending { files: names.to_vec(), summary, ..Ending::default() }.strange().len()
@@ -212,7 +212,7 @@ mod tests {
     fn noise_behind_a_log_is_damage_unless_it_is_what_was_on_the_card_before() {
         let noise = |foreign, unsound, stale, foreign_at_end| {
             let behind = BlockCounts { foreign, unsound, stale, ..BlockCounts::default() };
-            let summary = Summary { session: Some(1), behind, foreign_at_end, ..Summary::default() };
+            let summary = LogSummary { session: Some(1), behind, foreign_at_end, ..LogSummary::default() };
             Ending { summary, ..Ending::default() }.noise()
         };
         assert!(noise(0, 0, 0, 0).is_none());

@@ -3,7 +3,7 @@
 use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
-use crate::logs::reader::Summary;
+use crate::logs::reader::LogSummary;
 use crate::logs::sessions::again_words;
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
@@ -16,7 +16,7 @@ pub struct Ending {
     /// The log's files.
     pub files: Vec<String>,
     /// Totals.
-    pub summary: Summary,
+    pub summary: LogSummary,
     /// Proof of the end.
     pub proof: Proof,
     /// The session just before it.
@@ -29,7 +29,7 @@ pub struct Ending {
 
 impl Ending {
     /// A log alone; [`crate::followed`] adds later evidence.
-    pub fn of(log: &Log, summary: Summary) -> Self {
+    pub fn of(log: &Log, summary: LogSummary) -> Self {
         let proof = Proof::of(&summary, None);
         let (name, files, left_over) = (log.name.clone(), log.files.clone(), log.left_over);
         Self { name, files, summary, proof, left_over, ..Self::default() }
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn parity_is_missing_where_no_record_says_that_the_card_refused_blocks() {
         let of = |refused| {
-            let mut summary = Summary { session: Some(7), closed: true, ..Summary::default() };
+            let mut summary = LogSummary { session: Some(7), closed: true, ..LogSummary::default() };
             (summary.marks.has_boot, summary.marks.refused, summary.parity.missing) = (true, refused, 3);
             let ending = Ending { proof: Proof::of(&summary, None), summary, ..Ending::default() };
             (ending.unprotected(), ending.is_sound())
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn a_log_whose_times_fall_back_is_not_proved() {
         let summary =
-            |times_fell| Summary { session: Some(7), closed: true, times_fell, ..Summary::default() };
+            |times_fell| LogSummary { session: Some(7), closed: true, times_fell, ..LogSummary::default() };
         let unproved = |times_fell| {
             let summary = summary(times_fell);
             Ending { proof: Proof::of(&summary, None), summary, ..Ending::default() }.unproved()

@@ -3,7 +3,7 @@
 use hums_blackbox::record::{Before, Found, Resting};
 use hums_core::clock::Instant;
 
-use crate::logs::reader::Summary;
+use crate::logs::reader::LogSummary;
 use crate::plural::count;
 use crate::utc::iso8601_ms;
 
@@ -44,7 +44,7 @@ pub enum Teller {
 
 impl Proof {
     /// Proof by the log, and by the next start's record if known.
-    pub fn of(summary: &Summary, next: Option<&Before>) -> Self {
+    pub fn of(summary: &LogSummary, next: Option<&Before>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
         let whole = sectors.saturating_sub(u32::from(summary.ends_partial));
@@ -101,7 +101,7 @@ impl Proof {
     }
 
     /// A part of a sentence.
-    pub fn words(self, summary: &Summary) -> String {
+    pub fn words(self, summary: &LogSummary) -> String {
         let moment = |at| moment(summary, at);
         match self {
             Self::Closed => "ended in order".to_owned(),
@@ -155,12 +155,12 @@ impl Proof {
     }
 }
 
-pub(super) fn seconds_after(summary: &Summary, at: Instant) -> Option<f64> {
+pub(super) fn seconds_after(summary: &LogSummary, at: Instant) -> Option<f64> {
     summary.last.map(|last| last.since(at).as_micros() as f64 / 1e6)
 }
 
 /// UTC if known, otherwise seconds since power-on.
-fn moment(summary: &Summary, at: Instant) -> String {
+fn moment(summary: &LogSummary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| crate::utc::moment(at), iso8601_ms)
 }
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn a_log_that_breaks_off_is_told_with_its_likeliest_reason_alone() {
         let words = |moved: Option<u64>| {
-            let mut summary = Summary::default();
+            let mut summary = LogSummary::default();
             summary.marks.moved = moved.map(Instant::from_millis);
             Proof::None.words(&summary)
         };
@@ -184,8 +184,12 @@ mod tests {
 
     #[test]
     fn an_older_copy_of_the_last_sector_is_a_missing_end() {
-        let summary =
-            Summary { session: Some(7), last_number: Some(25), frames_end: Some(3047), ..Summary::default() };
+        let summary = LogSummary {
+            session: Some(7),
+            last_number: Some(25),
+            frames_end: Some(3047),
+            ..LogSummary::default()
+        };
         let next =
             |frames| Before { found: Found::Frames, session: 7, sectors: 26, frames, ..Before::default() };
         let short = Proof::Short { sectors: 0, frames: Some(17), by: Teller::NextStart };

@@ -12,7 +12,7 @@ use hums_blackbox::parity::Parity;
 use hums_recorder::layout::{Layout, LayoutError};
 
 use super::fat::{CardFile, Extent, ReadAt as _, Volume, Walk};
-use super::found::{Found, Image, belong};
+use super::found::{FoundLogs, Image, belong};
 use super::places::{BLOCK_BYTES, Log, Piece};
 use super::scan::{Files, Scan, scan};
 use crate::card::{ReadOnlyImage, length};
@@ -75,7 +75,7 @@ impl Card {
     }
 }
 
-pub(super) fn image(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
+pub(super) fn image(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     let context = || format!("{}: cannot be read", path.display());
     let file = File::open(path).with_context(context)?;
     let device = ReadOnlyImage::new(&file).with_context(context)?;

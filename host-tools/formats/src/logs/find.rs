@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, bail};
 
 use super::card::{image, whole_file};
 use super::folder::directory;
-pub use super::found::{Found, Image, REMARKS_MAX};
+pub use super::found::{FoundLogs, Image, REMARKS_MAX};
 pub use super::look::{Content, look};
 use super::naming::{SegmentName, is_part, make_unique, name_after, segment_or_part};
 use super::places::Log;
@@ -16,17 +16,17 @@ use crate::files::{is_seekable, why_unread};
 
 /// With `salvage` every block of an image is searched, and its file system ignored. An input without a log is
 /// an error.
-pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
+pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundLogs> {
     search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there", input.display()))
 }
 
 /// One folder, which may have no log.
-pub fn find_in(folder: &Path, salvage: bool) -> Result<Found> {
+pub fn find_in(folder: &Path, salvage: bool) -> Result<FoundLogs> {
     search(&[folder.to_owned()], salvage, |_| Ok(()))
 }
 
-fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>) -> Result<Found> {
-    let mut found = Found::default();
+fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>) -> Result<FoundLogs> {
+    let mut found = FoundLogs::default();
     let mut segments = Segments::new();
     for input in inputs {
         let before = found.logs.len();
@@ -82,7 +82,7 @@ pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
 }
 
 /// A named file must be something.
-fn named_file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
+fn named_file(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
         Content::Image => image(path, salvage, found)?,

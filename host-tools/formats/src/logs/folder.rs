@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 
 use super::card::{image, is_card, whole_file};
-use super::found::{Found, LOGS_MAX};
+use super::found::{FoundLogs, LOGS_MAX};
 use super::look::{Content, look};
 use super::naming::{SegmentName, is_part, segment_name, segment_or_part};
 use super::places::Log;
@@ -38,7 +38,7 @@ struct Entries {
 }
 
 /// Segments of one session are one log.
-pub(super) fn directory(root: &Path, salvage: bool, found: &mut Found) -> Result<()> {
+pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     let (mut waiting, mut walked) = (vec![(root.to_owned(), 0)], Walked::default());
     while let Some((dir, depth)) = waiting.pop() {
         if !walked.is_new(&dir) {
@@ -124,7 +124,7 @@ pub fn kind_of(entry: &DirEntry) -> io::Result<FileType> {
 }
 
 /// One by one: there may be millions of foreign entries.
-fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
+fn entries(dir: &Path, found: &mut FoundLogs) -> Result<Entries> {
     let context = || format!("{}: cannot be read", dir.display());
     let mut entries = Entries::default();
     for entry in fs::read_dir(dir).with_context(context)? {
@@ -144,7 +144,7 @@ fn entries(dir: &Path, found: &mut Found) -> Result<Entries> {
 }
 
 impl Entries {
-    fn file(&mut self, path: PathBuf, found: &mut Found) {
+    fn file(&mut self, path: PathBuf, found: &mut FoundLogs) {
         let shown = path.display();
         let content = look(&path);
         let is_log = matches!(content, Ok(Content::Log));
@@ -217,7 +217,7 @@ pub fn passed_over(path: &Path, kind: FileType) -> String {
     format!("{}: is {what}, and passed over", path.display())
 }
 
-fn file(path: &Path, salvage: bool, found: &mut Found) -> Result<()> {
+fn file(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
         Content::Image => {

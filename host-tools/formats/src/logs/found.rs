@@ -15,7 +15,7 @@ pub const REMARKS_MAX: usize = 20;
 const SEEN_MAX: usize = 200_000;
 /// Result of a search.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub struct FoundLogs {
     /// The logs, oldest session first.
     pub logs: Vec<Log>,
     /// One for each image.
@@ -33,7 +33,7 @@ pub struct Found {
     seen: BTreeSet<FileId>,
 }
 
-impl Found {
+impl FoundLogs {
     pub(super) fn remark(&mut self, sentence: String) {
         if self.remarks.len() < REMARKS_MAX {
             self.remarks.push(sentence);

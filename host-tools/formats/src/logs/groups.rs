@@ -4,7 +4,7 @@ use anyhow::Result;
 use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 
 use super::board::{HEADING_GROUPS, heading};
-use super::places::{BLOCK_BYTES, Blocks, Log};
+use super::places::{BLOCK_BYTES, Log, LogBlocks};
 use super::repair::{Evidence, Repairs};
 use super::strangers::{Strange, Strangers};
 
@@ -26,7 +26,7 @@ pub fn has_start(log: &Log) -> bool {
 
 /// Streams a log's groups.
 pub struct Groups<'a> {
-    blocks: Blocks<'a>,
+    blocks: LogBlocks<'a>,
     assembler: Assembler,
     group: Group,
     ended: bool,

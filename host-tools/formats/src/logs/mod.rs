@@ -29,12 +29,12 @@ pub mod side_by_side;
 pub mod strangers;
 
 pub use card::{Card, is_card, on_card};
-pub use find::{Content, Found, find};
+pub use find::{Content, FoundLogs, find};
 pub use folder::{Walked, is_named_as_card, is_named_as_log, kind_of, passed_over};
 pub use naming::segment_name;
 pub use places::{Log, Piece};
 
-impl Found {
+impl FoundLogs {
     /// Files with a part of a log or damage.
     pub fn paths(&self) -> impl Iterator<Item = &std::path::Path> {
         let pieces = self.logs.iter().flat_map(|log| &log.pieces).map(|piece| piece.path.as_path());

@@ -57,13 +57,22 @@ impl Log {
     }
 
     /// The blocks, in order.
-    pub fn blocks(&self) -> Blocks<'_> {
-        Blocks { log: self, piece: 0, extent: 0, offset: 0, begun: 0, file: None, buffer: Vec::new(), at: 0 }
+    pub fn blocks(&self) -> LogBlocks<'_> {
+        LogBlocks {
+            log: self,
+            piece: 0,
+            extent: 0,
+            offset: 0,
+            begun: 0,
+            file: None,
+            buffer: Vec::new(),
+            at: 0,
+        }
     }
 }
 
 /// Streams blocks; a short last one is padded with zeros.
-pub struct Blocks<'a> {
+pub struct LogBlocks<'a> {
     log: &'a Log,
     piece: usize,
     extent: usize,
@@ -76,7 +85,7 @@ pub struct Blocks<'a> {
     at: usize,
 }
 
-impl<'a> Blocks<'a> {
+impl<'a> LogBlocks<'a> {
     pub(super) const fn log(&self) -> &'a Log {
         self.log
     }

@@ -25,7 +25,7 @@ const GROUPS_MAX: usize = 16;
 pub const PART_BYTES: usize = 4 << 20;
 
 /// Collects a group's entries, or a part of them.
-pub trait Collect: Send {
+pub trait EntryCollector: Send {
     /// Takes the next entry of the group.
     fn entry(&mut self, entry: &Entry<'_>);
 
@@ -42,7 +42,7 @@ pub trait Collect: Send {
 }
 
 /// Receives groups in order.
-pub trait Deliver<C> {
+pub trait GroupReceiver<C> {
     /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
     /// The next group, or the next part of one.
@@ -51,7 +51,7 @@ pub trait Deliver<C> {
 
 /// Totals of the reading.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Summary {
+pub struct LogSummary {
     /// The session that the sectors name.
     pub session: Option<u32>,
     /// Ended in order; otherwise power failed.
@@ -106,7 +106,7 @@ pub struct Summary {
     pub files_gone: u32,
 }
 
-impl Summary {
+impl LogSummary {
     /// Begins a phrase that goes on with `missing`.
     pub fn missing_words(&self) -> String {
         match (self.gaps_uncounted, self.frames_missing) {
@@ -120,12 +120,12 @@ impl Summary {
 /// `new` makes a group's collector, `deliver` gets them in order.
 ///
 /// This thread reads, hands on and decodes.
-pub fn read<C: Collect>(
+pub fn read<C: EntryCollector>(
     log: &Log,
     new: impl Fn() -> C + Sync,
-    deliver: &mut impl Deliver<C>,
+    deliver: &mut impl GroupReceiver<C>,
     mut progress: impl FnMut(u64),
-) -> Result<Summary> {
+) -> Result<LogSummary> {
     let mut groups = Groups::new(log);
     let mut stitch = Stitch { first_file: log.first_segment(), ..Stitch::default() };
     let workers = workers();
@@ -160,7 +160,7 @@ pub fn read<C: Collect>(
 ///
 /// A bad sector may complete an entry wrongly, found only later: such a group is decoded again, up to the
 /// sector before.
-fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
+fn decode_here<C: EntryCollector>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
     thread_local!(static DECODER: Cell<Option<Box<GroupDecoder>>> = const { Cell::new(None) });
     let decoder = DECODER.take().unwrap_or_else(|| Box::new(GroupDecoder::new()));
     let mut rest = Rest { decoder, end: group.len(), group, at: 0 };
@@ -193,7 +193,7 @@ fn decode_here<C: Collect>(group: Group, new: &impl Fn() -> C) -> Decoded<C> {
 /// Keeps no entries.
 struct Uncollected;
 
-impl Collect for Uncollected {
+impl EntryCollector for Uncollected {
     fn entry(&mut self, _entry: &Entry<'_>) {}
 
     fn held_bytes(&self) -> usize {
@@ -246,7 +246,7 @@ struct Decoded<C> {
     epoch_us: Option<u64>,
 }
 
-impl<C: Collect> Decoded<C> {
+impl<C: EntryCollector> Decoded<C> {
     /// The facts from its sectors' headers.
     fn of(group: &Group) -> Self {
         let (first, last) = (group.first(), group.last());
@@ -349,7 +349,7 @@ fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, 
 /// Joins groups and finds the gaps.
 #[derive(Default)]
 struct Stitch {
-    summary: Summary,
+    summary: LogSummary,
     open: Option<Gap>,
     /// Modulo 2^32, while the count is unbroken.
     expected: Option<u32>,
@@ -362,11 +362,11 @@ struct Stitch {
 }
 
 impl Stitch {
-    fn take<C: Collect>(
+    fn take<C: EntryCollector>(
         &mut self,
         mut group: Decoded<C>,
         new: &impl Fn() -> C,
-        deliver: &mut impl Deliver<C>,
+        deliver: &mut impl GroupReceiver<C>,
     ) -> Result<()> {
         let begins_late = self.summary.groups == 0 && self.open.is_none() && group.number > 0;
         let cut = std::mem::replace(&mut self.cut, group.ends_partial);
@@ -440,14 +440,14 @@ impl Stitch {
         self.open.get_or_insert(new)
     }
 
-    fn close<C>(&mut self, gap: Gap, deliver: &mut impl Deliver<C>) -> Result<()> {
+    fn close<C>(&mut self, gap: Gap, deliver: &mut impl GroupReceiver<C>) -> Result<()> {
         self.summary.gaps += 1;
         self.summary.frames_missing += u64::from(gap.frames.unwrap_or(0));
         self.summary.gaps_uncounted += u64::from(gap.frames.is_none());
         deliver.gap(&gap)
     }
 
-    fn end<C>(&mut self, damaged: u32, deliver: &mut impl Deliver<C>) -> Result<()> {
+    fn end<C>(&mut self, damaged: u32, deliver: &mut impl GroupReceiver<C>) -> Result<()> {
         let damaged = damaged.saturating_add(self.damaged_partial);
         if damaged > 0 {
             let gap = self.gap(Cause::Damaged);
@@ -461,10 +461,10 @@ impl Stitch {
 }
 
 /// First the decoded entries, then the rest part by part.
-fn hand_on<C: Collect>(
+fn hand_on<C: EntryCollector>(
     group: &mut Decoded<C>,
     new: &impl Fn() -> C,
-    deliver: &mut impl Deliver<C>,
+    deliver: &mut impl GroupReceiver<C>,
 ) -> Result<()> {
     if let Some(collected) = group.collected.take() {
         deliver.group(collected)?;
@@ -484,7 +484,7 @@ pub fn epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |_| true)
 }
 
-/// Without decoding if a group's start has it. May miss the last group's value; [`Summary::epoch_us`] is
+/// Without decoding if a group's start has it. May miss the last group's value; [`LogSummary::epoch_us`] is
 /// exact.
 pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |epoch| epoch.is_none())

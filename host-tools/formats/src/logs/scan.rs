@@ -10,7 +10,7 @@ use anyhow::Result;
 use hums_blackbox::Header;
 
 use super::fat::Extent;
-use super::places::{BLOCK_BYTES, Blocks, Log, Piece};
+use super::places::{BLOCK_BYTES, Log, LogBlocks, Piece};
 use super::sessions::first_session;
 use crate::progress;
 
@@ -124,7 +124,7 @@ pub(super) fn scan(path: &Path, length: u64, files: &Files) -> Result<Scan> {
         session: None,
         left_over: false,
     };
-    let mut blocks: Blocks<'_> = all.blocks();
+    let mut blocks: LogBlocks<'_> = all.blocks();
     let mut sessions = Sessions::default();
     // 128 GB take minutes.
     let bar = progress::bytes(Some(length), &format!("{}: looking at every block", path.display()));

@@ -7,7 +7,7 @@ use hums_dialect::{Field, Kind, Message};
 
 /// One field's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value<'a> {
+pub enum FieldValue<'a> {
     /// A number.
     Scalar(Scalar),
     /// An array of numbers.
@@ -79,7 +79,7 @@ impl Payload {
     }
 
     /// Each field with its value, in wire order.
-    pub fn fields(&self) -> impl Iterator<Item = (&'static Field, Value<'_>)> {
+    pub fn fields(&self) -> impl Iterator<Item = (&'static Field, FieldValue<'_>)> {
         let mut at = 0;
         self.message.fields.iter().map(move |field| {
             let bytes = self.bytes.get(at..at + field.size()).unwrap_or_default();
@@ -92,18 +92,18 @@ impl Payload {
     pub fn number(&self, name: &str) -> Option<f64> {
         let (_, value) = self.fields().find(|(field, _)| field.name == name)?;
         match value {
-            Value::Scalar(scalar) => Some(scalar.as_f64()),
-            Value::Array(array) => array.iter().next().map(Scalar::as_f64),
-            Value::Text(_) => None,
+            FieldValue::Scalar(scalar) => Some(scalar.as_f64()),
+            FieldValue::Array(array) => array.iter().next().map(Scalar::as_f64),
+            FieldValue::Text(_) => None,
         }
     }
 }
 
-fn value<'a>(field: &Field, bytes: &'a [u8]) -> Value<'a> {
+fn value<'a>(field: &Field, bytes: &'a [u8]) -> FieldValue<'a> {
     match (field.kind, field.array) {
-        (Kind::Char, _) => Value::Text(bytes.split(|&byte| byte == 0).next().unwrap_or_default()),
-        (kind, 0) => Value::Scalar(scalar(kind, bytes)),
-        (kind, _) => Value::Array(Array { kind, bytes }),
+        (Kind::Char, _) => FieldValue::Text(bytes.split(|&byte| byte == 0).next().unwrap_or_default()),
+        (kind, 0) => FieldValue::Scalar(scalar(kind, bytes)),
+        (kind, _) => FieldValue::Array(Array { kind, bytes }),
     }
 }
 
@@ -139,9 +139,9 @@ mod tests {
         let statustext = message("STATUSTEXT");
         let payload = Payload::new(statustext, b"\x06Hello");
         let fields: Vec<_> = payload.fields().map(|(field, value)| (field.name, value)).collect();
-        assert_eq!(fields[0], ("severity", Value::Scalar(Scalar::Unsigned(6))));
-        assert_eq!(fields[1], ("text", Value::Text(b"Hello")));
-        assert_eq!(fields[2], ("id", Value::Scalar(Scalar::Unsigned(0))));
+        assert_eq!(fields[0], ("severity", FieldValue::Scalar(Scalar::Unsigned(6))));
+        assert_eq!(fields[1], ("text", FieldValue::Text(b"Hello")));
+        assert_eq!(fields[2], ("id", FieldValue::Scalar(Scalar::Unsigned(0))));
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         let battery = message("BATTERY_STATUS");
         let payload = Payload::new(battery, &[0xff; 36]);
         let (_, voltages) = payload.fields().find(|(field, _)| field.name == "voltages").expect("voltages");
-        let Value::Array(voltages) = voltages else { panic!("{voltages:?}") };
+        let FieldValue::Array(voltages) = voltages else { panic!("{voltages:?}") };
         assert_eq!(voltages.iter().collect::<Vec<_>>(), vec![Scalar::Unsigned(65_535); 10]);
         assert_eq!(payload.number("temperature"), Some(-1.0));
     }

@@ -31,7 +31,7 @@ impl Bytes {
 
 /// Finds parts that no line made.
 #[derive(Debug, Default)]
-pub struct Blocks {
+pub struct BlockFinder {
     value: u8,
     length: u64,
     unwritten: Bytes,
@@ -44,7 +44,7 @@ pub struct Blocks {
     pub place: u64,
 }
 
-impl Blocks {
+impl BlockFinder {
     /// `frames`: so far.
     pub fn take(&mut self, bytes: &[u8], frames: u64) {
         if self.frames != frames {
@@ -92,7 +92,7 @@ mod tests {
 
     /// `frames`: places.
     fn told(bytes: &[u8], frames: &[usize]) -> Vec<(Option<u64>, u64)> {
-        let mut blocks = Blocks::default();
+        let mut blocks = BlockFinder::default();
         for (at, chunk) in (0..).zip(bytes.chunks(32)) {
             blocks.take(chunk, frames.iter().filter(|frame| **frame <= at * 32).count() as u64);
         }

@@ -5,7 +5,7 @@ use std::io;
 use hums_core::clock::Instant;
 use hums_link::Framer;
 
-use super::blocks::Blocks;
+use super::blocks::BlockFinder;
 use super::boot::boot_ms;
 use super::stream::{Chunk, Source};
 use super::timeline::Timeline;
@@ -83,7 +83,7 @@ pub struct Booted<S> {
     at_us: u64,
     /// Another recording began with the latest chunk.
     begins: bool,
-    blocks: Blocks,
+    blocks: BlockFinder,
     /// The end cuts off a frame.
     is_cut: bool,
 }
@@ -98,7 +98,7 @@ impl<S: Source> Booted<S> {
             waiting: Vec::new(),
             at_us: 0,
             begins: false,
-            blocks: Blocks::default(),
+            blocks: BlockFinder::default(),
             is_cut: false,
         }
     }

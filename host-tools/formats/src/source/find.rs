@@ -29,7 +29,7 @@ const PASSED_OVER_MAX: usize = 20;
 
 /// Result of a search.
 #[derive(Debug, Default)]
-pub struct Found {
+pub struct FoundRecordings {
     /// Recordings in named order, a folder's by name.
     pub places: Vec<Place>,
     /// Facts from the file systems of cards and images.
@@ -41,14 +41,14 @@ pub struct Found {
     seen: BTreeSet<FileId>,
 }
 
-impl Found {
+impl FoundRecordings {
     /// Damage of a card, or left-out logs: exit code 3.
     pub fn is_lossy(&self) -> bool {
         self.is_cut || self.images.iter().any(|image| !image.damage.is_empty())
     }
 
     /// HUMS sessions of a path.
-    fn add_own(&mut self, path: &Path, own: logs::Found) {
+    fn add_own(&mut self, path: &Path, own: logs::FoundLogs) {
         self.is_cut |= own.is_cut();
         self.images.extend(own.images);
         self.remarks.extend(own.remarks);
@@ -172,8 +172,8 @@ impl Found {
 }
 
 /// Files, folders, cards, images, `-`. Named inputs must be recordings; others in a folder are passed over.
-pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
-    let mut found = Found::default();
+pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
+    let mut found = FoundRecordings::default();
     let is_segment = |input: &&PathBuf| segment_name(input).is_some() && is_own(input).unwrap_or(false);
     let mut segments: Vec<PathBuf> = inputs.iter().filter(is_segment).cloned().collect();
     for input in inputs {
@@ -232,7 +232,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<Found> {
 }
 
 /// Other contents of a folder, as sentences. Also whether a file is named like a recording and holds none.
-pub fn besides(folder: &Path, own: &logs::Found) -> Result<(Vec<String>, bool)> {
+pub fn besides(folder: &Path, own: &logs::FoundLogs) -> Result<(Vec<String>, bool)> {
     let walk = Walk::of(folder, own)?;
     let recordings = walk.paths.len();
     let not_judged = (recordings > 0).then(|| {
@@ -321,7 +321,7 @@ struct Walk {
 }
 
 impl Walk {
-    fn of(folder: &Path, own: &logs::Found) -> Result<Self> {
+    fn of(folder: &Path, own: &logs::FoundLogs) -> Result<Self> {
         let mut walk = Self { ours: own.paths().map(Path::to_owned).collect(), ..Self::default() };
         walk.folder(folder, 0)?;
         Ok(walk)

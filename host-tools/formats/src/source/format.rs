@@ -6,7 +6,7 @@ use hums_blackbox::Header;
 use hums_store::sim::is_store;
 
 use super::input::Input;
-use super::sniff::{Kind, sniff_bytes};
+use super::sniff::{InputKind, sniff_bytes};
 use super::{dataflash, ulog};
 use crate::archive;
 
@@ -118,8 +118,8 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
         return Some(Detected::DataFlash(dataflash::Form::Binary));
     }
     match kind {
-        Kind::Tlog if is_mavlink => Some(Detected::Tlog),
-        Kind::Raw if is_mavlink => Some(Detected::Raw),
+        InputKind::Tlog if is_mavlink => Some(Detected::Tlog),
+        InputKind::Raw if is_mavlink => Some(Detected::Raw),
         _ => dataflash::detect(start).map(Detected::DataFlash),
     }
 }

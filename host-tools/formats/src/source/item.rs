@@ -164,7 +164,7 @@ pub struct Column {
     /// Unit after multipliers; empty if unknown.
     pub unit: String,
     /// Type of the values.
-    pub kind: Kind,
+    pub kind: ColumnType,
 }
 
 /// Columns in the making, with different names.
@@ -176,7 +176,7 @@ pub struct Columns {
 
 impl Columns {
     /// Adds a column.
-    pub fn push(&mut self, name: &str, unit: &str, kind: Kind) {
+    pub fn push(&mut self, name: &str, unit: &str, kind: ColumnType) {
         let name = Table::free_name(&mut self.taken, name);
         self.columns.push(Column { name, unit: unit.to_owned(), kind });
     }
@@ -189,35 +189,35 @@ impl Columns {
 
 /// The type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// [`Value::Unsigned`]
+pub enum ColumnType {
+    /// [`CellValue::Unsigned`]
     Unsigned,
-    /// [`Value::Signed`]
+    /// [`CellValue::Signed`]
     Signed,
-    /// [`Value::Single`]
+    /// [`CellValue::Single`]
     Single,
-    /// [`Value::Double`]
+    /// [`CellValue::Double`]
     Double,
-    /// [`Value::Flag`]
+    /// [`CellValue::Flag`]
     Flag,
-    /// [`Value::Text`]
+    /// [`CellValue::Text`]
     Text,
-    /// [`Value::Bytes`]
+    /// [`CellValue::Bytes`]
     Bytes,
 }
 
-/// A value for each column, of its kind or [`Value::Unknown`]; a text log may have [`Value::Text`] instead.
+/// A value for each column, of its kind or [`CellValue::Unknown`]; a text log may have [`CellValue::Text`] instead.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<'a> {
     /// The same table is the same `Arc`.
     pub table: &'a Arc<Table>,
     /// Its values.
-    pub values: &'a [Value<'a>],
+    pub values: &'a [CellValue<'a>],
 }
 
 /// One value of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value<'a> {
+pub enum CellValue<'a> {
     /// Not there.
     Unknown,
     /// An unsigned integer.
@@ -232,11 +232,11 @@ pub enum Value<'a> {
     Flag(bool),
     /// Words.
     Text(&'a str),
-    /// A file's content ([`Kind::Bytes`]).
+    /// A file's content ([`ColumnType::Bytes`]).
     Bytes(&'a [u8]),
 }
 
-impl Value<'_> {
+impl CellValue<'_> {
     /// As a number, if it is one.
     pub fn number(self) -> Option<f64> {
         Some(match self {
@@ -448,7 +448,7 @@ pub struct MessageCount {
 
 /// Totals.
 #[derive(Clone, Debug, Default)]
-pub struct Summary {
+pub struct RecordingSummary {
     /// Unwanted ones too: by id, or by name without ids.
     pub messages: Vec<MessageCount>,
     /// Messages beyond the limit of ids.
@@ -468,5 +468,5 @@ pub struct Summary {
 /// Reads one recording.
 pub trait Reader: Send {
     /// Reads it from its beginning to its end.
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary>;
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary>;
 }

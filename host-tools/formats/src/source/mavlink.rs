@@ -6,13 +6,13 @@ use anyhow::Result;
 use hums_core::clock::{Instant, Span};
 use hums_link::framer::{Framer, FramerCounts};
 
-use super::blocks::Blocks;
+use super::blocks::BlockFinder;
 use super::booted::BootTimes;
 use super::checksums::Checksums;
 use super::counts::Counts;
 use super::daytime::Daytime;
 use super::input::Input;
-use super::item::{About, Cause, Fact, Gap, Item, Reader, Summary, Take, Want};
+use super::item::{About, Cause, Fact, Gap, Item, Reader, RecordingSummary, Take, Want};
 use super::pace::Pace;
 use super::paced::Paced;
 use super::raw::Raw;
@@ -24,12 +24,12 @@ use crate::plural::count;
 use crate::utc::moment;
 
 /// A message with a definition here counts as verified.
-fn summary(counts: Counts) -> Summary {
+fn summary(counts: Counts) -> RecordingSummary {
     let (mut messages, other_messages) = counts.messages();
     for message in &mut messages {
         message.id = message.id.map(|(id, _)| (id, hums_dialect::message(id).is_some()));
     }
-    Summary { messages, other_messages, ..Summary::default() }
+    RecordingSummary { messages, other_messages, ..RecordingSummary::default() }
 }
 
 /// A ground station's log.
@@ -45,7 +45,7 @@ impl TlogReader {
 }
 
 impl Reader for TlogReader {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut times = Times::default();
         let mut checksums = Checksums::default();
@@ -148,10 +148,10 @@ impl RawReader {
 }
 
 impl Reader for RawReader {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut line = Instant::ZERO;
-        let (mut times, mut blocks) = (BootTimes::default(), Blocks::default());
+        let (mut times, mut blocks) = (BootTimes::default(), BlockFinder::default());
         let (mut pace, mut bytes) = (Pace::default(), 0);
         let (mut daytime, mut strays) = (Daytime::default(), Strays::default());
         let now = std::cell::Cell::new(Instant::ZERO);

@@ -135,14 +135,14 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
     }
     let is_file = matches!(endpoint, Endpoint::File(_));
     let source: Box<dyn Source> = match (kind, timing.line_rate) {
-        (sniff::Kind::Empty, _) => match progress.damage() {
+        (sniff::InputKind::Empty, _) => match progress.damage() {
             Some(words) => bail!("{endpoint}: {words}"),
             None => bail!("{endpoint}: is empty: not one byte would arrive"),
         },
-        (sniff::Kind::Tlog, None) if is_file => Box::new(tlog::Tlog::ahead(input)),
-        (sniff::Kind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
-        (sniff::Kind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
-        (sniff::Kind::Raw, baud) => {
+        (sniff::InputKind::Tlog, None) if is_file => Box::new(tlog::Tlog::ahead(input)),
+        (sniff::InputKind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
+        (sniff::InputKind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
+        (sniff::InputKind::Raw, baud) => {
             Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
         }
     };

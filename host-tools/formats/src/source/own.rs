@@ -11,8 +11,8 @@ use hums_link::{Check, Frame, observe};
 use super::checksums::wrong_checksums;
 use super::counts::Counts;
 use super::input::Progress;
-use super::item::{Cause, Gap, Item, Reader, Summary, Take, Want};
-use super::parts::{Collect, Deliver};
+use super::item::{Cause, Gap, Item, Reader, RecordingSummary, Take, Want};
+use super::parts::{ItemCollector, PartReceiver};
 use super::said::Said;
 use crate::ending::Ending;
 use crate::logs::Log;
@@ -44,13 +44,13 @@ impl OwnReader {
     }
 
     /// Parts are groups; `seen` gets the bytes read.
-    pub fn in_parts<C: Collect>(
+    pub fn in_parts<C: ItemCollector>(
         &self,
         want: Want<'_>,
         new: impl Fn() -> C + Sync,
-        deliver: &mut impl Deliver<C>,
+        deliver: &mut impl PartReceiver<C>,
         mut seen: impl FnMut(u64),
-    ) -> Result<Summary> {
+    ) -> Result<RecordingSummary> {
         let Want { frames, observations, .. } = want;
         let new = || Part { frames, observations, counts: Counts::new(), not_frames: 0, collected: new() };
         let mut parts = Parts { deliver, counts: Counts::new(), not_frames: 0 };
@@ -58,20 +58,28 @@ impl OwnReader {
         let Parts { counts, not_frames, .. } = parts;
         let (messages, other_messages) = counts.messages();
         let ending = Ending::of(&self.log, summary);
-        let reader::Summary { first, last, gaps, losses, .. } = ending.summary;
+        let reader::LogSummary { first, last, gaps, losses, .. } = ending.summary;
         let span = first.zip(last);
-        Ok(Summary { messages, other_messages, not_frames, span, gaps, losses, ending: Some(ending) })
+        Ok(RecordingSummary {
+            messages,
+            other_messages,
+            not_frames,
+            span,
+            gaps,
+            losses,
+            ending: Some(ending),
+        })
     }
 
     /// Reads in parts; also hands on all items in order, as [`Reader::read`]: one reading for both.
-    pub fn in_parts_and_order<C: Collect>(
+    pub fn in_parts_and_order<C: ItemCollector>(
         &self,
         want: Want<'_>,
         new: impl Fn() -> C + Sync,
-        deliver: &mut impl Deliver<C>,
+        deliver: &mut impl PartReceiver<C>,
         take: &mut Take<'_>,
         seen: impl FnMut(u64),
-    ) -> Result<Summary> {
+    ) -> Result<RecordingSummary> {
         let in_order = Want { observations: true, system: want.system, ..Want::default() };
         let new = || Both {
             frames: want.frames,
@@ -87,7 +95,7 @@ impl OwnReader {
 }
 
 impl Reader for OwnReader {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
         if let Some(epoch) = epoch(&self.log)? {
             take(Instant::ZERO, Item::Epoch(epoch))?;
         }
@@ -108,7 +116,7 @@ struct Part<C> {
     collected: C,
 }
 
-impl<C: Collect> reader::Collect for Part<C> {
+impl<C: ItemCollector> reader::EntryCollector for Part<C> {
     fn entry(&mut self, entry: &Entry<'_>) {
         match *entry {
             Entry::Frame { at, bytes, verified } => {
@@ -149,7 +157,7 @@ struct Parts<'a, D> {
     not_frames: u64,
 }
 
-impl<C, D: Deliver<C>> reader::Deliver<Part<C>> for Parts<'_, D> {
+impl<C, D: PartReceiver<C>> reader::GroupReceiver<Part<C>> for Parts<'_, D> {
     fn gap(&mut self, own: &OwnGap) -> Result<()> {
         self.deliver.gap(&gap(own))
     }
@@ -178,7 +186,7 @@ enum Stored {
     Record(usize),
 }
 
-impl Collect for Kept {
+impl ItemCollector for Kept {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         match item {
             Item::Frame(frame) => {
@@ -214,7 +222,7 @@ struct Both<C> {
     kept: Kept,
 }
 
-impl<C: Collect> Collect for Both<C> {
+impl<C: ItemCollector> ItemCollector for Both<C> {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         self.kept.item(at, item);
         if self.frames || !matches!(item, Item::Frame(_)) {
@@ -232,7 +240,7 @@ struct HandBoth<'a, 'b, 'c, D> {
     hand: Hand<'a, 'b>,
 }
 
-impl<C, D: Deliver<C>> Deliver<Both<C>> for HandBoth<'_, '_, '_, D> {
+impl<C, D: PartReceiver<C>> PartReceiver<Both<C>> for HandBoth<'_, '_, '_, D> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         self.hand.gap(gap)?;
         self.deliver.gap(gap)
@@ -252,7 +260,7 @@ struct Hand<'a, 'b> {
     lost: Option<(Instant, Loss)>,
 }
 
-impl Deliver<Kept> for Hand<'_, '_> {
+impl PartReceiver<Kept> for Hand<'_, '_> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         self.tell_lost()?;
         (self.take)(gap.from.unwrap_or(Instant::ZERO), Item::Gap(gap))

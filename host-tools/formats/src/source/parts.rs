@@ -1,7 +1,7 @@
 //! The stream in parts, for commands that compute much for each item.
 //!
-//! A HUMS log's groups are decoded, and their results made, in parallel. A command has a [`Collect`] for each part,
-//! and a [`Deliver`] that gets them in order. Another format is cut into parts of bounded size, on one thread.
+//! A HUMS log's groups are decoded, and their results made, in parallel. A command has an [`ItemCollector`] for each part,
+//! and a [`PartReceiver`] that gets them in order. Another format is cut into parts of bounded size, on one thread.
 //!
 //! Parts have frames, observations, rows and records. They lack items that need earlier frames (modes; in HUMS logs
 //! also texts and parameters) and items needed before the first part (clocks).
@@ -16,7 +16,7 @@ pub use crate::logs::reader::PART_BYTES;
 pub const PART_ITEMS: u32 = 4_096;
 
 /// A part's result.
-pub trait Collect: Send {
+pub trait ItemCollector: Send {
     /// Takes the next item of the part.
     fn item(&mut self, at: Instant, item: Item<'_>);
 
@@ -25,7 +25,7 @@ pub trait Collect: Send {
 }
 
 /// Receives parts in order.
-pub trait Deliver<C> {
+pub trait PartReceiver<C> {
     /// Something is missing here.
     fn gap(&mut self, gap: &Gap) -> Result<()>;
     /// Takes the result of the next part.

@@ -10,10 +10,10 @@ use hums_core::clock::Instant;
 
 use super::format::{Detected, KNOWN, LOOK_BYTES, detect, hint};
 use super::input::{Input, Progress};
-use super::item::{Cause, Gap, Item, Reader, Stop, Summary, Take, Want};
+use super::item::{Cause, Gap, Item, Reader, RecordingSummary, Stop, Take, Want};
 use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
-use super::parts::{Collect, Deliver, PART_BYTES, PART_ITEMS};
+use super::parts::{ItemCollector, PART_BYTES, PART_ITEMS, PartReceiver};
 use super::{dataflash, ulog};
 use crate::logs::Log;
 use crate::outcome::usage;
@@ -136,14 +136,14 @@ impl Place {
     }
 
     /// Parts as [`Self::in_parts`], and items in order: one reading for both.
-    pub fn in_parts_and_order<C: Collect>(
+    pub fn in_parts_and_order<C: ItemCollector>(
         &self,
         log: &Log,
         want: Want<'_>,
         new: impl Fn() -> C + Sync,
-        deliver: &mut impl Deliver<C>,
+        deliver: &mut impl PartReceiver<C>,
         take: &mut Take<'_>,
-    ) -> Result<Summary> {
+    ) -> Result<RecordingSummary> {
         let bar = progress::bytes(Some(log.bytes()), &self.title);
         let want = Want { system: self.system, ..want };
         let reader = OwnReader::new(log.clone());
@@ -153,12 +153,12 @@ impl Place {
     }
 
     /// `new` makes a part's collector, `deliver` gets them in order.
-    pub fn in_parts<C: Collect>(
+    pub fn in_parts<C: ItemCollector>(
         &self,
         want: Want<'_>,
         new: impl Fn() -> C + Sync,
-        deliver: &mut impl Deliver<C>,
-    ) -> Result<Summary> {
+        deliver: &mut impl PartReceiver<C>,
+    ) -> Result<RecordingSummary> {
         if let Some(log) = self.own() {
             let bar = progress::bytes(Some(log.bytes()), &self.title);
             let summary =
@@ -245,7 +245,7 @@ impl Recording {
     }
 
     /// Reads until the end, or until `take` returns [`Stop`].
-    pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
         let want = Want { system: self.system, ..want };
         let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());
         let mut follow = |at: Instant, item: Item<'_>| {
@@ -256,7 +256,7 @@ impl Recording {
             taken
         };
         let mut summary = match self.reader.read(want, &mut follow) {
-            Err(error) if error.is::<Stop>() => return Ok(Summary::default()),
+            Err(error) if error.is::<Stop>() => return Ok(RecordingSummary::default()),
             Err(error) if is_takers => return Err(error),
             result => result.with_context(|| self.name.clone())?,
         };

@@ -76,12 +76,14 @@ impl Said {
     }
 
     fn text(&mut self, at: Instant, frame: &Frame<'_>, take: &mut Take<'_>) -> Result<()> {
-        let Some(text) = statustext::Text::of(at, frame.source(), frame.payload()) else { return Ok(()) };
+        let Some(text) = statustext::StatusText::of(at, frame.source(), frame.payload()) else {
+            return Ok(());
+        };
         hand_texts(take, |hand| self.texts.take(text, &mut |text| hand(text)))
     }
 }
 
-fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::Text))) -> Result<()> {
+fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::StatusText))) -> Result<()> {
     let mut result = Ok(());
     make(&mut |text| {
         if result.is_ok() {
@@ -92,12 +94,12 @@ fn hand_texts(take: &mut Take<'_>, make: impl FnOnce(&mut dyn FnMut(statustext::
 }
 
 /// `ArduPilot` names its firmware in a text, when parameters are requested (`send_banner`).
-fn hand_text(text: &statustext::Text, take: &mut Take<'_>) -> Result<()> {
+fn hand_text(text: &statustext::StatusText, take: &mut Take<'_>) -> Result<()> {
     let words = text.words.as_str();
     if text.source.component == AUTOPILOT && is_firmware(words) {
         take(text.at, Item::Fact(Fact { about: About::Firmware, words }))?;
     }
-    let statustext::Text { source, severity, alert, .. } = *text;
+    let statustext::StatusText { source, severity, alert, .. } = *text;
     take(text.at, Item::Text(Text { source, severity, words, alert }))
 }
 

@@ -17,7 +17,7 @@ const LEAD: i32 = 3;
 
 /// The kind of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum InputKind {
     /// Not one byte.
     Empty,
     /// Time, frame, time, frame.
@@ -30,7 +30,7 @@ pub enum Kind {
 pub type Sniffed<R> = io::Chain<Cursor<Vec<u8>>, R>;
 
 /// Looks at the beginning of `input`.
-pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
+pub fn sniff<R: Read>(mut input: R) -> io::Result<(InputKind, Sniffed<R>)> {
     let mut window = vec![0; WINDOW_BYTES];
     let mut filled = 0;
     let mut votes = 0;
@@ -47,21 +47,21 @@ pub fn sniff<R: Read>(mut input: R) -> io::Result<(Kind, Sniffed<R>)> {
     }
     window.truncate(filled);
     let kind = match (filled, votes) {
-        (0, _) => Kind::Empty,
-        (_, 1..) => Kind::Tlog,
-        (_, ..=-1) => Kind::Raw,
+        (0, _) => InputKind::Empty,
+        (_, 1..) => InputKind::Tlog,
+        (_, ..=-1) => InputKind::Raw,
         (_, 0) => single_record(&window),
     };
     Ok((kind, Cursor::new(window).chain(input)))
 }
 
 /// The kind, with the number of valid frames.
-pub fn sniff_bytes(bytes: &[u8]) -> (Kind, usize) {
+pub fn sniff_bytes(bytes: &[u8]) -> (InputKind, usize) {
     let (votes, good) = count(bytes);
     let kind = match votes {
-        _ if bytes.is_empty() => Kind::Empty,
-        1.. => Kind::Tlog,
-        ..=-1 => Kind::Raw,
+        _ if bytes.is_empty() => InputKind::Empty,
+        1.. => InputKind::Tlog,
+        ..=-1 => InputKind::Raw,
         0 => single_record(bytes),
     };
     (kind, good)
@@ -97,10 +97,10 @@ fn count(bytes: &[u8]) -> (i32, usize) {
 }
 
 /// A lone record at the beginning is a tlog.
-fn single_record(bytes: &[u8]) -> Kind {
+fn single_record(bytes: &[u8]) -> InputKind {
     match bytes.get(8..).map(peek) {
-        Some(Peek::Frame(_)) if !matches!(peek(bytes), Peek::Frame(_)) => Kind::Tlog,
-        _ => Kind::Raw,
+        Some(Peek::Frame(_)) if !matches!(peek(bytes), Peek::Frame(_)) => InputKind::Tlog,
+        _ => InputKind::Raw,
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
     use crate::mavlink::frame::tests::HEARTBEAT;
 
-    fn kind(bytes: &[u8]) -> Kind {
+    fn kind(bytes: &[u8]) -> InputKind {
         let (kind, mut rest) = sniff(bytes).expect("memory");
         let mut back = Vec::new();
         rest.read_to_end(&mut back).expect("memory");
@@ -123,31 +123,34 @@ mod tests {
 
     #[test]
     fn frames_alone_are_raw_and_with_times_a_tlog() {
-        assert_eq!(kind(&HEARTBEAT.repeat(20)), Kind::Raw);
+        assert_eq!(kind(&HEARTBEAT.repeat(20)), InputKind::Raw);
         assert_eq!(
             kind(&(0..20).flat_map(|at| record(1_700_000_000_000_000 + at)).collect::<Vec<_>>()),
-            Kind::Tlog
+            InputKind::Tlog
         );
-        assert_eq!(kind(&(0..20).flat_map(record).collect::<Vec<_>>()), Kind::Tlog, "times since boot");
+        assert_eq!(kind(&(0..20).flat_map(record).collect::<Vec<_>>()), InputKind::Tlog, "times since boot");
     }
 
     #[test]
     fn a_damaged_beginning_does_not_mislead() {
         let tlog: Vec<u8> = (0..20).flat_map(|at| record(1_700_000_000_000_000 + at)).collect();
-        assert_eq!(kind(&tlog[5..]), Kind::Tlog);
-        assert_eq!(kind(&[b"Init ArduCopter\n\xfd\xfe\xfd", &HEARTBEAT.repeat(3)[..]].concat()), Kind::Raw);
+        assert_eq!(kind(&tlog[5..]), InputKind::Tlog);
+        assert_eq!(
+            kind(&[b"Init ArduCopter\n\xfd\xfe\xfd", &HEARTBEAT.repeat(3)[..]].concat()),
+            InputKind::Raw
+        );
     }
 
     #[test]
     fn a_single_frame_tells_by_where_it_begins() {
-        assert_eq!(kind(&record(5)), Kind::Tlog);
-        assert_eq!(kind(&HEARTBEAT), Kind::Raw);
+        assert_eq!(kind(&record(5)), InputKind::Tlog);
+        assert_eq!(kind(&HEARTBEAT), InputKind::Raw);
     }
 
     #[test]
     fn nothing_and_garbage() {
-        assert_eq!(kind(b""), Kind::Empty);
-        assert_eq!(kind(b"garbage"), Kind::Raw);
-        assert_eq!(kind(&vec![0xfd; 100_000]), Kind::Raw);
+        assert_eq!(kind(b""), InputKind::Empty);
+        assert_eq!(kind(b"garbage"), InputKind::Raw);
+        assert_eq!(kind(&vec![0xfd; 100_000]), InputKind::Raw);
     }
 }

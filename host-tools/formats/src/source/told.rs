@@ -13,7 +13,7 @@ use crate::loss;
 
 /// A record of the monitor's.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum MonitorRecord {
     /// A setting of the monitor.
     Parameter {
         /// Its name.
@@ -120,7 +120,7 @@ impl From<&FindingRecord<'_>> for Finding {
     }
 }
 
-impl Told {
+impl MonitorRecord {
     /// Unreadable sectors; `None` if its times are unknown.
     pub fn missing(gap: &Gap) -> Option<Self> {
         let (own, (from, to)) = (gap.own?, gap.from.zip(gap.to)?);

@@ -10,7 +10,7 @@ use crate::mavlink::ids::{
     ATTITUDE_TARGET, NAV_CONTROLLER_OUTPUT, POSITION_TARGET_GLOBAL_INT, POSITION_TARGET_LOCAL_NED,
     RC_CHANNELS, WIND, WIND_COV,
 };
-use crate::source::item::{Row, Rows, Value};
+use crate::source::item::{CellValue, Row, Rows};
 
 /// Channels of radio control that are shown.
 const CHANNELS: u8 = 16;
@@ -229,23 +229,23 @@ fn default_of(row: &Row<'_>) -> Option<Default> {
         "default_parameters" => ("name", "value", flag(row, "configuration")),
         _ => return None,
     };
-    let Some(Value::Text(name)) = value_of(row, name) else { return None };
+    let Some(CellValue::Text(name)) = value_of(row, name) else { return None };
     let value = value_of(row, value).and_then(double).filter(|value| value.is_finite())?;
     Some(Default { name: (*name).to_owned(), value, is_of_airframe })
 }
 
-fn value_of<'a, 'b>(row: &'a Row<'b>, name: &str) -> Option<&'a Value<'b>> {
+fn value_of<'a, 'b>(row: &'a Row<'b>, name: &str) -> Option<&'a CellValue<'b>> {
     let place = row.table.columns.iter().position(|column| column.name == name)?;
     row.values.get(place)
 }
 
-fn double(value: &Value<'_>) -> Option<f64> {
+fn double(value: &CellValue<'_>) -> Option<f64> {
     match *value {
-        Value::Unsigned(number) => Some(number as f64),
-        Value::Signed(number) => Some(number as f64),
-        Value::Single(number) => Some(f64::from(number)),
-        Value::Double(number) => Some(number),
-        Value::Unknown | Value::Flag(_) | Value::Text(_) | Value::Bytes(_) => None,
+        CellValue::Unsigned(number) => Some(number as f64),
+        CellValue::Signed(number) => Some(number as f64),
+        CellValue::Single(number) => Some(f64::from(number)),
+        CellValue::Double(number) => Some(number),
+        CellValue::Unknown | CellValue::Flag(_) | CellValue::Text(_) | CellValue::Bytes(_) => None,
     }
 }
 
@@ -254,7 +254,7 @@ pub(super) fn number(row: &Row<'_>, name: &str) -> Option<f32> {
 }
 
 fn flag(row: &Row<'_>, name: &str) -> bool {
-    matches!(value_of(row, name), Some(Value::Flag(true)))
+    matches!(value_of(row, name), Some(CellValue::Flag(true)))
 }
 
 pub(super) fn is_first(row: &Row<'_>) -> bool {
@@ -269,7 +269,7 @@ mod tests {
     use hums_link::packet::Packet;
 
     use super::*;
-    use crate::source::item::{Column, Kind, Table};
+    use crate::source::item::{Column, ColumnType, Table};
 
     fn told(tell: impl FnOnce(&mut Put<'_>)) -> Vec<(Line, f32)> {
         let mut all = Vec::new();
@@ -281,18 +281,18 @@ mod tests {
         told(|put| of_message(packet.id(), packet.payload(), put))
     }
 
-    fn row(name: &str, columns: &[&str], values: &[Value<'_>]) -> Vec<(Line, f32)> {
+    fn row(name: &str, columns: &[&str], values: &[CellValue<'_>]) -> Vec<(Line, f32)> {
         with_row(name, columns, values, |row| told(|put| of_row(row, put)))
     }
 
     fn with_row<T>(
         name: &str,
         columns: &[&str],
-        values: &[Value<'_>],
+        values: &[CellValue<'_>],
         take: impl FnOnce(&Row<'_>) -> T,
     ) -> T {
         let column =
-            |name: &&str| Column { name: (*name).to_owned(), unit: String::new(), kind: Kind::Double };
+            |name: &&str| Column { name: (*name).to_owned(), unit: String::new(), kind: ColumnType::Double };
         let table = Table { name: name.to_owned(), columns: columns.iter().map(column).collect() };
         take(&Row { table: &Arc::new(table), values })
     }
@@ -304,9 +304,9 @@ mod tests {
         assert_eq!(message(&east), from_west);
         assert_eq!(message(&Packet::new(WIND).f32(0, -90.0).f32(4, 5.0)), from_west);
         let columns = ["C", "VWN", "VWE"];
-        let values = [Value::Unsigned(0), Value::Single(0.0), Value::Single(5.0)];
+        let values = [CellValue::Unsigned(0), CellValue::Single(0.0), CellValue::Single(5.0)];
         assert_eq!(row("XKF2", &columns, &values), from_west);
-        let second = [Value::Unsigned(1), Value::Single(0.0), Value::Single(5.0)];
+        let second = [CellValue::Unsigned(1), CellValue::Single(0.0), CellValue::Single(5.0)];
         assert_eq!(row("XKF2", &columns, &second), [], "another core is another estimate");
         let topic = ["multi_id", "windspeed_north", "windspeed_east"];
         assert_eq!(row("wind", &topic, &values), from_west);
@@ -331,23 +331,33 @@ mod tests {
     fn channels_that_are_not_used_have_no_line() {
         let sticks = Packet::new(RC_CHANNELS).u16(4, 1500).u16(6, 0).u16(8, u16::MAX).u16(10, 1900).u8(40, 4);
         assert_eq!(message(&sticks), [((Plot::Sticks, 0), 1500.0), ((Plot::Sticks, 3), 1900.0)]);
-        let values = [Value::Unsigned(1500), Value::Unsigned(0)];
+        let values = [CellValue::Unsigned(1500), CellValue::Unsigned(0)];
         assert_eq!(row("RCIN", &["C1", "C2"], &values), [((Plot::Sticks, 0), 1500.0)]);
-        let values = [Value::Unsigned(0), Value::Unsigned(1), Value::Unsigned(1100), Value::Unsigned(1200)];
+        let values = [
+            CellValue::Unsigned(0),
+            CellValue::Unsigned(1),
+            CellValue::Unsigned(1100),
+            CellValue::Unsigned(1200),
+        ];
         let columns = ["multi_id", "channel_count", "values[0]", "values[1]"];
         assert_eq!(row("input_rc", &columns, &values), [((Plot::Sticks, 0), 1100.0)]);
     }
 
     #[test]
     fn a_default_is_the_one_that_the_log_tells() {
-        let of = |value| [Value::Text("RTL_ALT"), Value::Single(15.0), Value::Single(value)];
+        let of = |value| [CellValue::Text("RTL_ALT"), CellValue::Single(15.0), CellValue::Single(value)];
         let parm = |value| with_row("PARM", &["Name", "Value", "Default"], &of(value), default_of);
         assert_eq!(parm(f32::NAN), None, "before 4.3, and where it is not known");
         assert_eq!(
             parm(20.0).map(|default| (default.name, default.value)),
             Some(("RTL_ALT".to_owned(), 20.0))
         );
-        let values = [Value::Text("MC_ROLL_P"), Value::Double(6.5), Value::Flag(false), Value::Flag(true)];
+        let values = [
+            CellValue::Text("MC_ROLL_P"),
+            CellValue::Double(6.5),
+            CellValue::Flag(false),
+            CellValue::Flag(true),
+        ];
         let columns = ["name", "value", "system", "configuration"];
         let default = with_row("default_parameters", &columns, &values, default_of).expect("one");
         assert!(default.is_of_airframe);

@@ -12,7 +12,7 @@ use crate::names::{check_name, unit_name, vocabulary};
 use crate::part;
 use crate::source::told;
 use crate::states::{Shown, Values, meaning, quantity, shown};
-use crate::statustext::Text;
+use crate::statustext::StatusText;
 
 const OURS: &str = "HUMS: ";
 
@@ -187,7 +187,7 @@ impl Note {
     }
 
     /// A text of a component. Texts of a HUMS on board are findings, with the names used here.
-    pub fn text(text: Text) -> Self {
+    pub fn text(text: StatusText) -> Self {
         let ours = text.source.component == COMPONENT && text.words.starts_with(OURS);
         if ours && let Some(note) = Self::on_board(&text) {
             return note;
@@ -203,7 +203,7 @@ impl Note {
         Self { at_s: text.at.as_secs_f64(), kind, level, from, subsystem: "", words, found: None }
     }
 
-    fn on_board(text: &Text) -> Option<Self> {
+    fn on_board(text: &StatusText) -> Option<Self> {
         let words = text.words.trim_start_matches(OURS);
         let (check, instance, rest) = told_check(words)?;
         let known = vocabulary(check)?;

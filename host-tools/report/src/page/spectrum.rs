@@ -216,14 +216,14 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::source::item::{Column, Kind, Table, Value};
+    use crate::source::item::{CellValue, Column, ColumnType, Table};
 
     /// Batches of the gyro at 2 kHz, between slow rows of the same sensor.
     #[test]
     fn batches_are_one_spectrum_whatever_rows_come_between() {
         let table = |name: &str, columns: &[String]| {
             let column =
-                |name: &String| Column { name: name.clone(), unit: String::new(), kind: Kind::Double };
+                |name: &String| Column { name: name.clone(), unit: String::new(), kind: ColumnType::Double };
             Arc::new(Table { name: name.to_owned(), columns: columns.iter().map(column).collect() })
         };
         let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
@@ -233,7 +233,7 @@ mod tests {
         let rows = table("ISBD", &own(&["seqno"]).into_iter().chain(arrays).collect::<Vec<_>>());
         let slow = table("IMU", &own(&["I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"]));
         let mut spectra = Spectra::default();
-        let numbers = |of: &[f64]| of.iter().map(|value| Value::Double(*value)).collect::<Vec<_>>();
+        let numbers = |of: &[f64]| of.iter().map(|value| CellValue::Double(*value)).collect::<Vec<_>>();
         for batch in 0..4_u32 {
             let at = Instant::from_millis(u64::from(batch) * 2_000);
             let values = numbers(&[f64::from(batch), 1.0, 0.0, 100.0, 1_024.0, 2_000.0]);

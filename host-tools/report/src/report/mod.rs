@@ -35,7 +35,7 @@ use crate::outcome::{Outcome, or_skipped, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
-use crate::source::find::{Found, find, sessions_of};
+use crate::source::find::{FoundRecordings, find, sessions_of};
 use crate::source::recording::Place;
 use crate::summary::Overview;
 
@@ -420,7 +420,7 @@ struct Wanted {
     pages: bool,
 }
 
-fn wanted(args: &Request<'_>, output: &Path, found: &Found) -> Result<Wanted> {
+fn wanted(args: &Request<'_>, output: &Path, found: &FoundRecordings) -> Result<Wanted> {
     let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
         bail!("no log is in there, so there is nothing to report")

@@ -173,7 +173,7 @@ impl Replay {
     fn keep(&mut self, at: Instant, text: Text<'_>) {
         self.texts_count += 1;
         if self.notes.len() < TEXTS_MAX {
-            let text = statustext::Text::whole(at, text.source, text.severity, text.words);
+            let text = statustext::StatusText::whole(at, text.source, text.severity, text.words);
             self.notes.push((at, Note::text(text)));
         }
     }

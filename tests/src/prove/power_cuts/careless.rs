@@ -15,7 +15,7 @@ use anyhow::{Context as _, Result, ensure};
 use hums::ending::SessionBefore;
 use hums::followed::EndResolver;
 use hums::logs::sessions::Sessions;
-use hums::logs::{Found, find};
+use hums::logs::{FoundLogs, find};
 use hums::run::sim::power_on;
 use hums::summary::Overview;
 use hums::verify::{Verdict, verdict};
@@ -472,7 +472,7 @@ fn blocks_of(file: &hums::logs::fat::CardFile) -> impl Iterator<Item = u32> + '_
     })
 }
 
-fn frames_by_session(found: &Found) -> Result<BTreeMap<u32, usize>> {
+fn frames_by_session(found: &FoundLogs) -> Result<BTreeMap<u32, usize>> {
     let mut frames = BTreeMap::new();
     for log in &found.logs {
         let record = Record::of(log)?;
@@ -484,7 +484,7 @@ fn frames_by_session(found: &Found) -> Result<BTreeMap<u32, usize>> {
 }
 
 /// Reported for the card, the log, or the log after.
-fn tells(found: &Found, less: &BTreeSet<u32>) -> Result<bool> {
+fn tells(found: &FoundLogs, less: &BTreeSet<u32>) -> Result<bool> {
     if found.images.iter().any(|image| !image.damage.is_empty()) {
         return Ok(true);
     }

@@ -19,7 +19,7 @@ use crate::checked::finding_words;
 use crate::context::Context;
 use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
 use crate::made::OutputFile;
-use crate::mavlink::values::{Array, Scalar, Value};
+use crate::mavlink::values::{Array, FieldValue, Scalar};
 use crate::motion::{Motion, quaternion_up};
 use crate::plural::count;
 use crate::row::{Cell, Row};
@@ -86,9 +86,9 @@ impl Part for Messages {
         self.add(Topic::Mavlink(frame.system, frame.component, frame.id), time_ns, |out| {
             for (number, (_, value)) in (1..).zip(payload.fields()) {
                 match value {
-                    Value::Scalar(value) => scalar(out, number, value),
-                    Value::Array(values) => inside(out, number, |out| list(out, values)),
-                    Value::Text(text) => bytes(out, number, String::from_utf8_lossy(text).as_bytes()),
+                    FieldValue::Scalar(value) => scalar(out, number, value),
+                    FieldValue::Array(values) => inside(out, number, |out| list(out, values)),
+                    FieldValue::Text(text) => bytes(out, number, String::from_utf8_lossy(text).as_bytes()),
                 }
             }
         });

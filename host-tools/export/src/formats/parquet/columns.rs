@@ -13,7 +13,7 @@ use parquet::schema::types::Type;
 use crate::field_names::free_name;
 use crate::hex::push_hex;
 use crate::mavlink::frame::Frame;
-use crate::mavlink::values::{Payload, Scalar, Value};
+use crate::mavlink::values::{FieldValue, Payload, Scalar};
 use crate::row::{Cell, CellType, Row, plain_name};
 use crate::table::Table;
 
@@ -238,12 +238,12 @@ impl Column {
             .build()
     }
 
-    fn push_value(&mut self, value: Value<'_>) {
+    fn push_value(&mut self, value: FieldValue<'_>) {
         match value {
             // Invalid UTF-8 gets replacement characters.
-            Value::Text(text) => self.push_text(&String::from_utf8_lossy(text)),
-            Value::Scalar(scalar) => self.push_scalar(scalar),
-            Value::Array(array) => array.iter().for_each(|scalar| self.push_scalar(scalar)),
+            FieldValue::Text(text) => self.push_text(&String::from_utf8_lossy(text)),
+            FieldValue::Scalar(scalar) => self.push_scalar(scalar),
+            FieldValue::Array(array) => array.iter().for_each(|scalar| self.push_scalar(scalar)),
         }
     }
 
@@ -440,7 +440,7 @@ impl TableRows {
     ) {
         let mut columns = self.begin(at, utc_us);
         let mut push = |value| columns.next().into_iter().for_each(|column| column.push_value(value));
-        let number = |number: u32| Value::Scalar(Scalar::Unsigned(number.into()));
+        let number = |number: u32| FieldValue::Scalar(Scalar::Unsigned(number.into()));
         push(number(frame.system.into()));
         push(number(frame.component.into()));
         if let Some(payload) = known {
@@ -451,7 +451,7 @@ impl TableRows {
         push_hex(&mut digits, frame.payload);
         push(number(frame.id));
         push(number(frame.sequence.into()));
-        push(Value::Text(&digits));
+        push(FieldValue::Text(&digits));
     }
 
     /// Adds a row.

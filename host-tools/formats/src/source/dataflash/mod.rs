@@ -37,7 +37,7 @@ pub use self::observe::mode_name;
 use self::session::{First, Session};
 use self::text::{Line, Lines};
 use super::input::Input;
-use super::item::{Cause, Reader, Summary, Take, Want};
+use super::item::{Cause, Reader, RecordingSummary, Take, Want};
 
 /// Searched first. Definitions and parameters, 100 KiB, come in the first second, among up to 1 MiB of other
 /// messages.
@@ -98,7 +98,7 @@ struct DataFlash {
 }
 
 impl Reader for DataFlash {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
         let Some(input) = self.input.take() else { bail!("a recording is read once") };
         match self.form {
             Form::Binary => binary(input, want, take),
@@ -116,7 +116,7 @@ const ODD_LINE: &str = "a line with bytes that are no text";
 const CUT_LINE: &str = "a line that the beginning of another log cuts off";
 
 /// Reads a binary log.
-pub fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+pub fn binary(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
     let mut bytes = Binary::new(input);
     let mut session = Session::new(first_of_bytes(&mut bytes)?, want);
     while let Some(piece) = bytes.next(session.lengths()).context(CONTEXT)? {
@@ -156,7 +156,7 @@ fn first_of_bytes(bytes: &mut Binary<impl std::io::Read>) -> Result<First> {
     Ok(first)
 }
 
-fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+fn text(input: impl std::io::Read, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
     let mut lines = Lines::new(input);
     let (mut session, mut kinds) = (Session::new(first_of_lines(&mut lines)?, want), Kinds::default());
     session.tell_banner(take)?;

@@ -20,8 +20,8 @@ use super::table::{self, Tables};
 use crate::plural::count;
 use crate::source::clock::Wrong;
 use crate::source::item::{
-    About, Amount, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, Row, Rows, Summary, Table,
-    Take, Text, Want, hand_said,
+    About, Amount, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, RecordingSummary, Row, Rows,
+    Table, Take, Text, Want, hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -488,7 +488,7 @@ impl<'w> Session<'w> {
         take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words, own: None }))
     }
 
-    pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<Summary> {
+    pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<RecordingSummary> {
         if let Some((_, words)) = self.state.open_text.take() {
             let alert = alert::of_text(None, words.as_bytes());
             take(self.clock.now(), Item::Text(Text { source: SOURCE, severity: 6, words: &words, alert }))?;
@@ -510,7 +510,7 @@ impl<'w> Session<'w> {
         self.count_by_name();
         let told = |(name, (count, bytes))| MessageCount { id: None, name, amount: Amount { count, bytes } };
         let messages = self.counts_before.into_iter().map(told).collect();
-        Ok(Summary { messages, ..Summary::default() })
+        Ok(RecordingSummary { messages, ..RecordingSummary::default() })
     }
 }
 

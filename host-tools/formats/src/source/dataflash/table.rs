@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::format::{ARRAY_LENGTH, FieldKind, Format};
 use super::message::Message;
-use crate::source::item::{Column, Columns, Kind, Table, Value};
+use crate::source::item::{CellValue, Column, ColumnType, Columns, Table};
 
 /// Tables of one name: a file may redefine it for ever.
 const VERSIONS_MAX: usize = 16;
@@ -55,7 +55,7 @@ fn columns(format: &Format, units: Vec<String>, is_words: bool) -> Vec<Column> {
     for (field, unit) in format.fields.iter().zip(units) {
         if field.kind == FieldKind::Array {
             for element in 0..ARRAY_LENGTH {
-                columns.push(&format!("{}[{element}]", field.name), &unit, Kind::Signed);
+                columns.push(&format!("{}[{element}]", field.name), &unit, ColumnType::Signed);
             }
         } else {
             columns.push(&field.name, &unit, kind(format, field.kind, is_words));
@@ -67,29 +67,33 @@ fn columns(format: &Format, units: Vec<String>, is_words: bool) -> Vec<Column> {
 /// Holds files: its text may be anything.
 const FILE: &str = "FILE";
 
-fn kind(format: &Format, field: FieldKind, is_words: bool) -> Kind {
+fn kind(format: &Format, field: FieldKind, is_words: bool) -> ColumnType {
     match field {
-        FieldKind::Text(64) if format.name == FILE && !is_words => Kind::Bytes,
-        FieldKind::Mode if is_words => Kind::Text,
-        FieldKind::Mode | FieldKind::U8 | FieldKind::U16 | FieldKind::U32 | FieldKind::U64 => Kind::Unsigned,
-        FieldKind::I8 | FieldKind::I16 | FieldKind::I32 | FieldKind::I64 | FieldKind::Array => Kind::Signed,
-        FieldKind::Half | FieldKind::Single => Kind::Single,
+        FieldKind::Text(64) if format.name == FILE && !is_words => ColumnType::Bytes,
+        FieldKind::Mode if is_words => ColumnType::Text,
+        FieldKind::Mode | FieldKind::U8 | FieldKind::U16 | FieldKind::U32 | FieldKind::U64 => {
+            ColumnType::Unsigned
+        }
+        FieldKind::I8 | FieldKind::I16 | FieldKind::I32 | FieldKind::I64 | FieldKind::Array => {
+            ColumnType::Signed
+        }
+        FieldKind::Half | FieldKind::Single => ColumnType::Single,
         FieldKind::Double
         | FieldKind::CentiI16
         | FieldKind::CentiU16
         | FieldKind::CentiI32
         | FieldKind::CentiU32
-        | FieldKind::Degrees => Kind::Double,
-        FieldKind::Text(_) => Kind::Text,
+        | FieldKind::Degrees => ColumnType::Double,
+        FieldKind::Text(_) => ColumnType::Text,
     }
 }
 
-pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[Value<'_>]) -> T) -> T {
+pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[CellValue<'_>]) -> T) -> T {
     let (format, fields) = (message.format(), &message.format().fields);
     let kinds: Vec<_> = fields.iter().map(|field| kind(format, field.kind, message.is_words())).collect();
     let texts: Vec<_> = (0..fields.len())
         .map(|column| match kinds.get(column) {
-            Some(Kind::Text) => message.text(column),
+            Some(ColumnType::Text) => message.text(column),
             _ => None,
         })
         .collect();
@@ -97,20 +101,22 @@ pub(super) fn with_values<T>(message: &Message<'_>, take: impl FnOnce(&[Value<'_
     for (column, ((field, kind), text)) in fields.iter().zip(&kinds).zip(&texts).enumerate() {
         if field.kind == FieldKind::Array {
             values.extend((0..ARRAY_LENGTH).map(|element| {
-                message.element(column, element).map_or(Value::Unknown, |number| Value::Signed(number.into()))
+                message
+                    .element(column, element)
+                    .map_or(CellValue::Unknown, |number| CellValue::Signed(number.into()))
             }));
             continue;
         }
         let value = match kind {
-            Kind::Text => text.as_deref().map(Value::Text),
-            Kind::Bytes => message.bytes(column).map(Value::Bytes),
-            Kind::Unsigned => message.unsigned(column).map(Value::Unsigned),
-            Kind::Signed => message.signed(column).map(Value::Signed),
-            Kind::Single => message.any_number(column).map(|number| Value::Single(number as f32)),
-            _ => message.any_number(column).map(Value::Double),
+            ColumnType::Text => text.as_deref().map(CellValue::Text),
+            ColumnType::Bytes => message.bytes(column).map(CellValue::Bytes),
+            ColumnType::Unsigned => message.unsigned(column).map(CellValue::Unsigned),
+            ColumnType::Signed => message.signed(column).map(CellValue::Signed),
+            ColumnType::Single => message.any_number(column).map(|number| CellValue::Single(number as f32)),
+            _ => message.any_number(column).map(CellValue::Double),
         };
-        let words = || message.no_number(column).map(Value::Text);
-        values.push(value.or_else(words).unwrap_or(Value::Unknown));
+        let words = || message.no_number(column).map(CellValue::Text);
+        values.push(value.or_else(words).unwrap_or(CellValue::Unknown));
     }
     take(&values)
 }

@@ -106,7 +106,7 @@ pub enum Begins {
 
 /// A record's time, judged.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Told {
+pub struct JudgedTime {
     /// Something begins with it.
     pub begins: Option<Begins>,
     /// New UTC at time zero, microseconds since 1970.
@@ -146,7 +146,13 @@ impl Times {
     }
 
     /// The time of a record at this byte.
-    pub fn take<R: Read>(&mut self, time_us: u64, bytes: &[u8], place: u64, after: &Records<R>) -> Told {
+    pub fn take<R: Read>(
+        &mut self,
+        time_us: u64,
+        bytes: &[u8],
+        place: u64,
+        after: &Records<R>,
+    ) -> JudgedTime {
         let told = self.time(time_us, place, after);
         if let Peek::Frame(frame) = peek(bytes)
             && let Some(boot_ms) = boot_ms_of(frame.id, frame.component, frame.payload)
@@ -163,7 +169,7 @@ impl Times {
         told
     }
 
-    fn time<R: Read>(&mut self, time_us: u64, place: u64, after: &Records<R>) -> Told {
+    fn time<R: Read>(&mut self, time_us: u64, place: u64, after: &Records<R>) -> JudgedTime {
         self.records += 1;
         let before = self.clock.recorded_us();
         let stamp = |us| Stamp { us, series: 0 };
@@ -176,7 +182,7 @@ impl Times {
         let passed = || if stands { Some(1) } else { joints.elapsed_us(before?, time_us, after) };
         let Reading::Sound(moment) = self.clock.take_beside(stamp(time_us), ahead, passed) else {
             self.wrong.add(self.now, place);
-            return Told::default();
+            return JudgedTime::default();
         };
         self.now = moment.at;
         let is_joint = before.is_some_and(|before| {
@@ -199,7 +205,7 @@ impl Times {
         let is_new = begins.is_some() || before.is_none();
         let epoch_us = time_us.checked_sub(self.now.as_micros());
         let epoch_us = epoch_us.filter(|_| is_new && time_us >= UTC_US_MIN);
-        Told { begins, epoch_us }
+        JudgedTime { begins, epoch_us }
     }
 
     /// Damage, once all were taken.

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::source::item::Value;
+use crate::source::item::CellValue;
 
 /// In one log. PX4 has some 250.
 const FORMATS_MAX: usize = 1_024;
@@ -66,19 +66,19 @@ impl Number {
     }
 
     /// A value of as many bytes as the type has; the code of a character.
-    pub(super) fn value(self, bytes: &[u8]) -> Option<Value<'static>> {
+    pub(super) fn value(self, bytes: &[u8]) -> Option<CellValue<'static>> {
         Some(match self {
-            Self::U8 | Self::Char => Value::Unsigned(u64::from(*bytes.first()?)),
-            Self::I8 => Value::Signed(i64::from(i8::from_le_bytes(*bytes.first_chunk()?))),
-            Self::U16 => Value::Unsigned(u64::from(u16::from_le_bytes(*bytes.first_chunk()?))),
-            Self::I16 => Value::Signed(i64::from(i16::from_le_bytes(*bytes.first_chunk()?))),
-            Self::U32 => Value::Unsigned(u64::from(u32::from_le_bytes(*bytes.first_chunk()?))),
-            Self::I32 => Value::Signed(i64::from(i32::from_le_bytes(*bytes.first_chunk()?))),
-            Self::U64 => Value::Unsigned(u64::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I64 => Value::Signed(i64::from_le_bytes(*bytes.first_chunk()?)),
-            Self::F32 => Value::Single(f32::from_le_bytes(*bytes.first_chunk()?)),
-            Self::F64 => Value::Double(f64::from_le_bytes(*bytes.first_chunk()?)),
-            Self::Bool => Value::Flag(*bytes.first()? != 0),
+            Self::U8 | Self::Char => CellValue::Unsigned(u64::from(*bytes.first()?)),
+            Self::I8 => CellValue::Signed(i64::from(i8::from_le_bytes(*bytes.first_chunk()?))),
+            Self::U16 => CellValue::Unsigned(u64::from(u16::from_le_bytes(*bytes.first_chunk()?))),
+            Self::I16 => CellValue::Signed(i64::from(i16::from_le_bytes(*bytes.first_chunk()?))),
+            Self::U32 => CellValue::Unsigned(u64::from(u32::from_le_bytes(*bytes.first_chunk()?))),
+            Self::I32 => CellValue::Signed(i64::from(i32::from_le_bytes(*bytes.first_chunk()?))),
+            Self::U64 => CellValue::Unsigned(u64::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I64 => CellValue::Signed(i64::from_le_bytes(*bytes.first_chunk()?)),
+            Self::F32 => CellValue::Single(f32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::F64 => CellValue::Double(f64::from_le_bytes(*bytes.first_chunk()?)),
+            Self::Bool => CellValue::Flag(*bytes.first()? != 0),
         })
     }
 }

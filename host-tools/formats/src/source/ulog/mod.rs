@@ -36,7 +36,7 @@ use anyhow::Result;
 
 pub use self::px4::{mode_name, nav_state};
 use super::input::Input;
-use super::item::{Reader, Summary, Take, Want};
+use super::item::{Reader, RecordingSummary, Take, Want};
 use window::Window;
 
 /// Such a log by the first bytes.
@@ -62,7 +62,7 @@ impl<R: Read> Ulog<R> {
 }
 
 impl<R: Read + Send> Reader for Ulog<R> {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
         session::read(&mut self.window, want, take)
     }
 }

@@ -4,14 +4,14 @@
 
 use super::format::{Field, Layout, Number};
 use super::message::words;
-use crate::source::item::{Columns, Kind, Table, Value};
+use crate::source::item::{CellValue, ColumnType, Columns, Table};
 
 /// A topic's instance. There may be two batteries.
 pub(super) const INSTANCE: &str = "multi_id";
 
 pub(super) fn table(layout: &Layout) -> Table {
     let mut columns = Columns::default();
-    columns.push(INSTANCE, "", Kind::Unsigned);
+    columns.push(INSTANCE, "", ColumnType::Unsigned);
     for field in &layout.fields {
         let (unit, kind) = (unit(&field.name), kind(field.number));
         match elements(field) {
@@ -45,20 +45,20 @@ pub(super) fn table_name(layout: &Layout) -> String {
     if is_taken { format!("topic_{name}") } else { name }
 }
 
-pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<Value<'a>> {
+pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<CellValue<'a>> {
     let mut values = Vec::with_capacity(layout.fields.len() + 1);
-    values.push(Value::Unsigned(u64::from(instance)));
+    values.push(CellValue::Unsigned(u64::from(instance)));
     for field in &layout.fields {
         let (at, bytes) = (field.offset as usize, field.number.bytes());
         if field.number == Number::Char {
             let text = data.get(at..at + field.array.unwrap_or(1) as usize);
-            values.push(text.map_or(Value::Unknown, |text| Value::Text(words(text))));
+            values.push(text.map_or(CellValue::Unknown, |text| CellValue::Text(words(text))));
             continue;
         }
         for element in 0..field.array.unwrap_or(1) as usize {
             let at = at + element * bytes;
             let number = data.get(at..at + bytes);
-            values.push(number.and_then(|bytes| field.number.value(bytes)).unwrap_or(Value::Unknown));
+            values.push(number.and_then(|bytes| field.number.value(bytes)).unwrap_or(CellValue::Unknown));
         }
     }
     values
@@ -69,14 +69,14 @@ fn elements(field: &Field) -> Option<u32> {
     field.array.filter(|_| field.number != Number::Char)
 }
 
-fn kind(number: Number) -> Kind {
+fn kind(number: Number) -> ColumnType {
     match number {
-        Number::U8 | Number::U16 | Number::U32 | Number::U64 => Kind::Unsigned,
-        Number::I8 | Number::I16 | Number::I32 | Number::I64 => Kind::Signed,
-        Number::F32 => Kind::Single,
-        Number::F64 => Kind::Double,
-        Number::Bool => Kind::Flag,
-        Number::Char => Kind::Text,
+        Number::U8 | Number::U16 | Number::U32 | Number::U64 => ColumnType::Unsigned,
+        Number::I8 | Number::I16 | Number::I32 | Number::I64 => ColumnType::Signed,
+        Number::F32 => ColumnType::Single,
+        Number::F64 => ColumnType::Double,
+        Number::Bool => ColumnType::Flag,
+        Number::Char => ColumnType::Text,
     }
 }
 
@@ -148,7 +148,7 @@ mod tests {
                 .concat();
         let values = values(&layout, 2, &data);
         assert_eq!(values.len(), table.columns.len());
-        assert_eq!(values[..3], [Value::Unsigned(2), Value::Unsigned(7), Value::Single(1.5)]);
-        assert_eq!(values[4..], [Value::Text("ab"), Value::Flag(true), Value::Signed(-1)]);
+        assert_eq!(values[..3], [CellValue::Unsigned(2), CellValue::Unsigned(7), CellValue::Single(1.5)]);
+        assert_eq!(values[4..], [CellValue::Text("ab"), CellValue::Flag(true), CellValue::Signed(-1)]);
     }
 }

@@ -21,8 +21,8 @@ use super::topics::Subscriptions;
 use super::window::Window;
 use crate::source::clock::{self, Clock, Reading, Stamp, Wrong};
 use crate::source::item::{
-    About, Cause, Column, Event, Fact, Gap, Item, Kind, Mode, Parameter, Row, Rows, Summary, Table, Take,
-    Text, Value, Want, hand_said,
+    About, Cause, CellValue, Column, ColumnType, Event, Fact, Gap, Item, Mode, Parameter, RecordingSummary,
+    Row, Rows, Table, Take, Text, Want, hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -44,7 +44,11 @@ const HARD_FAULT: &str = "hardfault_plain";
 /// Words of one piece of information at most.
 const WORDS_BYTES_MAX: usize = 256;
 
-pub(super) fn read<R: Read>(window: &mut Window<R>, want: Want<'_>, take: &mut Take<'_>) -> Result<Summary> {
+pub(super) fn read<R: Read>(
+    window: &mut Window<R>,
+    want: Want<'_>,
+    take: &mut Take<'_>,
+) -> Result<RecordingSummary> {
     window.fill(FILE_HEADER_BYTES);
     let Some((version, time_us)) = beginning(window.rest()) else {
         bail!("is no PX4 log: a ULog begins with 16 bytes of header, and this does not");
@@ -192,7 +196,7 @@ impl<'a, 'b> Session<'a, 'b> {
         Parser { fits: &fits }.find(rest, from, last)
     }
 
-    fn end(mut self) -> Result<Summary> {
+    fn end(mut self) -> Result<RecordingSummary> {
         let (strays, first) = self.strays;
         if strays > 0 {
             let words = format!("{strays} messages of data without a subscription");
@@ -207,7 +211,7 @@ impl<'a, 'b> Session<'a, 'b> {
             self.tell(Item::Gap(&gap))?;
         }
         self.tell_facts()?;
-        Ok(Summary { messages: self.subscriptions.counts(), ..Summary::default() })
+        Ok(RecordingSummary { messages: self.subscriptions.counts(), ..RecordingSummary::default() })
     }
 
     fn tell(&mut self, item: Item<'_>) -> Result<()> {
@@ -314,16 +318,16 @@ impl<'a, 'b> Session<'a, 'b> {
             self.tell(Item::Fact(Fact { about: About::ProcessorFault, words: &words }))?;
         }
         let Some(table) = self.own.information.clone() else { return Ok(()) };
-        let number = value.number().map_or(Value::Unknown, Value::Double);
-        let text = text.map_or(Value::Unknown, Value::Text);
-        self.tell(Item::Row(Row { table: &table, values: &[Value::Text(value.name), text, number] }))
+        let number = value.number().map_or(CellValue::Unknown, CellValue::Double);
+        let text = text.map_or(CellValue::Unknown, CellValue::Text);
+        self.tell(Item::Row(Row { table: &table, values: &[CellValue::Text(value.name), text, number] }))
     }
 
     fn parameter(&mut self, value: &Keyed<'_>) -> Result<()> {
         let Some(number) = value.number() else { return Ok(()) };
         self.px4.parameter(value.name, number);
         if let Some(table) = self.own.parameters.clone() {
-            let values = [Value::Text(value.name), Value::Double(number)];
+            let values = [CellValue::Text(value.name), CellValue::Double(number)];
             self.tell(Item::Row(Row { table: &table, values: &values }))?;
         }
         self.tell(Item::Parameter(Parameter { name: value.name, value: number }))
@@ -331,8 +335,8 @@ impl<'a, 'b> Session<'a, 'b> {
 
     fn default(&mut self, groups: u8, value: &Keyed<'_>) -> Result<()> {
         let (Some(table), Some(number)) = (self.own.defaults.clone(), value.number()) else { return Ok(()) };
-        let group = |bit: u8| Value::Flag(groups & bit != 0);
-        let values = [Value::Text(value.name), Value::Double(number), group(1), group(2)];
+        let group = |bit: u8| CellValue::Flag(groups & bit != 0);
+        let values = [CellValue::Text(value.name), CellValue::Double(number), group(1), group(2)];
         self.tell(Item::Row(Row { table: &table, values: &values }))
     }
 
@@ -490,9 +494,12 @@ impl<'a, 'b> Session<'a, 'b> {
 
     fn text(&mut self, level: u8, tag: Option<u16>, time_us: u64, words: &str) -> Result<()> {
         if let Some(table) = self.own.texts.clone() {
-            let tag = tag.map_or(Value::Unknown, |tag| Value::Unsigned(u64::from(tag)));
-            let [level, time_us] = [u64::from(level), time_us].map(Value::Unsigned);
-            self.tell(Item::Row(Row { table: &table, values: &[time_us, level, tag, Value::Text(words)] }))?;
+            let tag = tag.map_or(CellValue::Unknown, |tag| CellValue::Unsigned(u64::from(tag)));
+            let [level, time_us] = [u64::from(level), time_us].map(CellValue::Unsigned);
+            self.tell(Item::Row(Row {
+                table: &table,
+                values: &[time_us, level, tag, CellValue::Text(words)],
+            }))?;
         }
         self.say(level, words.trim_end())
     }
@@ -585,8 +592,8 @@ struct OwnTables {
 
 impl OwnTables {
     fn new(wanted: Rows<'_>) -> Self {
-        let table = |name: &str, columns: &[(&str, Kind)]| {
-            let column = |&(name, kind): &(&str, Kind)| Column {
+        let table = |name: &str, columns: &[(&str, ColumnType)]| {
+            let column = |&(name, kind): &(&str, ColumnType)| Column {
                 name: name.to_owned(),
                 unit: rows::unit(name).to_owned(),
                 kind,
@@ -594,7 +601,8 @@ impl OwnTables {
             let table = Table { name: name.to_owned(), columns: columns.iter().map(column).collect() };
             wanted.has(name).then(|| Arc::new(table))
         };
-        let (text, flag, number, count) = (Kind::Text, Kind::Flag, Kind::Double, Kind::Unsigned);
+        let (text, flag, number, count) =
+            (ColumnType::Text, ColumnType::Flag, ColumnType::Double, ColumnType::Unsigned);
         Self {
             defaults: table(
                 rows::DEFAULTS,

@@ -15,7 +15,7 @@ use hums_core::observation::{LandedState, Observation, VehicleKind};
 
 use self::writer::Writer;
 use super::*;
-use crate::source::item::{Amount, Item, Rows, Value};
+use crate::source::item::{Amount, CellValue, Item, Rows};
 
 #[derive(Debug, Default)]
 struct Seen {
@@ -43,14 +43,14 @@ impl Seen {
                     self.tables.push(table);
                 }
                 let values = row.values.iter().map(|value| match value {
-                    Value::Unknown => "?".to_owned(),
-                    Value::Unsigned(value) => value.to_string(),
-                    Value::Signed(value) => value.to_string(),
-                    Value::Single(value) => value.to_string(),
-                    Value::Double(value) => value.to_string(),
-                    Value::Flag(value) => value.to_string(),
-                    Value::Text(value) => (*value).to_owned(),
-                    Value::Bytes(value) => format!("{value:02x?}"),
+                    CellValue::Unknown => "?".to_owned(),
+                    CellValue::Unsigned(value) => value.to_string(),
+                    CellValue::Signed(value) => value.to_string(),
+                    CellValue::Single(value) => value.to_string(),
+                    CellValue::Double(value) => value.to_string(),
+                    CellValue::Flag(value) => value.to_string(),
+                    CellValue::Text(value) => (*value).to_owned(),
+                    CellValue::Bytes(value) => format!("{value:02x?}"),
                 });
                 assert_eq!(row.values.len(), row.table.columns.len());
                 self.rows.push(format!("{} {}", row.table.name, values.collect::<Vec<_>>().join(" ")));

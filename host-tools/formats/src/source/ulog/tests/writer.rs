@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 
-use crate::source::item::{Gap, Item, Reader, Rows, Summary, Value, Want};
+use crate::source::item::{CellValue, Gap, Item, Reader, RecordingSummary, Rows, Want};
 use crate::source::ulog::Ulog;
 
 #[derive(Clone)]
@@ -86,7 +86,7 @@ impl Writer {
 pub(in crate::source::ulog) struct Read {
     pub(in crate::source::ulog) items: Vec<(u64, String)>,
     pub(in crate::source::ulog) gaps: Vec<Gap>,
-    pub(in crate::source::ulog) summary: Summary,
+    pub(in crate::source::ulog) summary: RecordingSummary,
 }
 
 impl Read {
@@ -138,15 +138,15 @@ fn told(item: &Item<'_>) -> String {
     }
 }
 
-fn value(value: &Value<'_>) -> String {
+fn value(value: &CellValue<'_>) -> String {
     match value {
-        Value::Unknown => String::new(),
-        Value::Unsigned(number) => number.to_string(),
-        Value::Signed(number) => number.to_string(),
-        Value::Single(number) => number.to_string(),
-        Value::Double(number) => number.to_string(),
-        Value::Flag(flag) => flag.to_string(),
-        Value::Text(text) => (*text).to_owned(),
-        Value::Bytes(bytes) => format!("{bytes:02x?}"),
+        CellValue::Unknown => String::new(),
+        CellValue::Unsigned(number) => number.to_string(),
+        CellValue::Signed(number) => number.to_string(),
+        CellValue::Single(number) => number.to_string(),
+        CellValue::Double(number) => number.to_string(),
+        CellValue::Flag(flag) => flag.to_string(),
+        CellValue::Text(text) => (*text).to_owned(),
+        CellValue::Bytes(bytes) => format!("{bytes:02x?}"),
     }
 }
