@@ -7,7 +7,7 @@ use hums_core::component::{COMPONENTS_MAX, ComponentFigures, ComponentKind};
 use hums_core::health::Subsystem;
 
 /// Hours, flights, battery cycles, motor hours; 0 without a limit.
-pub type Limits = [f64; 4];
+pub type ServiceLimits = [f64; 4];
 
 /// How the names of their parameters end.
 const ENDS: [&str; 4] = ["_HOURS", "_FLIGHTS", "_CYCLES", "_MOT_HOURS"];
@@ -51,7 +51,7 @@ impl fmt::Display for Limit {
 }
 
 /// Limit, if any.
-pub fn first_limit(kind: &str, figures: &ComponentFigures, limits: &Limits) -> Option<Limit> {
+pub fn first_limit(kind: &str, figures: &ComponentFigures, limits: &ServiceLimits) -> Option<Limit> {
     let is_powered = [ComponentKind::Card, ComponentKind::Other].iter().any(|of| of.name() == kind);
     let (run_s, how) =
         if is_powered { (figures.powered_s, "powered") } else { (figures.flight_s, "in the air") };
@@ -80,7 +80,7 @@ pub fn due(monitor: &Monitor, subsystem: Subsystem) -> Option<(String, Option<St
 pub fn of(monitor: &Monitor, place: usize) -> Option<(String, Option<String>)> {
     let part = monitor.components().get(place)?;
     let (figures, _) = monitor.component_figures(place)?;
-    let mut limits = Limits::default();
+    let mut limits = ServiceLimits::default();
     for (spec, value) in monitor.params().iter() {
         if let Some((of, which)) = limit_of(spec.name)
             && let Some(limit) = limits.get_mut(which).filter(|_| of == place)

@@ -226,7 +226,7 @@ pub struct Contents {
     /// Components by place, from 1, as recorded last.
     pub components: BTreeMap<u8, ComponentLine>,
     /// Limits of use of each part, by place from 0.
-    pub part_limits: [part::Limits; COMPONENTS_MAX],
+    pub part_limits: [part::ServiceLimits; COMPONENTS_MAX],
     /// Count, first and last time.
     pub losses: BTreeMap<&'static str, Loss>,
     /// The recorder's last statistics.

@@ -7,7 +7,7 @@ use super::findings::Findings;
 use super::fleet::Fleet;
 use super::format::{self, Files, Format, Part, Way};
 use super::formats::influx::Tags;
-use super::identity::{About, Identity};
+use super::identity::{Identity, RecordingContent};
 use super::native::Tables;
 use super::selection::Selection;
 use crate::files::Inputs;
@@ -29,12 +29,12 @@ impl Formats {
     }
 
     /// Their descriptions.
-    pub fn about(&self) -> impl Iterator<Item = &'static format::About> {
+    pub fn about(&self) -> impl Iterator<Item = &'static format::FormatDetails> {
         self.formats.iter().map(|format| &format.about)
     }
 
     /// Those that are made in parts.
-    pub fn ways(&self) -> impl Iterator<Item = (&'static format::About, &'static Way)> {
+    pub fn ways(&self) -> impl Iterator<Item = (&'static format::FormatDetails, &'static Way)> {
         self.formats.iter().map(|format| (&format.about, &format.way))
     }
 
@@ -74,7 +74,7 @@ pub struct Context {
     /// Vehicle and date, if a format needs them.
     pub identity: Identity,
     /// The content of the recording, if a format needs the identity.
-    pub about: Option<About>,
+    pub about: Option<RecordingContent>,
     /// The tables of all sessions in the output's folder.
     pub(crate) fleet: Option<Arc<Fleet>>,
     /// The same for the line protocol.

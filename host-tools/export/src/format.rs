@@ -1,4 +1,4 @@
-//! An output format: [`About`] describes it, a [`Part`] encodes the entries of a group, and a [`Writer`] takes the parts in
+//! An output format: [`FormatDetails`] describes it, a [`Part`] encodes the entries of a group, and a [`Writer`] takes the parts in
 //! order. A format is one file in [`crate::formats`], and a line in the table there.
 
 use std::any::Any;
@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result, bail};
 use hums_blackbox::Gap;
 use hums_core::clock::Instant;
 
-use crate::Request;
+use crate::DecodeRequest;
 use crate::context::Context;
 use crate::files::{Output, make_parent, settle};
 use crate::made::OutputFile;
@@ -36,7 +36,7 @@ pub enum Files {
 /// A format, for help, documentation, and the reading of a log.
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "independent properties, each a line in a format's file")]
-pub struct About {
+pub struct FormatDetails {
     /// Its name on the command line.
     pub name: &'static str,
     /// Its content and the programs that read it.
@@ -57,7 +57,7 @@ pub struct About {
     pub needs_identity: bool,
 }
 
-impl About {
+impl FormatDetails {
     /// Of frames and rows, and not a recording.
     pub const fn new(name: &'static str, help: &'static str, files: Files) -> Self {
         Self {
@@ -153,7 +153,7 @@ impl From<OutputFile> for Finished {
 /// The open files of a log in one format.
 pub trait Writer: Sized + 'static {
     /// Its description.
-    const ABOUT: About;
+    const ABOUT: FormatDetails;
     /// Its encoder.
     type Part: Part + Default;
 
@@ -214,7 +214,7 @@ impl<W: Writer> AnyWriter for W {
 /// A line of the table of formats.
 pub struct Format {
     /// Its description.
-    pub about: About,
+    pub about: FormatDetails,
     /// Its functions.
     pub way: Way,
 }
@@ -229,7 +229,7 @@ pub enum Way {
         open: fn(&Context, &Path) -> Result<Box<dyn AnyWriter>>,
     },
     /// Written alone, from all bytes of one recording.
-    Alone(fn(&Request) -> Result<Outcome>),
+    Alone(fn(&DecodeRequest) -> Result<Outcome>),
 }
 
 impl Format {

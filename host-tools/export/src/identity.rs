@@ -46,7 +46,7 @@ pub struct Identity {
 
 /// The content of a recording, for a row of the table of sessions and for logbooks.
 #[derive(Clone, Debug, Default)]
-pub struct About {
+pub struct RecordingContent {
     /// Counts, findings, usage.
     pub overview: Overview,
     /// The way of the vehicle; its heights are above mean sea level.
@@ -67,7 +67,7 @@ pub struct Known {
     /// The findings by the monitor here, as in `hums check`; `None` if one on board checked it.
     pub checked: Option<Checked>,
     /// Its content.
-    pub about: About,
+    pub about: RecordingContent,
 }
 
 /// Vehicle, date, UTC and content of a recording. If `judges`, also the findings by the monitor here. The recording is read
@@ -106,7 +106,13 @@ pub fn identity(place: &Place, traits: &Traits, judges: bool, given: Option<&str
     let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
     let checked = judged.filter(|_| judges).and_then(Checked::new);
     let (session, recording) = (traits.identity(), traits.unique(place, &vehicle));
-    let about = About { overview, track, speeds, board: traits.board(), fingerprint: traits.fingerprint() };
+    let about = RecordingContent {
+        overview,
+        track,
+        speeds,
+        board: traits.board(),
+        fingerprint: traits.fingerprint(),
+    };
     Ok(Known { identity: Identity { vehicle, date, session, recording, epochs }, checked, about })
 }
 

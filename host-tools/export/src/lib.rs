@@ -99,7 +99,7 @@ pub const SCHEMA: Schema = Schema::first("hums-decode");
 /// The request of `hums decode`.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
-pub struct Request {
+pub struct DecodeRequest {
     /// Logs, images, recordings, and folders of them.
     pub inputs: Vec<PathBuf>,
     /// Look at every block of an image.
@@ -135,7 +135,7 @@ pub struct Request {
 }
 
 /// Runs `hums decode`.
-pub fn run(args: &Request) -> Result<Outcome> {
+pub fn run(args: &DecodeRequest) -> Result<Outcome> {
     check_request(args)?;
     let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
     if let Some(run) = args.formats.iter().find_map(alone) {
@@ -203,7 +203,7 @@ pub fn run(args: &Request) -> Result<Outcome> {
     Ok(outcome)
 }
 
-fn check_request(args: &Request) -> Result<()> {
+fn check_request(args: &DecodeRequest) -> Result<()> {
     if args.findings && !args.formats.iter().any(|format| format.about.name == "tlog") {
         return Err(usage_error("--findings is for --format tlog; the tables have the findings anyway"));
     }
@@ -245,7 +245,7 @@ fn beside(work: &NamedLog<'_>) -> Result<Done> {
 
 /// Whether the output is standard output. An error if the requested formats cannot go there, or into the
 /// given file.
-fn check_output(args: &Request, logs: usize, formats: &Formats) -> Result<bool> {
+fn check_output(args: &DecodeRequest, logs: usize, formats: &Formats) -> Result<bool> {
     let standard_output = means_standard_output(&args.output);
     if standard_output && (logs != 1 || !formats.is_single_file()) {
         let why = match logs {

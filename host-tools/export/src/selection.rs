@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_blackbox::Gap;
 use hums_core::clock::Instant;
 
-use crate::Request;
+use crate::DecodeRequest;
 use crate::outcome::usage;
 use crate::source::epochs::Epochs;
 use crate::utc::When;
@@ -24,7 +24,7 @@ pub struct Selection {
 
 impl Selection {
     /// As the command line says it; `native` says that there are messages other than MAVLink's, with names of their own.
-    pub fn new(args: &Request, native: bool) -> Result<Self> {
+    pub fn new(args: &DecodeRequest, native: bool) -> Result<Self> {
         let ids = args.messages.iter().map(|name| id_of(name));
         // A name other than an id selects a number that does not occur, because an empty list would select
         // all.

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use crate::decode::fleet::compact;
 use crate::decode::format::Format;
 use crate::decode::formats::{FORMATS, find};
-use crate::decode::{Request, logbook, share};
+use crate::decode::{DecodeRequest, logbook, share};
 use crate::endpoint::without_slash;
 use crate::report;
 use crate::report::tiles::Tiles;
@@ -113,8 +113,8 @@ pub enum Split {
 
 impl Decode {
     /// The arguments' request.
-    pub fn request(&self) -> Request {
-        Request {
+    pub fn request(&self) -> DecodeRequest {
+        DecodeRequest {
             inputs: self.inputs.clone(),
             salvage: self.salvage,
             session: self.session.clone(),
@@ -168,9 +168,9 @@ pub struct Share {
 
 impl Share {
     /// The arguments' request.
-    pub fn request(&self) -> share::Request {
+    pub fn request(&self) -> share::ShareRequest {
         let Self { input, session, output, force } = self.clone();
-        share::Request { input, session, output, force }
+        share::ShareRequest { input, session, output, force }
     }
 }
 
@@ -273,9 +273,9 @@ pub struct Logbook {
 
 impl Logbook {
     /// The request that the arguments make.
-    pub fn request(&self) -> logbook::Request {
+    pub fn request(&self) -> logbook::LogbookRequest {
         let Self { inputs, output, vehicle, force } = self.clone();
-        logbook::Request { inputs, outputs: output, vehicle, force }
+        logbook::LogbookRequest { inputs, outputs: output, vehicle, force }
     }
 }
 
@@ -296,8 +296,8 @@ pub struct Compact {
 
 impl Compact {
     /// The request that the arguments make.
-    pub fn request(&self) -> compact::Request {
-        compact::Request { folder: self.folder.clone() }
+    pub fn request(&self) -> compact::CompactRequest {
+        compact::CompactRequest { folder: self.folder.clone() }
     }
 }
 

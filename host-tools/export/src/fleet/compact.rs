@@ -41,7 +41,7 @@ const AT_ONCE: usize = 4;
 
 /// The request of `hums compact`.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct CompactRequest {
     /// The folder of the tables.
     pub folder: PathBuf,
 }
@@ -57,7 +57,7 @@ struct Sum {
 }
 
 /// Runs `hums compact`.
-pub fn run(args: &Request) -> Result<Outcome> {
+pub fn run(args: &CompactRequest) -> Result<Outcome> {
     let root = args.folder.as_path();
     if !root.join(OWN).is_dir() {
         return Err(usage(format!(

@@ -14,7 +14,7 @@ use crate::check::grouped::{Group, grouped};
 use crate::checked::{Checked, OnBoard, problems_of};
 use crate::context::Context;
 use crate::hex::hex;
-use crate::identity::About;
+use crate::identity::RecordingContent;
 use crate::names::counter_name;
 use crate::row::{Cell, CellType, Row};
 use crate::source::recording::Format;
@@ -76,8 +76,8 @@ fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: CellType) -
 }
 
 /// The row of a recording. It describes the whole recording, also if only a part of it is decoded.
-pub(crate) fn row(context: &Context, about: &About) -> Row {
-    let About { overview, board, fingerprint, track, .. } = about;
+pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
+    let RecordingContent { overview, board, fingerprint, track, .. } = about;
     let summary = &overview.ending.summary;
     let place = track.points().first();
     let end_utc_us = summary.last.and_then(|last| context.epochs.utc_us(last));
@@ -102,7 +102,7 @@ pub(crate) fn row(context: &Context, about: &About) -> Row {
 }
 
 /// The vehicle, and the firmware of both machines.
-fn machines(about: &About) -> Vec<(&'static str, Cell)> {
+fn machines(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let vehicle = vehicle(&about.overview);
     let of_vehicle = |of: fn(&VehicleJson) -> Option<String>| {
         known(vehicle.as_ref().and_then(of), Cell::Text, CellType::Text)
@@ -121,7 +121,7 @@ fn machines(about: &About) -> Vec<(&'static str, Cell)> {
 }
 
 /// The record itself: its size, its losses, its recorder.
-fn record(about: &About) -> Vec<(&'static str, Cell)> {
+fn record(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let overview = &about.overview;
     let bytes = if overview.format.is_some() { overview.bytes_on_card } else { overview.log_bytes() };
     let stats = overview.contents.stats.as_ref();
@@ -143,7 +143,7 @@ fn record(about: &About) -> Vec<(&'static str, Cell)> {
 }
 
 /// Findings, parts, and who checked.
-fn health(context: &Context, about: &About) -> Vec<(&'static str, Cell)> {
+fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let contents = &about.overview.contents;
     let checked = context.checked.as_ref().map_or_else(
         || {

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::context::Context;
-use crate::format::{About, Files, Finished, Single, Spool, Totals, Writer};
+use crate::format::{Files, Finished, FormatDetails, Single, Spool, Totals, Writer};
 use crate::journey::{Findings, Journey, push_element, utc};
 use crate::made::OutputFile;
 use crate::story::Story;
@@ -19,10 +19,10 @@ pub(super) struct Gpx {
 }
 
 impl Writer for Gpx {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         omits: "attitude, battery, motors, texts, parameters: all but the track and findings",
-        ..About::new("gpx", "The track with time, findings as waypoints, for maps", Files::One("gpx"))
+        ..FormatDetails::new("gpx", "The track with time, findings as waypoints, for maps", Files::One("gpx"))
     };
     type Part = Findings;
 

@@ -14,7 +14,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::endpoint::Endpoint;
 use crate::files::{Inputs, Output, cannot_write, says_directory};
-use crate::format::{About, Files, Format, Way};
+use crate::format::{Files, Format, FormatDetails, Way};
 use crate::logs::marks::PACKED;
 use crate::made::{LogJson, MadeJson, OutputFile};
 use crate::outcome::{Outcome, usage};
@@ -25,16 +25,16 @@ use crate::source::booted::Booted;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
-use crate::{Request, SCHEMA};
+use crate::{DecodeRequest, SCHEMA};
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
 
 pub(super) const FORMAT: Format = Format {
-    about: About {
+    about: FormatDetails {
         is_of_frames: true,
         omits: "an autopilot's own log, findings",
-        ..About::new(
+        ..FormatDetails::new(
             "hum",
             "A log as the box writes it, of one tlog or raw recording; written alone",
             Files::One("hum"),
@@ -43,7 +43,7 @@ pub(super) const FORMAT: Format = Format {
     way: Way::Alone(run),
 };
 
-fn run(args: &Request) -> Result<Outcome> {
+fn run(args: &DecodeRequest) -> Result<Outcome> {
     let (input, path) = (input(args)?, output(args));
     let name = input.to_string();
     let mut inputs = Inputs::none().forcing(args.force);
@@ -112,7 +112,7 @@ fn run(args: &Request) -> Result<Outcome> {
 }
 
 /// The one recording that is read; a usage error if more is asked for than all of it.
-fn input(args: &Request) -> Result<Endpoint> {
+fn input(args: &DecodeRequest) -> Result<Endpoint> {
     let is_part = args.session.is_some()
         || args.from.is_some()
         || args.to.is_some()
@@ -129,7 +129,7 @@ fn input(args: &Request) -> Result<Endpoint> {
 }
 
 /// The log's path: in a directory it is named after the recording.
-fn output(args: &Request) -> PathBuf {
+fn output(args: &DecodeRequest) -> PathBuf {
     let stem = args.inputs.first().and_then(|input| input.file_stem()).unwrap_or_default();
     if says_directory(&args.output) {
         args.output.join(stem).with_extension("hum")

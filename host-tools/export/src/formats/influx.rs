@@ -14,7 +14,7 @@ use hums_dialect::{Field, Kind};
 
 use crate::context::Context;
 use crate::field_names::free_name;
-use crate::format::{About, Entry, Files, Finished, Part, Single, Totals, Writer, lines_of};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Totals, Writer, lines_of};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::mavlink::frame::Frame;
@@ -386,10 +386,10 @@ impl Part for Points {
 }
 
 impl Writer for Influx {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         needs_identity: true,
-        ..About::new("influx", "Lines for InfluxDB, VictoriaMetrics and QuestDB", Files::One("lp"))
+        ..FormatDetails::new("influx", "Lines for InfluxDB, VictoriaMetrics and QuestDB", Files::One("lp"))
     };
     type Part = Points;
 

@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 
 use crate::context::Context;
-use crate::format::{About, Entry, Files, Finished, Part, Single, Totals, Writer, lines_of};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Totals, Writer, lines_of};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::names::message_name;
@@ -65,7 +65,7 @@ impl Part for Lines {
 }
 
 impl Writer for Jsonl {
-    const ABOUT: About = About::new(
+    const ABOUT: FormatDetails = FormatDetails::new(
         "jsonl",
         "An object a line, in order of time, for scripts and log stores",
         Files::One("jsonl"),

@@ -7,7 +7,7 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 
 use crate::context::Context;
-use crate::format::{About, Files, Finished, Single, Totals, Writer};
+use crate::format::{Files, Finished, FormatDetails, Single, Totals, Writer};
 use crate::journey::{Findings, Journey, push_element, utc};
 use crate::made::OutputFile;
 use crate::motion::Fix;
@@ -72,10 +72,10 @@ fn piece(context: &Context, places: &[(Instant, Fix)]) -> String {
 }
 
 impl Writer for Kml {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         omits: "attitude, battery, motors, texts, parameters: all but the track and findings",
-        ..About::new(
+        ..FormatDetails::new(
             "kml",
             "The track with time, findings as placemarks, for Google Earth",
             Files::One("kml"),

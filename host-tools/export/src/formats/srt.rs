@@ -8,7 +8,7 @@ use hums_core::clock::Instant;
 
 use crate::checked::{Checked, finding_words};
 use crate::context::Context;
-use crate::format::{About, Files, Finished, Single, Totals, Writer};
+use crate::format::{Files, Finished, FormatDetails, Single, Totals, Writer};
 use crate::journey::{Findings, utc};
 use crate::made::OutputFile;
 use crate::mavlink::values::Scalar;
@@ -85,11 +85,11 @@ fn time_of(us: i64) -> String {
 }
 
 impl Writer for Srt {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         needs_identity: true,
         omits: "all but time, height, speed, battery and findings",
-        ..About::new(
+        ..FormatDetails::new(
             "srt",
             "Subtitles for a video: time, height, speed, battery, findings",
             Files::One("srt"),

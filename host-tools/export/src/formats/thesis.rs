@@ -12,7 +12,7 @@ use hums_core::clock::{Instant, Span};
 
 use crate::context::Context;
 use crate::files::{Folder, FolderFile, buffered, settle};
-use crate::format::{About, Files, Finished, Totals, Writer};
+use crate::format::{Files, Finished, FormatDetails, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::values::Scalar;
 use crate::reference::{MOTORS, Quantity, Reference};
@@ -97,11 +97,11 @@ impl Thesis {
 }
 
 impl Writer for Thesis {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_records: false,
         has_observations: true,
         omits: "messages besides flight, ESC and speed values, the board's records, findings",
-        ..About::new(
+        ..FormatDetails::new(
             "thesis",
             "Four tables with a row a second, as the thesis has them on which HUMS is built: flight, ESC status, ESC errors, speeds",
             Files::Tables(Some("thesis"), "csv"),

@@ -9,7 +9,7 @@ use hums_blackbox::{Cause, Gap};
 use crate::context::Context;
 use crate::files::{Output, appended, settle};
 use crate::findings::Texts;
-use crate::format::{About, Entry, Files, Finished, Part, Single, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Totals, Writer};
 use crate::made::OutputFile;
 use crate::plural::count;
 use crate::record::gap_row;
@@ -46,11 +46,11 @@ impl Tlog {
 }
 
 impl Writer for Tlog {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_records: false,
         is_of_frames: true,
         omits: "the board's records, findings (with `--findings` as texts)",
-        ..About::new(
+        ..FormatDetails::new(
             "tlog",
             "A ground station's log: opens in Mission Planner, QGroundControl, MAVProxy, pymavlink",
             Files::One("tlog"),

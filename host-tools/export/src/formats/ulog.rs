@@ -16,7 +16,7 @@ use hums_core::vehicle::Vehicle;
 
 use crate::checked::finding_words;
 use crate::context::Context;
-use crate::format::{About, Entry, Files, Finished, Part, Single, Spool, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Spool, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::ids::RC_CHANNELS;
 use crate::mavlink::values::{FieldValue, Scalar};
@@ -387,11 +387,11 @@ fn axes(values: Option<[f32; 3]>) -> [Option<f32>; 3] {
 }
 
 impl Writer for Ulog {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         has_words: true,
         omits: "messages beyond some twenty quantities, the board's records",
-        ..About::new(
+        ..FormatDetails::new(
             "ulog",
             "PX4's log with the main quantities, for Flight Review and PlotJuggler",
             Files::One("ulg"),

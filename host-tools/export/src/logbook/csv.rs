@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 
-use super::{BY_HAND, Book, Entry, Life, Spot};
+use super::{BY_HAND, Book, Life, LogbookEntry, Spot};
 use crate::files::{Inputs, Output, make_parent, settle};
 use crate::text::push_csv_text;
 
@@ -79,7 +79,7 @@ pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
 }
 
 /// A flight of an earlier CSV.
-fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>) -> Entry {
+fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>) -> LogbookEntry {
     let text = |name: &str| cell(name).to_owned();
     let some = |name: &str| Some(text(name)).filter(|text| !text.is_empty());
     let number = |name: &str| cell(name).replace(',', ".").parse::<f64>().ok();
@@ -87,7 +87,7 @@ fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>)
         let part = |axis: &str| number(&format!("{name}_{axis}_deg"));
         Some(Spot { latitude_deg: part("latitude")?, longitude_deg: part("longitude")? })
     };
-    Entry {
+    LogbookEntry {
         key: text("flight"),
         aircraft: text("aircraft"),
         kind: text("type"),
@@ -137,7 +137,7 @@ pub(super) fn write(book: &Book, path: &Path) -> Result<()> {
     output.finish()
 }
 
-fn cells(entry: &Entry, sum: Life) -> [String; COLUMNS.len()] {
+fn cells(entry: &LogbookEntry, sum: Life) -> [String; COLUMNS.len()] {
     let number = |value: Option<f64>, decimals: usize| {
         value.map_or_else(String::new, |value| format!("{value:.decimals$}"))
     };
@@ -220,19 +220,19 @@ mod tests {
     use super::super::Aircraft;
     use super::*;
 
-    fn flight(key: &str, take_off: &str) -> Entry {
-        Entry {
+    fn flight(key: &str, take_off: &str) -> LogbookEntry {
+        LogbookEntry {
             key: key.to_owned(),
             aircraft: "uid-1".to_owned(),
             take_off: Some(take_off.to_owned()),
             duration_s: 1800.0,
             from: Some(Spot { latitude_deg: 51.5, longitude_deg: -0.25 }),
             defects: "cell_voltage 1 critical: 3.4 V; more, \"and\" so on".to_owned(),
-            ..Entry::default()
+            ..LogbookEntry::default()
         }
     }
 
-    fn book(entries: Vec<Entry>) -> Book {
+    fn book(entries: Vec<LogbookEntry>) -> Book {
         Book::from([("uid-1".to_owned(), Aircraft { entries, ..Aircraft::default() })])
     }
 

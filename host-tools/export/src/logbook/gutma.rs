@@ -7,7 +7,7 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 use serde_json::{Value, json};
 
-use super::{Book, Entry, hours};
+use super::{Book, LogbookEntry, hours};
 use crate::files::{Inputs, Output, make_directory, make_parent, says_directory, settle};
 use crate::identity::Known;
 use crate::outcome::usage;
@@ -53,7 +53,7 @@ fn one(flight: &Value, path: &Path, inputs: &Inputs) -> Result<()> {
 }
 
 /// A flight as a message; `None` without UTC.
-fn exchange(entry: &Entry, known: &Known) -> Option<Value> {
+fn exchange(entry: &LogbookEntry, known: &Known) -> Option<Value> {
     let (from, to) = entry.span?;
     let epochs = &known.identity.epochs;
     let start_us = epochs.utc_us(from)?;
@@ -112,7 +112,7 @@ struct Way {
     events: Vec<Value>,
 }
 
-fn way(entry: &Entry, known: &Known, (from, to): (Instant, Instant), start_us: u64) -> Way {
+fn way(entry: &LogbookEntry, known: &Known, (from, to): (Instant, Instant), start_us: u64) -> Way {
     let (about, epochs) = (&known.about, &known.identity.epochs);
     let points = about.track.points();
     let speeds = about.speeds.points();

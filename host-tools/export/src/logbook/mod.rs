@@ -19,7 +19,7 @@ use hums_core::usage::UsageCounter;
 use crate::check::problem::Problem;
 use crate::checked::{problem_words, problems_of};
 use crate::files::{Inputs, says_directory};
-use crate::identity::{About, Known, identity};
+use crate::identity::{Known, RecordingContent, identity};
 use crate::logs::side_by_side::side_by_side;
 use crate::naming::{self, Named};
 use crate::outcome::{Outcome, usage as usage_error};
@@ -36,7 +36,7 @@ pub(crate) const BY_HAND: [&str; 6] =
 
 /// The request of `hums logbook`.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct LogbookRequest {
     /// Logs, images, recordings, and folders of them.
     pub inputs: Vec<PathBuf>,
     /// The files to write, by their endings; a folder gets GUTMA's JSON.
@@ -56,7 +56,7 @@ pub(crate) struct Spot {
 
 /// A flight, or a session with defects and without a flight.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Entry {
+pub(crate) struct LogbookEntry {
     /// Its name: the recording's, and the number of the flight in it, from 1; 0 without a flight.
     pub(crate) key: String,
     pub(crate) aircraft: String,
@@ -107,7 +107,7 @@ pub(crate) struct Life {
 /// An aircraft with its flights in order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Aircraft {
-    pub(crate) entries: Vec<Entry>,
+    pub(crate) entries: Vec<LogbookEntry>,
     pub(crate) parts: Vec<PartLine>,
     pub(crate) life: Option<Life>,
 }
@@ -123,7 +123,7 @@ impl Aircraft {
     }
 }
 
-impl Entry {
+impl LogbookEntry {
     pub(crate) fn is_flight(&self) -> bool {
         !self.key.ends_with("-0")
     }
@@ -133,7 +133,7 @@ impl Entry {
 pub(crate) type Book = BTreeMap<String, Aircraft>;
 
 /// Runs `hums logbook`.
-pub fn run(args: &Request) -> Result<Outcome> {
+pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     let (given, mut remarks) = naming::without_made(&args.inputs);
     let found = find(&given, false)?;
     remarks.extend(found.remarks.iter().cloned());
@@ -256,11 +256,11 @@ fn book(sessions: &[(String, Known)]) -> Book {
 }
 
 /// The type of the vehicle, and its autopilot.
-fn kind(about: &About) -> String {
+fn kind(about: &RecordingContent) -> String {
     vehicle(&about.overview).map_or_else(String::new, |of| format!("{}, {}", of.r#type, of.autopilot))
 }
 
-fn parts(about: &About) -> Vec<PartLine> {
+fn parts(about: &RecordingContent) -> Vec<PartLine> {
     let contents = &about.overview.contents;
     let line = |(place, line): (&u8, &crate::summary::ComponentLine)| {
         let (name, limit) = contents.part(*place, line);
@@ -280,7 +280,7 @@ fn parts(about: &About) -> Vec<PartLine> {
 }
 
 /// The flights of a session, or its defects alone.
-fn entries(session: usize, record: &str, known: &Known) -> Vec<Entry> {
+fn entries(session: usize, record: &str, known: &Known) -> Vec<LogbookEntry> {
     let (identity, about) = (&known.identity, &known.about);
     let contents = &about.overview.contents;
     let summary = &about.overview.ending.summary;
@@ -294,7 +294,7 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<Entry> {
     let utc = |at: Instant| identity.epochs.utc_us(at).map(iso8601);
     let whole =
         |counter: UsageCounter| contents.usage.get(counter.name()).copied().filter(|_| flights.len() <= 1);
-    let of_session = Entry {
+    let of_session = LogbookEntry {
         aircraft: identity.vehicle.clone(),
         kind: kind(about),
         firmware,
@@ -302,14 +302,14 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<Entry> {
         voltage_min_v: whole(UsageCounter::VoltageMin),
         record: record.to_owned(),
         session: Some(session),
-        ..Entry::default()
+        ..LogbookEntry::default()
     };
     // A problem belongs to the flight before whose end it began; one after the last flight to that.
     let ends: Vec<Instant> = flights.iter().map(|flight| flight.to.unwrap_or(last)).collect();
     let flight_of = |problem: &Problem| {
         ends.iter().position(|end| problem.at <= *end).unwrap_or(ends.len().saturating_sub(1))
     };
-    let told = |mut entry: Entry, mine: &[&&Problem]| {
+    let told = |mut entry: LogbookEntry, mine: &[&&Problem]| {
         let (incidents, defects): (Vec<_>, Vec<_>) =
             mine.iter().partition(|problem| problem.subsystem == Subsystem::Mishap);
         let words = |problems: Vec<&&&Problem>| {
@@ -321,12 +321,12 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<Entry> {
     if flights.is_empty() {
         let key = format!("{}-0", identity.recording);
         let all: Vec<&&Problem> = problems.iter().collect();
-        let entry = Entry { key, take_off: summary.first.and_then(utc), ..of_session };
+        let entry = LogbookEntry { key, take_off: summary.first.and_then(utc), ..of_session };
         return if all.is_empty() { Vec::new() } else { vec![told(entry, &all)] };
     }
     let entry = |(index, flight): (usize, &crate::summary::FlightLine)| {
         let to = flight.to.unwrap_or(last);
-        let entry = Entry {
+        let entry = LogbookEntry {
             key: format!("{}-{}", identity.recording, index + 1),
             take_off: utc(flight.from),
             landing: flight.to.and_then(utc),
@@ -351,11 +351,11 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<Entry> {
 
 /// Removes flights at the time of another flight of the same aircraft: two recorders recorded it. The longer record stays.
 /// Returns the names of each pair.
-fn count_once(entries: &mut Vec<Entry>) -> Vec<(String, String)> {
+fn count_once(entries: &mut Vec<LogbookEntry>) -> Vec<(String, String)> {
     let mut pairs = Vec::new();
-    let mut kept: Vec<Entry> = Vec::new();
+    let mut kept: Vec<LogbookEntry> = Vec::new();
     for entry in std::mem::take(entries) {
-        let is_same = |other: &Entry| {
+        let is_same = |other: &LogbookEntry| {
             entry.session != other.session
                 && entry
                     .utc_us
@@ -376,7 +376,7 @@ fn count_once(entries: &mut Vec<Entry>) -> Vec<(String, String)> {
 }
 
 /// The place at a time: the last known before it, else the first after it.
-fn spot(about: &About, at: Instant) -> Option<Spot> {
+fn spot(about: &RecordingContent, at: Instant) -> Option<Spot> {
     let points = about.track.points();
     let after = points.partition_point(|point| point.at <= at);
     let point = points.get(after.saturating_sub(1))?;
@@ -396,16 +396,16 @@ mod tests {
     /// A box and a ground station, or two boxes, record the same flight.
     #[test]
     fn a_flight_that_two_recorders_recorded_counts_once() {
-        let entry = |session: usize, from_s: u64, to_s: u64| Entry {
+        let entry = |session: usize, from_s: u64, to_s: u64| LogbookEntry {
             key: format!("s{session}-{from_s}"),
             duration_s: (to_s - from_s) as f64,
             utc_us: Some((from_s * 1_000_000, to_s * 1_000_000)),
             session: Some(session),
-            ..Entry::default()
+            ..LogbookEntry::default()
         };
         let mut entries = vec![entry(1, 100, 200), entry(2, 90, 201), entry(2, 300, 400), entry(1, 400, 500)];
         // Without the time of day nothing is known of it.
-        entries.push(Entry { utc_us: None, ..entry(3, 100, 200) });
+        entries.push(LogbookEntry { utc_us: None, ..entry(3, 100, 200) });
         let pairs = count_once(&mut entries);
         assert_eq!(pairs, [("s2-90".to_owned(), "s1-100".to_owned())]);
         let kept: Vec<&str> = entries.iter().map(|entry| entry.key.as_str()).collect();

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::{Aircraft, Book, Entry, PartLine, Spot, hours};
+use super::{Aircraft, Book, LogbookEntry, PartLine, Spot, hours};
 use crate::files::{Inputs, Output, make_parent, settle};
 use crate::journey::push_xml;
 
@@ -48,7 +48,8 @@ fn of_aircraft(page: &mut String, name: &str, aircraft: &Aircraft) {
     push_xml(page, name);
     page.push_str("</h2>\n");
     let last = aircraft.entries.last();
-    let said = |of: fn(&Entry) -> &str| aircraft.entries.iter().rev().map(of).find(|text| !text.is_empty());
+    let said =
+        |of: fn(&LogbookEntry) -> &str| aircraft.entries.iter().rev().map(of).find(|text| !text.is_empty());
     let details = said(|entry| entry.by_hand.get("aircraft_details").map_or("", String::as_str));
     let rows = [
         ("Manufacturer, model, serial number", details.unwrap_or_default().to_owned()),
@@ -130,7 +131,7 @@ fn parts(page: &mut String, aircraft: &Aircraft) {
     }
 }
 
-fn flights(entries: &[Entry]) -> Vec<Vec<String>> {
+fn flights(entries: &[LogbookEntry]) -> Vec<Vec<String>> {
     let (mut seconds, mut count) = (0.0, 0_u64);
     let mut rows = Vec::new();
     for entry in entries {

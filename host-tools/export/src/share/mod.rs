@@ -50,7 +50,7 @@ const PARAM_VALUE: u32 = 22;
 
 /// The request of `hums share`.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct ShareRequest {
     /// A log, an image, or a recording.
     pub input: PathBuf,
     /// Only this session.
@@ -62,7 +62,7 @@ pub struct Request {
 }
 
 /// Runs `hums share`.
-pub fn run(args: &Request) -> Result<Outcome> {
+pub fn run(args: &ShareRequest) -> Result<Outcome> {
     let found = find(std::slice::from_ref(&args.input), false)?;
     found.remarks.iter().for_each(|remark| note!("{remark}"));
     let wanted = found.name_of(args.session.as_deref())?;
@@ -135,7 +135,7 @@ impl Share {
     }
 
     /// Returns whether the recording has damage.
-    fn link(&mut self, place: &Place, context: &Context, args: &Request) -> Result<bool> {
+    fn link(&mut self, place: &Place, context: &Context, args: &ShareRequest) -> Result<bool> {
         let mut file = Single::open(context, &args.output)?;
         let want = Want { frames: true, ..Want::default() };
         let (mut bytes, mut lossy) = (Vec::new(), false);
@@ -225,7 +225,7 @@ impl Share {
     }
 
     /// Returns whether the recording has damage.
-    fn own(&mut self, place: &Place, context: &Context, args: &Request) -> Result<bool> {
+    fn own(&mut self, place: &Place, context: &Context, args: &ShareRequest) -> Result<bool> {
         let mut file = Ulog::open(context, &args.output)?;
         let (mut story, mut lossy) = (Story::default(), false);
         let want = Want { observations: true, ..Want::default() };
@@ -261,7 +261,7 @@ impl Share {
         Ok(lossy)
     }
 
-    fn tell(self, args: &Request) -> Result<()> {
+    fn tell(self, args: &ShareRequest) -> Result<()> {
         let line = |words: &str| output::line(&printable::word(words));
         line(&format!("{}: {} kept", args.output.display(), count(self.kept, "message")))?;
         line(

@@ -59,7 +59,8 @@ fn record(at_us: u64, packet: &Packet) -> Vec<u8> {
 }
 
 fn share(input: &Path, output: &Path) -> Vec<u8> {
-    let args = Request { input: input.to_owned(), session: None, output: output.to_owned(), force: false };
+    let args =
+        ShareRequest { input: input.to_owned(), session: None, output: output.to_owned(), force: false };
     run(&args).expect("a copy");
     fs::read(output).expect("the copy")
 }

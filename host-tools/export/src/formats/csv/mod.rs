@@ -11,7 +11,7 @@ use hums_core::clock::Instant;
 
 use crate::context::Context;
 use crate::files::Folder;
-use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Totals, Writer};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::row::Row;
@@ -97,7 +97,7 @@ impl Part for Lines {
 }
 
 impl Writer for Csv {
-    const ABOUT: About = About::new(
+    const ABOUT: FormatDetails = FormatDetails::new(
         "csv",
         "A table for each type of message, units in the header, for spreadsheets and scripts",
         Files::Tables(None, "csv"),

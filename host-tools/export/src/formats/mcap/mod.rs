@@ -17,7 +17,7 @@ use hums_core::observation::Observation;
 
 use crate::checked::finding_words;
 use crate::context::Context;
-use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::values::{Array, FieldValue, Scalar};
 use crate::motion::{Motion, quaternion_up};
@@ -288,11 +288,11 @@ fn text(messages: &mut Messages, epochs: &Epochs, said: &Said) {
 }
 
 impl Writer for Mcap {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         has_words: true,
         needs_identity: true,
-        ..About::new("mcap", "Everything, for Foxglove and PlotJuggler", Files::One("mcap"))
+        ..FormatDetails::new("mcap", "Everything, for Foxglove and PlotJuggler", Files::One("mcap"))
     };
     type Part = Messages;
 

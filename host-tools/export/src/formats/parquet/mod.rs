@@ -40,7 +40,7 @@ use parquet::schema::types::Type;
 use crate::context::Context;
 use crate::files::cannot_write;
 use crate::fleet::{SESSIONS, Session, sessions};
-use crate::format::{About, Entry, Files, Finished, Part, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, Part, Totals, Writer};
 use crate::identity::Identity;
 use crate::logs::in_order::{in_order, workers};
 use crate::row::Row;
@@ -215,9 +215,9 @@ impl Part for Batches {
 pub(super) struct Parquet(ParquetTables);
 
 impl Writer for Parquet {
-    const ABOUT: About = About {
+    const ABOUT: FormatDetails = FormatDetails {
         needs_identity: true,
-        ..About::new(
+        ..FormatDetails::new(
             "parquet",
             "Typed columns of a whole fleet, for DuckDB, Spark, pandas",
             Files::Fleet("parquet"),
