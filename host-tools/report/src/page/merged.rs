@@ -19,7 +19,7 @@ type Quantity = (Plot, u8, bool);
 
 /// A flight to be merged with others.
 #[derive(Clone, Copy, Debug)]
-pub struct Flight<'a> {
+pub struct MergedFlight<'a> {
     /// Its name.
     pub name: &'a str,
     /// Its history.
@@ -53,7 +53,7 @@ const fn is_compared(plot: Plot, line: u8) -> bool {
 }
 
 /// One part that is all of them, in the order in which they are given; limits are those of the first one.
-pub fn merged(flights: &[Flight<'_>]) -> Part {
+pub fn merged(flights: &[MergedFlight<'_>]) -> Part {
     let mut store: Store<Quantity> = Store::of(SERIES_EACH * flights.len());
     // Take-off is the beginning of all.
     store.interval(Instant::ZERO);
@@ -85,7 +85,7 @@ pub fn merged(flights: &[Flight<'_>]) -> Part {
     }
 }
 
-fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
+fn add(store: &mut Store<Quantity>, number: u8, flight: &MergedFlight<'_>) {
     let (own, autopilot, _) = flight.history.drawn();
     let Some((start_ms, step_ms)) = own.spacing_ms() else { return };
     let (from, to) = flight.span;
@@ -110,7 +110,7 @@ fn add(store: &mut Store<Quantity>, number: u8, flight: &Flight<'_>) {
 
 /// The track of a flight, from its take-off on: the first place of each of at most `PLACES_MAX` pieces, and
 /// the last.
-pub fn places(flight: &Flight<'_>) -> Vec<Place> {
+pub fn places(flight: &MergedFlight<'_>) -> Vec<Place> {
     let (from, to) = flight.span;
     let track = flight.history.track();
     let begin = track.partition_point(|place| place.at < from);
@@ -121,7 +121,7 @@ pub fn places(flight: &Flight<'_>) -> Vec<Place> {
     chosen.chain(last).map(|place| told(place, from)).collect()
 }
 
-fn plots(store: &Store<Quantity>, flights: &[Flight<'_>]) -> Vec<PlotJson> {
+fn plots(store: &Store<Quantity>, flights: &[MergedFlight<'_>]) -> Vec<PlotJson> {
     let mut all: Vec<(Quantity, PlotJson)> = Vec::new();
     for (quantity, number) in store.lines() {
         let flight = flights.get(usize::from(number));
@@ -144,7 +144,7 @@ fn about((plot, _, of_px4): Quantity) -> plots::About {
     plots::about(plot, if of_px4 { Autopilot::Px4 } else { Autopilot::ArduPilot })
 }
 
-fn limits((plot, _, of_px4): Quantity, flights: &[Flight<'_>]) -> Vec<Limits> {
+fn limits((plot, _, of_px4): Quantity, flights: &[MergedFlight<'_>]) -> Vec<Limits> {
     let params = flights.iter().find_map(|flight| flight.history.drawn().2);
     let autopilot = if of_px4 { Autopilot::Px4 } else { Autopilot::ArduPilot };
     params.map(|params| plots::limits(plot, autopilot, params, 0)).unwrap_or_default()
@@ -181,7 +181,7 @@ mod tests {
         let span = |take_off_s: u64| {
             (Instant::from_millis(take_off_s * 1_000), Instant::from_millis((take_off_s + 40) * 1_000))
         };
-        let flight = |name, history, take_off_s| Flight { name, history, span: span(take_off_s) };
+        let flight = |name, history, take_off_s| MergedFlight { name, history, span: span(take_off_s) };
         let part = merged(&[flight("one", &histories[0], 10), flight("other", &histories[1], 300)]);
         let plots = part.plots.expect("plots");
         let height = plots.iter().find(|plot| plot.id == "Height-0").expect("its height");

@@ -23,7 +23,7 @@ const LOCAL_NED: u8 = 1;
 const ABOVE_SEA: [u8; 2] = [0, 5];
 
 /// Callback for each value.
-pub type Put<'a> = dyn FnMut(Line, f32) + 'a;
+pub type ValueSink<'a> = dyn FnMut(Line, f32) + 'a;
 
 /// An angle from north as a compass has it, 0 to 360 degrees.
 pub fn compass_deg(radians: f32) -> f32 {
@@ -36,7 +36,7 @@ fn yaw_rad([w, x, y, z]: [f32; 4]) -> f32 {
 }
 
 /// Wind to the north and to the east: its speed, and the direction from which it comes.
-fn wind(north: f32, east: f32, put: &mut Put<'_>) {
+fn wind(north: f32, east: f32, put: &mut ValueSink<'_>) {
     put((Plot::Wind, 0), north.hypot(east));
     put((Plot::WindFrom, 0), compass_deg((-east).atan2(-north)));
 }
@@ -56,7 +56,7 @@ pub fn is_of_use(id: u32) -> bool {
 }
 
 /// The values in a message.
-pub fn of_message(id: u32, payload: &[u8], put: &mut Put<'_>) {
+pub fn of_message(id: u32, payload: &[u8], put: &mut ValueSink<'_>) {
     let fields = Fields(payload);
     match id {
         RC_CHANNELS => {
@@ -100,7 +100,7 @@ pub fn of_message(id: u32, payload: &[u8], put: &mut Put<'_>) {
 }
 
 /// 0 and `UINT16_MAX`: not used.
-fn channel(line: u8, pulse_us: f32, put: &mut Put<'_>) {
+fn channel(line: u8, pulse_us: f32, put: &mut ValueSink<'_>) {
     if pulse_us > 0.0 && pulse_us < f32::from(u16::MAX) {
         put((Plot::Sticks, line), pulse_us);
     }
@@ -129,7 +129,7 @@ pub fn rows() -> Rows<'static> {
 }
 
 /// The values in a row of `ArduPilot`'s `DataFlash` or of PX4's topics, by the names there.
-fn of_row(row: &Row<'_>, put: &mut Put<'_>) {
+fn of_row(row: &Row<'_>, put: &mut ValueSink<'_>) {
     let number = |name: &str| number(row, name);
     match row.table.name.as_str() {
         "RCIN" => {
@@ -271,7 +271,7 @@ mod tests {
     use super::*;
     use crate::source::item::{Column, ColumnType, Table};
 
-    fn told(tell: impl FnOnce(&mut Put<'_>)) -> Vec<(Line, f32)> {
+    fn told(tell: impl FnOnce(&mut ValueSink<'_>)) -> Vec<(Line, f32)> {
         let mut all = Vec::new();
         tell(&mut |line, value| all.push((line, (value * 10.0).round() / 10.0)));
         all

@@ -85,10 +85,10 @@ pub fn html(recordings: &[Candidate<'_>], tiles: Option<&Tiles>) -> Result<Optio
         return Ok(None);
     }
     let names: Vec<String> = flights.iter().map(|(one, (index, _))| one.name(*index)).collect();
-    let drawn: Vec<merged::Flight<'_>> = flights
+    let drawn: Vec<merged::MergedFlight<'_>> = flights
         .iter()
         .zip(&names)
-        .map(|((one, (_, flight)), name)| merged::Flight {
+        .map(|((one, (_, flight)), name)| merged::MergedFlight {
             name,
             history: &one.replay.history,
             span: flight.span(),
@@ -110,7 +110,7 @@ impl Recorded<'_> {
         if self.replay.flights.len() > 1 { format!("{name}, flight {}", index + 1) } else { name.clone() }
     }
 
-    fn json(&self, flight: &Flight, drawn: &merged::Flight<'_>) -> FlightJson {
+    fn json(&self, flight: &Flight, drawn: &merged::MergedFlight<'_>) -> FlightJson {
         let (from, to) = flight.span();
         let contents = &self.overview.contents;
         let is_of_it = |at| at >= from && at <= to;

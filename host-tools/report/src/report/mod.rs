@@ -79,7 +79,7 @@ pub struct Request<'a> {
 }
 
 /// Takes a page: its path, its kind, its text. The inputs are not to be overwritten.
-pub type Put<'a> = dyn FnMut(&Path, &What<'_>, &str, &Inputs) -> Result<()> + 'a;
+pub type PageSink<'a> = dyn FnMut(&Path, &What<'_>, &str, &Inputs) -> Result<()> + 'a;
 
 /// Runs `hums report`.
 pub fn run(args: &Request<'_>) -> Result<Outcome> {
@@ -87,7 +87,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
 }
 
 /// Runs `hums report`, and hands the pages to `put` instead of writing files.
-pub fn run_into(args: &Request<'_>, put: &mut Put<'_>) -> Result<Outcome> {
+pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
     let output = &args.output.map_or_else(|| beside(args.inputs), |output| Ok(output.to_owned()))?;
     let (given, remarks) = without_made(args.inputs);
     let found = find(&given, false)?.of_system(args.system)?;
@@ -179,7 +179,7 @@ struct Making<'a> {
     json: bool,
     tiles: Option<&'a tiles::Tiles>,
     made: PagesJson,
-    put: &'a mut Put<'a>,
+    put: &'a mut PageSink<'a>,
 }
 
 impl Making<'_> {
