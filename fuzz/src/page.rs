@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hums::endpoint::Endpoint;
 use hums::live::recording::{self, Content};
-use hums::live::show::{self, Around, SourceJson};
+use hums::live::show::{self, HeadInputs, SourceJson};
 use hums::live::told::Limits;
 use hums::live::world::{Histories, World};
 use hums::logs;
@@ -119,7 +119,7 @@ fn live(path: &Path) {
     .expect("a file that can be read");
     let now = last.unwrap_or_default();
     let source = SourceJson::default();
-    let around = Around { source: &source, epoch_us: Some(1), frames_s: 1.0, influx: None };
+    let around = HeadInputs { source: &source, epoch_us: Some(1), frames_s: 1.0, influx: None };
     let (head, crafts) = show::all(&world, now, &around);
     for text in crafts.into_iter().map(|(_, text)| text).chain([head]) {
         serde_json::from_str::<Value>(&text).expect("JSON");

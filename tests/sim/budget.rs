@@ -6,7 +6,7 @@ use std::path::Path;
 
 use hums::card::{Faults, SimCard, image};
 use hums::endpoint::Endpoint;
-use hums::run::sim::both_ports::{Board, Outcome, Side, run};
+use hums::run::sim::both_ports::{BoardSetup, Outcome, Side, run};
 use hums::source::{self, Chunk, Timing};
 use hums_core::health::Level;
 use hums_core::params::Params;
@@ -62,7 +62,7 @@ fn power_on(recording: &Path, budget: u32, ask: impl FnMut(u64) -> Vec<u8>) -> (
     hums_recorder::format::format(&card, 7).unwrap();
     let mut params = Params::defaults();
     params.set("GS_BUDGET", budget as f32).unwrap();
-    let board = Board { card: &card, params: &params, key: None };
+    let board = BoardSetup { card: &card, params: &params, key: None };
     let mut sent = Vec::new();
     let outcome = run(&board, chunks(recording, ask), |side, at_us, bytes| {
         if side == Side::Ground {

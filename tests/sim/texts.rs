@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use hums::card::{Faults, SimCard, image};
 use hums::endpoint::Endpoint;
-use hums::run::sim::both_ports::{Board, Side, run};
+use hums::run::sim::both_ports::{BoardSetup, Side, run};
 use hums::source::{self, Chunk, Timing};
 use hums_core::health::{self, Level, Subsystem};
 use hums_core::params::Params;
@@ -37,7 +37,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let card = SimCard::new(file, Faults::default()).unwrap();
     hums_recorder::format::format(&card, 7).unwrap();
     let params = Params::defaults();
-    let board = Board { card: &card, params: &params, key: None };
+    let board = BoardSetup { card: &card, params: &params, key: None };
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
     // Without input too.

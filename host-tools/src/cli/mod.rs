@@ -15,7 +15,7 @@ pub use read::{Compact, Decode, Due, Info, Logbook, Report, Share, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{
-    Around, BoxAction, BoxArgs, CardReader, FormatCard, Link, Params, ParamsAction, Pull, Replaced,
+    BoxAction, BoxArgs, CardReader, FormatCard, Link, LogMoment, Params, ParamsAction, Pull, Replaced,
 };
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.

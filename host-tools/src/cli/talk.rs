@@ -158,7 +158,7 @@ pub struct Pull {
     /// Only the part of the newest log around a time (4:20 after power-on, or UTC), or around the latest finding: `critical`,
     /// `warning` (or worse), or the name of a check (`motor_loss`)
     #[arg(long, value_name = "TIME|FINDING")]
-    pub around: Option<Around>,
+    pub around: Option<LogMoment>,
     /// With --around: from S seconds before it to S seconds after it
     #[arg(long, value_name = "S", default_value = "30", value_parser = span, requires = "around")]
     pub span: Span,
@@ -174,7 +174,7 @@ fn span(text: &str) -> Result<Span, String> {
 
 /// A moment of a log.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Around {
+pub enum LogMoment {
     /// A time.
     Time(When),
     /// The latest finding of this level, or a worse one.
@@ -183,7 +183,7 @@ pub enum Around {
     Check(String),
 }
 
-impl std::str::FromStr for Around {
+impl std::str::FromStr for LogMoment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

@@ -15,7 +15,7 @@ use hums_link::framer::Framer;
 use super::hub::{Hub, Published};
 use super::influx::Influx;
 use super::rate::{PUBLISH, Rate};
-use super::show::{self, Around, SourceJson};
+use super::show::{self, HeadInputs, SourceJson};
 use super::told::Limits;
 use super::world::World;
 use crate::duplex::{self, Port};
@@ -210,7 +210,7 @@ impl Feed {
             };
         }
         self.rate.count(self.world.frames);
-        let around = Around {
+        let around = HeadInputs {
             source: &self.source,
             epoch_us: Some(self.epoch_us),
             frames_s: self.rate.frames_s,

@@ -30,7 +30,7 @@ pub struct Published {
 
 /// A request of a page; apart from the vehicle, only for playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
+pub enum PageCommand {
     /// Stops time.
     Pause,
     /// Time goes on.
@@ -46,12 +46,12 @@ pub enum Command {
 pub struct Hub {
     state: watch::Sender<Arc<Published>>,
     histories: Mutex<Histories>,
-    commands: SyncSender<Command>,
+    commands: SyncSender<PageCommand>,
 }
 
 impl Hub {
     /// With the end that takes commands.
-    pub fn new() -> (Arc<Self>, Receiver<Command>) {
+    pub fn new() -> (Arc<Self>, Receiver<PageCommand>) {
         let (commands, taken) = sync_channel(COMMANDS_MAX);
         let (state, _) = watch::channel(Arc::default());
         (Arc::new(Self { state, histories: Mutex::default(), commands }), taken)
@@ -79,7 +79,7 @@ impl Hub {
     }
 
     /// `false` if too many wait.
-    pub fn command(&self, command: Command) -> bool {
+    pub fn command(&self, command: PageCommand) -> bool {
         self.commands.try_send(command).is_ok()
     }
 }

@@ -113,7 +113,7 @@ fn follow(
     args: &cli::Live,
     limits: &Limits,
     hub: &Arc<Hub>,
-    commands: Receiver<hub::Command>,
+    commands: Receiver<hub::PageCommand>,
     influx: Option<Influx>,
 ) -> Result<(Follower, oneshot::Receiver<Infallible>)> {
     let (follows, followed) = oneshot::channel();

@@ -10,12 +10,12 @@ use anyhow::{Context as _, Result};
 use hums_core::clock::{Instant, Span};
 use hums_link::Frame;
 
-use super::hub::{Command, Hub, Published};
+use super::hub::{Hub, PageCommand, Published};
 use super::influx::{Figures, Influx};
 use super::native::Native;
 use super::rate::{PUBLISH, Rate};
 use super::recording::{self, Content, Opened};
-use super::show::{self, Around, SourceJson};
+use super::show::{self, HeadInputs, SourceJson};
 use super::spool::{Spool, SpoolWriter, Spooled};
 use super::told::{Limits, MonitorRecord};
 use super::world::World;
@@ -134,7 +134,7 @@ fn tell(told: &[(Instant, MonitorRecord)], next: &mut usize, by: Instant, world:
 /// Plays a recording until Ctrl-C.
 pub struct Player {
     hub: Arc<Hub>,
-    commands: Receiver<Command>,
+    commands: Receiver<PageCommand>,
     limits: Limits,
     source: SourceJson,
     epoch_us: Option<u64>,
@@ -154,7 +154,7 @@ impl Player {
         name: &str,
         limits: Limits,
         hub: Arc<Hub>,
-        commands: Receiver<Command>,
+        commands: Receiver<PageCommand>,
         influx: Option<Influx>,
     ) -> Self {
         let source = SourceJson {
@@ -238,7 +238,7 @@ impl Player {
             end = end.max(at);
             if frames.is_multiple_of(LOOK_EVERY) && shown.elapsed() >= PUBLISH {
                 shown = Wall::now();
-                let around = Around { source, epoch_us: None, frames_s: 0.0, influx: None };
+                let around = HeadInputs { source, epoch_us: None, frames_s: 0.0, influx: None };
                 let (head, _) = show::all(&World::new(Limits::default()), Instant::ZERO, &around);
                 hub.publish(Published { head, ..Published::default() });
             }
@@ -331,21 +331,23 @@ impl Player {
 
     fn obey(
         &mut self,
-        command: Command,
+        command: PageCommand,
         loaded: &mut Loaded,
         world: &mut World,
         now: &mut Instant,
     ) -> Result<()> {
         match command {
-            Command::Pause if self.source.phase == "playing" => self.source.phase = "paused",
-            Command::Play => {
+            PageCommand::Pause if self.source.phase == "playing" => self.source.phase = "paused",
+            PageCommand::Play => {
                 if self.source.phase == "ended" {
                     self.seek(loaded.start, loaded, world, now)?;
                 }
                 self.source.phase = "playing";
             }
-            Command::Speed(speed) if speed.is_finite() => self.source.speed = speed.clamp(SPEEDS.0, SPEEDS.1),
-            Command::Seek(to_s) if to_s.is_finite() => {
+            PageCommand::Speed(speed) if speed.is_finite() => {
+                self.source.speed = speed.clamp(SPEEDS.0, SPEEDS.1)
+            }
+            PageCommand::Seek(to_s) if to_s.is_finite() => {
                 let to = Instant::from_micros((to_s.max(0.0) * 1e6) as u64).clamp(loaded.start, loaded.end);
                 self.seek(to, loaded, world, now)?;
                 if self.source.phase == "ended" && to < loaded.end {
@@ -353,7 +355,7 @@ impl Player {
                 }
             }
             // Nothing to pause, or an invalid time.
-            Command::Pause | Command::Speed(_) | Command::Seek(_) => {}
+            PageCommand::Pause | PageCommand::Speed(_) | PageCommand::Seek(_) => {}
         }
         Ok(())
     }
@@ -385,7 +387,7 @@ impl Player {
 
     fn publish(&mut self, world: &World, now: Instant) {
         self.rate.count(world.frames);
-        let around = Around {
+        let around = HeadInputs {
             source: &self.source,
             epoch_us: self.epoch_us,
             frames_s: self.rate.frames_s,

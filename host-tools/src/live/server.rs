@@ -23,7 +23,7 @@ use tokio::sync::oneshot;
 
 use super::assets;
 use super::guard::Guard;
-use super::hub::{Command, Hub, Published};
+use super::hub::{Hub, PageCommand, Published};
 use crate::page::history::Cursor;
 use crate::page::json;
 
@@ -218,10 +218,10 @@ impl Page {
                 self.follow.mark_changed();
                 return;
             }
-            Ok(Asked::Pause) => Command::Pause,
-            Ok(Asked::Play) => Command::Play,
-            Ok(Asked::Seek { to }) => Command::Seek(to),
-            Ok(Asked::Speed { to }) => Command::Speed(to),
+            Ok(Asked::Pause) => PageCommand::Pause,
+            Ok(Asked::Play) => PageCommand::Play,
+            Ok(Asked::Seek { to }) => PageCommand::Seek(to),
+            Ok(Asked::Speed { to }) => PageCommand::Speed(to),
             Err(_) => return,
         };
         hub.command(command);

@@ -66,7 +66,7 @@ struct VehicleJson {
 
 /// The head's data, apart from the world.
 #[derive(Clone, Debug)]
-pub struct Around<'a> {
+pub struct HeadInputs<'a> {
     /// The source.
     pub source: &'a SourceJson,
     /// UTC of time zero, microseconds since 1970.
@@ -78,7 +78,7 @@ pub struct Around<'a> {
 }
 
 /// Source, time and vehicles; each vehicle by system id.
-pub fn all(world: &World, now: Instant, around: &Around<'_>) -> (String, Vec<(u8, String)>) {
+pub fn all(world: &World, now: Instant, around: &HeadInputs<'_>) -> (String, Vec<(u8, String)>) {
     let boards: Vec<_> = world.crafts.values().map(|craft| Board::of(craft, now)).collect();
     let crafts = || world.crafts.iter().zip(&boards);
     let vehicles = crafts().map(|((system, craft), board)| VehicleJson {

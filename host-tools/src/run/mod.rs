@@ -33,7 +33,7 @@ use crate::source::Chunk;
 use arrivals::Arrivals;
 use earlier::EarlierSessions;
 use ground::Ground;
-use report::Report;
+use report::RunReport;
 use store::FileFlash;
 
 /// Step in real time, while nothing arrives.
@@ -173,7 +173,7 @@ fn prepare(run: &Sim, (inputs, params): &Request, unknown: u64) -> Result<Prepar
 }
 
 /// Remarks and the report.
-fn finish(run: &Sim, arrivals: &Arrivals, ground: &Ground, report: &Report) -> Result<Outcome> {
+fn finish(run: &Sim, arrivals: &Arrivals, ground: &Ground, report: &RunReport) -> Result<Outcome> {
     let beside = ground.finish().and(arrivals.finish());
     for remark in arrivals.remark().into_iter().chain(report.remark(&run.input)) {
         note!("{remark}");

@@ -23,7 +23,7 @@ const SCHEMA: Schema = Schema::first("hums-run");
 
 /// The object of `--json`; its names are a contract.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Report {
+pub struct RunReport {
     /// Frames that came in.
     pub frames_in: u64,
     /// Frames that are on the card.
@@ -109,7 +109,7 @@ fn findings<S: Serializer>(findings: &[Finding], serializer: S) -> Result<S::Ok,
     serializer.collect_seq(findings.iter().map(|finding| FindingJson::new(finding, None)))
 }
 
-impl Report {
+impl RunReport {
     /// The recorder's counters.
     pub fn set_stats(&mut self, stats: &Stats) {
         self.frames_in = stats.frames_in;

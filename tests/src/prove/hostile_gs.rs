@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, ensure};
 use hums::card::Faults;
 use hums::logs::on_card;
 use hums::rng::Rng;
-use hums::run::sim::both_ports::{Board, Outcome, Side, run as power_on};
+use hums::run::sim::both_ports::{BoardSetup, Outcome, Side, run as power_on};
 use hums::source::Chunk;
 use hums_core::clock::Instant;
 use hums_core::params::{Param, Params, TABLE};
@@ -175,7 +175,7 @@ fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half
     let params = params(key.is_some())?;
     let mut hostile = Hostile::new(options.seed ^ u64::from(key.is_some()));
     let (mut window, mut to_autopilot) = (Window::default(), ToAutopilot::default());
-    let board = Board { card: &device, params: &params, key };
+    let board = BoardSetup { card: &device, params: &params, key };
     let outcome =
         power_on(&board, both_sides(&streams, seconds, &mut hostile), |side, at_us, frame| match side {
             Side::Ground => window.add(at_us, frame.len()),

@@ -11,7 +11,7 @@ use board::{Board, Traffic};
 use hums_sdcard::Medium;
 use stm32f405_model::image::Image;
 
-use super::report::{OnCard, Report};
+use super::report::{OnCard, RunReport};
 use super::{Prepared, check_request, check_standard_output, check_store, drive, finish, prepare};
 use crate::card::image::is_card;
 use crate::cli;
@@ -55,7 +55,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     if let Some((times, first_s)) = board.resets() {
         note!("the board reset itself {}, first at {first_s:.3} s", count(times, "time"));
     }
-    let mut report = Report::default();
+    let mut report = RunReport::default();
     let (frames, on_card) = report.read_card(&run.sd, &earlier)?;
     tell(&mut report, &board.traffic(), frames, &on_card);
     report.blocks_written = medium.writes();
@@ -67,7 +67,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     finish(run, &arrivals, &ground, &report)
 }
 
-fn tell(report: &mut Report, traffic: &Traffic, frames: u64, on_card: &OnCard) {
+fn tell(report: &mut RunReport, traffic: &Traffic, frames: u64, on_card: &OnCard) {
     report.frames_in = traffic.frames_in;
     report.frames_logged = frames.min(traffic.frames_in);
     report.frames_lost = report.frames_in - report.frames_logged;

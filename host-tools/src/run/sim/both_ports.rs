@@ -30,7 +30,7 @@ pub enum Side {
 
 /// The board before its first byte.
 #[derive(Clone, Copy, Debug)]
-pub struct Board<'a> {
+pub struct BoardSetup<'a> {
     /// Its card.
     pub card: &'a SimCard,
     /// Its parameters.
@@ -53,7 +53,7 @@ pub struct Outcome {
 /// Both ports get their bytes in time. `told` gets each frame that leaves a port, with the time of the chunk before.
 /// For milliseconds, give a chunk each millisecond.
 pub fn run(
-    board: &Board<'_>,
+    board: &BoardSetup<'_>,
     chunks: impl IntoIterator<Item = (Side, Chunk)>,
     mut told: impl FnMut(Side, u64, &[u8]),
 ) -> Result<Outcome> {

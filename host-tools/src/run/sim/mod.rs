@@ -25,7 +25,7 @@ use pipeline::Pipeline;
 use super::arrivals::Arrivals;
 use super::earlier::EarlierSessions;
 use super::ground::Ground;
-use super::report::{FINDINGS_MAX, Report};
+use super::report::{FINDINGS_MAX, RunReport};
 use super::store::{self, FileFlash};
 use super::{Prepared, check_request, check_standard_output, check_store, drive, emulate, finish, prepare};
 use crate::card::image::is_card;
@@ -55,7 +55,7 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
         flash: &flash,
         gs,
         autopilot: arrivals.take_autopilot(),
-        report: Report::default(),
+        report: RunReport::default(),
         reboots: run.faults.reboot_at_us.clone(),
         boots: 0,
         entropy,
@@ -152,7 +152,7 @@ struct World<'a> {
     flash: &'a FileFlash,
     gs: Box<dyn Write + Send>,
     autopilot: Box<dyn Write + Send>,
-    report: Report,
+    report: RunReport,
     /// When our own power goes for a moment, sorted.
     reboots: Vec<u64>,
     boots: u32,
@@ -174,7 +174,7 @@ impl World<'_> {
     ) -> Result<bool> {
         self.boots += 1;
         let mut memory = Memory::new(&Params::defaults());
-        let Report { findings, findings_left_out, .. } = &mut self.report;
+        let RunReport { findings, findings_left_out, .. } = &mut self.report;
         let mut keep = |finding| {
             if findings.len() < FINDINGS_MAX {
                 findings.push(finding);
@@ -230,7 +230,7 @@ impl World<'_> {
     }
 
     /// The report, with the data of the card itself.
-    fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<Report> {
+    fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<RunReport> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();
         let findings = std::mem::take(&mut report.findings);

@@ -19,7 +19,7 @@ use tempfile::NamedTempFile;
 
 use super::compare::{beginning_of, bytes_of, heading_of};
 use super::ftp::Ftp;
-use crate::cli::Around;
+use crate::cli::LogMoment;
 use crate::files::{begin, cannot_write};
 use crate::logs::fat::Extent;
 use crate::logs::naming::part_name;
@@ -52,13 +52,13 @@ pub(super) fn pull(
     ftp: &mut Ftp,
     files: &[(String, u32)],
     output: &Path,
-    (what, span): (&Around, Span),
+    (what, span): (&LogMoment, Span),
 ) -> Result<Brought> {
     let mut log = RemoteLog::new(ftp, files, output)?;
     let (mut found, mut searched) = (None, Outcome::Done);
     let at = match what {
-        Around::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
-        Around::Time(When::Utc(utc_us)) => {
+        LogMoment::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
+        LogMoment::Time(When::Utc(utc_us)) => {
             let power_on_us = log.power_on_us()?;
             let micros = utc_us.checked_sub(power_on_us);
             Instant::from_micros(micros.with_context(|| {
@@ -68,7 +68,7 @@ pub(super) fn pull(
                 )
             })?)
         }
-        Around::Level(_) | Around::Check(_) => {
+        LogMoment::Level(_) | LogMoment::Check(_) => {
             let latest;
             (latest, searched) = log.latest(what)?;
             found.insert(latest).at
@@ -129,12 +129,12 @@ fn tell_faults(overview: &Overview, to: Option<Instant>) -> Outcome {
 }
 
 /// A return to normal does not match.
-fn is_wanted(what: &Around, finding: &Finding) -> bool {
+fn is_wanted(what: &LogMoment, finding: &Finding) -> bool {
     match what {
-        Around::Level(Level::Critical) => finding.level == Level::Critical,
-        Around::Level(_) => finding.is_bad(),
-        Around::Check(name) => finding.is_bad() && finding.check == *name,
-        Around::Time(_) => false,
+        LogMoment::Level(Level::Critical) => finding.level == Level::Critical,
+        LogMoment::Level(_) => finding.is_bad(),
+        LogMoment::Check(name) => finding.is_bad() && finding.check == *name,
+        LogMoment::Time(_) => false,
     }
 }
 
@@ -281,7 +281,7 @@ impl<'a> RemoteLog<'a> {
     }
 
     /// Group by group from the end; whether nothing was lost there.
-    fn latest(&mut self, what: &Around) -> Result<(Finding, Outcome)> {
+    fn latest(&mut self, what: &LogMoment) -> Result<(Finding, Outcome)> {
         let (count, mut start, mut found) = (self.count(), self.count(), None);
         while start > 0 && found.is_none() {
             let places = self.group_before(start)?;

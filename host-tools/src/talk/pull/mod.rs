@@ -164,7 +164,7 @@ fn around(
     ftp: &mut Ftp,
     mut logs: Vec<(String, u32)>,
     args: &cli::Pull,
-    moment: &cli::Around,
+    moment: &cli::LogMoment,
 ) -> Result<Outcome> {
     let newest = logs.iter().rev().find(|(_, bytes)| *bytes > 0).and_then(|(log, _)| number(log));
     if !args.names.is_empty() && logs.iter().any(|(log, _)| number(log) != newest) {

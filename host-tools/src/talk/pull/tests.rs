@@ -193,7 +193,7 @@ fn what_is_no_file_in_the_place_of_a_log_is_told_and_left() {
 fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is_read() {
     let dir = tempfile::tempdir().expect("a folder");
     let (log, other, name) = two_logs(dir.path());
-    let what: cli::Around = "0".parse().expect("a time");
+    let what: cli::LogMoment = "0".parse().expect("a time");
     let mut ftp = board(log.clone(), other, 8 * 3 + 5);
     let span = hums_core::clock::Span::from_secs(9_999);
     let files = [(NAME.to_owned(), log.len() as u32)];
