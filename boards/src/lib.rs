@@ -24,12 +24,10 @@ pub const TAG_END: char = ';';
 const USB: [(&str, Pin); 2] =
     [("usb-dm", Pin { port: 0, number: 11 }), ("usb-dp", Pin { port: 0, number: 12 })];
 
-/// Multiples of this frequency divide down to the input of the chip's PLL.
 const CRYSTAL_STEP_HZ: u32 = 2_000_000;
 /// A crystal of the chip (DS8626, table 36).
 const CRYSTAL_HZ: std::ops::RangeInclusive<u32> = 4_000_000..=26_000_000;
 
-/// The files, by name.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/files.rs"));
 
 /// A board.
@@ -295,7 +293,7 @@ impl Board {
         Ok(board)
     }
 
-    /// Every pin with its function. A pin that two functions share appears twice.
+    /// Every pin with its function; a shared pin appears twice.
     pub fn pins(&self) -> Vec<(&'static str, Pin)> {
         let Self { autopilot, radio, card, led, button, hold, .. } = self;
         let mut pins = vec![
@@ -332,7 +330,6 @@ impl Board {
         ports.chain(card.bus.iter().flat_map(|bus| [bus.rx, bus.tx])).collect()
     }
 
-    /// Rules that the compiler of the firmware would report less clearly, or not at all.
     fn check(&self) -> Result<(), String> {
         if !CRYSTAL_HZ.contains(&self.crystal_hz) || !self.crystal_hz.is_multiple_of(CRYSTAL_STEP_HZ) {
             return Err(format!(

@@ -19,7 +19,6 @@ const RESTART: u16 = 246;
 /// In kB/s. The first guess of a person's patience: an hour's log in a minute and a half.
 const READ_KBPS_MIN: u64 = 600;
 
-/// A second of records and a second of a quiet line, with heartbeats of a disarmed vehicle.
 fn on_the_ground() -> Rig {
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
@@ -34,7 +33,6 @@ fn on_the_ground() -> Rig {
     rig
 }
 
-/// A command of the ground station's.
 fn command(rig: &mut Rig, action: f32) {
     let mut out = [0; FRAME_BYTES_MAX];
     let packet = messages::command_long(RESTART, &[action], 1, COMPONENT);
@@ -43,7 +41,6 @@ fn command(rig: &mut Rig, action: f32) {
     rig.machine.send(usart(&rig.wired.radio), &frame, now, 57_600.0);
 }
 
-/// A board in card-reader mode, and the number of its resets.
 fn reading() -> (Rig, usize) {
     let mut rig = on_the_ground();
     let resets = rig.machine.resets.len();
@@ -57,7 +54,6 @@ fn reading() -> (Rig, usize) {
     (rig, resets + 1)
 }
 
-/// Plugs a host in, runs its program to the end, and returns its result.
 fn use_host<T: Send + 'static>(
     rig: &mut Rig,
     limit: Ps,
@@ -98,7 +94,6 @@ fn the_card_reader_shows_the_card_as_it_is_and_the_board_records_after_the_eject
         let (begun, count) = (disk.bus.now, 500);
         disk.read(20_000, count)?;
         let kbps = u64::from(count) * 512 * MS / (disk.bus.now - begun);
-        // A write changes nothing.
         let done = disk.write(&[0x2A, 0, 0, 0, 0, 0, 0, 0, 2, 0], &[0x55; 1_024])?;
         ensure!((done.status, done.residue, disk.sense()?) == (1, 1_024, (0x07, 0x27)), "{done:?}");
         ensure!(disk.command(&[0x5E; 10], 512)?.status == 1 && disk.sense()? == (0x05, 0x20));
@@ -134,7 +129,6 @@ fn no_cable_and_no_other_command_stops_a_record() {
         bus.act(Action::Setup(0, [0x80, 6, 0, 1, 0, 0, 18, 0]))
     });
     assert_eq!(answers, Reply::Nothing);
-    // A restart of another kind; card-reader mode while armed.
     command(&mut rig, 1.0);
     let now = rig.machine.now();
     rig.run(now + SECOND, false).unwrap();
@@ -158,7 +152,6 @@ fn a_hostile_host_gets_the_card_after_it_behaves() {
     use_host(&mut rig, 60 * SECOND, move |bus| {
         let mut disk = Disk::attach(bus)?;
         let (to, from) = disk.endpoints;
-        // Requests about endpoints that there are not, and halts of those that there are.
         for endpoint in [1, 2, 3, 4, 15, 0x81, 0x83, 0x84, 0x8F, 0xFF] {
             for request in [1, 3] {
                 disk.bus.control(2, request, 0, endpoint)?;
@@ -180,7 +173,6 @@ fn a_hostile_host_gets_the_card_after_it_behaves() {
             disk.bus.clear_halt(0x80 | from)?;
             ensure!(disk.read(0, 1)?.data == first, "after garbage");
         }
-        // Unknown requests of all kinds.
         for kind in [0x00, 0x01, 0x02, 0x03, 0x20, 0x21, 0x22, 0x40, 0x41, 0x5F] {
             for request in [0, 2, 7, 9, 11, 0x22, 0xFD, 0xFE] {
                 disk.bus.control(kind, request, 0xFFFF, 0xFFFF)?;
@@ -188,7 +180,6 @@ fn a_hostile_host_gets_the_card_after_it_behaves() {
             }
         }
         ensure!(disk.read(0, 1)?.data == first, "after unknown requests");
-        // A host that goes away in the middle of a command.
         let mut wrapper = b"USBC\x01\0\0\0\0\x80\0\0\x80\0\x0A\x28\0\0\0\0\0\0\0\x40".to_vec();
         wrapper.resize(31, 0);
         disk.bus.write(to, &wrapper)?;

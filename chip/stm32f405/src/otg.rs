@@ -1,12 +1,12 @@
-//! USB OTG FS as a device (RM0090, chapter 34), and the bus to a host: whole packets, each with its time at 12 Mbit/s.
+//! USB OTG FS as a device (RM0090, chapter 34), and the bus to a host: whole packets, each with its time at
+//! 12 Mbit/s.
 //!
-//! The host is a [`Host`]: it gives one action after the other, and gets the device's reply.
+//! Not modelled: host and OTG mode, DMA, isochronous and interrupt timing, remote wake-up, start of frame
+//! interrupts, thresholds, damaged packets, the time that a switch to device mode takes (25 ms). A register
+//! that is not modelled stops the machine.
 //!
-//! Not modelled: host and OTG mode, DMA, isochronous and interrupt timing, remote wake-up, start of frame interrupts, thresholds,
-//! damaged packets, the time that a switch to device mode takes (25 ms). A register that is not modelled stops the machine.
-//!
-//! An OUT endpoint stays enabled at the end of a transfer, and only NAK stops the next packet. The manual says that it is disabled.
-//! embassy's driver, which runs on boards, enables it once.
+//! An OUT endpoint stays enabled at the end of a transfer, and only NAK stops the next packet. The manual
+//! says that it is disabled; embassy's driver, which runs on boards, enables it once.
 
 use std::collections::VecDeque;
 
@@ -19,11 +19,9 @@ const BIT: Ps = 83_333;
 const OVERHEAD_BYTES: u64 = 14;
 /// A token with NAK, STALL or nothing behind it.
 const REFUSAL_BYTES: u64 = 8;
-/// A reset of the bus.
 const RESET: Ps = 10 * MS;
 /// How often a host looks for a device.
 const LOOK: Ps = MS;
-/// Endpoints in each direction.
 const ENDPOINTS: usize = 4;
 /// Words of the FIFO memory.
 const FIFO_WORDS: usize = 320;
@@ -42,7 +40,7 @@ const OEPINT: u32 = 1 << 19;
 const WKUPINT: u32 = 1 << 31;
 /// `GUSBCFG`: device mode.
 const FDMOD: u32 = 1 << 30;
-/// `GCCFG`: the transceiver is on; the bus's voltage is not looked at.
+/// `GCCFG`: the transceiver is on.
 const PWRDWN: u32 = 1 << 16;
 const NOVBUSSENS: u32 = 1 << 21;
 /// `DCTL`: disconnected by software.
@@ -56,7 +54,6 @@ const SNAK: u32 = 1 << 27;
 const SD0PID: u32 = 1 << 28;
 const EPDIS: u32 = 1 << 30;
 const EPENA: u32 = 1 << 31;
-/// Size, type and FIFO: bits that are only kept.
 const KEPT: u32 = 0x7FF | 3 << 18 | 0xF << 22;
 /// Bits of `DIEPINT` and `DOEPINT`.
 const XFRC: u32 = 1;
@@ -111,11 +108,8 @@ pub trait Host: Send {
 
 #[derive(Clone, Copy, Debug)]
 struct Endpoint {
-    /// Bits of its control register.
     control: u32,
-    /// Its interrupts.
     interrupts: u32,
-    /// Its transfer.
     size: u32,
     /// The next packet is DATA1.
     data1: bool,
@@ -186,10 +180,10 @@ pub struct Otg {
     address: u32,
     to_host: [Endpoint; ENDPOINTS],
     from_host: [Endpoint; ENDPOINTS],
-    /// Words of packets to the host.
+    /// Words to the host.
     sending: [VecDeque<u32>; ENDPOINTS],
     received: VecDeque<Received>,
-    /// Words of the packet whose status was read.
+    /// Words of the packet with a read status.
     popped: VecDeque<u32>,
     host: Option<Box<dyn Host>>,
     action: Action,
@@ -259,7 +253,7 @@ impl Otg {
         (self.host, self.action, self.over) = (Some(host), Action::Wait(0), now);
     }
 
-    /// When the bus has its next moment.
+    /// The bus's next moment.
     pub fn deadline(&self) -> Ps {
         if self.host.is_some() { self.over } else { NEVER }
     }
@@ -303,7 +297,6 @@ impl Otg {
         self.begin(now);
     }
 
-    /// Begins the host's action: its end is known.
     fn begin(&mut self, now: Ps) {
         let transfer = |bytes: u64| 8 * bytes * BIT;
         let lasts = match &self.action {
@@ -357,7 +350,7 @@ impl Otg {
         self.enumerated && self.address == u32::from(address)
     }
 
-    /// Words in the receive FIFO: each packet has a status word.
+    /// Words in the receive FIFO, with a status word for each packet.
     fn taken(&self) -> usize {
         self.received.iter().map(|packet| 1 + packet.words.len()).sum::<usize>() + self.popped.len()
     }
@@ -381,7 +374,6 @@ impl Otg {
         Reply::Done
     }
 
-    /// An endpoint that takes part.
     fn active(endpoints: &[Endpoint; ENDPOINTS], number: u8) -> Option<Endpoint> {
         endpoints.get(usize::from(number)).copied().filter(|endpoint| endpoint.is(USBAEP))
     }
@@ -407,7 +399,6 @@ impl Otg {
         Reply::Done
     }
 
-    /// Bytes of the packet that an endpoint sends now.
     fn ready(&self, number: u8) -> Result<usize, Reply> {
         let endpoint = Self::active(&self.to_host, number).ok_or(Reply::Nothing)?;
         let bytes = (endpoint.size & 0x7_FFFF) as usize;
@@ -597,7 +588,7 @@ impl Otg {
         Some(())
     }
 
-    /// `GRSTCTL`: empties FIFOs. A reset of the core is not modelled.
+    /// `GRSTCTL` without a reset of the core.
     fn flush(&mut self, value: u32) -> Option<()> {
         if value & 1 == 1 {
             return None;

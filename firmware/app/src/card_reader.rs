@@ -1,12 +1,12 @@
 //! Card-reader mode: the card as a read-only USB disk. Nothing is recorded.
 //!
-//! The mode is a start of its own. A station's command ends the log, leaves a mark in memory that survives a reset, and resets the
-//! board. So no task of a recording runs beside USB, and its memory and stack are free. A fault, the watchdog, an eject or ten
-//! minutes without a host reset the board again: it then records. Plugging a cable in never starts the mode, because a charger in
+//! A station's command ends the log, leaves a mark in memory that survives a reset, and resets the board. So
+//! no task of a recording runs beside USB, and its memory and stack are free. A fault, the watchdog, an eject
+//! or ten minutes without a host end the mode by a reset. A plugged cable never starts the mode: a charger in
 //! the field must not stop a recording.
 //!
-//! There is one loop, without an executor: it polls the USB stack and the disk. The card's driver blocks it for at most 8 s.
-//! Meanwhile [`watch`] feeds the watchdog.
+//! One loop without an executor polls the USB stack and the disk. The card's driver blocks it for at most 8
+//! s; [`watch`] feeds the watchdog meanwhile.
 
 use core::future::poll_fn;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -26,7 +26,6 @@ use crate::boards::board;
 use crate::links::now;
 use crate::watch;
 
-/// The mode ends after this time without a host.
 const HOST_MAX: Span = Span::from_secs(600);
 /// After an eject the host still fetches its status.
 const PARTING: Span = Span::from_secs(1);
@@ -39,7 +38,6 @@ const LED_EVERY: Span = Span::from_millis(100);
 const VENDOR: u16 = 0x1209;
 const PRODUCT: u16 = 0x0001;
 
-/// Says that the mode was asked for.
 const MARK: u32 = 0x5553_4244;
 
 struct Asked {
@@ -50,14 +48,13 @@ struct Asked {
 #[unsafe(link_section = ".uninit.card_reader")]
 static ASKED: Asked = Asked { mark: AtomicU32::new(0), not_mark: AtomicU32::new(0) };
 
-/// Restarts the board in card-reader mode.
 pub(crate) fn restart() -> ! {
     ASKED.mark.store(MARK, Ordering::Relaxed);
     ASKED.not_mark.store(!MARK, Ordering::Relaxed);
     board::restart()
 }
 
-/// Whether this start is the card reader's. True once for each [`restart`].
+/// True once for each [`restart`].
 pub(crate) fn is_asked(cause: ResetCause) -> bool {
     let words = [&ASKED.mark, &ASKED.not_mark].map(|word| word.swap(0, Ordering::Relaxed));
     // At another start memory may hold anything.
@@ -102,7 +99,6 @@ pub(crate) fn run(
     board::restart()
 }
 
-/// Reports to the watch, lights the LED, and ends when no host was there for long enough.
 async fn supervise(mut led: board::Led, link: &Link) {
     let (mut seen, mut lit) = (now(), Instant::ZERO);
     poll_fn(|_| {

@@ -1,11 +1,11 @@
 //! Watchdog monitor: finds the cause of a watchdog reset.
 //!
-//! A watchdog reset leaves no trace. So `SysTick`, the most urgent exception, counts the time since the last feeding. Before the
-//! timeout it leaves a note of the interrupted code with its registers, so it catches a hanging task of any urgency. Only code
-//! that masks all interrupts leaves no note; the next start reports that too.
+//! A watchdog reset leaves no trace. So `SysTick`, the most urgent exception, counts the time since the last
+//! feeding. Before the timeout it notes the interrupted code with its registers, for a hanging task of any
+//! urgency. Only code that masks all interrupts leaves no note; the next start reports that too.
 //!
-//! In card-reader mode `SysTick` itself feeds the watchdog for some time ([`allow`]): no task runs that could do so while the
-//! card's driver blocks.
+//! In card-reader mode `SysTick` itself feeds the watchdog for some time ([`allow`]), while the card's driver
+//! blocks.
 
 use core::arch::naked_asm;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -18,12 +18,10 @@ use crate::fault;
 /// The watchdog does not run yet.
 const NEVER: u32 = u32::MAX;
 
-/// Turns of `SysTick`.
 static SINCE_FED: AtomicU32 = AtomicU32::new(NEVER);
 /// Turns that `SysTick` itself feeds the watchdog for.
 static ALLOWED: AtomicU32 = AtomicU32::new(0);
 
-/// For this many turns without [`fed`] the watchdog is fed here.
 pub(crate) fn allow(turns: u32) {
     ALLOWED.store(turns, Ordering::Relaxed);
     fed();
@@ -36,7 +34,6 @@ pub(crate) fn fed() {
     }
 }
 
-/// The exception itself: [`turn`] with what it interrupted.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn SysTick() {

@@ -1,5 +1,4 @@
-//! Every check finds its fault within its own debounce plus 100 ms, alone, and is good again after it: on both autopilots,
-//! with an engine, a second battery and a twelfth motor.
+//! Every check finds its fault within its own debounce plus 100 ms, alone, and is good again after it.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use crate::common::{Quad, Run};
@@ -17,7 +16,6 @@ use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Metres, Radians
 const FAULT_MS: u64 = 20_000;
 const END_MS: u64 = 95_000;
 
-/// A fault: it changes the quad, and adds other observations.
 type Fault = fn(&mut Quad, &mut Vec<Observation>);
 
 /// Off by default, since they depend on the engine and on the devices.
@@ -30,7 +28,6 @@ const LIMITS: [(&str, f32); 6] = [
     ("RADIO_RSSI_WARN", 60.0),
 ];
 
-/// The heartbeat decides the scale of vibration.
 fn px4() -> Observation {
     let kind = VehicleKind::Rotorcraft;
     Observation::Heartbeat(Heartbeat {
@@ -100,7 +97,6 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
             ..Engine::default()
         }));
     }),
-    // It runs at its speed, and then no longer.
     ("generator_speed", 0, Level::Critical, |_, more| {
         more.extend([6_000.0, 3_000.0].map(|rpm| generator(false, rpm)));
     }),
@@ -184,7 +180,6 @@ const ELSEWHERE: &str = "\
     baro_mismatch compass_unused vibration_rise motor_output motor_off esc_silent esc_errors heartbeat \
     autopilot_reboot batt_resistance gps_speed free_fall impact tumbling disarmed_in_air sinking overturned";
 
-/// Checks whose fault is one of another check too.
 const WITH: [(&str, &str); 7] = [
     ("cell_dev_lasting", "cell_deviation"),
     ("cell_deviation", "cell_dev_lasting"),
@@ -222,7 +217,6 @@ fn esc(quad: &mut Quad, motor: usize) -> &mut Esc {
     quad.escs[motor].as_mut().unwrap()
 }
 
-/// Signal of both ends, and their noise.
 fn radio(more: &mut Vec<Observation>, rssi: [u8; 2], noise: [u8; 2]) {
     let ([rssi, remote_rssi], [noise, remote_noise]) = (rssi.map(Some), noise.map(Some));
     let radio = TelemetryRadio { rssi, remote_rssi, noise, remote_noise, errors: 0 };
@@ -255,8 +249,7 @@ fn a_generator_is_judged_once_it_has_run_and_until_it_is_switched_off() {
     assert_eq!(generator_levels(false, &[runs, stands, starts]), [], "disarmed");
 }
 
-/// A fault is found as this level, after the debounce of its check. It makes no other alarm that it does not explain, and is over
-/// when its value was good for a while.
+/// A fault is found as this level, after the debounce of its check.
 fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad, &mut Vec<Observation>)) {
     let check = health::check_named(name).expect(name);
     let mut run = with(&LIMITS);
@@ -350,7 +343,6 @@ fn the_autopilots_figure_of_the_battery_counts_where_no_battery_reports_itself()
 fn each_kind_of_component_is_due_in_its_own_subsystem() {
     for (name, kind) in DUE {
         let limits = [("CMP1_KIND", kind), ("CMP1_FLIGHTS", 1.0)];
-        // It is disarmed on the ground, and its flight has ended.
         let findings = fly(&limits, |quad, _| (quad.armed, quad.height) = (false, 0.0));
         let found: Vec<_> = findings.iter().map(|finding| (finding.check, finding.level)).collect();
         assert_eq!(found, [(name, Level::Warning), (name, Level::Critical)], "kind {kind}: {findings:?}");

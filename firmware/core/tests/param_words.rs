@@ -1,5 +1,4 @@
-//! Texts of a parameter for editors and lists: the words of its row, or of its check if it is the limit of one.
-//! Documents, component information and Mission Planner's file are made of them by tests.
+//! Texts of a parameter for documents, component information and Mission Planner's file.
 
 use core::fmt;
 
@@ -68,7 +67,6 @@ pub fn group(param: Param) -> &'static str {
     }
 }
 
-/// The checks that a parameter limits, and whether it is the warning's limit.
 fn limits(param: Param) -> impl Iterator<Item = (&'static Check, bool)> {
     checks().filter_map(move |check| match param {
         _ if check.limits.warn == Some(param) => Some((check, true)),

@@ -86,7 +86,6 @@ pub struct MassStorage<'d, D: Driver<'d>> {
 enum End {
     /// The host has ejected the disk, and has the status of that command.
     Ejected,
-    /// The bus was reset.
     Disabled,
 }
 
@@ -117,7 +116,7 @@ impl<'d, D: Driver<'d>> MassStorage<'d, D> {
             self.from_host.wait_enabled().await;
             self.link.abort.reset();
             let link = self.link;
-            // A packet from before the reset. The host sends none before the status of its request.
+            // The host sends none before the status of its request.
             let mut packet = [0; PACKET_BYTES];
             let _ = poll_once(self.from_host.read(&mut packet));
             // The abort first: the rest of an aborted command must not reach an endpoint that was emptied.

@@ -51,7 +51,6 @@ impl Link {
         self.is_configured.load(Ordering::Relaxed) && !self.is_suspended.load(Ordering::Relaxed)
     }
 
-    /// Halts the endpoints of all classes.
     pub(crate) fn halt(&self) {
         self.is_halted.store(true, Ordering::Relaxed);
         self.halt.signal(());
@@ -175,7 +174,6 @@ pub struct GuardedBus<'d, B> {
     endpoints: Endpoints,
 }
 
-/// Drops the packet that an endpoint has for the host.
 fn empty(bus: &mut impl driver::Bus, address: EndpointAddress) {
     if address.is_in() {
         bus.endpoint_set_enabled(address, false);

@@ -65,25 +65,20 @@ pub enum Answer {
     },
 }
 
-/// State of the slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Slot {
-    /// Not looked at yet.
     Unknown,
     /// A card of this many blocks.
     Card(u32),
-    /// The card was missing at the last access.
     Empty,
-    /// The host has ejected the disk.
     Ejected,
 }
 
 /// Hexadecimal digits of the serial number.
 pub const SERIAL_BYTES: usize = 24;
 
-/// Standard INQUIRY data: removable disk, SPC-2, without the names.
+/// Removable disk, SPC-2.
 const INQUIRY: [u8; 8] = [0, 0x80, 4, 2, 31, 0, 0, 0];
-/// Vendor, product and revision.
 const NAMES: [u8; 28] = *b"HUMS    Card reader     1.0 ";
 const REPLY_BYTES: usize = 48;
 const _: () = assert!(INQUIRY.len() + NAMES.len() <= REPLY_BYTES && 4 + 8 + SERIAL_BYTES <= REPLY_BYTES);
@@ -130,7 +125,7 @@ impl<D: CardDevice> Disk<D> {
         answer.map_err(|sense| self.sense = sense).ok()
     }
 
-    /// Reads blocks of an accepted command. `false`: the card did not give them, and `blocks` must not be sent.
+    /// Reads blocks of an accepted command. After `false` nobody may send `blocks`.
     pub fn read(&mut self, first: u32, blocks: &mut [Block]) -> bool {
         let read = self.access(|card| card.read(blocks, first));
         read.map_err(|sense| self.sense = sense).is_ok()
@@ -207,7 +202,7 @@ impl<D: CardDevice> Disk<D> {
         })
     }
 
-    /// These pieces as the reply, cut at the host's allocation length.
+    /// Cuts the reply at the host's allocation length.
     fn answer(&mut self, pieces: &[&[u8]], length: u32) -> Answer {
         let mut bytes = 0;
         for (to, from) in self.reply.iter_mut().zip(pieces.iter().copied().flatten()) {
@@ -217,7 +212,6 @@ impl<D: CardDevice> Disk<D> {
         Answer::Reply(bytes.min(length as usize))
     }
 
-    /// The card's number of blocks, at least 1.
     fn blocks(&mut self) -> Result<u32, Sense> {
         let was_empty = match self.slot {
             Slot::Card(blocks) => return Ok(blocks),
@@ -278,7 +272,6 @@ const READ_12: u8 = 0xA8;
 /// AND VERIFY (12).
 pub const WRITING: [u8; 11] = [0x04, 0x0A, 0x2A, 0x2E, 0x41, 0x42, 0x8A, 0x8E, 0x93, 0xAA, 0xAE];
 
-/// A command block of at least the length that its code wants.
 struct Command<'a> {
     code: u8,
     block: &'a [u8],

@@ -56,9 +56,7 @@ enum Status {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// This many bytes of the disk's reply.
     Reply(u32),
-    /// This many bytes of the card, from this block on.
     Blocks(u32, u32),
     /// The data is over: a short packet, if none was sent.
     End,
@@ -95,7 +93,6 @@ impl Transport {
         let expected = u32::from_le_bytes([e0, e1, e2, e3]);
         let answer = disk.command(block, scratch);
         let wants_data = expected > 0 && flags == TO_HOST;
-        // Bytes of the command's data.
         let has = match answer {
             Some(Answer::Reply(bytes)) => bytes as u64,
             Some(Answer::Blocks { count, .. }) => u64::from(count) * BLOCK_BYTES as u64,

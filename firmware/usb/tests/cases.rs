@@ -10,7 +10,6 @@ const PHASE_ERROR: u8 = 2;
 const READY: [u8; 6] = [0; 6];
 const WRITE: [u8; 10] = [0x2A, 0, 0, 0, 0, 1, 0, 0, 2, 0];
 
-/// Status, bytes of data, bytes taken, residue.
 fn outcome(expected: u32, flags: u8, block: &[u8]) -> (u8, usize, usize, u32) {
     let got = Host::new().run(expected, flags, block);
     (got.status, got.data.len(), got.taken, got.residue)

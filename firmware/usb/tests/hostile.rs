@@ -1,10 +1,9 @@
-//! Any packets: the disk answers by the rules of the bus, reads only blocks that exist, and sends only what the card gave.
+//! Answers to any packets: rules of the bus, blocks that exist, data that the card gave.
 
 use proptest::prelude::*;
 
 use super::common::{BLOCKS, Host, IN, OUT, content, wrapper};
 
-/// A command with fields that are likely to hurt.
 fn command() -> impl Strategy<Value = Vec<u8>> {
     let code = prop_oneof![
         Just(0x28_u8),
@@ -46,7 +45,6 @@ proptest! {
                 _ => {}
             }
             let flags = if to_host { IN } else { OUT };
-            // The harness checks the rules of the bus.
             let got = host.packet(&wrapper(tag, expected, flags, &block)).expect("a valid wrapper");
             prop_assert!(got.status <= 2);
             if matches!(block[0], 0x28 | 0x88 | 0xA8) {

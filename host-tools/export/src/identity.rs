@@ -1,5 +1,5 @@
-//! Vehicle and date of a log, known before the first byte is written. They are the tags of every point of the
-//! line protocol, and the path of the Parquet tables.
+//! Vehicle and date of a log, read before the first output. They are tags of the line protocol, and paths of
+//! Parquet tables.
 
 use std::path::Path;
 
@@ -30,9 +30,9 @@ const NAME_MAX: usize = 60;
 /// A session's names. Each begins with a letter: a tool that guesses types must not make a number of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
-    /// `uid-0031002a3035510a` from the autopilot's unique id. Without it the name that the user gave, otherwise
-    /// `box-3f0042000d51373435363338` from the board's own id. Without all of them `system-1-quadrotor-PX4-logs`, from the
-    /// system id, the kind, the autopilot and the log's folder, or `unknown`.
+    /// `uid-0031002a3035510a` from the autopilot's unique id. Without it the user's name, else
+    /// `box-3f0042000d51373435363338` from the board's id, else `system-1-quadrotor-PX4-logs`, from system
+    /// id, kind, autopilot and folder, or `unknown`.
     pub vehicle: String,
     /// The day of its first entry, UTC: `2026-11-21`; `None` if unknown.
     pub date: Option<String>,
@@ -44,14 +44,14 @@ pub struct Identity {
     pub epochs: Epochs,
 }
 
-/// The content of a recording, for a row of the table of sessions and for logbooks.
+/// Content of a recording for tables of sessions and logbooks.
 #[derive(Clone, Debug, Default)]
 pub struct RecordingContent {
     /// Counts, findings, usage.
     pub overview: Overview,
     /// The way of the vehicle; its heights are above mean sea level.
     pub track: Track,
-    /// The same places with the speed over ground in place of the height, m/s.
+    /// Speed over ground at the same places, m/s.
     pub speeds: Track,
     /// Unique id of the box.
     pub board: Option<[u8; 12]>,
@@ -70,9 +70,8 @@ pub struct Known {
     pub about: RecordingContent,
 }
 
-/// Vehicle, date, UTC and content of a recording. If `judges`, also the findings by the monitor here. The recording is read
-/// once for it. Its `session` is taken from its files' names, so it does not depend on the messages that this version
-/// understands.
+/// Vehicle, date, UTC and content of a recording, read once. With `judges`, also the findings by the monitor
+/// here. `session` comes from the files' names, so it does not depend on this version's messages.
 pub fn identity(place: &Place, traits: &Traits, judges: bool, given: Option<&str>) -> Result<Known> {
     let (mut sources, mut epochs) = (Sources::default(), Epochs::default());
     let (mut motion, mut track, mut speeds) = (Motion::default(), Track::default(), Track::default());
@@ -101,7 +100,6 @@ pub fn identity(place: &Place, traits: &Traits, judges: bool, given: Option<&str
         }
         None => sources.first,
     };
-    // A recording without an observation begins at time zero.
     let utc_us = epochs.utc_us(first.unwrap_or(Instant::ZERO));
     let date = utc_us.map(|utc| iso8601(utc).chars().take(10).collect());
     let checked = judged.filter(|_| judges).and_then(Checked::new);
@@ -118,11 +116,9 @@ pub fn identity(place: &Place, traits: &Traits, judges: bool, given: Option<&str
 
 #[derive(Default)]
 struct Sources {
-    /// The monitor's record of the vehicle. A packed log has no such record, so the vehicle's own messages
-    /// count too.
+    /// A packed log has no such record, so the vehicle's own messages count too.
     recorded: Option<Vehicle>,
     board: Option<[u8; 12]>,
-    /// System id, type and autopilot of the first system whose autopilot sends a heartbeat.
     heard: Option<(u8, u8, u8)>,
     uid: Option<u64>,
     first: Option<Instant>,
@@ -171,7 +167,7 @@ impl Sources {
     }
 }
 
-/// A name that every tool takes for a text, and every file system for a name.
+/// A text for every tool, and a name for every file system.
 fn path_name(name: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || matches!(letter, '.' | '_' | '-');
     let plain: String = name.chars().map(|letter| if is_plain(letter) { letter } else { '-' }).collect();

@@ -21,7 +21,6 @@ const ANSWER: Duration = Duration::from_millis(400);
 /// The board restarts half a second after its answer, which may be lost.
 const TRIES: usize = 3;
 
-/// Output of `hums box card-reader --json`.
 const SCHEMA: Schema = Schema::first("hums-card-reader");
 
 #[derive(Debug, Serialize)]
@@ -46,7 +45,6 @@ pub fn run(args: &cli::CardReader) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Tells the board, and waits for its answer.
 fn tell(client: &mut Client) -> Result<()> {
     let (system, component) = client.target();
     let packet = messages::command_long(RESTART, &[MASS_STORAGE], system, component);
@@ -81,7 +79,6 @@ mod tests {
                 return Vec::new();
             }
             asked += 1;
-            // The first answer is lost.
             if asked == 1 { Vec::new() } else { vec![(1, command_ack(RESTART, 0, 255, 190))] }
         });
         tell(&mut client).expect("accepted");

@@ -10,7 +10,6 @@ use parquet::file::reader::SerializedFileReader;
 
 use super::support::{contents, px4, run, text};
 
-/// The rows of each table, as texts, sorted.
 fn rows(fleet: &Path) -> BTreeMap<String, Vec<String>> {
     let mut tables: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (name, _) in contents(fleet) {
@@ -31,7 +30,6 @@ fn files(fleet: &Path) -> usize {
     contents(fleet).iter().filter(|(name, _)| !name.starts_with('.') && name.ends_with(".parquet")).count()
 }
 
-/// Two sessions of one day: of a log, and of a part of its recording.
 fn fleet() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("directory");
     run(dir.path(), "decode --format hum PX4 -o log.hum", 0);
@@ -64,7 +62,6 @@ fn every_value_is_there_once_also_after_kills() {
     assert!(killed > 0 && text(&said).starts_with("fleet: "), "{killed} {}", text(&said));
     assert!(rows(&at) == before, "rows differ");
     assert!(files(&at) <= before.len() && files(&at) < many, "{} of {many}", files(&at));
-    // Nothing is left to do.
     assert!(text(&run(dir.path(), "compact fleet", 0)).contains("0 sessions"));
     let again = run(dir.path(), "decode few.tlog -o fleet --format parquet --force", 1);
     assert!(String::from_utf8_lossy(&again.stderr).contains("in a file of several sessions"));
@@ -92,7 +89,6 @@ fn other_files_stay_and_a_damaged_one_leaves_its_day_as_it_is() {
         all.into_iter().filter(|(name, _)| !name.starts_with('.')).collect()
     };
     assert!(left(contents(&at)) == left(before), "something was changed");
-    // An upload of the whole file mends it.
     fs::write(at.join(&name), &bytes).expect("written");
     run(dir.path(), "compact fleet", 0);
     assert_eq!(fs::read(folder.join("notes.txt")).expect("there"), b"mine");

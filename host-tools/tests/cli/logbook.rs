@@ -7,7 +7,6 @@ use serde_json::Value;
 
 use super::support::{contents, flight, json, run, text};
 
-/// A card with two flights, one with findings, and a recording of a link.
 fn cards() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("directory");
     fs::create_dir(dir.path().join("cards")).expect("made");
@@ -18,13 +17,11 @@ fn cards() -> tempfile::TempDir {
     dir
 }
 
-/// The rows of a CSV without line ends in its cells, by the names of its columns.
 fn rows(path: &Path) -> Vec<Value> {
     let text = fs::read_to_string(path).expect("a CSV");
     let mut lines = text.lines();
     let heading: Vec<&str> = lines.next().expect("a heading").split(',').collect();
     let object = |line: &str| {
-        // A comma in quotes is no separator.
         let parts = line.split('"').enumerate();
         let line: String = parts
             .map(|(index, part)| if index % 2 == 1 { part.replace(',', ";") } else { part.to_owned() })
@@ -89,7 +86,6 @@ fn what_people_wrote_stays_when_the_logbook_is_made_again() {
     run(dir.path(), "logbook cards/card.img -o book.csv", 0);
     let path = dir.path().join("book.csv");
     let filled = fs::read_to_string(&path).expect("a CSV");
-    // The first flight's last cells: pilot and so on are empty.
     let mut lines: Vec<String> = filled.lines().map(str::to_owned).collect();
     assert!(lines[1].ends_with(",,,,,,"), "{}", lines[1]);
     lines[1] = format!(
@@ -97,7 +93,6 @@ fn what_people_wrote_stays_when_the_logbook_is_made_again() {
         &lines[1][..lines[1].len() - 5]
     );
     fs::write(&path, lines.join("\n")).expect("written");
-    // Another card later; the first one is not there any more.
     run(dir.path(), "logbook cards/px4.tlog -o book.csv", 0);
     run(dir.path(), "logbook cards/card.img -o book.csv -o book.html -o flights/", 0);
     let again = fs::read_to_string(&path).expect("a CSV");

@@ -1,4 +1,4 @@
-//! A USB host for the board's plug. Its program is plain code in a thread of its own; both sides take turns, so that runs repeat.
+//! A USB host for the board's plug: plain code in a thread. Both sides take turns, so that runs repeat.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
@@ -7,7 +7,6 @@ use anyhow::{Context as _, Result, bail, ensure};
 use stm32f405_model::otg::{Action, Host, Reply};
 use stm32f405_model::time::{MS, Ps, SECOND};
 
-/// Packet of all endpoints.
 const PACKET_BYTES: usize = 64;
 /// A device that takes or gives no packet for so long counts as hung.
 const HUNG: Ps = 10 * SECOND;
@@ -21,20 +20,18 @@ struct Turns {
 
 impl Host for Turns {
     fn next(&mut self, now: Ps, reply: Reply) -> Action {
-        // The program has ended, or ends with this.
         let _ = self.replies.send((now, reply));
         self.actions.recv().unwrap_or(Action::Wait(1_000 * SECOND))
     }
 }
 
-/// A host with this program, for [`stm32f405_model::machine::Machine::plug`], and the program's result.
+/// A host with this program for [`stm32f405_model::machine::Machine::plug`], and the program's result.
 pub fn host<T: Send + 'static>(
     program: impl FnOnce(&mut Bus) -> Result<T> + Send + 'static,
 ) -> (Box<dyn Host>, JoinHandle<Result<T>>) {
     let ((replies, from_bus), (actions, to_bus)) = (channel(), channel());
     let thread = std::thread::spawn(move || {
         let mut bus = Bus { actions, replies: from_bus, now: 0, address: 0, toggles: [[false; 16]; 2] };
-        // The reply to nothing.
         bus.now = bus.replies.recv()?.0;
         program(&mut bus)
     });
@@ -49,7 +46,7 @@ pub struct Bus {
     /// The time on the bus.
     pub now: Ps,
     address: u8,
-    /// Whether the next packet of each endpoint is DATA1: from the host, to the host.
+    /// Next packet is DATA1: from the host, to the host.
     toggles: [[bool; 16]; 2],
 }
 
@@ -62,7 +59,6 @@ impl Bus {
         Ok(reply)
     }
 
-    /// Repeats a packet while the device is not ready.
     fn packet(&mut self, action: &Action) -> Result<Reply> {
         let end = self.now + HUNG;
         loop {
@@ -129,7 +125,6 @@ impl Bus {
     ) -> Result<Option<Vec<u8>>> {
         self.setup(kind | 0x80, request, value, index, length)?;
         let Some(data) = self.read(0, length.into())? else { return Ok(None) };
-        // The status: an empty packet, always DATA1.
         let reply = self.packet(&Action::Out(self.address, 0, true, Vec::new()))?;
         ensure!(reply == Reply::Done, "status: {reply:?}");
         Ok(Some(data))

@@ -67,7 +67,6 @@ pub(crate) async fn run(
             Either3::Second(()) => is_behind = drain(body, ends),
             Either3::Third(()) => uplink(body, ends),
             Either3::First(()) => {
-                // Frames from before this tick.
                 is_behind = drain(body, ends);
                 if let Some((cpu_permille, cpu_permille_max)) = load.step(now()) {
                     let (stack_bytes_max, stack_bytes) = memory::stack_used();
@@ -98,7 +97,7 @@ pub(crate) async fn run(
         }
         wake_others();
         if is_behind {
-            // Less urgent tasks run; frames that overflow the queue meanwhile are lost and counted.
+            // Frames that overflow the queue meanwhile are lost and counted.
             links::FRAMES.signal(());
             Timer::after(REST).await;
         }
@@ -134,7 +133,6 @@ fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
     LOG_ENDS.store(true, Ordering::Relaxed);
 }
 
-/// Hands over what the store keeps; whether that is all.
 #[inline(never)]
 fn save(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) -> bool {
     let is_all = handover.finish(now(), body.monitor_mut());
@@ -154,7 +152,6 @@ fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause
     }
 }
 
-/// Missing parts of the board, once each; `told` stores the reported ones.
 #[inline(never)]
 fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool; 6], has_random: bool) {
     let stood_still = |port: &AtomicBool| port.load(Ordering::Relaxed);

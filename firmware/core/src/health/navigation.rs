@@ -50,7 +50,6 @@ const GNSS: Check = Check {
     ..ESTIMATOR
 };
 
-/// Two sensors of a kind against each other ([`crate::crosscheck`]).
 const MISMATCH: Check = Check {
     name: "accel_mismatch",
     unit: Unit::of("m/s2"),
@@ -75,7 +74,6 @@ const STUCK: Check = Check {
     ..MISMATCH
 };
 
-/// The estimator that flies against the second one (`ahrs2_residual`).
 const SECOND: Check = Check {
     name: "ahrs2_tilt",
     role: Role::of(Group::Other, DISTURBANCES | ESTIMATORS),
@@ -248,7 +246,6 @@ fn estimator(
     inputs.vehicle.estimator.read(|estimator| value(estimator).filter(|_| estimator.scale == scale))
 }
 
-/// The compass has a check of its own, which names it.
 fn largest(estimator: &Estimator) -> Option<f32> {
     [estimator.velocity, estimator.position_horizontal, estimator.position_vertical]
         .into_iter()
@@ -264,13 +261,12 @@ fn second_largest(estimator: &Estimator) -> Option<f32> {
     Some(second).filter(|second| second.is_finite())
 }
 
-/// Whether a receiver had a fix, or none reports: before its first fix a vehicle stands, or flies without GNSS, under a roof or water.
+/// Before its first fix a vehicle stands, or flies without GNSS.
 fn is_gnss_judged(inputs: &Inputs<'_>) -> bool {
     let reports = inputs.vehicle.gnss.iter().any(|gnss| gnss.get().is_some());
     !reports || inputs.derived.had_fix.contains(&true)
 }
 
-/// A second receiver that never had a fix is not fitted; it says nothing.
 fn gnss(inputs: &Inputs<'_>, receiver: u8, value: impl FnOnce(&Gnss) -> Option<f32>) -> Option<Reading> {
     let place = usize::from(receiver);
     let had_fix = *inputs.derived.had_fix.get(place)?;
@@ -285,7 +281,6 @@ fn is_exact(inputs: &Inputs<'_>, gnss: &Gnss) -> bool {
         && gnss.accuracy.is_some_and(|accuracy| accuracy.0 <= inputs.params.get(Param::GpsHaccWarn) / 2.0)
 }
 
-/// A state of a receiver; 0 is unknown.
 fn integrity(inputs: &Inputs<'_>, receiver: u8, state: fn(&GnssIntegrity) -> u8) -> Option<Reading> {
     let slot = inputs.vehicle.gnss_integrity.get(usize::from(receiver))?;
     slot.read(|known| Some(f32::from(state(known))).filter(|state| *state > 0.0))

@@ -16,12 +16,10 @@ pub(crate) struct Ring<T, const PLACES: usize> {
 unsafe impl<T: Send, const PLACES: usize> Sync for Ring<T, PLACES> {}
 
 impl<T, const PLACES: usize> Ring<T, PLACES> {
-    /// These places, all free.
     pub(crate) const fn new(places: [T; PLACES]) -> Self {
         Self { places: UnsafeCell::new(places), waiting: AtomicUsize::new(0) }
     }
 
-    /// Both ends; all places are free.
     pub(crate) fn split(&mut self) -> (In<'_, T, PLACES>, Out<'_, T, PLACES>) {
         *self.waiting.get_mut() = 0;
         (In { ring: self, next: 0 }, Out { ring: self, first: 0 })
@@ -46,12 +44,12 @@ pub(crate) struct In<'a, T, const PLACES: usize> {
 }
 
 impl<T, const PLACES: usize> In<'_, T, PLACES> {
-    /// Filled places, with those that are being read.
+    /// With those that are being read.
     pub(crate) fn len(&self) -> usize {
         self.ring.len()
     }
 
-    /// The next free place, to be filled and handed over with [`Self::commit`]; `None` if there is none.
+    /// Filled places are handed over with [`Self::commit`].
     pub(crate) fn free(&mut self) -> Option<&mut T> {
         if self.len() >= PLACES {
             return None;
@@ -60,7 +58,6 @@ impl<T, const PLACES: usize> In<'_, T, PLACES> {
         unsafe { self.ring.places(self.next, 1) }.first_mut()
     }
 
-    /// Hands the next free place over, if there is one.
     pub(crate) fn commit(&mut self) {
         if self.len() < PLACES {
             self.next = (self.next + 1) % PLACES;
@@ -81,7 +78,6 @@ impl<T, const PLACES: usize> Out<'_, T, PLACES> {
         self.ring.len()
     }
 
-    /// The oldest filled places that lie in a row, none if the ring is empty.
     pub(crate) fn waiting(&mut self) -> &mut [T] {
         let count = self.len().min(PLACES - self.first);
         // SAFETY: `first` is below `PLACES`, and these places are counted as filled until `release`.

@@ -8,10 +8,8 @@ use hums_usb::PACKET_BYTES;
 use hums_usb::scsi::{Disk, Sense};
 use hums_usb::transport::{Invalid, Step, Transport};
 
-/// Blocks of the card.
 pub(crate) const BLOCKS: u32 = 1_000;
 pub(crate) const SERIAL: [u8; 24] = *b"0123456789ABCDEF01234567";
-/// Blocks of the buffer.
 pub(crate) const BUFFER: usize = 4;
 /// `bCBWFlags` of a command whose data goes to the host.
 pub(crate) const IN: u8 = 0x80;
@@ -30,7 +28,6 @@ pub(crate) struct Numbered {
     pub(crate) end: Rc<Cell<u32>>,
 }
 
-/// Contents of a block.
 pub(crate) fn content(number: u32) -> Block {
     let mut block = [0; BLOCK_BYTES];
     block.chunks_exact_mut(4).for_each(|word| word.copy_from_slice(&number.to_le_bytes()));
@@ -73,17 +70,14 @@ impl CardDevice for Numbered {
     }
 }
 
-/// What the host got of a command.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Got {
     pub(crate) data: Vec<u8>,
-    /// Bytes that the disk took.
     pub(crate) taken: usize,
     pub(crate) status: u8,
     pub(crate) residue: u32,
 }
 
-/// A host with a disk.
 pub(crate) struct Host {
     pub(crate) disk: Disk<Numbered>,
     pub(crate) card: Numbered,
@@ -107,8 +101,7 @@ impl Host {
         Self { disk: Disk::new(card.clone(), SERIAL), card, tag: 0 }
     }
 
-    /// Runs a command to its status. Checks the rules of the bus: each packet but the last is full, a data stage that is shorter
-    /// than expected ends with a short packet, and the residue is right.
+    /// Runs a command to its status, and checks the rules of the bus: full packets, a short end, the residue.
     pub(crate) fn run(&mut self, expected: u32, flags: u8, block: &[u8]) -> Got {
         self.tag += 1;
         self.packet(&wrapper(self.tag, expected, flags, block)).expect("a valid wrapper")
@@ -151,14 +144,12 @@ impl Host {
         }
     }
 
-    /// The sense data, which is then gone.
     pub(crate) fn sense(&mut self) -> Sense {
         let got = self.run(18, IN, &[3, 0, 0, 0, 18, 0]);
         assert_eq!((got.status, got.data[0], got.data[7]), (0, 0x70, 10));
         Sense { key: got.data[2], code: got.data[12], qualifier: got.data[13] }
     }
 
-    /// Runs a command that the disk refuses.
     pub(crate) fn refused(&mut self, expected: u32, flags: u8, block: &[u8]) -> Sense {
         let got = self.run(expected, flags, block);
         assert_eq!((got.status, got.data.len()), (1, 0), "{block:x?}");

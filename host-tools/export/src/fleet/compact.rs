@@ -1,7 +1,7 @@
 //! `hums compact`: the files of many sessions become few files, sorted by vehicle and session.
 //!
-//! A date and bucket is one change ([`super::transaction`]): of all its tables together, so a session is in files of its own
-//! or in files of several, never in both. Columns have the encoding that makes them smallest in a sample.
+//! All tables of a date and bucket are one change ([`super::transaction`]), so a session is never in both
+//! kinds of files. Columns have the encoding that makes them smallest in a sample.
 
 mod column;
 
@@ -30,13 +30,10 @@ use crate::plural::count;
 use crate::printable::word;
 use column::Input;
 
-/// How the names of files of several sessions begin.
 const PREFIX: &str = "compact-";
 /// A larger file of several sessions stays as it is, and new sessions go into a further one.
 const LARGE_BYTES: u64 = 256 << 20;
-/// Rows of a row group at most.
 const GROUP_ROWS: usize = 256 * 1024;
-/// Tables that are written at once.
 const AT_ONCE: usize = 4;
 
 /// The request of `hums compact`.
@@ -46,7 +43,6 @@ pub struct CompactRequest {
     pub folder: PathBuf,
 }
 
-/// Files and bytes before and after.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
     files: u64,
@@ -113,7 +109,6 @@ pub fn run(args: &CompactRequest) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Compacts a date and bucket of all tables.
 fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> {
     let lock = transaction::lock(root)?;
     let (mut work, mut new) = (Vec::new(), BTreeSet::new());
@@ -174,7 +169,7 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
     Ok(sum)
 }
 
-/// Writes the rows of a table's files into one file for each set of columns. Returns the number of files and their bytes.
+/// Writes one file for each set of columns. Returns the number of files and their bytes.
 fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result<(u64, u64)> {
     let mut by_schema: BTreeMap<String, Vec<Input>> = BTreeMap::new();
     for path in paths {
@@ -195,7 +190,6 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
         let path = transaction.path(&format!("{place}/{name}"));
         path.parent().map_or(Ok(()), fs::create_dir_all)?;
         let rows = merge(&inputs, &path).with_context(|| place.to_owned())?;
-        // What is removed afterwards must be here.
         let expected: usize = inputs.iter().map(Input::rows).sum();
         let written = SerializedFileReader::new(File::open(&path)?)?.metadata().file_metadata().num_rows();
         if rows != expected || written != expected as i64 {
@@ -206,10 +200,9 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
     Ok(sum)
 }
 
-/// A part of an input's rows: the input's index, the first row, the number of rows.
+/// The input's index, the first row, the number of rows.
 pub(super) type Rows = (usize, usize, usize);
 
-/// Row groups of inputs in the order of vehicles and sessions.
 fn groups(inputs: &[Input]) -> Vec<Vec<Rows>> {
     let mut segments: Vec<_> = inputs
         .iter()
@@ -234,7 +227,6 @@ fn groups(inputs: &[Input]) -> Vec<Vec<Rows>> {
     groups
 }
 
-/// Merges inputs of equal columns. Returns the number of rows.
 fn merge(inputs: &[Input], path: &Path) -> Result<usize> {
     let groups = groups(inputs);
     let (Some(first), Some(group)) = (inputs.first(), groups.first()) else { return Ok(0) };
@@ -263,7 +255,6 @@ fn merge(inputs: &[Input], path: &Path) -> Result<usize> {
     Ok(rows)
 }
 
-/// Properties of the files.
 fn base() -> parquet::file::properties::WriterPropertiesBuilder {
     WriterProperties::builder()
         .set_compression(Compression::GZIP(GzipLevel::default()))

@@ -31,9 +31,7 @@ use crate::hex::hex;
 use crate::outcome::exists;
 use transaction::{OWN, Transaction};
 
-/// The table with a row for each session.
 pub(crate) const SESSIONS: &str = "sessions";
-/// The extension of tables.
 const EXTENSION: &str = ".parquet";
 /// Hive's word for "null", known to every reader of this layout.
 const NO_DATE: &str = "__HIVE_DEFAULT_PARTITION__";
@@ -43,12 +41,10 @@ pub fn bucket(vehicle: &str) -> u8 {
     Sha256::digest(vehicle.as_bytes()).first().map_or(0, |byte| byte >> 4)
 }
 
-/// The folder of a vehicle's sessions of a day, in the folder of each table.
 fn partition(vehicle: &str, date: Option<&str>) -> String {
     format!("date={}/bucket={:02}", date.unwrap_or(NO_DATE), bucket(vehicle))
 }
 
-/// The name of a session's `part`th file of a table, from 1.
 fn file_name(session: &str, part: u32) -> String {
     match part {
         ..=1 => format!("{session}{EXTENSION}"),
@@ -66,7 +62,6 @@ fn session_of(name: &str) -> Option<&str> {
     (number.len() == 8 && is_hex(number) && unique.len() == 24 && is_hex(unique)).then_some(session)
 }
 
-/// The tables of a fleet in a folder, and the sessions that this call has written there.
 #[derive(Debug)]
 pub(crate) struct Fleet {
     root: PathBuf,
@@ -74,16 +69,13 @@ pub(crate) struct Fleet {
     written: Mutex<BTreeMap<String, u64>>,
 }
 
-/// The place of a session.
 enum Found {
-    /// In a file of its own, in this partition.
     Alone(String),
     /// In a file of several sessions.
     Compacted,
 }
 
 impl Fleet {
-    /// In a folder, which need not be there.
     pub(crate) fn new(root: &Path) -> Self {
         Self { root: root.to_owned(), written: Mutex::default() }
     }
@@ -117,7 +109,6 @@ impl Fleet {
         self.written.lock().unwrap_or_else(PoisonError::into_inner).get(session).copied()
     }
 
-    /// Refuses a session that is there, unless it may be replaced.
     fn check(&self, session: &str, found: &Found, inputs: &Inputs) -> Result<()> {
         match found {
             Found::Compacted => {
@@ -132,7 +123,6 @@ impl Fleet {
         }
     }
 
-    /// All files of a session in a partition, relative to the root.
     fn files(&self, session: &str, partition: &str) -> Result<BTreeSet<String>> {
         let mut files = BTreeSet::new();
         for table in folders(&self.root)? {
@@ -146,12 +136,10 @@ impl Fleet {
     }
 }
 
-/// The file of the index that has a session of a file of several.
 fn shard(session: &str) -> String {
     hex(&Sha256::digest(session.as_bytes())[..1])
 }
 
-/// The names of a folder's entries; none if the folder is missing.
 fn names(folder: &Path) -> Result<Vec<String>> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
@@ -169,22 +157,18 @@ fn names(folder: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// The names of a folder's folders, without those of this program alone and hidden ones.
 fn folders(folder: &Path) -> Result<Vec<String>> {
     let names = names(folder)?.into_iter();
     Ok(names.filter(|name| !name.starts_with('.') && folder.join(name).is_dir()).collect())
 }
 
-/// The tables of one session, open.
 pub(crate) struct Session {
     transaction: Transaction,
     partition: String,
-    /// The unique name of the recording.
     name: String,
 }
 
 impl Session {
-    /// Begins a session's tables.
     pub(crate) fn begin(context: &Context) -> Result<Self> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
         let identity = &context.identity;
@@ -201,17 +185,14 @@ impl Session {
         Ok(Self { transaction: Transaction::begin(&fleet.root)?, partition, name })
     }
 
-    /// The place of a table's file, relative to the root.
     fn place(&self, table: &str, part: u32) -> String {
         format!("{table}/{}/{}", self.partition, file_name(&self.name, part))
     }
 
-    /// The path that a table's file will have.
     pub(crate) fn path(&self, table: &str, part: u32) -> PathBuf {
         self.transaction.root().join(self.place(table, part))
     }
 
-    /// A new file of a table.
     pub(crate) fn file(&self, table: &str, part: u32) -> Result<File> {
         let path = self.transaction.path(&self.place(table, part));
         let made = path.parent().map_or(Ok(()), fs::create_dir_all);
@@ -219,8 +200,8 @@ impl Session {
         file.with_context(|| cannot_write(&self.path(table, part)))
     }
 
-    /// All files are there and closed: they take their places. Of two recordings of one session in one call the longer one
-    /// stays; `false` if that is the other one.
+    /// Closed files take their places. Of two recordings of one session in one call the longer stays; `false`
+    /// for the other.
     pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<bool> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
         let Self { transaction, name, .. } = self;

@@ -1,4 +1,4 @@
-//! The table `sessions`: a row for each session, which answers a fleet's common questions by itself.
+//! The table `sessions`: a row for each session.
 
 use std::sync::LazyLock;
 
@@ -20,7 +20,6 @@ use crate::row::{Cell, CellType, Row};
 use crate::source::recording::Format;
 use crate::summary::BootLine;
 
-/// The counters with a column: of the vehicle, the motors' running times, and the figures of steady flight.
 static COUNTERS: LazyLock<Vec<String>> = LazyLock::new(|| {
     let has_column = |number: &u8| match meaning(*number) {
         Some(CounterName::Vehicle(_) | CounterName::Motor("run_time_s", _)) => true,
@@ -32,7 +31,6 @@ static COUNTERS: LazyLock<Vec<String>> = LazyLock::new(|| {
     (0..=u8::MAX).filter(has_column).map(counter_name).collect()
 });
 
-/// A check that found something.
 #[derive(Serialize)]
 struct ProblemJson<'a> {
     level: &'static str,
@@ -48,13 +46,11 @@ struct ProblemJson<'a> {
     unit: &'a str,
 }
 
-/// A part with a limited life.
 #[derive(Serialize)]
 struct PartJson<'a> {
     part: String,
     serial: &'a str,
     status: &'a str,
-    /// `null` without a limit.
     used_percent: Option<f32>,
     limit: Option<String>,
     flight_s: f64,
@@ -70,7 +66,6 @@ fn count(number: impl Into<u64>) -> Cell {
     Cell::Count(number.into())
 }
 
-/// A cell of this type, null if the value is not known.
 fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: CellType) -> Cell {
     value.map_or(Cell::Unknown(unknown), cell)
 }

@@ -1,4 +1,4 @@
-//! Changes of a fleet that are stopped at every step: no row is lost, and none is there twice.
+//! Changes of a fleet that are stopped at every step.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -24,7 +24,6 @@ fn session(number: u64) -> String {
     format!("s{number:08x}-{number:024x}")
 }
 
-/// A context for a session of a vehicle.
 fn context(fleet: &Arc<Fleet>, number: u64, date: Option<&str>, force: bool) -> Context {
     let identity = Identity {
         vehicle: format!("uid-{number:016x}"),
@@ -40,7 +39,6 @@ fn context(fleet: &Arc<Fleet>, number: u64, date: Option<&str>, force: bool) -> 
     }
 }
 
-/// Three columns: vehicle, session, and the number of a row.
 fn table(file: File, vehicle: &str, session: &str, rows: std::ops::Range<i64>) {
     let field = |name, physical, logical| {
         let field = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
@@ -70,7 +68,6 @@ fn table(file: File, vehicle: &str, session: &str, rows: std::ops::Range<i64>) {
     writer.close().expect("closed");
 }
 
-/// Adds a session with so many rows in each table.
 fn add(root: &Path, number: u64, date: Option<&str>, rows: i64, force: bool) -> Result<bool> {
     let fleet = Arc::new(Fleet::new(root));
     let context = context(&fleet, number, date, force);
@@ -81,7 +78,6 @@ fn add(root: &Path, number: u64, date: Option<&str>, rows: i64, force: bool) -> 
     open.finish(&context, rows as u64)
 }
 
-/// All rows of a table, sorted.
 fn rows(root: &Path, table: &str) -> Vec<(String, i64)> {
     let mut all = Vec::new();
     for date in folders(&root.join(table)).expect("dates") {
@@ -128,7 +124,6 @@ fn a_compaction_that_is_stopped_at_any_step_loses_and_doubles_no_row() {
         let ended = compact::run(&compact::CompactRequest { folder: root.to_owned() });
         come_next(root);
         assert_eq!(all_rows(root), before, "after {steps} steps");
-        // A session is there once, whatever file it is in.
         add(root, 3, Some("2026-05-01"), 9, false).expect_err("it is there");
         add(root, 3, None, 9, false).expect_err("it is there, with another date");
         compact::run(&compact::CompactRequest { folder: root.to_owned() }).expect("compacted");
@@ -184,7 +179,6 @@ fn a_session_that_is_replaced_is_the_old_one_or_the_new_one_after_a_stop_at_any_
     assert!(old > 1 && new > 3, "{old} {new}");
 }
 
-/// Several programs at once, each with the same sessions in another order.
 #[test]
 fn programs_that_add_the_same_sessions_at_once_add_each_once() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -203,7 +197,6 @@ fn programs_that_add_the_same_sessions_at_once_add_each_once() {
     assert!(all_rows(root).iter().all(|rows| rows.len() == 60));
 }
 
-/// Of two logs of a session in one call the one with more frames stays, in any order.
 #[test]
 fn the_longer_log_of_a_session_stays() {
     for order in [[10, 20], [20, 10]] {
@@ -235,7 +228,6 @@ fn the_files_of_sessions_are_known_by_their_names() {
     }
 }
 
-/// The document has this formula.
 #[test]
 fn vehicles_share_sixteen_buckets_evenly() {
     let mut vehicles = [0_u32; 16];

@@ -20,16 +20,13 @@ use crate::files::{check_parent, settle};
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
 pub(crate) const OWN: &str = ".hums-fleet";
-/// How the names of changes that count begin.
 const COMMIT: &str = "commit-";
-/// How the names of unfinished changes end.
 pub(crate) const PART: &str = ".hums-part";
-/// The new files in a change's folder, the list of replaced ones, and the list of sessions that share a file from now on.
+/// Files in a change's folder: new files, replaced ones, and sessions that share a file from now on.
 const FILES: &str = "files";
 const REPLACED: &str = "replaced";
 const COMPACTED: &str = "compacted";
 
-/// Steps at which a test stops a change.
 #[cfg(test)]
 pub(crate) mod stop {
     use std::cell::Cell;
@@ -40,7 +37,6 @@ pub(crate) mod stop {
         static LEFT: Cell<Option<u32>> = const { Cell::new(None) };
     }
 
-    /// Stops this thread's changes after so many steps.
     pub(crate) fn after(steps: Option<u32>) {
         LEFT.set(steps);
     }
@@ -58,7 +54,6 @@ pub(crate) mod stop {
 
 #[cfg(not(test))]
 mod stop {
-    /// A program that runs is not stopped.
     #[expect(clippy::unnecessary_wraps, reason = "the test's steps fail")]
     pub(super) fn step() -> std::io::Result<()> {
         Ok(())
@@ -68,7 +63,7 @@ mod stop {
 /// The right to change a fleet's files, until it is dropped.
 pub(crate) struct Lock(#[expect(dead_code, reason = "holds the lock")] File);
 
-/// Waits for other programs that change the fleet, and completes a change that one of them began.
+/// Waits for other programs, and completes the change of one that ended.
 pub(crate) fn lock(root: &Path) -> Result<Lock> {
     let own = root.join(OWN);
     settle(fs::create_dir_all(&own), &own)?;
@@ -89,7 +84,6 @@ pub(crate) fn lock(root: &Path) -> Result<Lock> {
     Ok(lock)
 }
 
-/// Completes a change that an ended run began.
 pub(crate) fn recover(root: &Path) -> Result<()> {
     let is_begun = names(&root.join(OWN))?.iter().any(|name| name.starts_with(COMMIT));
     if is_begun { lock(root).map(|_| ()) } else { Ok(()) }
@@ -103,7 +97,6 @@ pub(crate) struct Transaction {
 }
 
 impl Transaction {
-    /// Begins a change of the fleet in this folder.
     pub(crate) fn begin(root: &Path) -> Result<Self> {
         let own = root.join(OWN);
         let part = fs::create_dir_all(&own)
@@ -111,18 +104,16 @@ impl Transaction {
         Ok(Self { root: root.to_owned(), part: settle(part, root)? })
     }
 
-    /// The fleet's folder.
     pub(crate) fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The path of a new file until its move, by its place in the fleet's folder.
     pub(crate) fn path(&self, place: &str) -> PathBuf {
         self.part.path().join(FILES).join(place)
     }
 
-    /// The change counts from here on, and is carried out. `replaced` are the places of files that go, `compacted` the
-    /// sessions that are in a file of several.
+    /// Makes the change count, and carries it out. `replaced` are places of files, `compacted` are sessions
+    /// of shared files.
     pub(crate) fn commit(self, _: &Lock, replaced: &BTreeSet<String>, compacted: &[String]) -> Result<()> {
         let Self { root, part } = self;
         let mut places = Vec::new();
@@ -176,12 +167,12 @@ impl Transaction {
     }
 }
 
-/// Writes all files of a folder to the disk: the files that they replace are removed soon.
+/// Removal of the replaced files follows.
 fn sync_all(folder: &Path) -> io::Result<()> {
     each(folder, "", &mut |place| File::open(folder.join(place))?.sync_all())
 }
 
-/// Carries out a change, or the rest of it: each step may have been done before.
+/// Each step may have been done before.
 fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     let files = folder.join(FILES);
     for place in fs::read_to_string(folder.join(REPLACED))?.lines() {
@@ -212,7 +203,6 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     fs::remove_dir_all(done)
 }
 
-/// Calls `take` with the place of each file below a folder.
 fn each(folder: &Path, prefix: &str, take: &mut dyn FnMut(&str) -> io::Result<()>) -> io::Result<()> {
     let mut entries = fs::read_dir(folder.join(prefix))?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);

@@ -33,7 +33,6 @@ const COLUMNS: [&str; 18] = [
     "record",
 ];
 
-/// Adds the flights of an earlier CSV, and the cells of people in it. A flight of this call has its own cells besides.
 pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
     let text = match fs::read_to_string(path) {
         Ok(text) => text,
@@ -109,7 +108,6 @@ fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>)
     }
 }
 
-/// Writes the logbook. Cells of people have their columns at the end.
 pub(super) fn write(book: &Book, path: &Path) -> Result<()> {
     let entries = || book.values().flat_map(|aircraft| &aircraft.entries);
     let mut by_hand: Vec<&str> = BY_HAND.to_vec();
@@ -179,7 +177,6 @@ fn line(text: &mut Vec<u8>, cells: impl Iterator<Item = String>) {
     text.push(b'\n');
 }
 
-/// A cell without the apostrophe before a text that a spreadsheet could run.
 fn plain(cell: &str) -> &str {
     cell.strip_prefix('\'').unwrap_or(cell)
 }
@@ -236,7 +233,6 @@ mod tests {
         Book::from([("uid-1".to_owned(), Aircraft { entries, ..Aircraft::default() })])
     }
 
-    /// Whatever a person writes comes back, also through a spreadsheet with other separators.
     #[test]
     fn cells_of_people_and_earlier_flights_stay() {
         let dir = tempfile::tempdir().expect("a directory");

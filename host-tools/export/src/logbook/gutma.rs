@@ -13,7 +13,7 @@ use crate::identity::Known;
 use crate::outcome::usage;
 use crate::utc::iso8601;
 
-/// Writes the flights of this call. A flight without the time of day has no place in this format, which is reported.
+/// Reports flights without the time of day, which have no place in this format.
 pub(super) fn write(book: &Book, sessions: &[(String, Known)], path: &Path, inputs: &Inputs) -> Result<()> {
     let mut flights = Vec::new();
     for entry in book.values().flat_map(|aircraft| &aircraft.entries) {
@@ -105,7 +105,6 @@ fn exchange(entry: &LogbookEntry, known: &Known) -> Option<Value> {
     }}))
 }
 
-/// The places of a flight in both forms of the protocol, and its events.
 struct Way {
     features: Vec<Value>,
     items: Vec<Value>,
@@ -127,7 +126,6 @@ fn way(entry: &LogbookEntry, known: &Known, (from, to): (Instant, Instant), star
             "properties": {"time": milliseconds(utc_us), "altitude": altitude, "groundspeed": speed, "ground_speed": speed},
             "geometry": {"type": "Point", "coordinates": place},
         }));
-        // The last place before the take-off is the place of the take-off.
         let seconds = (utc_us.saturating_sub(start_us) / 1000) as f64 / 1000.0;
         items.push(json!([seconds, place[0], place[1], altitude, speed]));
     }

@@ -30,7 +30,6 @@ use crate::source::find::{find, sessions_of};
 use crate::utc::iso8601;
 use crate::works::works;
 
-/// The columns that people fill in, after those of the recordings.
 pub(crate) const BY_HAND: [&str; 6] =
     ["aircraft_details", "pilot", "activity", "pre_flight_inspection", "rectification", "remarks"];
 
@@ -54,7 +53,7 @@ pub(crate) struct Spot {
     pub(crate) longitude_deg: f64,
 }
 
-/// A flight, or a session with defects and without a flight.
+/// A flight, or a session with defects alone.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LogbookEntry {
     /// Its name: the recording's, and the number of the flight in it, from 1; 0 without a flight.
@@ -64,7 +63,6 @@ pub(crate) struct LogbookEntry {
     pub(crate) firmware: String,
     pub(crate) take_off: Option<String>,
     pub(crate) landing: Option<String>,
-    /// From take-off to landing, or to the end of the record.
     pub(crate) duration_s: f64,
     pub(crate) from: Option<Spot>,
     pub(crate) to: Option<Spot>,
@@ -73,17 +71,14 @@ pub(crate) struct LogbookEntry {
     pub(crate) incident: String,
     pub(crate) defects: String,
     pub(crate) record: String,
-    /// The cells of people, by column.
     pub(crate) by_hand: BTreeMap<String, String>,
     /// Times of it in the recording; `None` from an earlier CSV.
     pub(crate) span: Option<(Instant, Instant)>,
     /// The same in microseconds since 1970, if known.
     pub(crate) utc_us: Option<(u64, u64)>,
-    /// The recording's index.
     pub(crate) session: Option<usize>,
 }
 
-/// A part of an aircraft as its last record has it.
 #[derive(Clone, Debug)]
 pub(crate) struct PartLine {
     pub(crate) name: String,
@@ -97,14 +92,12 @@ pub(crate) struct PartLine {
     pub(crate) cycles: f64,
 }
 
-/// Counters of the box over the life of an aircraft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Life {
     pub(crate) flights: f64,
     pub(crate) flight_s: f64,
 }
 
-/// An aircraft with its flights in order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Aircraft {
     pub(crate) entries: Vec<LogbookEntry>,
@@ -113,7 +106,6 @@ pub(crate) struct Aircraft {
 }
 
 impl Aircraft {
-    /// Flights and their seconds in the logbook.
     pub(crate) fn totals(&self) -> Life {
         let flights = self.entries.iter().filter(|entry| entry.is_flight());
         flights.fold(Life { flights: 0.0, flight_s: 0.0 }, |sum, entry| Life {
@@ -129,7 +121,6 @@ impl LogbookEntry {
     }
 }
 
-/// The logbook, by aircraft.
 pub(crate) type Book = BTreeMap<String, Aircraft>;
 
 /// Runs `hums logbook`.
@@ -155,7 +146,6 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
             let Some(known) = known? else { return Ok(()) };
             let overview = &known.about.overview;
             outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
-            // Of two records of one session the longer one counts.
             let frames = |known: &Known| known.about.overview.contents.frames();
             let recording = known.identity.recording.clone();
             let is_longer = read.get(&recording).is_none_or(|(_, other)| frames(other) < frames(&known));
@@ -198,12 +188,10 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The form of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Form {
     Csv,
     Page,
-    /// JSON of one flight, or a folder with one for each flight.
     Gutma,
 }
 
@@ -223,7 +211,6 @@ impl Form {
     }
 }
 
-/// The logbook of these sessions.
 fn book(sessions: &[(String, Known)]) -> Book {
     let mut order: Vec<usize> = (0..sessions.len()).collect();
     let start = |index: &usize| {
@@ -383,7 +370,6 @@ fn spot(about: &RecordingContent, at: Instant) -> Option<Spot> {
     Some(Spot { latitude_deg: point.latitude_deg, longitude_deg: point.longitude_deg })
 }
 
-/// Hours and minutes of seconds.
 fn hours(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     format!("{}:{:02}", minutes / 60, minutes % 60)
@@ -393,7 +379,6 @@ fn hours(seconds: f64) -> String {
 mod tests {
     use super::*;
 
-    /// A box and a ground station, or two boxes, record the same flight.
     #[test]
     fn a_flight_that_two_recorders_recorded_counts_once() {
         let entry = |session: usize, from_s: u64, to_s: u64| LogbookEntry {

@@ -1,4 +1,4 @@
-//! The logbook as a page to print: HTML for A4, without scripts or other files.
+//! The logbook as a page to print.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -17,7 +17,6 @@ table{border-collapse:collapse;width:100%}th,td{border:1px solid #999;padding:2p
 th{background:#eee}td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}tr{break-inside:avoid}\
 thead{display:table-header-group}p{margin:.3em 0}";
 
-/// Writes the page.
 pub(super) fn write(book: &Book, path: &Path, inputs: &Inputs) -> Result<()> {
     make_parent(path)?;
     let mut output = Output::create(path, inputs)?;
@@ -175,12 +174,10 @@ fn of_part(part: &PartLine) -> Vec<String> {
     ]
 }
 
-/// A time to the second, with its day.
 fn shown(utc: &str) -> String {
     utc.get(..19).unwrap_or(utc).replace('T', " ")
 }
 
-/// A place to a metre.
 fn place(spot: Option<Spot>) -> String {
     spot.map_or_else(String::new, |spot| format!("{:.5}, {:.5}", spot.latitude_deg, spot.longitude_deg))
 }

@@ -1,5 +1,5 @@
-//! Spectra of acceleration and body rates, of logs that have an inertial sensor's samples at 200 Hz or more: rows `IMU` and
-//! batches `ISBH`, `ISBD` of `ArduPilot`, `sensor_combined` of PX4.
+//! Spectra of acceleration and body rates from samples at 200 Hz or more: rows `IMU` and batches `ISBH`,
+//! `ISBD` of `ArduPilot`, `sensor_combined` of PX4.
 //!
 //! Power is averaged over segments with a Hann window (Welch's method). A segment with a pause is left out.
 
@@ -14,7 +14,6 @@ use crate::source::item::Row;
 /// The rows with samples.
 pub const ROWS: [&str; 4] = ["IMU", "ISBH", "ISBD", "sensor_combined"];
 
-/// Samples of a segment, a power of two.
 const SEGMENT: usize = 512;
 /// The least rate of samples: vibration of rotors is below half of it.
 const RATE_MIN_HZ: f64 = 200.0;
@@ -22,10 +21,8 @@ const RATE_MIN_HZ: f64 = 200.0;
 const RATE_PART: f64 = 0.1;
 /// Fewer segments are noise.
 const SEGMENTS_MIN: u32 = 4;
-/// Samples in a row `ISBD`.
 const BATCH_ROW: usize = 32;
 
-/// Samples of the three axes.
 type Sample = [f64; 3];
 
 /// One sensor's spectrum for the page.
@@ -47,7 +44,7 @@ pub struct SpectrumJson {
 /// Spectra in the making.
 #[derive(Debug, Default)]
 pub struct Spectra {
-    /// Of acceleration and of body rates, from samples in rows of their own.
+    /// From samples in rows of their own.
     rows: [Spectrum; 2],
     /// The same from batches, whose rate is higher.
     batches: [Spectrum; 2],
@@ -57,11 +54,9 @@ pub struct Spectra {
 
 #[derive(Debug, Default)]
 struct Spectrum {
-    /// Samples of the next segment, and their times, seconds.
     waiting: Vec<(f64, Sample)>,
     rate_hz: f64,
     segments: u32,
-    /// Sums of power densities.
     power: Vec<Sample>,
 }
 
@@ -139,14 +134,12 @@ impl Spectrum {
         }
     }
 
-    /// Adds the power of a segment.
     fn segment(&mut self) {
         let (Some((first, _)), Some((last, _))) = (self.waiting.first(), self.waiting.last()) else { return };
         let rate_hz = (SEGMENT - 1) as f64 / (last - first);
         let times = self.waiting.iter().map(|(at, _)| at);
         let pause = times.clone().zip(times.skip(1)).map(|(from, to)| to - from).fold(0.0, f64::max);
         let is_other = self.segments > 0 && (rate_hz / self.rate_hz - 1.0).abs() > RATE_PART;
-        // Also of a rate that is no number.
         if !(rate_hz >= RATE_MIN_HZ && pause < 3.0 / rate_hz) || is_other {
             return;
         }
@@ -184,7 +177,6 @@ impl Spectrum {
         let bins = values.iter().zip(["x", "y", "z"]).flat_map(|(of, axis)| {
             of.iter().enumerate().map(move |(place, value)| (*value, (place + 1) as f64 * step_hz, axis))
         });
-        // A sensor that never changes has none.
         let strongest =
             bins.max_by(|(one, ..), (other, ..)| one.total_cmp(other)).filter(|(value, ..)| *value > 0.0);
         let strongest = strongest.map(|(_, hz, axis)| format!("{hz:.1} Hz, {axis}"))?;
@@ -192,7 +184,7 @@ impl Spectrum {
     }
 }
 
-/// The discrete Fourier transform of complex samples, as many as a power of two (radix 2).
+/// Discrete Fourier transform (radix 2).
 fn transform(samples: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if samples.len() < 2 {
         return samples;
@@ -218,7 +210,6 @@ mod tests {
     use super::*;
     use crate::source::item::{CellValue, Column, ColumnType, Table};
 
-    /// Batches of the gyro at 2 kHz, between slow rows of the same sensor.
     #[test]
     fn batches_are_one_spectrum_whatever_rows_come_between() {
         let table = |name: &str, columns: &[String]| {
@@ -255,7 +246,6 @@ mod tests {
         assert!((found.rate_hz - 2_000.0).abs() < 1e-6, "{}", found.rate_hz);
     }
 
-    /// Samples of a sine of 2 m/s² at 80 Hz on the second axis, at this rate; with a pause in each second.
     fn spectrum(rate_hz: f64, has_pauses: bool) -> Option<SpectrumJson> {
         let mut spectrum = Spectrum::default();
         for place in 0..(rate_hz * 8.0) as u32 {

@@ -11,12 +11,10 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// The directive of the page's policy: images of this server only.
     pub(crate) fn policy(&self) -> String {
         format!("img-src {}; ", self.origin)
     }
 
-    /// The element of the page's head that names the server.
     pub(crate) fn element(&self) -> String {
         format!("\n<meta name=\"tiles\" content=\"{}\">", self.address.replace('&', "&amp;"))
     }
@@ -25,7 +23,6 @@ impl Tiles {
 impl FromStr for Tiles {
     type Err = String;
 
-    /// The error says what is missing, and shows an address.
     fn from_str(address: &str) -> Result<Self, String> {
         const EXAMPLE: &str = "for example https://tiles.example.org/{z}/{x}/{y}.png";
         let scheme = ["https://", "http://"].into_iter().find(|scheme| address.starts_with(scheme));

@@ -33,10 +33,9 @@ use super::outcome::{count, rises};
 use super::rates::{an_hour, hours, share};
 use super::table::{Form, records};
 
-/// A finding may come this much earlier than its label's onset, in seconds, after a check has become faster.
+/// Tolerance of a finding before its label, in seconds: a check may have become faster.
 const EARLIER_S: f64 = 10.0;
 
-/// The beginning and the end of a table's name.
 const TABLE: (&str, &str) = ("labels", ".csv");
 
 const COLUMNS: [&str; 6] = ["file", "check", "instance", "onset", "label", "cause"];
@@ -70,7 +69,6 @@ pub(super) const EACH: Form = Form {
     columns: &["recording", "check", "instance", "level", "at s", "label", "evidence"],
 };
 
-/// The truth of a told finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
     True,
@@ -97,14 +95,12 @@ impl Verdict {
     }
 }
 
-/// The known fault of a flight.
 #[derive(Clone, Copy, Debug)]
 struct Fault {
     class: &'static Class,
     onset_s: f64,
 }
 
-/// A label of a finding.
 #[derive(Clone, Debug)]
 struct Label {
     onset_s: f64,
@@ -112,13 +108,11 @@ struct Label {
     evidence: String,
 }
 
-/// The labels of one recording.
 #[derive(Debug)]
 struct Flight {
     path: PathBuf,
     name: String,
     fault: Option<Fault>,
-    /// By check and instance, in order of their onsets.
     labels: BTreeMap<(String, u8), Vec<Label>>,
 }
 
@@ -129,7 +123,6 @@ impl Flight {
     }
 }
 
-/// Labelled recordings that are counted together.
 #[derive(Debug)]
 pub(super) struct Set {
     name: String,
@@ -148,7 +141,6 @@ struct Told {
     evidence: String,
 }
 
-/// The result of one recording.
 #[derive(Debug)]
 struct Outcome {
     name: String,
@@ -157,7 +149,6 @@ struct Outcome {
     told: Vec<Told>,
 }
 
-/// The results of a set.
 #[derive(Debug)]
 pub(super) struct Results {
     name: String,
@@ -165,7 +156,6 @@ pub(super) struct Results {
     outcomes: Vec<Outcome>,
 }
 
-/// The set of a folder that has tables of labels.
 pub(super) fn find(folder: &Path, known: Known) -> Result<Option<Set>> {
     let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
     let mut tables = Vec::new();
@@ -188,7 +178,6 @@ pub(super) fn find(folder: &Path, known: Known) -> Result<Option<Set>> {
     Ok(Some(set).filter(|_| !tables.is_empty()))
 }
 
-/// Adds a table's rows. Rows of findings follow the row of their flight.
 fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Result<()> {
     let mut rows = records(text)?.into_iter();
     let header = rows.next().context("the table is empty")?;
@@ -227,7 +216,6 @@ fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Re
     Ok(())
 }
 
-/// Judges a set as `hums check` does.
 pub(super) fn judge(set: &Set) -> Result<Results> {
     let outcomes = set.flights.par_iter().with_max_len(1).map(|flight| {
         let place = Place::file(&flight.path);
@@ -316,7 +304,6 @@ fn head(name: &str, judged: &str, recordings: usize, seconds: f64, level: &str) 
     vec![name.to_owned(), judged.to_owned(), recordings.to_string(), hours(seconds), level.to_owned()]
 }
 
-/// How many of the faults were told first by a finding of the part that failed.
 fn right_first(faults: impl Iterator<Item = bool>) -> String {
     let faults: Vec<bool> = faults.collect();
     let (right, all) = (faults.iter().filter(|is_right| **is_right).count(), faults.len());
@@ -324,13 +311,11 @@ fn right_first(faults: impl Iterator<Item = bool>) -> String {
     format!("{right} of {all} ({part}, at least {least})")
 }
 
-/// Whether the first told finding since a fault is of the part that failed.
 fn is_right_first(told: &[Told], fault: Fault) -> bool {
     let first = told.iter().find(|one| fault.onset_s - EARLIER_S <= one.at_s);
     first.is_some_and(|first| fault.class.checks.contains(&first.check.as_str()))
 }
 
-/// Each finding that is not true.
 pub(super) fn each(real: &[Results]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     for outcome in real.iter().flat_map(|set| &set.outcomes) {

@@ -1,4 +1,4 @@
-//! Columns of tables as they are read and written again: values with their levels, whatever their type.
+//! Columns of tables, read and written with their levels, for any type.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -18,25 +18,19 @@ use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use super::super::session_of;
 use super::Rows;
 
-/// Rows of a column that show its best encoding.
 const SAMPLE_ROWS: usize = 32 * 1024;
-/// The first two columns of every table.
 const NAMES: [&str; 2] = ["vehicle", "session"];
-/// Rows whose names are read at once.
 const NAMES_AT_ONCE: usize = 64 * 1024;
 
-/// Rows of one session in a file.
 #[derive(Clone, Debug)]
 pub(super) struct Segment {
     pub(super) vehicle: String,
     pub(super) session: String,
-    /// The number of the session's file.
     pub(super) part: u32,
     pub(super) from: usize,
     pub(super) rows: usize,
 }
 
-/// A file of a table. It is open while it is read only.
 pub(super) struct Input {
     path: PathBuf,
     metadata: Arc<ParquetMetaData>,
@@ -44,7 +38,6 @@ pub(super) struct Input {
 }
 
 impl Input {
-    /// Reads what the file has of which session.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let context = || format!("{}: cannot be read as a table", path.display());
         let file = File::open(path).with_context(context)?;
@@ -111,7 +104,6 @@ impl Input {
         self.metadata.file_metadata().schema().clone()
     }
 
-    /// What is known of the columns.
     pub(super) fn about(&self) -> &[KeyValue] {
         self.metadata.file_metadata().key_value_metadata().map_or(&[], Vec::as_slice)
     }
@@ -140,7 +132,6 @@ pub(super) enum Column {
     Texts(Values<ByteArrayType>),
 }
 
-/// Reads a column of these rows.
 pub(super) fn read(inputs: &[Input], rows: &[Rows], column: usize) -> Result<Column> {
     let mut all = None;
     for (index, from, count) in rows {
@@ -235,7 +226,6 @@ impl<T: DataType> Values<T> {
         Self { present, definition, repetition }
     }
 
-    /// Adds the encoding that makes a sample smallest.
     fn encoded(
         &self,
         schema: &TypePtr,
@@ -269,7 +259,6 @@ impl<T: DataType> Values<T> {
     }
 }
 
-/// A column with this encoding.
 fn encode(
     properties: WriterPropertiesBuilder,
     path: &ColumnPath,
@@ -281,7 +270,6 @@ fn encode(
     }
 }
 
-/// The path of a field's values.
 fn path_of(field: &Type) -> ColumnPath {
     let (mut path, mut field) = (vec![field.name().to_owned()], field);
     while let Some(inner) = (!field.is_primitive()).then(|| field.get_fields().first()).flatten() {
@@ -305,7 +293,6 @@ impl Column {
         .map_err(Into::into)
     }
 
-    /// Adds the best encoding of the column of this number.
     pub(super) fn encoded(
         &self,
         schema: &TypePtr,
