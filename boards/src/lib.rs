@@ -24,6 +24,7 @@ pub const TAG_END: char = ';';
 const USB: [(&str, Pin); 2] =
     [("usb-dm", Pin { port: 0, number: 11 }), ("usb-dp", Pin { port: 0, number: 12 })];
 
+/// Multiples of this frequency divide down to the input of the chip's PLL.
 const CRYSTAL_STEP_HZ: u32 = 2_000_000;
 /// A crystal of the chip (DS8626, table 36).
 const CRYSTAL_HZ: std::ops::RangeInclusive<u32> = 4_000_000..=26_000_000;

@@ -54,7 +54,6 @@ pub fn table(page: &str) -> String {
     table
 }
 
-/// The anchor that GitHub makes of a heading.
 fn anchor(title: &str) -> String {
     let letters = title.chars().filter(|letter| letter.is_alphanumeric() || matches!(letter, ' ' | '-'));
     letters.map(|letter| if letter == ' ' { '-' } else { letter.to_ascii_lowercase() }).collect()

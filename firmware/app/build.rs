@@ -91,7 +91,6 @@ fn copy(from: &str, to: &Path) {
     fs::copy(from, to).expect("the linker script is in the source tree");
 }
 
-/// The commit; empty without git.
 fn commit() -> String {
     // The log of HEAD grows with every commit, so that the next build looks again.
     if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]) {

@@ -129,7 +129,6 @@ fn write_structures(definitions: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A file of definitions without the messages and enumerations that are not in `kept`.
 fn only(text: &str, kept: &BTreeSet<&str>) -> Result<String> {
     let document = Document::parse(text)?;
     let (mut out, mut from) = (String::new(), 0);

@@ -87,7 +87,6 @@ fn push(out: &mut Vec<u8>, kind: u8, step: u8, id: u32, content: &[u8]) {
     out.extend_from_slice(content);
 }
 
-/// A change of a card: an entry of a directory.
 fn entry(place: u8, number: u16, name: &[u8; 11], attributes: u8, cluster: u16, size: u32) -> Vec<u8> {
     let [low, high] = (number * 32).to_le_bytes();
     let mut out = vec![place, low, high, 32];
@@ -99,7 +98,6 @@ fn entry(place: u8, number: u16, name: &[u8; 11], attributes: u8, cluster: u16, 
     out
 }
 
-/// A change of a card: the FAT's entries from a cluster on.
 fn chain(first: u16, next: &[u32]) -> Vec<u8> {
     let [low, high] = (first * 4).to_le_bytes();
     let mut out = vec![3, low, high, 4 * next.len() as u8];
@@ -107,7 +105,6 @@ fn chain(first: u16, next: &[u32]) -> Vec<u8> {
     out
 }
 
-/// Two segments of a log in the root directory, and another file.
 fn segments() -> Vec<u8> {
     let name = |session, segment| LogName { session, segment }.short();
     [

@@ -7,7 +7,6 @@ use hums_blackbox::{SectorSink, Writer};
 /// Bytes of a group's first body before its coded stream.
 const PREAMBLE_BYTES: usize = 26;
 
-/// Start of a sector's body.
 const BODY_AT: usize = 19;
 
 /// The longest entry: a record.
@@ -25,7 +24,6 @@ impl SectorSink for First {
     }
 }
 
-/// The start of a group as this build's writer makes it.
 fn preamble() -> [u8; PREAMBLE_BYTES] {
     let (mut writer, mut first) = (Box::new(Writer::new()), First(None));
     writer.finish(&mut first);

@@ -2,7 +2,6 @@
 
 use hums_link::{Framer, FramerCounts};
 
-/// The frames of the bytes in pieces of `piece` bytes; and the counts after the line fell silent.
 fn frames(bytes: &[u8], piece: usize) -> (Vec<Vec<u8>>, FramerCounts) {
     let mut framer = Box::new(Framer::new());
     let mut frames = Vec::new();

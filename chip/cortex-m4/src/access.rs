@@ -9,7 +9,6 @@ use crate::trap::Trap;
 
 enum Way {
     Bus,
-    /// A bit of this word at this place.
     Bit(u32, u32),
     Own,
 }
@@ -152,7 +151,6 @@ impl Core {
         Ok(())
     }
 
-    /// In as few aligned parts as there are.
     #[cold]
     fn read_unaligned<B: Bus>(&mut self, bus: &mut B, address: u32, size: Size) -> Result<u32, Trap> {
         self.may_be_unaligned(address)?;
@@ -283,7 +281,6 @@ fn align_bit(at: u32, bit: Option<u32>, size: Size) -> (u32, Option<u32>) {
     (at - low, bit.map(|bit| bit + 8 * low))
 }
 
-/// The widest aligned access at an address, of at most so many bytes.
 fn part_of(address: u32, bytes: u32) -> Size {
     if address & 1 != 0 || bytes == 1 {
         Size::Byte

@@ -55,7 +55,6 @@ impl Cache {
         self.entries[(entry.tag >> 1) as usize & (ENTRIES - 1)] = entry;
     }
 
-    /// After a store of up to a word.
     #[inline(always)]
     pub(crate) fn stored(&mut self, address: u32) {
         let (word, bit) = page(address);

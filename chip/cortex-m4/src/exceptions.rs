@@ -100,7 +100,6 @@ impl Exceptions {
         number >= 16 && number < 16 + self.lines
     }
 
-    /// True if it was not.
     pub(crate) fn pend(&mut self, number: u16) -> bool {
         if number >= 16 && !self.is_interrupt(number) {
             return false;
@@ -115,7 +114,6 @@ impl Exceptions {
         self.pending.put(number, self.high.has(number) && !self.active.has(number));
     }
 
-    /// True if the interrupt became pending.
     pub(crate) fn set_line(&mut self, interrupt: u16, high: bool) -> bool {
         let number = interrupt + 16;
         if interrupt >= self.lines || self.high.has(number) == high {

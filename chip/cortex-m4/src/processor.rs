@@ -39,11 +39,9 @@ pub enum Outcome {
 pub struct Core {
     /// Registers 0 to 14; 13 is the stack pointer in use. 15 is the executed instruction's address and 4.
     pub(crate) r: [u32; 16],
-    /// The stack pointer that is not in use.
     pub(crate) other_sp: u32,
     /// Next, or executed now.
     pub(crate) pc: u32,
-    /// The address after the executed instruction.
     pub(crate) next: u32,
     pub(crate) flags: Flags,
     /// `ITSTATE` of the next instruction, and of the executed one.

@@ -93,7 +93,6 @@ fn is_signaling(bits: u32) -> bool {
     is_nan(bits) && bits & QUIET == 0
 }
 
-/// The first signaling NaN, or the first quiet one.
 fn nan_of(operands: &[u32], status: &mut u32) -> Option<u32> {
     let signaling = operands.iter().copied().find(|&bits| is_signaling(bits));
     let nan = signaling.or_else(|| operands.iter().copied().find(|&bits| is_nan(bits)))?;
@@ -236,7 +235,6 @@ pub(crate) fn add(a: u32, b: u32, status: &mut u32) -> u32 {
     }
 }
 
-/// A number with room below it.
 fn wide(value: Unpacked, room: u32) -> (bool, u128, i32) {
     match value.number {
         Number::Finite { mantissa, exponent } => {

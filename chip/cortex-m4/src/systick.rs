@@ -40,7 +40,6 @@ impl SysTick {
         if self.processor_clock { cycles } else { cycles / self.divider }
     }
 
-    /// Ticks to the first zero, and the period.
     fn course(&self) -> (u64, u64) {
         let period = u64::from(self.reload) + 1;
         let first = if self.value == 0 { period } else { u64::from(self.value) };
@@ -84,7 +83,6 @@ impl SysTick {
         Some(self.since + cycles)
     }
 
-    /// True if one interrupts.
     pub(crate) fn update(&mut self, now: u64) -> bool {
         let zeros = self.zeros(now);
         let new = zeros > self.told;

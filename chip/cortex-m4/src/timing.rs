@@ -93,7 +93,6 @@ fn float3(kind: Float3) -> u8 {
     }
 }
 
-/// Cycles of a division beyond the first two.
 pub(crate) fn division(n: u32, m: u32) -> u64 {
     let quotient_bits = (n.max(1).ilog2() + 1).saturating_sub(m.max(1).ilog2());
     if m == 0 || n < m { 0 } else { u64::from(quotient_bits.div_ceil(4) + 2).min(10) }

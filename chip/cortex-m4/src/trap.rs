@@ -10,7 +10,6 @@ pub(crate) enum Trap {
     DivideByZero,
     /// Refused by the bus.
     Bus(u32),
-    /// Refused by the bus.
     FetchBus,
     /// Refused by the MPU.
     Memory(u32),

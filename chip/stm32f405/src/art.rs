@@ -16,7 +16,6 @@ use crate::memory::{FLASH, Memory};
 
 const INSTRUCTION_LINES: usize = 64;
 const DATA_LINES: usize = 8;
-/// Lines of the whole flash.
 const FLASH_LINES: usize = (FLASH.1 / LINE) as usize;
 /// Bytes.
 const LINE: u32 = 16;
@@ -26,7 +25,6 @@ const NONE: u32 = u32::MAX;
 /// Least recently used first to go.
 #[derive(Clone)]
 struct Lines<const N: usize> {
-    /// The line in each place.
     kept: [u32; N],
     /// Place plus one; 0 outside the cache.
     place_of: Box<[u8]>,

@@ -122,7 +122,6 @@ pub struct Chip {
     next: u64,
     /// The processor runs until then without being asked.
     pub(crate) until: u64,
-    /// When a copy from memory to memory ends.
     pub(crate) copies: [u64; 2],
 }
 

@@ -24,7 +24,6 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// Pins driven from outside, and their levels.
     driven: u32,
     level: u32,
 }

@@ -159,7 +159,6 @@ fn symbols(numbers: &Numbers) -> Result<Vec<Symbol>, Refused> {
     let mut found = Vec::new();
     for number in 0..count {
         let at = headers + number * size;
-        // A table of symbols.
         if numbers.word(at + 4)? != 2 {
             continue;
         }
@@ -225,7 +224,6 @@ mod tests {
         file
     }
 
-    /// One piece, no symbols.
     fn elf_file(machine: u16, address: u32, bytes: &[u8]) -> Vec<u8> {
         let mut file = vec![0; 84];
         file[..7].copy_from_slice(b"\x7fELF\x01\x01\x01");

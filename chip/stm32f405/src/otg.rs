@@ -19,6 +19,7 @@ const BIT: Ps = 83_333;
 const OVERHEAD_BYTES: u64 = 14;
 /// A token with NAK, STALL or nothing behind it.
 const REFUSAL_BYTES: u64 = 8;
+/// A reset of the bus.
 const RESET: Ps = 10 * MS;
 /// How often a host looks for a device.
 const LOOK: Ps = MS;

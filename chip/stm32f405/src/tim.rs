@@ -103,7 +103,6 @@ impl Tim {
         Some(if to > from { to - from } else { period - from + to })
     }
 
-    /// Steps until the counter begins anew.
     fn steps_to_update(&self) -> Option<u64> {
         self.steps_to(0)
     }

@@ -39,7 +39,6 @@ impl Tim11 {
         *self = Self::default();
     }
 
-    /// Captures since the model began, with the last one's time.
     fn captures(&self, input: Input) -> (u64, Ps) {
         let is_on = self.cr1 & self.ccer == 1 && self.ccmr == EACH_EIGHTH && self.or == CRYSTAL;
         if !is_on || input.edges_mhz == 0 {

@@ -18,7 +18,6 @@ pub(crate) enum Stage {
     Tasks,
     /// Bytes to frames.
     Framer,
-    /// Frames out of their queue.
     Monitor,
     /// Frames to sectors.
     Encode,
@@ -26,9 +25,7 @@ pub(crate) enum Stage {
     Observe,
     /// Frames on to the ground station.
     Summary,
-    /// Periodic work: checks for silence, the summary.
     Tick,
-    /// Sectors to the card.
     Storage,
 }
 

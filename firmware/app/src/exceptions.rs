@@ -6,7 +6,6 @@ use cortex_m::peripheral::{NVIC, SCB};
 use embassy_stm32::interrupt::Interrupt;
 use hums_onboard::Task;
 
-/// Interrupt of each task. The handlers in `executors` have these names, as in the vector table.
 pub(crate) const RECEPTION: Interrupt = Interrupt::CAN1_TX;
 pub(crate) const MONITOR: Interrupt = Interrupt::CAN1_RX0;
 pub(crate) const DOWNLINK: Interrupt = Interrupt::CAN1_RX1;
@@ -41,7 +40,6 @@ pub(crate) fn rank(number: u16) -> usize {
     }
 }
 
-/// The most urgent active task, which ran until now. Used if no exception number was stacked.
 pub(crate) fn begun() -> u16 {
     let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
     tasks.into_iter().map(number_of).find(|number| NVIC::is_active(Number(number - 16))).unwrap_or(0)

@@ -18,7 +18,6 @@ use hums_onboard::Task;
 use crate::exceptions;
 use crate::registers::{Registers, stacked};
 
-/// Stored bytes of the place: a source file and its line.
 const PLACE_BYTES: usize = 64;
 /// Bytes of the file's path within the place: the rest is for the line.
 const FILE_BYTES: usize = PLACE_BYTES - 8;
@@ -28,7 +27,6 @@ const SEEN: usize = 8;
 const LAST_BYTES: usize = 200;
 const MARK: u32 = 0x4641_554C;
 
-/// How a start can end, by the numbers that the record uses.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
     Supply = 0,
@@ -73,7 +71,6 @@ static LAST_SEEN: Seen = Seen {
     next: AtomicU32::new(0),
     messages: [const { (AtomicU32::new(0), AtomicU32::new(0)) }; SEEN],
 };
-/// An id that no message has: the place is empty.
 const NOTHING: u32 = u32::MAX;
 /// Task that missed its deadline, as an exception number; 0: none.
 static SILENT: AtomicU32 = AtomicU32::new(0);
@@ -119,7 +116,6 @@ impl Fault {
     }
 }
 
-/// The note of the previous start, if any; returned once.
 pub(crate) fn take() -> Option<Fault> {
     let noted = NOTE.mark.swap(0, Ordering::Relaxed) == MARK;
     if !noted || NOTE.sum.load(Ordering::Relaxed) != NOTE.sum_now() {
@@ -189,7 +185,6 @@ pub(crate) fn count_start() -> u32 {
     starts
 }
 
-/// Sets the task that missed its deadline, if any.
 pub(crate) fn silent(task: Option<Task>) {
     SILENT.store(task.map_or(0, |task| u32::from(exceptions::number_of(task))), Ordering::Relaxed);
 }

@@ -6,15 +6,10 @@ use hums_core::clock::Instant;
 
 type Link<T = ()> = Signal<CriticalSectionRawMutex, T>;
 
-/// Reception to monitor: there may be frames.
 pub(crate) static FRAMES: Link = Signal::new();
-/// Monitor to storage: there may be sectors, or the end of them.
 pub(crate) static SECTORS: Link = Signal::new();
-/// Monitor to downlink: there may be frames for the ground station.
 pub(crate) static GS: Link = Signal::new();
-/// Uplink to monitor: there may be frames from the ground station.
 pub(crate) static UPLINK: Link = Signal::new();
-/// Monitor to requests: there may be frames for the autopilot.
 pub(crate) static AUTOPILOT: Link = Signal::new();
 
 /// The board's clock, as everything below the app counts time.

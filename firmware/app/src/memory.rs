@@ -2,7 +2,6 @@
 
 use core::ptr;
 
-/// Paint of unused stack.
 const PAINT: u32 = 0x5AFE_57AC;
 
 unsafe extern "C" {
@@ -41,7 +40,6 @@ pub(crate) fn stack_used() -> (usize, usize) {
     (top - bottom - free, top - bottom)
 }
 
-/// The stack's first address and the one after its last.
 pub(crate) fn stack_bounds() -> (usize, usize) {
     ((&raw const _stack_end).addr(), (&raw const _stack_start).addr())
 }
@@ -54,7 +52,6 @@ pub(crate) fn stack_words() -> impl Iterator<Item = u32> {
     (0..all).map(move |word| unsafe { bottom.add(word).read_volatile() })
 }
 
-/// Address range of the program's functions.
 pub(crate) fn code() -> core::ops::Range<usize> {
     (&raw const __stext).addr()..(&raw const __etext).addr()
 }

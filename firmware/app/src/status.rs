@@ -13,5 +13,4 @@ pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();
 /// Monitor to storage: after the last sector the log ends.
 pub(crate) static LOG_ENDS: AtomicBool = AtomicBool::new(false);
-/// The log has ended, or no card is there.
 pub(crate) static LOG_ENDED: AtomicBool = AtomicBool::new(false);

@@ -69,7 +69,7 @@ fn return_address() -> u32 {
     memory::stack_words().take(SEARCHED_WORDS).find(is_return).map_or(0, |word| word & !1)
 }
 
-/// The processor cannot continue. `overflow`: the stack was full and only `place` is known.
+/// `overflow`: the stack was full and only `place` is known.
 fn give_up(running: u16, registers: Registers, overflow: bool, place: fmt::Arguments) -> ! {
     fault::processor(running, registers, overflow, place);
     board::restart();

@@ -79,7 +79,6 @@ fn main() -> Result<ExitCode> {
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// A line's bytes as a tlog: each frame with the time of its last byte.
 fn tlog_of_line(line: &[u8]) -> Vec<u8> {
     const MICROS_PER_BYTE: usize = 10_000_000 / 57_600;
     let (mut tlog, mut rest) = (Vec::new(), line);

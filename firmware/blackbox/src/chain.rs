@@ -28,7 +28,6 @@ pub(crate) fn begun(preamble: &[u8]) -> u32 {
     crc32c(preamble)
 }
 
-/// The chained value after an entry of this value.
 pub(crate) fn after(chain: u32, entry: u32) -> u32 {
     let mut crc = Crc32c::going_on(chain);
     crc.add(&entry.to_le_bytes());

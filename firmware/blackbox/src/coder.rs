@@ -13,7 +13,6 @@ const TOP: u32 = 1 << 24;
 /// Below this the interval is cut so that its top bytes settle.
 const BOTTOM: u32 = 1 << 16;
 
-/// Bytes that the decoder reads ahead of the symbol that it decodes.
 pub(crate) const LOOKAHEAD: usize = 4;
 
 /// Bytes that end a stream at most: enough to name one number within the interval, as `range >= 2^16`.
@@ -179,7 +178,6 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-/// The reading end with its user's extra memory.
 pub(crate) struct Reading<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],
@@ -230,7 +228,6 @@ impl<R> Coder for Reading<'_, R> {
 pub(crate) struct Decoder {
     low: u32,
     range: u32,
-    /// How far into the interval the bytes point.
     offset: u32,
     at: usize,
 }

@@ -4,7 +4,6 @@ mod at_once;
 
 pub(crate) const SYMBOLS: usize = 16;
 
-/// Bits of a distribution's probabilities.
 pub(crate) const PROBABILITY_BITS: u32 = 16;
 
 /// A distribution over 16 symbols that adapts to those it codes: quickly at first, then ever more slowly.
@@ -102,7 +101,6 @@ impl Cdf {
         (start, end - start)
     }
 
-    /// Start and size of a symbol in the mean of this distribution and another one.
     #[inline]
     pub(crate) fn part_between(&self, other: &Self, symbol: usize) -> (u32, u32) {
         let ((one, size), (two, other)) = (self.part_of(symbol), other.part_of(symbol));

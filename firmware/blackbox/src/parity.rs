@@ -121,7 +121,6 @@ pub struct Column {
 /// An available sum.
 #[derive(Clone, Copy, Debug)]
 struct Held {
-    /// The last number that it covers.
     last: u32,
     block: [u8; SECTOR_BYTES],
     /// Sum of the taken sectors; the latest one has the factor 1.
@@ -295,7 +294,6 @@ fn is_zero(rest: &[u8; SECTOR_BYTES]) -> bool {
     PARTS.into_iter().all(|part| rest[part].iter().all(|byte| *byte == 0))
 }
 
-/// Everything times two, four bytes at a time.
 fn double(block: &mut [u8; SECTOR_BYTES]) {
     for word in block.as_chunks_mut().0 {
         let bits = u32::from_le_bytes(*word);
@@ -355,7 +353,6 @@ mod tests {
         sector
     }
 
-    /// The sums of a column of the first `rows` sectors from `first` on.
     fn sums(first: u32, rows: u32, absent: Option<u32>) -> [[u8; SECTOR_BYTES]; 2] {
         Sum::ALL.map(|sum| {
             let mut block = [0; SECTOR_BYTES];

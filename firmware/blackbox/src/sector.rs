@@ -139,7 +139,6 @@ impl Sector {
         &mut self.bytes[BODY_AT..CRC_AT]
     }
 
-    /// Writes the header but for the session; clears the rest of the body.
     pub(crate) fn set_header(&mut self, header: &Header) {
         let flags = if header.partial { PARTIAL } else { 0 } | if header.closed { CLOSED } else { 0 };
         let body_bytes = (header.body_bytes).min(BODY_BYTES);

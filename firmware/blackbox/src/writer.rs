@@ -290,7 +290,6 @@ impl Writer {
         len
     }
 
-    /// Adds coded bytes `done` to `len` to the sector in progress, as far as there is room; returns the end.
     #[inline(never)]
     fn add(&mut self, done: usize, len: usize) -> usize {
         let at = self.header.body_bytes;

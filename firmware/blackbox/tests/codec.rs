@@ -38,7 +38,6 @@ fn read(sectors: &[Sector]) -> (Vec<Frame>, Vec<String>) {
     }
 }
 
-/// Returns the size of the log.
 fn round_trip(frames: &[Frame]) -> usize {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
     for (at, bytes, verified) in frames {

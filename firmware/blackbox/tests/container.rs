@@ -280,7 +280,6 @@ fn records_stand_among_frames_and_restart_begins_a_group() {
     assert_eq!((log.frames.len(), log.gaps.len()), (25, 0));
 }
 
-/// A card that misplaces a page.
 #[derive(Clone, Copy, Debug)]
 enum Misplaced {
     Swapped,

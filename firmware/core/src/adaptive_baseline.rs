@@ -7,7 +7,6 @@
 /// The baseline is known after so long, s, and looks back over so long.
 const KNOWN_S: f32 = 8.0;
 const MEMORY_S: f32 = 60.0;
-/// Greater figures are garbage.
 const FIGURE_MAX: f32 = 1e6;
 /// Of noise with a normal distribution four mean distances are 3.2 standard deviations.
 const SPREADS: f32 = 4.0;
@@ -45,7 +44,6 @@ impl AdaptiveBaseline {
         self.smooth += weight * (sample - self.smooth);
     }
 
-    /// Takes a periodic figure to the side of its baseline.
     pub(crate) fn wrap(&mut self, period: f32) {
         self.smooth -= period * libm::roundf(self.departed() / period);
     }
@@ -63,17 +61,14 @@ impl AdaptiveBaseline {
         self.learnt_s >= KNOWN_S
     }
 
-    /// How far the figure is from its baseline, with its sign.
     pub(crate) fn departed(&self) -> f32 {
         self.smooth - self.mean
     }
 
-    /// The usual distance of the figure from its baseline.
     pub(crate) fn range(&self) -> f32 {
         SPREADS * self.spread
     }
 
-    /// Its mean distance from its baseline.
     pub(crate) fn spread(&self) -> f32 {
         self.spread
     }

@@ -46,7 +46,6 @@ pub(crate) fn take(residuals: &mut Residuals, at: Instant, second: &SecondEstima
     }
 }
 
-/// Downwards, in the body's axes.
 fn down([roll, pitch]: [f32; 2]) -> [f32; 3] {
     let level = libm::cosf(pitch);
     [-libm::sinf(pitch), libm::sinf(roll) * level, libm::cosf(roll) * level]

@@ -134,7 +134,7 @@ state! {
 }
 
 impl Alerts {
-    /// A heartbeat. Each arming begins anew.
+    /// Each arming begins anew.
     pub(crate) fn take_armed(&mut self, at: Instant, armed: bool) {
         if armed && !self.armed {
             let Self { had, had_both, .. } = *self;
@@ -158,7 +158,7 @@ impl Alerts {
         self.began_at.age(now).is_some_and(|age| age <= span)
     }
 
-    /// A text or an event. An autopilot that crashes disarms with that text, and reports the damage right behind it.
+    /// An autopilot that crashes disarms with that text, and reports the damage right behind it.
     pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
         let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
             && self.armed_at.age(at).is_some_and(|age| age <= DISARMED);

@@ -1,7 +1,6 @@
 //! Construction of large values in place, part by part. A whole value would fill a board's stack, and as a constant
 //! it would be a copy in flash, nearly all zeros.
 
-/// A frame of its own, freed before the next step.
 #[inline(never)]
 pub(crate) fn apart(act: impl FnOnce()) {
     act();

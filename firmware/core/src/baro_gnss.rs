@@ -38,7 +38,6 @@ state! {
     /// Movement of a height without a climb, within [`RECEIVER_S`].
     #[derive(Clone, Copy, Debug)]
     struct Leap {
-        /// The last height, m, and when it was measured.
         height_m: f32,
         at: Stamp,
         leapt_m: f32,
@@ -62,7 +61,6 @@ impl Leap {
         self.late_m = (kept * self.late_m).max(RECEIVER_LATE_S * libm::fabsf(climb_mps));
     }
 
-    /// The movement in either direction, m.
     fn far_m(&self) -> f32 {
         (libm::fabsf(self.leapt_m) - self.late_m).max(0.0)
     }
@@ -90,7 +88,6 @@ state! {
         is_doubted: bool,
         /// Usual height and half of the usual dynamic pressure, both in m.
         air: Option<[f32; 2]>,
-        /// The leaps of barometer and receiver.
         leaps: [Leap; 2],
     }
 }

@@ -89,7 +89,6 @@ pub(crate) enum Meaning {
     Wrong(Alert),
     /// No fault in flight: arming, set-up, a command, or the end of a fault.
     Fine,
-    /// It is in no table.
     Unknown,
 }
 

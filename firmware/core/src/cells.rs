@@ -104,7 +104,6 @@ state! {
         rested: bool,
         /// 0: none.
         before: u8,
-        /// The last flight did not confirm it.
         doubted: bool,
         count: u8,
     }
@@ -128,7 +127,6 @@ fn counts(volts: f32, from_v: f32, to_v: f32) -> Counts {
 }
 
 impl Cells {
-    /// The voltage of the battery at a place, with its id; `rests`: the vehicle stands; `armed`: motors may turn.
     pub(crate) fn take_voltage(&mut self, battery: usize, id: u8, pack_v: f32, rests: bool, armed: bool) {
         let Some(pack) = self.packs.get_mut(battery).filter(|_| pack_v.is_finite() && pack_v > PLUGGED_V)
         else {
@@ -271,7 +269,6 @@ mod tests {
                 );
             }
         }
-        // Common packs are known without any help.
         for (pack_v, count) in
             [(4.2, 1), (3.8, 1), (8.4, 2), (12.6, 3), (11.4, 3), (16.8, 4), (15.2, 4), (17.4, 4)]
         {
@@ -352,7 +349,6 @@ mod tests {
             cells.remember(0, stored);
             cells.take_voltage(0, 0, 20.4, false, true);
             assert_eq!(cells.of(0), count, "{stored}");
-            // Another time, at rest and full.
             let mut cells = plugged(25.2);
             cells.remember(0, stored);
             assert_eq!(cells.of(0), if stored & 6 == 6 && stored != 0xFF { 6 } else { 0 }, "{stored}");

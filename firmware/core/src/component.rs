@@ -272,7 +272,6 @@ impl Component {
         true
     }
 
-    /// A new part, with no wear; returns the old one.
     pub(crate) fn replace(&mut self, serial: Label, wear: &Wear<'_>) -> Self {
         let old = Self { base: self.figures(wear), ..*self };
         self.serial = serial;
@@ -298,7 +297,6 @@ impl Component {
         self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
     }
 
-    /// Whether it is new at this power-on, so that it is saved again.
     pub(crate) const fn begin(&mut self, boots: u32) -> bool {
         let begins = self.as_of != boots;
         self.as_of = boots;

@@ -156,7 +156,6 @@ impl Crosschecks {
         }
     }
 
-    /// A flight begins: nothing is usual yet.
     pub(crate) fn begin(&mut self) {
         self.pairs.iter_mut().for_each(Pairs::begin);
         let Self { pairs, selects, residuals: Residuals { gates, .. }, .. } = *self;
@@ -180,7 +179,6 @@ impl Crosschecks {
         }
     }
 
-    /// Sensors up to the last one of any kind that has measured.
     pub(crate) fn sensors_known(&self) -> u8 {
         let measured = |sensor: usize| self.pairs.iter().any(|pairs| pairs.has_measured(sensor));
         (0..SENSORS_MAX).rev().find(|sensor| measured(*sensor)).map_or(0, |last| last as u8 + 1)
@@ -196,7 +194,6 @@ impl Crosschecks {
         self.repeats.stuck(now, kind, sensor, measures)
     }
 
-    /// Vibration as a multiple of its baseline.
     pub(crate) fn vibration_rise(&self, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
         self.residuals.multiple(now, vibration_of(vehicle))
     }

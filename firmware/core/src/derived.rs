@@ -30,7 +30,6 @@ const SILENCE_PAUSES: f32 = 3.0;
 /// after some hundred.
 const PAUSE_MAX_S: f32 = 1.0;
 const PAUSE_FADES: f32 = 1.0 / 64.0;
-/// How long a loss of frames stays a warning.
 const LOSS_MEMORY: Span = Span::from_secs(10);
 
 state! {
@@ -277,7 +276,6 @@ pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
         .map(|force| force / GRAVITY)
 }
 
-/// A battery's voltage; the autopilot's figure for the first one where no battery reports itself.
 pub(crate) fn pack_v(vehicle: &Vehicle, battery: usize) -> Option<f32> {
     let known = vehicle.batteries.get(battery)?.get();
     let system = || vehicle.system.get().filter(|_| battery == 0).and_then(|system| system.voltage);

@@ -31,7 +31,6 @@ const FAR_MORE: u16 = 2;
 struct Candidate {
     source: Source,
     autopilot: Autopilot,
-    /// Observations in this window, and in the one before.
     now: u16,
     before: u16,
     heard: Instant,
@@ -44,7 +43,6 @@ impl Candidate {
 }
 
 state! {
-    /// The systems on the port, and which of them is the vehicle.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Election {
         candidates: [Option<Candidate>; CANDIDATES_MAX] = [None; CANDIDATES_MAX],
@@ -53,7 +51,6 @@ state! {
         since: Option<Instant>,
         /// First heartbeat: turns are counted from here.
         first: Instant,
-        /// The vehicle makes a stream.
         streams: bool,
         /// It did so before anybody was asked.
         by_itself: bool,
@@ -63,7 +60,6 @@ state! {
 }
 
 impl Election {
-    /// Whether the choice stands as long as heartbeats come.
     pub(crate) fn is_settled(&self, now: Instant) -> bool {
         self.settled || (self.lasts(now) >= SETTLES && self.heard(now).count() == 1)
     }
@@ -79,7 +75,6 @@ impl Election {
         asked.map(|candidate| (candidate.source, candidate.autopilot))
     }
 
-    /// Whether asking further cannot change the choice.
     fn is_decided(&self, now: Instant) -> bool {
         let turns = self.heard(now).count() as u64;
         let over = now.since(self.first).as_millis() >= turns * TURN.as_millis();
@@ -94,8 +89,7 @@ impl Election {
         self.since.map_or(Span::ZERO, |since| now.since(since))
     }
 
-    /// Counts an observation and returns the vehicle from now on. `heartbeat`: the autopilot, if the observation is a
-    /// heartbeat.
+    /// `heartbeat`: the autopilot, if the observation is a heartbeat.
     pub(crate) fn hear(
         &mut self,
         at: Instant,
@@ -134,7 +128,6 @@ impl Election {
         source
     }
 
-    /// `says`: its number of observations.
     fn note_stream(&mut self, at: Instant, says: u16) {
         if !self.streams && says >= STREAM_MIN {
             self.streams = true;
@@ -181,8 +174,7 @@ mod tests {
     const OURS: Source = Source { system: 1, component: 1 };
     const OTHER: Source = Source { system: 7, component: 1 };
 
-    /// A run of tenths of a second: each system has a period in ms, and a heartbeat every second. Returns the vehicle
-    /// at the end.
+    /// Each system has a period in ms, and a heartbeat every second. Returns the vehicle at the end.
     fn hear(
         election: &mut Election,
         mut vehicle: Option<Source>,

@@ -83,11 +83,9 @@ state! {
     }
 }
 
-/// How often the time in ranges is counted.
 const EVERY: Span = Span::from_millis(100);
 
 impl Exposure {
-    /// One step; `current_a` is the sum of all batteries, if known.
     pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) {
         let step = self.last.map_or(Span::ZERO, |last| now.since(last));
         if self.last.is_some() && step < EVERY {
@@ -124,7 +122,6 @@ impl Exposure {
         both
     }
 
-    /// Forgets earlier sessions: they were another airframe's.
     pub(crate) fn forget_life(&mut self) {
         self.before = Tenths::default();
     }

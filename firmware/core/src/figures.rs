@@ -25,7 +25,6 @@ use crate::vehicle::{BATTERIES_MAX, Vehicle};
 const EVERY: Span = Span::from_secs(1);
 /// Samples from which on a mean is a figure.
 const SAMPLES_MIN: u16 = 20;
-/// Samples that a mean looks back over.
 const SAMPLES: u16 = 60;
 /// Part of the distance by which a sample moves the mean at most (and [`Quantity::grain`]).
 const BELIEVED: f32 = 0.5;
@@ -143,7 +142,6 @@ state! {
 }
 
 impl Figures {
-    /// One step, after flight and derived quantities.
     pub(crate) fn step(&mut self, inputs: &Inputs<'_>, event: Option<FlightEvent>) {
         let Inputs { now, vehicle, flight, derived, params, .. } = *inputs;
         match event {
@@ -227,7 +225,6 @@ fn sample(quantity: Quantity, inputs: &Inputs<'_>) -> Option<f32> {
     }
 }
 
-/// The air's density as a part of that at sea level.
 fn density(vehicle: &Vehicle) -> f32 {
     let pressure =
         vehicle.air.get().and_then(|air| air.pressure).map_or(SEA_LEVEL_HPA, |pressure| pressure.0);

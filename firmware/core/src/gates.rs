@@ -27,7 +27,6 @@ pub(crate) const ONE_CONTROL: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
 
-/// It has turned fast if it did so within this.
 pub(crate) const TURNED: Span = Span::from_secs(1);
 const EXACT_FOR: Span = Span::from_secs(15);
 pub(crate) const LEVEL_MPS: f32 = 2.0;
@@ -35,11 +34,9 @@ pub(crate) const LEVEL_MPS: f32 = 2.0;
 pub(crate) const LEANS_RAD: f32 = 0.6;
 
 state! {
-    /// The conditions at the last step.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Gates {
         open: u16,
-        /// When the first receiver was not exact last.
         inexact_at: Stamp,
     }
 }
@@ -51,7 +48,6 @@ impl Gates {
         Self { open, ..Self::default() }
     }
 
-    /// Whether all of these are open.
     pub(crate) const fn are(self, all: u16) -> bool {
         self.open & all == all
     }

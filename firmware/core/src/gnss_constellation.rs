@@ -12,7 +12,6 @@ use crate::time::Instant;
 /// The best geometry that counts. Receivers of several systems report less, and then a small change is a large part.
 const HDOP_IDEAL: f32 = 1.0;
 
-/// Takes a receiver's figures with a fix.
 pub(crate) fn take(residuals: &mut Residuals, at: Instant, gnss: &Gnss) {
     let fewer = gnss.satellites.filter(|count| *count > 0).map(|count| -libm::logf(count.into()));
     let hdop = gnss.hdop.filter(|hdop| hdop.is_finite()).map(|hdop| libm::logf(hdop.max(HDOP_IDEAL)));
@@ -40,8 +39,6 @@ mod tests {
     use super::*;
     use crate::gates::{self, Gates};
 
-    /// The lost part and the rise of the dilution after seconds with these satellites and this dilution, five times a
-    /// second.
     fn told(said: impl Iterator<Item = (usize, u8, f32)>) -> (Option<f32>, Option<f32>) {
         let (mut residuals, mut now) = (Residuals::default(), Instant::ZERO);
         residuals.gates = Gates::open(gates::AIRBORNE);

@@ -19,7 +19,6 @@ use crate::units::{Metres, Position};
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = 0.011_132;
 
-/// One measurement of a receiver.
 #[derive(Clone, Copy, Debug)]
 struct Fix {
     /// Latitude and longitude, 1e-7 degrees.
@@ -30,7 +29,6 @@ struct Fix {
 }
 
 state! {
-    /// The memory of one receiver.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct GnssVelocity {
         before: Option<Fix>,
@@ -44,7 +42,6 @@ state! {
 }
 
 impl GnssVelocity {
-    /// Takes a receiver's message in flight.
     pub(crate) fn take(&mut self, at: Instant, gnss: &Gnss, airborne: bool) {
         let Some(fix) = fix(gnss).filter(|_| airborne) else {
             *self = Self::default();
@@ -80,7 +77,6 @@ impl GnssVelocity {
         (self.known_s, self.at) = (self.known_s + step_s, Stamp::at(at));
     }
 
-    /// The difference between velocity and movement of the positions, m/s.
     pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
         let velocity = self.before?.velocity;
         let changed_mps = length([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
@@ -93,7 +89,6 @@ fn length([north, east]: [f32; 2]) -> f32 {
     libm::sqrtf(north * north + east * east)
 }
 
-/// Position and velocity of an exact receiver.
 fn fix(gnss: &Gnss) -> Option<Fix> {
     let speed_mps = gnss.speed?.sane().filter(|speed| *speed >= 0.0)?;
     let course = gnss.course.map(|course| course.0).filter(|course| course.is_finite() && gnss.is_exact())?;

@@ -55,7 +55,6 @@ impl Happenings {
         self.waiting[WAITING_MAX - 1].take()
     }
 
-    /// Events without a place since the last call.
     pub(crate) const fn take_lost(&mut self) -> u16 {
         core::mem::replace(&mut self.lost, 0)
     }

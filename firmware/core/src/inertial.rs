@@ -22,7 +22,6 @@ use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
 /// Time constant of the force, of 0.53 Hz: a shock counts for little, a lasting turn fully.
 const SMOOTHING_S: f32 = 0.3;
-/// Minimum time level and still.
 const LASTS: Span = Span::from_millis(1_500);
 /// A fast turn is above 0.7 rad/s (40 degrees a second). A still vehicle turns slower than 0.5 rad/s (29 degrees a second) on the average: more
 /// than the offset of a gyro that still flies.
@@ -155,7 +154,6 @@ impl Inertial {
         self.at.is_some_and(|at| now.since(at) <= FRESH && at.since(self.steps_since) >= STEPS_KNOWN)
     }
 
-    /// Rest on the ground, without thrust.
     pub(crate) fn rest(&mut self, now: Instant) {
         if self.has_steps(now) && (self.step_at_rest == 0.0 || self.step < self.step_at_rest) {
             self.step_at_rest = self.step;

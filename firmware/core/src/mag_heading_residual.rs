@@ -38,7 +38,6 @@ pub(crate) fn take(residuals: &mut Residuals, at: Instant, [x, y, z]: [f32; 3], 
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct CompassUse {
-        /// Compass ratios in this flight, and whether the last message had none.
         ratios: u8,
         unused: (Stamp, bool),
     }

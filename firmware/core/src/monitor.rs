@@ -63,9 +63,7 @@ state! {
     struct Before {
         armed: bool,
         reboots: u32,
-        /// The last reported phase; the next one, and since when.
         phase: Phase = Phase::Ground,
-        /// Changes of the vehicle until then.
         changes: u32,
         next_phase: Phase = Phase::Ground,
         next_since: Instant,

@@ -28,7 +28,6 @@ pub fn throttle(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     displayed(now, vehicle, |hud| Some(hud.throttle?.0))
 }
 
-/// The speed through the air, in m/s.
 pub(crate) fn airspeed_mps(now: Instant, vehicle: &Vehicle) -> Option<f32> {
     displayed(now, vehicle, |hud| Some(hud.airspeed?.0))
         .filter(|speed| (0.0..=MetresPerSecond::MAX).contains(speed))
@@ -70,7 +69,6 @@ pub(crate) const CLEAR_M: f32 = 1.5;
 pub(crate) const LOW_M: f32 = 1.0;
 /// Slower than this it may stand: estimators wander by half of it.
 pub(crate) const STILL_MPS: f32 = 1.0;
-/// Faster than this it moves, despite wind and noise in an estimate at rest.
 pub(crate) const MOVES_MPS: f32 = 1.5;
 /// A climb or sink slower than this may be none: an estimator of a hover trembles, and has offsets.
 pub(crate) const HANGS_MPS: f32 = 0.3;
@@ -117,12 +115,10 @@ pub(crate) struct Kinematics {
     pub(crate) sink: WindowMax,
     /// Height of the place of arming, m; `None` if the arming was not received.
     armed_m: Option<f32>,
-    /// Displayed altitude while it stood without thrust, m.
     idle_m: Option<f32>,
     /// When the receiver moved last, and its altitude since, m.
     moved_at: Option<Instant>,
     stood_at_m: f32,
-    /// When the estimate moved last while the receiver stood.
     strayed_at: Option<Instant>,
 }
 

@@ -45,7 +45,6 @@ const FLYING_PART: f32 = 0.2;
 const LOST_PART: f32 = 0.4;
 /// A vehicle that turned fast within this drives each motor as it needs to.
 const TURNED: Span = Span::from_secs(2);
-/// Time constant of the motor speeds that are compared, s.
 const SMOOTHING_S: f32 = 1.0;
 /// ESCs that do not measure current say zero for all, and then nothing follows.
 const CURRENT_MIN_A: f32 = 0.5;
@@ -69,7 +68,6 @@ state! {
     /// One motor.
     #[derive(Clone, Copy, Debug)]
     struct Track {
-        /// Errors that its ESC counted lately.
         errors: Option<Rate>,
         /// Smoothed interval between messages that carry speed or current, s; 0 before there are two.
         interval_s: f32,
@@ -109,7 +107,6 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Motors {
         tracks: [Track; MOTORS_MAX] = [Track::default(); MOTORS_MAX],
-        /// What the autopilot gives them.
         pub(crate) outputs: MotorOutputs,
         /// Messages of the vehicle since the last one of any ESC, and eight times their smoothed number between two.
         messages: u16,
@@ -120,7 +117,6 @@ state! {
 }
 
 impl Motors {
-    /// Counts any message of the vehicle.
     pub(crate) const fn hear(&mut self) {
         self.messages = self.messages.saturating_add(1);
     }
@@ -180,7 +176,6 @@ impl Motors {
         tracks.filter(|(_, track)| track.is_fitted()).map(|(motor, track)| (motor, track.smooth_rpm))
     }
 
-    /// Errors a minute that a motor's ESC counts.
     pub(crate) fn errors(&self, motor: u8) -> Option<f32> {
         Some(self.track(motor)?.errors?.per_minute() as f32)
     }
@@ -302,8 +297,7 @@ impl Motors {
         others.map(|(_, speed)| (speed - own).abs()).reduce(f32::min).unwrap_or(0.0)
     }
 
-    /// One step: which motor is furthest from the middle one. It stays the one that was found first until another is twice as far: if one is lost,
-    /// others follow.
+    /// It stays the one that was found first until another is twice as far: if one is lost, others follow.
     pub(crate) fn step(&mut self) {
         let Some(middle) = self.middle_speed() else { return };
         let own = self.speeds().find(|(motor, _)| *motor == self.furthest);

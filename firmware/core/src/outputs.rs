@@ -42,7 +42,6 @@ use crate::observation::{MOTORS_MAX, Outputs};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::vehicle::Vehicle;
 
-/// Motors of the largest frame that is judged.
 pub(crate) const JUDGED_MAX: usize = 8;
 /// Time constant of the commands, s: gusts and corrections of course that last longer are in what commands vary by ([`SPREADS`]).
 const SMOOTHING_S: f32 = 2.0;
@@ -121,9 +120,7 @@ pub(crate) enum Verdict {
     Ok,
     /// It gives less thrust than it should: its command stands out by so much, percent of the average.
     Weak(f32),
-    /// It alone is at the end of its range.
     Saturated,
-    /// It is given next to nothing while the others carry: the autopilot, or a command, shut it off.
     ShutOff,
 }
 
@@ -150,9 +147,7 @@ state! {
         share: AdaptiveBaseline,
         /// It was given as little on the ground as a motor that does not turn.
         idles: bool,
-        /// It carried in any flight.
         carried: bool,
-        /// It is given next to nothing now, or is at the end of its range.
         off: bool,
         full: bool,
         /// Of a flight whose take-off was not received: the first output, and whether it moved since.
@@ -164,7 +159,6 @@ state! {
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct MotorOutputs {
-        /// The group that has the motors: the first one that has any output.
         port: Option<u8>,
         /// How many motors there are in this flight; 0 before it is known.
         count: u8,
@@ -246,7 +240,6 @@ impl MotorOutputs {
         self.judge(count, step_s);
     }
 
-    /// Whether there are so many motors; how many there are shows in the first level flight.
     fn is_of_frame(&mut self, parts: &[f32; JUDGED_MAX], mean: f32, count: usize) -> bool {
         if self.count == 0 {
             let is_like =
@@ -293,7 +286,7 @@ impl MotorOutputs {
             && matches!(self.verdict.1, Verdict::Saturated | Verdict::ShutOff)
     }
 
-    /// The outputs on the ground. One that is given more while the vehicle is disarmed is a servo's, or a motor's in a test.
+    /// One that is given more while the vehicle is disarmed is a servo's, or a motor's in a test.
     fn note_idle(&mut self, outputs: &[u16; JUDGED_MAX], parts: &[f32; JUDGED_MAX], armed: bool) {
         let used = self.outputs.iter_mut().zip(outputs).zip(parts).filter(|((_, now), _)| **now > 0);
         for ((output, _), given) in used {
@@ -429,7 +422,6 @@ fn surely_carries(given: &f32) -> bool {
     *given > SURELY_CARRIES
 }
 
-/// The only motor with property `is`, if all others have property `others`.
 fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option<u8> {
     let place = given.iter().position(is)?;
     let mut rest = given.iter().enumerate().filter(|(other, _)| *other != place);
@@ -441,7 +433,6 @@ fn saturated_alone(given: &[f32]) -> Option<u8> {
     only(given, is_full, |given| (IDLE..SHARES).contains(given))
 }
 
-/// Whether it turns about its upright axis: then wind and load go round it, and two motors are given more.
 fn yaws(vehicle: &Vehicle) -> bool {
     let rates = vehicle.attitude.get().and_then(|attitude| attitude.rates);
     rates.is_some_and(|[.., yaw]| libm::fabsf(yaw.0) > YAWS_RAD_S)

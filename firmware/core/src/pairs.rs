@@ -16,7 +16,6 @@ use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};
 use crate::time::{Instant, PAUSE, Span, Stamp};
 use crate::units::norm;
 
-/// Sensors of one kind that are compared.
 pub(crate) const SENSORS_MAX: usize = 3;
 /// Pairs of them.
 const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
@@ -87,7 +86,6 @@ state! {
 state! {
     #[derive(Clone, Copy, Debug)]
     struct Pair {
-        /// How far they are apart, smoothed.
         difference: [f32; 3],
         residual: Residual = Residual::after(SETTLES_S),
     }
@@ -105,7 +103,6 @@ impl Pair {
         self.residual.take(row, at, norm(self.difference), 0.0);
     }
 
-    /// How far they are apart beyond their baseline, while that is known and fresh.
     fn excess(&self, now: Instant, kind: Kind) -> Option<Reading> {
         let at = self.residual.at().instant(now).filter(|at| now.since(*at) <= PAUSE);
         Reading::new(at, self.residual.excess(kind.row()))

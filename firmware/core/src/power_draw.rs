@@ -32,7 +32,6 @@ pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
     drawn
 }
 
-/// The discharge current of one battery that reports itself, or of the only one by the autopilot's figure.
 pub(crate) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f64 {
     let Some(slot) = vehicle.batteries.get(battery) else { return 0.0 };
     let mut drawn = Drawn::default();

@@ -28,7 +28,6 @@ pub(crate) struct Pressure {
     began_hpa: f32,
     before_hpa: f32,
     window: Instant,
-    /// Last time of a sink as fast as under a parachute.
     sank_at: Instant,
     /// Pressure at the arming, hPa; 0 for none.
     armed_hpa: f32,

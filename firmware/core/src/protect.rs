@@ -47,7 +47,6 @@ use crate::vehicle::{BATTERIES_MAX, Vehicle};
 /// Bytes of a text that a ground station shows to the pilot: one `STATUSTEXT`.
 pub const TEXT_BYTES_MAX: usize = 50;
 
-/// Between two requests that are not answered.
 const AGAIN: Span = Span::from_secs(1);
 /// Requests at most.
 const ATTEMPTS_MAX: u8 = 3;
@@ -196,7 +195,6 @@ enum State {
 enum Way {
     Accepted,
     Mode,
-    /// The vehicle sinks as in a landing, or the autopilot calls it one.
     Landing,
 }
 
@@ -259,7 +257,6 @@ impl Protect {
         self.request.take()
     }
 
-    /// `true` if there is something to cancel.
     pub(crate) const fn cancel(&mut self) -> bool {
         self.cancelled = matches!(self.state, State::Counting { .. } | State::Asking { .. });
         self.cancelled
@@ -338,7 +335,6 @@ impl Protect {
         })
     }
 
-    /// Whether the mode has changed since the last step, and who changed it.
     fn note_mode(&mut self, now: Instant, vehicle: &Vehicle) -> Option<Input> {
         let after = vehicle.heartbeat.get()?.mode;
         let before = self.mode.replace(after).filter(|before| *before != after)?;
@@ -410,7 +406,6 @@ impl Protect {
         (next, Some((Stage::Answered, result)))
     }
 
-    /// Asks again without an answer, or for a landing.
     fn insist(&mut self, now: Instant, attempt: u8, at: Instant, progress: bool) -> Move {
         if attempt == 0 {
             self.action = Action::Land;
@@ -518,7 +513,6 @@ fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bo
     })
 }
 
-/// Signs of landing: its landed state, a sink close to the ground, or a mission's.
 fn is_landing(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, flight, .. } = *situation;
     vehicle.landed.within(now, SILENT) == Some(&LandedState::Landing)

@@ -23,7 +23,6 @@ impl<const BINS: usize> Rainflow<BINS> {
         Self { edges, halves: [0; BINS], points: [0.0; POINTS], used: 0, extreme: None, turn }
     }
 
-    /// NaN and infinities are skipped.
     pub(crate) fn take(&mut self, value: f32) {
         if !value.is_finite() {
             return;

@@ -19,7 +19,6 @@ use crate::time::{Instant, PAUSE, Span};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
-/// Maximum age of a setpoint: an agile vehicle turns differently after it.
 const FRESH: Span = Span::from_millis(150);
 /// This part of the rates of the setpoint may be missing.
 const LATE_PART: f32 = 0.3;
@@ -59,7 +58,6 @@ pub(crate) fn take_attitude(to: &mut Residuals, at: Instant, attitude: &Attitude
 }
 
 state! {
-    /// Duration of full throttle without a climb.
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Thrust {
         full_since: Option<Instant>,

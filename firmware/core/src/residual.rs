@@ -55,7 +55,6 @@ enum Learn {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row {
-    /// The gates that must be open ([`crate::gates`]).
     gates: u16,
     /// Time constant, s; not zero.
     smoothing_s: f32,
@@ -124,7 +123,6 @@ impl Comparison {
     /// Of each receiver.
     pub(crate) const SATELLITES: [Self; RECEIVERS_MAX] = [Self::Satellites0, Self::Satellites1];
     pub(crate) const HDOP: [Self; RECEIVERS_MAX] = [Self::Hdop0, Self::Hdop1];
-    /// Of roll and pitch.
     pub(crate) const RATES: [Self; 2] = [Self::RollRate, Self::PitchRate];
 
     const fn row(self) -> &'static Row {
@@ -192,7 +190,6 @@ impl Row {
     }
 }
 
-/// Smooths a figure by axis; a sample moves it by `clamp` at most.
 pub(crate) fn smooth<const N: usize>(figure: &mut [f32; N], sample: [f32; N], weight: f32, clamp: f32) {
     for (figure, sample) in figure.iter_mut().zip(sample) {
         *figure += (weight * (sample - *figure)).clamp(-clamp, clamp);
@@ -259,7 +256,6 @@ impl Residual {
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Residuals {
-        /// The conditions at the last step.
         pub(crate) gates: Gates,
         each: [Residual; Comparison::COUNT] = [Residual::default(); Comparison::COUNT],
     }
@@ -281,7 +277,6 @@ impl Residuals {
         self.each[of as usize].excess(of.row())
     }
 
-    /// The same, when it was measured.
     pub(crate) fn reading(&self, now: Instant, of: Comparison) -> Option<Reading> {
         self.as_measured(now, of, self.excess(of))
     }
@@ -296,7 +291,6 @@ impl Residuals {
         self.as_measured(now, of, multiple)
     }
 
-    /// The figure from which on it is more than this multiple.
     pub(crate) fn limit(&self, of: Comparison, times: f32) -> Option<f32> {
         self.each[of as usize].figure.limit(times, of.row().hold)
     }
@@ -309,7 +303,6 @@ mod tests {
     const ABOVE: Row = Row { hold: 1.0, ..ROW };
     const EITHER: Row = Row { side: Side::Either, ..ABOVE };
 
-    /// Takes figures ten times a second.
     fn taken(row: &Row, figures: impl Iterator<Item = f32>) -> Residual {
         let mut residual = Residual::default();
         for (tenth, figure) in (0..).zip(figures) {
@@ -322,7 +315,6 @@ mod tests {
         taken(&ABOVE, figures).excess(&ABOVE)
     }
 
-    /// Up and down by one around a level.
     fn noise(level: f32, count: usize) -> impl Iterator<Item = f32> {
         (0..count).map(move |step| level + if step % 2 == 0 { 1.0 } else { -1.0 })
     }

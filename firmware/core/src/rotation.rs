@@ -9,7 +9,6 @@ fn turn([w, x, y, z]: [f32; 4], vector: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|axis| vector[axis] + w * once[axis] + twice[axis])
 }
 
-/// The rotation of an attitude.
 fn of([roll, pitch, yaw]: [f32; 3]) -> [f32; 4] {
     let [(sr, cr), (sp, cp), (sy, cy)] =
         [roll, pitch, yaw].map(|angle| (libm::sinf(angle / 2.0), libm::cosf(angle / 2.0)));
@@ -27,7 +26,6 @@ pub(crate) fn from_axes_of(other: [f32; 4], vector: [f32; 3], attitude: &Attitud
     turn([w, -x, -y, -z], turn(other, vector))
 }
 
-/// A vector about the body's axes, in north, east, down.
 pub(crate) fn to_earth(attitude: &Attitude, vector: [f32; 3]) -> [f32; 3] {
     turn(of([attitude.roll.0, attitude.pitch.0, attitude.yaw.0]), vector)
 }

@@ -192,7 +192,6 @@ impl Snapshots {
         });
     }
 
-    /// The next half of a snapshot that is ready, once.
     pub(crate) fn take(&mut self, now: Instant) -> Option<Snapshot<'_>> {
         let ready = |pending: &Pending| !pending.before_told || now.since(pending.at) >= AFTER;
         let place = self.pending.iter_mut().find(|place| place.as_ref().is_some_and(ready))?;

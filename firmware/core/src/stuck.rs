@@ -21,7 +21,6 @@ use crate::residual::KNOWN_SAMPLES;
 use crate::time::{Instant, PAUSE};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
-/// Fewer repeats say nothing, however slow the message.
 const REPEATS_MIN: u8 = 3;
 /// What lasts so many times what is usual is none of it.
 const TIMES: u32 = 4;
@@ -50,18 +49,15 @@ state! {
     /// One sensor.
     #[derive(Clone, Copy, Debug)]
     struct Stuck {
-        /// Check sums of the last two values that differed.
         values: [u16; 2],
         /// When the last one came first: milliseconds modulo 2^32.
         since_ms: u32,
         /// For how long it has come, and the longest that one did before: up to 65.5 s.
         lasts_ms: u16,
         usual_ms: u16,
-        /// How far the vehicle had moved when the last one came first.
         moved: f32,
         repeats: u8,
         changes: u8,
-        /// Changes for which the vehicle had not moved.
         trembles: u8,
     }
 }
@@ -89,7 +85,6 @@ impl Stuck {
         }
     }
 
-    /// Another flight begins: nothing is usual yet.
     const fn begun(self) -> Self {
         Self { moved: 0.0, usual_ms: 0, ..self }
     }
@@ -203,7 +198,6 @@ impl Repeats {
         }
     }
 
-    /// Whether a receiver's last place is not a new one.
     pub(crate) fn repeats_place(&self, receiver: usize) -> bool {
         self.receivers.get(receiver).is_some_and(|stuck| stuck.repeats > 0)
     }
@@ -246,7 +240,6 @@ impl Repeats {
 mod tests {
     use super::*;
 
-    /// Values a tenth of a second apart.
     fn taken(values: impl IntoIterator<Item = u32>) -> Option<f32> {
         let mut stuck = Stuck::default();
         for (tenth, value) in (0_u64..).zip(values) {

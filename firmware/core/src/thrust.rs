@@ -6,7 +6,6 @@
 use crate::motion::IDLE_THROTTLE;
 use crate::time::{Instant, PAUSE, Span};
 
-/// Above this the vehicle may fly, while the hover throttle is unknown.
 pub(crate) const CARRIES: f32 = 0.2;
 /// Full throttle. Controllers keep some back for attitude.
 pub(crate) const FULL: f32 = 0.95;
@@ -17,10 +16,8 @@ const HOVER_S: f32 = 10.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Power {
-    /// Too little to carry the vehicle.
     Idle,
     Little,
-    /// It carries the vehicle.
     Carries,
     /// Enough to climb.
     Full,
@@ -38,7 +35,6 @@ pub(crate) struct Thrust {
 }
 
 impl Thrust {
-    /// Armed anew, perhaps with another payload.
     pub(crate) fn forget(&mut self) {
         (self.hovered_s, self.has_flown) = (0.0, false);
     }
@@ -60,7 +56,6 @@ impl Thrust {
         self.hovered_s >= HOVER_S
     }
 
-    /// The throttle below which no vehicle flies.
     fn idle(&self) -> f32 {
         if self.is_learnt() { HOVER_PART * self.hover } else { IDLE_THROTTLE }
     }

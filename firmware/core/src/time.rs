@@ -103,12 +103,10 @@ impl Stamp {
         self.0.is_some()
     }
 
-    /// Whether it is set and more than `span` ago.
     pub(crate) fn older_than(self, now: Instant, span: Span) -> bool {
         self.age(now).is_some_and(|age| age > span)
     }
 
-    /// How long ago it was; zero if it is yet to come.
     pub(crate) fn age(self, now: Instant) -> Option<Span> {
         Some(now.since(self.0?))
     }
@@ -117,7 +115,6 @@ impl Stamp {
         Some(self.age(now)?.as_millis())
     }
 
-    /// The time, no later than `now`.
     pub(crate) fn instant(self, now: Instant) -> Option<Instant> {
         Some(self.0?.earlier(now))
     }

@@ -28,9 +28,7 @@ impl Resistance {
     /// The part of the voltage's variance that the current must explain. A voltage that falls for another reason (an
     /// empty battery, a failing cell) gives no resistance.
     const EXPLAINED_MIN: f32 = 0.7;
-    /// Samples before there is a figure.
     const SAMPLES_MIN: u16 = 120;
-    /// Samples before the figure is the baseline of this session.
     const SAMPLES_BASELINE: u16 = 480;
     /// A figure from a large change: this many samples, and a spread of the current of this part of its mean. A
     /// failing cell lowers the voltage without such a change.
@@ -83,7 +81,6 @@ impl Resistance {
         (enough && ohm > 0.001 && ohm < 1.0).then_some(ohm)
     }
 
-    /// The rise above the baseline, percent.
     pub(crate) fn rise_percent(&self) -> Option<f32> {
         let ohm = self.ohm()?;
         (self.baseline_ohm > 0.0).then(|| (ohm / self.baseline_ohm - 1.0) * 100.0)
@@ -94,7 +91,6 @@ impl Resistance {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rate {
     count: u32,
-    /// Of this half minute and of the one before.
     events: [u32; 2],
     /// Milliseconds since power-on, modulo 2^32.
     half_began_ms: u32,

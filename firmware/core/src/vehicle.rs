@@ -61,7 +61,6 @@ impl Motor {
     }
 }
 
-/// The places up to the last one that is known.
 fn known(places: impl Iterator<Item = bool>) -> u8 {
     (1..).zip(places).fold(0, |count, (place, is_known)| if is_known { place } else { count })
 }
@@ -110,7 +109,6 @@ state! {
         pub batteries: [Latest<Battery>; BATTERIES_MAX] = [Latest::default(); BATTERIES_MAX],
         /// The component that each battery is told by: two components may both have a battery 0.
         battery_of: [u8; BATTERIES_MAX],
-        /// The place of the battery that was told of last.
         pub(crate) told_battery: Option<usize>,
         /// The estimator.
         pub estimator: Latest<Estimator>,
@@ -159,17 +157,14 @@ state! {
 }
 
 impl Vehicle {
-    /// Motors up to the last one whose ESC has said anything.
     pub(crate) fn motors_known(&self) -> u8 {
         known(self.motors.iter().map(Motor::is_known))
     }
 
-    /// Batteries up to the last one that has reported itself.
     pub(crate) fn batteries_known(&self) -> u8 {
         known(self.batteries.iter().map(|slot| slot.get().is_some()))
     }
 
-    /// Receivers up to the last one that has said anything.
     pub(crate) fn receivers_known(&self) -> u8 {
         let of_both = self.gnss.iter().zip(&self.gnss_integrity);
         known(of_both.map(|(gnss, integrity)| gnss.get().is_some() || integrity.get().is_some()))
@@ -407,7 +402,6 @@ impl Vehicle {
         }
     }
 
-    /// The first barometer's likewise.
     fn take_air(&mut self, at: Instant, air: Air) {
         if air.instance == 0 {
             self.air.set(at, air);

@@ -12,15 +12,12 @@ use hums_core::params::{Param, Params};
 use hums_core::units::{Amperes, Volts};
 use hums_core::usage::UsageCounter;
 
-/// The pack is under load and empty from here on.
 const EMPTY_MS: u64 = 60_000;
 
-/// Levels of cell voltage.
 fn cells(run: &Run) -> Vec<(u8, Level)> {
     run.of_check("cell_voltage").map(|finding| (finding.instance, finding.level)).collect()
 }
 
-/// When unknown cells were told, ms.
 fn told_ms(run: &Run) -> Vec<u64> {
     let told = run.happenings.iter().filter(|(_, happening)| *happening == Happening::CellsUnknown);
     told.map(|(at_ms, _)| *at_ms).collect()
@@ -31,7 +28,6 @@ fn fly(monitor: &Monitor, resting_v: f32, empty_v: f32, more: &[Observation]) ->
     fly_with(monitor, |now_ms| (if now_ms < EMPTY_MS { resting_v } else { empty_v }, 20.0), more)
 }
 
-/// A hundred seconds with a pack that has these volts and gives these amperes at each time.
 fn fly_with(monitor: &Monitor, pack: impl Fn(u64) -> (f32, f32), more: &[Observation]) -> Run {
     let mut run = Run::of(monitor);
     run.flies(0..100_000, |now_ms, quad, said| {
@@ -42,7 +38,6 @@ fn fly_with(monitor: &Monitor, pack: impl Fn(u64) -> (f32, f32), more: &[Observa
     run
 }
 
-/// The next power-on, with the stored life.
 fn restarted(run: &Run, params: &Params) -> Monitor {
     let mut item = [0; ITEM_BYTES_MAX];
     let length = run.monitor.encode_item(ItemKey::Lifetime, &mut item);

@@ -22,7 +22,6 @@ const OFF_MS: u64 = 4_000;
 const FAULT_MS: u64 = 30_000;
 const END_MS: u64 = 60_000;
 
-/// A vehicle with three sensors of each kind, and the outputs of its motors.
 #[derive(Clone, Default)]
 struct Fitted {
     quad: Quad,
@@ -31,37 +30,27 @@ struct Fitted {
     field: [[f32; 3]; 3],
     pressure: [f32; 3],
     pulses: [f32; MOTORS_MAX],
-    /// How fast it turns, rad/s.
     yaw_rate: f32,
     /// Body rates about roll and pitch, and their setpoints, rad/s.
     turns: [f32; 2],
     wanted: [f32; 2],
     /// The attitude whose axes these are about.
     wanted_of: Option<[f32; 4]>,
-    /// Whether setpoints come now.
     wants: bool,
-    /// Height of GPS above sea level, m.
     altitude: f32,
-    /// Amplitude of the attitude's noise, rad.
     attitude_noise: f32,
     /// The climb of `VFR_HUD`, m/s.
     hud_climb: Option<f32>,
-    /// A second after this, GPS repeats its position.
     gps_until_ms: u64,
-    /// Speed northwards, m/s.
     speed: f32,
     /// The receiver's speed northwards, m/s, if it sends one, and the way north since, m.
     gps_speed: Option<f32>,
     gps_north: f32,
-    /// Whether positions come now.
     places: bool,
-    /// Offset of the second estimator: roll, rad; height and north, m.
     second: Option<[f32; 3]>,
-    /// The sensors whose messages come now.
     speaks: [bool; 3],
     /// The first sensor's message is `HIGHRES_IMU`.
     selects: bool,
-    /// Time without any message, ms.
     silence: core::ops::Range<u64>,
 }
 
@@ -178,12 +167,10 @@ impl Fitted {
     }
 }
 
-/// Flies; the script changes the messages from the beginning on.
 fn fly(script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     fly_with([(100, 0); 3], script)
 }
 
-/// Flies; the script changes the messages from the fault on.
 fn fly_after(fault: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     fly(|now_ms, it| {
         if now_ms >= FAULT_MS {
@@ -210,7 +197,6 @@ fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<F
     findings
 }
 
-/// The check, the instance and the time after the fault, ms, of the only finding, which is a warning.
 #[track_caller]
 fn only(findings: &[Finding]) -> (&'static str, u8, u64) {
     let [found] = findings[..] else { panic!("{findings:?}") };
@@ -218,26 +204,21 @@ fn only(findings: &[Finding]) -> (&'static str, u8, u64) {
     (found.check, found.instance, found.at.as_millis().saturating_sub(FAULT_MS))
 }
 
-/// A step of a sensor or motor of a number.
 type Fault = fn(u64, &mut Fitted, usize);
 
 /// `MAV_TYPE`, the check that finds a fault, its instance, and the fault.
 type Leg = (u8, &'static str, u8, fn(&mut Fitted));
 
-/// The moment of the fault.
 fn held() -> Fitted {
     Fitted::healthy(FAULT_MS)
 }
 
-/// Seconds since the fault.
 fn since_s(now_ms: u64) -> f32 {
     now_ms.saturating_sub(FAULT_MS) as f32 / 1_000.0
 }
 
-/// Check, instances, level, time until it, ms, and fault.
 type Found = (&'static str, &'static [usize], Level, u64, Fault);
 
-/// Each is found alone.
 const FOUND: &[Found] = &[
     // Of three sensors the one that comes apart. The first barometer leaves the height of GPS too.
     ("accel_mismatch", &[0, 1, 2], Warning, 3_200, |_, it, of| it.force[of][2] += 3.0),
@@ -297,7 +278,6 @@ fn a_fault_is_found_in_time_under_its_own_name_and_number_and_no_other() {
 /// Its name, and a script from the beginning on.
 type Quiet = (&'static str, fn(u64, &mut Fitted));
 
-/// None has a finding.
 const QUIET: &[Quiet] = &[
     ("offsets from the beginning", |_, it| {
         (it.force[1][0], it.rate[1][0]) = (it.force[1][0] + 3.0, it.rate[1][0] + 0.4);
@@ -359,7 +339,6 @@ const QUIET: &[Quiet] = &[
     }),
     ("a declination", |_, it| turned(it, 175.0)),
     ("a heading that is off by a little", |ms, it| turned(it, if ms < FAULT_MS { 0.0 } else { 8.0 })),
-    // The two are not of one moment.
     ("a heading that is off in a turn", |ms, it| {
         if ms >= FAULT_MS {
             turned(it, 25.0);
@@ -509,7 +488,6 @@ fn lags(now_ms: u64, it: &mut Fitted) {
     (it.wanted, it.turns) = ([0.0, turning(now_ms)], [-turning(now_ms.saturating_sub(100)), 0.0]);
 }
 
-/// Pressures and pilot's display of a climb, in m/s by pressure and by the estimator.
 fn climbs(it: &mut Fitted, seconds: f32, by_pressure: f32, by_estimator: f32) {
     rises(it, 0.12 * by_pressure * seconds);
     it.hud_climb = Some(by_estimator + 0.01);
@@ -751,7 +729,6 @@ fn of_two_heights_the_one_that_leapt_is_named() {
         let height = findings.iter().find(|one| one.check == "baro_height").expect("they are apart");
         assert_eq!(height.because, "gps_height");
     }
-    // A slow drift is blamed on neither, and a leap of the barometer belongs to another check.
     let drifts = fly_after(|now_ms, it| it.altitude += 0.5 * since_s(now_ms));
     assert!(drifts.iter().all(|one| one.check == "baro_height"), "{drifts:?}");
     let leaps = fly_after(|_, it| rises(it, 1.8));
@@ -841,7 +818,6 @@ fn frame<const N: usize>(it: &mut Fitted, now_ms: u64, (type_number, shift): (u8
     }
 }
 
-/// Findings about motors of a hexarotor.
 fn hexa(shift: [f32; 6]) -> Vec<Finding> {
     let findings = fly(|now_ms, it| frame(it, now_ms, (13, shift)));
     findings.into_iter().filter(|one| one.check.starts_with("motor_o")).collect()

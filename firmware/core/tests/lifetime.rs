@@ -27,7 +27,6 @@ impl Store {
         monitor
     }
 
-    /// Saves all items that are due; returns the keys.
     fn save(&mut self, monitor: &mut Monitor, now: Instant) -> Vec<ItemKey> {
         let mut keys = Vec::new();
         while let Some(key) = self.save_one(monitor, now) {
@@ -72,7 +71,6 @@ fn step(monitor: &mut Monitor, now_ms: u64, from_s: u64, to_s: u64, vehicle: (u8
     monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
 }
 
-/// Flies from `from_s` to `to_s`, and saves due items at each tick.
 fn run(
     monitor: &mut Monitor,
     store: &mut Store,

@@ -216,7 +216,6 @@ fn quad_given_on(
     };
     told_given(script, |now_ms| {
         let mut pulses = [900; MOTORS_MAX];
-        // A servo is not a motor, even at the end of its range.
         pulses[5] = 2_000;
         pulses[..4].copy_from_slice(&match now_ms {
             0..4_000 => [1_000; 4],

@@ -28,7 +28,6 @@ const AUTOPILOT: Source = Source { system: 1, component: 1 };
 enum Values {
     /// Anything: sane, extreme, NaN or infinite.
     Any,
-    /// All are unknown: missing, NaN or infinite.
     Unknown,
 }
 

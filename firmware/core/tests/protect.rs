@@ -96,7 +96,6 @@ fn ack(now_ms: u64, monitor: &mut Monitor, at_ms: u64, command: u16, result: u8)
     say(now_ms, monitor, at_ms, AUTOPILOT, Observation::CommandAck(ack));
 }
 
-/// It accepts a return or a landing, and enters a mode that is one for a plane and for a copter.
 fn accept(now_ms: u64, quad: &mut Quad, monitor: &mut Monitor, at_ms: u64, command: u16) {
     ack(now_ms, monitor, at_ms, command, 0);
     if now_ms > at_ms {
@@ -119,7 +118,6 @@ const VEHICLES: [(Autopilot, VehicleKind, u32); 5] = [
     (Px4, Plane, POSCTL),
 ];
 
-/// Each vehicle flies the script, and its return is requested at this time or up to this much later.
 fn all_are_asked(
     at_ms: u64,
     late_ms: u64,

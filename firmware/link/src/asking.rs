@@ -33,9 +33,7 @@ pub const ROUND: Span = Span::from_secs(10);
 /// Share of the line for all requested messages, percent.
 pub const SHARE: u32 = 50;
 const ANSWER: Span = Span::from_secs(1);
-/// Repeats of an unanswered command.
 const TRIES: u8 = 3;
-/// Unanswered commands in a row: it does not answer any.
 const DEAF: u8 = 6;
 /// Most doublings of the interval: 10 s, 20 s ... 10.5 min.
 const PATIENCE_MAX: u8 = 6;
@@ -110,7 +108,6 @@ enum Has {
     /// Unknown.
     #[default]
     Perhaps,
-    /// Received, or a request was accepted.
     Yes,
     /// Refused.
     No,
@@ -120,11 +117,8 @@ enum Has {
 struct Message {
     seen: u8,
     has: Has,
-    /// Accepted requests without a message.
     patience: u8,
-    /// Rounds until the next request.
     wait: u8,
-    /// Due for a request in this round.
     due: bool,
 }
 
@@ -360,7 +354,6 @@ impl Asking {
         }
     }
 
-    /// Without intervals: parameters only.
     fn next(&self, known: &Known) -> Option<What> {
         let commands = || {
             if self.identity.due {

@@ -18,7 +18,6 @@ pub enum Check {
     Unverified,
 }
 
-/// Header of a frame and the offsets of its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     /// 1 or 2.
@@ -35,7 +34,6 @@ pub(crate) struct Header {
 pub(crate) enum NoHeader {
     /// Undecided: this many bytes are needed.
     Incomplete(usize),
-    /// Not a header: no start byte, or an unknown incompatibility flag.
     Invalid,
 }
 

@@ -28,7 +28,6 @@ use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
 use crate::frame::{self, Frame, Header, NoHeader};
 use crate::seen::{Extra, Seen};
 
-/// Bytes held: an undecided candidate, and room for more.
 const BUFFER: usize = FRAME_BYTES_MAX + ROOM_MIN;
 /// Least length of [`Framer::room`]: 2 ms of a line at 921,600 baud.
 pub const ROOM_MIN: usize = 192;
@@ -77,7 +76,6 @@ const _: () = assert!(size_of::<Framer>() <= 1_152);
 enum Verdict {
     /// A frame, and its message if the checksum is ours.
     Frame(Header, Option<u16>),
-    /// This many bytes belong to no frame.
     Skip(usize),
     /// Undecided: this many bytes are needed.
     Wait(usize),
@@ -193,7 +191,6 @@ impl Framer {
         }
     }
 
-    /// With `idle` no more bytes are expected.
     fn judge(&mut self, idle: bool) -> Verdict {
         let held = &self.buffer[self.start..self.end];
         match held.iter().position(|&byte| is_start(byte)) {

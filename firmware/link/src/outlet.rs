@@ -140,7 +140,6 @@ pub struct Outlet {
     bulk_at: Option<Instant>,
 }
 
-/// Time for which bulk counts as waiting after its request.
 const BULK_WAITS: Span = Span::from_secs(1);
 
 impl Outlet {

@@ -179,7 +179,6 @@ impl Replies {
         if let Some(reply) = self.line.pop_front()
             && !sent
         {
-            // There is room: one was taken out.
             let _ = self.line.push_back(reply);
         }
     }

@@ -14,9 +14,7 @@ const FREE: u32 = u32::MAX;
 pub(crate) enum Extra {
     /// Never seen.
     None,
-    /// Seen once: it may have been chance.
     Once(u8),
-    /// Seen at least twice.
     Confirmed(u8),
     Full,
 }
@@ -30,7 +28,6 @@ pub(crate) struct Seen {
     /// System in the high byte, message id below.
     keys: [u32; EXTRAS],
     extras: [u8; EXTRAS],
-    /// One bit for each key.
     confirmed: u64,
 }
 
@@ -95,7 +92,6 @@ impl Seen {
         self.systems[..usize::from(self.systems_used)].iter().position(|&other| other == system)
     }
 
-    /// A free place, else one that was seen only once.
     fn place_for_new(&self) -> Option<usize> {
         let once = (!self.confirmed).trailing_zeros() as usize;
         self.keys.iter().position(|&key| key == FREE).or((once < EXTRAS).then_some(once))

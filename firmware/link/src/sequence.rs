@@ -9,11 +9,8 @@ use hums_core::status::LinkReading;
 
 use crate::frame::Frame;
 
-/// Senders that are followed; later ones are not counted.
 const SENDERS_MAX: usize = 8;
-/// Seconds that a reading looks back.
 const WINDOW_SECS: usize = 10;
-/// Minimum frames for a reading.
 const FRAMES_MIN: u32 = 20;
 
 #[derive(Clone, Copy, Debug, Default)]

@@ -51,7 +51,6 @@ const AHEAD_PART: u64 = 30;
 const AHEAD_MAX: u64 = 10 * MINUTE;
 /// Stamps have 48 bits: until the year 2104.
 const STAMP_MAX: u64 = (1 << 48) - 1;
-/// Bytes of the hash that are sent.
 const HASH: usize = 6;
 
 /// The common secret of all partners. Never shown.
@@ -75,7 +74,6 @@ impl Key {
         self.0 == [0; KEY_BYTES]
     }
 
-    /// The hash of a frame from its first byte to its checksum, then link id and stamp.
     fn hash(&self, frame: &[u8], link_and_stamp: &[u8]) -> [u8; HASH] {
         let hash =
             Sha256::new().chain_update(self.0).chain_update(frame).chain_update(link_and_stamp).finalize();
@@ -188,7 +186,6 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, Default)]
 struct Stream {
     last: u64,
-    /// Link id, component, system.
     who: [u8; 3],
 }
 

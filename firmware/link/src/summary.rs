@@ -72,7 +72,6 @@ const COMPUTER_BYTES: usize = 250 + SIGNATURE_BYTES;
 pub const WAITING_BYTES: u32 = 288;
 const WAITING_MAX: usize = 16;
 const HEARTBEAT: Span = Span::from_secs(1);
-/// Intervals after which a message goes like a heartbeat.
 const STARVED: u32 = 4;
 /// A message without a frame for this many intervals, and [`GONE_MS`], is not waited for.
 const GONE: u32 = 3;
@@ -201,19 +200,16 @@ impl Summary {
     fn announce(&mut self, index: usize, now_ms: u32, bytes: usize) {
         let turn = &mut self.turns[index];
         if !turn.known {
-            // Its first turn is now.
             turn.due_ms = now_ms;
         }
         *turn = Turn { seen_ms: now_ms, bytes: bytes as u16, known: true, ..*turn };
     }
 
-    /// The vehicle's heartbeat puts it on the ground station's map.
     fn is_urgent(&self, index: usize, now_ms: u32) -> bool {
         let score = self.turns[index].score(now_ms, interval_ms(index));
         index == 0 || score.is_some_and(|score| score > 16 * STARVED)
     }
 
-    /// Whether the message is due and the longest-waiting one would still fit after it.
     fn has_turn(&mut self, index: usize, now: Instant, bytes: usize) -> bool {
         let now_ms = now.as_millis() as u32;
         let Some(score) = self.turns[index].score(now_ms, interval_ms(index)) else { return false };
@@ -251,12 +247,10 @@ impl Summary {
             self.waiting.pop();
         }
         let place = self.waiting.iter().position(|other| urgency(other) < urgency(finding));
-        // There is room: one was taken out.
         let _ = self.waiting.insert(place.unwrap_or(self.waiting.len()), *finding);
         self.tell(now, None, out);
     }
 
-    /// Sends waiting findings whose turn it is; without `health` only the critical ones.
     fn tell(&mut self, now: Instant, health: Option<&Health>, out: &mut impl FnMut(&[u8])) {
         let mut place = 0;
         while let Some(finding) = self.waiting.get(place) {
@@ -351,7 +345,6 @@ enum Told {
     Level(Subsystem),
     /// A usage figure.
     Usage(UsageCounter),
-    /// A state of the box.
     Own(fn(&OwnFigures) -> f32),
 }
 

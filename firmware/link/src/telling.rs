@@ -23,7 +23,6 @@
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{self, Finding, Level, Subsystem};
 
-/// Duration of an event from its first text.
 const EVENT: Span = Span::from_secs(10);
 /// Time that a warning waits in case it becomes critical.
 const HOLD: Span = Span::from_secs(1);
@@ -37,11 +36,8 @@ const OPEN_MAX: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fate {
-    /// It is sent now.
     Now,
-    /// It is sent later, if it still holds.
     Later,
-    /// It is in the record.
     Never,
 }
 
@@ -56,7 +52,6 @@ struct Event {
     begun_ms: u32,
     /// Texts; 0: no event.
     told: u8,
-    /// The numbers of the critical checks that were sent.
     critical: [Option<u8>; 3],
 }
 
@@ -79,7 +74,6 @@ pub(crate) struct Telling {
     events: [Event; Subsystem::ALL.len()],
     /// When the last texts went that were not critical, in milliseconds modulo 2^32.
     mild: heapless::Deque<u32, MILD_MAX>,
-    /// Check number and instance of the sent alarms that are not over.
     open: heapless::Vec<(u8, u8), OPEN_MAX>,
 }
 

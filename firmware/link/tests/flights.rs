@@ -22,7 +22,6 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Findings of at least a warning: second, check, level.
     fn alarms(&self) -> Vec<(f64, &'static str, Level)> {
         let bad = |finding: &&Finding| matches!(finding.level, Level::Warning | Level::Critical);
         let entry = |finding: &Finding| (finding.at.as_millis() as f64 / 1e3, finding.check, finding.level);

@@ -6,7 +6,6 @@ use common::{Random, crc32, excerpt, flight};
 use hums_link::{Check, Frame, Framer};
 use std::collections::HashSet;
 
-/// Frames in pieces of `piece` bytes; then the line ends.
 fn frames_in_pieces(bytes: &[u8], piece: usize) -> (Vec<(Vec<u8>, Check)>, Framer) {
     let mut framer = Framer::new();
     let mut frames = Vec::new();
@@ -85,7 +84,6 @@ fn with_noise(bytes: &[u8], one_in: u64, random: &mut Random) -> (Vec<u8>, Vec<b
         .unzip()
 }
 
-/// Returns damaged frames and additional ones.
 fn survives_noise(name: &str, bytes: &[u8], bounds: &[(usize, usize)], seed: u64) -> (usize, usize) {
     let mut random = Random(seed);
     let (noisy, hits) = with_noise(bytes, 1_000, &mut random);
@@ -148,7 +146,6 @@ fn under_noise_every_undamaged_frame_of_whole_flights_survives() {
     }
 }
 
-/// Found by the (undamaged) framer.
 fn bounds_of_raw(bytes: &[u8]) -> Vec<(usize, usize)> {
     let (frames, _) = frames_in_pieces(bytes, 4_096);
     let mut at = 0;

@@ -27,7 +27,6 @@ pub(crate) type By = (u8, u8);
 pub(crate) struct Journal<'a> {
     writer: &'a mut Writer,
     losses: Losses,
-    /// The sector queue was full.
     refused: u64,
 }
 
@@ -74,7 +73,6 @@ impl<'a> Journal<'a> {
         self.losses.count(since, now, what, count);
     }
 
-    /// Losses whose window is over, or, at the end, all.
     #[inline(never)]
     pub(crate) fn record_losses(&mut self, now: Instant, all: bool, sectors: &mut SectorsIn) {
         let Self { losses, writer, .. } = self;
@@ -83,7 +81,6 @@ impl<'a> Journal<'a> {
         losses.flush(now, all, &mut write);
     }
 
-    /// Frames that found no room.
     pub(crate) const fn refused(&self) -> u64 {
         self.refused
     }

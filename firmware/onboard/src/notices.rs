@@ -15,7 +15,6 @@ use hums_link::text::{Severity, Text};
 use crate::journal::Journal;
 use crate::queues::{GsIn, SectorsIn};
 
-/// Texts that wait; further ones are only recorded.
 const WAITING_MAX: usize = 4;
 /// Time that a restart's text waits for a known vehicle.
 const UNKNOWN_MAX: Span = Span::from_secs(5);
@@ -28,7 +27,6 @@ pub(crate) enum Notice {
     Text(u8, &'static str),
     Protection(Step),
     Mishap(Report),
-    /// A restart with the cause, and the task if known.
     Restarted(&'static str, Option<&'static str>),
 }
 
@@ -40,7 +38,6 @@ impl Notices {
         Self(heapless::Vec::new())
     }
 
-    /// A text; if the queue is full, only the record has it.
     pub(crate) fn push(&mut self, notice: Notice) {
         let _ = self.0.push(notice);
     }

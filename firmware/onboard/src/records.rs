@@ -41,7 +41,6 @@ impl Counters {
     }
 }
 
-/// Recorded again after a change or after a time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Recorded {
     vehicle: VehicleRecord,
@@ -116,7 +115,6 @@ impl Recorded {
         self.usage_at
     }
 
-    /// All usage again, for a new file.
     pub(crate) fn usage_anew(&mut self, now: Instant, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
         self.usage_at = Instant::ZERO;
         self.usage(now, Moment::Periodic, book, sectors);

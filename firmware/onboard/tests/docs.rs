@@ -5,7 +5,6 @@ use std::path::Path;
 
 use hums_link::text::TEXT_BYTES_MAX;
 
-/// Begins with our name, without tests.
 fn texts(folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("readable").flatten() {
         let path = entry.path();

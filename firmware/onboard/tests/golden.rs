@@ -88,7 +88,6 @@ fn judge_all(recordings: &[PathBuf]) -> String {
     recordings.iter().map(|path| judge(path)).collect()
 }
 
-/// Seconds since its first frame.
 fn judge(path: &Path) -> String {
     let mut box_of = BoxUnderTest::new();
     let name = path.file_name().expect("a recording has a name").to_string_lossy();
@@ -109,7 +108,6 @@ fn read(path: &Path) -> Vec<u8> {
     plain
 }
 
-/// Microseconds since the first one; never back.
 fn frames(tlog: &[u8]) -> Vec<(u64, &[u8])> {
     let (mut frames, mut rest, mut now_us, mut before) = (Vec::new(), tlog, 0, None);
     while let Some((time, after)) = rest.split_first_chunk::<TIME_BYTES>() {

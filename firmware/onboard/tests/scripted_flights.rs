@@ -19,7 +19,6 @@ use hums_onboard::monitoring::TICK;
 /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`
 const RETURN: Request = Request { command: 20, confirmation: 0 };
 
-/// Seconds since its first frame.
 struct Outcome {
     findings: Vec<(f32, Finding)>,
     happenings: Vec<(f32, Happening)>,
@@ -29,7 +28,6 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Critical or warning, from `from_s` on.
     fn reported_s(&self, check: &str, from_s: f32) -> Option<f32> {
         let is_alarm = |finding: &Finding| {
             finding.check == check
@@ -71,14 +69,12 @@ impl Outcome {
         self.happenings.iter().filter(|(_, happening)| announced(happening)).count()
     }
 
-    /// Critical or a warning, in this session.
     fn exceeded_s(&self, check: &str) -> f32 {
         let of_check = self.monitor.exceedances().iter(self.end.into()).filter(|it| it.check.name == check);
         of_check.map(|it| (it.session.warning_tenths + it.session.critical_tenths) as f32 / 10.0).sum()
     }
 }
 
-/// Microseconds since the first one.
 fn frames(tlog: &[u8]) -> Vec<(u64, &[u8])> {
     let (mut frames, mut rest) = (Vec::new(), tlog);
     while let Some((time, tail)) = rest.split_first_chunk::<8>() {

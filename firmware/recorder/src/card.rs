@@ -38,7 +38,6 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// An entry by index, in this block of the card.
     pub(crate) const fn of(block: u32, index: u32) -> Self {
         Self { block, offset: (index % BLOCK_ENTRIES) as u16 * ENTRY_BYTES as u16 }
     }
@@ -181,7 +180,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// Entries from this one on; returns the entry after the last shown one.
     #[inline(never)]
     fn walk(
         &self,
@@ -341,7 +339,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.link(last, cluster)
     }
 
-    /// One with a lost part of the FAT cannot be overwritten.
     fn is_chained(&self, entry: &LogEntry) -> Result<bool, CardError<D::Error>> {
         let mut segment = Segment::of(entry);
         let last = segment.blocks().saturating_sub(1);
@@ -417,7 +414,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         })
     }
 
-    /// Changes a directory entry. If `change` returns `false` (another entry is there), nothing is written.
+    /// If `change` returns `false` (another entry is there), nothing is written.
     #[inline(never)]
     fn change_entry(
         &self,
@@ -433,7 +430,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         self.volume.write_metadata(&block, place.block)
     }
 
-    /// Whether no file has the entry at this place.
     #[inline(never)]
     fn is_unused(&self, place: Place) -> Result<bool, CardError<D::Error>> {
         let mut block = [[0; BLOCK_BYTES]];

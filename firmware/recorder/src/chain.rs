@@ -12,7 +12,6 @@ use crate::volume::{ENTRIES, Volume, entry};
 pub(crate) struct ClusterChain {
     first: u32,
     before: u32,
-    /// First of the row.
     cluster: u32,
     length: u32,
 }
@@ -52,7 +51,6 @@ impl ClusterChain {
         Ok(Some((volume.block_of(self.cluster + at) + offset, in_row(self))))
     }
 
-    /// Lengthens the row by the entries of one block of the FAT; `false` if it ends there.
     fn lengthen<D: CardDevice>(&mut self, volume: &Volume<'_, D>) -> Result<bool, CardError<D::Error>> {
         let before = self.length;
         let fat_block = self.last() / ENTRIES;
@@ -67,7 +65,6 @@ impl ClusterChain {
         Ok(self.length > before)
     }
 
-    /// `false`: this is the last.
     fn next_row<D: CardDevice>(&mut self, volume: &Volume<'_, D>) -> Result<bool, CardError<D::Error>> {
         let next = volume.entry(self.last())?;
         if !volume.is_cluster(next) {

@@ -30,7 +30,6 @@ pub(crate) const BLOCK_ENTRIES: u32 = BLOCK_BYTES as u32 / ENTRY_BYTES as u32;
 /// Logs that are noted: the newest, and the oldest that may be overwritten.
 const NEWEST_MAX: usize = 4;
 const OLDEST_MAX: usize = 8;
-/// Deleted entries that are noted, for new ones.
 const DELETED_MAX: usize = 8;
 /// The shortest log that may be overwritten: two groups.
 const OVERWRITTEN_MIN: u32 = 2 * (hums_blackbox::GROUP_SECTORS * hums_blackbox::SECTOR_BYTES) as u32;
@@ -68,7 +67,6 @@ pub(crate) struct Directory {
     root: ClusterChain,
     /// The newest names below the last session number. A folder has the length 0.
     pub(crate) newest: Newest,
-    /// The newest name of the last session number.
     last: Option<LogName>,
     /// The oldest logs that may be overwritten, the oldest first; the first `sure` of them are older than all others.
     oldest: Vec<LogEntry, OLDEST_MAX>,
@@ -79,10 +77,8 @@ pub(crate) struct Directory {
     /// Clusters that logs have. Each counts at most the clusters of the longest segment, since its entry may be
     /// wrong.
     pub(crate) clusters: u32,
-    /// Logs not hidden, and a sum over their names.
     pub(crate) shown: u16,
     pub(crate) names: u32,
-    /// First cluster and length of the file of parameters.
     pub(crate) settings: Option<(u32, u32)>,
     /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
@@ -240,7 +236,6 @@ impl Directory {
         if self.newest.is_full() && place < NEWEST_MAX {
             self.newest.pop();
         }
-        // No place: it is older than all of them.
         let _ = self.newest.insert(place, entry);
     }
 
@@ -328,7 +323,6 @@ impl Directory {
         }
     }
 
-    /// The last cluster of a full directory.
     pub(crate) const fn last_cluster(&self) -> u32 {
         self.root.last()
     }
@@ -419,7 +413,6 @@ fn claimed<D: CardDevice>(volume: &Volume<'_, D>, entry: &LogEntry) -> Option<Ra
     is_sound.then_some(entry.first..end)
 }
 
-/// A hash of a name; sums of them identify sets of names.
 const fn hash(name: LogName) -> u32 {
     let hash = (name.session << 7 | name.segment).wrapping_mul(0x9E37_79B1);
     (hash ^ hash >> 15).wrapping_mul(0x85EB_CA6B)

@@ -65,7 +65,6 @@ struct Plan {
     total: u32,
     cluster_blocks: u32,
     fat_blocks: u32,
-    /// The next block to be cleared, of those before `end`.
     next: u32,
     end: u32,
     structures: usize,

@@ -20,7 +20,6 @@ const FREE_COUNT: usize = 488;
 /// Signatures of the information sector (Microsoft's FAT specification 1.03, `FSInfo`), and their offsets.
 const SIGNATURES: [(usize, u32); 3] = [(0, 0x4161_5252), (484, 0x6141_7272), (508, 0xAA55_0000)];
 
-/// Goes on from segment to segment; counts all of them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FreeSearch {
     next: u32,
@@ -143,12 +142,10 @@ impl FreeSearch {
         Err(CardError::Searching)
     }
 
-    /// Begins anew at the next block: clusters found before may no longer be free.
     pub(crate) const fn restart(&mut self) {
         (self.first, self.found) = (self.next, 0);
     }
 
-    /// Returns the blocks that were found last to the search.
     pub(crate) const fn again(&mut self, found: &Range<u32>) {
         (self.next, self.first) = (found.start, found.start);
     }

@@ -9,7 +9,6 @@ use hums_core::clock::{Instant, Span};
 /// cannot be rebuilt without it.
 const EVERY: Span = Span::from_secs(10);
 
-/// Sums in the blocks in which they are written.
 pub(crate) struct Parity {
     blocks: [Block; PARITY_SECTORS as usize],
     /// Sectors in each column so far, missing ones included.
@@ -52,7 +51,6 @@ impl Parity {
         self.stretch
     }
 
-    /// Written at this block of the file.
     pub(crate) fn add(&mut self, now: Instant, at: u32, sector: &[u8; SECTOR_BYTES]) {
         let index = (at % STRETCH_SECTORS) as usize;
         let (row, column) = ((index / COLUMNS) as u8, index % COLUMNS);

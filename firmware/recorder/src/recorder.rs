@@ -33,7 +33,6 @@ use segments::{Log, NewestCopy, Segments};
 use socket::Socket;
 use trouble::may_work_elsewhere;
 
-/// How often a missing or failing card is looked for.
 const RETRY: Span = Span::from_secs(1);
 /// How often a sector is tried before the segment is given up. A card that refuses one block of five at random then needs a new
 /// segment once in 100,000 sectors.
@@ -114,7 +113,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    /// A card at most once a second; opens a session on it.
     fn ready(&mut self, now: Instant) -> Result<(), NotYet> {
         self.begin_service();
         if !self.socket.is_mounted() {
@@ -267,7 +265,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         self.socket.begin_service();
     }
 
-    /// The first sector with those that follow directly; returns their number.
     fn try_write(
         &mut self,
         now: Instant,
@@ -331,7 +328,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         is_closed
     }
 
-    /// Writes new parity of the stretch in work, if there is any. A failure is counted.
+    /// A failure is counted.
     fn write_parity(&mut self) {
         let buffers = self.buffers;
         let mut parity = buffers.parity.borrow_mut();

@@ -5,9 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use hums_blackbox::record::{Before, Found};
 use hums_core::clock::{Instant, Span};
 
-/// No command is running.
 const IDLE: u32 = u32::MAX;
-/// The room is not counted yet.
 const UNCOUNTED: u32 = u32::MAX;
 
 /// The state of the card. The numbers are stored in logs.
@@ -105,7 +103,6 @@ pub struct CardStatus {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counted {
-    /// The share for logs, in thousandths.
     pub(crate) permille: u32,
     /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,

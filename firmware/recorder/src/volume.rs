@@ -9,9 +9,7 @@ use crate::{BLOCK_BYTES, Block, CardDevice};
 /// bounds the time of all tries together ([`CardDevice::begin_service`]).
 const METADATA_TRIES: u32 = 8;
 
-/// FAT entries of a block.
 pub(crate) const ENTRIES: u32 = 128;
-/// The FAT entry of the last cluster of a chain.
 pub(crate) const END_OF_CHAIN: u32 = 0x0FFF_FFFF;
 
 pub(crate) struct Volume<'a, D> {
@@ -70,7 +68,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         (0..fat_copies).try_for_each(|copy| self.write_metadata(block, fat_start + copy * fat_stride + index))
     }
 
-    /// Changes the FAT entry of one cluster.
     #[inline(never)]
     pub(crate) fn link(&self, cluster: u32, next: u32) -> Result<(), CardError<D::Error>> {
         let mut block = self.read_fat(cluster / ENTRIES)?;
@@ -83,7 +80,6 @@ impl<'a, D: CardDevice> Volume<'a, D> {
         Ok(entry(&self.read_fat(cluster / ENTRIES)?[0], cluster))
     }
 
-    /// Exists on the card.
     pub(crate) const fn is_cluster(&self, cluster: u32) -> bool {
         cluster >= 2 && cluster - 2 < self.layout.clusters
     }

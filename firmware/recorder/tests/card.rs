@@ -303,7 +303,6 @@ fn a_card_too_small_for_fat32_is_not_formatted() {
     format(&MemCard::new(BLOCKS_MIN), 1).expect("the smallest card");
 }
 
-/// The first block of the FAT after formatting.
 const FAT_START: u32 = 2048 + 32;
 
 fn change(device: &MemCard, at: u32, change: impl FnOnce(&mut [u8; 512])) {
@@ -314,7 +313,6 @@ fn forget_hint(device: &MemCard) {
     change(device, 2048 + 1, |info| info[488..496].fill(0xFF));
 }
 
-/// The search for room begins at this cluster.
 fn set_hint(device: &MemCard, cluster: u32) {
     change(device, 2048 + 1, |info| info[492..496].copy_from_slice(&cluster.to_le_bytes()));
 }
@@ -327,7 +325,6 @@ fn a_damaged_information_sector_keeps_nobody_from_recording_and_is_mended() {
         change(&device, info, |block| block[at..at + bytes].fill(0));
         let status = CardStatus::new();
         mount(&device, &status).create(FIRST, 1 << 20).expect("there is room");
-        // Again, by other readers.
         assert!(logs(&mount(&device, &status)).iter().any(|log| log.name == FIRST));
         change(&device, info, |block| {
             assert_eq!(

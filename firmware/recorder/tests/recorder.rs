@@ -64,7 +64,6 @@ fn write_all(recorder: &mut Recorder<'_, impl CardDevice>, sectors: &[Sector]) {
     }
 }
 
-/// (Number, place) in order.
 fn stored(device: &MemCard) -> Vec<(LogName, u32, Header)> {
     let status = CardStatus::new();
     let card = Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
@@ -450,7 +449,6 @@ fn the_next_start_finds_where_the_session_before_ended() {
     }
 }
 
-/// The check of a sector that the writer has not sealed.
 fn check_of(sector: &Sector) -> u32 {
     let mut sector = *sector;
     sector.seal(1);
@@ -518,7 +516,6 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
             let (before, mut is_fuller) = (newest, false);
             if let Some(own) = own {
                 match before.filter(|before| before.number == own.number) {
-                    // The copy before the sector itself.
                     Some(before) if !before.partial => continue,
                     Some(before) => is_fuller = !own.partial && before.frames > own.frames,
                     None => {}
@@ -539,7 +536,6 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
                 (Found::Frames, session, number + 1, frames, newest.check),
                 "{older_sessions}, sector {number}"
             );
-            // The same write, torn.
             let Some(before) = before.filter(|_| own.is_some()) else { continue };
             let mut torn = held_before;
             torn[..256].copy_from_slice(&block[..256]);
@@ -552,7 +548,6 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     assert!(begun > 8 && fuller_copies > 0, "{begun} writes to begin files, {fuller_copies} fuller copies");
 }
 
-/// Files with copies of the sector in progress; returns the session.
 fn record_files(device: &MemCard) -> u32 {
     let status = leaked();
     let mut recorder = Recorder::new(device.clone(), status, held(), 99);
@@ -634,7 +629,6 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
 }
 
-/// The session at its next start; the card stays unchanged.
 fn found_at_next_start(device: &MemCard) -> Before {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();

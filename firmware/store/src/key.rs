@@ -11,9 +11,7 @@ pub const PARAM_BYTES_MAX: usize = 1 + NAME_BYTES_MAX + 4;
 pub struct Key(u32);
 
 impl Key {
-    /// Set in the key of a parameter.
     const PARAM: u32 = 1 << 31;
-    /// Set in the store's own keys.
     const OWN: u32 = 1 << 30;
 
     /// Mount count, four bytes.

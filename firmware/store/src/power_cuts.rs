@@ -35,7 +35,6 @@ fn items<F: NorFlash<Error: Copy>>(store: &mut Store<F>) -> Items {
     items
 }
 
-/// `cuts` random power cuts, each with a check. Returns erased sectors.
 fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, steps_max: u64) -> u64 {
     let mut random = Random(seed);
     let mut flash = SimFlash::<SECTOR>::blank();

@@ -22,19 +22,15 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::key::Key;
 
-/// Bytes of a word.
 pub(crate) const WORD: usize = 4;
 pub(crate) const HEADER_BYTES: usize = 4 * WORD;
-/// Bytes of an item without its value: length, key and checksum.
 pub(crate) const ITEM_BYTES: usize = 3 * WORD;
-/// Word of erased flash.
 pub(crate) const ERASED: u32 = u32::MAX;
 /// "HST2". Change it with the layout.
 pub(crate) const MAGIC: u32 = u32::from_be_bytes(*b"HST2");
 /// "done"
 const COMPLETE: u32 = u32::from_be_bytes(*b"done");
 
-/// Offsets of the header's words.
 const GENERATION_AT: usize = WORD;
 const COMPLETE_AT: usize = 2 * WORD;
 const SUPERSEDED_AT: usize = 3 * WORD;
@@ -73,7 +69,6 @@ impl Item {
         self.at + 2 * WORD
     }
 
-    /// Bytes of the item in the flash.
     pub(crate) const fn bytes(&self) -> usize {
         ITEM_BYTES + self.length.next_multiple_of(WORD)
     }
@@ -97,7 +92,6 @@ pub(crate) struct Content {
     pub(crate) items: usize,
     /// The sector holds bytes that are neither an item nor the trace of a power cut.
     pub(crate) is_damaged: bool,
-    /// Offset after the last written word.
     pub(crate) end: usize,
 }
 
@@ -109,7 +103,6 @@ pub(crate) struct Sector<'f, F> {
 }
 
 impl<'f, F: NorFlash> Sector<'f, F> {
-    /// First or second sector, up to this offset.
     pub(crate) const fn new(flash: &'f mut F, index: usize, end: usize) -> Self {
         const {
             assert!(F::WRITE_SIZE == WORD && F::READ_SIZE == 1, "the layout is made for words of four bytes");
@@ -139,7 +132,6 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(Header { generation, is_complete, superseded_by: decoded(self.word(SUPERSEDED_AT)?) })
     }
 
-    /// Erases the sector and writes a new header.
     pub(crate) fn begin(&mut self, generation: u16) -> Result<(), F::Error> {
         self.flash.erase(self.start as u32, (self.start + F::ERASE_SIZE) as u32)?;
         self.write_word(GENERATION_AT, coded(generation))?;
@@ -150,7 +142,7 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         self.write_word(COMPLETE_AT, COMPLETE)
     }
 
-    /// Marks the sector as superseded. The mark matters only if the newer header is damaged later, so this write may fail.
+    /// The mark matters only if the newer header is damaged later, so this write may fail.
     pub(crate) fn supersede(&mut self, generation: u16) -> Result<(), F::Error> {
         if self.word(SUPERSEDED_AT)? == ERASED {
             self.write_word(SUPERSEDED_AT, coded(generation))?;
@@ -158,7 +150,6 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(())
     }
 
-    /// The caller checks that it fits.
     pub(crate) fn append(&mut self, at: usize, key: Key, value: &[u8]) -> Result<(), F::Error> {
         let mut crc = Crc::new();
         for (place, word) in [coded(value.len() as u16), key.stored()].into_iter().enumerate() {
@@ -209,7 +200,6 @@ impl<'f, F: NorFlash> Sector<'f, F> {
         Ok(true)
     }
 
-    /// The next complete item from this offset.
     pub(crate) fn next(&mut self, mut at: usize) -> Result<Option<Item>, F::Error> {
         while at + ITEM_BYTES <= self.end {
             match self.item(at)? {

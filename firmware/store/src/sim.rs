@@ -69,7 +69,6 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         (self.is_dead, self.cut_at) = (false, None);
     }
 
-    /// `true` if power is cut in it.
     fn step(&mut self) -> bool {
         self.steps += 1;
         self.is_dead = self.cut_at.is_some_and(|at| self.steps >= at);

@@ -219,7 +219,6 @@ impl<F: NorFlash> Store<F> {
         Ok(bytes)
     }
 
-    /// Makes it the active one.
     fn turn(&mut self) -> Outcome<(), F> {
         let (from, to) = (self.in_use, 1 - self.in_use);
         let generation = self.generation.saturating_add(1);

@@ -32,7 +32,6 @@ pub struct Manifest {
     logs: Vec<LogJson>,
 }
 
-/// A file and its content.
 #[derive(Debug, Serialize)]
 struct FileJson {
     /// Its name from the given path on.
@@ -140,7 +139,6 @@ fn name_below(file: &Path, given: &[PathBuf]) -> PathBuf {
     name.unwrap_or_else(|| file.file_name().map_or_else(PathBuf::new, PathBuf::from))
 }
 
-/// A file's content, by this name.
 fn hashed(path: &Path, name: &Path) -> Result<FileJson> {
     let context = || format!("{}: cannot be read", path.display());
     let bytes = fs::metadata(path).with_context(context)?.len();

@@ -8,7 +8,6 @@ use hums_core::clock::Instant;
 
 /// A large screen's columns.
 const INTERVALS_MAX: usize = 2048;
-/// The first length of an interval.
 const INTERVAL_MS: u64 = 50;
 /// All that a vehicle's model can fill.
 const SERIES_MAX: usize = 256;
@@ -22,7 +21,6 @@ pub struct Grid {
     interval_ms: u64,
 }
 
-/// One interval of one series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extremes {
     low: f32,
@@ -55,7 +53,6 @@ impl Extremes {
 struct Series {
     /// Values by interval; slow quantities fill few.
     values: Vec<(u16, Extremes)>,
-    /// Number of its last value.
     last: u64,
 }
 

@@ -81,7 +81,6 @@ pub fn open(endpoint: &Endpoint, silence: Duration) -> Result<Duplex> {
     })
 }
 
-/// The reason why a port cannot be bound, with advice.
 fn why_not_bound(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::AddrInUse => "another program, perhaps a ground station, has this port: close it, or let it forward the vehicle's \
@@ -119,13 +118,11 @@ struct DatagramReader {
     socket: UdpSocket,
     peer: Arc<Mutex<Option<SocketAddr>>>,
     fixed: bool,
-    /// The sender of the last received datagram.
     last: Option<SocketAddr>,
     /// Whoever else speaks does not become the peer.
     kept: bool,
 }
 
-/// The largest UDP datagram.
 const LARGEST_BYTES: usize = 65_536;
 /// Room for [`Port::read_all`]: it reads on while another datagram surely fits.
 pub const ALL_BYTES: usize = 2 * LARGEST_BYTES;

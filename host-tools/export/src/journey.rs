@@ -16,7 +16,6 @@ use crate::source::told::Finding;
 use crate::story::Story;
 use crate::utc::iso8601;
 
-/// Findings in a file at most.
 const FINDINGS_MAX: usize = 10_000;
 /// The distance between two places: five a second.
 const EVERY: Span = Span::from_millis(200);
@@ -91,7 +90,6 @@ impl Journey {
         Ok(())
     }
 
-    /// The findings with a place before them or, without one, after them.
     pub(crate) fn placed(&self) -> impl Iterator<Item = Placed<'_>> {
         let points = self.track.points();
         self.findings.iter().filter_map(move |finding| {

@@ -301,17 +301,13 @@ struct Task<'a> {
     fleet: Arc<Fleet>,
 }
 
-/// A log's outcome, reported in the logs' order.
 struct Done {
     name: String,
     outcome: Outcome,
-    /// The evidence of its end, for a HUMS log.
     ending: Option<Ending>,
     /// What a recording of another program lacks.
     lacks: Soundness,
-    /// Its outputs exist, and were not overwritten.
     skipped: bool,
-    /// Whether there was anything to write.
     written: bool,
     /// The files written.
     made: Vec<OutputFile>,
@@ -336,7 +332,6 @@ impl Done {
         self.remarks.extend(new.collect::<Vec<_>>());
     }
 
-    /// What the log lacks.
     fn soundness(&self) -> Soundness {
         self.ending.as_ref().map_or(self.lacks, Soundness::of)
     }

@@ -30,7 +30,6 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Takes an observation; `false` if it is not of the vehicle.
     pub(crate) fn observe(&mut self, observed: &Observed) -> bool {
         let own = self.vehicle.observe(observed.at.into(), observed.source, &observed.observation);
         if own {

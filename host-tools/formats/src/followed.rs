@@ -76,7 +76,6 @@ impl<T: HasEnding> EndResolver<T> {
         }
     }
 
-    /// The record of `next` about the log before.
     fn tell(&mut self, before: &Before, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(HasEnding::ending).collect();

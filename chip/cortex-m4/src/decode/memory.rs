@@ -81,7 +81,6 @@ pub(super) fn double_or_exclusive(a: u32, b: u32) -> Op {
     }
 }
 
-/// Address forms of one register.
 enum Form {
     Offset(i32),
     Indexed(i16, Index),

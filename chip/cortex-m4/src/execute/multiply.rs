@@ -5,7 +5,6 @@ use crate::processor::Core;
 use crate::timing;
 use crate::trap::Trap;
 
-/// A half of a register, signed.
 fn half(value: u32, top: bool) -> i64 {
     i64::from(if top { (value >> 16) as i16 } else { value as i16 })
 }

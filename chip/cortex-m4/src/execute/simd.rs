@@ -4,7 +4,6 @@ use super::alu::shift;
 use crate::op::{Lanes, Op, Prefix};
 use crate::processor::Core;
 
-/// The value, and whether it was changed.
 fn saturate(value: i64, signed: bool, bits: u8) -> (i64, bool) {
     let (low, high) =
         if signed { (-(1i64 << (bits - 1)), (1 << (bits - 1)) - 1) } else { (0, (1i64 << bits) - 1) };

@@ -117,7 +117,6 @@ fn state(random: &mut Random, name: &'static str, op: Op, start: u32) -> Case {
     case
 }
 
-/// An instruction, perhaps conditional; none if harmful here.
 pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
     let (name, pattern) = random.of(patterns::PATTERNS);
     let bits = patterns::fill(pattern, random.next());
@@ -144,7 +143,6 @@ pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
     prepare(random, &mut case, slot).then_some(case)
 }
 
-/// False if it cannot be tested here.
 fn prepare(random: &mut Random, case: &mut Case, slot: u32) -> bool {
     match case.op {
         // QEMU loads; the architecture has an unallocated hint here.

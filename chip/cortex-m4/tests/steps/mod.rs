@@ -48,7 +48,6 @@ fn bytes_of(words: impl IntoIterator<Item = u32>) -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
-/// The memory that a batch needs beside the program.
 fn parts(cases: &[Case], seed: u64) -> Vec<(u32, Vec<u8>)> {
     let mut random = Random(seed ^ 0x5EED | 1);
     let mut pattern: Vec<u32> = (0..SCRATCH_WORDS)

@@ -7,7 +7,6 @@ use stm32f405_model::machine::Machine;
 use stm32f405_model::spi::Wire;
 use stm32f405_model::time::{MS, Ps};
 
-/// Nothing, or the program's fault.
 pub(crate) type Outcome = Result<(), Box<dyn Error>>;
 
 pub(crate) fn run(machine: &mut Machine, until: Ps) -> Outcome {
@@ -40,7 +39,6 @@ pub(crate) fn logged_since(machine: &Machine, place: u32) -> Vec<u8> {
     (0..bytes).map(|at| machine.memory(buffer + (place + at) % ring, 1)[0]).collect()
 }
 
-/// The log, of a program that logs text.
 pub(crate) fn log(machine: &Machine) -> String {
     let Some([buffer, _, written]) = channel(machine) else { return String::new() };
     String::from_utf8_lossy(machine.memory(buffer, written)).into_owned()
@@ -50,7 +48,6 @@ pub(crate) fn text(sent: &[(Ps, u8)]) -> String {
     sent.iter().map(|(_, byte)| char::from(*byte)).collect()
 }
 
-/// Milliseconds and levels of a pin's changes.
 pub(crate) fn changes(
     machine: &mut Machine,
     pin: Pin,

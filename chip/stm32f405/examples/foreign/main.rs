@@ -59,7 +59,6 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns the failed ones.
 fn judge(folder: &Path) -> std::io::Result<usize> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -80,7 +79,6 @@ fn judge(folder: &Path) -> std::io::Result<usize> {
     Ok(failed)
 }
 
-/// Returns the model's notes.
 fn one(name: &str, bytes: &[u8]) -> Result<String, Box<dyn std::error::Error>> {
     let Some((_, hse_hz, check)) = PROGRAMS.iter().find(|(known, ..)| *known == name) else {
         return Err("nobody knows what it should do".into());

@@ -24,7 +24,6 @@ pub(crate) use super::stm32f4::{
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
 static GS_RING: ConstStaticCell<[u8; GS_RING_BYTES]> = ConstStaticCell::new([0; GS_RING_BYTES]);
 
-/// Reception and transmission of each port, and the rest.
 pub(crate) struct Parts {
     pub(crate) autopilot: (PortRx, PortTx),
     pub(crate) gs: (PortRx, PortTx),
@@ -33,7 +32,6 @@ pub(crate) struct Parts {
     pub(crate) store: Option<StoreFlash>,
     pub(crate) usb: Usb,
     pub(crate) led: Led,
-    /// The button for the card reader was held at the start.
     pub(crate) button: bool,
     pub(crate) watchdog: Watchdog,
     pub(crate) idle: Idle,
@@ -93,7 +91,6 @@ macro_rules! card {
     }};
 }
 
-/// Whether the board has a button, and it is pressed.
 macro_rules! button {
     ($p:ident) => {
         false

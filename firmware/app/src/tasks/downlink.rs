@@ -10,7 +10,6 @@ use crate::boards::board;
 use crate::links::{self, now};
 use crate::status::SUPERVISOR;
 
-/// Check-in interval while idle.
 const REPORT: Duration = Duration::from_millis(500);
 /// Timeout of a frame. The longest frame takes 73 ms at 38,400 baud; the supervisor allows 1 s.
 const SEND_MAX: Duration = Duration::from_millis(500);
@@ -19,7 +18,6 @@ const SEND_MAX: Duration = Duration::from_millis(500);
 pub(crate) static BAUD_GS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static BAUD_AUTOPILOT: AtomicU32 = AtomicU32::new(0);
 
-/// A transmission since the start did not end.
 pub(crate) static GS_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 pub(crate) static AUTOPILOT_STOOD_STILL: AtomicBool = AtomicBool::new(false);
 

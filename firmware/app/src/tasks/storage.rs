@@ -18,7 +18,6 @@ use crate::boards::board;
 use crate::costs::{Stage, measure};
 use crate::links::{self, now};
 
-/// Check-in interval while idle.
 const REPORT: Duration = Duration::from_secs(1);
 
 /// Period after the end of the log.
@@ -76,7 +75,6 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
     }
 }
 
-/// Ends the log, once.
 #[inline(never)]
 fn end(body: &mut Body) {
     if !LOG_ENDED.load(Ordering::Relaxed) {
@@ -85,7 +83,6 @@ fn end(body: &mut Body) {
     }
 }
 
-/// Returns when there is a sector or a question, or the log ends.
 async fn wait_for_work(body: &mut Body) {
     let mut asked = body.shelf.is_wanted();
     while body.sectors.is_empty() && !asked && !LOG_ENDS.load(Ordering::Relaxed) {

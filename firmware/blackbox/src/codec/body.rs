@@ -134,7 +134,6 @@ impl Body {
         Some(true)
     }
 
-    /// Whether the payload equals the slot's last one.
     pub(super) fn is_repeat(&self, slot: &Slot, frame: &Frame) -> bool {
         let mut copy = Frame::empty();
         copy.len = frame.len;

@@ -24,7 +24,6 @@ pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     None
 }
 
-/// Coding, number and bytes of a field's elements.
 fn elements_of(field: FieldLayout) -> (What, u8, u8) {
     let whole = |what| (what, 1, field.size() as u8);
     if field.role == Role::Instance && field.size() <= INSTANCE_BYTES {

@@ -129,7 +129,6 @@ impl Frame {
         }
     }
 
-    /// The message id in the head, if the frame's flags are known.
     pub(crate) fn known_id(&self) -> Option<u32> {
         match (self.v2, self.incompat) {
             (false, _) => Some(self.id & 0xff),

@@ -19,7 +19,6 @@ const TOLD: usize = 27;
 const TIMES: usize = 43;
 const ATTITUDE_QUATERNION: u32 = 31;
 
-/// A register, and the factor from the field's unit to the register's.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     register: u8,

@@ -36,10 +36,7 @@ const _: () = assert!(ENTRY_BYTES_MAX + 20 <= CODED_BYTES_MAX);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A frame, and whether its checksum matches our definition.
-    Frame {
-        verified: bool,
-    },
+    Frame { verified: bool },
     Record,
 }
 
@@ -57,7 +54,6 @@ pub(crate) struct Decoded {
     pub(crate) len: usize,
 }
 
-/// The stream is not one that the writer makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Corrupt;
 
@@ -71,7 +67,6 @@ pub(crate) struct Model {
     headers: Headers,
     body: Body,
     records: Records,
-    /// The times between entries that have no distribution of their own.
     times: Cdf,
 }
 
@@ -207,7 +202,7 @@ impl Model {
         Some(Decoded { kind, at_ms, len })
     }
 
-    /// The time since the entry before, by the slot's own distribution where there is a slot.
+    /// By the slot's own distribution where there is a slot.
     fn time<C: Coder>(&mut self, coder: &mut C, slot: Option<u8>, at_ms: u64) -> Option<u64> {
         let step = at_ms.saturating_sub(self.last_ms);
         let length = 64 - step.leading_zeros();

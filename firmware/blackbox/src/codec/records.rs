@@ -95,7 +95,6 @@ impl Records {
         Some(len)
     }
 
-    /// A number of a kind's record, against a guess or else the last one.
     fn number<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -126,7 +125,6 @@ impl Records {
     }
 }
 
-/// A record of any bytes, uncoded.
 fn raw_bytes<C: Coder>(coder: &mut C, buffer: &mut [u8; ENTRY_BYTES_MAX], len: usize) -> Option<usize> {
     let len = coder.bits16(len as u32, 10) as usize;
     for place in buffer.get_mut(..len)? {

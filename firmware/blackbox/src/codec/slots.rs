@@ -9,7 +9,6 @@ use crate::layouts::{Layout, Place};
 /// Slots at most. Further streams are coded as plain bytes.
 pub(crate) const SLOTS: usize = 112;
 
-/// Senders (system, component) at most.
 pub(crate) const SENDERS: usize = 16;
 
 /// A name of 10 characters.
@@ -23,7 +22,6 @@ pub(crate) struct Key {
     pub(crate) instance: [u8; INSTANCE_BYTES],
 }
 
-/// How a slot's frames get their length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Length {
     /// Without the zeros at the end.
@@ -55,9 +53,7 @@ pub(crate) struct Slot {
     /// Offset and size of the instance field; 0 where there is none.
     pub(crate) instance_at: u8,
     pub(crate) instance_size: u8,
-    /// Whether the quiet elements were unchanged.
     pub(crate) calm: Cell,
-    /// There were quiet elements after the last frame.
     pub(crate) quiet: bool,
     /// Frames so far, up to 255.
     pub(crate) frames: u8,
@@ -178,7 +174,6 @@ pub(crate) struct Slots {
     past: [u8; 3],
     /// The places in `order_3` and `order_2` for its successor.
     places: (u16, u16),
-    /// Prediction: the two likeliest slots, and the confidence in the first.
     guesses: (u8, u8, u8),
     kind: [Cdf; KINDS],
     high: Cdf,
@@ -217,7 +212,6 @@ impl Slots {
         self.low = [Cdf::FLAT; SLOTS / 16];
     }
 
-    /// The sender's number; a new one where there is room.
     pub(crate) fn sender(&mut self, system: u8, component: u8) -> Option<u8> {
         let used = usize::from(self.senders_used);
         let known = self.senders.get(..used)?;
@@ -272,7 +266,6 @@ impl Slots {
         Some(self.used - 1)
     }
 
-    /// The two most likely next slots, and the certainty of the first one.
     fn guess(&self) -> (u8, u8, u8) {
         let (three, two) = self.places;
         let three = self.order_3[usize::from(three) % ORDER_3];

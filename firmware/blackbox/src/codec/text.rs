@@ -12,7 +12,6 @@ const MATCHES: usize = 8;
 
 pub(crate) struct TextModel {
     rows: [Cdf; ROWS],
-    /// Whether a byte is as in the text before.
     same: [Cell; MATCHES],
 }
 

@@ -10,7 +10,6 @@ const TEXT_BYTES: usize = 1_024;
 /// The longest text: a payload.
 const TEXT_BYTES_MAX: usize = 255;
 
-/// A text that is not stored.
 const NOT_KEPT: u32 = u32::MAX;
 
 pub(super) struct Texts {

@@ -23,7 +23,6 @@ impl Cdf {
         }
     }
 
-    /// A symbol of the mean of two distributions; both adapt.
     #[inline]
     pub(crate) fn read_between(&mut self, other: &mut Self, width: u16, offset: u32) -> (usize, u32, u32) {
         #[cfg(target_arch = "x86_64")]

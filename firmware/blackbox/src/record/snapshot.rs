@@ -9,7 +9,6 @@ use hums_core::snapshot::{COLUMNS_MAX, INTERVAL, SAMPLES, columns};
 use super::stored::{Fields, Sink};
 use crate::limits::RECORD_BYTES_MAX;
 
-/// Bytes of the values of a snapshot at most.
 const VALUES_MAX: usize = 2 * COLUMNS_MAX * SAMPLES;
 // A check's name has 16 characters at most.
 const _: () = assert!(2 + 8 + 1 + 16 + 3 + 8 + 2 + 1 + VALUES_MAX <= RECORD_BYTES_MAX);

@@ -1,6 +1,5 @@
 //! Recorded frames, without the code under test.
 
-/// Milliseconds since the first one, bytes, and whether the checksum matches.
 pub(crate) type Frame = (u64, Vec<u8>, bool);
 
 /// CRC-16/MCRF4XX over the bytes and the seed.

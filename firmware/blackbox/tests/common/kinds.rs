@@ -14,7 +14,6 @@ pub(crate) enum Entry {
     Record(u64, Vec<u8>),
 }
 
-/// The course of a value from frame to frame.
 #[derive(Clone, Copy)]
 enum Habit {
     Constant,
@@ -214,7 +213,6 @@ fn frame(
     (bytes, verified)
 }
 
-/// Numbers stay or jump.
 fn record(index: usize, random: &mut Random) -> Vec<u8> {
     let (words, halves) = (random.below(20), random.below(10));
     let calm = random.below(3) > 0;

@@ -11,7 +11,6 @@ use crate::cause::{Alert, Cause, Meaning};
 enum Where {
     /// All.
     Everywhere,
-    /// Those that are known to be severe.
     Severe,
     /// Those without a word of failure ([`FAILURES`]).
     Sound,
@@ -73,7 +72,6 @@ texts! {
     (fine): "landing sequence" "smartrtl" "rally" "fence upload" "log streaming" "log download"
         "avoidance enabled" "avoidance disabled" "avoid: performing" "locate copter"
         "command received" "throttle not zero" "not landed";
-    // Mishaps and ends of a flight.
     (critical Crash): "crash" "ditching";
     (warning Crash): "hard landing";
     (critical Crash): "parachute*releas" "parachute*deploy";
@@ -130,7 +128,6 @@ texts! {
     (broad Accelerometer): "accel";
     (warning Estimator): "error pos" "error vel";
     (broad Terrain): "terrain";
-    // The rest of the autopilot.
     (warning Fence): "fence*breach" "geofence violation";
     (warning Logging): "log file";
     (broad Logging): "logg" "sd card";

@@ -22,7 +22,6 @@ const DROPS_MPS: f32 = 10.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DisarmWatch {
     since: Instant,
-    /// Height above home, m.
     pub(super) height_m: Option<f32>,
     /// Height above mean sea level, m.
     altitude_m: Option<f32>,
@@ -96,7 +95,6 @@ impl Flight {
             && now.since(watch.since) > WATCH
     }
 
-    /// Whether its sensors say that it stands upright and still, and they are alive.
     fn stands_off(&self, now: Instant, vehicle: &Vehicle) -> bool {
         let slow = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() < STILL_MPS);
         now.since(self.felt.at) <= STILL

@@ -68,7 +68,6 @@ struct Lasting {
 }
 
 impl Lasting {
-    /// For how long it has been so, once there were enough samples.
     fn take(&mut self, at: Instant, so: bool) -> Option<Span> {
         if !so {
             self.samples = 0;
@@ -115,7 +114,6 @@ pub(super) struct Shock {
     pub(super) load_g: f32,
     /// Speed just before it, m/s; 0 if the estimator is not to be believed.
     speed_mps: f32,
-    /// Sink just before it, m/s.
     pub(super) sink_mps: f32,
     stopped: bool,
     /// Little carried the vehicle just before.
@@ -342,7 +340,6 @@ impl Flight {
         }
     }
 
-    /// It touched with this sink, unless the air pressure contradicts it.
     pub(super) fn touch(&mut self, at: Instant, sink_mps: f32) {
         if self.pressure.follows(at, -sink_mps) != Some(false) {
             self.touch_mps = self.touch_mps.max(sink_mps);
@@ -437,12 +434,10 @@ impl Flight {
         (turned && !is_fast(now, vehicle)).then_some(over)
     }
 
-    /// Whether a shock was seen that is an impact if it lies still soon.
     pub(super) fn may_have_hit(&self) -> bool {
         self.shock.is_some_and(|shock| shock.has_hit)
     }
 
-    /// Whether the last shock followed a fall.
     pub(super) fn was_dropped(&self) -> bool {
         self.shock.is_some_and(|shock| shock.dropped)
     }

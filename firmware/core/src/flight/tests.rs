@@ -11,7 +11,6 @@ use crate::units::{Fraction, Metres, MetresPerSecond};
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-/// The observations of a piece, `for_s` after it began.
 fn observations(words: &str, for_s: f32, kind: VehicleKind) -> Vec<Observation> {
     let has = |word: &str| words.split(' ').any(|it| it == word);
     let number = |name: char| words.split(' ').find_map(|word| word.strip_prefix(name)?.parse::<f32>().ok());

@@ -22,7 +22,7 @@ struct Stop {
 pub(super) struct Touchdown(Option<Stop>);
 
 impl Touchdown {
-    /// One step in the air: how fast it sinks (negative: climbs), and sank at most in the last second, and how high it is.
+    /// Sink is negative in a climb; the other sink is the most in the last second.
     pub(super) fn step(&mut self, at: Instant, sink_mps: f32, fastest_mps: f32, height_m: f32) {
         if fastest_mps < HANGS_MPS || sink_mps > fastest_mps / 2.0 {
             return;

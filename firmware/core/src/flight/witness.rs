@@ -42,7 +42,6 @@ const LOST_MPS: f32 = 2.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vote {
-    /// It does not tell.
     Unknown,
     Undecided,
     /// Its height is below the place of arming: a valley, or an estimate that drifts. It does not count.
@@ -59,7 +58,6 @@ pub(super) const THRUST: u8 = 4;
 pub(super) const INERTIAL: u8 = 8;
 pub(super) const SPEED: u8 = 16;
 
-/// The votes of all witnesses, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Votes {
     pub(super) flies: u8,
@@ -121,7 +119,6 @@ impl Flight {
         self.word(now, vehicle) == Stands
     }
 
-    /// Height above the place of arming, by pressure and by position.
     fn heights(&self, now: Instant, vehicle: &Vehicle, is_lost: bool) -> [Vote; 2] {
         let by_position = self.motion.rise_m(now, vehicle).filter(|_| !is_lost);
         [(self.pressure.height_m(now), NOISE_M), (by_position, LOW_M)].map(|(height_m, low_m)| match height_m
@@ -260,7 +257,6 @@ impl Flight {
             || climbs.is_some_and(|climb_mps| self.pressure.follows(now, climb_mps) == Some(false))
     }
 
-    /// A receiver that stands in flight may be stuck.
     fn has_strayed(&self, now: Instant) -> bool {
         self.stage.is_mishap() && self.motion.has_strayed(now)
     }
@@ -319,7 +315,6 @@ pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
     vehicle.hovers(now) == Some(true)
 }
 
-/// Whether it hangs on wings, or is between rotors and wings.
 pub(super) fn is_on_wings(now: Instant, vehicle: &Vehicle) -> bool {
     let has_wings = matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol);
     !vehicle.hovers(now).unwrap_or(!has_wings)
@@ -333,7 +328,6 @@ fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
             .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD)
 }
 
-/// Whether it is faster over ground than a vehicle that lies, or is dragged along: the air carries it from ahead besides its rotors.
 pub(super) fn is_fast(now: Instant, vehicle: &Vehicle) -> bool {
     const DRAGS_MPS: f32 = 12.0;
     ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS)

@@ -15,7 +15,6 @@ pub(super) const OUTLIVES: Span = Span::from_secs(8);
 pub(super) struct Standing {
     pub(super) slot: u16,
     pub(super) level: Level,
-    /// Its onset: when it began, or rose to its level.
     pub(super) since: Instant,
     /// The state whose alarm explains it, and when that ended or fell below this one.
     cause: Option<u16>,
@@ -79,7 +78,6 @@ impl Alarms {
         }
     }
 
-    /// It is explained no longer once it is reported.
     pub(super) fn outliving(&self, place: usize, now: Instant) -> Option<u16> {
         let known = self.standing.get(place)?.as_ref()?;
         (now.since(known.cause_ended?) >= OUTLIVES).then_some(known.slot)

@@ -191,7 +191,7 @@ impl Limits {
         Self { side: Side::Below, warn, critical, hysteresis }
     }
 
-    /// The values of both. A limit that is missing or off is NaN: no comparison with it is true.
+    /// A limit that is missing or off is NaN: no comparison with it is true.
     fn values(&self, params: &Params) -> [f32; 2] {
         [self.warn, self.critical].map(|limit| limit.map_or(f32::NAN, |param| params.get(param)))
     }
@@ -350,7 +350,6 @@ impl Check {
         }
     }
 
-    /// The limit; NaN where there is none.
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
         let [warn, critical] = self.limits.values(params);
         if level == Level::Critical || warn.is_nan() { critical } else { warn }
@@ -400,7 +399,6 @@ impl State {
         }
     }
 
-    /// Whether it is a warning or critical, and its value is good just now.
     pub(super) const fn gets_better(&self) -> bool {
         self.alarm().is_some() && self.better.is_set()
     }

@@ -68,13 +68,11 @@ pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) 
     }
 }
 
-/// What the autopilot says of a cause.
 pub(super) fn said(inputs: &Inputs<'_>, cause: Cause) -> Option<Reading> {
     let level = inputs.vehicle.alerts.level(inputs.now, cause, inputs.flight.in_mishap());
     inputs.reading(level?)
 }
 
-/// Of a subsystem's components, the one that is nearest to its limit.
 pub(super) const fn due(subsystem: Subsystem) -> Check {
     Check {
         name: "",

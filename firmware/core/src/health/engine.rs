@@ -8,7 +8,6 @@ use super::inputs::Inputs;
 use crate::latest::Reading;
 use crate::params::Param;
 
-/// Above the ripple of a governor that holds the speed.
 const GENERATOR_HYSTERESIS_RPM: f32 = 100.0;
 
 const ENGINE: Check = Check {

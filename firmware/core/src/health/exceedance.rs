@@ -198,7 +198,6 @@ impl Exceedances {
         self.entries.iter().flatten().filter(changed).filter_map(move |entry| entry.now(now))
     }
 
-    /// The previous vehicle was heard last at this time.
     pub(crate) fn end(&mut self, now: Instant) {
         for entry in self.entries.iter_mut().flatten() {
             entry.extend(now);
@@ -215,7 +214,7 @@ impl Exceedances {
         self.left_out
     }
 
-    /// Forgets earlier sessions: they were another airframe's.
+    /// They were another airframe's.
     pub(crate) fn forget_life(&mut self) {
         for place in &mut self.entries {
             match place {
@@ -262,7 +261,6 @@ impl Exceedances {
     }
 }
 
-/// A stale value exceeds nothing.
 const fn rank(level: Level) -> u8 {
     match level {
         Level::Warning => 1,

@@ -54,7 +54,6 @@ pub(super) const CHECKS: &[Check] = &[
     ),
 ];
 
-/// Time since the last position, global or local, while the autopilot is heard.
 fn position_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let vehicle = inputs.vehicle;
     let at = match (vehicle.global.at(), vehicle.local.at()) {

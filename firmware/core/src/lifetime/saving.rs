@@ -19,7 +19,6 @@ const FIRST: Span = Span::from_secs(10);
 pub const EVERY: Span = Span::from_secs(15 * 60);
 /// The longest time until counters are saved in flight, in the first hour of a power-on; a power cut loses no more.
 pub const EVERY_ARMED: Span = Span::from_secs(2 * 60);
-/// Afterwards: this fraction of the time since power-on.
 const EVERY_PART: u64 = 30;
 
 /// Whether the store has room to spare.

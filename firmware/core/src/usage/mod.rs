@@ -53,7 +53,6 @@ state! {
     }
 }
 
-/// Lowest ranges of the load factor's cycles, g.
 const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// A load factor that turns back by less is vibration and noise.
 const LOAD_TURN_G: f32 = 0.1;

@@ -65,7 +65,6 @@ fn an_impact_is_a_shock_a_speed_that_breaks_off_and_then_stillness() {
         } else {
             (quad.climb, quad.height, motion.ground_mps) = (0.0, 0.3, 0.0);
             motion.load_g = if ms < hits + 100 { 10.0 } else { 1.0 };
-            // It rocks for a while.
             let still = ms >= hits + 2_600;
             motion.rates = if still { [0.0; 3] } else { [0.5, 0.0, 0.0] };
             let off = ms >= hits + 2_000;
@@ -433,7 +432,6 @@ fn a_barometer_that_freezes_before_the_take_off_hides_no_flight() {
                 let noise = (ms.min(frozen_ms) / 100 * 37 % 11) as f32 * 0.002;
                 let high_m = if ms.min(frozen_ms) >= 8_000 { height } else { 0.0 };
                 motion.pressure_hpa = Some(957.0 - 0.12 * high_m + noise);
-                // It moves up and down by its estimator.
                 if flies {
                     quad.climb = if ms / 2_000 % 2 == 0 { 1.0 } else { -1.0 };
                     motion.ground_mps = ground_mps;

@@ -22,28 +22,23 @@ use hums_core::units::{
 };
 use hums_core::usage::UsageCounter;
 
-/// Start of the script, ms.
 const AT_MS: u64 = 20_000;
 
-/// The ground station's radio.
 const RADIO: Source = Source { system: 51, component: 68 };
 
 /// Motion of the vehicle besides the messages of a [`Quad`].
 #[derive(Clone, Copy)]
 struct Motion {
     load_g: f32,
-    /// Force of the air from ahead.
     drag_g: f32,
     rates: [f32; 3],
     ground_mps: f32,
     pitch: f32,
-    /// The barometer's pressure, if it measures.
     pressure_hpa: Option<f32>,
     /// The greatest specific force since the last sample, for a shock.
     shock_g: Option<f32>,
     displayed_mps: Option<f32>,
     roll_wanted: Option<f32>,
-    /// No message comes but the radio's.
     unheard: bool,
     /// The autopilot sends only heartbeats, and whether it reports a landing.
     beats_only: bool,
@@ -76,7 +71,6 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// The reported mishaps, each kind once, in order.
     fn told(&self) -> Vec<&'static str> {
         let of_mishap =
             |finding: &&Finding| finding.subsystem == Subsystem::Mishap && finding.level == Level::Critical;
@@ -177,7 +171,6 @@ type Of = (Autopilot, VehicleKind, u8);
 
 type Counts = (u32, u32, u32);
 
-/// The outcome of a flight: reported mishaps in order, after ".." any others; and the counts.
 type Come<'a> = (&'a [&'a str], Counts);
 
 /// Each of these vehicles flies the script. `told` are the reported mishaps, in order; after ".." any others.

@@ -4,11 +4,9 @@ use crate::packet::Fields;
 #[derive(Default)]
 struct Script {
     autopilot: Autopilot,
-    /// Id and rate in Hz.
     streams: Vec<(u32, u32)>,
     /// Unsupported messages.
     unknown: Vec<u32>,
-    /// Promised and never sent.
     empty: Vec<u32>,
     deaf: bool,
     /// Answers every `SET_MESSAGE_INTERVAL` with this `MAV_RESULT`.

@@ -192,7 +192,6 @@ pub(super) fn outputs(payload: &[u8]) -> Outputs {
     Outputs { port: Fields(payload).u8(20), pulses: core::array::from_fn::<u16, MOTORS_MAX, _>(pulse) }
 }
 
-/// A NaN attitude counts as missing.
 pub(super) fn attitude(payload: &[u8]) -> Option<Attitude> {
     let attitude = read::<ap::ATTITUDE_DATA>(payload, &[])?;
     let [roll, pitch, yaw] = vector([attitude.roll, attitude.pitch, attitude.yaw])?.map(Radians);

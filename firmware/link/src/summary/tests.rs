@@ -260,10 +260,8 @@ fn the_state_holds_every_subsystem() {
     assert!(VALUES_TOLD.iter().all(|(name, _)| name.len() <= 10));
 }
 
-/// Tenths of a second: check, instance, level, previous level.
 type Comes = (u64, &'static str, u8, Level, Level);
 
-/// Tenths of a second, and the text after our name.
 fn told(findings: &[Comes]) -> Vec<(u64, String)> {
     told_because(findings, "")
 }
@@ -272,7 +270,6 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
     told_where(findings, because, |_| Orders::Own)
 }
 
-/// Texts if some checks have the orders of others.
 fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Orders) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());

@@ -72,9 +72,7 @@ pub(crate) const fn only_asks(command: u16) -> bool {
 pub(crate) struct Commands {
     pub(crate) replies: Replies,
     limits: [Limiter; 2],
-    /// Recording is stopped by command.
     stopped: bool,
-    /// When a station asked for card-reader mode.
     card_reader_asked: Option<Instant>,
 }
 
@@ -187,8 +185,8 @@ impl Commands {
         }
     }
 
-    /// Stops or starts recording. A stop is visible: an event in the record, a text on the ground station, and a
-    /// finding for as long as it lasts. It ends when the vehicle is armed.
+    /// A stop is visible: an event in the record, a text on the ground station, and a finding for as long as
+    /// it lasts. It ends when the vehicle is armed.
     pub(crate) fn stop_or_record(
         &mut self,
         now: Instant,

@@ -5,7 +5,6 @@ use hums_link::request::Port;
 
 use crate::journal::By;
 
-/// An asker, and the port of the answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asker {
     pub(crate) port: Port,
@@ -16,7 +15,6 @@ pub(crate) struct Asker {
 const REQUESTS_MAX: u32 = 20;
 const REQUESTS_PER_S: u32 = 5;
 
-/// A limit at once, and a limit each second.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limiter {
     left: u32,

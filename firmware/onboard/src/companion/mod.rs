@@ -94,7 +94,6 @@ impl Companion {
         self.commands.stopped()
     }
 
-    /// Whether the board is to restart in card-reader mode.
     pub(crate) fn wants_card_reader(&mut self, now: Instant, monitor: &Monitor) -> bool {
         self.commands.wants_card_reader(now, monitor.vehicle().armed())
     }
@@ -117,7 +116,6 @@ impl Companion {
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
     }
 
-    /// A frame of the ground station's own port.
     pub(crate) fn uplink(
         &mut self,
         now: Instant,
@@ -190,7 +188,6 @@ impl Companion {
         }
         let asker = Asker { port, by: (frame.system(), frame.component()) };
         if asker.by == (system, COMPONENT) {
-            // Our own frame that came back, or one with our ids.
             return;
         }
         if let Request::Key(key, stamp) = asked.request {
@@ -282,7 +279,6 @@ impl Companion {
         }
     }
 
-    /// Takes a key, if the port is trusted.
     fn key_brought(
         &mut self,
         now: Instant,
@@ -322,7 +318,6 @@ impl Companion {
         }
     }
 
-    /// Periodic work, every tick: our heartbeat to the autopilot, our requests, settings on a card.
     #[inline(never)]
     pub(crate) fn converse(
         &mut self,

@@ -31,13 +31,11 @@ const RADIO: [u32; 2] = [166, 109];
 /// `MAG_CAL_REPORT`, `CAMERA_INFORMATION`, `PROTOCOL_VERSION`, `PARAM_EXT_VALUE`, `COMPONENT_INFORMATION`,
 /// `COMPONENT_METADATA`, `EVENT`, `CURRENT_EVENT_SEQUENCE`.
 const ANSWERS: [u32; 13] = [22, 49, 118, 120, 191, 192, 259, 300, 322, 395, 397, 410, 411];
-/// Time between two frames of unknown definitions.
 const UNKNOWN: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pass {
     pub(super) lost: u32,
-    /// Last time of a frame of an unknown definition.
     unknown_at: Option<Instant>,
 }
 

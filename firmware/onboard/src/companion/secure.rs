@@ -44,7 +44,6 @@ const ITEM_TIMES: u8 = 33;
 const TIMES_BYTES: usize = 24;
 /// `SETUP_SIGNING`
 pub(crate) const SETUP: u32 = 256;
-/// Minimum interval of stored times.
 const SAVE: Span = Span::from_secs(1);
 /// The same while the store has little more than its reserve, and then [`SIGNED_MAX`] times at most.
 const SAVE_SCARCE: Span = Span::from_secs(60);
@@ -59,18 +58,14 @@ fn guard(params: &Params, port: Port) -> u8 {
     }) as u8
 }
 
-/// May bring a key.
 pub(crate) fn is_trusted(params: &Params, port: Port) -> bool {
     params.get(Param::SignPort) as u8 == port as u8 + 1
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trust {
-    /// No signature is required.
     Open,
-    /// It is signed with our key.
     Signed,
-    /// A required signature is missing or wrong.
     Refused,
 }
 
@@ -83,7 +78,6 @@ pub(crate) struct Secure {
     saved_at: Option<Instant>,
     /// Times stored since the store had more than its reserve.
     scarce: u8,
-    /// Our next stamps follow this one.
     last: u64,
     /// A key was set together with the time: both outlets begin anew.
     reseal: bool,
@@ -150,7 +144,6 @@ impl Secure {
         }
     }
 
-    /// The authorisation by a frame's signature on this port.
     pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
         let guard = guard(params, port);
         if guard == 0 || self.signing.key().is_none() {

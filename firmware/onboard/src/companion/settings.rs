@@ -29,9 +29,7 @@ const LINE_MAX: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// No card, or no heartbeat yet.
     Waiting,
-    /// The bytes from this offset on are requested.
     Reading(u32),
     /// The file of this volume is read, or must not be.
     Done(u32),
@@ -61,12 +59,10 @@ impl Settings {
         }
     }
 
-    /// Whether the card's answers are for this file.
     pub(crate) const fn is_reading(&self) -> bool {
         matches!(self.state, State::Reading(_))
     }
 
-    /// `true` at the end of a line.
     fn take(&mut self, byte: u8) -> bool {
         if byte != b'\n' {
             let comment = self.line.contains(&b'#');
@@ -75,7 +71,6 @@ impl Settings {
         byte == b'\n'
     }
 
-    /// One piece a tick.
     pub(crate) fn tick(
         &mut self,
         now: Instant,
@@ -110,7 +105,6 @@ impl Settings {
         }
     }
 
-    /// The piece, if it has come; whether it was the last one.
     fn read_on(
         &mut self,
         now: Instant,

@@ -27,8 +27,7 @@ impl CardNotices {
         Self { told: CardState::Unknown, told_at: None }
     }
 
-    /// Records and reports a new state of the card. A good state at the beginning is not reported: the heartbeat has
-    /// it.
+    /// A good state at the beginning is not reported: the heartbeat has it.
     pub(super) fn tick(
         &mut self,
         now: Instant,

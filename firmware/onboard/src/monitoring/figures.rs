@@ -15,7 +15,6 @@ use crate::queues::{
     FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, GsIn, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS, SectorsIn,
 };
 
-/// Window of the ports' rates.
 const RATES: Span = Span::from_secs(5);
 
 /// How long a card may take to be found before it counts as missing.
@@ -61,7 +60,6 @@ struct Rates {
     /// Last count, milliseconds modulo 2^32, and the counts.
     at_ms: u32,
     counts: [u32; 2],
-    /// Input from the autopilot, and output at the ground station's port.
     a_second: [u32; 2],
 }
 

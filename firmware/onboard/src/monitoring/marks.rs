@@ -19,7 +19,6 @@ const APART: Span = Span::from_secs(1);
 pub(super) struct Marks {
     due: Option<Resting>,
     at: Option<Instant>,
-    /// The sector with the last one is not with storage yet.
     unsent: bool,
 }
 
@@ -38,7 +37,6 @@ impl Marks {
         (self.due, self.at) = (Some(why), None);
     }
 
-    /// Armed or takes off: an earlier mark is outdated.
     pub(super) const fn moves(&mut self) {
         self.due = None;
     }

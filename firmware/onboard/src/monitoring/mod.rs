@@ -42,9 +42,7 @@ pub const TICK: Span = Span::from_millis(monitor::TICK.as_millis());
 /// Maximum time until a sector in progress is given to storage. With the tick's 50 ms a power cut costs less than 200
 /// ms, even at a low rate.
 const PARTIAL: Span = Span::from_millis(150);
-/// How often the recorder's statistics are recorded.
 const STATS: Span = Span::from_secs(10);
-/// How often usage is recorded.
 const USAGE: Span = Span::from_secs(60);
 
 /// The `MAV_SEVERITY` of a restart after a fault.
@@ -349,7 +347,6 @@ impl<'a> Monitoring<'a> {
         monitor.tick(now.into(), &link, &recorder, &mut |finding| {
             journal.record(now, &Record::Finding(FindingRecord::new(now, finding)), sectors);
             if finding.level == Level::Critical {
-                // A mark for readers of the record.
                 let event = Event { number: CRITICAL, text: finding.check };
                 journal.record(now, &Record::Event(event), sectors);
             }

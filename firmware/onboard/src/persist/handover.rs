@@ -142,7 +142,6 @@ impl<'a> Handover<'a> {
     }
 }
 
-/// Copies an item that fits; returns its length.
 fn copy(value: &[u8], to: &mut [u8; ITEM_BYTES_MAX]) -> usize {
     let Some(to) = to.get_mut(..value.len()) else { return 0 };
     to.copy_from_slice(value);

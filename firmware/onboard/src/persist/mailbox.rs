@@ -58,7 +58,6 @@ impl MailboxOut<'_> {
         Some((item.key, item.bytes.get(..item.length).unwrap_or_default()))
     }
 
-    /// The waiting item is finished.
     pub(super) fn release(&mut self) {
         self.0.release(1);
     }

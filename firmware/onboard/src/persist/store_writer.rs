@@ -10,7 +10,6 @@ use hums_store::{Error, Found, Key, Store, param};
 use super::mailbox::MailboxOut;
 use super::status::{Calm, StoreState, StoreStatus, count};
 
-/// Minimum free part of a sector before a flight.
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with a smaller free part is erased on the ground even while the autopilot talks.
 const SCARCE: (usize, usize) = (1, 4);
@@ -161,7 +160,6 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
     }
 }
 
-/// An item at another place, after an error of the flash.
 fn again<F: NorFlash>(
     store: &mut Store<F>,
     error: Error<F::Error>,

@@ -21,7 +21,6 @@ use hums_store::{Key, Store, param_value};
 
 type Flash = SimFlash<16384>;
 
-/// A power-on without a frame, ended by a power cut.
 fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut StoreWriter<&mut Flash>)) {
     let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
@@ -127,7 +126,6 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
     });
 }
 
-/// A second in the air, or disarmed on the ground.
 fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover, frames: u32) {
     let now = Instant::from_millis(second * 1_000);
     let source = Source { system: 1, component: 1 };

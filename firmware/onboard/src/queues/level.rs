@@ -5,8 +5,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 /// Bytes of the length that the queue puts before each frame.
 const HEAD_BYTES: usize = 2;
 
-/// The present and the highest fill level of a queue. It includes the queue's own bytes, but not the gap before it
-/// wraps to its start, which is shorter than a frame.
+/// It includes the queue's own bytes, but not the gap before it wraps to its start, which is shorter than a
+/// frame.
 #[derive(Debug, Default)]
 pub(super) struct Level {
     bytes: AtomicU32,

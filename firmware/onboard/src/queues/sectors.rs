@@ -27,7 +27,6 @@ pub struct SectorsIn<'a> {
 }
 
 impl SectorsIn<'_> {
-    /// Lends the reserve too, for records.
     pub(crate) fn with_reserve<R>(&mut self, write: impl FnOnce(&mut Self) -> R) -> R {
         let reserve = core::mem::replace(&mut self.reserve, 0);
         let result = write(self);

@@ -90,7 +90,6 @@ impl Reader<'_> {
         self.answers.waiting().first()
     }
 
-    /// The answer that has come is used up.
     pub(crate) fn release(&mut self) {
         self.answers.release(1);
     }
@@ -171,7 +170,6 @@ impl Server<'_> {
         }
     }
 
-    /// Answers one request, or begins its checksum.
     fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
         let Some((to, data)) = self.answers.free() else { return false };
         self.wants.release(1);
@@ -207,7 +205,6 @@ impl Server<'_> {
         true
     }
 
-    /// Sends its answer at the end.
     fn add<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
         let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
             return false;
@@ -246,7 +243,6 @@ fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Opti
     more.is_ok_and(|more| more).then_some(entry + BLOCK_BYTES as u32 / 32)
 }
 
-/// The answer, with the segment if the log exists.
 struct Looked {
     answer: Answer,
     segment: Option<Segment>,
@@ -318,7 +314,6 @@ fn at_place<D: CardDevice>(
     Ok(found.map(|(_, log)| log))
 }
 
-/// Appends bytes from the answer's offset on, as many as fit.
 fn copy<D: CardDevice>(
     card: &Card<'_, D>,
     segment: &mut Segment,
@@ -327,7 +322,6 @@ fn copy<D: CardDevice>(
 ) {
     let end = answer.offset.saturating_add(DATA_MAX as u32).min(answer.bytes);
     for_each_part(card, segment, &answer.log, answer.offset..end, |part| {
-        // Fits: not more is read.
         let _ = to.extend_from_slice(part);
     });
 }

@@ -51,7 +51,6 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         &self.block
     }
 
-    /// The number of blocks for sectors.
     const fn limit(&self) -> u32 {
         data_blocks(self.segment.blocks())
     }
@@ -65,7 +64,6 @@ impl<'r, 'a, D: CardDevice> Blocks<'r, 'a, D> {
         })
     }
 
-    /// Blocks of the session, from this number on.
     fn recorded(&mut self, session: u32, first: u32) -> u32 {
         let limit = self.limit();
         let mut end = self.covered(session, first).max(1);

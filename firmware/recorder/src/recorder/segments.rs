@@ -19,7 +19,6 @@ const SHORT_SEGMENT_BYTES: u32 = 256 * 1024;
 #[derive(Clone, Copy)]
 pub(super) struct Log {
     pub(super) name: LogName,
-    /// The session number in the seal of its sectors.
     pub(super) session: u32,
     volume_id: u32,
     /// The sector number at block 0 of the open segment; `None` before the first sector.
@@ -43,7 +42,6 @@ pub(super) struct Segments<'a> {
     /// Differs from power-on to power-on.
     entropy: u32,
     pub(super) log: Option<Log>,
-    /// The present card has a segment of it.
     pub(super) is_open: bool,
     /// The newest segments on the card from before the session, until they were read.
     earlier: Newest,
@@ -56,13 +54,12 @@ impl<'a> Segments<'a> {
         Self { status, entropy, log: None, is_open: false, earlier: Newest::new(), is_dated: false }
     }
 
-    /// A number for a card that is formatted now.
     pub(super) const fn volume_id(&self, now: Instant) -> u32 {
         mix(self.entropy, now.as_micros() as u32)
     }
 
-    /// Opens a segment on a card just mounted. On the same card the session goes on; another card gets a new one.
-    /// Returns whether the card was changed within a group.
+    /// On the same card the session goes on; another card gets a new one. Returns whether the card was
+    /// changed within a group.
     pub(super) fn begin<D: CardDevice>(
         &mut self,
         card: &mut Card<'_, D>,
@@ -111,8 +108,7 @@ impl<'a> Segments<'a> {
         }
     }
 
-    /// Dates the open segment's directory entry, if it was opened before UTC was known. It reads and writes a block,
-    /// so it waits until nothing is to be written. A failure is not repeated.
+    /// It reads and writes a block, so it waits until nothing is to be written. A failure is not repeated.
     #[inline(never)]
     pub(super) fn date<D: CardDevice>(&mut self, card: &mut Card<'_, D>) {
         if !self.is_dated && self.status.is_utc_known() {

@@ -77,7 +77,6 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         Some(done)
     }
 
-    /// Its time limit starts anew.
     pub(super) fn begin_service(&self) {
         match self {
             Self::Waiting(device) | Self::Formatting(device, _) => device.begin_service(),
@@ -86,7 +85,6 @@ impl<'a, D: CardDevice> Socket<'a, D> {
         }
     }
 
-    /// Repetitions by the device since the last call.
     pub(super) fn take_retries(&self) -> u32 {
         match self {
             Self::Mounted(card) => card.device().take_retries(),

@@ -40,7 +40,6 @@ const WAKE: [u8; 10] = [0xFF; 10];
 pub(super) struct Identity {
     /// CID register.
     pub(super) cid: [u8; 16],
-    /// Number of blocks, and whether they may be written.
     pub(super) csd: Csd,
     /// Blocks are addressed by their first byte: cards up to 2 GB.
     pub(super) by_bytes: bool,

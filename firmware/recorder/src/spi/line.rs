@@ -26,11 +26,8 @@ const STATUS_LOCKED: u8 = 0x01 | 0x20;
 
 pub(super) struct Line<P> {
     pub(super) port: P,
-    /// The time limit of the present service.
     pub(super) deadline: Option<Instant>,
-    /// Blocks carry checksums that count.
     pub(super) checks: bool,
-    /// Busy timeouts in a row.
     pub(super) busy_times: u8,
 }
 
@@ -146,7 +143,6 @@ impl<P: Port> Line<P> {
         Ok(())
     }
 
-    /// Sends one block, and waits until the card has taken it.
     pub(super) fn give(&mut self, token: u8, block: &[u8]) -> Result<(), SpiError> {
         // One byte's gap before a token (N_WR, 7.5.2).
         self.port.send(&[0xFF, token])?;
@@ -168,7 +164,6 @@ impl<P: Port> Line<P> {
         self.ready(BUSY_MAX)
     }
 
-    /// Ends a write of many blocks that went well.
     pub(super) fn stop(&mut self) -> Result<(), SpiError> {
         // The byte after the token is not yet the card's busy signal.
         self.port.send(&[0xFF, TOKEN_STOP, 0xFF])?;

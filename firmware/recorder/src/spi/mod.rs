@@ -51,9 +51,7 @@ struct Inner<P> {
     line: Line<P>,
     /// `None`: the card must be identified before it is used.
     card: Option<Identity>,
-    /// The identity of the last card.
     cid: Option<[u8; 16]>,
-    /// Repeated accesses since the last call.
     retries: u32,
 }
 

@@ -8,7 +8,6 @@ use hums_core::health::{Alarm, Level, root_cause};
 use super::problem::began;
 use crate::source::told::Finding;
 
-/// A check of a part that is not well.
 struct Open<'a> {
     since: Instant,
     level: Level,

@@ -8,10 +8,8 @@ use crate::utc::moment;
 /// The cell count comes within this time after a recording's beginning in the air.
 const CELLS_COME: Span = Span::from_secs(2);
 
-/// Cells of the main battery, as reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cells {
-    /// Unknown in the air: from and to.
     unknown: Option<(Instant, Instant)>,
     unknown_on_board: bool,
     /// No count of the last flight.
@@ -32,7 +30,6 @@ impl Cells {
         self.unknown = Some((from, now));
     }
 
-    /// Start of unknown cells, if the voltage raised no alarm for that reason.
     pub(super) fn unknown_since(&self, by: JudgedBy) -> Option<Instant> {
         self.unknown.filter(|_| self.are_unknown(by)).map(|(from, _)| from)
     }

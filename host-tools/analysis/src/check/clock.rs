@@ -13,9 +13,7 @@ pub const SETTLE: Span = Span::from_secs(1);
 pub(super) struct Clock {
     /// Time of the next step; `None` before the first.
     next: Option<Instant>,
-    /// Sum of the gaps.
     behind: Span,
-    /// Latest gap's, recording's time.
     gap_end: Instant,
     /// Latest, monitor's time.
     reached: Instant,
@@ -34,7 +32,6 @@ impl Clock {
         Some(now)
     }
 
-    /// The next step's time, if that is later; both times go on.
     pub(super) fn skip_to(&mut self, at: Instant) {
         self.next = self.next.max(Some(whole(at)));
     }
@@ -62,7 +59,6 @@ impl Clock {
         self.gap_end
     }
 
-    /// Sum of the gaps until now.
     pub(super) const fn behind(&self) -> Span {
         self.behind
     }

@@ -17,9 +17,7 @@ const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_
 const CELL_VOLTAGE: &str = "cell_voltage";
 /// Reason for checks of earlier flights and worn parts.
 const UNTOLD: &str = "only earlier flights (--past) or a monitor on board tell";
-/// Why a check without a limit is not judged.
 pub(super) const OFF: &str = "its limit is off";
-/// Period of the notes.
 const NOTE_EVERY: Span = Span::from_millis(500);
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,12 +28,10 @@ struct Seen {
 
 #[derive(Debug)]
 pub(super) struct Coverage {
-    /// In the order of the checks.
     seen: Vec<Seen>,
     next: Instant,
 }
 
-/// Judged ones; the others with the reason.
 pub(super) type Lists = (Vec<&'static str>, Vec<(&'static str, String)>);
 
 impl Coverage {
@@ -89,12 +85,10 @@ impl Coverage {
     }
 }
 
-/// Facts about a recording at its end.
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
-    /// Received over a link.
     pub(super) is_of_link: bool,
     /// The recording was taken on the monitor's own wire.
     pub(super) on_the_wire: bool,

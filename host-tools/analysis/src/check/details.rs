@@ -31,11 +31,9 @@ const NEAR: Span = Span::from_secs(20);
 pub(super) struct Details {
     failsafes: String,
     sensors: u32,
-    /// The sensors that the estimator's flags reject.
     doubted: Option<Causes>,
     /// Last text by cause, with its time.
     said: [Option<(Instant, String)>; Cause::COUNT],
-    /// The last position of the first GPS receiver.
     fix: Option<(Instant, Position)>,
     /// Metres, and when.
     jump: Option<(Instant, f64)>,
@@ -43,11 +41,9 @@ pub(super) struct Details {
     batteries: Vec<(u8, u8)>,
     /// Those beyond them, up to [`BEYOND_MAX`].
     beyond: BTreeSet<(u8, u8)>,
-    /// Autopilots in the order in which they came.
     autopilots: Vec<Heard>,
     /// Remarks on the recordings before a joint.
     earlier: Vec<String>,
-    /// The autopilots of those.
     others: Vec<Heard>,
 }
 
@@ -57,7 +53,6 @@ struct Heard {
     system: u8,
     /// `MAV_AUTOPILOT`
     autopilot: u8,
-    /// Its unique id, once reported.
     uid: u64,
 }
 
@@ -110,7 +105,6 @@ impl Details {
         is_new.is_some()
     }
 
-    /// Rejected by the estimator.
     pub(super) fn estimator(&mut self, estimator: &Estimator) -> bool {
         let doubted = Some(of_estimator(estimator, true, true));
         core::mem::replace(&mut self.doubted, doubted) != doubted
@@ -125,7 +119,6 @@ impl Details {
         is_wrong
     }
 
-    /// A GPS receiver reports its position and speed.
     pub(super) fn gnss(&mut self, at: Instant, gnss: &Gnss) {
         let Some(position) = gnss.position.filter(|_| gnss.instance == 0 && gnss.fix >= 3) else { return };
         let before = self.fix.replace((at, position)).filter(|(then, _)| at.since(*then) <= NEAR);
@@ -247,7 +240,6 @@ impl Details {
         }
     }
 
-    /// Changed its level or part.
     pub(super) fn tell(&self, check: &str, problems: &mut Problems) {
         if !problems.is_open(check) {
             return;

@@ -52,7 +52,6 @@ pub(super) struct Flights {
     silence: Option<Silence>,
     /// Time since a possible landing; flight if it goes on.
     landing: Span,
-    /// Last step, monitor's time.
     stepped_at: Option<Instant>,
 }
 
@@ -96,7 +95,6 @@ impl Flight {
     }
 }
 
-/// First received in the air.
 pub(super) fn begin_in_air(flights: &[Flight]) -> bool {
     flights.first().is_some_and(|flight| !flight.took_off)
 }
@@ -179,7 +177,6 @@ impl Flights {
         self.close();
     }
 
-    /// Unknown if in the air.
     pub(super) fn forget_disarming(&mut self) {
         for flight in &mut self.list {
             flight.disarmed_at_m = None;
@@ -240,7 +237,6 @@ impl Flights {
         self.break_off();
     }
 
-    /// The flight ended at the last reception.
     pub(super) fn break_off(&mut self) {
         self.close();
         self.crashed = false;

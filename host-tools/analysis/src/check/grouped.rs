@@ -68,7 +68,6 @@ pub fn grouped(problems: &[Problem]) -> Vec<Group<'_>> {
     groups
 }
 
-/// They have one level.
 pub(super) fn is_critical(problems: &[&Problem]) -> bool {
     problems.first().is_some_and(|first| first.level == Level::Critical)
 }
@@ -95,7 +94,6 @@ fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
     None
 }
 
-/// Problems by check and level, in order of the first.
 fn alike(problems: &[Problem]) -> Vec<Vec<&Problem>> {
     let mut alike: Vec<Vec<&Problem>> = Vec::new();
     for problem in problems {

@@ -84,7 +84,6 @@ impl Limits {
         limits
     }
 
-    /// Others than on board.
     fn is_given(&self) -> bool {
         !self.given.is_empty()
     }
@@ -361,7 +360,6 @@ impl Judge {
         }
     }
 
-    /// Rejected by the estimator.
     fn doubts(&mut self, source: Source, estimator: &Estimator) {
         if self.is_vehicle(source) && self.details.estimator(estimator) {
             self.tell(Cause::Gnss.name());
@@ -375,7 +373,6 @@ impl Judge {
         }
     }
 
-    /// Found here and on board.
     fn tell(&mut self, check: &str) {
         self.details.tell(check, &mut self.here);
         self.details.tell(check, &mut self.board);
@@ -394,7 +391,6 @@ impl Judge {
         }
     }
 
-    /// Takes the box's own count of the time in the air.
     fn box_counted(&mut self, at: Instant, usage: &Usage<'_>) {
         let mut counters = usage.iter();
         if let Some((_, seconds)) = counters.find(|(number, _)| *number == UsageCounter::Flight as u8) {
@@ -616,7 +612,6 @@ impl Judge {
         }
     }
 
-    /// Frame loss of the vehicle's link, if known.
     fn link(&mut self, steps: Instant) -> LinkReading {
         let source = self.monitor.vehicle().source;
         self.wire.as_mut().map_or_else(LinkReading::default, |wire| wire.reading(steps, source))
@@ -630,7 +625,6 @@ impl Judge {
         }
     }
 
-    /// Takes the worst values from the monitor's exceedances.
     fn peaks(&mut self, at: Instant) {
         let steps = self.clock.monitor(at);
         for exceedance in self.monitor.exceedances().iter(steps.into()) {
@@ -755,7 +749,6 @@ impl Judge {
     }
 }
 
-/// Estimator's, or first receiver's.
 fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
     let estimated = vehicle.global.get().and_then(|global| global.position);
     let received = || vehicle.gnss.first()?.get()?.position;

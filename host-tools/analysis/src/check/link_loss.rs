@@ -62,7 +62,6 @@ const FIRST: Span = Span::from_secs(10);
 /// Sinks are kept for this long.
 const WINDOW: Span = Span::from_millis(900);
 
-/// How it came down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Verdict {
     /// Finding check.
@@ -95,7 +94,6 @@ impl Verdict {
     }
 }
 
-/// A silence of the vehicle in the air.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
     /// Last reception, less lost spans, over which time stops.
@@ -135,7 +133,6 @@ pub(super) struct LinkLoss {
     first_at: Option<Instant>,
     /// Has flown, or received for [`FIRST`].
     is_known: bool,
-    /// A finding stays until the vehicle is armed again.
     found: Option<Verdict>,
     silence: Option<Silence>,
     /// Sinks, and pressures in hPa, of the last seconds.
@@ -369,7 +366,6 @@ impl LinkLoss {
             && self.is_sinking(now, FALLING_MPS) == Some(false)
     }
 
-    /// The greatest sink of the last moments.
     fn sink_mps(&self, now: Instant) -> f32 {
         let recent = self.sinks.iter().filter(|(at, _)| now.since(*at) <= FRESH);
         recent.fold(0.0, |greatest: f32, (_, sink_mps)| greatest.max(*sink_mps))
@@ -388,7 +384,6 @@ impl LinkLoss {
     }
 }
 
-/// Drops values older than `span`.
 fn push(values: &mut VecDeque<(Instant, f32)>, span: Span, at: Instant, value: f32) {
     values.push_back((at, value));
     while values.front().is_some_and(|(then, _)| at.since(*then) > span) {

@@ -187,7 +187,6 @@ fn logs(args: &Request<'_>) -> Result<(FoundRecordings, usize)> {
 
 struct Told {
     name: String,
-    /// The name of its place.
     of: String,
     checked: Result<Checked>,
 }

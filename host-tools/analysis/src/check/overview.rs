@@ -35,7 +35,6 @@ const LOOK_EVERY: u32 = 4_096;
 
 /// Read and judged.
 pub(super) struct Read {
-    /// Format of the recording.
     pub(super) format: Format,
     /// The judgement.
     pub(super) judged: Judged,
@@ -177,7 +176,6 @@ fn read_other(place: &Place, take: Option<&mut Take<'_>>) -> Result<(Overview, O
     Ok((overview, kept))
 }
 
-/// Gives findings of a box the worst values that it recorded.
 fn peaks(contents: &mut Contents) {
     let peaks = contents.exceedances.iter();
     let peaks = peaks.map(|((check, part), line)| (check.as_str(), *part, line.session.peak));
@@ -185,7 +183,6 @@ fn peaks(contents: &mut Contents) {
     give_worst(&mut contents.findings, &problems);
 }
 
-/// Lists the systems that are there.
 pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
     let Some(wanted) = place.system.filter(|_| !heard) else { return Ok(()) };
     let mut systems = BTreeSet::new();

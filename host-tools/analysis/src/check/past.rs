@@ -71,7 +71,6 @@ impl Series {
         Self { past_is_given: past.taught.is_some(), vehicles: Vec::new() }
     }
 
-    /// Judges the trends of the next log.
     pub(super) fn judge(&mut self, checked: Result<Checked>) -> Result<Checked> {
         let mut checked = checked?;
         let is_of_box = checked.format == Format::Hums && !self.past_is_given;
@@ -142,7 +141,6 @@ const fn learn_uid(vehicle: &mut Vehicle, own: Vehicle) {
     }
 }
 
-/// A part of a sentence.
 fn words(of: &Vehicle) -> String {
     let system = if of.system == 0 { String::new() } else { format!("system {}, ", of.system) };
     let id = if of.uid == 0 { String::new() } else { format!(", uid {:016x}", of.uid) };

@@ -26,7 +26,6 @@ fn fly(log: &mut Writer, tenths: std::ops::Range<u64>, silent: bool) {
     }
 }
 
-/// Number of silences of an ESC, by `hums check`.
 fn silences(log: &Writer) -> usize {
     let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
     let want = Want { observations: true, ..Want::default() };

@@ -113,14 +113,12 @@ fn measured(check: &str, value: f32, limit: f32) -> f32 {
 /// Start with the sum of gaps until then.
 type Since = (Instant, Span);
 
-/// Joins changes of level.
 #[derive(Debug, Default)]
 pub(super) struct Problems {
     /// The changes, up to [`LISTED_MAX`].
     pub findings: Vec<Finding>,
     /// Number of findings.
     pub findings_count: u64,
-    /// By check and part.
     open: BTreeMap<(String, u8), OpenProblem>,
     /// Found by a box, perhaps late ([`began`]).
     of_box: bool,
@@ -148,7 +146,6 @@ impl OpenProblem {
 }
 
 impl Problems {
-    /// Found by a box.
     pub(super) fn of_box() -> Self {
         Self { of_box: true, ..Self::default() }
     }
@@ -296,7 +293,6 @@ impl Problems {
         self.open.retain(|(check, _), _| !out(check));
     }
 
-    /// The real end is unknown.
     pub(super) fn break_off(&mut self, at: Instant, gaps: Span) {
         self.open.values_mut().for_each(|followed| followed.end(at, gaps));
     }
@@ -309,7 +305,6 @@ impl Problems {
         }
     }
 
-    /// The number of findings, the findings in order of time, and the problems, worst first.
     pub(super) fn all(mut self) -> (u64, Vec<Finding>, Vec<Problem>) {
         let (count, mut findings) = (self.findings_count, std::mem::take(&mut self.findings));
         // An impact is reported after the vehicle lies still.

@@ -32,7 +32,6 @@ const SHOWN_MAX: usize = 6;
 /// `--json` has them all.
 const LINES_MAX: usize = 8;
 
-/// Details in the verdict.
 const HEADLINE_DETAILS_MAX: usize = 2;
 const CRITICAL: &str = "CRITICAL";
 
@@ -94,7 +93,6 @@ pub fn line(checked: &Checked) -> String {
         .to_owned()
 }
 
-/// The end of the verdict's line.
 fn but(checked: &Checked) -> String {
     let ends = if checked.judged.ends_in_air.is_some() { "; the log ends in the air" } else { "" };
     match checked.soundness() {
@@ -213,7 +211,6 @@ fn vehicle(judged: &Judged) -> String {
     text
 }
 
-/// A version as people write it.
 pub(super) fn firmware(version: u32) -> Option<String> {
     let [major, minor, patch, _] = version.to_be_bytes();
     (version != 0).then(|| format!("{major}.{minor}.{patch}"))
@@ -435,13 +432,11 @@ fn kind_of_alarm(check: &str) -> String {
     words_of_alarm(check).replacen(" #", "", 1)
 }
 
-/// `#` stands for the part.
 fn words_of_alarm(check: &str) -> &str {
     let alarm = vocabulary(check).map_or(check, |words| words.said.alarm);
     alarm.split_once('|').map_or(alarm, |(fault, _)| fault)
 }
 
-/// The first of the details, in parentheses.
 fn details(problem: &Problem, max: usize) -> String {
     let details: Vec<&str> = problem.details.iter().take(max).map(String::as_str).collect();
     if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
@@ -481,7 +476,6 @@ fn sentence(group: &[&Problem]) -> String {
     text
 }
 
-/// A check's name for people.
 fn name(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }

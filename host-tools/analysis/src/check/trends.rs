@@ -63,7 +63,6 @@ pub(super) fn is_change(record: &Record<'_>) -> bool {
     }
 }
 
-/// Direction of a fault.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Bad {
     Up,
@@ -71,7 +70,6 @@ enum Bad {
     Either,
 }
 
-/// Rules of a comparison.
 struct Terms {
     check: &'static str,
     part: u8,
@@ -151,7 +149,6 @@ impl Flown {
     }
 }
 
-/// The normal value of one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Baseline {
     /// In the quantity's unit.

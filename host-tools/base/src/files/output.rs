@@ -35,12 +35,18 @@ enum To {
 
 #[derive(Debug)]
 enum Part {
-    /// They are in their place.
     None,
     /// The file takes this name; it is removed if it does not come to that.
-    Temporary { from: TempPath, to: PathBuf, replaces: bool },
+    Temporary {
+        from: TempPath,
+        to: PathBuf,
+        replaces: bool,
+    },
     /// The same of a file that a later run may go on with.
-    Begun { from: PathBuf, to: PathBuf },
+    Begun {
+        from: PathBuf,
+        to: PathBuf,
+    },
 }
 
 impl Output {

@@ -51,6 +51,7 @@ struct PartJson<'a> {
     part: String,
     serial: &'a str,
     status: &'a str,
+    /// `null` without a limit.
     used_percent: Option<f32>,
     limit: Option<String>,
     flight_s: f64,

@@ -157,7 +157,6 @@ struct Done {
     wrong_checksums: Option<String>,
 }
 
-/// Finished sectors, until they are written out.
 #[derive(Default)]
 struct Finished(Vec<Sector>);
 
@@ -243,7 +242,6 @@ impl<W: Write> Packer<W> {
         self.write_out()
     }
 
-    /// Another recording was joined on.
     fn joint(&mut self, at_us: u64) -> Result<()> {
         let at = Instant::from_micros(at_us);
         self.framer.idle(&mut |_: hums_link::Frame<'_>| {});

@@ -312,7 +312,6 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A key with escaped delimiters.
 fn push_key(out: &mut Vec<u8>, key: &str) {
     for byte in key.bytes() {
         if matches!(byte, b',' | b' ' | b'=') {

@@ -27,7 +27,6 @@ pub(super) struct Srt {
     /// The beginning of the video, microseconds of the log; known with the log's first observation.
     begin_us: Option<i64>,
     next_us: i64,
-    /// In order of time.
     findings: Vec<Finding>,
     cues: u64,
 }

@@ -18,7 +18,6 @@ const SET_US: u64 = 3_600_000_000;
 /// A time from here on is UTC in microseconds: 1973. An earlier one counts from power-on.
 const UTC_MIN_US: u64 = 100_000_000_000_000;
 
-/// The amounts, each known from its first value on.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Moved {
     place: Option<(f64, f64)>,

@@ -53,7 +53,6 @@ impl FoundLogs {
         self.remark(sentence);
     }
 
-    /// Adds a log, as far as there is room.
     pub(super) fn log(&mut self, log: Log) {
         if self.logs.len() < LOGS_MAX {
             self.logs.push(log);

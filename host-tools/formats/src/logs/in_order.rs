@@ -79,7 +79,6 @@ pub fn in_order<T: Send, R: Send>(
     })
 }
 
-/// Waiting items, oldest first.
 struct Queue<T> {
     state: Mutex<(VecDeque<T>, bool)>,
     more: Condvar,

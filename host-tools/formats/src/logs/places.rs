@@ -10,7 +10,6 @@ use super::naming::segment_name;
 
 /// One sector.
 pub const BLOCK_BYTES: usize = 512;
-/// Bytes of one read.
 const READ_BYTES: u64 = 64 * 1024;
 
 /// Places in one file.

@@ -205,7 +205,6 @@ impl EntryCollector for Uncollected {
     }
 }
 
-/// A group that is not decoded to its end.
 struct Rest {
     decoder: Box<GroupDecoder>,
     group: Group,
@@ -215,7 +214,6 @@ struct Rest {
     end: usize,
 }
 
-/// A group, decoded as far as it was.
 struct Decoded<C> {
     collected: Option<C>,
     rest: Option<Rest>,
@@ -223,7 +221,6 @@ struct Decoded<C> {
     missing: u32,
     damaged: bool,
     sectors: u32,
-    /// The number of its first sector.
     number: u32,
     /// Frames that its sectors complete, by their own counts.
     frames_said: u32,
@@ -353,11 +350,9 @@ struct Stitch {
     open: Option<Gap>,
     /// Modulo 2^32, while the count is unbroken.
     expected: Option<u32>,
-    /// The check that the last sector has.
     check: Option<u32>,
     cut: bool,
     damaged_partial: u32,
-    /// The number of the log's first file.
     first_file: Option<u32>,
 }
 

@@ -51,7 +51,6 @@ impl Evidence {
     }
 }
 
-/// Rebuilt sectors by block, and evidence.
 #[derive(Debug, Default)]
 pub(super) struct Repairs {
     made: BTreeMap<u64, [u8; BLOCK_BYTES]>,

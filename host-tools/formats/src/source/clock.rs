@@ -94,7 +94,6 @@ pub enum Reading {
 struct Series {
     /// Old or not.
     last_us: Option<u64>,
-    /// Number of messages in a row without a pause.
     steady: u8,
     /// Messages without a later time while the recording's time was this one.
     still: u8,
@@ -113,7 +112,6 @@ pub struct Clock {
     steps: Steps,
 }
 
-/// A ring of the last steps, microseconds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Steps {
     last_us: [u64; RUN as usize],

@@ -28,7 +28,6 @@ const HSI_HZ: u32 = 16_000_000;
 /// Polls for a capture, which takes 62 µs with the slowest crystal.
 const CAPTURE_TRIES_MAX: u32 = 10_000;
 
-/// The crystal does not run, or not at the board's frequency.
 static CRYSTAL_FAILED: AtomicBool = AtomicBool::new(false);
 static CRYSTAL_IS_WRONG: AtomicBool = AtomicBool::new(false);
 

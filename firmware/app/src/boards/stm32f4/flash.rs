@@ -17,7 +17,6 @@ use super::{supply, watchdog};
 const FLASH_BEGIN: usize = 0x0800_0000;
 /// Sector 1 begins here (RM0090, table 5).
 const BEGIN: usize = FLASH_BEGIN + 16 * 1024;
-/// The store's first sector.
 const SECTOR: u8 = 1;
 const SECTOR_BYTES: usize = 16 * 1024;
 /// Sectors 1 and 2.
@@ -30,9 +29,7 @@ const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 pub(crate) enum FlashError {
     /// Outside the store, or not whole words or sectors.
     Place,
-    /// The supply is too low.
     Supply,
-    /// Error bits of the flash status.
     Refused(u32),
 }
 

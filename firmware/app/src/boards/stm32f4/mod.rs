@@ -34,7 +34,6 @@ use crate::boards::machine::SYSTICK_RELOAD;
 #[cfg(feature = "log")]
 use defmt_rtt as _;
 
-/// Baud rate of the autopilot's port until a parameter sets it.
 pub(crate) const AUTOPILOT_BAUD: u32 = 921_600;
 /// Baud rate of the ground station's port: the radios' usual one.
 pub(crate) const GS_BAUD: u32 = 57_600;
@@ -50,7 +49,6 @@ pub(crate) const GS_RING_BYTES: usize = 512;
 /// Period of the uplink, which is not urgent.
 pub(crate) const GS_FETCH_EVERY: Duration = Duration::from_millis(10);
 
-/// Clocks, counters and monitors of the machine.
 pub(crate) fn start(crystal: Crystal) -> Peripherals {
     watchdog::start();
     let parts = embassy_stm32::init(clock::config(crystal));
@@ -68,7 +66,6 @@ const FLASH_KIB: usize = 0x1FFF_7A22;
 /// Flash of the memory map (`memory.x`).
 const FLASH_KIB_MIN: u16 = 512;
 
-/// Whether the chip is another one, or has too little flash.
 pub(crate) fn chip_is_wrong() -> bool {
     let flash = ptr::with_exposed_provenance::<u16>(FLASH_KIB);
     // SAFETY: an aligned constant of the factory's, which can always be read.

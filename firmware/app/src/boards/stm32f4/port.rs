@@ -52,7 +52,6 @@ pub(crate) struct PortRx {
     _port: UartRx<'static, Blocking>,
     ring: ReadableRingBuffer<'static, u8>,
     registers: pac::usart::Usart,
-    /// Clock of the port's rate divider.
     clock: Hertz,
     fetch_every: Duration,
     looked: Instant,
@@ -139,7 +138,6 @@ impl PortTx {
 }
 
 impl PortTx {
-    /// Sends all of `bytes`; returns when the port has taken the last.
     pub(crate) async fn transmit(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -155,7 +153,6 @@ impl PortTx {
         unsafe { self.channel.write(self.request, bytes, to, TransferOptions::default()) }.await;
     }
 
-    /// Restarts after an incomplete transmission.
     pub(crate) fn restart(&mut self) {
         self.registers.cr1().modify(|w| w.set_te(false));
         self.registers.cr1().modify(|w| w.set_te(true));

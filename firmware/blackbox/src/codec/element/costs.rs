@@ -40,7 +40,6 @@ impl Costs {
         best
     }
 
-    /// Each cost first falls by an eighth.
     #[inline]
     pub(super) fn charge(&mut self, errors: [i32; 4]) {
         // Adds four bytes at once. All sums stay below 256, so intermediate carries cancel.

@@ -20,7 +20,6 @@ impl Distributions {
         value: u32,
         linked: Option<u32>,
     ) -> u32 {
-        // Bits that the value does not have.
         let (spare, kind) = match element.what() {
             What::Integer1 => (24, INTEGER_1),
             What::Integer2 => (16, INTEGER_2),

@@ -131,8 +131,7 @@ fn a_change_tells_its_value_and_the_limit_it_crossed() {
     }
 }
 
-/// A value that is bad for two seconds in each period, with a script between: the changes of level, with times
-/// relative to their period.
+/// Times of the changes are relative to their period.
 fn again(when: When, times: u64, period_ms: u64, after: impl Fn(u64) -> String) -> Vec<(u64, Level)> {
     let script: Vec<String> =
         (0..times).map(|time| format!("{} 50, {}", time * period_ms, after(time * period_ms))).collect();
@@ -158,7 +157,6 @@ fn a_value_that_goes_up_and_down_is_told_a_few_times_and_not_each_time() {
     let falls = |changes: Vec<(u64, Level)>| -> Vec<u64> {
         changes.into_iter().filter(|(_, level)| *level == Level::Ok).map(|(ms, _)| ms).collect()
     };
-    // After a good time longer than any required, it is reported again.
     let times = falls(again(When::InFlight, 4, 150_000, good));
     assert_eq!(times, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
     // Landed for a second every 20 s: earlier bad values are forgotten.

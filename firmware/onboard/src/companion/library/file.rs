@@ -33,19 +33,16 @@ pub(super) struct Job {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// Needs nothing from the card.
     Say(Option<Error>),
     /// One entry of the directory, by place.
     List(u16),
     Open(LogName),
     /// Length or checksum of a file that the firmware holds.
     Number(u32),
-    /// From the reply's offset on, `size` in each message.
     Read {
         of: Open,
         size: u8,
     },
-    /// Message after message; `left` bytes of the burst remain.
     Burst {
         of: Open,
         size: u8,

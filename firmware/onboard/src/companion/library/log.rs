@@ -17,7 +17,6 @@ const DATA_BYTES: usize = 90;
 /// A number keeps its log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Places {
-    /// When the list began.
     listed: Option<u32>,
     download: Option<Download>,
     /// A refusal, since then.
@@ -29,7 +28,6 @@ struct Download {
     id: u16,
     /// `None` once the log is gone.
     log: Option<LogId>,
-    /// The list of the number.
     listed: Option<u32>,
 }
 
@@ -78,7 +76,6 @@ impl Places {
 pub(super) struct List {
     next: u16,
     last: u16,
-    /// The card could not read one.
     lacks: bool,
 }
 
@@ -164,7 +161,6 @@ impl Data {
             }
             Which::Same(_) => {}
             _ if !places.is_listed(self.offset, answer.directory) => return places.refuse(),
-            // No such log ever existed: it ends before it begins.
             _ if answer.found.is_err() => {
                 return out.say(&messages::log_data(self.id, self.offset, &[]), Step::Done);
             }

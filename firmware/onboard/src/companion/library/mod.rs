@@ -33,10 +33,8 @@ pub(crate) struct Library {
     job: Option<Job>,
     ticket: u16,
     asked: bool,
-    /// Earlier logs are to be erased.
     pub(crate) erases: bool,
     places: Places,
-    /// The file that is open over FTP.
     open: Option<Open>,
 }
 
@@ -68,7 +66,6 @@ impl Library {
         Self { job: None, ticket: 0, asked: false, erases: false, places: Places::new(), open: None }
     }
 
-    /// An earlier answer is no longer awaited.
     pub(crate) const fn next_ticket(&mut self) -> u16 {
         self.ticket = self.ticket.wrapping_add(1);
         self.asked = false;
@@ -80,7 +77,6 @@ impl Library {
         self.next_ticket();
     }
 
-    /// `false` unless it is about logs.
     pub(crate) fn asked(&mut self, asker: Asker, request: &Request<'_>) -> bool {
         match *request {
             Request::LogList(first, last) => self.begin(asker, Kind::List(log::List::new(first, last))),
@@ -109,7 +105,6 @@ impl Library {
         self.begin(asker, Kind::File(file));
     }
 
-    /// Goes on as far as answers and budget allow; returns a report of its end.
     pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();

@@ -11,9 +11,7 @@ use super::super::ways::Ways;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// The port is full: the same again later.
     Wait,
-    /// The answer is used up: the next one.
     Next,
     /// All is sent.
     Done,
@@ -33,12 +31,10 @@ pub(super) struct Out<'o, 'w, 'q> {
 }
 
 impl Out<'_, '_, '_> {
-    /// `then` if it was sent.
     pub(super) fn say(&mut self, packet: &Packet, then: Step) -> Step {
         if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { Step::Wait }
     }
 
-    /// `then` if it was sent.
     pub(super) fn file(&mut self, payload: &[u8], then: Step) -> Step {
         let (system, component) = self.asker.by;
         self.say(&messages::file_transfer(system, component, payload), then)

@@ -47,7 +47,6 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
     run_with(&text(), cause, ticks_an_answer, comes)
 }
 
-/// The text on a card that answers every `ticks_an_answer`.
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let is = |params: &Params, param, value: f32| params.get(param).to_bits() == value.to_bits();
     after(text, cause, ticks_an_answer, comes, |monitor| {
@@ -210,7 +209,6 @@ fn the_port_s_rate_is_set_over_a_link_unless_the_vehicle_may_be_in_flight() {
     let set = |cause, comes: &[(u64, Comes)]| run(cause, comes).1.to_bits() == 115_200.0_f32.to_bits();
     let baud = Baud(115_200.0);
     for cause in BY_HAND {
-        // A wrong rate gives no heartbeat.
         assert!(set(cause, &[(2, baud)]), "{cause:?}");
         assert!(set(cause, &[(1, DISARMED), (2, baud)]), "{cause:?}");
         assert!(!set(cause, &[(1, ARMED), (2, baud)]), "{cause:?}");

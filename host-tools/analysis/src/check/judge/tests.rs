@@ -29,7 +29,6 @@ fn battery(remaining: f32) -> Observation {
     Observation::Battery(Battery { voltage, remaining, ..Battery::default() })
 }
 
-/// Heartbeats and battery levels.
 fn fly(judge: &mut Judge, from_s: u64, to_s: u64, per_s: u64, remaining: f32) {
     for tick in from_s * per_s..to_s * per_s {
         let at = Instant::from_micros(tick * 1_000_000 / per_s);
@@ -142,7 +141,6 @@ fn a_vehicle_that_falls_after_it_is_disarmed_did_not_land() {
     assert_eq!((flight.landed, flight.disarmed_at_m), (true, None), "it stands on a hill");
 }
 
-/// Armed and landed states.
 fn half_seconds(judge: &mut Judge, from_ms: u64, to_ms: u64, armed: bool, landed: LandedState) {
     for at_ms in (from_ms..to_ms).step_by(500) {
         let at = Instant::from_millis(at_ms);

@@ -18,7 +18,6 @@ pub(crate) const UNKNOWN_TABLES_MAX: usize = 512;
 
 pub(crate) struct Tables {
     folder: Folder,
-    /// Ids with a table of their own.
     unknown: BTreeSet<u32>,
     open: BTreeMap<Table, BufWriter<FolderFile>>,
     /// Tables that have their header; not all of them are open.
@@ -90,7 +89,6 @@ impl Tables {
         if shared.is_empty() { Ok(()) } else { self.put(Table::Unknowns, &shared) }
     }
 
-    /// Whether some ids share a table.
     pub(crate) fn has_shared(&self) -> bool {
         self.begun.contains(&Table::Unknowns)
     }
@@ -100,7 +98,6 @@ impl Tables {
         self.begun.len()
     }
 
-    /// The folder gets its name.
     pub(crate) fn finish(mut self) -> Result<()> {
         for (table, mut file) in std::mem::take(&mut self.open) {
             settle(file.flush(), &self.folder.path().join(table.name()))?;

@@ -135,7 +135,6 @@ impl Container {
         self.file.write(bytes)
     }
 
-    /// Returns the schema's number.
     pub(super) fn schema(&mut self, name: &str, descriptors: &[u8]) -> u16 {
         self.schema_count = self.schema_count.saturating_add(1);
         let record = Record::default().u16(self.schema_count).text(name).text("protobuf").bytes(descriptors);
@@ -216,7 +215,6 @@ impl Container {
         Ok(())
     }
 
-    /// Returns the file and the number of messages.
     pub(super) fn finish(mut self) -> Result<(Single, u64)> {
         self.end_chunk()?;
         self.write(&Record::default().u32(0).record(DATA_END))?;

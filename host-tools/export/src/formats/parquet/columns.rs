@@ -122,7 +122,6 @@ impl Values {
     }
 }
 
-/// Texts in a row, and the end of each.
 #[derive(Debug, Default)]
 struct Texts {
     text: String,
@@ -364,7 +363,6 @@ pub(super) fn name_type(name: &str) -> Result<Type> {
     text.with_logical_type(Some(LogicalType::String)).build()
 }
 
-/// Writes a name for each of these rows.
 pub(super) fn write_name(
     writer: &mut SerializedColumnWriter<'_>,
     name: &ByteArray,

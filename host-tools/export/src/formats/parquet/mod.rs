@@ -86,7 +86,6 @@ struct ParquetTables {
 struct Properties {
     writer: WriterPropertiesBuilder,
     about: Vec<KeyValue>,
-    /// Vehicle and session, the first columns.
     names: [ByteArray; 2],
 }
 
@@ -105,7 +104,6 @@ struct Open {
 }
 
 impl ParquetTables {
-    /// Tables of a session of a vehicle.
     fn new(session: Session, identity: &Identity) -> Self {
         let names = [("vehicle", &identity.vehicle), ("session", &identity.recording)];
         let about = names.map(|(name, value)| KeyValue::new(format!("hums.{name}"), value.clone())).into();
@@ -184,7 +182,6 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Returns the session, and the number of tables.
     fn finish(mut self) -> Result<(Session, usize)> {
         let count = self.tables.len();
         let (session, properties) = (&self.session, &self.properties);

@@ -24,7 +24,6 @@ const ARMS_US: u64 = 1_000_000;
 /// Searched definitions.
 const DEFINED_MAX: usize = 256;
 
-/// The bytes after a message in the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead<'a> {
     /// [`AHEAD_BYTES`] or more, unless the file ends.
@@ -118,7 +117,6 @@ fn of_bytes(bytes: &[u8], formats: &Formats, take: &mut dyn FnMut(&Message<'_>) 
     (last, false)
 }
 
-/// Whether another log begins.
 fn of_lines(
     bytes: &[u8],
     is_end: bool,

@@ -26,11 +26,9 @@ pub(super) enum Piece<'a> {
     Message {
         /// Its type.
         kind: u8,
-        /// The bytes after the header.
         payload: &'a [u8],
         /// Its beginning.
         place: u64,
-        /// The bytes after it.
         after: Ahead<'a>,
     },
     Damage(Damage),
@@ -73,7 +71,6 @@ impl<R: Read> Binary<R> {
         Self { buffer: Buffer::new(input), skipped: None }
     }
 
-    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.buffer.window(bytes)
     }

@@ -14,7 +14,6 @@ pub(super) struct Buffer<R> {
     bytes: Vec<u8>,
     /// Place of reading.
     at: usize,
-    /// Its start in the file.
     base: u64,
     ended: bool,
 }
@@ -24,7 +23,6 @@ impl<R: Read> Buffer<R> {
         Self { input, bytes: Vec::new(), at: 0, base: 0, ended: false }
     }
 
-    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.fill(bytes)?;
         Ok(self.rest())

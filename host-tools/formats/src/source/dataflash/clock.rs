@@ -39,7 +39,6 @@ pub(super) struct When {
     pub(super) restarted: bool,
     /// Microseconds since power-on, if known.
     pub(super) boot_us: Option<u64>,
-    /// Validity of its own time.
     pub(super) own: Own,
     pub(super) stands: bool,
 }
@@ -87,7 +86,6 @@ impl Clock {
         self.times.now()
     }
 
-    /// `ahead`: the bytes after it.
     pub(super) fn at(&mut self, message: &Message<'_>, ahead: Ahead<'_>, formats: &Formats) -> When {
         let boot_us = message.time_us();
         if boot_us.is_none()

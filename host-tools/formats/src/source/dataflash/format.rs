@@ -129,7 +129,6 @@ pub(super) struct Field {
     /// Its label.
     pub(super) name: String,
     pub(super) kind: FieldKind,
-    /// Offset after the header.
     pub(super) offset: usize,
 }
 
@@ -139,7 +138,6 @@ pub(super) struct Format {
     pub(super) kind: u8,
     /// Its name: `ATT`.
     pub(super) name: String,
-    /// Its length with its header, by FMT.
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
@@ -248,7 +246,6 @@ impl Format {
         self.fields.last().is_none_or(|field| matches!(field.kind, FieldKind::Text(_)))
     }
 
-    /// The column of this label.
     pub(super) fn field(&self, name: &str) -> Option<usize> {
         self.fields.iter().position(|field| field.name == name)
     }
@@ -268,7 +265,6 @@ fn time_field(name: &str, fields: &[Field]) -> Option<TimeField> {
     if name.starts_with("GPS") { at("T", &millis) } else { at("TimeMS", &millis) }.map(TimeField::Millis)
 }
 
-/// Units of one type from FMTU.
 #[derive(Clone, Debug, Default)]
 struct Units {
     units: Vec<u8>,

@@ -59,12 +59,10 @@ impl First {
         &self.formats
     }
 
-    /// The lengths so far, for a scanner.
     pub(super) fn lengths(&mut self) -> &mut Lengths {
         &mut self.formats.lengths
     }
 
-    /// Takes a line before the first message.
     pub(super) fn banner(&mut self, words: &str) {
         let words = words.trim();
         if self.banner.is_none() && self.state.is_firmware(words) {
@@ -262,7 +260,6 @@ impl<'w> Session<'w> {
         &self.formats
     }
 
-    /// The lengths so far, for a scanner.
     pub(super) fn lengths(&mut self) -> &mut Lengths {
         &mut self.formats.lengths
     }

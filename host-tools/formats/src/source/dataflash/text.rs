@@ -11,7 +11,6 @@ const LINE_BYTES_MAX: usize = 64 * 1024;
 
 #[derive(Debug)]
 pub(super) struct Line<'a> {
-    /// Its place in the file.
     pub(super) place: u64,
     /// Its bytes in the file, with its end.
     pub(super) bytes: u64,
@@ -41,7 +40,6 @@ impl<R: Read> Lines<R> {
         Self(Buffer::new(input))
     }
 
-    /// The next bytes, without reading on.
     pub(super) fn window(&mut self, bytes: usize) -> io::Result<&[u8]> {
         self.0.window(bytes)
     }
