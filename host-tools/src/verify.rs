@@ -128,7 +128,6 @@ impl Totals {
         self.made_again + self.unprotected > 0
     }
 
-    /// The verdict on all logs that were read.
     fn words(&self, has_passed_over: bool) -> String {
         let all = self.without_earlier.is_none() && !has_passed_over;
         let words = match (self.worst, self.is_damage(), all) {
@@ -207,7 +206,6 @@ pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
     failed
 }
 
-/// A session, its checks and its state.
 fn print_log(log: &LogJson, overview: &Overview) -> Result<()> {
     let files = overview.ending.files.join(", ");
     output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;

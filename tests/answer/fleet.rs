@@ -198,7 +198,6 @@ fn word(value: &Value) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }
 
-/// A session, the source of its checks, and its number of findings.
 fn told(row: &Value) -> (String, String, u64) {
     let session = word(&row["session"]);
     let short = session.split_once('-').expect("a unique name").0;

@@ -56,7 +56,6 @@ impl Page {
         self.shown.run(&script).as_str().unwrap().to_owned()
     }
 
-    /// Returns the saved file of each.
     #[track_caller]
     fn save(&mut self, words: &str, count: usize) -> Vec<PathBuf> {
         let saved = self.dir.path().join("saved");
@@ -83,7 +82,6 @@ fn hums_in(folder: &Path, arguments: &[&str], names: &[String]) -> child::Outcom
     child::run(hums.current_dir(folder), LIMIT)
 }
 
-/// All recordings of the repository, under names that differ.
 fn recordings(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     for from in [

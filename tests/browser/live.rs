@@ -44,7 +44,6 @@ fn frames(recording: &Path) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// The part of a recording after its first seconds.
 fn cut(recording: &Path, from_s: f64, to: &Path) -> PathBuf {
     let data = std::fs::read(recording).unwrap();
     let frames = hums_tests::frames::of_tlog(&data, &Manifest::own().seeds, false);
@@ -109,7 +108,6 @@ fn assert_shows(page: &Value, frames: &[Value]) {
     }
 }
 
-/// Like a hand on the slider.
 fn seek(page: &mut LivePage, to_s: f64) -> Value {
     page.run(&format!(
         "const s = document.querySelector('input[type=range]'); s.value = {to_s}; \
@@ -189,7 +187,6 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     }
 }
 
-/// Its level, and the used part of its life, percent.
 fn part(page: &mut LivePage) -> (String, f64) {
     page.wait("return document.querySelector('.due li') !== null", 20);
     let level = page.run("return document.querySelector('.due .badge').textContent");
@@ -379,7 +376,6 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
     assert_sound(&mut page);
 }
 
-/// The first line of the answer to a request with these headers.
 fn ask(address: &str, path: &str, headers: &[(&str, &str)]) -> String {
     let host = address.trim_start_matches("http://").trim_end_matches('/');
     let mut stream = TcpStream::connect(host).unwrap();
@@ -550,7 +546,6 @@ fn two_vehicles_on_one_link_are_told_apart() {
     assert_sound(&mut page);
 }
 
-/// The same frame from another system.
 fn sent_by(system: u8, mut frame: Vec<u8>, seeds: &hums_tests::frames::Seeds) -> Vec<u8> {
     frame[5] = system;
     let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);

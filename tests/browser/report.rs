@@ -358,7 +358,6 @@ fn data_of(path: &Path) -> Value {
     json(data.split_once("</script>").unwrap().0)
 }
 
-/// Parameters by an independent reader: the last values, or the first ones.
 fn parameters(recording: &Path) -> BTreeMap<String, u32> {
     let dir = tempfile::tempdir().unwrap();
     let log = dir.path().join("flight.hum");
@@ -472,7 +471,6 @@ fn page_of(pages: &Path, begins: &str) -> String {
     format!("file://{}", file.display())
 }
 
-/// The newest flight comes first everywhere.
 fn assert_compared(
     page: &mut LivePage,
     pages: &Path,

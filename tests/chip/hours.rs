@@ -29,7 +29,6 @@ fn off_ms(ended: &[Ps], recorded: &[(u64, Vec<u8>)]) -> u64 {
     lates.map(|late| late.abs_diff(first)).max().unwrap_or(0)
 }
 
-/// A recording's frames again and again, with three seconds of silence between.
 struct Flight {
     frames: Vec<(u64, Vec<u8>)>,
     lap: Ps,
@@ -121,7 +120,6 @@ fn hours_of_flight_are_recorded_whole_and_at_their_times() {
     }
 }
 
-/// Returns the end of each frame on the line.
 #[track_caller]
 fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
     let (mut ended, mut free) = (Vec::new(), 0);

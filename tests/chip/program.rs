@@ -35,7 +35,6 @@ struct Expected<'a> {
     within_ms: u64,
 }
 
-/// Half a second at full rate; the store exists.
 fn flying() -> Rig {
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;

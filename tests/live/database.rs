@@ -53,7 +53,6 @@ impl Database {
         )
     }
 
-    /// Starts it with its data, at its previous port.
     pub(crate) fn again(&mut self) {
         let start = Instant::now();
         while !self.runs() {
@@ -112,7 +111,6 @@ impl Database {
         Ok((code, body.to_owned()))
     }
 
-    /// Creates the database `hums` if needed.
     pub(crate) fn write(&self, line: &str) {
         for (path, body) in [("/query?q=CREATE%20DATABASE%20hums", ""), ("/write?db=hums&precision=ns", line)]
         {

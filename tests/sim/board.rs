@@ -23,7 +23,6 @@ impl Board {
         Self::start_in(tempfile::tempdir().unwrap(), flags)
     }
 
-    /// On the card in `dir`, if there is one.
     pub(crate) fn start_in(dir: TempDir, flags: &[&str]) -> Self {
         Self::start_with(own("ap_quad_guided.tlog").as_os_str(), dir, flags)
     }
@@ -66,7 +65,6 @@ impl Drop for Board {
     }
 }
 
-/// Whole and in one row.
 #[track_caller]
 pub(crate) fn assert_on_card(log: &Path, card: &[u8]) {
     let log = fs::read(log).unwrap();

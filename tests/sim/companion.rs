@@ -319,7 +319,6 @@ fn parameters_on_the_card_are_set_and_recorded_and_wrong_ones_are_told() {
     assert!(!log.contains("line 1 is refused") && !log.contains("line 4 is refused"));
 }
 
-/// Loses every tenth datagram, each way.
 struct Lossy {
     port: u16,
     lost: Arc<AtomicU32>,

@@ -183,7 +183,6 @@ fn a_log_in_work_that_has_grown_is_completed() {
     assert_on_card(&log, &fs::read(dir.path().join("card.img")).unwrap());
 }
 
-/// Seconds after its first record.
 fn cut(tlog: &[u8], from_s: u64, to_s: u64) -> Vec<u8> {
     let (mut at, mut first, mut out) = (0, None, Vec::new());
     while let Some(record) = tlog.get(at..).filter(|record| record.len() > 11) {

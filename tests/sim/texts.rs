@@ -30,7 +30,6 @@ struct Said {
     text: String,
 }
 
-/// Texts, and the times of critical checks.
 fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let dir = tempfile::tempdir().unwrap();
     let file = image::open_or_make(&dir.path().join("card.img"), Some(256), |_| Ok(())).unwrap();

@@ -12,7 +12,6 @@ const SECTOR: u64 = 512;
 /// Pieces of zeros are left out: sparse files stay sparse.
 const PIECE: usize = 1 << 16;
 
-/// Start and length, bytes.
 fn partition(image: &mut File) -> (u64, u64) {
     let mut table = [0; 512];
     image.read_exact(&mut table).unwrap();

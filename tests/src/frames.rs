@@ -22,7 +22,6 @@ pub struct Frame<'a> {
     pub verified: bool,
 }
 
-/// Length and message id.
 fn header(data: &[u8]) -> Option<(usize, u32)> {
     let (length, id) = match *data.first()? {
         STX_V1 => (8 + usize::from(*data.get(1)?), u32::from(*data.get(5)?)),

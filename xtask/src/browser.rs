@@ -12,7 +12,6 @@ use crate::shell::Shell;
 /// Opens at once, also from a phone's storage.
 pub(crate) const PAGE_BYTES_MAX: u64 = 6_000_000;
 
-/// The arguments of cargo that build the program.
 pub(crate) const BUILD: [&str; 6] = [
     "build",
     "--profile=browser",
@@ -31,7 +30,6 @@ pub(crate) fn build() -> Result<()> {
     Shell::cargo().args(BUILD).run()
 }
 
-/// Makes `target/hums-check.html` of the working copy.
 pub(crate) fn page() -> Result<()> {
     setup::require(&[Need::Linker, Need::BrowserTarget])?;
     build()?;

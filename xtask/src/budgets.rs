@@ -41,7 +41,6 @@ pub(crate) struct Limit {
     pub(crate) reason: String,
 }
 
-/// Processor cycles for each frame.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Cycles {

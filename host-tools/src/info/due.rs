@@ -77,7 +77,6 @@ fn vehicle(log: &Overview, found: &FoundRecordings, given: Option<&str>) -> Stri
     format!("folder {folder}, {kind}")
 }
 
-/// Figures of one log.
 struct Log {
     start_us: Option<u64>,
     order_us: u64,
@@ -103,7 +102,6 @@ impl Log {
     }
 }
 
-/// One vehicle, over its logs.
 #[derive(Default)]
 struct Vehicle {
     name: String,
@@ -292,7 +290,6 @@ fn day(utc: &str) -> &str {
     utc.get(..10).unwrap_or(utc)
 }
 
-/// A line, and a table of its parts.
 fn text(vehicle: &VehicleJson) -> String {
     let span = match (&vehicle.first_utc, &vehicle.last_utc) {
         (Some(first), Some(last)) if day(first) == day(last) => format!(", {}", day(first)),

@@ -17,7 +17,6 @@ pub(super) struct Read {
 }
 
 impl Read {
-    /// An error if some were unreadable.
     pub(super) fn end(self) -> Result<Outcome> {
         if self.failed > 0 {
             bail!("{} of {} could not be read", self.failed, count(self.all as u64, "log"));

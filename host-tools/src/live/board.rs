@@ -128,7 +128,6 @@ fn overall(craft: &Craft, now: Instant, known: &[Known]) -> Level {
     heard.chain(unknown.then_some(Level::Stale)).max_by_key(|level| rank(*level)).unwrap_or(Level::Stale)
 }
 
-/// The worst finding of the last judgement.
 fn was(craft: &Craft, silent: bool) -> Option<&Finding> {
     let all = craft.unjudged.values().chain(craft.worries.values().filter(|_| silent));
     all.filter(|finding| is_bad(finding)).max_by_key(|finding| (rank(finding.level), finding.at.as_millis()))

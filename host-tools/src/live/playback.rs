@@ -33,7 +33,6 @@ const TOLD_MAX: usize = 8_192;
 /// Frames between two looks at the clock.
 const LOOK_EVERY: u64 = 4_096;
 
-/// The state with the place after it.
 #[derive(Debug)]
 struct Copy {
     at: Instant,

@@ -167,7 +167,6 @@ enum Asked {
     Speed { to: f64 },
 }
 
-/// One page, and the data it has.
 struct Page {
     follow: tokio::sync::watch::Receiver<Arc<Published>>,
     vehicle: Option<u8>,
@@ -227,7 +226,6 @@ impl Page {
         hub.command(command);
     }
 
-    /// The state with the history that the page lacks.
     fn news(&mut self, hub: &Hub) -> Vec<String> {
         let published = Arc::clone(&self.follow.borrow_and_update());
         if published.epoch != self.epoch {

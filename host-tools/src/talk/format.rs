@@ -72,7 +72,6 @@ impl Answer {
     }
 }
 
-/// Waits until the board records again: at most `limit`, with at most `silence` between messages.
 fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
     let (system, component) = client.target();
     let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);

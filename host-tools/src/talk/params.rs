@@ -100,7 +100,6 @@ struct KeyJson {
     has_key: bool,
 }
 
-/// Lines for `hums sim --params`, or one object.
 fn show(system: u8, values: impl IntoIterator<Item = Param>, json: bool) -> Result<()> {
     if json {
         let values = values.into_iter().map(|value| (shown(&value.name), f64::from(value.value).into()));

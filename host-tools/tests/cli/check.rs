@@ -17,7 +17,6 @@ fn faults(dir: &Path) {
     fs::copy(flight("ap_quad_faults.tlog"), dir.join("faults.tlog")).expect("a copy");
 }
 
-/// Check, instance, level and second of each finding.
 fn findings(object: &serde_json::Value) -> Vec<(String, u64, String, f64)> {
     let findings = object["findings"].as_array().expect("an array");
     let own = |finding: &serde_json::Value| {

@@ -108,7 +108,6 @@ pub(crate) fn with_parity(file: &Path) -> Vec<u8> {
     bytes[begin * BLOCK..end * BLOCK].to_vec()
 }
 
-/// A file in which so many parity sectors are overwritten.
 pub(crate) fn without(bytes: &[u8], most: usize, with: u8) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let parity = bytes.as_chunks_mut::<BLOCK>().0.iter_mut().filter(|block| Parity::read(block).is_some());

@@ -9,7 +9,6 @@ fn check(name: &str, code: i32) -> Value {
     json(&run(folder.as_ref(), &format!("check --json {name}.gz"), code))
 }
 
-/// Check, level, second and detail of each problem.
 fn problems(checked: &Value) -> Vec<(String, String, f64, String)> {
     let text = |problem: &Value, name: &str| problem[name].as_str().unwrap_or_default().to_owned();
     let of = |problem: &Value| {

@@ -17,7 +17,6 @@ fn uncompressed(name: &str) -> Vec<u8> {
     bytes
 }
 
-/// The problems of a vehicle: check, instance, level, seconds since take-off.
 fn problems(dir: &Path, name: &str) -> Vec<(String, u64, String, f64)> {
     let code = if name.contains("n03") { 0 } else { 4 };
     let checked = json(&run(dir, &format!("check --json {}", labelled(name).display()), code));

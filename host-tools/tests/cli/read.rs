@@ -504,12 +504,10 @@ fn a_log_that_breaks_off_in_the_air_has_one_time_in_the_air_and_logs_stand_in_th
     assert!(String::from_utf8_lossy(&report.stderr).contains("-o is missing"));
 }
 
-/// An input of these tests.
 fn input(name: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/inputs").join(name).display().to_string()
 }
 
-/// The line protocol's tag `session` of the only file of points in a folder.
 fn session_of_points(folder: &Path, recording: &str) -> String {
     let files = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     let of = |path: &PathBuf| {

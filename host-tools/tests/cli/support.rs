@@ -15,12 +15,10 @@ pub(crate) fn flight(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights").join(name)
 }
 
-/// The shortest whole flight.
 pub(crate) fn px4() -> PathBuf {
     flight("px4_hil_quad_low.tlog")
 }
 
-/// The records of a tlog: their times and their frames.
 pub(crate) fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
     const TIME_BYTES: usize = 8;
     let mut records = Vec::new();
@@ -36,7 +34,6 @@ pub(crate) fn records(mut rest: &[u8]) -> Vec<(u64, &[u8])> {
     records
 }
 
-/// The last fifth of a recording, in a file of this folder: another short flight for tests.
 pub(crate) fn end_of(name: &str, folder: &Path) -> PathBuf {
     let log = fs::read(flight(name)).expect("a recording");
     let records = records(&log);
@@ -47,7 +44,6 @@ pub(crate) fn end_of(name: &str, folder: &Path) -> PathBuf {
     path
 }
 
-/// The program, with a minute as its limit.
 pub(crate) fn hums() -> Command {
     let mut command = Command::cargo_bin("hums").expect("the program");
     command.timeout(std::time::Duration::from_mins(1));
@@ -118,7 +114,6 @@ impl Made {
     }
 }
 
-/// A new directory with these files, which the first test that needs them makes.
 pub(crate) fn made_once(what: &str, make: impl FnOnce(&Path)) -> TempDir {
     static MADE: Mutex<BTreeMap<String, Arc<OnceLock<Vec<Made>>>>> = Mutex::new(BTreeMap::new());
     let slot = MADE.lock().expect("nothing fails under it").entry(what.to_owned()).or_default().clone();
@@ -177,7 +172,6 @@ pub(crate) fn all_named(dir: &Path, base: &str) -> Vec<String> {
     names
 }
 
-/// A directory with an input of each kind, as a file, through links, and in a folder.
 pub(crate) fn furnished() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     let at = |name: &str| dir.path().join(name);

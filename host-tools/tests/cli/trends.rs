@@ -17,7 +17,6 @@ use hums_core::time::Instant;
 use hums_core::units::{Amperes, Rpm, Volts};
 
 type Change = fn(&mut Quad);
-/// Check, part and level.
 type Expected = (&'static str, u8, Level);
 
 /// Flies for 80 s and lands, with these outputs in flight: the findings, before the flight is learnt.

@@ -73,7 +73,6 @@ fn wait(rig: &mut Rig, ms: u64) {
     rig.run_to(now_ms + ms);
 }
 
-/// Operation, requested operation, complete, offset, data.
 type Answer = (u8, u8, bool, u32, Vec<u8>);
 
 fn ftp(rig: &mut Rig, opcode: u8, offset: u32, size: u8, data: &[u8], ms: u64) -> Vec<Answer> {

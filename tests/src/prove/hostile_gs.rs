@@ -143,7 +143,6 @@ impl ToAutopilot {
     }
 }
 
-/// Frames, and the number of logs marked as erased.
 fn logs_of(card: &Card) -> Result<(BTreeMap<String, Vec<u64>>, usize)> {
     let mut frames = BTreeMap::new();
     for log in on_card(&card.path()).into_iter().take(EARLIER as usize) {
@@ -206,7 +205,6 @@ fn attack(options: &Options, seconds: u64, key: Option<[u8; 32]>) -> Result<Half
     Ok(half)
 }
 
-/// Parameters; with a key unsigned requests get no answer.
 fn params(keyed: bool) -> Result<Params> {
     let mut params = Params::defaults();
     let mut set = |name: &str, value: f32| {

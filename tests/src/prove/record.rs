@@ -42,7 +42,6 @@ impl EntryCollector for Group {
         }
     }
 
-    /// Each group is passed on whole.
     fn held_bytes(&self) -> usize {
         0
     }

@@ -60,7 +60,6 @@ pub(super) fn work_folder() -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// A recording, repeated to that many bytes.
 pub(super) fn repeat(flight: &Path, bytes_min: f64, to: &Path) -> Result<()> {
     let tlog = fs::read(flight)?;
     let times = (bytes_min / tlog.len().max(1) as f64).ceil().max(1.0) as usize;

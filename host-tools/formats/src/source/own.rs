@@ -169,7 +169,6 @@ impl<C, D: PartReceiver<C>> reader::GroupReceiver<Part<C>> for Parts<'_, D> {
     }
 }
 
-/// A part's items until their turn.
 #[derive(Default)]
 struct Kept {
     frames: bool,
@@ -216,7 +215,6 @@ impl ItemCollector for Kept {
 }
 
 struct Both<C> {
-    /// The result needs frames.
     frames: bool,
     collected: C,
     kept: Kept,

@@ -72,7 +72,6 @@ fn count_votes(bytes: &[u8]) -> i32 {
     count(bytes).0
 }
 
-/// Votes, and the number of valid frames.
 fn count(bytes: &[u8]) -> (i32, usize) {
     let (mut votes, mut good) = (0, 0);
     let mut at = 0;

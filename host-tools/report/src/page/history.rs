@@ -361,7 +361,6 @@ fn name((plot, line): Line) -> String {
     name
 }
 
-/// A place, at its time since `from`.
 pub(super) fn told(place: &Point, from: Instant) -> Place {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
     (place.at.as_secs_f64() - from.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
@@ -390,7 +389,6 @@ mod tests {
         }
     }
 
-    /// The vehicle reports only its airspeed.
     fn tell(history: &mut History, second: u64) {
         history.sample(seconds(second), &Reference::new(), &airspeed());
     }

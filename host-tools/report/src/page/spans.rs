@@ -60,7 +60,6 @@ impl Spans {
         if *seen == now {
             return None;
         }
-        // Only the last one is ever taken back.
         let stay = seen.count.min(count).saturating_sub(1);
         *seen = now;
         let rest = self.begun.get(stay..count).unwrap_or_default();

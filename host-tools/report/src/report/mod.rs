@@ -145,7 +145,6 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
     making.end(args.compare)
 }
 
-/// The page of the only input: `flight.html` beside `flight.tlog` or `flight.bin.gz`.
 fn beside(inputs: &[PathBuf]) -> Result<PathBuf> {
     let name =
         |input: &PathBuf| Some(PathBuf::from(input.file_name()?)).filter(|name| name != Path::new("-"));
@@ -349,7 +348,6 @@ impl Making<'_> {
     }
 }
 
-/// The name of a page's file.
 fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |file| file.to_string_lossy().into_owned())
 }

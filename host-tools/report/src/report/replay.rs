@@ -26,7 +26,6 @@ use crate::source::recording::Place;
 use crate::statustext;
 use crate::summary::{EndsInAir, JudgedChecks, Overview};
 
-/// The rows that are shown.
 static NAMES: LazyLock<Vec<String>> =
     LazyLock::new(|| MORE.iter().chain(&ROWS).map(|name| (*name).to_owned()).collect());
 

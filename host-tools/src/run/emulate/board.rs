@@ -127,7 +127,6 @@ impl Board {
         }
     }
 
-    /// Microseconds since the first byte, in the chip's time.
     fn moment(at_us: u64) -> Ps {
         LEAD.saturating_add(at_us.saturating_mul(US))
     }

@@ -47,7 +47,6 @@ pub(super) struct Brought {
     pub(super) outcome: Outcome,
 }
 
-/// The files of one log, in order, with lengths.
 pub(super) fn pull(
     ftp: &mut Ftp,
     files: &[(String, u32)],
@@ -138,7 +137,6 @@ fn is_wanted(what: &LogMoment, finding: &Finding) -> bool {
     }
 }
 
-/// A log with random access to sectors.
 struct RemoteLog<'a> {
     ftp: &'a mut Ftp,
     output: &'a Path,
@@ -356,7 +354,6 @@ impl<'a> RemoteLog<'a> {
         Log { name, files: Vec::new(), pieces, session: None, left_over: false }
     }
 
-    /// Deletes files without these places.
     fn finish(self, places: &Range<u32>) -> Result<Vec<(String, PathBuf)>> {
         let is_in = |file: &RemoteFile| file.first < places.end && places.start < file.first + file.sectors;
         let files = self.files.into_iter().filter(is_in);

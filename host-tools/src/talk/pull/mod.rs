@@ -159,7 +159,6 @@ fn each(
     failed.map_or(Ok(outcome), Err)
 }
 
-/// Downloads a moment of the newest of these logs.
 fn around(
     ftp: &mut Ftp,
     mut logs: Vec<(String, u32)>,

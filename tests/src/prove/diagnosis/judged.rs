@@ -7,7 +7,6 @@ use super::options::Known;
 use super::outcome::{Outcome, judge};
 use super::sets::Set;
 
-/// The results of one set's flights, in their order.
 #[derive(Debug)]
 pub(super) struct Judged {
     pub(super) name: String,

@@ -210,11 +210,8 @@ struct Kept {
 
 struct Subject {
     session: Session,
-    /// Sectors of earlier sessions by their block.
     kept: BTreeMap<u32, Kept>,
-    /// Frames of each earlier session.
     frames: BTreeMap<u32, usize>,
-    /// The recording of the next power-on.
     next: Stream,
     /// A faultless card, where it differs from the earlier content.
     now: Blocks,

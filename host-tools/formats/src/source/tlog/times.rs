@@ -82,7 +82,6 @@ impl Beside {
         early_us
     }
 
-    /// Faults of the recorder's clock.
     fn gap(&self) -> Option<Gap> {
         let is_start = |at: Instant| at.as_micros() <= START_US && self.passed_us <= START_US && !self.stands;
         let (at, place) = self.began.filter(|(at, _)| !is_start(*at))?;
@@ -226,7 +225,6 @@ impl Times {
         (self.records == 0 && frames > 0).then(|| Gap::new(None, Cause::NoTimes, words))
     }
 
-    /// The recorded times are invalid.
     fn no_times(&self) -> Option<Gap> {
         if self.now != Instant::ZERO || self.records < STILL_RECORDS {
             return None;

@@ -3,7 +3,6 @@
 use super::format::{Layout, Number};
 use super::message::words;
 
-/// A field's place in a message's data.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slot {
     number: Number,

@@ -148,7 +148,6 @@ struct Written {
     name: String,
 }
 
-/// The definitions of a log.
 #[derive(Debug)]
 pub(super) struct Formats {
     written: HashMap<String, Vec<Written>>,

@@ -68,7 +68,6 @@ impl<'a> Keyed<'a> {
         Some(Self { name, number: Number::named(kind), array, value })
     }
 
-    /// Whether the value has the length of its type.
     fn fits(&self) -> bool {
         self.number
             .is_some_and(|number| number.bytes() * self.array.unwrap_or(1) as usize == self.value.len())
@@ -170,7 +169,6 @@ impl Parser<'_> {
         }
     }
 
-    /// A message, a header, or the end.
     fn goes_on(&self, rest: &[u8]) -> bool {
         if rest.is_empty() || beginning(rest).is_some() {
             return true;
@@ -275,7 +273,6 @@ fn could_be(kind: u8, bytes: usize) -> bool {
     }
 }
 
-/// Kind, and length of the body.
 fn header(rest: &[u8]) -> Option<(u8, usize)> {
     let &[low, high, kind] = rest.first_chunk::<HEADER_BYTES>()?;
     Some((kind, usize::from(u16::from_le_bytes([low, high]))))

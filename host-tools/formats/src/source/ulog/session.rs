@@ -429,7 +429,6 @@ impl<'a, 'b> Session<'a, 'b> {
         Ok(false)
     }
 
-    /// The latest time as the log has it.
     fn recorded(&self) -> u64 {
         self.clock.recorded_us().unwrap_or(0)
     }
@@ -526,7 +525,6 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Gap(&gap))
     }
 
-    /// All earlier state is void.
     fn another(&mut self, place: u64, time_us: u64, after: &[u8]) -> Result<()> {
         self.tell_facts()?;
         self.formats = Formats::default();
@@ -541,7 +539,6 @@ impl<'a, 'b> Session<'a, 'b> {
         self.tell(Item::Joint)
     }
 
-    /// The log's maker, once known.
     fn tell_facts(&mut self) -> Result<()> {
         if std::mem::replace(&mut self.told_facts, true) {
             return Ok(());

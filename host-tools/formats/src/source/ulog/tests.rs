@@ -16,7 +16,6 @@ fn position(x: f32, n: u8) -> Vec<u8> {
     [&x.to_le_bytes()[..], &[n]].concat()
 }
 
-/// Two instances, ten messages each.
 fn small() -> Writer {
     let mut writer = Writer::new(SECOND)
         .flags(0, [0; 3])

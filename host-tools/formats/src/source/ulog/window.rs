@@ -34,7 +34,6 @@ impl<R: Read> Window<R> {
         self.place
     }
 
-    /// Nothing follows the rest.
     pub(super) fn ended(&self) -> bool {
         self.ended
     }
@@ -43,7 +42,6 @@ impl<R: Read> Window<R> {
         self.trouble.take()
     }
 
-    /// Reads until the rest is this long, or the input ends.
     pub(super) fn fill(&mut self, bytes: usize) {
         if self.rest().len() >= bytes || self.ended {
             return;

@@ -84,7 +84,6 @@ pub(in crate::source::ulog) struct Px4 {
 }
 
 impl Px4 {
-    /// The vehicle's number, and the autopilot's component.
     pub(in crate::source::ulog) fn source(&self) -> Source {
         Source { system: self.system.number.unwrap_or(1), component: 1 }
     }
