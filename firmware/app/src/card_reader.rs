@@ -5,8 +5,8 @@
 //! or ten minutes without a host end the mode by a reset. A plugged cable never starts the mode: a charger in
 //! the field must not stop a recording.
 //!
-//! One loop without an executor polls the USB stack and the disk. The card's driver blocks it for at most 8
-//! s; [`watch`] feeds the watchdog meanwhile.
+//! One loop without an executor polls the USB stack and the disk. The card's driver blocks it for 8 s at
+//! most; [`watch`] feeds the watchdog meanwhile.
 
 use core::future::poll_fn;
 use core::sync::atomic::{AtomicU32, Ordering};

@@ -125,7 +125,7 @@ impl<D: CardDevice> Disk<D> {
         answer.map_err(|sense| self.sense = sense).ok()
     }
 
-    /// Reads blocks of an accepted command. After `false` nobody may send `blocks`.
+    /// Reads blocks of an accepted command. After `false` the host must not get `blocks`.
     pub fn read(&mut self, first: u32, blocks: &mut [Block]) -> bool {
         let read = self.access(|card| card.read(blocks, first));
         read.map_err(|sense| self.sense = sense).is_ok()

@@ -167,7 +167,7 @@ impl Transaction {
     }
 }
 
-/// Removal of the replaced files follows.
+/// The replaced files are removed after this.
 fn sync_all(folder: &Path) -> io::Result<()> {
     each(folder, "", &mut |place| File::open(folder.join(place))?.sync_all())
 }
