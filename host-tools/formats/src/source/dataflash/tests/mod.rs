@@ -80,7 +80,7 @@ impl Seen {
     }
 }
 
-fn read(bytes: &[u8]) -> Result<(Seen, Summary)> {
+fn read(bytes: &[u8]) -> Result<(Seen, RecordingSummary)> {
     let form = detect(bytes).unwrap_or(Form::Binary);
     let want = Want { observations: true, rows: Rows::All, ..Want::default() };
     let mut seen = Seen::default();
