@@ -266,7 +266,6 @@ impl Flight {
         self.stage == Stage::Down
     }
 
-    /// Whether it leaned so far or turned so fast in the last seconds that thrust did not carry it.
     pub(crate) fn has_tilted(&self, now: Instant) -> bool {
         self.tilted_at.is_some_and(|at| now.since(at) <= RECOVERED)
     }
@@ -303,7 +302,7 @@ impl Flight {
         (change, event)
     }
 
-    /// In the air a descent may break off; on the ground the last one was the touch.
+    /// In the air a descent may break off; on the ground the last descent was the touch.
     fn note_touch(&mut self, now: Instant, vehicle: &Vehicle) {
         let height_m = height_m(now, vehicle);
         if !self.airborne() {

@@ -108,7 +108,7 @@ state! {
     pub(crate) struct Motors {
         tracks: [Track; MOTORS_MAX] = [Track::default(); MOTORS_MAX],
         pub(crate) outputs: MotorOutputs,
-        /// Messages of the vehicle since the last one of any ESC, and eight times their smoothed number between two.
+        /// Messages since the last one of any ESC, and eight times their smoothed number between two.
         messages: u16,
         interval_messages: u16,
         /// The motor whose speed is furthest from the others'.
@@ -195,8 +195,7 @@ impl Motors {
         Some(if missed { silence_s } else { 0.0 })
     }
 
-    /// Whether all ESCs that sent anything, of several, are silent at once. Motors that carry the vehicle do not fail
-    /// together; the wire of their telemetry does.
+    /// Motors that carry the vehicle do not fail together; the wire of their telemetry does.
     pub(crate) fn are_silent(&self, heard: Instant, resumed: Instant) -> bool {
         let mut known =
             (0..).zip(&self.tracks).filter(|(_, track)| track.interval_s > 0.0).map(|(motor, _)| motor);
@@ -309,8 +308,7 @@ impl Motors {
         self.furthest = further.0;
     }
 
-    /// The middle one of the speeds of all motors that are fitted (of an even number the lower one of the two); `None` while they
-    /// do not turn.
+    /// The median speed of all fitted motors (the lower of two); `None` while they do not turn.
     fn middle_speed(&self) -> Option<f32> {
         let speeds = || self.speeds().map(|(_, speed)| speed);
         let half = speeds().count() / 2;
@@ -321,8 +319,7 @@ impl Motors {
         speeds().find(is_middle).filter(|speed| *speed >= TURNING_RPM)
     }
 
-    /// Whether all fitted motors sent a speed just now, and turn as in flight. Held speeds, or zeros of ESCs that
-    /// lost their telemetry, do not count.
+    /// Held speeds, or zeros of ESCs that lost their telemetry, do not count.
     fn turn_as_in_flight(&self, now: Instant, middle_rpm: f32) -> bool {
         let mut fitted = self.tracks.iter().filter(|track| track.is_fitted());
         fitted.all(|track| {
@@ -331,8 +328,8 @@ impl Motors {
         })
     }
 
-    /// How far a motor's speed is from the mean of the others, percent with its sign, wherever it flies; `None` for a motor that is not
-    /// fitted, and while the others do not turn.
+    /// A motor's speed against the mean of the others, signed percent; `None` for a missing motor, or while
+    /// the others do not turn.
     pub(crate) fn departure(&self, motor: u8) -> Option<f32> {
         let speed = |motor: usize| {
             self.tracks.get(motor).filter(|track| track.is_fitted()).map(|track| track.smooth_rpm)
@@ -356,7 +353,7 @@ fn is_fresh(now: Instant, motor: &Motor) -> bool {
     motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE)
 }
 
-/// The current of a motor as a part of the mean of the others among these, while the throttle asks for thrust in hover.
+/// The mean is of the other motors here, while the throttle asks for thrust in hover.
 fn current_part(
     now: Instant,
     vehicle: &Vehicle,

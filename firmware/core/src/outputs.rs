@@ -150,7 +150,7 @@ state! {
         carried: bool,
         off: bool,
         full: bool,
-        /// Of a flight whose take-off was not received: the first output, and whether it moved since.
+        /// Without a received take-off: the first output, and whether it moved since.
         first: u16,
         moved: bool,
     }
@@ -167,7 +167,7 @@ state! {
         at: Stamp,
         /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
         summed: (u8, f32),
-        /// The motor that is judged, and how; none of the others is anything but good.
+        /// The judged motor and its verdict; all others are good.
         verdict: (u8, Verdict) = (0, Verdict::Ok),
         /// The take-off was not received; since when one output alone is at an end of its range then.
         takeoff_not_recorded: bool,
@@ -250,7 +250,7 @@ impl MotorOutputs {
         usize::from(self.count) == count
     }
 
-    /// The verdict in a flight whose take-off was not received: only an output that alone is at an end of its range says something.
+    /// Without a received take-off only an output alone at an end of its range has a meaning.
     fn judge_unseen(&mut self, at: Instant, given: &[f32], used: bool, flies_level: bool) -> (u8, Verdict) {
         let (place, verdict) = self.verdict;
         // The one opposite may idle then.
@@ -279,14 +279,14 @@ impl MotorOutputs {
         }
     }
 
-    /// Whether its output alone is at an end of its range in a flight without a received take-off: its motor's earlier speed is not known.
+    /// Without a received take-off the motor's earlier speed is unknown.
     pub(crate) fn was_found_at_end(&self, motor: u8) -> bool {
         self.takeoff_not_recorded
             && self.verdict.0 == motor
             && matches!(self.verdict.1, Verdict::Saturated | Verdict::ShutOff)
     }
 
-    /// One that is given more while the vehicle is disarmed is a servo's, or a motor's in a test.
+    /// An output above idle while disarmed is a servo's, or a motor's in a test.
     fn note_idle(&mut self, outputs: &[u16; JUDGED_MAX], parts: &[f32; JUDGED_MAX], armed: bool) {
         let used = self.outputs.iter_mut().zip(outputs).zip(parts).filter(|((_, now), _)| **now > 0);
         for ((output, _), given) in used {
@@ -294,7 +294,7 @@ impl MotorOutputs {
         }
     }
 
-    /// Which outputs are at an end of their range: also those beyond the motors of the frame that the vehicle says it is.
+    /// Includes outputs beyond the motors of the reported frame.
     fn note_ends(&mut self, parts: &[f32; JUDGED_MAX]) {
         for (output, given) in self.outputs.iter_mut().zip(parts) {
             output.carried |= carries(given);
@@ -307,7 +307,7 @@ impl MotorOutputs {
         self.outputs.get(usize::from(motor))
     }
 
-    /// Whether a motor that carried before has next to no command: then it stands without a fault of its own.
+    /// A motor that carried before, now with next to no command, stands without a fault of its own.
     pub(crate) fn is_off(&self, motor: u8) -> bool {
         self.output(motor).is_some_and(|output| output.off)
     }
@@ -322,7 +322,7 @@ impl MotorOutputs {
         if is_quiet {
             self.outputs.iter_mut().for_each(|output| output.share.learn(step_s));
         }
-        // Opposite to one that is driven alone, one idles: that is the balance, and no fault of its own.
+        // Opposite to a motor that alone drives, an idle motor is the balance, and no fault.
         let shut_off = self.find_shut_off(count).filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
         self.verdict = match shut_off {
             Some(place) => (place, Verdict::ShutOff),
@@ -394,7 +394,7 @@ impl MotorOutputs {
     pub(crate) fn verdict(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<(Instant, Verdict)> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
-        // If all idled on the ground, or all but one moved in a flight whose take-off was not received, they are motors.
+        // Outputs that all idled on the ground are motors; without a received take-off, if all but one moved.
         let seen = |is: fn(&Output) -> bool| self.outputs.iter().filter(|output| is(output)).count();
         let are_motors = seen(|output| output.idles) >= count || seen(|output| output.moved) + 1 >= count;
         if usize::from(motor) >= count || !are_motors {
@@ -428,7 +428,7 @@ fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option
     rest.all(|(_, given)| others(given)).then_some(place as u8)
 }
 
-/// The one that is at the end of its range while no other one is near that, and none idles.
+/// No other motor is near the end of its range, and none idles.
 fn saturated_alone(given: &[f32]) -> Option<u8> {
     only(given, is_full, |given| (IDLE..SHARES).contains(given))
 }

@@ -344,7 +344,7 @@ impl Protect {
         Some(if by_itself { Input::ModeByAutopilot } else { Input::ModeByPilot })
     }
 
-    /// Whether the mode has changed since then, or shows nothing, as it is with an autopilot whose modes are not known.
+    /// A change, or an autopilot with unknown modes.
     fn has_changed_since(&self, now: Instant, vehicle: &Vehicle, at: Instant) -> bool {
         modes(vehicle).is_none() || self.changed_at.age(now).is_some_and(|age| age <= now.since(at))
     }
@@ -426,7 +426,7 @@ fn hovers(situation: &Situation<'_>) -> bool {
         && (vehicle.kind() != VehicleKind::Vtol || vehicle.vtol == VtolState::Hover)
 }
 
-/// A mission that goes to a lower place looks like its landing, and is waited for too.
+/// A mission to a lower place looks like its landing, and is waited for too.
 fn approaches(situation: &Situation<'_>) -> bool {
     let Situation { now, vehicle, .. } = *situation;
     let mode = vehicle.heartbeat.get().map(|heartbeat| heartbeat.mode);

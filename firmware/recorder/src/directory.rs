@@ -68,7 +68,7 @@ pub(crate) struct Directory {
     /// The newest names below the last session number. A folder has the length 0.
     pub(crate) newest: Newest,
     last: Option<LogName>,
-    /// The oldest logs that may be overwritten, the oldest first; the first `sure` of them are older than all others.
+    /// Oldest logs for overwriting, oldest first; the first `sure` are older than all others.
     oldest: Vec<LogEntry, OLDEST_MAX>,
     sure: usize,
     has_more: bool,
@@ -110,7 +110,7 @@ impl Directory {
         }
     }
 
-    /// Walks over the whole directory, and repairs chains that logs claim of the FAT from this block on.
+    /// Also repairs chains that logs claim of the FAT from this block on.
     pub(crate) fn learn<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -147,8 +147,8 @@ impl Directory {
         if self.verified.contains(&from) { self.verified.end } else { from }
     }
 
-    /// Reads as many blocks of the directory as `buffer` has, and begins anew at its end. It collects the oldest
-    /// logs, and repairs claims of logs on the next FAT blocks from `free` on. Returns whether chains were repaired.
+    /// Reads as many blocks as `buffer` has; begins anew at the end. Collects the oldest logs, and repairs
+    /// claims of logs on the next FAT blocks from `free` on. Returns whether chains were repaired.
     pub(crate) fn look_on<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
@@ -191,7 +191,7 @@ impl Directory {
         self.next > 0 || self.has_more
     }
 
-    /// Notes an entry; returns the clusters that it claims, if it is a log's.
+    /// Returns the clusters that a log claims.
     fn note<D: CardDevice>(&mut self, volume: &Volume<'_, D>, slot: &Slot<'_>) -> Option<Range<u32>> {
         let entry = slot.log()?;
         self.note_newest(entry);
@@ -274,8 +274,8 @@ impl Directory {
         self.show(new.name);
     }
 
-    /// The newest session's name, and the next session's first name. A session number in use is skipped, so that a
-    /// foreign file with the last number does not end the numbers.
+    /// The newest session's name, and the next session's first name. A used session number is skipped, so
+    /// that a foreign file with the last number does not end the numbers.
     pub(crate) fn next_session(&self) -> (Option<LogName>, Option<LogName>) {
         let is_free = |name: &LogName| {
             let is_last = name.session == LogName::SESSION_MAX && self.last.is_some();
@@ -369,8 +369,8 @@ impl Slot<'_> {
     }
 }
 
-/// Shows `each` the used and deleted entries of a directory, from entry `from` on, reading as many blocks with one
-/// command as `buffer` has. Returns the first unused entry, or the one after that at which `each` broke off.
+/// Shows `each` the used and deleted entries from entry `from` on, with one command for all blocks of
+/// `buffer`. Returns the first unused entry, or the one after that at which `each` broke off.
 pub(crate) fn walk<D: CardDevice>(
     volume: &Volume<'_, D>,
     chain: &mut ClusterChain,
@@ -418,7 +418,7 @@ const fn hash(name: LogName) -> u32 {
     (hash ^ hash >> 15).wrapping_mul(0x85EB_CA6B)
 }
 
-/// Repairs the row of a log's clusters in these blocks of the FAT; whether any entry was lost.
+/// Repairs the row of a log's clusters in these FAT blocks; returns whether an entry was lost.
 fn mend<D: CardDevice>(
     volume: &Volume<'_, D>,
     row: &Range<u32>,
@@ -456,8 +456,8 @@ fn broken_at<D: CardDevice>(
     Ok(None)
 }
 
-/// Chains the free entries of one block of the FAT in this row; whether there were any. One block is written in each
-/// copy of the FAT, and each of its entries is valid by itself, even in a torn block.
+/// Returns whether there were free entries. One block is written in each copy of the FAT. Each entry is valid
+/// by itself, even in a torn block.
 #[inline(never)]
 fn chain_block<D: CardDevice>(
     volume: &Volume<'_, D>,

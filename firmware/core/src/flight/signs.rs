@@ -185,8 +185,7 @@ impl Flight {
         }
     }
 
-    /// The beginning of a fall or turn by an inertial sensor that others contradict: two report flight, none reports
-    /// standing, and the vehicle does not sink. The sensor is bad.
+    /// Two report flight, none reports standing, and the vehicle does not sink: the inertial sensor is bad.
     pub(super) fn doubt(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) {
         let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
             && self.pressure.follows(now, -FALLING_MPS) != Some(true);
@@ -295,7 +294,7 @@ impl Flight {
         }
     }
 
-    /// Rotors that pull downwards carry nothing: in no mode but those made for it does an autopilot or a pilot ask for that.
+    /// No autopilot or pilot asks for rotors that pull downwards, except in modes for it.
     fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
         let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
@@ -368,7 +367,7 @@ impl Flight {
         }
     }
 
-    /// How far it is below the highest that it was since it has had all its thrust, but for what a glide path takes.
+    /// Height below the highest since full thrust, less that of a glide path.
     fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
         let since_s = at.since(core::mem::replace(&mut self.peak.at, at)).as_secs_f32();
         let height_m = height_m(at, vehicle).filter(|_| thrust && self.arming.is_on);
@@ -448,14 +447,13 @@ impl Flight {
     }
 }
 
-/// Whether the autopilot wants a faster sink than the limit, and the vehicle sinks little faster than that. A
-/// mission, a script or an offboard computer then asks for it.
+/// A mission, a script or an offboard computer asks for such a sink.
 fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
     let wanted_mps = vehicle.climb_wanted.within(at, FRESH).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
 }
 
-/// Whether the autopilot wants a bank in which all the thrust of a multicopter may not carry it.
+/// In such a bank all the thrust of a multicopter may not carry it.
 fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
     vehicle
         .wanted
@@ -463,8 +461,8 @@ fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
         .is_some_and(|[roll, pitch]| vehicle.is_multicopter() && roll.0.abs().max(pitch.0.abs()) > LEANS_RAD)
 }
 
-/// Whether the display sinks too; so it is where no climb is displayed, or nothing but zeros. A receiver that loses its satellites tells
-/// of a fall that neither the barometer nor the inertial sensors know of.
+/// True also without a displayed climb, or with zeros only. A receiver that loses its satellites reports a
+/// fall that neither barometer nor inertial sensors see.
 fn is_displayed(at: Instant, sink_mps: f32, vehicle: &Vehicle) -> bool {
     const PART: f32 = 0.3;
     let climb_mps = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);

@@ -71,7 +71,7 @@ fn known<T>(value: Option<T>, cell: impl FnOnce(T) -> Cell, unknown: CellType) -
     value.map_or(Cell::Unknown(unknown), cell)
 }
 
-/// The row of a recording. It describes the whole recording, also if only a part of it is decoded.
+/// The whole recording counts, also if a part is decoded.
 pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
     let RecordingContent { overview, board, fingerprint, track, .. } = about;
     let summary = &overview.ending.summary;
@@ -97,7 +97,6 @@ pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
     Row::new(SESSIONS, cells)
 }
 
-/// The vehicle, and the firmware of both machines.
 fn machines(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let vehicle = vehicle(&about.overview);
     let of_vehicle = |of: fn(&VehicleJson) -> Option<String>| {
@@ -116,7 +115,6 @@ fn machines(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// The record itself: its size, its losses, its recorder.
 fn record(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let overview = &about.overview;
     let bytes = if overview.format.is_some() { overview.bytes_on_card } else { overview.log_bytes() };
@@ -138,7 +136,6 @@ fn record(about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     ]
 }
 
-/// Findings, parts, and who checked.
 fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cell)> {
     let contents = &about.overview.contents;
     let checked = context.checked.as_ref().map_or_else(

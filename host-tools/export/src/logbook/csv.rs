@@ -77,7 +77,6 @@ pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A flight of an earlier CSV.
 fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>) -> LogbookEntry {
     let text = |name: &str| cell(name).to_owned();
     let some = |name: &str| Some(text(name)).filter(|text| !text.is_empty());
@@ -181,7 +180,7 @@ fn plain(cell: &str) -> &str {
     cell.strip_prefix('\'').unwrap_or(cell)
 }
 
-/// The cells of a table, with the separator that its first line has: a spreadsheet of another language writes `;`.
+/// A table's cells, with the separator of its first line: a spreadsheet of another language writes `;`.
 fn rows(text: &str) -> Vec<Vec<String>> {
     let heading = text.lines().next().unwrap_or_default();
     let separator =

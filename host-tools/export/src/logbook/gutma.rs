@@ -52,7 +52,6 @@ fn one(flight: &Value, path: &Path, inputs: &Inputs) -> Result<()> {
     output.finish()
 }
 
-/// A flight as a message; `None` without UTC.
 fn exchange(entry: &LogbookEntry, known: &Known) -> Option<Value> {
     let (from, to) = entry.span?;
     let epochs = &known.identity.epochs;

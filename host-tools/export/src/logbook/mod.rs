@@ -56,7 +56,7 @@ pub(crate) struct Spot {
 /// A flight, or a session with defects alone.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LogbookEntry {
-    /// Its name: the recording's, and the number of the flight in it, from 1; 0 without a flight.
+    /// The recording's name, and the flight's number in it from 1; 0 without a flight.
     pub(crate) key: String,
     pub(crate) aircraft: String,
     pub(crate) kind: String,
@@ -242,7 +242,6 @@ fn book(sessions: &[(String, Known)]) -> Book {
     book
 }
 
-/// The type of the vehicle, and its autopilot.
 fn kind(about: &RecordingContent) -> String {
     vehicle(&about.overview).map_or_else(String::new, |of| format!("{}, {}", of.r#type, of.autopilot))
 }
@@ -266,7 +265,6 @@ fn parts(about: &RecordingContent) -> Vec<PartLine> {
     contents.components.iter().map(line).collect()
 }
 
-/// The flights of a session, or its defects alone.
 fn entries(session: usize, record: &str, known: &Known) -> Vec<LogbookEntry> {
     let (identity, about) = (&known.identity, &known.about);
     let contents = &about.overview.contents;
@@ -336,8 +334,7 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<LogbookEntry> {
     flights.iter().enumerate().map(entry).collect()
 }
 
-/// Removes flights at the time of another flight of the same aircraft: two recorders recorded it. The longer record stays.
-/// Returns the names of each pair.
+/// Removes the shorter record of a flight that two recorders recorded. Returns the names of each pair.
 fn count_once(entries: &mut Vec<LogbookEntry>) -> Vec<(String, String)> {
     let mut pairs = Vec::new();
     let mut kept: Vec<LogbookEntry> = Vec::new();
