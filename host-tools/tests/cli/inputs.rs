@@ -23,11 +23,10 @@ fn role(arg: &Arg) -> Role {
         "output" | "sd" | "gs" | "tap" | "store" | "manifest" => Role::Output,
         "around" | "bucket" | "number" | "part" | "serial" | "card" | "card_out" | "command"
         | "card_size" | "cut_after_writes" | "cut_store_after" | "folder" | "format" | "from" | "influx"
-        | "last" | "line_rate" | "link" | "listen" | "listen_token" | "message" | "name" | "names"
-        | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session" | "shell" | "span"
-        | "speed" | "split" | "stall" | "system" | "to" | "token" | "value" | "vehicle" | "write_error" => {
-            Role::Other
-        }
+        | "last" | "line_rate" | "link" | "listen" | "listen_token" | "map" | "message" | "name"
+        | "names" | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session"
+        | "shell" | "span" | "speed" | "split" | "stall" | "system" | "to" | "token" | "value"
+        | "vehicle" | "write_error" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
