@@ -344,7 +344,7 @@ impl Player {
                 self.source.phase = "playing";
             }
             PageCommand::Speed(speed) if speed.is_finite() => {
-                self.source.speed = speed.clamp(SPEEDS.0, SPEEDS.1)
+                self.source.speed = speed.clamp(SPEEDS.0, SPEEDS.1);
             }
             PageCommand::Seek(to_s) if to_s.is_finite() => {
                 let to = Instant::from_micros((to_s.max(0.0) * 1e6) as u64).clamp(loaded.start, loaded.end);
