@@ -131,7 +131,7 @@ fn what_is_not_modelled_is_told_with_its_address() {
     let cases = [
         (0x4001_2000, 1, Trouble::Register(0x4001_2000, Some(1))),
         (RCC + 0x0C, 0x100, Trouble::Register(RCC + 0x0C, Some(0x100))),
-        (0x5000_0000, 0, Trouble::Register(0x5000_0000, Some(0))),
+        (0x5005_0000, 0, Trouble::Register(0x5005_0000, Some(0))),
         (0x4002_3C14, 2, Trouble::Register(0x4002_3C14, Some(2))),
     ];
     for (address, value, trouble) in cases {
