@@ -1,6 +1,6 @@
 //! The logbook as CSV, which people continue.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -10,6 +10,7 @@ use anyhow::{Context as _, Result, bail};
 use super::{BY_HAND, Book, Life, LogbookEntry, Spot};
 use crate::files::{Inputs, Output, make_parent, settle};
 use crate::text::push_csv_text;
+use crate::utc::When;
 
 /// The columns of the recordings. The first one names a flight.
 const COLUMNS: [&str; 18] = [
@@ -46,6 +47,11 @@ pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
     {
         bail!("{}: exists and is no logbook of this command; name another output", path.display());
     }
+    let mut names = BTreeSet::new();
+    if let Some(name) = heading.iter().find(|name| !names.insert(name.as_str())) {
+        bail!("{}: line 1 has two columns of the name `{name}`; rename or delete one", path.display());
+    }
+    let mut keys = BTreeSet::new();
     for (line, row) in (2..).zip(rows) {
         let cells: BTreeMap<&str, &str> =
             heading.iter().map(String::as_str).zip(row.iter().map(|cell| plain(cell))).collect();
@@ -59,17 +65,25 @@ pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
                 path.display()
             );
         }
+        if !keys.insert(cell("flight").to_owned()) {
+            let key = cell("flight");
+            bail!(
+                "{}: line {line}: the flight {key} is there twice; delete one of its lines",
+                path.display()
+            );
+        }
         let is_of_people = |name: &&&str| !COLUMNS.contains(*name);
         let by_hand =
             cells.keys().filter(is_of_people).map(|name| ((*name).to_owned(), cell(name).to_owned()));
         let by_hand: BTreeMap<String, String> = by_hand.collect();
         let known = book.values_mut().flat_map(|aircraft| &mut aircraft.entries);
         if let Some(entry) = known.into_iter().find(|entry| entry.key == cell("flight")) {
-            entry.by_hand = by_hand;
+            entry.add_by_hand(by_hand);
             continue;
         }
         let aircraft = book.entry(cell("aircraft").to_owned()).or_default();
-        aircraft.entries.push(entry(&cell, by_hand));
+        let entry = entry(&cell, by_hand).with_context(|| format!("{}: line {line}", path.display()))?;
+        aircraft.entries.push(entry);
     }
     for aircraft in book.values_mut() {
         aircraft.entries.sort_by(|one, other| one.take_off.cmp(&other.take_off));
@@ -77,33 +91,55 @@ pub(super) fn merge(book: &mut Book, path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>) -> LogbookEntry {
+/// A flight of an earlier CSV. An error for a cell that would be lost.
+fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>) -> Result<LogbookEntry> {
     let text = |name: &str| cell(name).to_owned();
     let some = |name: &str| Some(text(name)).filter(|text| !text.is_empty());
-    let number = |name: &str| cell(name).replace(',', ".").parse::<f64>().ok();
+    let number = |name: &str| match cell(name) {
+        "" => Ok(None),
+        text => match text.replace(',', ".").parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => bail!("`{text}` in the column {name} is no number; mend it"),
+        },
+    };
     let spot = |name: &str| {
         let part = |axis: &str| number(&format!("{name}_{axis}_deg"));
-        Some(Spot { latitude_deg: part("latitude")?, longitude_deg: part("longitude")? })
+        match (part("latitude")?, part("longitude")?) {
+            (Some(latitude_deg), Some(longitude_deg)) => Ok(Some(Spot { latitude_deg, longitude_deg })),
+            (None, None) => Ok(None),
+            _ => bail!("the columns {name}_latitude_deg and {name}_longitude_deg need both numbers or none"),
+        }
     };
-    LogbookEntry {
+    let duration_s = number("duration_s")?.unwrap_or(0.0);
+    let end_us =
+        |from: u64| utc_us(cell("landing_utc")).unwrap_or(from.saturating_add((duration_s * 1e6) as u64));
+    Ok(LogbookEntry {
         key: text("flight"),
         aircraft: text("aircraft"),
         kind: text("type"),
         firmware: text("firmware"),
         take_off: some("take_off_utc"),
         landing: some("landing_utc"),
-        duration_s: number("duration_s").unwrap_or(0.0),
-        from: spot("take_off"),
-        to: spot("landing"),
-        charge_ah: number("charge_ah"),
-        voltage_min_v: number("voltage_min_v"),
+        duration_s,
+        from: spot("take_off")?,
+        to: spot("landing")?,
+        charge_ah: number("charge_ah")?,
+        voltage_min_v: number("voltage_min_v")?,
         incident: text("incident"),
         defects: text("defects"),
         record: text("record"),
         by_hand,
         span: None,
-        utc_us: None,
+        utc_us: utc_us(cell("take_off_utc")).map(|from| (from, end_us(from))),
         session: None,
+    })
+}
+
+/// Microseconds since 1970. A spreadsheet may write a time without its zone.
+fn utc_us(text: &str) -> Option<u64> {
+    match text.parse().or_else(|_| format!("{text}Z").parse()) {
+        Ok(When::Utc(utc_us)) => Some(utc_us),
+        _ => None,
     }
 }
 
@@ -267,6 +303,76 @@ mod tests {
             merge(&mut again, &path).expect("merged");
             assert_eq!(again["uid-1"].entries.len(), 1);
             assert_eq!(again["uid-1"].entries[0].by_hand.get("pilot").map(String::as_str), Some("A. Pilot"));
+        }
+    }
+
+    /// Two recorders of a flight, each in a call of its own.
+    #[test]
+    fn a_flight_of_an_earlier_call_counts_once() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("logbook.csv");
+        let live = |key: &str, second: u64, duration_s: f64, by_hand: &[(&str, &str)]| {
+            let from_us = 1_795_256_000_000_000 + second * 1_000_000;
+            let to_us = from_us + (duration_s * 1e6) as u64;
+            LogbookEntry {
+                take_off: Some(crate::utc::iso8601(from_us)),
+                landing: Some(crate::utc::iso8601(to_us)),
+                duration_s,
+                utc_us: Some((from_us, to_us)),
+                by_hand: by_hand
+                    .iter()
+                    .map(|(name, cell)| ((*name).to_owned(), (*cell).to_owned()))
+                    .collect(),
+                ..flight(key, "")
+            }
+        };
+        // Also a record that ends in the air, and times that a spreadsheet wrote.
+        for (open, zone) in [(false, "Z"), (true, "Z"), (false, "")] {
+            for longer in [100.0, 300.0] {
+                let mut ground = live("r1-1", 10, 200.0, &[("pilot", "A. Pilot"), ("remarks", "one")]);
+                if open {
+                    ground.landing = None;
+                }
+                let next = live("r1-2", 5000, 60.0, &[]);
+                write(&book(vec![ground, next]), &path).expect("written");
+                let text = fs::read_to_string(&path).expect("text").replace("Z,", &format!("{zone},"));
+                fs::write(&path, text).expect("written");
+                for _ in 0..2 {
+                    let mut card = book(vec![live("s2-1", 0, longer, &[])]);
+                    merge(&mut card, &path).expect("merged");
+                    let entries = &mut card.get_mut("uid-1").expect("there").entries;
+                    super::super::count_once(entries);
+                    let keys: Vec<&str> = entries.iter().map(|entry| entry.key.as_str()).collect();
+                    assert_eq!(
+                        keys,
+                        [if longer > 200.0 { "s2-1" } else { "r1-1" }, "r1-2"],
+                        "{open} {zone:?}"
+                    );
+                    assert_eq!(entries[0].by_hand["pilot"], "A. Pilot");
+                    assert_eq!(entries[0].by_hand["remarks"], "one");
+                    write(&card, &path).expect("written");
+                }
+            }
+        }
+    }
+
+    /// A cell that cannot be kept is never lost without a word.
+    #[test]
+    fn cells_that_would_be_lost_are_refused_with_their_line() {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("logbook.csv");
+        for (text, said) in [
+            ("flight,aircraft,,\ns1-1,uid-1,a,b\n", "line 1"),
+            ("flight,aircraft,own,own\ns1-1,uid-1,a,b\n", "line 1"),
+            ("flight,aircraft,own\ns1-1,uid-1,a\ns2-1,uid-1,b\ns1-1,uid-1,c\n", "line 4"),
+            ("flight,aircraft,duration_s\ns1-1,uid-1,\"1.234,5\"\n", "line 2"),
+            ("flight,aircraft,charge_ah\ns1-1,uid-1,nan\n", "line 2"),
+            ("flight,aircraft,landing_latitude_deg\ns1-1,uid-1,north\n", "line 2"),
+            ("flight,aircraft,landing_latitude_deg\ns1-1,uid-1,51.5\n", "line 2"),
+        ] {
+            fs::write(&path, text).expect("written");
+            let error = format!("{:#}", merge(&mut Book::new(), &path).expect_err(text));
+            assert!(error.contains(said), "{text}: {error}");
         }
     }
 

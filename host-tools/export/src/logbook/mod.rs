@@ -74,7 +74,7 @@ pub(crate) struct LogbookEntry {
     pub(crate) by_hand: BTreeMap<String, String>,
     /// Times of it in the recording; `None` from an earlier CSV.
     pub(crate) span: Option<(Instant, Instant)>,
-    /// The same in microseconds since 1970, if known.
+    /// Take-off and landing, or the end of the record, in microseconds since 1970, if known.
     pub(crate) utc_us: Option<(u64, u64)>,
     pub(crate) session: Option<usize>,
 }
@@ -118,6 +118,23 @@ impl Aircraft {
 impl LogbookEntry {
     pub(crate) fn is_flight(&self) -> bool {
         !self.key.ends_with("-0")
+    }
+
+    /// The name of its recording.
+    fn recording(&self) -> &str {
+        self.key.rsplit_once('-').map_or(&self.key, |(recording, _)| recording)
+    }
+
+    /// Adds cells of people. Different texts of one column both stay.
+    fn add_by_hand(&mut self, cells: BTreeMap<String, String>) {
+        for (name, cell) in cells {
+            let own = self.by_hand.entry(name).or_default();
+            if own.is_empty() {
+                *own = cell;
+            } else if !cell.is_empty() && *own != cell {
+                *own = format!("{own}; {cell}");
+            }
+        }
     }
 }
 
@@ -163,14 +180,14 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     }
     let sessions: Vec<(String, Known)> = read.into_values().collect();
     let mut book = book(&sessions);
+    for (_, path) in forms.iter().filter(|(form, _)| *form == Form::Csv) {
+        csv::merge(&mut book, path)?;
+    }
     // A system id is no proof that two flights at once are of one aircraft.
     for (_, aircraft) in book.iter_mut().filter(|(name, _)| name.starts_with("uid-")) {
         for (once, again) in count_once(&mut aircraft.entries) {
             note!("{again}: is the flight of {once}, by another recorder; it is counted once");
         }
-    }
-    for (_, path) in forms.iter().filter(|(form, _)| *form == Form::Csv) {
-        csv::merge(&mut book, path)?;
     }
     let flights: u64 = book.values().map(|aircraft| aircraft.totals().flights as u64).sum();
     if book.is_empty() {
@@ -334,23 +351,26 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<LogbookEntry> {
     flights.iter().enumerate().map(entry).collect()
 }
 
-/// Removes the shorter record of a flight that two recorders recorded. Returns the names of each pair.
+/// Removes flights at the time of another flight of the same aircraft: two recorders recorded it. The longer record stays,
+/// with the cells of people of both. Returns the names of each pair.
 fn count_once(entries: &mut Vec<LogbookEntry>) -> Vec<(String, String)> {
     let mut pairs = Vec::new();
     let mut kept: Vec<LogbookEntry> = Vec::new();
-    for entry in std::mem::take(entries) {
+    for mut entry in std::mem::take(entries) {
         let is_same = |other: &LogbookEntry| {
-            entry.session != other.session
+            entry.recording() != other.recording()
                 && entry
                     .utc_us
                     .zip(other.utc_us)
                     .is_some_and(|((from, to), (begin, end))| from < end && begin < to)
         };
         match kept.iter().position(is_same).and_then(|index| kept.get_mut(index)) {
-            Some(other) if other.duration_s >= entry.duration_s => pairs.push((other.key.clone(), entry.key)),
             Some(other) => {
-                pairs.push((entry.key.clone(), other.key.clone()));
-                *other = entry;
+                if other.duration_s < entry.duration_s {
+                    std::mem::swap(other, &mut entry);
+                }
+                other.add_by_hand(entry.by_hand);
+                pairs.push((other.key.clone(), entry.key));
             }
             None => kept.push(entry),
         }
