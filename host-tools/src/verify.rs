@@ -89,7 +89,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         output::line(&format!("{}: {words}", count(all.logs, "session")))?;
     }
     if let Some(to) = &args.manifest {
-        manifest.write(cli::PROGRAM, to, &args.inputs, &read, &[], &inputs)?;
+        manifest.write(cli::PROGRAM, to, &args.inputs, &read, &BTreeSet::new(), &inputs)?;
     }
     if failed > 0 {
         bail!("{failed} of {} could not be read", count(found.logs.len() as u64, "log"));

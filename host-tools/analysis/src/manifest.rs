@@ -74,7 +74,7 @@ impl Manifest {
         });
     }
 
-    /// Hashes all files, tells people of them, and writes the manifest. Inputs are named from the `given` paths on.
+    /// Hashes all files, tells people of them, and writes the manifest. Files are named from the `given` paths on.
     /// Outputs may be folders.
     ///
     /// # Errors
@@ -85,7 +85,7 @@ impl Manifest {
         to: &Path,
         given: &[PathBuf],
         inputs: &BTreeSet<PathBuf>,
-        outputs: &[PathBuf],
+        outputs: &BTreeSet<PathBuf>,
         refuse: &Inputs,
     ) -> Result<()> {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -93,7 +93,7 @@ impl Manifest {
         self.inputs =
             inputs.iter().map(|path| hashed(path, &name_below(path, given))).collect::<Result<_>>()?;
         for output in outputs {
-            self.outputs.extend(below(output)?);
+            self.outputs.extend(below(output, given)?);
         }
         refuse.refuse(to)?;
         let mut file = Output::create(to, refuse)?;
@@ -111,7 +111,8 @@ impl Manifest {
 }
 
 /// Files below, or itself, by name.
-fn below(output: &Path) -> Result<Vec<FileJson>> {
+fn below(output: &Path, given: &[PathBuf]) -> Result<Vec<FileJson>> {
+    let roots: Vec<PathBuf> = given.iter().cloned().chain([output.to_owned()]).collect();
     let mut files = Vec::new();
     let mut waiting = vec![output.to_owned()];
     while let Some(path) = waiting.pop() {
@@ -121,7 +122,7 @@ fn below(output: &Path) -> Result<Vec<FileJson>> {
                 waiting.push(entry.with_context(context)?.path());
             }
         } else {
-            files.push(hashed(&path, &name_below(&path, &[output.to_owned()]))?);
+            files.push(hashed(&path, &name_below(&path, &roots))?);
         }
     }
     files.sort_by(|one, other| one.file.cmp(&other.file));

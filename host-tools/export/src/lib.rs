@@ -173,7 +173,7 @@ pub fn run(args: &DecodeRequest) -> Result<Outcome> {
     };
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);
-    let (mut manifest, mut made) = (Manifest::default(), Vec::new());
+    let (mut manifest, mut made) = (Manifest::default(), BTreeSet::new());
     let mut tell = |done: Done| {
         if !is_wanted(&done.name) {
             return Ok(());
@@ -181,7 +181,7 @@ pub fn run(args: &DecodeRequest) -> Result<Outcome> {
         outcome = outcome.and(done.outcome());
         written |= done.written;
         manifest.log(&done.name, done.soundness(), done.ending.as_ref(), &done.remarks);
-        made.extend(done.made.iter().map(|made| made.path().to_owned()));
+        made.extend(done.made.iter().flat_map(OutputFile::files).cloned());
         done.tell(json.as_mut())
     };
     side_by_side(
@@ -195,7 +195,10 @@ pub fn run(args: &DecodeRequest) -> Result<Outcome> {
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
-        manifest.write(args.program, to, &given, &read, &made, &task.inputs)?;
+        // A longer log of the same session may have replaced the tables of a shorter one.
+        made.retain(|path| path.exists());
+        let roots: Vec<PathBuf> = given.iter().chain([&args.output]).cloned().collect();
+        manifest.write(args.program, to, &roots, &read, &made, &task.inputs)?;
     }
     if !written {
         bail!("nothing of what was asked for is there, so nothing was written");

@@ -1,7 +1,7 @@
 //! The outputs of a decoding, for people and as JSON.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
@@ -35,6 +35,9 @@ pub struct OutputFile {
     counts: BTreeMap<String, u64>,
     #[serde(skip)]
     words: String,
+    /// The files, if they are in several folders.
+    #[serde(skip)]
+    files: Vec<PathBuf>,
 }
 
 impl OutputFile {
@@ -42,17 +45,23 @@ impl OutputFile {
     pub fn of(path: PathBuf, format: &'static str, counts: &[(u64, &str)]) -> Self {
         let words: Vec<String> = counts.iter().map(|(number, thing)| count(*number, thing)).collect();
         let counts = counts.iter().map(|(number, thing)| (noun(2, thing), *number)).collect();
-        Self { path, format, counts, words: words.join(", ") }
+        Self { path, format, counts, words: words.join(", "), files: Vec::new() }
     }
 
     /// With this description.
     pub fn with_words(path: PathBuf, format: &'static str, words: String) -> Self {
-        Self { path, format, counts: BTreeMap::new(), words }
+        Self { path, format, counts: BTreeMap::new(), words, files: Vec::new() }
     }
 
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// With these files in several folders.
+    #[must_use]
+    pub fn with_files(self, files: Vec<PathBuf>) -> Self {
+        Self { files, ..self }
+    }
+
+    /// Its files and folders.
+    pub fn files(&self) -> &[PathBuf] {
+        if self.files.is_empty() { std::slice::from_ref(&self.path) } else { &self.files }
     }
 
     /// For people.

@@ -200,16 +200,16 @@ impl Session {
         file.with_context(|| cannot_write(&self.path(table, part)))
     }
 
-    /// Closed files take their places. Of two recordings of one session in one call the longer stays; `false`
-    /// for the other.
-    pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<bool> {
+    /// All files are there and closed: they take their places. Of two recordings of one session in one call the longer one
+    /// stays; `None` if that is the other one. Returns the paths of the files.
+    pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<Option<Vec<PathBuf>>> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
         let Self { transaction, name, .. } = self;
         let lock = transaction::lock(&fleet.root)?;
         let mut written = fleet.written.lock().unwrap_or_else(PoisonError::into_inner);
         let found = fleet.find(&name)?;
         match (written.get(&name), &found) {
-            (Some(other), _) if *other >= frames => return Ok(false),
+            (Some(other), _) if *other >= frames => return Ok(None),
             (None, Some(found)) => fleet.check(&name, found, &context.inputs)?,
             _ => {}
         }
@@ -217,8 +217,8 @@ impl Session {
             Some(Found::Alone(partition)) => fleet.files(&name, &partition)?,
             _ => BTreeSet::new(),
         };
-        transaction.commit(&lock, &replaced, &[])?;
+        let files = transaction.commit(&lock, &replaced, &[])?;
         written.insert(name, frames);
-        Ok(true)
+        Ok(Some(files))
     }
 }

@@ -75,7 +75,7 @@ fn add(root: &Path, number: u64, date: Option<&str>, rows: i64, force: bool) -> 
     for name in TABLES {
         table(open.file(name, 1)?, &context.identity.vehicle, &session(number), 0..rows);
     }
-    open.finish(&context, rows as u64)
+    Ok(open.finish(&context, rows as u64)?.is_some())
 }
 
 fn rows(root: &Path, table: &str) -> Vec<(String, i64)> {
@@ -179,6 +179,57 @@ fn a_session_that_is_replaced_is_the_old_one_or_the_new_one_after_a_stop_at_any_
     assert!(old > 1 && new > 3, "{old} {new}");
 }
 
+/// A kill while the folder of a complete change is removed.
+#[test]
+fn a_complete_change_is_never_applied_again_whatever_is_left_of_its_folder() {
+    for gone in ["", "replaced", "compacted", "files"] {
+        let dir = tempfile::tempdir().expect("a directory");
+        let root = dir.path();
+        assert!(add(root, 7, None, 10, false).expect("added"));
+        let before = all_rows(root);
+        let own = root.join(OWN);
+        let left = own.join("commit-abc.hums-part");
+        fs::create_dir_all(left.join("files")).expect("made");
+        let file = format!("A/{}/{}", partition("uid-0000000000000007", None), file_name(&session(7), 1));
+        assert!(root.join(&file).exists());
+        fs::write(left.join("replaced"), format!("{file}\n")).expect("written");
+        fs::write(left.join("compacted"), "").expect("written");
+        match left.join(gone) {
+            path if gone.is_empty() => assert!(path.exists()),
+            path if path.is_dir() => fs::remove_dir(path).expect("removed"),
+            path => fs::remove_file(path).expect("removed"),
+        }
+        assert!(add(root, 8, None, 4, false).expect("added"), "without {gone:?}");
+        assert!(!left.exists(), "without {gone:?}");
+        let rows = all_rows(root);
+        assert!(before.iter().zip(&rows).all(|(before, rows)| rows.starts_with(before)), "without {gone:?}");
+    }
+}
+
+/// A folder of tables may come from elsewhere.
+#[test]
+fn a_change_that_names_files_elsewhere_removes_none() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let root = dir.path().join("fleet");
+    assert!(add(&root, 7, None, 10, false).expect("added"));
+    let (mine, inside) = (dir.path().join("mine.txt"), root.join("A/inside.txt"));
+    fs::write(&mine, "mine").expect("written");
+    fs::write(&inside, "inside").expect("written");
+    let begun = root.join(OWN).join("commit-abc");
+    for line in ["../mine.txt", mine.to_str().expect("text"), "A/../../mine.txt", ""] {
+        fs::create_dir_all(begun.join("files")).expect("made");
+        fs::write(begun.join("replaced"), format!("A/inside.txt\n{line}\n")).expect("written");
+        fs::write(begun.join("compacted"), "").expect("written");
+        let error = add(&root, 8, None, 4, false).expect_err(line);
+        assert!(format!("{error:#}").contains("outside of the tables"), "{error:#}");
+        assert!(mine.exists() && inside.exists(), "{line}");
+    }
+    fs::write(begun.join("replaced"), "A/inside.txt\n").expect("written");
+    assert!(add(&root, 8, None, 4, false).expect("added"));
+    assert!(mine.exists() && !inside.exists());
+}
+
+/// Several programs at once, each with the same sessions in another order.
 #[test]
 fn programs_that_add_the_same_sessions_at_once_add_each_once() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -208,7 +259,7 @@ fn the_longer_log_of_a_session_stays() {
             for name in TABLES {
                 table(open.file(name, 1).expect("a file"), "uid-1", &session(1), 0..rows);
             }
-            open.finish(&context, rows as u64).expect("finished")
+            open.finish(&context, rows as u64).expect("finished").is_some()
         });
         assert_eq!(kept, [true, order[1] == 20]);
         assert!(all_rows(dir.path()).iter().all(|rows| rows.len() == 20));

@@ -10,7 +10,7 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use tempfile::TempDir;
@@ -78,15 +78,25 @@ pub(crate) fn lock(root: &Path) -> Result<Lock> {
     }
     let lock = Lock(file);
     for name in names(&own)?.iter().filter(|name| name.starts_with(COMMIT)) {
-        note!("{}: a change that an earlier run began is completed", root.display());
-        settle(apply(root, &own.join(name)), root)?;
+        let folder = own.join(name);
+        if is_begun(name) {
+            note!("{}: a change that an earlier run began is completed", root.display());
+            settle(apply(root, &folder), root)?;
+        } else {
+            settle(fs::remove_dir_all(&folder), &folder)?;
+        }
     }
     Ok(lock)
 }
 
 pub(crate) fn recover(root: &Path) -> Result<()> {
-    let is_begun = names(&root.join(OWN))?.iter().any(|name| name.starts_with(COMMIT));
+    let is_begun = names(&root.join(OWN))?.iter().any(|name| is_begun(name));
     if is_begun { lock(root).map(|_| ()) } else { Ok(()) }
+}
+
+/// Whether the change in a folder of this name counts and is not complete. The folder of a complete one may lack its lists.
+fn is_begun(name: &str) -> bool {
+    name.starts_with(COMMIT) && !name.ends_with(PART)
 }
 
 /// A change that does not count yet. Dropped, it leaves nothing.
@@ -112,9 +122,14 @@ impl Transaction {
         self.part.path().join(FILES).join(place)
     }
 
-    /// Makes the change count, and carries it out. `replaced` are places of files, `compacted` are sessions
-    /// of shared files.
-    pub(crate) fn commit(self, _: &Lock, replaced: &BTreeSet<String>, compacted: &[String]) -> Result<()> {
+    /// The change counts from here on, and is carried out. `replaced` are the places of files that go, `compacted` the
+    /// sessions that are in a file of several. Returns the paths of the new files.
+    pub(crate) fn commit(
+        self,
+        _: &Lock,
+        replaced: &BTreeSet<String>,
+        compacted: &[String],
+    ) -> Result<Vec<PathBuf>> {
         let Self { root, part } = self;
         let mut places = Vec::new();
         let listed = each(&part.path().join(FILES), "", &mut |place| {
@@ -123,14 +138,15 @@ impl Transaction {
         });
         settle(listed, &root)?;
         // A change that counts must be possible.
-        for place in places {
-            check_parent(&place)?;
+        for place in &places {
+            check_parent(place)?;
             if place.is_dir() {
                 bail!("{}: is a directory, and a file is needed there; move it away", place.display());
             }
         }
         let committed = Self::count(&root, part, replaced, compacted);
-        settle(committed.and_then(|folder| apply(&root, &folder)), &root)
+        settle(committed.and_then(|folder| apply(&root, &folder)), &root)?;
+        Ok(places)
     }
 
     fn count(
@@ -153,9 +169,7 @@ impl Transaction {
             file.write_all(text.as_bytes())?;
             file.sync_all()?;
         }
-        if !replaced.is_empty() {
-            sync_all(&files)?;
-        }
+        sync_all(&files)?;
         let unique = part.path().file_name().unwrap_or_default().to_string_lossy();
         let unique = unique.trim_matches('.').trim_end_matches(PART);
         let folder = root.join(OWN).join(format!("{COMMIT}{unique}"));
@@ -167,7 +181,7 @@ impl Transaction {
     }
 }
 
-/// The replaced files are removed after this.
+/// Writes all files of a folder to the disk. A change that counts must have them after a power cut.
 fn sync_all(folder: &Path) -> io::Result<()> {
     each(folder, "", &mut |place| File::open(folder.join(place))?.sync_all())
 }
@@ -175,7 +189,14 @@ fn sync_all(folder: &Path) -> io::Result<()> {
 /// Each step may have been done before.
 fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     let files = folder.join(FILES);
-    for place in fs::read_to_string(folder.join(REPLACED))?.lines() {
+    let replaced = fs::read_to_string(folder.join(REPLACED))?;
+    if let Some(place) = replaced.lines().find(|place| !is_inside(place)) {
+        return Err(io::Error::other(format!(
+            "{}: wants to remove {place}, which is outside of the tables; if it is not your own, delete this folder",
+            folder.display()
+        )));
+    }
+    for place in replaced.lines() {
         stop::step()?;
         match fs::remove_file(root.join(place)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
@@ -203,6 +224,13 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     fs::remove_dir_all(done)
 }
 
+/// Whether a place of a list is below the folder of the tables.
+fn is_inside(place: &str) -> bool {
+    let mut parts = Path::new(place).components();
+    !place.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// Calls `take` with the place of each file below a folder.
 fn each(folder: &Path, prefix: &str, take: &mut dyn FnMut(&str) -> io::Result<()>) -> io::Result<()> {
     let mut entries = fs::read_dir(folder.join(prefix))?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);

@@ -239,8 +239,8 @@ impl Writer for Parquet {
         }
         let (session, tables) = self.0.finish()?;
         let path = session.path(SESSIONS, 1);
-        if session.finish(context, totals.frames)? {
-            let finished = Finished::from(totals.of_tables(path, "parquet", tables));
+        if let Some(files) = session.finish(context, totals.frames)? {
+            let finished = Finished::from(totals.of_tables(path, "parquet", tables).with_files(files));
             let today_us =
                 SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |now| now.as_micros() as u64);
             let tomorrow = iso8601(today_us + DAY_US);
@@ -412,9 +412,10 @@ mod tests {
             let (session, count) = tables.finish().expect("finish");
             assert_eq!(count, 2);
             let paths: Vec<PathBuf> = (1..100).map(|part| session.path("ATTITUDE", part)).collect();
-            assert!(session.finish(&context, 4000).expect("finish"));
+            let made = session.finish(&context, 4000).expect("finish").expect("files");
             let mut seconds = Vec::new();
             let files: Vec<PathBuf> = paths.into_iter().take_while(|path| path.exists()).collect();
+            assert!(files.iter().all(|path| made.contains(path)) && made.iter().all(|path| path.exists()));
             for path in &files {
                 let file = File::open(path).expect("a file");
                 let reader = SerializedFileReader::new(file).expect("a Parquet file");
