@@ -55,6 +55,10 @@ fn tried(command: &str) -> Tried {
         }
         "check" => lines(&["check IN"]),
         "due" => lines(&["due IN"]),
+        "logbook" => {
+            lines(&["logbook IN -o OUT/logbook.csv -o OUT/logbook.html", "logbook IN -o OUT/flights/"])
+        }
+        "compact" => Tried::Nothing("tables of its own, whose groups have a limit of values"),
         "share" => lines(&["share IN -o OUT/shared"]),
         "report" => lines(&["report IN -o OUT/page.html", "report IN -o OUT/pages.html --compare"]),
         "decode" => {
