@@ -313,6 +313,11 @@ fn render(messages: &BTreeMap<u32, Message>) -> Result<String> {
         }
         writeln!(out, "    ] }},")?;
     }
-    out.push_str("];\n");
+    out.push_str("];\n\n/// The id of each message, by its name in the definitions.\npub mod ids {\n");
+    for (id, message) in messages {
+        let name = &message.name;
+        writeln!(out, "    /// `{name}`\n    pub const {name}: u32 = {id};")?;
+    }
+    out.push_str("}\n");
     Ok(out)
 }

@@ -187,9 +187,9 @@ mod tests {
 
     #[test]
     fn lengths_count_extensions_apart() {
-        let heartbeat = message(0).expect("HEARTBEAT");
+        let heartbeat = message(ids::HEARTBEAT).expect("HEARTBEAT");
         assert_eq!((heartbeat.len_base, heartbeat.len_max), (9, 9));
-        let gps = message(24).expect("GPS_RAW_INT");
+        let gps = message(ids::GPS_RAW_INT).expect("GPS_RAW_INT");
         assert_eq!((gps.len_base, gps.len_max), (30, 52));
     }
 

@@ -22,6 +22,7 @@
 use hums_core::cells::{self, KNOWN};
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Autopilot, Source};
+use hums_dialect::ids;
 
 use crate::messages;
 use crate::packet::Packet;
@@ -42,7 +43,6 @@ const PATIENCE_MAX: u8 = 6;
 pub const SET_MESSAGE_INTERVAL: u16 = 511;
 /// `MAV_CMD_REQUEST_MESSAGE`
 pub const REQUEST_MESSAGE: u16 = 512;
-const AUTOPILOT_VERSION: u32 = 148;
 /// A `MAV_RESULT`.
 const ACCEPTED: u8 = 0;
 /// As above.
@@ -64,40 +64,40 @@ type Wanted = (u32, By, u8, u8);
 
 /// Most important first.
 const WANTED: [Wanted; 34] = [
-    (1, By::Both, 5, 43),            // SYS_STATUS
-    (30, By::Both, 10, 40),          // ATTITUDE
-    (33, By::Both, 5, 40),           // GLOBAL_POSITION_INT
-    (24, By::Both, 5, 64),           // GPS_RAW_INT
-    (147, By::Both, 1, 66),          // BATTERY_STATUS
-    (74, By::Both, 4, 32),           // VFR_HUD
-    (241, By::Both, 5, 44),          // VIBRATION
-    (2, By::Both, 1, 24),            // SYSTEM_TIME
-    (65, By::Both, 2, 54),           // RC_CHANNELS
-    (245, By::Both, 2, 14),          // EXTENDED_SYS_STATE
-    (36, By::Both, 5, 49),           // SERVO_OUTPUT_RAW
-    (83, By::Both, 8, 49),           // ATTITUDE_TARGET
-    (230, By::Px4, 5, 54),           // ESTIMATOR_STATUS
-    (291, By::Px4, 5, 69),           // ESC_STATUS
-    (290, By::Px4, 1, 58),           // ESC_INFO
-    (105, By::Px4, 20, 75),          // HIGHRES_IMU
-    (193, By::ArduPilot, 5, 34),     // EKF_STATUS_REPORT
-    (62, By::ArduPilot, 2, 38),      // NAV_CONTROLLER_OUTPUT
-    (125, By::ArduPilot, 1, 18),     // POWER_STATUS
-    (11_030, By::ArduPilot, 5, 112), // ESC_TELEMETRY_1_TO_4, and 5_TO_8 with it
-    (27, By::ArduPilot, 10, 41),     // RAW_IMU
-    (226, By::ArduPilot, 2, 20),     // RPM
-    (225, By::ArduPilot, 2, 82),     // EFI_STATUS
-    (373, By::ArduPilot, 2, 54),     // GENERATOR_STATUS
-    (11_039, By::ArduPilot, 1, 22),  // MCU_STATUS
-    (29, By::ArduPilot, 5, 28),      // SCALED_PRESSURE
-    (178, By::ArduPilot, 5, 36),     // AHRS2
-    (116, By::Both, 8, 36),          // SCALED_IMU2
-    (129, By::Both, 8, 36),          // SCALED_IMU3
-    (137, By::Both, 5, 28),          // SCALED_PRESSURE2
-    (143, By::Both, 2, 28),          // SCALED_PRESSURE3
-    (124, By::Both, 1, 69),          // GPS2_RAW
-    (85, By::Both, 2, 63),           // POSITION_TARGET_LOCAL_NED
-    (32, By::Both, 5, 40),           // LOCAL_POSITION_NED
+    (ids::SYS_STATUS, By::Both, 5, 43),
+    (ids::ATTITUDE, By::Both, 10, 40),
+    (ids::GLOBAL_POSITION_INT, By::Both, 5, 40),
+    (ids::GPS_RAW_INT, By::Both, 5, 64),
+    (ids::BATTERY_STATUS, By::Both, 1, 66),
+    (ids::VFR_HUD, By::Both, 4, 32),
+    (ids::VIBRATION, By::Both, 5, 44),
+    (ids::SYSTEM_TIME, By::Both, 1, 24),
+    (ids::RC_CHANNELS, By::Both, 2, 54),
+    (ids::EXTENDED_SYS_STATE, By::Both, 2, 14),
+    (ids::SERVO_OUTPUT_RAW, By::Both, 5, 49),
+    (ids::ATTITUDE_TARGET, By::Both, 8, 49),
+    (ids::ESTIMATOR_STATUS, By::Px4, 5, 54),
+    (ids::ESC_STATUS, By::Px4, 5, 69),
+    (ids::ESC_INFO, By::Px4, 1, 58),
+    (ids::HIGHRES_IMU, By::Px4, 20, 75),
+    (ids::EKF_STATUS_REPORT, By::ArduPilot, 5, 34),
+    (ids::NAV_CONTROLLER_OUTPUT, By::ArduPilot, 2, 38),
+    (ids::POWER_STATUS, By::ArduPilot, 1, 18),
+    (ids::ESC_TELEMETRY_1_TO_4, By::ArduPilot, 5, 112), // The autopilot sends 5_TO_8 with it.
+    (ids::RAW_IMU, By::ArduPilot, 10, 41),
+    (ids::RPM, By::ArduPilot, 2, 20),
+    (ids::EFI_STATUS, By::ArduPilot, 2, 82),
+    (ids::GENERATOR_STATUS, By::ArduPilot, 2, 54),
+    (ids::MCU_STATUS, By::ArduPilot, 1, 22),
+    (ids::SCALED_PRESSURE, By::ArduPilot, 5, 28),
+    (ids::AHRS2, By::ArduPilot, 5, 36),
+    (ids::SCALED_IMU2, By::Both, 8, 36),
+    (ids::SCALED_IMU3, By::Both, 8, 36),
+    (ids::SCALED_PRESSURE2, By::Both, 5, 28),
+    (ids::SCALED_PRESSURE3, By::Both, 2, 28),
+    (ids::GPS2_RAW, By::Both, 1, 69),
+    (ids::POSITION_TARGET_LOCAL_NED, By::Both, 2, 63),
+    (ids::LOCAL_POSITION_NED, By::Both, 5, 40),
 ];
 
 /// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.
@@ -412,7 +412,7 @@ fn packet(what: What, known: &Known) -> Packet {
             messages::command_long(REQUEST_MESSAGE, &[WANTED[index].0 as f32], system, component)
         }
         What::Identity => {
-            messages::command_long(REQUEST_MESSAGE, &[AUTOPILOT_VERSION as f32], system, component)
+            messages::command_long(REQUEST_MESSAGE, &[ids::AUTOPILOT_VERSION as f32], system, component)
         }
         What::Parameter(place) => messages::param_request_read(KNOWN[place].1, system, component),
     }

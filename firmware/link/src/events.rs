@@ -6,16 +6,11 @@
 
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
+use hums_dialect::ids::{CURRENT_EVENT_SEQUENCE, EVENT, RESPONSE_EVENT_ERROR};
 
 use crate::messages;
 use crate::packet::{Fields, Packet};
 
-/// `EVENT`
-const EVENT: u32 = 410;
-/// `CURRENT_EVENT_SEQUENCE`
-const CURRENT_EVENT_SEQUENCE: u32 = 411;
-/// `RESPONSE_EVENT_ERROR`
-const RESPONSE_EVENT_ERROR: u32 = 413;
 /// More than PX4 stores: a wider gap is a restart of the autopilot, or too old.
 const GAP_MAX: u16 = 20;
 const ANSWER: Span = Span::from_secs(1);

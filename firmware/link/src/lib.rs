@@ -23,5 +23,6 @@ pub mod text;
 
 pub use frame::{Check, Frame};
 pub use framer::{Framer, FramerCounts};
+pub use hums_dialect::ids;
 pub use long_text::LongTexts;
 pub use observe::observe;

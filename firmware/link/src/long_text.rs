@@ -5,13 +5,12 @@ use hums_core::cause::Alert;
 use hums_core::clock::Instant;
 use hums_core::observation::Source;
 use hums_core::time::{self, Span};
+use hums_dialect::ids::STATUSTEXT;
 
 use crate::frame::{Check, Frame};
 use crate::packet::Fields;
 use crate::text::TEXT_BYTES_MAX;
 
-/// `STATUSTEXT`
-const STATUSTEXT: u32 = 253;
 /// Time after which a text without its last part counts as complete. Autopilots send the parts in one go.
 const COMPLETE_AFTER: Span = Span::from_secs(1);
 /// Bytes of a text that are looked up: two parts. Longer texts of autopilots begin with their subject.

@@ -1,6 +1,7 @@
 //! Our messages, fields in wire order (`common.xml`).
 
 use hums_core::clock::Instant;
+use hums_dialect::ids;
 
 use crate::encode::COMPONENT;
 use crate::packet::Packet;
@@ -17,53 +18,58 @@ const CAPABILITIES: u64 = 8 | 32 | 8_192 | 131_072;
 
 /// HEARTBEAT; `state` is a `MAV_STATE`: 3 standby, 4 active, 5 critical, 6 emergency.
 pub fn heartbeat(state: u8) -> Packet {
-    Packet::new(0).u8(4, TYPE).u8(5, AUTOPILOT).u8(7, state).u8(8, 3)
+    Packet::new(ids::HEARTBEAT).u8(4, TYPE).u8(5, AUTOPILOT).u8(7, state).u8(8, 3)
 }
 
 /// STATUSTEXT: a text for the pilot; longer than [`TEXT_BYTES_MAX`] bytes is cut.
 pub fn status_text(severity: Severity, text: &str) -> Packet {
-    Packet::new(253).u8(0, severity as u8).text(1, TEXT_BYTES_MAX, text)
+    Packet::new(ids::STATUSTEXT).u8(0, severity as u8).text(1, TEXT_BYTES_MAX, text)
 }
 
 /// `NAMED_VALUE_FLOAT`: a value that ground stations plot by its name (at most 10 bytes).
 pub fn named_float(now: Instant, name: &str, value: f32) -> Packet {
-    Packet::new(251).u32(0, now.as_millis() as u32).f32(4, value).text(8, 10, name)
+    Packet::new(ids::NAMED_VALUE_FLOAT).u32(0, now.as_millis() as u32).f32(4, value).text(8, 10, name)
 }
 
 /// `NAMED_VALUE_INT`
 pub fn named_int(now: Instant, name: &str, value: i32) -> Packet {
-    Packet::new(252).u32(0, now.as_millis() as u32).u32(4, value as u32).text(8, 10, name)
+    Packet::new(ids::NAMED_VALUE_INT).u32(0, now.as_millis() as u32).u32(4, value as u32).text(8, 10, name)
 }
 
 /// `PARAM_REQUEST_READ`, by its name
 pub(crate) fn param_request_read(name: &str, system: u8, component: u8) -> Packet {
-    Packet::new(20).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name)
+    Packet::new(ids::PARAM_REQUEST_READ).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name)
 }
 
 /// `REQUEST_EVENT`: these again, please.
 pub(crate) fn request_event(first: u16, last: u16, system: u8, component: u8) -> Packet {
-    Packet::new(412).u16(0, first).u16(2, last).u8(4, system).u8(5, component)
+    Packet::new(ids::REQUEST_EVENT).u16(0, first).u16(2, last).u8(4, system).u8(5, component)
 }
 
 /// `PARAM_VALUE`
 pub fn param_value(name: &str, value: f32, index: u16, count: u16) -> Packet {
-    Packet::new(22).f32(0, value).u16(4, count).u16(6, index).text(8, 16, name).u8(24, REAL32)
+    Packet::new(ids::PARAM_VALUE).f32(0, value).u16(4, count).u16(6, index).text(8, 16, name).u8(24, REAL32)
 }
 
 /// `COMMAND_ACK` to the asker; `result` is a `MAV_RESULT`.
 pub fn command_ack(command: u16, result: u8, system: u8, component: u8) -> Packet {
-    Packet::new(77).u16(0, command).u8(2, result).u8(8, system).u8(9, component)
+    Packet::new(ids::COMMAND_ACK).u16(0, command).u8(2, result).u8(8, system).u8(9, component)
 }
 
 /// `COMMAND_LONG` with the first parameters given and the others zero.
 pub fn command_long(command: u16, params: &[f32], system: u8, component: u8) -> Packet {
-    let packet = Packet::new(76).u16(28, command).u8(30, system).u8(31, component);
+    let packet = Packet::new(ids::COMMAND_LONG).u16(28, command).u8(30, system).u8(31, component);
     params.iter().take(7).enumerate().fold(packet, |packet, (index, value)| packet.f32(4 * index, *value))
 }
 
 /// `REQUEST_DATA_STREAM`: all messages of a group at `rate_hz`.
 pub(crate) fn request_data_stream(stream: u8, rate_hz: u16, system: u8, component: u8) -> Packet {
-    Packet::new(66).u16(0, rate_hz).u8(2, system).u8(3, component).u8(4, stream).u8(5, 1)
+    Packet::new(ids::REQUEST_DATA_STREAM)
+        .u16(0, rate_hz)
+        .u8(2, system)
+        .u8(3, component)
+        .u8(4, stream)
+        .u8(5, 1)
 }
 
 /// Our `AUTOPILOT_VERSION`: capabilities, version (major, minor, patch), the chip's own number.
@@ -72,7 +78,12 @@ pub fn autopilot_version(version: [u8; 3], git: &str, uid: &[u8; 12]) -> Packet 
     // The lowest byte is FIRMWARE_VERSION_TYPE: 255 is official, 0 development.
     let number = u32::from_be_bytes([major, minor, patch, 0]);
     let short = uid.iter().fold(0_u64, |sum, byte| sum.rotate_left(8) ^ u64::from(*byte));
-    Packet::new(148).u64(0, CAPABILITIES).u64(8, short).u32(16, number).text(36, 8, git).bytes(60, uid)
+    Packet::new(ids::AUTOPILOT_VERSION)
+        .u64(0, CAPABILITIES)
+        .u64(8, short)
+        .u32(16, number)
+        .text(36, 8, git)
+        .bytes(60, uid)
 }
 
 /// The state of a computer; `None` is sent as unknown.
@@ -131,36 +142,36 @@ pub fn computer_status(now: Instant, status: &ComputerStatus) -> Packet {
     }
     put(196, &[0, status.cpu_percent]);
     put(229, &[i8::MAX as u8; 9]);
-    Packet::new(390).bytes(0, &payload)
+    Packet::new(ids::ONBOARD_COMPUTER_STATUS).bytes(0, &payload)
 }
 
 /// `COMPONENT_METADATA`: the address of the component information's general file, and its checksum.
 pub fn component_metadata(now: Instant, crc: u32, uri: &str) -> Packet {
     // The text ends with a zero: it is shorter than its 100 bytes.
-    Packet::new(397).u32(0, now.as_millis() as u32).u32(4, crc).text(8, 99, uri)
+    Packet::new(ids::COMPONENT_METADATA).u32(0, now.as_millis() as u32).u32(4, crc).text(8, 99, uri)
 }
 
 /// `PROTOCOL_VERSION`: MAVLink 2.0 only.
 pub fn protocol_version() -> Packet {
-    Packet::new(300).u16(0, 200).u16(2, 200).u16(4, 200)
+    Packet::new(ids::PROTOCOL_VERSION).u16(0, 200).u16(2, 200).u16(4, 200)
 }
 
 /// `LOG_ENTRY`
 pub fn log_entry(id: u16, count: u16, last: u16, bytes: u32, utc_s: u32) -> Packet {
-    Packet::new(118).u32(0, utc_s).u32(4, bytes).u16(8, id).u16(10, count).u16(12, last)
+    Packet::new(ids::LOG_ENTRY).u32(0, utc_s).u32(4, bytes).u16(8, id).u16(10, count).u16(12, last)
 }
 
 /// `LOG_DATA`: at most 90 bytes.
 pub fn log_data(id: u16, offset: u32, data: &[u8]) -> Packet {
     let data = data.get(..90).unwrap_or(data);
     // The count is set last, so that a block that ends in zeros is sent whole.
-    Packet::new(120).u32(0, offset).u16(4, id).bytes(7, data).u8(6, data.len() as u8)
+    Packet::new(ids::LOG_DATA).u32(0, offset).u16(4, id).bytes(7, data).u8(6, data.len() as u8)
 }
 
 /// `FILE_TRANSFER_PROTOCOL` to the asker.
 pub fn file_transfer(system: u8, component: u8, payload: &[u8]) -> Packet {
     let payload = payload.get(..251).unwrap_or(payload);
-    Packet::new(110).u8(1, system).u8(2, component).bytes(3, payload)
+    Packet::new(ids::FILE_TRANSFER_PROTOCOL).u8(1, system).u8(2, component).bytes(3, payload)
 }
 
 /// Our component, our system, or all.

@@ -1,6 +1,7 @@
 //! Requests to us, and the queue of answers.
 
 use heapless::Deque;
+use hums_dialect::ids;
 
 use crate::frame::{Check, Frame};
 use crate::packet::Fields;
@@ -68,16 +69,16 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<AddressedRequest<'a>> {
     let fields = Fields(frame.payload());
     let target = |at: usize| (fields.u8(at), fields.u8(at + 1));
     let (target, request) = match frame.id() {
-        20 => match u16::try_from(i16::from_le_bytes(fields.bytes(0))) {
+        ids::PARAM_REQUEST_READ => match u16::try_from(i16::from_le_bytes(fields.bytes(0))) {
             Ok(index) => (target(2), Request::ParamAt(index)),
             Err(_) => (target(2), Request::ParamNamed(fields.text(4, 16)?)),
         },
-        21 => (target(0), Request::ParamList),
-        23 => (target(4), Request::ParamSet(fields.text(6, 16)?, fields.f32(0))),
+        ids::PARAM_REQUEST_LIST => (target(0), Request::ParamList),
+        ids::PARAM_SET => (target(4), Request::ParamSet(fields.text(6, 16)?, fields.f32(0))),
         // COMMAND_INT has whole numbers in its parameters 5 and 6.
-        id @ (75 | 76) => {
+        id @ (ids::COMMAND_INT | ids::COMMAND_LONG) => {
             let number = |at| {
-                if id == 75 && matches!(at, 16 | 20) {
+                if id == ids::COMMAND_INT && matches!(at, 16 | 20) {
                     fields.u32(at).cast_signed() as f32
                 } else {
                     fields.f32(at)
@@ -85,12 +86,14 @@ pub fn read<'a>(frame: &Frame<'a>) -> Option<AddressedRequest<'a>> {
             };
             (target(30), Request::Command(fields.u16(28), [0, 4, 8, 12, 16, 20, 24].map(number)))
         }
-        110 => (target(1), Request::File(frame.payload().get(3..).unwrap_or_default())),
-        117 => (target(4), Request::LogList(fields.u16(0), fields.u16(2))),
-        119 => (target(10), Request::LogData(fields.u16(8), fields.u32(0), fields.u32(4))),
-        121 => (target(0), Request::LogErase),
-        122 => (target(0), Request::LogEnd),
-        256 => (target(8), Request::Key(Key(fields.bytes(10)), fields.u64(0))),
+        ids::FILE_TRANSFER_PROTOCOL => {
+            (target(1), Request::File(frame.payload().get(3..).unwrap_or_default()))
+        }
+        ids::LOG_REQUEST_LIST => (target(4), Request::LogList(fields.u16(0), fields.u16(2))),
+        ids::LOG_REQUEST_DATA => (target(10), Request::LogData(fields.u16(8), fields.u32(0), fields.u32(4))),
+        ids::LOG_ERASE => (target(0), Request::LogErase),
+        ids::LOG_REQUEST_END => (target(0), Request::LogEnd),
+        ids::SETUP_SIGNING => (target(8), Request::Key(Key(fields.bytes(10)), fields.u64(0))),
         _ => return None,
     };
     Some(AddressedRequest { target, request })

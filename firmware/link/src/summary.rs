@@ -8,6 +8,7 @@
 //! message that has waited four intervals gets the priority of a heartbeat.
 
 use core::fmt::Write as _;
+use hums_dialect::ids;
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -27,34 +28,34 @@ use crate::text::{Severity, TEXT_BYTES_MAX, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
-    (0, 1_000),      // HEARTBEAT
-    (1, 2_000),      // SYS_STATUS
-    (2, 5_000),      // SYSTEM_TIME
-    (24, 1_000),     // GPS_RAW_INT
-    (30, 250),       // ATTITUDE
-    (33, 500),       // GLOBAL_POSITION_INT
-    (42, 2_000),     // MISSION_CURRENT
-    (46, 0),         // MISSION_ITEM_REACHED
-    (65, 2_000),     // RC_CHANNELS
-    (74, 500),       // VFR_HUD
-    (77, 0),         // COMMAND_ACK
-    (109, 2_000),    // RADIO_STATUS
-    (147, 2_000),    // BATTERY_STATUS
-    (148, 0),        // AUTOPILOT_VERSION
-    (193, 2_000),    // EKF_STATUS_REPORT
-    (225, 2_000),    // EFI_STATUS
-    (226, 2_000),    // RPM
-    (230, 2_000),    // ESTIMATOR_STATUS
-    (241, 2_000),    // VIBRATION
-    (242, 5_000),    // HOME_POSITION
-    (245, 1_000),    // EXTENDED_SYS_STATE
-    (253, 0),        // STATUSTEXT
-    (290, 2_000),    // ESC_INFO
-    (291, 1_000),    // ESC_STATUS
-    (339, 2_000),    // RAW_RPM
-    (11_030, 1_000), // ESC_TELEMETRY_1_TO_4
-    (11_031, 1_000), // ESC_TELEMETRY_5_TO_8
-    (11_032, 1_000), // ESC_TELEMETRY_9_TO_12
+    (ids::HEARTBEAT, 1_000),
+    (ids::SYS_STATUS, 2_000),
+    (ids::SYSTEM_TIME, 5_000),
+    (ids::GPS_RAW_INT, 1_000),
+    (ids::ATTITUDE, 250),
+    (ids::GLOBAL_POSITION_INT, 500),
+    (ids::MISSION_CURRENT, 2_000),
+    (ids::MISSION_ITEM_REACHED, 0),
+    (ids::RC_CHANNELS, 2_000),
+    (ids::VFR_HUD, 500),
+    (ids::COMMAND_ACK, 0),
+    (ids::RADIO_STATUS, 2_000),
+    (ids::BATTERY_STATUS, 2_000),
+    (ids::AUTOPILOT_VERSION, 0),
+    (ids::EKF_STATUS_REPORT, 2_000),
+    (ids::EFI_STATUS, 2_000),
+    (ids::RPM, 2_000),
+    (ids::ESTIMATOR_STATUS, 2_000),
+    (ids::VIBRATION, 2_000),
+    (ids::HOME_POSITION, 5_000),
+    (ids::EXTENDED_SYS_STATE, 1_000),
+    (ids::STATUSTEXT, 0),
+    (ids::ESC_INFO, 2_000),
+    (ids::ESC_STATUS, 1_000),
+    (ids::RAW_RPM, 2_000),
+    (ids::ESC_TELEMETRY_1_TO_4, 1_000),
+    (ids::ESC_TELEMETRY_5_TO_8, 1_000),
+    (ids::ESC_TELEMETRY_9_TO_12, 1_000),
 ];
 const VALUES: usize = FORWARDED.len();
 const STATE: usize = VALUES + 1;
@@ -176,7 +177,8 @@ impl Summary {
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, out: &mut impl FnMut(&[u8])) {
         // Heartbeats of the vehicle's other components (gimbal, camera) must not take the autopilot's turn.
         let ours = |vehicle: Source| {
-            vehicle.system == frame.system() && (frame.id() != 0 || vehicle.component == frame.component())
+            vehicle.system == frame.system()
+                && (frame.id() != ids::HEARTBEAT || vehicle.component == frame.component())
         };
         if !self.forwards || !self.vehicle.is_some_and(ours) {
             return;

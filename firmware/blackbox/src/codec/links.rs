@@ -6,6 +6,7 @@
 //! prediction is bad, but writer and reader still agree.
 
 use super::element::Element;
+use hums_dialect::ids::ATTITUDE_QUATERNION;
 
 /// Stored quantities: single-precision numbers, and from `WHOLE` on whole ones of 32 bits, without a scale.
 const REGISTERS: usize = 45;
@@ -17,7 +18,6 @@ const QUATERNION: usize = 23;
 const TOLD: usize = 27;
 /// The times of the angles, and of the message that has them as a quaternion.
 const TIMES: usize = 43;
-const ATTITUDE_QUATERNION: u32 = 31;
 
 #[derive(Clone, Copy, Debug)]
 struct Link {

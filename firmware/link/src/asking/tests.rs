@@ -86,7 +86,7 @@ impl Script {
             self.streams.retain(|(stream, _)| *stream != id);
             self.streams.push((id, (1e6 / interval_us).round() as u32));
         }
-        self.identified |= result == 0 && (command, id) == (REQUEST_MESSAGE, AUTOPILOT_VERSION);
+        self.identified |= result == 0 && (command, id) == (REQUEST_MESSAGE, ids::AUTOPILOT_VERSION);
         asking.answered(command, result);
     }
 

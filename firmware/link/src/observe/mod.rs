@@ -12,6 +12,7 @@ mod system;
 
 use hums_core::observation::{Observation, Source};
 use hums_dialect::ardupilotmega as ap;
+use hums_dialect::ids;
 
 use crate::frame::{Check, Frame};
 use crate::long_text::alert_of_text;
@@ -28,52 +29,62 @@ pub fn observe(frame: &Frame<'_>) -> Option<(Source, Observation)> {
 
 fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
     Some(match id {
-        0 => Observation::Heartbeat(system::heartbeat(payload)?),
-        1 => Observation::SystemStatus(system::status(payload)?),
-        2 => Observation::SystemTime(system::time(payload)?),
-        22 => system::parameter(payload)?,
-        24 => Observation::Gnss(motion::gnss(payload)?),
-        26 | 27 | 116 | 129 => Observation::Imu(motion::imu(id, payload)?),
-        29 | 137 | 143 => Observation::Air(motion::air(id, payload)?),
-        30 => Observation::Attitude(motion::attitude(payload)?),
-        32 => Observation::LocalPosition(motion::local_position(payload)?),
-        33 => Observation::GlobalPosition(motion::global_position(payload)?),
-        36 => Observation::Outputs(motion::outputs(payload)),
-        42 => Observation::MissionCurrent(read::<ap::MISSION_CURRENT_DATA>(payload, &[4])?.seq),
-        46 => Observation::MissionReached(read::<ap::MISSION_ITEM_REACHED_DATA>(payload, &[])?.seq),
-        62 => Observation::Wanted(motion::nav_controller_output(payload)?),
-        65 => Observation::RadioControl(system::rc(payload)?),
-        74 => Observation::Hud(motion::hud(payload)?),
-        77 => Observation::CommandAck(system::command_ack(payload)),
-        178 => Observation::SecondEstimate(motion::second_estimate(payload)),
-        83 => Observation::Wanted(motion::attitude_target(payload)?),
-        85 => Observation::ClimbWanted(motion::climb_wanted(payload)?),
-        105 => {
+        ids::HEARTBEAT => Observation::Heartbeat(system::heartbeat(payload)?),
+        ids::SYS_STATUS => Observation::SystemStatus(system::status(payload)?),
+        ids::SYSTEM_TIME => Observation::SystemTime(system::time(payload)?),
+        ids::PARAM_VALUE => system::parameter(payload)?,
+        ids::GPS_RAW_INT => Observation::Gnss(motion::gnss(payload)?),
+        ids::SCALED_IMU | ids::RAW_IMU | ids::SCALED_IMU2 | ids::SCALED_IMU3 => {
+            Observation::Imu(motion::imu(id, payload)?)
+        }
+        ids::SCALED_PRESSURE | ids::SCALED_PRESSURE2 | ids::SCALED_PRESSURE3 => {
+            Observation::Air(motion::air(id, payload)?)
+        }
+        ids::ATTITUDE => Observation::Attitude(motion::attitude(payload)?),
+        ids::LOCAL_POSITION_NED => Observation::LocalPosition(motion::local_position(payload)?),
+        ids::GLOBAL_POSITION_INT => Observation::GlobalPosition(motion::global_position(payload)?),
+        ids::SERVO_OUTPUT_RAW => Observation::Outputs(motion::outputs(payload)),
+        ids::MISSION_CURRENT => {
+            Observation::MissionCurrent(read::<ap::MISSION_CURRENT_DATA>(payload, &[4])?.seq)
+        }
+        ids::MISSION_ITEM_REACHED => {
+            Observation::MissionReached(read::<ap::MISSION_ITEM_REACHED_DATA>(payload, &[])?.seq)
+        }
+        ids::NAV_CONTROLLER_OUTPUT => Observation::Wanted(motion::nav_controller_output(payload)?),
+        ids::RC_CHANNELS => Observation::RadioControl(system::rc(payload)?),
+        ids::VFR_HUD => Observation::Hud(motion::hud(payload)?),
+        ids::COMMAND_ACK => Observation::CommandAck(system::command_ack(payload)),
+        ids::AHRS2 => Observation::SecondEstimate(motion::second_estimate(payload)),
+        ids::ATTITUDE_TARGET => Observation::Wanted(motion::attitude_target(payload)?),
+        ids::POSITION_TARGET_LOCAL_NED => Observation::ClimbWanted(motion::climb_wanted(payload)?),
+        ids::HIGHRES_IMU => {
             let (imu, air) = motion::highres_imu(payload)?;
             Observation::ImuAndAir(imu, air)
         }
-        109 => Observation::TelemetryRadio(system::radio(payload)?),
-        124 => Observation::Gnss(motion::gnss2(payload)?),
-        125 => Observation::Rails(power::rails(payload)?),
-        147 => Observation::Battery(power::battery(payload)?),
-        148 => Observation::Identity(system::identity(payload)?),
-        193 => Observation::Estimator(motion::ekf_status_report(payload)?),
-        225 => Observation::Engine(propulsion::engine(payload)?),
-        226 => Observation::SpeedSensors(propulsion::rpm(payload)?),
-        230 => Observation::Estimator(motion::estimator_status(payload)?),
-        235 => Observation::Failing(system::failing(payload)),
-        241 => Observation::Vibration(motion::vibration(payload)?),
-        245 => system::landed(payload),
-        253 => Observation::Alert(alert_of_text(payload)?),
-        264 => system::flight_information(payload)?,
-        290 => Observation::Escs(propulsion::esc_info(payload)?),
-        291 => Observation::Escs(propulsion::esc_status(payload)?),
-        339 => Observation::SpeedSensors(propulsion::raw_rpm(payload)?),
-        373 => Observation::Generator(propulsion::generator(payload)?),
-        410 => Observation::Alert(system::alert_of_event(payload)?),
-        441 => Observation::GnssIntegrity(motion::gnss_integrity(payload)),
-        11_030..=11_032 => Observation::Escs(propulsion::esc_telemetry(id, payload)?),
-        11_039 => Observation::Processor(system::processor(payload)?),
+        ids::RADIO_STATUS => Observation::TelemetryRadio(system::radio(payload)?),
+        ids::GPS2_RAW => Observation::Gnss(motion::gnss2(payload)?),
+        ids::POWER_STATUS => Observation::Rails(power::rails(payload)?),
+        ids::BATTERY_STATUS => Observation::Battery(power::battery(payload)?),
+        ids::AUTOPILOT_VERSION => Observation::Identity(system::identity(payload)?),
+        ids::EKF_STATUS_REPORT => Observation::Estimator(motion::ekf_status_report(payload)?),
+        ids::EFI_STATUS => Observation::Engine(propulsion::engine(payload)?),
+        ids::RPM => Observation::SpeedSensors(propulsion::rpm(payload)?),
+        ids::ESTIMATOR_STATUS => Observation::Estimator(motion::estimator_status(payload)?),
+        ids::HIGH_LATENCY2 => Observation::Failing(system::failing(payload)),
+        ids::VIBRATION => Observation::Vibration(motion::vibration(payload)?),
+        ids::EXTENDED_SYS_STATE => system::landed(payload),
+        ids::STATUSTEXT => Observation::Alert(alert_of_text(payload)?),
+        ids::FLIGHT_INFORMATION => system::flight_information(payload)?,
+        ids::ESC_INFO => Observation::Escs(propulsion::esc_info(payload)?),
+        ids::ESC_STATUS => Observation::Escs(propulsion::esc_status(payload)?),
+        ids::RAW_RPM => Observation::SpeedSensors(propulsion::raw_rpm(payload)?),
+        ids::GENERATOR_STATUS => Observation::Generator(propulsion::generator(payload)?),
+        ids::EVENT => Observation::Alert(system::alert_of_event(payload)?),
+        ids::GNSS_INTEGRITY => Observation::GnssIntegrity(motion::gnss_integrity(payload)),
+        ids::ESC_TELEMETRY_1_TO_4..=ids::ESC_TELEMETRY_9_TO_12 => {
+            Observation::Escs(propulsion::esc_telemetry(id, payload)?)
+        }
+        ids::MCU_STATUS => Observation::Processor(system::processor(payload)?),
         _ => return None,
     })
 }

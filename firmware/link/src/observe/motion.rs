@@ -1,6 +1,7 @@
 //! Position, motion and the estimator's accuracy.
 
 use core::num::NonZeroU32;
+use hums_dialect::ids;
 
 use hums_core::observation::{
     Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
@@ -130,7 +131,7 @@ fn scaled(
 }
 
 pub(super) fn imu(id: u32, payload: &[u8]) -> Option<Imu> {
-    if id == 27 {
+    if id == ids::RAW_IMU {
         let imu = read::<ap::RAW_IMU_DATA>(payload, &[])?;
         let rotation = [imu.xgyro, imu.ygyro, imu.zgyro];
         let magnetic = [imu.xmag, imu.ymag, imu.zmag];
@@ -139,8 +140,8 @@ pub(super) fn imu(id: u32, payload: &[u8]) -> Option<Imu> {
     // The second and the third have the fields of the first.
     let imu = read::<ap::SCALED_IMU_DATA>(payload, &[])?;
     let instance = match id {
-        26 => 0,
-        116 => 1,
+        ids::SCALED_IMU => 0,
+        ids::SCALED_IMU2 => 1,
         _ => 2,
     };
     let rotation = [imu.xgyro, imu.ygyro, imu.zgyro];
@@ -171,8 +172,8 @@ pub(super) fn highres_imu(payload: &[u8]) -> Option<(Imu, Air)> {
 pub(super) fn air(id: u32, payload: &[u8]) -> Option<Air> {
     let pressure = read::<ap::SCALED_PRESSURE_DATA>(payload, &[])?;
     let instance = match id {
-        29 => 0,
-        137 => 1,
+        ids::SCALED_PRESSURE => 0,
+        ids::SCALED_PRESSURE2 => 1,
         _ => 2,
     };
     Some(Air {

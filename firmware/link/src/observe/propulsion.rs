@@ -3,6 +3,7 @@
 use hums_core::observation::{ESC_GROUP, Engine, Esc, EscGroup, Generator, SpeedSensor};
 use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Rpm, Volts};
 use hums_dialect::ardupilotmega as ap;
+use hums_dialect::ids;
 
 use super::fields::{read, unless};
 use crate::packet::Fields;
@@ -50,7 +51,7 @@ pub(super) fn esc_status(payload: &[u8]) -> Option<EscGroup> {
 pub(super) fn esc_telemetry(id: u32, payload: &[u8]) -> Option<EscGroup> {
     // The messages for motors 1 to 4, 5 to 8 and 9 to 12 have the same fields.
     let telemetry = read::<ap::ESC_TELEMETRY_1_TO_4_DATA>(payload, &[])?;
-    let mut group = group(((id - 11_030) * ESC_GROUP as u32) as u8);
+    let mut group = group(((id - ids::ESC_TELEMETRY_1_TO_4) * ESC_GROUP as u32) as u8);
     for (place, esc) in group.escs.iter_mut().enumerate() {
         let (packets, rpm) = (telemetry.count[place], telemetry.rpm[place]);
         if packets == 0 && rpm == 0 && telemetry.voltage[place] == 0 {

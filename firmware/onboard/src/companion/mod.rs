@@ -23,6 +23,7 @@ use hums_link::asking::{Asking, Known};
 use hums_link::encode::COMPONENT;
 use hums_link::events::Events;
 use hums_link::frame::Frame;
+use hums_link::ids;
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::Fields;
@@ -38,7 +39,6 @@ use commands::Commands;
 use library::Library;
 use limiter::Asker;
 use pass::Pass;
-pub(crate) use secure::SETUP;
 use secure::{Secure, Trust};
 use settings::Settings;
 use ways::Ways;
@@ -143,12 +143,12 @@ impl Companion {
         if self.asking.of() == Some(frame.source()) {
             self.asking.seen(frame.id());
             self.events.heard(frame.id(), frame.payload());
-            if frame.id() == 22
+            if frame.id() == ids::PARAM_VALUE
                 && let Some(name) = Fields(frame.payload()).text(8, 16)
             {
                 self.asking.told(name);
             }
-            if frame.id() == 77 {
+            if frame.id() == ids::COMMAND_ACK {
                 let fields = Fields(frame.payload());
                 let target = (fields.u8(8), fields.u8(9));
                 if messages::concerns_us(target, self.outlet.encoder.system()) {

@@ -18,19 +18,31 @@ use hums_core::clock::{Instant, Span};
 use hums_core::params::Param;
 use hums_link::encode::COMPONENT;
 use hums_link::frame::{Check, Frame};
+use hums_link::ids;
 use hums_link::outlet::Class;
 use hums_link::request::Port;
 
-use super::secure;
 use super::ways::Ways;
 use crate::queues::SummaryRoute;
 
-/// `RADIO`, `RADIO_STATUS`
-const RADIO: [u32; 2] = [166, 109];
-/// Answers without an address: `PARAM_VALUE`, `GPS_GLOBAL_ORIGIN`, `LOG_ENTRY`, `LOG_DATA`, `MAG_CAL_PROGRESS`,
-/// `MAG_CAL_REPORT`, `CAMERA_INFORMATION`, `PROTOCOL_VERSION`, `PARAM_EXT_VALUE`, `COMPONENT_INFORMATION`,
-/// `COMPONENT_METADATA`, `EVENT`, `CURRENT_EVENT_SEQUENCE`.
-const ANSWERS: [u32; 13] = [22, 49, 118, 120, 191, 192, 259, 300, 322, 395, 397, 410, 411];
+/// Messages of a telemetry radio.
+const RADIO: [u32; 2] = [ids::RADIO, ids::RADIO_STATUS];
+/// Answers without an address.
+const ANSWERS: [u32; 13] = [
+    ids::PARAM_VALUE,
+    ids::GPS_GLOBAL_ORIGIN,
+    ids::LOG_ENTRY,
+    ids::LOG_DATA,
+    ids::MAG_CAL_PROGRESS,
+    ids::MAG_CAL_REPORT,
+    ids::CAMERA_INFORMATION,
+    ids::PROTOCOL_VERSION,
+    ids::PARAM_EXT_VALUE,
+    ids::COMPONENT_INFORMATION,
+    ids::COMPONENT_METADATA,
+    ids::EVENT,
+    ids::CURRENT_EVENT_SEQUENCE,
+];
 const UNKNOWN: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -50,7 +62,7 @@ impl Pass {
         let pretends = of == (vehicle.system, vehicle.component) || of == (vehicle.system, COMPONENT);
         let stays = pretends
             || frame.target() == Some((vehicle.system, COMPONENT))
-            || frame.id() == secure::SETUP
+            || frame.id() == ids::SETUP_SIGNING
             || RADIO.contains(&frame.id());
         if stays || !is_on(monitor, ways) {
             return;
@@ -60,7 +72,7 @@ impl Pass {
     }
 
     pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
-        if !is_on(monitor, ways) || frame.id() == secure::SETUP {
+        if !is_on(monitor, ways) || frame.id() == ids::SETUP_SIGNING {
             return;
         }
         let Some(vehicle) = monitor.vehicle().source else { return };
@@ -73,9 +85,9 @@ impl Pass {
             }
             due
         } else {
-            frame.target().is_some_and(names_another) && frame.id() != 77
+            frame.target().is_some_and(names_another) && frame.id() != ids::COMMAND_ACK
                 || ANSWERS.contains(&frame.id())
-                || frame.id() == 0 && is_other
+                || frame.id() == ids::HEARTBEAT && is_other
         };
         if passes {
             let sent = ways.pass(now, Port::Gs, Class::Bulk, frame.bytes());

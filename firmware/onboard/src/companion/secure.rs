@@ -42,8 +42,6 @@ use crate::queues::SummaryRoute;
 const ITEM_KEY: u8 = 32;
 const ITEM_TIMES: u8 = 33;
 const TIMES_BYTES: usize = 24;
-/// `SETUP_SIGNING`
-pub(crate) const SETUP: u32 = 256;
 const SAVE: Span = Span::from_secs(1);
 /// The same while the store has little more than its reserve, and then [`SIGNED_MAX`] times at most.
 const SAVE_SCARCE: Span = Span::from_secs(60);

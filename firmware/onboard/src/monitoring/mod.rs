@@ -17,12 +17,13 @@ use hums_core::observation::Observation;
 use hums_core::{Monitor, monitor};
 use hums_link::LongTexts;
 use hums_link::frame::{Check, Frame};
+use hums_link::ids;
 use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
 use hums_recorder::status::CardStatus;
 
 use crate::ResetCause;
-use crate::companion::{self, Companion};
+use crate::companion::Companion;
 use crate::journal::{Journal, Logbook};
 use crate::notices::{Notice, Notices};
 use crate::persist::{Handover, StoreWriter};
@@ -179,7 +180,7 @@ impl<'a> Monitoring<'a> {
         let Self { book, summary, companion, .. } = self;
         let frame = Frame::from_queue(bytes, message);
         begin(Step::Encode { at, id: frame.as_ref().map_or(0, Frame::id) });
-        if let Some(frame) = frame.filter(|frame| frame.id() == companion::SETUP) {
+        if let Some(frame) = frame.filter(|frame| frame.id() == ids::SETUP_SIGNING) {
             companion.withhold(at, &frame, &mut book.journal, sectors);
         } else if !companion.stopped() {
             book.journal.frame(at, bytes, message.is_some(), sectors);

@@ -8,6 +8,7 @@
 mod moved;
 mod rules;
 
+use crate::mavlink::ids::{GLOBAL_POSITION_INT, PARAM_VALUE, STATUSTEXT};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -43,10 +44,6 @@ const RECORDS: &str = "records of the board";
 const OBSERVATIONS: &str = "observations";
 const TEXTS: &str = "texts";
 const PARAMETERS: &str = "parameters";
-const STATUSTEXT: u32 = 253;
-/// `GLOBAL_POSITION_INT`, which an autopilot sends once it knows where it is.
-const GLOBAL_POSITION_INT: u32 = 33;
-const PARAM_VALUE: u32 = 22;
 
 /// The request of `hums share`.
 #[derive(Clone, Debug)]
@@ -194,7 +191,7 @@ impl Share {
             let place = fields.iter().find(|place| place.rule == Some(rule))?;
             Some(i32::from_le_bytes(*value(place).first_chunk()?))
         };
-        // A receiver without a fix reports a default place.
+        // A receiver without a fix reports a default place; this message comes once the autopilot knows its place.
         if frame.id() == GLOBAL_POSITION_INT
             && let (Some(latitude), Some(longitude)) = (degrees(Rule::Latitude), degrees(Rule::Longitude))
         {

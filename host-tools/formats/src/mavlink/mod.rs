@@ -1,5 +1,6 @@
 //! MAVLink: frames, and payloads as typed values.
 
 pub mod frame;
-pub mod ids;
 pub mod values;
+
+pub use hums_dialect::ids;
