@@ -59,6 +59,16 @@ impl<'a, D: CardDevice> Storage<'a, D> {
         self.recorder.finish();
     }
 
+    /// Ends the session if no sector waits; whether it has ended. Ask for the end before this call: a sector that was queued
+    /// before the request is then on the card.
+    pub fn finish_after(&mut self, sectors: &SectorsOut) -> bool {
+        let is_last = sectors.is_empty();
+        if is_last {
+            self.finish();
+        }
+        is_last
+    }
+
     /// The recorder, for stored logs and for the card.
     pub const fn recorder(&mut self) -> &mut Recorder<'a, D> {
         &mut self.recorder
@@ -67,5 +77,48 @@ impl<'a, D: CardDevice> Storage<'a, D> {
     /// Gives the device back.
     pub fn into_device(self) -> Option<D> {
         self.recorder.into_device()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::queues::Queues;
+    use hums_blackbox::{Sector, SectorSink};
+    use hums_recorder::{BLOCK_BYTES, Block};
+
+    /// A slot without a card.
+    struct Empty;
+
+    impl CardDevice for Empty {
+        type Error = ();
+
+        fn read(&self, _: &mut [Block], _: u32) -> Result<(), ()> {
+            Err(())
+        }
+
+        fn write(&self, _: &[Block], _: u32) -> Result<(), ()> {
+            Err(())
+        }
+
+        fn num_blocks(&self) -> Result<u32, ()> {
+            Err(())
+        }
+    }
+
+    #[test]
+    fn a_log_ends_only_after_its_last_sector_whatever_the_card_does() {
+        let (status, buffers, mut queues) =
+            (CardStatus::new(), Box::new(Buffers::new()), Box::new(Queues::new()));
+        let mut ends = queues.split();
+        let mut storage = Storage::new(Empty, &status, &buffers, 1);
+        for second in 0..3 {
+            // Queued after storage looked, and before it asks for the end.
+            storage.service(Instant::from_millis(second * 1_000), &mut ends.sectors_out);
+            ends.sectors_in.put(&Sector::from_bytes([0; BLOCK_BYTES]));
+            assert!(!storage.finish_after(&ends.sectors_out));
+        }
+        ends.sectors_out.abandon();
+        assert!(storage.finish_after(&ends.sectors_out));
     }
 }

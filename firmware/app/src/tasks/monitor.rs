@@ -130,7 +130,7 @@ async fn leave(
 #[inline(never)]
 fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
     body.finish(now(), &mut ends.sectors, &ends.gs);
-    LOG_ENDS.store(true, Ordering::Relaxed);
+    LOG_ENDS.store(true, Ordering::Release);
 }
 
 #[inline(never)]

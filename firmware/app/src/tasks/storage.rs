@@ -60,8 +60,8 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
         SUPERVISOR.report(Task::Storage, now());
         let service = service(body, now());
         keep(body);
-        if service != Service::Wrote && LOG_ENDS.load(Ordering::Relaxed) {
-            end(body);
+        // In this order: the monitor preempts this task, and asks for the end after it has queued the last sector.
+        if service != Service::Wrote && LOG_ENDS.load(Ordering::Acquire) && end(body) {
             // For items of the store.
             Timer::after(END_LOOK).await;
             continue;
@@ -75,12 +75,12 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
     }
 }
 
+/// Ends the log, once, if no sector waits; whether it has ended.
 #[inline(never)]
-fn end(body: &mut Body) {
-    if !LOG_ENDED.load(Ordering::Relaxed) {
-        body.storage.finish();
-        LOG_ENDED.store(true, Ordering::Relaxed);
-    }
+fn end(body: &mut Body) -> bool {
+    let has_ended = LOG_ENDED.load(Ordering::Relaxed) || body.storage.finish_after(&body.sectors);
+    LOG_ENDED.store(has_ended, Ordering::Relaxed);
+    has_ended
 }
 
 async fn wait_for_work(body: &mut Body) {

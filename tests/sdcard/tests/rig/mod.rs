@@ -248,12 +248,11 @@ impl Rig {
         let Ends { sectors_in, gs_in, .. } = &mut self.ends;
         self.monitoring.finish(self.slot.now(), sectors_in, gs_in);
         let end = self.slot.now() + Span::from_secs(10);
-        while !self.ends.sectors_out.is_empty() && self.slot.now() < end {
+        while !self.storage.finish_after(&self.ends.sectors_out) && self.slot.now() < end {
             let begun = self.slot.now();
             self.storage.service(begun, &mut self.ends.sectors_out);
             self.slot.advance_to(self.slot.now_ns() + 10 * MS);
         }
-        self.storage.finish();
         let left = self.ends.sectors_out.abandon();
         let card_lost = u64::from(self.status.read().frames_lost);
         let refused = self.monitoring.stats(&self.ends.gs_in).frames_lost;
