@@ -133,11 +133,12 @@ fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
     LOG_ENDS.store(true, Ordering::Release);
 }
 
+/// Hands over the store's items; whether all are written.
 #[inline(never)]
 fn save(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) -> bool {
-    let is_all = handover.finish(now(), body.monitor_mut());
-    body.save_signing(now(), handover);
-    is_all
+    // The handover last: it looks at the mailbox of both.
+    let is_signing_handed = body.save_signing(now(), handover);
+    handover.finish(now(), body.monitor_mut()) && is_signing_handed
 }
 
 /// The previous start's end, for record and ground station.

@@ -111,9 +111,9 @@ impl Companion {
         self.secure.restore(store_writer);
     }
 
-    pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) {
+    pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) -> bool {
         let seals = [&summary.outlet.seal, &self.outlet.seal];
-        self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover);
+        self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover)
     }
 
     pub(crate) fn uplink(

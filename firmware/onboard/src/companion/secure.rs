@@ -113,8 +113,8 @@ impl Secure {
         self.signing.restore(key, self.times);
     }
 
-    /// At every tick and at the end. `last` is the highest stamp of our signatures.
-    pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) {
+    /// At every tick and at the end; whether no item is left. `last` is the highest stamp of our signatures.
+    pub(crate) fn save(&mut self, now: Instant, last: Option<u64>, handover: &mut Handover<'_>) -> bool {
         let Self { signing, times, key_due, times_due, saved_at, scarce, .. } = self;
         let has_room = handover.room() == Room::Enough;
         *scarce = if has_room { 0 } else { *scarce };
@@ -140,6 +140,7 @@ impl Secure {
                 *scarce += u8::from(!has_room);
             }
         }
+        !*key_due && !*times_due
     }
 
     pub(crate) fn trust(&mut self, now: Instant, params: &Params, port: Port, frame: &Frame<'_>) -> Trust {
@@ -226,6 +227,27 @@ mod tests {
     use hums_store::sim::SimFlash;
 
     type Flash = SimFlash<16384>;
+
+    #[test]
+    fn a_key_is_left_until_it_and_its_times_are_in_the_mailbox() {
+        let mut flash = Flash::blank();
+        let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
+        let (items_in, items_out) = mailbox.split();
+        let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
+        let mut monitor = Box::new(Monitor::new(Params::defaults()));
+        let mut handover = Handover::new(items_in, &status, &mut monitor);
+        let mut secure = Secure::new();
+        assert!(secure.save(Instant::ZERO, None, &mut handover), "there is no key");
+        secure.set_key(Instant::ZERO, Key([7; KEY_BYTES]), 1);
+        let all = [0; 3].map(|_| {
+            let all = secure.save(Instant::ZERO, None, &mut handover);
+            assert!(!handover.finish(Instant::ZERO, &mut monitor), "the last item is not written");
+            store_writer.service(true);
+            all
+        });
+        assert_eq!(all, [false, true, true]);
+        assert_ne!(store_writer.item(ITEM_TIMES, &mut [0; TIMES_BYTES]), 0);
+    }
 
     #[test]
     fn signed_changes_all_day_leave_what_a_landing_needs_of_the_store() {

@@ -328,9 +328,9 @@ impl<'a> Monitoring<'a> {
         self.companion.restore(store_writer);
     }
 
-    /// Hands over items of the signing key at every tick and at the end.
-    pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) {
-        self.companion.save(now, &self.summary, handover);
+    /// Hands over items of the signing key at every tick and at the end; whether none is left.
+    pub fn save_signing(&mut self, now: Instant, handover: &mut Handover<'_>) -> bool {
+        self.companion.save(now, &self.summary, handover)
     }
 
     #[inline(never)]

@@ -66,10 +66,10 @@ impl<'a> Handover<'a> {
         self.put_items(now, monitor);
     }
 
-    /// `false`: call again after the store's writer took an item.
+    /// Hands over all items; whether all are written. `false`: call again after the store's writer took one.
     pub fn finish(&mut self, now: Instant, monitor: &mut Monitor) -> bool {
         monitor.save_all();
-        self.put_params(monitor.params_mut()) && self.put_items(now, monitor)
+        self.put_params(monitor.params_mut()) && self.put_items(now, monitor) && self.items.is_empty()
     }
 
     /// Next store text.

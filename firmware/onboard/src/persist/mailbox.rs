@@ -46,6 +46,11 @@ impl MailboxIn<'_> {
         self.0.commit();
         true
     }
+
+    /// Whether the writer has finished with the last item.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.len() == 0
+    }
 }
 
 /// The store writer's end.

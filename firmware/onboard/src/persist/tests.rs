@@ -35,11 +35,11 @@ fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut
 
 fn end(monitor: &mut Monitor, handover: &mut Handover, store_writer: &mut StoreWriter<&mut Flash>) {
     for _ in 0..TABLE.len() + 100 {
-        let all = handover.finish(Instant::from_millis(60_000), monitor);
-        while store_writer.service(true) == Saved::Took {}
-        if all {
+        // As at a restart: afterwards nothing is written.
+        if handover.finish(Instant::from_millis(60_000), monitor) {
             return;
         }
+        while store_writer.service(true) == Saved::Took {}
     }
     panic!("it never ends");
 }
