@@ -2,8 +2,8 @@
 //!
 //! A station's command ends the log, leaves a mark in memory that survives a reset, and resets the board. So
 //! no task of a recording runs beside USB, and its memory and stack are free. A fault, the watchdog, an eject
-//! or ten minutes without a host end the mode by a reset. A plugged cable never starts the mode: a charger in
-//! the field must not stop a recording.
+//! or ten minutes without a host end the mode by a reset. Only the start after an eject counts as one by
+//! hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
 //!
 //! One loop without an executor polls the USB stack and the disk. The card's driver blocks it for 8 s at
 //! most; [`watch`] feeds the watchdog meanwhile.
@@ -13,7 +13,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Poll;
 
 use embassy_futures::block_on;
-use embassy_futures::select::select3;
+use embassy_futures::select::{Either3, select3};
 use hums_core::clock::{Instant, Span};
 use hums_onboard::ResetCause;
 use hums_recorder::Block;
@@ -38,27 +38,22 @@ const LED_EVERY: Span = Span::from_millis(100);
 const VENDOR: u16 = 0x1209;
 const PRODUCT: u16 = 0x0001;
 
-const MARK: u32 = 0x5553_4244;
-
-struct Asked {
-    mark: AtomicU32,
-    not_mark: AtomicU32,
-}
-
+/// Mark of a restart by this module, for the next start.
 #[unsafe(link_section = ".uninit.card_reader")]
-static ASKED: Asked = Asked { mark: AtomicU32::new(0), not_mark: AtomicU32::new(0) };
+static MARK: AtomicU32 = AtomicU32::new(0);
 
 pub(crate) fn restart() -> ! {
-    ASKED.mark.store(MARK, Ordering::Relaxed);
-    ASKED.not_mark.store(!MARK, Ordering::Relaxed);
+    restart_with(ResetCause::MARK_CARD_READER)
+}
+
+fn restart_with(mark: u32) -> ! {
+    MARK.store(mark, Ordering::Relaxed);
     board::restart()
 }
 
-/// True once for each [`restart`].
-pub(crate) fn is_asked(cause: ResetCause) -> bool {
-    let words = [&ASKED.mark, &ASKED.not_mark].map(|word| word.swap(0, Ordering::Relaxed));
-    // At another start memory may hold anything.
-    words == [MARK, !MARK] && cause == ResetCause::Software
+/// The cause of this start, by its reset and the mark. Clears the mark: every start calls it once.
+pub(crate) fn cause(reset: ResetCause) -> ResetCause {
+    reset.with_mark(MARK.swap(0, Ordering::Relaxed))
 }
 
 /// The mode, until the board restarts. `buffer` is for blocks on their way.
@@ -95,8 +90,9 @@ pub(crate) fn run(
         let end = now() + PARTING;
         poll_fn(|_| if now() < end { Poll::Pending } else { Poll::Ready(()) }).await;
     };
-    block_on(select3(device.run(), serve, supervise(led, &link)));
-    board::restart()
+    let end = block_on(select3(device.run(), serve, supervise(led, &link)));
+    // Only an eject proves a cable. A vehicle without one may have been armed since the mode began.
+    restart_with(if matches!(end, Either3::Second(())) { ResetCause::MARK_EJECT } else { 0 })
 }
 
 async fn supervise(mut led: board::Led, link: &Link) {

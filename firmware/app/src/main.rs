@@ -63,11 +63,12 @@ fn start() -> board::Idle {
     // SAFETY: this is the program's first statement: CCM is untouched and no interrupt is unmasked.
     unsafe { memory::init() };
     let boots = fault::count_start();
-    let parts = board::take();
+    let mut parts = board::take();
+    parts.boot.cause = card_reader::cause(parts.boot.cause);
     log::log!(info, "start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
 
     let is_button = parts.button && !parts.boot.cause.may_be_in_flight();
-    if card_reader::is_asked(parts.boot.cause) || is_button {
+    if parts.boot.cause == ResetCause::CardReader || is_button {
         // Ports stay as they are: nothing reads them.
         core::mem::forget((parts.autopilot, parts.gs));
         card_reader::run(

@@ -113,7 +113,7 @@ const DEFAULT: f32 = 921_600.0;
 const NOTHING: ([bool; 2], f32) = ([false, false], DEFAULT);
 const ALL: ([bool; 2], f32) = ([true, true], 57_600.0);
 const IN_FLIGHT: [ResetCause; 3] = [ResetCause::BrownOut, ResetCause::Software, ResetCause::Watchdog];
-const BY_HAND: [ResetCause; 2] = [ResetCause::PowerOn, ResetCause::Pin];
+const BY_HAND: [ResetCause; 3] = [ResetCause::PowerOn, ResetCause::Pin, ResetCause::Eject];
 
 #[test]
 fn a_box_on_the_ground_reads_its_parameters_whichever_comes_first_card_or_heartbeat() {
