@@ -33,8 +33,16 @@ pub(crate) struct Body {
     store_writer: Saving,
 }
 
-// SAFETY: `BUFFERS`, the only part that may not be shared, is lent to the one body.
+// SAFETY: `BUFFERS`, the only part that may not be shared, is lent to the one body. The others are `Send` (below).
 unsafe impl Send for Body {}
+
+const fn is_send<T: Send>() {}
+const _: () = {
+    is_send::<board::Card>();
+    is_send::<SectorsOut<'static>>();
+    is_send::<Server<'static>>();
+    is_send::<Saving>();
+};
 
 pub(crate) static BUFFERS: ConstStaticCell<Buffers> = ConstStaticCell::new(Buffers::new());
 // In a static of its own: a task's arguments take their room twice.
