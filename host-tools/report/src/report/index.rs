@@ -72,11 +72,16 @@ impl Pages {
         serde_json::from_str(data.split_once("</script>")?.0).ok()
     }
 
+    /// Whether a page has a row.
+    pub fn has(&self, file: &str) -> bool {
+        self.pages.iter().any(|row| row.file == file)
+    }
+
     /// Adds the earlier pages that are still in the folder.
     pub fn with(mut self, before: Self, folder: &Path) -> Self {
         let is_there = |file: &str| folder.join(file).is_file();
         for row in before.pages {
-            if self.pages.iter().all(|known| known.file != row.file) && is_there(&row.file) {
+            if !self.has(&row.file) && is_there(&row.file) {
                 self.pages.push(row);
             }
         }

@@ -1,12 +1,13 @@
-//! `hums report`: one self-contained page for each session, without network or further files. A folder of
-//! pages has a table of them ([`index`]); flights are compared on a page of their own ([`compare`]).
+//! `hums report`: one self-contained page for each session, without further files. Only a page with `--map` asks a
+//! network. A folder of pages has a table of them ([`index`]); flights are compared on a page of their own
+//! ([`compare`]).
 //!
 //! [`replay`] reads the log in order. The vehicle's reports become a history as in `hums live`
 //! ([`crate::page`]), bounded, so that a page of hours stays below a few megabytes. [`flights`] finds flights
 //! with the firmware's own rules, and [`trend`] compares with the earlier sessions of the same card. [`page`]
 //! puts all of it, as JSON, beside the program that draws it.
 //!
-//! The page's own policy blocks other scripts and all loading.
+//! The page's own policy blocks other scripts and all loading except the map's tiles.
 
 pub mod compare;
 pub mod flights;
@@ -124,6 +125,7 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
         earlier: Vec::new(),
         pages: BTreeMap::new(),
         rows: Vec::new(),
+        table: Some(output).filter(|_| wanted.directory).and_then(|folder| index::Pages::of(folder)),
         names: Names::default(),
         outcome: Outcome::lossy(found.is_lossy()),
         parameters: None,
@@ -172,6 +174,8 @@ struct Making<'a> {
     /// Files of pages, by the index of their session.
     pages: BTreeMap<usize, String>,
     rows: Vec<index::Row>,
+    /// The folder's table of earlier runs.
+    table: Option<index::Pages>,
     names: Names,
     outcome: Outcome,
     parameters: Option<(usize, Vec<(String, f64)>)>,
@@ -207,7 +211,14 @@ impl Making<'_> {
                         self.page(index, place, overview, &this, &path)?;
                     } else if let Err(why) = or_skipped(free)? {
                         note!("{}: skipped: {why}", place.name);
-                        self.pages.insert(index, file_name(&path));
+                        let file = file_name(&path);
+                        // An interrupted run writes pages and no table.
+                        if !self.table.as_ref().is_some_and(|table| table.has(&file)) {
+                            let overview = &without_folders(overview);
+                            let replay = replay::Replay::of(place, overview)?;
+                            self.rows.push(index::Row::new(file.clone(), overview, &replay));
+                        }
+                        self.pages.insert(index, file);
                         self.made.skipped.push(path);
                     } else {
                         self.page(index, place, overview, &this, &path)?;
@@ -287,13 +298,10 @@ impl Making<'_> {
         let comparisons = if compare { self.compare()? } else { Vec::new() };
         if self.wanted.directory {
             let folder = &self.wanted.output;
-            let known = index::Pages::of(folder);
-            // The program's own table is extended: pages of other flights in it are not a reason to ask.
-            let inputs =
-                if known.is_some() { self.inputs.clone().forcing(true) } else { self.inputs.clone() };
+            let inputs = self.inputs_of_table();
             let pages =
                 index::Pages { pages: std::mem::take(&mut self.rows), comparisons, ..Default::default() };
-            let pages = pages.with(known.unwrap_or_default(), folder);
+            let pages = pages.with(self.table.take().unwrap_or_default(), folder);
             let what = What::Table(pages.pages.len());
             let path = folder.join(index::FILE);
             self.write(&path, &pages.html(), &what, &inputs)?;
@@ -302,6 +310,12 @@ impl Making<'_> {
             output::json(SCHEMA, &self.made)?;
         }
         Ok(self.outcome)
+    }
+
+    /// The program's own table and comparisons are replaced without a question.
+    fn inputs_of_table(&self) -> Inputs {
+        let inputs = self.inputs.clone();
+        if self.table.is_some() { inputs.forcing(true) } else { inputs }
     }
 
     /// Compares the last flights: of each airframe in a folder, or of all in a file. Returns airframes and
@@ -335,10 +349,7 @@ impl Making<'_> {
             } else {
                 self.wanted.output.clone()
             };
-            let is_ours = self.wanted.directory && index::Pages::of(&self.wanted.output).is_some();
-            let inputs = self.inputs.clone();
-            let inputs = if is_ours { inputs.forcing(true) } else { inputs };
-            self.write(&path, &html, &What::Comparison, &inputs)?;
+            self.write(&path, &html, &What::Comparison, &self.inputs_of_table())?;
             comparisons.push((airframe, file));
         }
         if comparisons.is_empty() && !self.wanted.directory {
