@@ -136,10 +136,9 @@ impl Totals {
             (Verdict::Holds, true, true) => "nothing is lost",
             (Verdict::Holds, true, false) => "nothing is lost of what was read",
             (Verdict::ToMark, ..) => "whole to the last end marks; what came after them cannot be proved",
-            (Verdict::NotProved, ..) if self.soundness == Soundness::Whole => {
-                "not all could be read: see above"
-            }
-            (Verdict::NotProved, ..) => self.soundness.words(),
+            (Verdict::NotProved, ..) if self.soundness >= Soundness::NotProved => self.soundness.words(),
+            // A failed check of a card, or an unreadable log, is in no log's state.
+            (Verdict::NotProved, ..) => "a check failed or a log could not be read: see above",
         };
         let earlier = self.without_earlier.as_ref();
         let more = [
@@ -441,6 +440,21 @@ mod tests {
     use hums_blackbox::Sector;
 
     use super::*;
+
+    /// A card's file system, a cut search or an unreadable log fails beside logs that lost nothing.
+    #[test]
+    fn logs_that_lost_nothing_do_not_name_what_failed() {
+        let words = |soundness| {
+            let (worst, without_earlier) = (Verdict::NotProved, None);
+            Totals { logs: 1, worst, soundness, made_again: 0, unprotected: 0, without_earlier }.words(false)
+        };
+        for soundness in [Soundness::Whole, Soundness::Repaired, Soundness::Unprotected] {
+            assert_eq!(words(soundness), "a check failed or a log could not be read: see above");
+        }
+        for soundness in [Soundness::NotProved, Soundness::NotFrames, Soundness::Lossy, Soundness::Damaged] {
+            assert_eq!(words(soundness), soundness.words());
+        }
+    }
 
     #[test]
     fn a_log_that_cannot_be_read_keeps_no_other_from_being_read() {
