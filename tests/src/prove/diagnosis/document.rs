@@ -21,6 +21,7 @@ fewer faults are found or more false alarms come than before.
   the part that failed (`tests/src/prove/diagnosis/causes.rs`). Faults that no message shows are not counted.
 * An alarm is false if nothing was wrong: without a fault, before it, or in weather that the autopilot holds against. Each rise counts.
 * Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air.
+* [real-flights.md](real-flights.md) compares the ArduPilot flights before and after a change of the checks.
 ";
 
 /// No table shows these.
@@ -120,5 +121,22 @@ mod tests {
         assert!(text.contains(summary::TITLE));
         assert_eq!(text.lines().filter(|line| line.starts_with("Commit ")).count(), 1, "one commit");
         assert!(text.lines().count() <= 150, "one page");
+    }
+
+    /// `--write` deletes text that no table or constant has.
+    #[test]
+    fn the_document_has_no_text_by_hand() {
+        let text = fs::read_to_string(root().join("docs/diagnosis.md")).unwrap();
+        let made = text.strip_prefix(HEAD).unwrap().strip_suffix(LIMITS).unwrap();
+        let forms = [&RATES, &SETS, &BY_CLASS, &BY_CHECK];
+        for line in made.lines().filter(|line| !line.starts_with("| ") && !line.starts_with("|---")) {
+            let is_made = line.is_empty()
+                || line.starts_with("Commit ")
+                || line == summary::TITLE
+                || line.starts_with("* ")
+                || forms.iter().any(|form| line == form.about || line == form.lines()[0]);
+            assert!(is_made, "{line}");
+        }
+        assert_eq!(made.lines().filter(|line| line.starts_with("|---")).count(), forms.len(), "tables");
     }
 }
