@@ -39,8 +39,9 @@ pub fn run(flights: &Flights, commit: impl FnOnce() -> Result<String>) -> Result
         return short::run();
     }
     let commit = if flights.write { Some(commit()?) } else { None };
-    let real = sets::find_real(flights)?.iter().map(real::judge).collect::<Result<Vec<_>>>()?;
-    let judged = sets::find_all(flights)?.iter().map(judge_all).collect::<Result<Vec<_>>>()?;
+    let (sets, reals) = sets::find_all(flights)?;
+    let real = reals.iter().map(real::judge).collect::<Result<Vec<_>>>()?;
+    let judged = sets.iter().map(judge_all).collect::<Result<Vec<_>>>()?;
     let text = document::text(&real, &judged);
     if let Some(commit) = commit {
         let path = root().join("docs/diagnosis.md");

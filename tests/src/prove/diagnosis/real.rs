@@ -6,13 +6,13 @@
 //! |---|---|---|
 //! | `file` | the recording, relative to the folder | the same |
 //! | `check` | empty | the check's name |
-//! | `instance` | empty | which one of several, from 0; empty is 0 |
-//! | `onset` | when the known fault began | when the level rose first; as `time_s` of `hums check --json`; empty is the beginning |
+//! | `instance` | empty | which one of several, 0 to 255; empty is 0 |
+//! | `onset` | when the known fault began | when the level rose; as `time_s` of `hums check --json`; empty is the beginning |
 //! | `label` | `flight` | `true`, `needless` (true, and no pilot, mechanic or owner would act on it) or `false` |
 //! | `cause` | the class of the known fault ([`super::causes::CLASSES`]); empty for an ordinary flight | the evidence |
 //!
-//! Recordings without a row of the flight are not judged. A label holds for its check and instance from
-//! [`EARLIER_S`] before its onset to the next label of them.
+//! Recordings without a row of the flight are not judged. A label holds for one rise: the first of its check and
+//! instance since [`EARLIER_S`] before its onset. A later rise needs a label of its own.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -116,11 +116,14 @@ struct Flight {
     labels: BTreeMap<(String, u8), Vec<Label>>,
 }
 
-impl Flight {
-    fn label(&self, check: &str, instance: u8, at_s: f64) -> Option<&Label> {
-        let labels = self.labels.get(&(check.to_owned(), instance))?;
-        labels.iter().rev().find(|label| label.onset_s - EARLIER_S <= at_s)
-    }
+/// Takes the label of a rise: of those that hold, the one with the nearest onset. Labels before it are stale.
+fn take<'a>(labels: &mut &'a [Label], at_s: f64) -> Option<&'a Label> {
+    let holding = labels.iter().enumerate().filter(|(_, label)| label.onset_s - EARLIER_S <= at_s);
+    let distance_s = |label: &Label| (label.onset_s - at_s).abs();
+    let (place, label) =
+        holding.min_by(|(_, one), (_, other)| distance_s(one).total_cmp(&distance_s(other)))?;
+    *labels = &labels[place + 1..];
+    Some(label)
 }
 
 #[derive(Debug)]
@@ -190,8 +193,10 @@ fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Re
             places.iter().map(|place| row.get(*place).map_or("", String::as_str)).collect();
         let [file, check, instance, onset, label, cause] = cells[..] else { bail!("a row has no cells") };
         let context = || format!("row {number}, {file}");
-        let number = |text: &str| if text.is_empty() { Ok(0.0) } else { text.parse::<f64>() };
-        let onset_s = number(onset).with_context(|| format!("{}: onset {onset}", context()))?;
+        let or_zero = |cell: &str| if cell.is_empty() { "0".to_owned() } else { cell.to_owned() };
+        let onset_s =
+            or_zero(onset).parse::<f64>().with_context(|| format!("{}: onset {onset}", context()))?;
+        ensure!(onset_s.is_finite(), "{}: onset {onset} is no time", context());
         if label == "flight" {
             ensure!(check.is_empty(), "{}: the row of a flight names a check", context());
             let class = causes::of(cause);
@@ -206,9 +211,11 @@ fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Re
             let flight =
                 flights.get_mut(file).with_context(|| format!("{}: the flight has no row", context()))?;
             ensure!(vocabulary(check).is_some(), "{}: there is no check {check}", context());
-            let instance = number(instance).with_context(|| format!("{}: instance {instance}", context()))?;
+            let instance = or_zero(instance)
+                .parse::<u8>()
+                .with_context(|| format!("{}: instance {instance}", context()))?;
             let verdict = Verdict::parse(label).with_context(context)?;
-            let labels = flight.labels.entry((check.to_owned(), instance as u8)).or_default();
+            let labels = flight.labels.entry((check.to_owned(), instance)).or_default();
             labels.push(Label { onset_s, verdict, evidence: cause.to_owned() });
             labels.sort_by(|one, other| one.onset_s.total_cmp(&other.onset_s));
         }
@@ -230,10 +237,13 @@ fn of(flight: &Flight, judged: &Judgement) -> Outcome {
         let mut problems = judged.problems.iter();
         problems.any(|one| one.check == check && one.instance == instance && one.because.is_some())
     };
+    let mut labels: BTreeMap<_, _> =
+        flight.labels.iter().map(|(of, labels)| (of, labels.as_slice())).collect();
     let told = rises(judged).filter(|finding| !is_explained(&finding.check, finding.instance));
     let told = told.map(|finding| {
         let at_s = finding.at.as_secs_f64();
-        let label = flight.label(&finding.check, finding.instance, at_s);
+        let labels = labels.get_mut(&(finding.check.clone(), finding.instance));
+        let label = labels.and_then(|labels| take(labels, at_s));
         Told {
             check: finding.check.clone(),
             instance: finding.instance,
@@ -395,6 +405,33 @@ mod tests {
     }
 
     #[test]
+    fn a_label_holds_for_one_rise() {
+        let verdicts = |onsets: &[f64], rises: &[f64]| {
+            let label = |(place, onset_s): (usize, &f64)| Label {
+                onset_s: *onset_s,
+                verdict: Verdict::True,
+                evidence: place.to_string(),
+            };
+            let labels: Vec<Label> = onsets.iter().enumerate().map(label).collect();
+            let mut left = labels.as_slice();
+            let of = |at_s: &f64| take(&mut left, *at_s).map_or("-".to_owned(), |one| one.evidence.clone());
+            rises.iter().map(of).collect::<String>()
+        };
+        for (onsets, rises, labelled) in [
+            (&[50.0][..], &[50.0, 500.0][..], "0-"),
+            (&[0.0], &[30.0, 60.0, 90.0], "0--"),
+            (&[50.0], &[39.9, 40.0], "-0"),
+            (&[50.0, 55.0], &[50.0, 55.0], "01"),
+            (&[50.0, 55.0], &[45.0, 52.0, 58.0], "01-"),
+            // The check rises at 50 s no more.
+            (&[50.0, 500.0], &[500.0], "1"),
+            (&[50.0, 400.0], &[400.0, 500.0], "1-"),
+        ] {
+            assert_eq!(verdicts(onsets, rises), labelled, "{onsets:?} {rises:?}");
+        }
+    }
+
+    #[test]
     fn the_first_finding_is_the_first_since_the_fault() {
         let right = |flight: &str| {
             let folder = folder(&format!("ap_quad_faults.tlog,,,{flight}\n"));
@@ -414,6 +451,12 @@ mod tests {
             ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,luck,,,true,\n", "no check luck"),
             ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,,,maybe,\n", "maybe is no label"),
             ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,,soon,true,\n", "onset soon"),
+            ("ap_quad_faults.tlog,,,nan,flight,gnss\n", "onset nan is no time"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,,inf,true,\n", "onset inf"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,-1,,true,\n", "instance -1"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,1.7,,true,\n", "instance 1.7"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,300,,true,\n", "instance 300"),
+            ("ap_quad_faults.tlog,,,,flight,\nap_quad_faults.tlog,roll,nan,,true,\n", "instance nan"),
         ] {
             let error = refusal(labels);
             assert!(error.contains(said) && error.contains("labels-mine.csv"), "{error}");

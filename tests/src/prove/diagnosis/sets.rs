@@ -29,19 +29,22 @@ impl Set {
     }
 }
 
-pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
+/// Sets of flights, and those of real flights.
+pub(super) fn find_all(options: &Flights) -> Result<(Vec<Set>, Vec<real::Set>)> {
+    let mut reals = Vec::new();
     let mut sets = vec![
         repository("labelled, ArduPilot", "tests/labelled")?,
         repository("labelled, PX4", "tests/labelled/px4")?,
         repository("first recordings", "tests/flights")?,
     ];
     for (folder, known) in &options.folders {
-        if real::find(folder, *known)?.is_none() {
-            sets.push(given(folder, *known)?);
+        match real::find(folder, *known)? {
+            Some(set) => reals.push(set),
+            None => sets.push(given(folder, *known)?),
         }
     }
     if options.short {
-        return Ok(sets);
+        return Ok((sets, reals));
     }
     let unlabelled = flights::more().into_iter().filter(|path| !has_labels_beside(path));
     let flights: Vec<_> = unlabelled.map(|path| (Place::file(&path), None)).collect();
@@ -49,13 +52,7 @@ pub(super) fn find_all(options: &Flights) -> Result<Vec<Set>> {
         sets.push(Set { name: "further recordings".to_owned(), known: Known::Seen, flights });
     }
     sets.sort_by_key(|set| !set.is_labelled());
-    Ok(sets)
-}
-
-/// The folders of real flights.
-pub(super) fn find_real(options: &Flights) -> Result<Vec<real::Set>> {
-    let folders = options.folders.iter().map(|(folder, known)| real::find(folder, *known));
-    folders.filter_map(Result::transpose).collect()
+    Ok((sets, reals))
 }
 
 fn repository(name: &str, folder: &str) -> Result<Set> {

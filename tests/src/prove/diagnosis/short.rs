@@ -34,7 +34,7 @@ struct Sums {
 
 pub(super) fn run() -> Result<String> {
     let mut sums = Sums::default();
-    let sets = find_all(&Flights::short())?;
+    let (sets, _) = find_all(&Flights::short())?;
     for set in sets.iter().filter(|set| set.is_labelled()) {
         for one in judge_all(set)?.outcomes {
             if let Some(fault) = one.fault.filter(|fault| fault.visible) {
