@@ -12,7 +12,7 @@ const HEIGHT = 220;
 const AXES = ["x", "y", "z"];
 
 const spectrum = ({ title, unit, rate_hz: rate, step_hz: step, strongest, values }) => {
-  const words = `${unit}, from ${fixed(rate, 0)} samples a second; strongest at ${strongest}`;
+  const words = `${unit}, from ${fixed(rate, 0)} samples a second; strongest above 10 Hz: ${strongest}`;
   const body = el("div", { class: "plotted", role: "img", "aria-label": `Spectrum of ${title}, ${words}` });
   const marks = AXES.map(() => el("i"));
   const keys = el(
