@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::craft::{Craft, is_of_wire};
 use crate::counters::tells_flight;
-use crate::names::check_kind;
+use crate::names::{check_kind, vocabulary};
 use crate::page::note::CELLS_UNKNOWN;
 use crate::part;
 
@@ -39,6 +39,8 @@ pub struct Part {
     /// the vehicle seems to lack the part.
     calm: Option<&'static str>,
     reason: String,
+    /// The recommended action for the reason, as a sentence; empty without a finding.
+    action: &'static str,
 }
 
 /// The health board.
@@ -171,7 +173,8 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
     let is_link = silent && subsystem == Subsystem::Link;
     let unknown = level == Level::Stale && !recorder && !known.is_heard && !is_link;
     let absent = subsystem == Subsystem::Engine && craft.monitor.vehicle().engine.get().is_none();
-    let (calm, reason) = if let Some(finding) = ended.filter(|_| level == Level::Stale && !is_link) {
+    let no_action = |calm, reason| (calm, reason, "");
+    let (calm, reason, action) = if let Some(finding) = ended.filter(|_| level == Level::Stale && !is_link) {
         let why = if silent {
             format!("silent for {}", seconds(craft, now))
         } else if subsystem == Subsystem::Mishap {
@@ -179,22 +182,23 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
         } else {
             "not judged on the ground or disarmed".to_owned()
         };
-        (Some(was_level(finding)), format!("{}; {why}", without_advice(finding)))
+        no_action(Some(was_level(finding)), format!("{}; {why}", without_advice(finding)))
     } else if unknown && !absent && !silent && waits(craft, subsystem) {
-        (Some("idle"), waits_for(craft, subsystem).to_owned())
+        no_action(Some("idle"), waits_for(craft, subsystem).to_owned())
     } else if recorder && level == Level::Stale && craft.on_the_wire {
-        (Some("recorded"), "it recorded this; hums info --verify says how well".to_owned())
+        no_action(Some("recorded"), "it recorded this; hums info --verify says how well".to_owned())
     } else if unknown && !EXPECTED.contains(&subsystem) {
-        (Some("none"), "nothing is heard of any".to_owned())
+        no_action(Some("none"), "nothing is heard of any".to_owned())
     } else if silent && level == Level::Stale && !recorder {
-        (None, format!("silent for {}", seconds(craft, now)))
+        no_action(None, format!("silent for {}", seconds(craft, now)))
     } else if recorder && level == Level::Stale && craft.companion.known() {
-        (None, "it was heard before, and is silent now".to_owned())
+        no_action(None, "it was heard before, and is silent now".to_owned())
     } else {
-        (None, reason(craft, subsystem, level, here, known.good))
+        let (reason, action) = reason(craft, subsystem, level, here, known.good);
+        (None, reason, action)
     };
     let reason = if doubt && !silent { format!("{reason}; {CELLS_UNKNOWN}") } else { reason };
-    Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason }
+    Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason, action }
 }
 
 fn is_silent(craft: &Craft, now: Instant) -> bool {
@@ -223,8 +227,14 @@ fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
     }
 }
 
-/// The worst finding, or the reason for its absence.
-fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: usize) -> String {
+/// The worst finding with the action for its cause, or the reason for its absence.
+fn reason(
+    craft: &Craft,
+    subsystem: Subsystem,
+    level: Level,
+    here: Level,
+    good: usize,
+) -> (String, &'static str) {
     let findings = craft.worries.values().filter(|finding| finding.subsystem == subsystem);
     let worst = findings.max_by_key(|finding| (rank(finding.level), finding.at.as_millis()));
     if let Some(finding) = worst.filter(|_| level != Level::Ok) {
@@ -233,15 +243,20 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
         // One cause has its own order.
         return match alarm(finding).and_then(|effect| health::root_cause(&effect, alarms)) {
             Some(cause) => {
-                format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name))
+                let words =
+                    format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name));
+                (words, action(cause.check.name))
             }
-            None => match craft.due(finding) {
-                Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
-                None => words(finding),
-            },
+            None => {
+                let words = match craft.due(finding) {
+                    Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
+                    None => words(finding),
+                };
+                (words, action(finding.check))
+            }
         };
     }
-    match (subsystem, level) {
+    let reason = match (subsystem, level) {
         (Subsystem::Recorder, Level::Ok) => "it records".to_owned(),
         (Subsystem::Recorder, Level::Stale) => "no recorder is heard".to_owned(),
         (Subsystem::Power, Level::Advisory) if here == level => format!("{good} checks good"),
@@ -253,7 +268,12 @@ fn reason(craft: &Craft, subsystem: Subsystem, level: Level, here: Level, good: 
         // The box receives more than this PC does.
         _ if here == Level::Ok => "seen on board; within limits by what this link carries".to_owned(),
         _ => "seen on board".to_owned(),
-    }
+    };
+    (reason, "")
+}
+
+fn action(check: &str) -> &'static str {
+    vocabulary(check).map_or("", |words| words.action)
 }
 
 /// Unknown is between a warning and a known danger ([`hums_core::health`]).
@@ -319,11 +339,16 @@ mod tests {
         let mut craft = craft(&[battery, failsafe]);
         let reason =
             |craft: &Craft, of: Subsystem| self::reason(craft, of, Level::Critical, Level::Critical, 0);
-        assert_eq!(reason(&craft, Subsystem::Power), "battery 1 cell low: 3.40 V, LAND NOW");
-        let words = "autopilot in failsafe, because of: battery cell voltage";
-        assert_eq!(reason(&craft, Subsystem::Computer), words);
+        let land = action("cell_voltage");
+        let words = "battery 1 cell low: 3.40 V, LAND NOW".to_owned();
+        assert_eq!(reason(&craft, Subsystem::Power), (words, land));
+        let words = "autopilot in failsafe, because of: battery cell voltage".to_owned();
+        assert_eq!(reason(&craft, Subsystem::Computer), (words, land));
         craft.worries.remove(&("cell_voltage", 0));
-        assert_eq!(reason(&craft, Subsystem::Computer), "autopilot in failsafe, WATCH IT");
+        let words = "autopilot in failsafe, WATCH IT".to_owned();
+        assert_eq!(reason(&craft, Subsystem::Computer), (words, action("autopilot_state")));
+        assert!(!land.is_empty() && land != action("autopilot_state"));
+        assert_eq!(reason(&craft, Subsystem::Propulsion).1, "");
     }
 
     #[test]

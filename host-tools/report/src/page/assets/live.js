@@ -229,15 +229,12 @@ const drawHead = () => {
   toggle(root, "cut", !connected || silent || source.phase === "lost");
 };
 
-// Why the level is bad, and what to do: of the worst subsystem, with the advice of its last finding.
+// Why the level is bad, and what to do: of the worst subsystem.
 const drawWhy = () => {
   const worst = ["critical", "warning"].includes(state.overall) ? state.board.find(({ level }) => level === state.overall) : null;
   why.hidden = !connected || !worst?.reason;
   if (why.hidden) return;
-  const last = flight.notes.findLast(
-    ({ subsystem, level, found }) => subsystem === worst.subsystem && level === worst.level && found && !found.because,
-  );
-  say(why, [`${worst.reason}.`, last?.found.action].filter(Boolean).join(" "));
+  say(why, [`${worst.reason}.`, worst.action].filter(Boolean).join(" "));
   attribute(why, "class", `verdict ${worst.level}`);
 };
 
