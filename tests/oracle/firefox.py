@@ -37,24 +37,33 @@ class Firefox:
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.count = 0
         self.rest = b""
-        self.socket = self.connect(port)
+        self.port = port
+
+    def begin(self):
+        self.socket = self.connect()
         self.receive()
         self("WebDriver:NewSession", {})
 
-    def connect(self, port):
+    def connect(self):
         for _ in range(600):
             try:
-                return socket.create_connection(("127.0.0.1", port), timeout=600)
+                return socket.create_connection(("127.0.0.1", self.port), timeout=600)
             except OSError:
                 time.sleep(0.1)
         raise TimeoutError("Firefox does not listen")
 
+    def more(self):
+        part = self.socket.recv(65536)
+        if not part:
+            raise ConnectionError("Firefox closed the connection")
+        self.rest += part
+
     def receive(self):
         while b":" not in self.rest:
-            self.rest += self.socket.recv(65536)
+            self.more()
         length, self.rest = self.rest.split(b":", 1)
         while len(self.rest) < int(length):
-            self.rest += self.socket.recv(65536)
+            self.more()
         message, self.rest = self.rest[:int(length)], self.rest[int(length):]
         return json.loads(message)
 
@@ -107,6 +116,7 @@ def main():
         folder = pathlib.Path(folder)
         firefox = Firefox(program, folder)
         try:
+            firefox.begin()
             firefox("WebDriver:Navigate", {"url": pathlib.Path(page).resolve().as_uri()})
             firefox.wait("return document.documentElement.dataset.ready === 'true'", 60)
             begun = time.monotonic()
