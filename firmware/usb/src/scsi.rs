@@ -121,12 +121,14 @@ impl<D: CardDevice> Disk<D> {
         if block.first() != Some(&REQUEST_SENSE) {
             self.sense = Sense::default();
         }
+        self.card.begin_service();
         let answer = self.execute(block, scratch);
         answer.map_err(|sense| self.sense = sense).ok()
     }
 
     /// Reads blocks of an accepted command. After `false` the host must not get `blocks`.
     pub fn read(&mut self, first: u32, blocks: &mut [Block]) -> bool {
+        self.card.begin_service();
         let read = self.access(|card| card.read(blocks, first));
         read.map_err(|sense| self.sense = sense).is_ok()
     }
@@ -238,7 +240,6 @@ impl<D: CardDevice> Disk<D> {
 
     /// Accesses the card. After an error another card may be in the slot.
     fn access<T>(&mut self, act: impl FnOnce(&D) -> Result<T, D::Error>) -> Result<T, Sense> {
-        self.card.begin_service();
         act(&self.card).map_err(|error| match D::trouble(&error) {
             Trouble::Gone => {
                 self.card.reset();
