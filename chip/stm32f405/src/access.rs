@@ -109,7 +109,7 @@ impl Chip {
             Unit::Flash => self.flash.read(offset),
             Unit::Dma(number) => self.dmas[number as usize].read(offset),
             Unit::Rng => self.rng.read(offset, now.ps, self.clocks.pll48),
-            Unit::Otg => self.otg.read(offset),
+            Unit::Otg => self.otg.read(offset, now.ps),
             Unit::Dbgmcu => self.read_dbgmcu(offset),
         };
         let Some(value) = value else {

@@ -312,6 +312,12 @@ impl Machine {
         self.chip.host_plugged();
     }
 
+    /// Pulls the cable of the USB port.
+    pub fn unplug(&mut self) {
+        self.chip.otg.disconnect();
+        self.chip.host_plugged();
+    }
+
     /// Other ends of buses.
     fn wires(&mut self) -> impl Iterator<Item = &mut Box<dyn Wire>> {
         let bits = self.chip.bits.iter_mut().map(|bits| &mut bits.wire);

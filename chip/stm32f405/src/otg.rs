@@ -177,6 +177,8 @@ pub struct Otg {
     diepempmsk: u32,
     pcgcctl: u32,
     enumerated: bool,
+    /// The last frame that the host began.
+    frame: u32,
     /// Its address on the bus: a new one counts from the end of the status stage on.
     address: u32,
     to_host: [Endpoint; ENDPOINTS],
@@ -229,6 +231,7 @@ impl Otg {
             diepempmsk: 0,
             pcgcctl: 0,
             enumerated: false,
+            frame: 0,
             address: 0,
             to_host: ENDPOINTS_AT_RESET,
             from_host: ENDPOINTS_AT_RESET,
@@ -252,6 +255,11 @@ impl Otg {
     /// Plugs a host in.
     pub fn connect(&mut self, host: Box<dyn Host>, now: Ps) {
         (self.host, self.action, self.over) = (Some(host), Action::Wait(0), now);
+    }
+
+    /// Pulls the cable. The device gets no event, as if it had missed that of an idle bus.
+    pub fn disconnect(&mut self) {
+        (self.host, self.over) = (None, NEVER);
     }
 
     /// The bus's next moment.
@@ -326,6 +334,15 @@ impl Otg {
             }
         };
         self.over = now.saturating_add(lasts);
+    }
+
+    /// Number of the frame: one each millisecond while the bus is awake, in 11 bits.
+    fn frame(&mut self, now: Ps) -> u32 {
+        let is_awake = !matches!(self.action, Action::Attach | Action::Reset | Action::Sleep(_));
+        if self.host.is_some() && self.enumerated && is_awake {
+            self.frame = (now / MS) as u32 & 0x7FF;
+        }
+        self.frame
     }
 
     fn bus_reset(&mut self) {
@@ -481,7 +498,7 @@ impl Otg {
     }
 
     /// The register at this offset.
-    pub fn read(&mut self, offset: u32) -> Option<u32> {
+    pub fn read(&mut self, offset: u32, now: Ps) -> Option<u32> {
         let number = (offset >> 5 & 0x1F) as usize;
         Some(match offset {
             // Nothing of OTG; a register of later versions.
@@ -501,7 +518,7 @@ impl Otg {
             0x800 => self.dcfg,
             0x804 => self.dctl,
             // Full speed.
-            0x808 => 3 << 1,
+            0x808 => 3 << 1 | self.frame(now) << 8,
             0x810 => self.masks[0],
             0x814 => self.masks[1],
             0x818 => self.endpoint_interrupts(),
