@@ -220,10 +220,156 @@ fn a_pulled_card_is_told_and_read_again_when_it_is_back() {
     assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
 }
 
+/// The device's descriptor, which it must give within 100 ms.
+fn answers(bus: &mut Bus) -> Result<()> {
+    let begun = bus.now;
+    let device = bus.control_in(0, 6, 0x0100, 0, 64)?;
+    ensure!(device.is_some_and(|device| device.len() == 18), "no descriptor");
+    ensure!(bus.now - begun < 100 * MS, "after {} ms", (bus.now - begun) / MS);
+    Ok(())
+}
+
+#[test]
+fn a_control_transfer_that_the_host_gives_up_ends_with_its_next_one_or_a_reset() {
+    let (mut rig, resets) = reading();
+    let first = rig.medium.get(0).to_vec();
+    use_host(&mut rig, 120 * SECOND, move |bus| {
+        type Unfinished = fn(&mut Bus) -> Result<()>;
+        let unfinished: [(&str, Unfinished); 6] = [
+            ("no data", |bus| bus.setup(0x80, 6, 0x0100, 0, 64)),
+            ("no status", |bus| {
+                bus.setup(0x80, 6, 0x0100, 0, 64)?;
+                bus.read(0, 64).map(drop)
+            }),
+            ("no data to the device", |bus| bus.setup(0x21, 0xFF, 0, 0, 8)),
+            ("data but no status", |bus| {
+                bus.setup(0x21, 0xFF, 0, 0, 8)?;
+                bus.write(0, &[0x55; 8]).map(drop)
+            }),
+            ("half of the data", |bus| {
+                bus.setup(0x21, 0xFF, 0, 0, 128)?;
+                bus.write(0, &[0x55; 64]).map(drop)
+            }),
+            ("no status of a request without data", |bus| bus.setup(0, 9, 1, 0, 0)),
+        ];
+        for (name, begin) in unfinished {
+            println!("{name}");
+            let bus = &mut *Disk::attach(bus)?.bus;
+            begin(bus)?;
+            answers(bus)?;
+            // The device has waited for it for some time.
+            begin(bus)?;
+            bus.act(Action::Wait(20 * MS))?;
+            answers(bus)?;
+            begin(bus)?;
+            bus.act(Action::Wait(20 * MS))?;
+            bus.reset()?;
+            answers(bus)?;
+            begin(bus)?;
+            bus.act(Action::Wait(2 * SECOND))?;
+            answers(bus)?;
+            begin(bus)?;
+            ensure!(Disk::attach(bus)?.read(0, 1)?.data == first, "{name}");
+        }
+        Ok(())
+    });
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+}
+
+#[test]
+fn a_configuration_begins_anew_without_a_reset() {
+    let (mut rig, _) = reading();
+    let first = rig.medium.get(0).to_vec();
+    use_host(&mut rig, 60 * SECOND, move |bus| {
+        let mut disk = Disk::attach(bus)?;
+        let (to, from) = disk.endpoints;
+        let mut wrapper = b"USBC\x01\0\0\0\0\x80\0\0\x80\0\x0A\x28\0\0\0\0\0\0\0\x40".to_vec();
+        wrapper.resize(31, 0);
+        // SET_CONFIGURATION, SET_INTERFACE.
+        for (kind, request, value) in [(0, 9, 1), (1, 11, 0)] {
+            // An odd number of packets; endpoints that are halted; a command in work.
+            disk.command(&[0; 6], 0)?;
+            disk.bus.control(2, 3, 0, to.into())?;
+            disk.bus.control(2, 3, 0, u16::from(0x80 | from))?;
+            disk.bus.configure(kind, request, value)?;
+            ensure!(disk.read(0, 1)?.data == first, "after halts of the host");
+            disk.bus.write(to, &[0x55; 31])?;
+            disk.bus.act(Action::Wait(10 * MS))?;
+            disk.bus.configure(kind, request, value)?;
+            ensure!(disk.read(0, 1)?.data == first, "after halts of the disk");
+            disk.bus.write(to, &wrapper)?;
+            disk.bus.read(from, 640)?;
+            disk.bus.configure(kind, request, value)?;
+            ensure!(disk.read(0, 1)?.data == first, "after a part of a command");
+        }
+        // Without a configuration the class has no endpoints, and a reset of the class gives it none.
+        disk.bus.control(0, 9, 0, 0)?;
+        disk.bus.control(0x21, 0xFF, 0, 0)?;
+        let packet = Action::Out(disk.bus.address, to, false, vec![0; 31]);
+        ensure!(disk.bus.act(packet)? == Reply::Nothing, "an endpoint without a configuration");
+        disk.bus.configure(0, 9, 1)?;
+        ensure!(disk.read(0, 1)?.data == first, "configured again");
+        Ok(())
+    });
+}
+
+/// Any actions of a host, without sense.
+fn any_actions(bus: &mut Bus, mut random: impl FnMut(u64) -> u64, count: u32) -> Result<()> {
+    for _ in 0..count {
+        let address = [0, bus.address][random(2) as usize];
+        let endpoint = random(3) as u8;
+        let action = match random(10) {
+            0 => Action::Reset,
+            1 => Action::Sleep((1 + random(20)) * MS),
+            2 => Action::Wait(random(1_500) * MS),
+            3 | 4 => Action::Out(address, endpoint, random(2) == 1, vec![0x55; random(65) as usize]),
+            5 | 6 => Action::In(address, endpoint),
+            _ => {
+                // Kind, request, value: descriptors, addresses, configurations, interfaces, halts, the class, anything.
+                let kinds = [0x80, 0x00, 0x01, 0x02, 0x82, 0x21, 0xA1, random(256) as u8];
+                let requests = [6, 5, 9, 11, 3, 1, 0xFF, 0xFE, 0, random(256) as u8];
+                let values = [0x00, 0x01, 0x0100, 0x0200, 0x0301, random(1 << 16) as u16];
+                let [v0, v1] = values[random(6) as usize].to_le_bytes();
+                let (index, length) =
+                    ([0, 1, 0x81, 0x80][random(4) as usize], [0, 8, 64, 255][random(4) as usize]);
+                let (kind, request) = (kinds[random(8) as usize], requests[random(10) as usize]);
+                Action::Setup(address, [kind, request, v0, v1, index, 0, length, 0])
+            }
+        };
+        bus.act(action)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn after_any_actions_of_a_host_the_disk_can_be_attached() {
+    let (mut rig, resets) = reading();
+    let first = rig.medium.get(0).to_vec();
+    use_host(&mut rig, 600 * SECOND, move |bus| {
+        for seed in 1..=4_u64 {
+            println!("seed {seed}");
+            let mut state = seed;
+            let random = move |below: u64| {
+                // Constants: Knuth, MMIX.
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 33) % below
+            };
+            any_actions(bus, random, 60)?;
+            let begun = bus.now;
+            ensure!(Disk::attach(bus)?.read(0, 1)?.data == first, "seed {seed}");
+            ensure!(bus.now - begun < 2 * SECOND, "seed {seed}: after {} ms", (bus.now - begun) / MS);
+        }
+        Ok(())
+    });
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+}
+
 #[test]
 #[ignore = "ten minutes of a busy processor: `cargo xtask prove chip`"]
-fn without_a_host_the_board_records_again_after_ten_minutes() {
+fn ten_minutes_after_the_cable_was_pulled_the_board_records_again() {
     let (mut rig, resets) = reading();
+    use_host(&mut rig, 60 * SECOND, |bus| Disk::attach(bus)?.blocks());
+    rig.machine.unplug();
     let now = rig.machine.now();
     rig.run(now + 590 * SECOND, false).unwrap();
     assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);

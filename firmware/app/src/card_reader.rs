@@ -18,7 +18,8 @@ use hums_core::clock::{Instant, Span};
 use hums_onboard::ResetCause;
 use hums_recorder::Block;
 use hums_usb::class::{Control, MassStorage};
-use hums_usb::guard::{Guarded, Link};
+use hums_usb::guard::{Guarded, Link, Port};
+use hums_usb::presence::Presence;
 use hums_usb::scsi::{Disk, SERIAL_BYTES};
 use hums_usb::{Builder, Config, PACKET_BYTES};
 
@@ -31,8 +32,8 @@ const HOST_MAX: Span = Span::from_secs(600);
 const PARTING: Span = Span::from_secs(1);
 /// `SysTick` feeds the watchdog for this many turns without the loop: 10 s, of which the card's driver has 8.
 const LOOP_TURNS_MAX: u32 = 100;
-/// How often the LED's pin is set: a pin of the debug port is not the LED's at first.
-const LED_EVERY: Span = Span::from_millis(100);
+/// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
+const LOOK_EVERY: Span = Span::from_millis(100);
 
 /// The test number of pid.codes: the project has none of its own.
 const VENDOR: u16 = 0x1209;
@@ -71,7 +72,13 @@ pub(crate) fn run(
     let mut disk = Disk::new(card, serial);
     // One packet of each endpoint: control and class.
     let mut packets = [0; 2 * PACKET_BYTES];
-    let driver = Guarded::new(usb.driver(&mut packets), &link, board::begin_with_data0);
+    let port = Port {
+        begin_with_data0: board::begin_with_data0,
+        drop_control_packet: board::drop_control_packet,
+        has_bus_event: board::has_bus_event,
+        now,
+    };
+    let driver = Guarded::new(usb.driver(&mut packets), &link, port);
     // Some hosts take the class from the interface only.
     let mut config = Config::new(VENDOR, PRODUCT);
     (config.device_class, config.device_sub_class, config.device_protocol) = (0, 0, 0);
@@ -96,18 +103,16 @@ pub(crate) fn run(
 }
 
 async fn supervise(mut led: board::Led, link: &Link) {
-    let (mut seen, mut lit) = (now(), Instant::ZERO);
+    let (mut presence, mut looked) = (Presence::new(now()), Instant::ZERO);
     poll_fn(|_| {
         watch::fed();
         let now = now();
-        if now.since(lit) >= LED_EVERY {
-            lit = now;
+        if now.since(looked) >= LOOK_EVERY {
+            looked = now;
             led.set(true);
+            presence.look(now, link.is_configured(), board::frame_number());
         }
-        if link.has_host() {
-            seen = now;
-        }
-        if now.since(seen) < HOST_MAX { Poll::Pending } else { Poll::Ready(()) }
+        if presence.absent(now) < HOST_MAX { Poll::Pending } else { Poll::Ready(()) }
     })
     .await;
 }

@@ -1,7 +1,7 @@
 //! The mass storage class on a USB driver: bytes between endpoints and [`Transport`].
 
-use embassy_futures::poll_once;
 use embassy_futures::select::{Either, select};
+use embassy_futures::{poll_once, yield_now};
 use embassy_usb::control::{InResponse, OutResponse, Recipient, Request, RequestType};
 use embassy_usb::driver::{Driver, Endpoint as _, EndpointError, EndpointIn as _, EndpointOut as _};
 use embassy_usb::types::InterfaceNumber;
@@ -43,15 +43,14 @@ impl<'d> Control<'d> {
 impl Handler for Control<'_> {
     fn reset(&mut self) {
         self.link.configured(false);
-        self.link.suspended(false);
     }
 
     fn configured(&mut self, is_so: bool) {
         self.link.configured(is_so);
     }
 
-    fn suspended(&mut self, is_so: bool) {
-        self.link.suspended(is_so);
+    fn set_alternate_setting(&mut self, _: InterfaceNumber, _: u8) {
+        self.link.abort();
     }
 
     fn control_out(&mut self, request: Request, _data: &[u8]) -> Option<OutResponse> {
@@ -141,12 +140,15 @@ impl<'d, D: Driver<'d>> MassStorage<'d, D> {
     async fn command<C: CardDevice>(&mut self, disk: &mut Disk<C>, buffer: &mut [Block]) -> Result<(), End> {
         let mut packet = [0; PACKET_BYTES];
         let bytes = self.from_host.read(&mut packet).await?;
+        // The card may block each step for its whole service. The watchdog is fed between two of them.
+        yield_now().await;
         let Some(scratch) = buffer.first_mut() else { return Err(End::Disabled) };
         let Ok(mut transport) = Transport::begin(packet.get(..bytes).unwrap_or_default(), disk, scratch)
         else {
             self.link.halt();
             return Err(End::Disabled);
         };
+        yield_now().await;
         loop {
             match transport.step(disk, buffer) {
                 Step::Send([]) => self.to_host.write(&[]).await?,

@@ -5,7 +5,7 @@
 //! host <- bulk IN  <-
 //! ```
 //! [`transport`] and [`scsi`] have no I/O: command block in, data and status out. [`class`] moves their bytes through any driver of
-//! `embassy_usb`; [`guard`] keeps requests of a hostile host from that driver.
+//! `embassy_usb`; [`guard`] keeps requests of a hostile host from that driver. [`presence`] finds out whether a host is there.
 //!
 //! Rules:
 //! * The disk cannot be written. Writes are refused as protected, and hosts are told so by MODE SENSE.
@@ -18,6 +18,7 @@
 
 pub mod class;
 pub mod guard;
+pub mod presence;
 pub mod scsi;
 pub mod transport;
 

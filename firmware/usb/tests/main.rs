@@ -5,3 +5,4 @@ mod cases;
 mod commands;
 mod common;
 mod hostile;
+mod presence;

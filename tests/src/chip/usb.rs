@@ -45,7 +45,8 @@ pub struct Bus {
     replies: Receiver<(Ps, Reply)>,
     /// The time on the bus.
     pub now: Ps,
-    address: u8,
+    /// The device's address.
+    pub address: u8,
     /// Next packet is DATA1: from the host, to the host.
     toggles: [[bool; 16]; 2],
 }
@@ -105,7 +106,8 @@ impl Bus {
         Ok(Some(data))
     }
 
-    fn setup(&mut self, kind: u8, request: u8, value: u16, index: u16, length: u16) -> Result<()> {
+    /// A SETUP packet: the first stage of a request.
+    pub fn setup(&mut self, kind: u8, request: u8, value: u16, index: u16, length: u16) -> Result<()> {
         let ([v0, v1], [i0, i1], [l0, l1]) = (value.to_le_bytes(), index.to_le_bytes(), length.to_le_bytes());
         let packet = [kind, request, v0, v1, i0, i1, l0, l1];
         let reply = self.packet(&Action::Setup(self.address, packet))?;
@@ -161,6 +163,13 @@ impl Bus {
         self.act(Action::Reset)?;
         (self.address, self.toggles) = (0, [[false; 16]; 2]);
         self.act(Action::Wait(10 * MS)).map(drop)
+    }
+
+    /// A request that begins a configuration: endpoints go on with DATA0 (USB 2.0, 9.1.1.5).
+    pub fn configure(&mut self, kind: u8, request: u8, value: u16) -> Result<()> {
+        ensure!(self.control(kind, request, value, 0)?, "no configuration");
+        self.toggles = [[false; 16]; 2];
+        Ok(())
     }
 
     /// Clears an endpoint's halt. `address` has the direction as its highest bit.

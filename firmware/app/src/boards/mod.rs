@@ -13,7 +13,7 @@
 //! | `crystal_failed()` | whether the clock has gone over to a less exact oscillator |
 //! | `LATE_TURNS` | when the watchdog counts as late (`watch`) |
 //! | `restart()` | after a fault |
-//! | `feed_watchdog()`, `begin_with_data0()` | for the card reader |
+//! | `feed_watchdog()` and the functions of the USB port | for the card reader |
 
 pub(crate) mod board;
 pub(crate) mod machine;

@@ -26,7 +26,7 @@ pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
-pub(crate) use usb::begin_with_data0;
+pub(crate) use usb::{begin_with_data0, drop_control_packet, frame_number, has_bus_event};
 pub(crate) use watchdog::{Watchdog, reload as feed_watchdog};
 
 use crate::boards::machine::SYSTICK_RELOAD;
