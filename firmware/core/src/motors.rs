@@ -186,8 +186,9 @@ impl Motors {
         let track = self.track(motor)?;
         let silence_s = heard.since(track.last.instant(heard)?.later(resumed)).as_secs_f32();
         let intervals = if track.interval_s > SLOW_S { INTERVALS_MISSED_SLOW } else { INTERVALS_MISSED };
-        let age = |track: &Track| track.last.age(heard);
-        let others_come = self.tracks.iter().filter_map(age).any(|other| Some(other) < age(track));
+        let age_s = |track: &Track| track.last.age(heard).map_or(f32::INFINITY, Span::as_secs_f32);
+        // Groups of ESCs follow each other.
+        let others_come = self.tracks.iter().any(|other| age_s(other) + track.interval_s < age_s(track));
         let missed = track.interval_s > 0.0
             && silence_s > intervals * track.interval_s
             && (others_come

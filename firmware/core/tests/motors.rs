@@ -1,6 +1,6 @@
 //! Speeds and currents of motors against each other: frames, turning, standing and pushing motors.
 
-use crate::common::{Quad, Run};
+use crate::common::{AUTOPILOT, Quad, Run, observe};
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{
     Attitude, Autopilot, Esc, EscGroup, LandedState, MOTORS_MAX, Observation, Outputs, VehicleKind, VtolState,
@@ -406,19 +406,21 @@ fn a_temperature_that_is_no_longer_in_the_message_is_no_longer_known() {
 
 #[test]
 fn escs_on_a_link_that_slows_all_messages_alike_are_not_silent() {
-    // ESCs report five times a second, other parts ten times. After 30 s all report an eighth as often, or the ESCs stop.
+    // Two groups of ESCs report five times a second, other parts ten times. After 30 s all report an eighth as often, or the ESCs stop.
     let silent = |is_slowed: bool| {
         let mut run = Run::new(&Params::defaults());
-        run.says(0..60_000, |now_ms| {
+        run.steps(0..60_000, |now_ms, monitor| {
             let is_late = now_ms >= 30_000;
             let times = if is_late && is_slowed { 8 } else { 1 };
             let quad = Quad::healthy();
             let is_of_escs = |said: &Observation| matches!(said, Observation::Escs(_));
             let mut said = if now_ms % (100 * times) == 0 { quad.says(now_ms) } else { Vec::new() };
             said.retain(|one| !is_of_escs(one));
-            let reports = now_ms % (200 * times) == 0 && (is_slowed || !is_late);
-            said.extend(reports.then_some(Observation::Escs(EscGroup { first: 0, escs: quad.escs })));
-            said
+            for (first, after_ms) in [(0, 0), (4, 50)] {
+                let reports = now_ms % (200 * times) == after_ms && (is_slowed || !is_late);
+                said.extend(reports.then_some(Observation::Escs(EscGroup { first, escs: quad.escs })));
+            }
+            observe(monitor, now_ms, AUTOPILOT, said);
         });
         run.of_check("esc_silent").any(|one| matches!(one.level, Level::Warning | Level::Critical))
     };
