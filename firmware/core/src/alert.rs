@@ -69,10 +69,10 @@ pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
 /// estimator had attitude and position before, and a receiver has a fix.
 ///
 /// - Both autopilots: 0 attitude, 3 and 4 position, 8 and 9 a position as soon as it is needed. `ArduPilot` holds its position fixed
-///   from a landing to the disarming, and says by these two that it has not lost it.
+///   from a landing to the disarming, and says by these two that it has not lost it. In the air they are no position.
 /// - PX4: 10 GPS glitch, 11 accelerometer error.
 /// - ArduPilot: 15 GPS glitching. It also sets this one indoors without GPS.
-pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Causes {
+pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool, in_air: bool) -> Causes {
     let flags = estimator.flags;
     let (glitch, accelerometer) = match estimator.scale {
         EstimatorScale::TestRatio => (1 << 10, 1 << 11),
@@ -81,13 +81,15 @@ pub fn of_estimator(estimator: &Estimator, had_both: bool, has_fix: bool) -> Cau
     let glitch = if had_both && has_fix { glitch } else { 0 };
     let said =
         Causes::of_bits(u32::from(flags), &[(glitch, Cause::Gnss), (accelerometer, Cause::Accelerometer)]);
+    let flags = if in_air { flags } else { flags | flags >> 5 & POSITION };
     if had_both && !has_both(flags) { said.with(Cause::Estimator) } else { said }
 }
 
+/// The predicted one is five bits above.
+const POSITION: u16 = 1 << 3 | 1 << 4;
+
 const fn has_both(flags: u16) -> bool {
-    const ATTITUDE: u16 = 1;
-    const POSITION: u16 = 1 << 3 | 1 << 4 | 1 << 8 | 1 << 9;
-    flags & ATTITUDE != 0 && flags & POSITION != 0
+    flags & 1 != 0 && flags & POSITION != 0
 }
 
 state! {
@@ -195,9 +197,9 @@ impl Alerts {
         self.failures.take(at, causes);
     }
 
-    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator, has_fix: bool) {
+    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator, has_fix: bool, in_air: bool) {
         self.had_both |= has_both(estimator.flags);
-        self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix));
+        self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix, in_air));
     }
 
     /// Whether flags were ever received: then each cause has a level.

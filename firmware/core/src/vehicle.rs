@@ -315,7 +315,8 @@ impl Vehicle {
             Observation::Battery(battery) => self.take_battery(at, component, battery),
             Observation::Estimator(estimator) => {
                 let has_fix = self.gnss.iter().filter_map(Latest::get).any(|gnss| gnss.fix >= 3);
-                self.alerts.take_estimator(at, &estimator, has_fix);
+                let in_air = self.landed.within(at, SILENT) == Some(&LandedState::InAir);
+                self.alerts.take_estimator(at, &estimator, has_fix, in_air);
                 self.estimator.set(at, estimator);
             }
             Observation::Vibration(vibration) => self.take_vibration(at, vibration),

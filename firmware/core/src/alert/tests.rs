@@ -209,27 +209,27 @@ fn a_sensor_that_is_lost_heals_with_the_word_that_it_is_healthy() {
 #[test]
 fn the_estimators_flags_are_read_on_either_scale() {
     const GOOD: u16 = 0x37F;
-    let with = |has_fix, scale, flags: [u16; 3]| {
+    let with = |has_fix, in_air, scale, flags: [u16; 3]| {
         let mut alerts = armed();
         for (second, flags) in (0..).zip(flags) {
             let told = Estimator { scale, flags, ..Estimator::default() };
-            alerts.take_estimator(after(second), &told, has_fix);
+            alerts.take_estimator(after(second), &told, has_fix, in_air);
         }
         let level = |cause| alerts.level(after(2), cause, false) == Some(1.0);
         (level(Cause::Gnss), level(Cause::Accelerometer), level(Cause::Estimator))
     };
-    let says = |scale, flags| with(true, scale, flags);
+    let says = |scale, flags| with(true, false, scale, flags);
     let (px4, ardupilot) = (EstimatorScale::TestRatio, EstimatorScale::Variance);
     assert_eq!(says(px4, [GOOD; 3]), (false, false, false));
     assert_eq!(says(px4, [GOOD, GOOD | 1 << 10, GOOD | 1 << 10]), (true, false, false));
     assert_eq!(says(ardupilot, [0x80A7; 3]), (false, false, false), "no GPS, and the glitch bit set");
     let glitches = [GOOD | 1 << 15; 3];
     assert_eq!(
-        with(false, ardupilot, glitches),
+        with(false, false, ardupilot, glitches),
         (false, false, false),
         "it flies by beacons, and no receiver has a fix"
     );
-    assert_eq!(with(true, ardupilot, glitches), (true, false, false));
+    assert_eq!(with(true, false, ardupilot, glitches), (true, false, false));
     assert_eq!(says(px4, [GOOD, GOOD | 1 << 11, GOOD | 1 << 11]), (false, true, false));
     assert_eq!(says(ardupilot, [GOOD, GOOD | 1 << 15, GOOD | 1 << 15]), (true, false, false));
     assert_eq!(says(ardupilot, [GOOD, 0xA7, 0xA7]), (false, false, true), "position lost");
@@ -237,6 +237,10 @@ fn the_estimators_flags_are_read_on_either_scale() {
     for landed in [0x1A5, 0x2A5, 0x3A5] {
         let said = says(ardupilot, [GOOD, landed, landed]);
         assert_eq!(said, (false, false, false), "{landed:#x}: position held fixed after a landing");
+        let said = with(true, true, ardupilot, [GOOD, landed, landed]);
+        assert_eq!(said, (false, false, true), "{landed:#x}: position lost in the air");
+        let said = says(ardupilot, [landed, 0xA5, 0xA5]);
+        assert_eq!(said, (false, false, false), "{landed:#x}: a predicted position is none yet");
     }
     assert_eq!(says(ardupilot, [GOOD, 0x3A4, 0x3A4]), (false, false, true), "attitude lost");
 }

@@ -106,7 +106,7 @@ impl Details {
     }
 
     pub(super) fn estimator(&mut self, estimator: &Estimator) -> bool {
-        let doubted = Some(of_estimator(estimator, true, true));
+        let doubted = Some(of_estimator(estimator, true, true, false));
         core::mem::replace(&mut self.doubted, doubted) != doubted
     }
 
