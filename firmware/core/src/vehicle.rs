@@ -346,7 +346,7 @@ impl Vehicle {
     fn take_heartbeat(&mut self, at: Instant, heartbeat: Heartbeat) {
         self.alerts.take_armed(at, heartbeat.armed);
         self.alerts.take_state(at, heartbeat.state);
-        if heartbeat.armed && self.heartbeat.get().is_some_and(|before| !before.armed) {
+        if heartbeat.armed && self.heartbeat.within(at, SILENT).is_some_and(|before| !before.armed) {
             self.state_since_arming = heartbeat.state;
         }
         self.state_since_arming = self.state_since_arming.min(heartbeat.state);
