@@ -97,9 +97,8 @@ impl Pair {
             return;
         }
         let row = kind.row();
-        let step = self.residual.at().age(at);
-        let (weight, most) = step.map_or((1.0, f32::INFINITY), |step| (row.weight(step), row.hold()));
-        smooth(&mut self.difference, difference, weight, most);
+        let weight = self.residual.at().age(at).map_or(1.0, |step| row.weight(step));
+        smooth(&mut self.difference, difference, weight, row.hold());
         self.residual.take(row, at, norm(self.difference), 0.0);
     }
 
