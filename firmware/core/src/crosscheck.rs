@@ -47,6 +47,8 @@ state! {
         pub(crate) compass_use: CompassUse,
         rate_setpoint: RateSetpoint,
         pub(crate) thrust: Thrust,
+        /// The level of vibration in the last message, m/s2: a shock is in one message, and the lower of two counts.
+        vibration: f32,
         /// The first sensor's messages are `HIGHRES_IMU`: of the sensor that PX4 has selected, less the offset of its estimator, which moves
         /// after faults elsewhere. The compasses of the other messages are in axes of their own there.
         selects: bool,
@@ -152,7 +154,8 @@ impl Crosschecks {
 
     fn take_vibration(&mut self, at: Instant, vehicle: &Vehicle) {
         if let Some(level) = vehicle.vibration.get().and_then(Vibration::acceleration) {
-            self.residuals.take(vibration_of(vehicle), at, level, 0.0);
+            let lasting = level.min(core::mem::replace(&mut self.vibration, level));
+            self.residuals.take(vibration_of(vehicle), at, lasting, 0.0);
         }
     }
 

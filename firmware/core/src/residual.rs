@@ -32,8 +32,8 @@ pub(crate) const LATE_S: f32 = 0.3;
 /// Time over which a receiver's position and height are compared with its speed and the climb, s.
 pub(crate) const RECEIVER_S: f32 = 4.0;
 
-/// Values of one moment.
-pub(crate) const AT_ONCE: Span = Span::from_millis(250);
+/// Values of one moment: messages at 4 Hz, with their jitter.
+pub(crate) const AT_ONCE: Span = Span::from_millis(300);
 /// Samples of a flight before anything is usual, or a lack of them says something.
 pub(crate) const KNOWN_SAMPLES: u8 = 20;
 
@@ -87,7 +87,7 @@ const AHRS2: Row = Row {
 };
 /// A part of the satellites is lost, or the dilution has grown, by more than the logarithm of 1.2.
 const CONSTELLATION: Row = Row { gates: gates::AIRBORNE, learn: Learn::Level, hold: 0.182, ..ROW };
-/// The hold is the least rise, m/s2.
+/// The lower of two messages. The hold is the least rise, m/s2.
 const VIBRATION: Row =
     Row { gates: gates::SETTLED | gates::CLEAR | gates::ROTORS, smoothing_s: 0.25, hold: 2.5, ..ROW };
 const RATE: Row = Row {

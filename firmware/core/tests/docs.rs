@@ -27,7 +27,7 @@ rail_5v_low: POWER_STATUS
 rail_5v_high: POWER_STATUS
 battery_due: components of kind battery: percent of the limit that trips first
 battery_alert: STATUSTEXT, EVENT; SYS_STATUS: battery; HIGH_LATENCY2
-esc_silent: ESC_STATUS, ESC_INFO, ESC_TELEMETRY: silence beyond three of its own intervals, or five of more than 0.7 s
+esc_silent: ESC_STATUS, ESC_INFO, ESC_TELEMETRY: silence beyond three of its own intervals, or five of more than 0.7 s, and as many other messages came as in three usual intervals, or another ESC reports
 esc_temperature: ESC_INFO, ESC_TELEMETRY
 esc_failure: ESC_INFO: failure flags; 1 any, 2 motor stuck or ESC failed
 esc_errors: ESC_INFO: error count, a minute; wraps are no errors
@@ -47,7 +47,7 @@ generator_speed: GENERATOR_STATUS: not while it is off or starts; once it has re
 engine_due: components of kind engine
 vibration: VIBRATION of ArduPilot: the worst axis
 vibration_px4: VIBRATION of PX4: the accelerometer metric
-vibration_rise: VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; on rotors away from the ground
+vibration_rise: VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; on rotors away from the ground; told after 10 s
 clipping: VIBRATION: clipped samples of a flight, since ten seconds without any
 load_factor: SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity, while VIBRATION is below 60
 airframe_due: components of kind airframe, other

@@ -322,7 +322,7 @@ fn an_alarm_that_rises_long_after_its_cause_began_is_not_explained_by_it() {
         quad.autopilot = Autopilot::Px4;
         quad.mode = 3 << 16;
         quad.estimator.scale = EstimatorScale::TestRatio;
-        quad.vibration.levels = [Some(0.01), Some(0.01), Some(20.0)];
+        quad.vibration.levels = [Some(0.01), Some(0.7), Some(20.0)];
         let velocity = if now_ms < FAULT_MS + 2_000 {
             0.1
         } else if now_ms < 70_000 {
@@ -334,6 +334,8 @@ fn an_alarm_that_rises_long_after_its_cause_began_is_not_explained_by_it() {
     });
     let warned = findings.iter().find(|finding| finding.check == "ekf_test_ratio").expect("it warns");
     assert_eq!((warned.level, warned.because), (Level::Warning, "vibration_px4"));
+    let noise = findings.iter().find(|finding| finding.check == "gyro_noise").expect("of the same message");
+    assert_eq!(noise.because, "vibration_px4");
     let critical = critical_of("ekf_test_ratio", &findings);
     assert!(critical.iter().all(|(at_s, because)| *at_s >= 70 && because.is_empty()), "{critical:?}");
     assert!(!critical.is_empty());
@@ -389,9 +391,10 @@ fn what_has_no_data_when_a_silence_is_over_is_told_then() {
 #[test]
 fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_received() {
     // The `MAV_STATE` while disarmed, armed, and armed from 30 s on.
-    let critical_ms = |disarmed: Option<u8>, [first, then]: [u8; 2]| {
+    let critical_ms = |gap_ms: u64, disarmed: Option<u8>, [first, then]: [u8; 2]| {
         let mut run = Run::new(&Params::defaults());
         run.flies(0..60_000, |now_ms, quad, _| {
+            quad.silent = (10_000..10_000 + gap_ms).contains(&now_ms);
             quad.armed = disarmed.is_none() || now_ms >= 10_000;
             let armed_state = if now_ms < 30_000 { first } else { then };
             quad.state = disarmed.filter(|_| !quad.armed).unwrap_or(armed_state);
@@ -399,13 +402,18 @@ fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_recei
         let mut critical = run.of_check("autopilot_state").filter(|one| one.level == Level::Critical);
         critical.next().map(|one| one.at.as_millis())
     };
-    assert_eq!(critical_ms(Some(5), [5, 5]), None, "it stood at the arming");
-    assert!(critical_ms(Some(3), [4, 5]).is_some_and(|ms| (30_000..34_000).contains(&ms)));
-    assert!(
-        critical_ms(Some(5), [4, 5]).is_some_and(|ms| (30_000..34_000).contains(&ms)),
-        "it ended between"
-    );
-    assert!(critical_ms(None, [5, 5]).is_some_and(|ms| ms < 5_000), "first received in the air");
+    for (case, gap_ms, disarmed, states, told_ms) in [
+        ("it stood at the arming", 0, Some(5), [5, 5], None),
+        ("it begins", 0, Some(3), [4, 5], Some(30_000..34_000)),
+        ("it ended between", 0, Some(5), [4, 5], Some(30_000..34_000)),
+        ("first received in the air", 0, None, [5, 5], Some(0..5_000)),
+        ("armed in a gap", 12_000, Some(3), [5, 5], Some(22_000..26_000)),
+    ] {
+        let critical_ms = critical_ms(gap_ms, disarmed, states);
+        let is_so =
+            told_ms.map_or(critical_ms.is_none(), |told| critical_ms.is_some_and(|ms| told.contains(&ms)));
+        assert!(is_so, "{case}: {critical_ms:?}");
+    }
 }
 
 #[test]

@@ -257,7 +257,10 @@ impl Summary {
         let mut place = 0;
         while let Some(finding) = self.waiting.get(place) {
             let is_critical = finding.level == Level::Critical;
-            let is_so = |health: &Health| !health.gets_better(finding.check, finding.instance);
+            let is_so = |health: &Health| {
+                let check = health::check_named(finding.check);
+                check.is_none_or(|check| health.lasts(check, finding.instance, now.into()))
+            };
             let fate = if is_critical || health.is_some_and(is_so) {
                 self.telling.fate(now, finding)
             } else {

@@ -14,7 +14,8 @@
 //!   that it is down, with the place, comes by itself. A kind whose order does not fit the vehicle is sent with the
 //!   one that fits ([`order`]); if none fits, its cause does not count. A waiting mild finding that began with the
 //!   mishap or after it is a consequence, and is dropped.
-//! * A recovering finding waits until it is over or bad again, so a delayed text is true when sent.
+//! * A recovering finding waits until it is over or bad again, so a delayed text is true when sent. The text of some checks waits until
+//!   they were bad for a while (`Check::told_after_s`).
 //! * The end of a finding is sent only if the finding was sent and its explanation has ended. Missing data are
 //!   reported only while no alarm is open.
 //! * Findings that are not critical wait during an event with a critical text. At most [`MILD_MAX`] of them are sent

@@ -220,6 +220,8 @@ pub struct Check {
     pub limits: Limits,
     /// How long it must be bad before it is a warning, and before it is critical.
     pub debounce: [Debounce; 2],
+    /// How long it must be bad before its warning is told, if that is longer, seconds.
+    pub told_after_s: u8,
     /// When the check applies.
     pub when: When,
     /// How old the value may be, seconds; `None` for values that are ages themselves.
@@ -399,8 +401,9 @@ impl State {
         }
     }
 
-    pub(super) const fn gets_better(&self) -> bool {
-        self.alarm().is_some() && self.better.is_set()
+    /// Whether it has no alarm, or its value was bad for so long and is not good just now.
+    pub(super) fn lasts(&self, now: Instant, span: Span) -> bool {
+        self.alarm().is_none() || (!self.better.is_set() && self.bad.age(now).unwrap_or(Span::ZERO) >= span)
     }
 
     /// Whether it never had a value since it began to apply, nor a level: then a step without a value changes nothing.

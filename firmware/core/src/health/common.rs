@@ -22,6 +22,7 @@ pub(super) const PLAIN: Check = Check {
     unit: Unit::of(""),
     limits: Limits::above(None, None, 0.0),
     debounce: after(0, 0),
+    told_after_s: 0,
     when: When::Always,
     stale_s: None,
     instances: 1,

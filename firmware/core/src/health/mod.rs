@@ -35,7 +35,7 @@ pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
 use crate::params::Param;
-use crate::time::{Instant, SILENT};
+use crate::time::{Instant, SILENT, Span};
 use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
@@ -203,10 +203,10 @@ impl Health {
         })
     }
 
-    /// Whether an alarm's value is good just now, and its level about to fall.
-    pub fn gets_better(&self, check: &str, instance: u8) -> bool {
-        let state = slot_of(check, instance).and_then(|slot| self.states.get(usize::from(slot)));
-        state.is_some_and(State::gets_better)
+    /// Whether an alarm's value is still bad, and was for as long as its text waits. True of what has no alarm.
+    pub fn lasts(&self, check: &Check, instance: u8, now: Instant) -> bool {
+        let state = slot_of(check.name, instance).and_then(|slot| self.states.get(usize::from(slot)));
+        state.is_none_or(|state| state.lasts(now, Span::from_secs(check.told_after_s.into())))
     }
 
     /// Of each check, in the order of [`checks`], the levels of its instances.

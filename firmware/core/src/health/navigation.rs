@@ -115,7 +115,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
     // What shakes the accelerometer shakes the gyro.
     row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, VIBRATION),
-        unit: Unit::of("rad/s"), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        unit: Unit::of("rad/s"), debounce: after(2_000, 0), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate)),
     // It goes by the attitude and a receiver too.
     row!("imu_gps" MISMATCH, above(ImuGpsWarn _ 0.3),

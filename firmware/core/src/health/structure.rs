@@ -26,11 +26,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Vibration, 0), ..VIBRATION },
     row!("vibration_px4" VIBRATION, above(VibePx4Warn VibePx4Crit 0.5), role: Role::of(Group::Vibration, 0),
         read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[.., accelerometer]| accelerometer)),
-    // A worn or broken part shakes all the time; gusts and the vehicle's own downwash end within ten seconds.
+    // A worn or broken part shakes all the time; gusts and the vehicle's own downwash end within ten seconds. It explains other alarms
+    // meanwhile.
     // Never stale: only flight on rotors can be judged.
     row!("vibration_rise" VIBRATION, above(VibeRiseWarn _ 0.5),
         role: Role::of(Group::Shaking, DRIVE | Group::EscTelemetry.bit() | Group::Vibration.bit()),
-        unit: Unit::of("times"), debounce: after(10_000, 1_000), when: When::InFlight, stale_s: None,
+        unit: Unit::of("times"), debounce: after(200, 1_000), told_after_s: 10, when: When::InFlight, stale_s: None,
         read: |inputs, _| inputs.derived.crosschecks.vibration_rise(inputs.now, inputs.vehicle)),
     row!("clipping" VIBRATION, above(ClipWarn ClipCrit 0.0),
         role: Role::of(Group::Shaking, Group::Vibration.bit()), unit: Unit::of(""), debounce: after(0, 0),
