@@ -3,6 +3,7 @@
 use super::*;
 
 const CHECK: Check = Check {
+    told_after_s: 0,
     name: "tilt",
     subsystem: Subsystem::Attitude,
     unit: Unit::of("deg"),
