@@ -131,7 +131,7 @@ fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>)
         by_hand,
         span: None,
         utc_us: utc_us(cell("take_off_utc")).map(|from| (from, end_us(from))),
-        session: None,
+        known: None,
     })
 }
 

@@ -14,10 +14,10 @@ use crate::outcome::usage;
 use crate::utc::iso8601;
 
 /// Reports flights without the time of day, which have no place in this format.
-pub(super) fn write(book: &Book, sessions: &[(String, Known)], path: &Path, inputs: &Inputs) -> Result<()> {
+pub(super) fn write(book: &Book, path: &Path, inputs: &Inputs) -> Result<()> {
     let mut flights = Vec::new();
     for entry in book.values().flat_map(|aircraft| &aircraft.entries) {
-        let Some((_, known)) = entry.session.and_then(|session| sessions.get(session)) else { continue };
+        let Some(known) = &entry.known else { continue };
         if !entry.is_flight() {
             continue;
         }

@@ -9,6 +9,7 @@ mod page;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use hums_analysis::log_json::vehicle;
@@ -76,7 +77,8 @@ pub(crate) struct LogbookEntry {
     pub(crate) span: Option<(Instant, Instant)>,
     /// Take-off and landing, or the end of the record, in microseconds since 1970, if known.
     pub(crate) utc_us: Option<(u64, u64)>,
-    pub(crate) session: Option<usize>,
+    /// The recording, if the output needs its tracks.
+    pub(crate) known: Option<Arc<Known>>,
 }
 
 #[derive(Clone, Debug)]
@@ -152,23 +154,24 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     let sessions = sessions_of(&found.places);
     let works = works(&found.places, &sessions)?;
     let mut outcome = Outcome::lossy(found.is_lossy());
-    let mut read: BTreeMap<String, (String, Known)> = BTreeMap::new();
+    let has_tracks = forms.iter().any(|(form, _)| *form == Form::Gutma);
+    let mut read: BTreeMap<String, Session> = BTreeMap::new();
     side_by_side(
         &works,
         |work| match &work.named {
-            Named::As(..) => identity(work.log, &work.traits, false, args.vehicle.as_deref()).map(Some),
+            Named::As(..) => {
+                let known = identity(work.log, &work.traits, false, args.vehicle.as_deref())?;
+                Ok(Some(Session::of(known, has_tracks)))
+            }
             Named::Copy(_) => Ok(None),
         },
-        |known| {
-            let Some(known) = known? else { return Ok(()) };
-            let overview = &known.about.overview;
-            outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
-            let frames = |known: &Known| known.about.overview.contents.frames();
-            let recording = known.identity.recording.clone();
-            let is_longer = read.get(&recording).is_none_or(|(_, other)| frames(other) < frames(&known));
+        |session: Result<Option<Session>>| {
+            let Some(session) = session? else { return Ok(()) };
+            outcome = outcome.and(Outcome::lossy(!session.is_sound));
+            let recording = session.recording.clone();
+            let is_longer = read.get(&recording).is_none_or(|other| other.frames < session.frames);
             if is_longer {
-                let name = overview.ending.files.first().cloned().unwrap_or_default();
-                read.insert(recording, (name, known));
+                read.insert(recording, session);
             } else {
                 remarks.push(format!("{recording}: is there twice, and is counted once"));
             }
@@ -178,8 +181,7 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     for remark in &remarks {
         note!("{remark}");
     }
-    let sessions: Vec<(String, Known)> = read.into_values().collect();
-    let mut book = book(&sessions);
+    let mut book = book(read.into_values());
     for (_, path) in forms.iter().filter(|(form, _)| *form == Form::Csv) {
         csv::merge(&mut book, path)?;
     }
@@ -197,7 +199,7 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
         match form {
             Form::Csv => csv::write(&book, path)?,
             Form::Page => page::write(&book, path, &inputs)?,
-            Form::Gutma => gutma::write(&book, &sessions, path, &inputs)?,
+            Form::Gutma => gutma::write(&book, path, &inputs)?,
         }
         let flights = count(flights, "flight");
         output::line(&word(&format!("{}: {} aircraft, {flights}", path.display(), book.len())))?;
@@ -228,33 +230,59 @@ impl Form {
     }
 }
 
-fn book(sessions: &[(String, Known)]) -> Book {
-    let mut order: Vec<usize> = (0..sessions.len()).collect();
-    let start = |index: &usize| {
-        let (_, known) = sessions.get(*index)?;
-        let first = known.about.overview.ending.summary.first?;
-        known.identity.epochs.utc_us(first)
-    };
-    order.sort_by_key(start);
+/// A recording as a logbook has it.
+struct Session {
+    recording: String,
+    vehicle: String,
+    is_sound: bool,
+    frames: u64,
+    /// Microseconds since 1970, if known.
+    start_us: Option<u64>,
+    entries: Vec<LogbookEntry>,
+    parts: Vec<PartLine>,
+    life: Option<Life>,
+}
+
+impl Session {
+    /// Of a recording. Its entries keep it only if the output needs its tracks, which take most of the memory.
+    fn of(known: Known, has_tracks: bool) -> Self {
+        let (identity, about) = (&known.identity, &known.about);
+        let overview = &about.overview;
+        let counter = |counter: UsageCounter| overview.contents.lifetime.get(counter.name()).copied();
+        let life = counter(UsageCounter::Flights).zip(counter(UsageCounter::Flight));
+        let record = overview.ending.files.first().cloned().unwrap_or_default();
+        let mut session = Self {
+            recording: identity.recording.clone(),
+            vehicle: identity.vehicle.clone(),
+            is_sound: overview.is_sound(),
+            frames: overview.contents.frames(),
+            start_us: overview.ending.summary.first.and_then(|first| identity.epochs.utc_us(first)),
+            entries: entries(&record, &known),
+            parts: parts(about),
+            life: life.map(|(flights, flight_s)| Life { flights, flight_s }),
+        };
+        if has_tracks {
+            let known = Arc::new(known);
+            session.entries.iter_mut().for_each(|entry| entry.known = Some(known.clone()));
+        }
+        session
+    }
+}
+
+fn book(sessions: impl Iterator<Item = Session>) -> Book {
+    let mut sessions: Vec<Session> = sessions.collect();
+    sessions.sort_by_key(|session| session.start_us);
     let mut book = Book::new();
-    for index in order {
-        let Some((name, known)) = sessions.get(index) else { continue };
-        let entries = entries(index, name, known);
-        let contents = &known.about.overview.contents;
-        if entries.is_empty() && contents.components.is_empty() {
+    for session in sessions {
+        if session.entries.is_empty() && session.parts.is_empty() {
             continue;
         }
-        let aircraft = book.entry(known.identity.vehicle.clone()).or_default();
-        aircraft.entries.extend(entries);
-        if !contents.components.is_empty() {
-            aircraft.parts = parts(&known.about);
+        let aircraft = book.entry(session.vehicle).or_default();
+        aircraft.entries.extend(session.entries);
+        if !session.parts.is_empty() {
+            aircraft.parts = session.parts;
         }
-        let counter = |counter: UsageCounter| contents.lifetime.get(counter.name()).copied();
-        if let (Some(flights), Some(flight_s)) =
-            (counter(UsageCounter::Flights), counter(UsageCounter::Flight))
-        {
-            aircraft.life = Some(Life { flights, flight_s });
-        }
+        aircraft.life = session.life.or(aircraft.life);
     }
     book
 }
@@ -282,7 +310,7 @@ fn parts(about: &RecordingContent) -> Vec<PartLine> {
     contents.components.iter().map(line).collect()
 }
 
-fn entries(session: usize, record: &str, known: &Known) -> Vec<LogbookEntry> {
+fn entries(record: &str, known: &Known) -> Vec<LogbookEntry> {
     let (identity, about) = (&known.identity, &known.about);
     let contents = &about.overview.contents;
     let summary = &about.overview.ending.summary;
@@ -303,7 +331,6 @@ fn entries(session: usize, record: &str, known: &Known) -> Vec<LogbookEntry> {
         charge_ah: whole(UsageCounter::Charge),
         voltage_min_v: whole(UsageCounter::VoltageMin),
         record: record.to_owned(),
-        session: Some(session),
         ..LogbookEntry::default()
     };
     // A problem belongs to the flight before whose end it began; one after the last flight to that.
@@ -402,7 +429,6 @@ mod tests {
             key: format!("s{session}-{from_s}"),
             duration_s: (to_s - from_s) as f64,
             utc_us: Some((from_s * 1_000_000, to_s * 1_000_000)),
-            session: Some(session),
             ..LogbookEntry::default()
         };
         let mut entries = vec![entry(1, 100, 200), entry(2, 90, 201), entry(2, 300, 400), entry(1, 400, 500)];
