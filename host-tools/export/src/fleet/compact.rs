@@ -33,7 +33,8 @@ use column::Input;
 const PREFIX: &str = "compact-";
 /// A larger file of several sessions stays as it is, and new sessions go into a further one.
 const LARGE_BYTES: u64 = 256 << 20;
-const GROUP_ROWS: usize = 256 * 1024;
+/// Values of a column of a row group at most: a column is in memory as a whole. A row of a column of lists has many values.
+const GROUP_VALUES: usize = 256 * 1024;
 const AT_ONCE: usize = 4;
 
 /// The request of `hums compact`.
@@ -210,17 +211,24 @@ fn groups(inputs: &[Input]) -> Vec<Vec<Rows>> {
         .flat_map(|(index, input)| input.segments().iter().map(move |segment| (segment, index)))
         .collect();
     segments.sort_by_key(|(segment, _)| (&segment.vehicle, &segment.session, segment.part, segment.from));
-    let (mut groups, mut group, mut room) = (Vec::new(), Vec::new(), GROUP_ROWS);
-    for (segment, index) in segments {
-        let (mut from, mut left) = (segment.from, segment.rows);
+    cut(segments.into_iter().map(|(segment, index)| {
+        let width = inputs.get(index).map_or(1, Input::values_of_row);
+        ((index, segment.from, segment.rows), width)
+    }))
+}
+
+/// Cuts rows into row groups. The second number is the number of values of a row, at least 1.
+pub(super) fn cut(segments: impl Iterator<Item = (Rows, usize)>) -> Vec<Vec<Rows>> {
+    let (mut groups, mut group, mut room) = (Vec::new(), Vec::new(), GROUP_VALUES);
+    for ((index, mut from, mut left), width) in segments {
         while left > 0 {
-            let rows = left.min(room);
-            group.push((index, from, rows));
-            (from, left, room) = (from + rows, left - rows, room - rows);
-            if room == 0 {
+            if room < width && !group.is_empty() {
                 groups.push(std::mem::take(&mut group));
-                room = GROUP_ROWS;
+                room = GROUP_VALUES;
             }
+            let rows = left.min((room / width).max(1));
+            group.push((index, from, rows));
+            (from, left, room) = (from + rows, left - rows, room.saturating_sub(rows * width));
         }
     }
     groups.extend(Some(group).filter(|group| !group.is_empty()));

@@ -229,6 +229,26 @@ fn a_change_that_names_files_elsewhere_removes_none() {
     assert!(mine.exists() && !inside.exists());
 }
 
+/// A row of lists has many values: memory is limited by values, not rows.
+#[test]
+fn a_row_group_has_so_many_values_at_most() {
+    for (width, rows) in [(1, 600_000), (90, 10_000), (300_000, 3), (100_000, 7)] {
+        let segments = [(0, 0, rows), (0, rows, rows / 2)];
+        let groups = compact::cut(segments.map(|rows| (rows, width)).into_iter());
+        for group in &groups {
+            let in_group: usize = group.iter().map(|(_, _, rows)| rows).sum();
+            assert!(in_group > 0 && (in_group == 1 || in_group * width <= 256 * 1024), "{width}: {group:?}");
+        }
+        let mut next = 0;
+        for (_, from, rows) in groups.iter().flatten() {
+            assert_eq!(*from, next, "in order, without a gap");
+            next += rows;
+        }
+        assert_eq!(next, rows + rows / 2);
+        assert!(groups.len() <= (next * width).div_ceil(128 * 1024) + 1, "{width}: {}", groups.len());
+    }
+}
+
 /// Several programs at once, each with the same sessions in another order.
 #[test]
 fn programs_that_add_the_same_sessions_at_once_add_each_once() {

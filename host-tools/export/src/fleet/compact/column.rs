@@ -96,6 +96,16 @@ impl Input {
         self.metadata.file_metadata().num_rows() as usize
     }
 
+    /// Values of a row in the column that has the most of them, on average, rounded up; at least one.
+    pub(super) fn values_of_row(&self) -> usize {
+        let of_column = |column: usize| -> usize {
+            let groups = self.metadata.row_groups().iter();
+            groups.filter_map(|group| Some(group.columns().get(column)?.num_values() as usize)).sum()
+        };
+        let most = (0..self.columns()).map(of_column).max().unwrap_or(0);
+        most.div_ceil(self.rows().max(1)).max(1)
+    }
+
     pub(super) fn columns(&self) -> usize {
         self.metadata.file_metadata().schema_descr().num_columns()
     }
