@@ -85,10 +85,11 @@ use plural::count;
 use selection::Selection;
 use source::epochs::Epochs;
 use source::find::{FoundRecordings, find, sessions_of};
-use source::item::{RecordingSummary, Rows, Want};
+use source::item::{Gap, Item, RecordingSummary, Rows, Want};
+use source::parts::{ItemCollector, PartReceiver};
 use source::recording::{Format, Place};
 use story::Said;
-use summary::{Overview, damaged_places};
+use summary::damaged_places;
 use utc::When;
 use works::{NamedLog, check_forms, works};
 use write::Writers;
@@ -325,6 +326,21 @@ impl Done {
         Self { name, outcome, ending: None, lacks, skipped: false, written: false, made, remarks }
     }
 
+    /// Of a log that was read, with remarks on its losses.
+    fn read(log: &Place, summary: RecordingSummary, lacks: Soundness) -> Self {
+        let mut done = Self { lacks, written: true, ..Self::of(log) };
+        done.ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
+        if done.ending.is_none() && summary.gaps > 0 {
+            done.outcome = Outcome::Losses;
+            done.remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
+        }
+        if done.ending.is_none() && summary.losses > 0 {
+            let places = count(summary.losses, "place");
+            done.remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
+        }
+        done
+    }
+
     fn add(&mut self, next: Self) {
         self.outcome = self.outcome.and(next.outcome);
         self.ending = next.ending.or_else(|| self.ending.take());
@@ -392,10 +408,10 @@ impl Task<'_> {
         if self.logs == 1 {
             return done;
         }
-        Ok(or_skipped(done)?.unwrap_or_else(|why| {
-            let remarks = vec![format!("{}: skipped: {why}", work.log.name)];
-            Done { skipped: true, written: true, remarks, ..Done::of(work.log) }
-        }))
+        match or_skipped(done)? {
+            Ok(done) => Ok(done),
+            Err(why) => Ok(Done { skipped: true, ..unwritten(work.log, &format!("skipped: {why}"))? }),
+        }
     }
 
     fn decode(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
@@ -403,7 +419,8 @@ impl Task<'_> {
         let name = match &work.named {
             Named::As(name, _) => name,
             Named::Copy(of) => {
-                return copy(log, all.get(*of).map_or("another log", |work| &work.log.name));
+                let of = all.get(*of).map_or("another log", |work| &work.log.name);
+                return unwritten(log, &format!("is a copy of {of}, which is written once"));
             }
         };
         let flights = if self.formats.split { flights(log)? } else { Vec::new() };
@@ -442,20 +459,12 @@ impl Task<'_> {
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
         let (rows_left_out, lacks) = (writers.rows_left_out(), writers.lacks());
         let Finished { made, remarks: left_out } = writers.finish()?;
-        let mut outcome = Outcome::Done;
-        let ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
-        if ending.is_none() && summary.gaps > 0 {
-            outcome = Outcome::Losses;
-            remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
-        }
-        if ending.is_none() && summary.losses > 0 {
-            let places = count(summary.losses, "place");
-            remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
-        }
+        let read = Done::read(log, summary, lacks);
+        remarks.extend(read.remarks);
         remarks.extend(left_out.into_iter().map(|words| format!("{}: {words}", log.name)));
-        outcome = outcome.and(Outcome::lossy(rows_left_out > 0));
+        let outcome = read.outcome.and(Outcome::lossy(rows_left_out > 0));
         let made = if self.standard_output { Vec::new() } else { made };
-        Ok(Done { outcome, ending, lacks, written: true, made, remarks, ..Done::of(log) })
+        Ok(Done { outcome, made, remarks, ..read })
     }
 
     /// The context of a log, needed before its first byte is written.
@@ -554,12 +563,35 @@ fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
     Ok(if flights.is_empty() { Vec::new() } else { begins.zip(ends).collect() })
 }
 
-/// A copy of another log: it is read for remarks only, and no files are written.
-fn copy(log: &Place, of: &str) -> Result<Done> {
-    let remarks = vec![format!("{}: is a copy of {of}, which is written once", log.name)];
-    let ending = log.own().map(Overview::verified).transpose()?.map(|overview| overview.ending);
-    let ending = ending.map(|ending| Ending { name: log.name.clone(), ..ending });
-    Ok(Done { written: true, ending, remarks, ..Done::of(log) })
+/// A log whose files are there already. It is read for its losses, which count as if it was written.
+fn unwritten(log: &Place, why: &str) -> Result<Done> {
+    let (want, mut gaps) = (Want { frames: true, ..Want::default() }, Gaps(Soundness::Whole));
+    let summary = log.in_parts(want, || Gaps(Soundness::Whole), &mut gaps)?;
+    let mut done = Done::read(log, summary, gaps.0);
+    done.remarks.insert(0, format!("{}: {why}", log.name));
+    Ok(done)
+}
+
+/// Takes no items, and what a recording lacks by its gaps.
+struct Gaps(Soundness);
+
+impl ItemCollector for Gaps {
+    fn item(&mut self, _: Instant, _: Item<'_>) {}
+
+    fn held_bytes(&self) -> usize {
+        0
+    }
+}
+
+impl PartReceiver<Self> for Gaps {
+    fn gap(&mut self, gap: &Gap) -> Result<()> {
+        self.0 = self.0.max(Soundness::of_gap(gap));
+        Ok(())
+    }
+
+    fn part(&mut self, _: Self) -> Result<()> {
+        Ok(())
+    }
 }
 
 /// The message for a log without the requested data, with the log's own times.

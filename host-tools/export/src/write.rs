@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use hums_analysis::soundness::Soundness;
 use hums_core::clock::Instant;
 
@@ -14,6 +14,7 @@ use super::context::Context;
 use super::destination::Destination;
 use super::format::{AnyWriter, Files, Finished, Totals, Way};
 use super::story::Said;
+use crate::outcome::Exists;
 use crate::plural::count;
 use crate::source::item;
 use crate::source::parts::PartReceiver;
@@ -35,16 +36,25 @@ pub struct Writers<'a> {
 
 impl<'a> Writers<'a> {
     /// Opens the files that are always written; a table is opened for its first row. `fleet` is the folder of the tables of
-    /// all sessions.
+    /// all sessions. The error is no [`Exists`] if only some of the outputs exist: the log must not be skipped.
     pub fn new(context: &'a Context, destination: &Destination, fleet: &Path) -> Result<Self> {
-        let mut files = Vec::new();
+        let (mut files, mut existing) = (Vec::new(), None);
         for (about, way) in context.formats.ways() {
             let Way::Parts { open, .. } = way else { continue };
             let path = match about.files {
                 Files::Fleet(_) => fleet.to_owned(),
                 files => destination.path(files).unwrap_or_else(|| PathBuf::from("-")),
             };
-            files.push(open(context, &path)?);
+            match open(context, &path) {
+                Ok(file) => files.push(file),
+                Err(error) if error.is::<Exists>() => existing = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        match existing {
+            Some(error) if files.is_empty() => return Err(error),
+            Some(error) => bail!("{error:#}; other outputs of this log are missing"),
+            None => {}
         }
         Ok(Self {
             context,

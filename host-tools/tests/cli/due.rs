@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use super::support::{attempt, flight, json, recorded, records, run, text};
+use super::support::{attempt, contents, flight, json, recorded, records, run, text};
 
 #[test]
 fn a_manifest_names_each_file_with_its_hash() {
@@ -53,6 +53,28 @@ fn a_tlog_with_findings_has_them_as_texts_of_the_box() {
         (&made["inputs"][0]["file"], &made["outputs"][0]["file"]),
         (&"faults.tlog".into(), &"found.tlog".into())
     );
+}
+
+/// Two logs of one session in one call are one set of tables.
+#[test]
+fn a_manifest_names_each_table_of_a_fleet_once() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::create_dir(dir.path().join("logs")).expect("a folder");
+    run(dir.path(), "decode --format hum PX4 -o logs/whole.hum", 0);
+    let whole = fs::read(dir.path().join("logs/whole.hum")).expect("a log");
+    fs::write(dir.path().join("logs/half.hum"), &whole[..whole.len() / 1024 * 512]).expect("written");
+    let out = dir.path().join("out");
+    let line = format!("decode logs -o {} --format parquet --manifest made.json", out.display());
+    attempt(dir.path(), &line);
+    let made: serde_json::Value =
+        serde_json::from_slice(&fs::read(dir.path().join("made.json")).expect("a manifest")).expect("JSON");
+    let named = made["outputs"].as_array().expect("outputs").iter();
+    let mut named: Vec<_> = named.map(|file| file["file"].as_str().expect("a name").to_owned()).collect();
+    let tables = contents(&out).into_iter().map(|(name, _)| name).filter(|name| name.ends_with(".parquet"));
+    let mut tables: Vec<_> = tables.map(|name| format!("out/{name}")).collect();
+    (named.sort(), tables.sort());
+    assert!(tables.len() > 5);
+    assert_eq!(named, tables);
 }
 
 #[test]

@@ -225,6 +225,65 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     assert!(!gaps.exists() && dir.path().join("back.tlog").exists());
 }
 
+/// A folder that is decoded again has the exit code and the soundness of the first time.
+#[test]
+fn a_skipped_log_counts_as_the_written_one() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::create_dir(dir.path().join("logs")).expect("a folder");
+    run(dir.path(), "decode --format hum PX4 -o logs/log.hum", 0);
+    let path = dir.path().join("logs/log.hum");
+    let mut log = fs::read(&path).expect("a log");
+    log[150 * 512 + 100] ^= 4;
+    fs::write(&path, log).expect("written");
+    let whole = fs::read(flight("ap_quad_guided.tlog")).expect("a recording");
+    let (first, last) = whole.split_at(whole.len() / 2);
+    fs::write(dir.path().join("logs/noisy.tlog"), [first, &[0x55; 3000], last].concat()).expect("written");
+    let decode = |manifest: &str| {
+        let line = format!("decode logs -o out --format jsonl --manifest {manifest}");
+        let said = String::from_utf8_lossy(&run(dir.path(), &line, 3).stderr).into_owned();
+        let made = fs::read(dir.path().join(manifest)).expect("a manifest");
+        let made: serde_json::Value = serde_json::from_slice(&made).expect("JSON");
+        let logs = made["logs"].as_array().expect("logs").clone();
+        let lacks: Vec<_> = logs.iter().map(|log| log["lacks"].as_str().expect("words").to_owned()).collect();
+        (said.matches("skipped: ").count(), lacks)
+    };
+    let (skipped, lacks) = decode("first.json");
+    assert!(skipped == 0 && lacks.len() == 2 && lacks.iter().all(|words| !words.is_empty()), "{lacks:?}");
+    assert_eq!(decode("again.json"), (2, lacks));
+}
+
+/// The log after a log proves its end, also if its own files are there already.
+#[test]
+fn a_skipped_log_proves_the_end_of_the_log_before() {
+    let dir = tempfile::tempdir().expect("directory");
+    for name in ["ap_quad_guided.tlog", "ap_quad_faults.tlog"] {
+        run(dir.path(), &format!("sim {} --sd card.img --speed max", flight(name).display()), 0);
+    }
+    run(dir.path(), "decode card.img -o all --format tlog", 0);
+    run(dir.path(), "decode card.img --session 00002 -o out/ --format tlog", 0);
+    let said = run(dir.path(), "decode card.img -o out --format tlog", 0);
+    let said = String::from_utf8_lossy(&said.stderr);
+    assert_eq!(said.matches("skipped: ").count(), 1, "{said}");
+}
+
+/// A log is skipped only if all that was asked for is there.
+#[test]
+fn a_log_with_some_of_its_outputs_is_not_skipped() {
+    let dir = two_cards();
+    run(dir.path(), "decode c1.img c2.img -o out --format tlog", 0);
+    let before = contents(&dir.path().join("out"));
+    for format in ["tlog,csv", "tlog,parquet", "jsonl,tlog"] {
+        let said = run(dir.path(), &format!("decode c1.img c2.img -o out --format {format}"), 1);
+        let said = String::from_utf8_lossy(&said.stderr);
+        assert!(said.contains("other outputs of this log are missing"), "{format}: {said}");
+    }
+    let tables = |(name, _): &(String, Vec<u8>)| !name.ends_with("lock");
+    let after: Vec<_> = contents(&dir.path().join("out")).into_iter().filter(tables).collect();
+    assert_eq!(after, before);
+    run(dir.path(), "decode c1.img c2.img -o out --format tlog,csv --force", 0);
+    run(dir.path(), "decode c1.img c2.img -o out --format tlog,csv", 0);
+}
+
 #[test]
 fn a_time_in_which_there_is_nothing_is_told_and_nothing_is_written() {
     let dir = tempfile::tempdir().expect("directory");
