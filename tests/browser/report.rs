@@ -629,7 +629,8 @@ fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
     page.wait("return document.documentElement.dataset.ready === 'true'", 20);
     let beyond = "
         const right = document.querySelector('main').getBoundingClientRect().left + 704;
-        return [...document.querySelectorAll('.plot .uplot, #timeline')].filter((plot) => {
+        // Plots that are folded away are not on paper.
+        return [...document.querySelectorAll('.plot .uplot, #timeline')].filter((plot) => plot.checkVisibility()).filter((plot) => {
           const [own, around] = [plot, plot.parentElement].map((node) => node.getBoundingClientRect());
           return own.right > right || own.right > around.right + 1;
         }).length";
@@ -734,7 +735,7 @@ fn the_map_has_tiles_of_the_server_that_the_user_named_at_the_place_of_the_fligh
     .expect_code(&[0]);
     let mut shown = LivePage::start();
     shown.open(&format!("file://{}", page.display()), "light", 1280, 900);
-    let legend = "return document.querySelector('.legend')?.textContent.includes('map tiles from')";
+    let legend = "return document.querySelector('.mapped + .legend')?.textContent.includes('map tiles from')";
     shown.wait(legend, 20);
     let first = paths.recv_timeout(std::time::Duration::from_secs(20)).unwrap();
     let numbers: Vec<f64> = first
@@ -745,8 +746,11 @@ fn the_map_has_tiles_of_the_server_that_the_user_named_at_the_place_of_the_fligh
         .collect();
     let [zoom, x, y] = numbers[..] else { panic!("{first}") };
     // The flight begins at home; a tile is no further away than the map is wide.
-    let begins =
-        shown.run("return document.querySelector('.legend').textContent").as_str().unwrap().to_owned();
+    let begins = shown
+        .run("return document.querySelector('.mapped + .legend').textContent")
+        .as_str()
+        .unwrap()
+        .to_owned();
     let place: Vec<f64> = begins
         .split("begins at ")
         .nth(1)

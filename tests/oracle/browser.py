@@ -128,6 +128,8 @@ def look(driver, page, parts):
     driver.get(address)
     WebDriverWait(driver, 60).until(
         lambda driver: driver.execute_script("return document.documentElement.dataset.ready") == "true")
+    # Plots that never change fold away; the mouse points at each.
+    driver.execute_script("for (const node of document.querySelectorAll('details')) node.open = true")
     time_range = driver.execute_script(RANGE)
     all_of = lambda selector: driver.find_elements("css selector", selector)
     shown = driver.execute_script(SHOWN)

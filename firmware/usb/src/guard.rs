@@ -2,7 +2,7 @@
 //!
 //! It adds five things to the driver inside:
 //! * Requests about endpoints that no class has do nothing. Drivers of embassy panic on them.
-//! * A class can halt its endpoints ([`Link::halt`]). They stay halted until the host resets class or bus (BOT, 6.6.1).
+//! * A class can halt its endpoints (`Link::halt`). They stay halted until the host resets class or bus (BOT, 6.6.1).
 //! * A packet that the host did not fetch is dropped by the next configuration, and by a reset of the class. A driver may wait for it
 //!   for ever.
 //! * After a halt, and with a configuration, an endpoint begins with DATA0 (USB 2.0, 9.1.1.5 and 9.4.5), by a function of the board.
