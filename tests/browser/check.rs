@@ -89,6 +89,8 @@ fn recordings(folder: &Path) -> Vec<String> {
         "tests/labelled",
         "tests/labelled/bin",
         "tests/labelled/px4",
+        "tests/field",
+        "tests/field",
         "tests/monitor",
         "host-tools/tests/inputs",
     ] {
@@ -171,6 +173,32 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
     page.shown.wait("return document.querySelector('iframe')?.srcdoc.length > 10000", 10);
     shoot(&mut page.shown, "check");
     assert_eq!(page.shown.console(), serde_json::json!([]), "a script of the report is refused");
+}
+
+#[test]
+fn what_is_dropped_is_judged_also_folders_and_two_files_of_one_name() {
+    let mut page = Page::open(1280);
+    let folder = page.dir.path().join("logs");
+    let flight = |to: &str, from: &str| {
+        let to = folder.join(to);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(root().join(from), &to).unwrap();
+        to
+    };
+    let one = flight("one/flight.tlog", "tests/flights/px4_hil_quad_low.tlog");
+    let two = flight("two/flight.tlog", "tests/flights/ap_quad_faults.tlog");
+    let both = flight("card/a/b.bin.gz", "tests/labelled/bin/f12_gps_jump.bin.gz");
+    page.shown.run("document.documentElement.dataset.state = ''; return null");
+    page.shown.drop_files(&[one, two, both.ancestors().nth(2).unwrap().to_owned()]);
+    page.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
+    let shown = page.text("#logs h2");
+    for name in ["flight.tlog", "flight (2).tlog", "card/a/b.bin.gz"] {
+        assert!(shown.contains(name), "{name}: {shown}");
+    }
+    // A link of a report inside the page scrolls the report.
+    page.shown.run("document.querySelector('[data-log=\"flight.tlog\"]').querySelectorAll('button')[1].click(); return null");
+    page.shown.wait("return document.querySelector('iframe')?.srcdoc.length > 10000", 10);
+    assert_eq!(page.shown.console(), serde_json::json!([]));
 }
 
 #[test]

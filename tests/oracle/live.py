@@ -10,6 +10,7 @@ usage: live.py CHROMIUM CHROMEDRIVER        a JSON object a line on standard inp
   {"do": "run", "script": JS}               answers its result
   {"do": "press", "keys": [...]}            key presses, by name or as the character
   {"do": "files", "selector": CSS, "paths": [...]}    chooses files, or a folder, in an input
+  {"do": "drop", "paths": [...]}            drops files and folders onto the window
   {"do": "downloads", "path": P}            saved files go to this folder
   {"do": "frames", "seconds": S}            milliseconds of each frame, from its beginning until it is painted
   {"do": "shot", "path": P, "whole": BOOL}  a screenshot, of the window or of the whole page
@@ -121,6 +122,11 @@ def step(driver, asked):
         return None
     if do == "files":
         driver.find_element("css selector", asked["selector"]).send_keys("\n".join(asked["paths"]))
+        return None
+    if do == "drop":
+        data = {"items": [], "files": asked["paths"], "dragOperationsMask": 1}
+        for kind in ["dragEnter", "dragOver", "drop"]:
+            driver.execute_cdp_cmd("Input.dispatchDragEvent", {"type": kind, "x": 100, "y": 100, "data": data})
         return None
     if do == "downloads":
         driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": asked["path"]})

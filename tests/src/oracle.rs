@@ -183,6 +183,12 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "files", "selector": selector, "paths": paths }));
     }
 
+    /// Drops files and folders onto the window.
+    #[track_caller]
+    pub fn drop_files(&mut self, paths: &[PathBuf]) {
+        self.ask(&serde_json::json!({ "do": "drop", "paths": paths }));
+    }
+
     /// The folder of saved files.
     #[track_caller]
     pub fn downloads(&mut self, folder: &Path) {

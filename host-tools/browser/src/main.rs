@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! hums-browser check INPUT...      two lines for each log: {"screen": TEXT}, then the object of `hums check --json`
-//! hums-browser report INPUT...     a line for each page: {"page": FILE, "log": LOG or null, "html": TEXT}
+//! hums-browser report INPUT...     a line for each page: {"page": FILE, "log": LOG or null, "system": ID or null, "html": TEXT}
 //! hums-browser compare INPUT...    the same with the flights side by side
 //! ```
 //!
@@ -70,9 +70,14 @@ fn report(inputs: &[PathBuf], compare: bool) -> Result<Outcome> {
         json: false,
     };
     report::run_into(&request, &mut |path, what, html, _| {
-        let log = if let What::Session(place) = what { Some(&place.title) } else { None };
+        let (log, system) = if let What::Session(place, system) = what {
+            (Some(&place.title), *system)
+        } else {
+            (None, None)
+        };
         output::json_line(
-            &json!({ "page": path.file_name().map(Path::new), "log": log, "html": html }).to_string(),
+            &json!({ "page": path.file_name().map(Path::new), "log": log, "system": system, "html": html })
+                .to_string(),
         )
     })
 }

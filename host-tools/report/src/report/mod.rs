@@ -256,7 +256,8 @@ impl Making<'_> {
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        self.write(path, &html, &What::Session(place), self.inputs)?;
+        let system = overview.contents.vehicle.as_ref().map(|vehicle| vehicle.system);
+        self.write(path, &html, &What::Session(place, system), self.inputs)?;
         self.rows.push(index::Row::new(file.clone(), overview, &replay));
         self.pages.insert(index, file);
         Ok(())
@@ -377,8 +378,8 @@ fn without_folders(overview: &Overview) -> Overview {
 /// The kind of a page.
 #[derive(Clone, Copy, Debug)]
 pub enum What<'a> {
-    /// Of this recording.
-    Session(&'a Place),
+    /// Of this recording, and of the vehicle with this system id.
+    Session(&'a Place, Option<u8>),
     /// The table of this many pages.
     Table(usize),
     /// Of flights side by side.
@@ -387,14 +388,14 @@ pub enum What<'a> {
 
 impl What<'_> {
     fn session(&self) -> Option<String> {
-        if let Self::Session(place) = self { Some(place.name.clone()) } else { None }
+        if let Self::Session(place, _) = self { Some(place.name.clone()) } else { None }
     }
 }
 
 impl Display for What<'_> {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Session(place) => write!(formatter, "session {}", word(&place.name)),
+            Self::Session(place, _) => write!(formatter, "session {}", word(&place.name)),
             Self::Table(pages) => write!(formatter, "table of {}", count(*pages as u64, "page")),
             Self::Comparison => formatter.write_str("flights side by side"),
         }

@@ -23,7 +23,8 @@ const stop = el("button", { type: "button", hidden: true, onclick: () => cancel(
 const choose = (label, options) => {
   const input = el("input", { type: "file", multiple: true, ...options });
   input.addEventListener("change", () => {
-    start([...input.files].map((file) => ({ path: file.webkitRelativePath || file.name, file })));
+    const files = [...input.files].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
+    start(options.webkitdirectory ? [files] : files.map((file) => [file]));
     input.value = "";
   });
   return el("label", { class: "choose" }, label, input);
@@ -57,24 +58,28 @@ document
 main.append(zone, beside, list, remarks, shown);
 
 // ---- Saving and showing.
-const save = (name, text, type) => {
-  const address = URL.createObjectURL(new Blob([text], { type }));
+const save = (name, content, type) => {
+  const address = URL.createObjectURL(new Blob([content], { type }));
   el("a", { href: address, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 };
 const button = (words, onclick) => el("button", { type: "button", onclick }, words);
-const show = (title, html) => {
+const show = async (title, page) => {
+  const html = await page.text();
   // The report runs apart from this page, under the same policy.
   const frame = el("iframe", { title, sandbox: "allow-scripts allow-modals", srcdoc: html });
   shown.replaceChildren(el("h2", {}, title), frame);
   shown.hidden = false;
   shown.scrollIntoView({ behavior: "smooth" });
 };
-const pageButtons = (host, words, { page, html, title }) =>
+const pageButtons = (host, words, { page, html, title }) => {
+  // Out of the script's memory: reports are large, and a card may have hundreds.
+  const content = new Blob([html]);
   host.append(
-    button(words, () => show(title, html)),
-    button("Save it", () => save(page, html, "text/html")),
+    button(words, () => show(title, content)),
+    button("Save it", () => save(page, content, "text/html")),
   );
+};
 
 // ---- A log's verdict.
 const LEVELS = { ok: "ok", advisory: "advisory", warning: "warning", critical: "critical" };
@@ -101,6 +106,7 @@ const addLog = (line, told, screen) => {
 };
 
 // ---- Runs of the program, one at a time, each in a worker of its own: its memory ends with it.
+// A run ends with `why` it ended early, or null, and the program's exit code.
 let worker = null;
 let turn = 0;
 const idle = (words) => {
@@ -120,28 +126,47 @@ const run = (words, command, inputs, files, takeLine) => {
     (module) =>
       new Promise((resolve) => {
         // It may have been cancelled before it began.
-        if (mine !== turn) return resolve(null);
-        worker = new Worker(workerAddress);
+        if (mine !== turn) return resolve({ why: null });
+        const own = new Worker(workerAddress);
+        const end = (result) => {
+          own.terminate();
+          resolve(result);
+        };
+        worker = own;
         status.textContent = words;
         meter.removeAttribute("value");
         meter.hidden = stop.hidden = false;
-        worker.onmessage = ({ data }) => {
+        own.onmessage = ({ data }) => {
           if (data.kind === "line") takeLine(data.line);
           else if (data.kind === "remark") remarks.append(el("li", {}, data.line.replace(/^hums: /, "")));
           else if (data.kind === "progress") {
             meter.value = data.part;
             status.textContent = `${words} ${data.name}, ${Math.round(data.part * 100)} %`;
-          } else resolve(data.why);
+          } else end(data);
         };
-        worker.onerror = ({ message }) => resolve(`the program stopped (${message})`);
-        worker.postMessage({ module, command, inputs, files });
-      }).finally(() => worker?.terminate()),
-    (error) => `this browser cannot run the program (${error.message}); use a newer one`,
+        own.onerror = ({ message }) => end({ why: `the program stopped (${message})` });
+        own.postMessage({ module, command, inputs, files });
+      }),
+    (error) => ({ why: `this browser cannot run the program (${error.message}); use a newer one` }),
   );
 };
 
-const start = async (given) => {
-  if (given.length === 0) return;
+// What was chosen or dropped has names of its own: two files or folders may have one name.
+const named = (items) => {
+  const taken = new Set();
+  return items.flatMap((files) => {
+    const [first] = files[0].path.split("/");
+    let name = first;
+    for (let number = 2; taken.has(name); number++) name = first.replace(/(\.[^.]+(\.gz)?)?$/, ` (${number})$1`);
+    taken.add(name);
+    return files.map(({ path, file }) => ({ path: name + path.slice(first.length), file }));
+  });
+};
+
+// `items`: the files of each chosen or dropped file or folder; `unread`: sentences about others.
+const start = async (items, unread = []) => {
+  const given = named(items.filter((files) => files.length));
+  if (given.length + unread.length === 0) return;
   cancel("");
   const mine = turn;
   const isOld = () => mine !== turn;
@@ -149,6 +174,8 @@ const start = async (given) => {
   logs = [];
   for (const node of [list, beside, remarks, shown]) node.replaceChildren();
   shown.hidden = true;
+  for (const words of unread) remarks.append(el("li", {}, words));
+  if (given.length === 0) return idle("Nothing could be read.");
   const inputs = [...new Set(given.map(({ path }) => path.split("/")[0]))];
   let screen = "";
   const checked = await run("Checking", "check", inputs, given, (line) => {
@@ -164,49 +191,73 @@ const start = async (given) => {
         save("findings.jsonl", logs.map(({ line }) => `${line}\n`).join(""), "application/json"),
       ),
     );
-  if (checked) return idle(`The check ended early: ${checked}.`);
+  if (checked.why) return idle(`The check ended early: ${checked.why}.`);
   if (read.length === 0) return idle(`No log could be read${logs.length ? "" : " in what was given"}.`);
   // A report for each, and one of the flights side by side.
   const flights = read.reduce((sum, { told }) => sum + told.flights.length, 0);
   const failed = new Set(logs.filter(({ told }) => told.error).map(({ told }) => told.log));
   const good = inputs.filter((input) => !failed.has(input));
-  const files = given.filter(({ path }) => good.includes(path.split("/")[0]));
+  const files = given.filter(({ path }) => !failed.has(path) && good.includes(path.split("/")[0]));
   root.dataset.state = "checked";
   const reported = await run("Reporting", flights > 1 ? "compare" : "report", good, files, (line) => {
     if (!line.startsWith("{")) return;
-    const { page, log, html } = JSON.parse(line);
+    const { page, log, system, html } = JSON.parse(line);
     if (log != null) {
-      const of = logs.find(({ told }) => told.log === log);
+      const own = logs.filter(({ told }) => told.log === log);
+      const of = own.length === 1 ? own[0] : own.find(({ told }) => told.vehicle?.system === system);
       if (of) pageButtons(of.buttons, "Report", { page, html, title: log });
     } else if (page !== "index.html") pageButtons(beside, "Flights side by side", { page, html, title: "Flights side by side" });
   });
   if (isOld()) return;
-  idle(reported ? `The reports ended early: ${reported}.` : `${plural(new Set(logs.map(({ told }) => told.log)).size, "log")} checked.`);
+  // Exit codes 1 and 2: an input or a request that the program refused.
+  const early = reported.why ?? ([1, 2].includes(reported.code) ? "see the remarks" : null);
+  idle(early ? `The reports ended early: ${early}.` : `${plural(new Set(logs.map(({ told }) => told.log)).size, "log")} checked.`);
 };
 
 // ---- Dropping: files, and folders with all that is in them.
-const within = async (entry, path) => {
-  const name = path ? `${path}/${entry.name}` : entry.name;
-  if (entry.isFile) return [{ path: name, file: await new Promise((resolve, reject) => entry.file(resolve, reject)) }];
+// A folder as a handle, where the browser has those: on a page from disk Chromium refuses to read entries.
+const ofHandle = async (folder, path) => {
+  const all = [];
+  for await (const one of folder.values()) {
+    const name = `${path}/${one.name}`;
+    if (one.kind === "file") all.push({ path: name, file: await one.getFile() });
+    else all.push(...(await ofHandle(one, name)));
+  }
+  return all;
+};
+const ofEntry = async (entry, path) => {
+  if (entry.isFile) return [{ path, file: await new Promise((resolve, reject) => entry.file(resolve, reject)) }];
   const reader = entry.createReader();
   const all = [];
   // It tells a part of its entries at a time.
   for (;;) {
     const part = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
     if (part.length === 0) break;
-    for (const inner of part) all.push(...(await within(inner, name)));
+    for (const inner of part) all.push(...(await ofEntry(inner, `${path}/${inner.name}`)));
   }
   return all;
+};
+// Begins at once: what was dropped is known only within its event.
+const dropped = (item) => {
+  const entry = item.webkitGetAsEntry(),
+    file = item.getAsFile();
+  if (!entry?.isDirectory) return file ? [{ path: file.name, file }] : [];
+  const handle = item.getAsFileSystemHandle?.();
+  return handle ? handle.then((folder) => ofHandle(folder, folder.name)) : ofEntry(entry, entry.name);
 };
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", async (event) => {
   event.preventDefault();
-  const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry()).filter(Boolean);
-  try {
-    start((await Promise.all(entries.map((entry) => within(entry, "")))).flat());
-  } catch (error) {
-    status.textContent = `What was dropped cannot be read: ${error.message}.`;
-  }
+  const items = [...event.dataTransfer.items].filter(({ kind }) => kind === "file").map(dropped);
+  cancel("Listing what was dropped.");
+  const mine = turn;
+  const ended = await Promise.allSettled(items);
+  if (mine !== turn) return;
+  const failed = ended.filter(({ status }) => status === "rejected");
+  start(
+    ended.filter(({ status }) => status === "fulfilled").map(({ value }) => value),
+    failed.map(({ reason }) => `A folder that was dropped cannot be read: ${reason.message}.`),
+  );
 });
 
 compiled.then(

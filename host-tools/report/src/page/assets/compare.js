@@ -3,7 +3,7 @@
 import { line, whenColoursChange } from "./colours.js";
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
-import { bar, cells, rows, section } from "./layout.js";
+import { bar, cells, isFramed, rows, section } from "./layout.js";
 import { extent, map } from "./map.js";
 import { charts } from "./plot.js";
 import { plots } from "./plots.js";
@@ -86,7 +86,7 @@ const choice = (name, number) => {
   return box;
 };
 const title = ({ name, page }) =>
-  page ? el("a", { href: encodeURIComponent(page), title: name }, brief(name)) : el("span", { title: name }, brief(name));
+  page && !isFramed ? el("a", { href: encodeURIComponent(page), title: name }, brief(name)) : el("span", { title: name }, brief(name));
 
 // ---- Figures: what is of the flight, and the extremes of what it told.
 const low = (id) => (number) => flight.extremes(id, number)?.[0];

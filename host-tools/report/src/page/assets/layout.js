@@ -3,11 +3,18 @@
 import { el } from "./elements.js";
 
 export const main = document.getElementById("main");
+export const isFramed = location.href.startsWith("about:");
 export const bar = el("div");
 document.getElementById("nav").append(bar);
 // `host` is where it stands, `before` which one it stands before.
 export const section = (id, title, host = main, before = null) => {
-  const link = el("a", { href: `#${id}` }, title);
+  // Inside the check in a browser a fragment would be one of the page around.
+  const scroll = (event) => {
+    if (!isFramed) return;
+    event.preventDefault();
+    node.scrollIntoView();
+  };
+  const link = el("a", { href: `#${id}`, onclick: scroll }, title);
   bar.insertBefore(link, before ? bar.querySelector(`[href="#${before.id}"]`) : bar.querySelector(".back"));
   const node = el("section", { id, class: "row" }, el("h2", {}, title));
   host.insertBefore(node, before);

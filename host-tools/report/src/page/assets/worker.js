@@ -252,7 +252,11 @@ const system = (files, commandLine, say) => {
     },
     path_readlink: () => INVALID,
   };
-  const imports = new Proxy(calls, { get: (known, name) => known[name] ?? (() => NO_SUCH_CALL) });
+  // Addresses beyond 2 GB arrive as negative numbers.
+  const unsigned = (value) => (typeof value === "number" ? value >>> 0 : value);
+  const imports = new Proxy(calls, {
+    get: (known, name) => (known[name] ? (...values) => known[name](...values.map(unsigned)) : () => NO_SUCH_CALL),
+  });
   const attach = (of) => {
     memory = of;
   };
@@ -273,14 +277,16 @@ self.onmessage = async ({ data: { module, command, inputs, files } }) => {
     if (message.kind === "remark") remarks.push(message.line);
     self.postMessage(message);
   };
-  let why = null;
+  let why = null,
+    code = null;
   try {
     const { imports, attach } = system(files, ["hums", command, ...inputs], say);
     const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: imports });
     attach(instance.exports.memory);
     instance.exports._start();
   } catch (error) {
-    if (!(error instanceof Exit)) why = reason(error, remarks);
+    if (error instanceof Exit) code = Number(error.message);
+    else why = reason(error, remarks);
   }
-  say({ kind: "end", why });
+  say({ kind: "end", why, code });
 };
