@@ -173,3 +173,22 @@ fn a_bad_value_of_a_slow_stream_is_told_twice_and_then_stays() {
     let told = changes(&Check { when: When::InFlight, ..CHECK }, &script, 0);
     assert_eq!(told, "1050 stale, 3500 warning, 4050 stale, 6500 warning | warning");
 }
+
+#[test]
+fn a_text_waits_until_the_value_was_bad_for_so_long_and_a_shorter_rise_has_none() {
+    let check = Check { limits: Limits::above(Some(Param::TiltWarn), None, 5.0), ..CHECK };
+    for (good_again_ms, told_ms) in
+        [(60_000, Some(11_000)), (9_000, None), (10_950, None), (11_050, Some(11_000))]
+    {
+        let (mut state, mut alarmed) = (State::default(), false);
+        let told = (0..30_000).step_by(50).find(|now_ms| {
+            let value = if (1_000..good_again_ms).contains(now_ms) { 50.0 } else { 10.0 };
+            let now = Instant::from_millis(*now_ms);
+            state.step(&check, now, Some(Reading { at: now, value }), true, &Params::defaults());
+            alarmed |= state.alarm().is_some();
+            state.alarm().is_some() && state.lasts(now, Span::from_millis(10_000))
+        });
+        assert!(alarmed);
+        assert_eq!(told, told_ms, "good again at {good_again_ms} ms");
+    }
+}
