@@ -1,4 +1,4 @@
-//! Loads and stores: alignment, bit-band aliases, MPU, the processor's registers, or the bus.
+//! Loads and stores.
 
 use crate::bus::{Bus, Fault, Size};
 use crate::exceptions::{BUS_FAULT, HARD_FAULT};
@@ -191,7 +191,6 @@ impl Core {
         if trapped || own(address) { Err(Trap::Unaligned) } else { Ok(()) }
     }
 
-    /// Which way an access goes, if allowed.
     fn way(&self, address: u32, write: bool, privileged: bool) -> Result<Way, Trap> {
         if own(address) {
             return if privileged || self.control.user_may(address, write) {

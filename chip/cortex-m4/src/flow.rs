@@ -1,4 +1,4 @@
-//! Exceptions: faults and their escalation, entry with stacking (also of floating-point registers, late), return, tail-chaining.
+//! Entry into exceptions, and return from them.
 //!
 //! After the architecture's pseudocode (DDI 0403E, B1.5): `ExceptionEntry`, `PushStack`, `ExceptionTaken`, `ExceptionReturn`,
 //! `PopStack`, `PreserveFPState`. Entry has two halves for late arrival: [`Core::interrupt`] stacks, then [`Core::enter`]

@@ -1,7 +1,6 @@
 //! The processor: an instruction-level model of the Arm Cortex-M4 with its single-precision FPU (ARMv7E-M, FPv4-SP).
 //!
-//! [`Core`] is the processor, [`Bus`] its interface to the chip round it. A run is deterministic: time is the count
-//! of cycles of a documented model (`timing.rs`; modelled, not measured).
+//! A run is deterministic: time is the count of cycles of a documented model (`timing.rs`; modelled, not measured).
 //!
 //! Modelled: all instructions of ARMv7E-M with FPv4-SP. Exceptions with priorities, groups, pre-emption,
 //! tail-chaining, late arrival, lazy stacking of floating-point registers. Faults with their status and escalation,

@@ -1,5 +1,4 @@
-//! DMA1 and DMA2 (RM0090, chapter 10): streams between a device and memory, or memory and memory. Normal, circular,
-//! double-buffered; direct or by the FIFO with packing; half, full and error flags.
+//! DMA1 and DMA2 (RM0090, chapter 10).
 //!
 //! An item moves when a device asks: no arbitration, no bus waits, no burst. FIFO errors (`FEIF`) and direct mode
 //! errors are never set. Flow control by a device (SDIO) stops the machine.

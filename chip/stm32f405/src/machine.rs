@@ -1,7 +1,6 @@
 //! A board: processor, chip, supply, crystal, wired pins.
 //!
-//! It runs until a moment ([`Ps`]); then its driver reads outputs, sets inputs, may cut the power. The same
-//! image, seed and wires give the same run.
+//! The same image, seed and wires give the same run.
 
 use cortex_m4_model::{Core, Outcome};
 

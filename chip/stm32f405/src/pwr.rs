@@ -1,5 +1,5 @@
-//! Power control (RM0090, chapter 5): voltage detector, backup lock, regulator's scale, and the supply's reset. Not
-//! modelled: stop and standby (see `Machine`), the wake-up pin, BOR levels.
+//! Power control (RM0090, chapter 5). Not modelled: stop and standby (see `Machine`), the wake-up pin, BOR
+//! levels.
 
 /// Levels of the detector, mV, rising and falling, typical (DS8626, table 20).
 const LEVELS: [(u32, u32); 8] = [

@@ -1,5 +1,4 @@
-//! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405). Oscillators start and fail; PLL,
-//! prescalers, gates, resets and their causes.
+//! Reset and clock control (RM0090, chapter 7; reset values of the STM32F405).
 //!
 //! Not modelled: interrupts of ready oscillators (an enabled one stops the machine), the clock outputs, spread
 //! spectrum, `PLLI2S`'s output.

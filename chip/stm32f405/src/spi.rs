@@ -1,5 +1,4 @@
-//! SPI1 to SPI3 as master (RM0090, chapter 28): a word in transfer and one behind, overrun, divider, DMA, interrupts. The other
-//! end is a [`Wire`].
+//! SPI1 to SPI3 as master (RM0090, chapter 28). The other end is a [`Wire`].
 //!
 //! Not modelled: slave mode, one line for both ways, the CRC unit, I2S, TI's frame: they stop the machine. A word is exchanged
 //! at its last clock: the card decides by time.

@@ -1,6 +1,5 @@
-//! TIM2 to TIM5 and TIM12, general-purpose timers (RM0090, chapters 18 and 19), as counters. Prescaler, reload with
-//! and without its buffer, update, four compare channels, one pulse, interrupts. TIM2 and TIM5 have 32 bits; TIM12
-//! has two channels.
+//! TIM2 to TIM5 and TIM12, general-purpose timers (RM0090, chapters 18 and 19), as counters. TIM2 and TIM5 have 32
+//! bits; TIM12 has two channels.
 //!
 //! Not modelled: counting down, capture, outputs, encoder, slave mode, DMA requests: they stop the machine. The
 //! counter is computed on demand; events only set flags.

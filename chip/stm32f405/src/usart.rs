@@ -1,5 +1,5 @@
-//! A USART or UART in asynchronous mode (RM0090, chapter 30): overrun, noise, framing, idle line; DMA requests and
-//! interrupts. Divider and bus clock give the rate; the sender has its own.
+//! A USART or UART in asynchronous mode (RM0090, chapter 30). Divider and bus clock give the rate; the sender has its
+//! own.
 //!
 //! Not modelled: synchronous, smart card, infrared (`IrDA`), LIN, half duplex, hardware flow control, 9 bits, parity,
 //! break, mute mode: they stop the machine. TE's first idle frame is left out.

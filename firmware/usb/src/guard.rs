@@ -1,6 +1,6 @@
 //! A USB driver for hostile hosts, around any other driver.
 //!
-//! It adds five things to the driver inside:
+//! The guard adds:
 //! * Requests about endpoints that no class has do nothing. Drivers of embassy panic on them.
 //! * A class can halt its endpoints (`Link::halt`). They stay halted until the host resets class or bus (BOT, 6.6.1).
 //! * A packet that the host did not fetch is dropped by the next configuration, and by a reset of the class. A driver may wait for it

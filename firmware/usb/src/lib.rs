@@ -4,14 +4,13 @@
 //! host -> bulk OUT -> Transport (wrappers, lengths) -> Disk (SCSI commands) -> CardDevice
 //! host <- bulk IN  <-
 //! ```
-//! [`transport`] and [`scsi`] have no I/O: command block in, data and status out. [`class`] moves their bytes through any driver of
-//! `embassy_usb`; [`guard`] keeps requests of a hostile host from that driver. [`presence`] finds out whether a host is there.
+//! [`transport`] and [`scsi`] have no I/O. [`class`] moves their bytes through any driver of `embassy_usb`, which [`guard`]
+//! protects from a hostile host.
 //!
 //! Rules:
 //! * The disk cannot be written. Writes are refused as protected, and hosts are told so by MODE SENSE.
 //! * Each address and length of a host is checked against the card before the card is read.
 //! * A read error of the card is a medium error. Data is sent only after the card has given it without an error.
-//! * An unknown command gets sense data.
 //!
 //! Sources: USB Mass Storage Class Bulk-Only Transport 1.0 (*BOT*), SPC-4, SBC-3.
 #![cfg_attr(not(test), no_std)]

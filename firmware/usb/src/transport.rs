@@ -1,6 +1,6 @@
 //! Bulk-Only Transport: command wrappers in, data and status wrappers out.
 //!
-//! A host announces direction and length of the data, and so does the command block. BOT 6.7 lists the thirteen cases of both:
+//! Host and command block each announce direction and length of the data. The thirteen cases (BOT, 6.7):
 //!
 //! | case | host | command | data on the bus | status |
 //! |---|---|---|---|---|
@@ -12,9 +12,8 @@
 //! | 9, 11 to 13 | out | none, out | taken and dropped | the command's, with residue |
 //! | 10 | out | in | taken and dropped | phase error |
 //!
-//! No command of this disk takes data: a write is refused, which is case 3, 8, 9 or 11 to 13 with the status of a refused command.
-//! A refused command has no data. In place of a short packet BOT wants padding or a halted endpoint. Linux's gadget ends the data in
-//! the same way if its controller cannot halt.
+//! A write is refused: case 3, 8, 9 or 11 to 13, with the status of a refused command. A refused command has no data. In place of
+//! a short packet BOT wants padding or a halted endpoint; Linux's gadget sends a short packet too if its controller cannot halt.
 
 use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 

@@ -1,6 +1,5 @@
 //! The checker of the vehicle's health in a log, as rows: `HUMS_CHECKED`, one row a log. If the recorder ran
-//! no checks, also `HUMS_FINDING` with the findings of this program. So an empty table of findings means a
-//! checked log.
+//! no checks, also `HUMS_FINDING` with the findings of this program.
 
 use hums_core::clock::Instant;
 use hums_core::health::Level;

@@ -1,5 +1,5 @@
 //! The findings of a log as texts of the box (`STATUSTEXT` of component 191) between the frames of a tlog, for programs
-//! that show texts. Without them a tlog has the vehicle's frames alone, bit for bit.
+//! that show texts.
 
 use std::collections::VecDeque;
 

@@ -1,5 +1,4 @@
-//! An output format: [`FormatDetails`] describes it, a [`Part`] encodes the entries of a group, and a [`Writer`] takes the parts in
-//! order. A format is one file in [`crate::formats`], and a line in the table there.
+//! An output format is one file in [`crate::formats`], and a line in the table there.
 
 use std::any::Any;
 use std::fmt;

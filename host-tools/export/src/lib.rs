@@ -1,18 +1,16 @@
 //! `hums decode`: logs and recordings become files for other tools.
 //!
-//! Each format is a file in [`formats`], where their table is.
+//! Each format is a file in [`formats`].
 //!
 //! A log is read once (twice if its vehicle must be known first), and an unchecked one is judged in the same
-//! reading. Its groups become text and columns in parallel, and are written in order. Several logs are
-//! decoded in parallel, few enough that memory stays bounded.
+//! reading. Its groups are encoded in parallel, and written in order. Several logs are decoded in parallel,
+//! few enough that memory stays bounded.
 //!
-//! A log's files are named after its session ([`naming`]), and written by the rules of `hums_base::files`.
+//! A log's files are named after its session ([`naming`]).
 //!
-//! Recordings of every kind go the same way (`hums_formats::source::parts`); an autopilot's log has its own
-//! tables (`native`).
+//! An autopilot's log has its own tables (`native`).
 //!
-//! Gaps are in every format: `HUMS_GAP` tables, objects and points; a table `gaps.csv` beside a tlog and with
-//! `thesis`.
+//! Gaps are in every format.
 
 #![deny(
     clippy::print_stderr,
@@ -548,7 +546,7 @@ impl Task<'_> {
     }
 }
 
-/// The parts of a log, each with one flight: it is cut in the middle between a landing and the next take-off.
+/// Cuts a log midway between a landing and the next take-off.
 fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
     let flights = check::overview(log)?.contents.flights();
     let middle = |landing: Instant, take_off: Instant| {

@@ -1,5 +1,4 @@
-//! The monitor's own records as rows of tables: `HUMS_FINDING`, `HUMS_USAGE`, `HUMS_LOSS` and so on; gaps as rows of
-//! `HUMS_GAP`.
+//! The monitor's own records and gaps as rows of tables.
 
 use hums_blackbox::Gap;
 use hums_blackbox::record::{Record, Stats};

@@ -1,4 +1,4 @@
-//! The tables that a log becomes: one for each message and for each record of the monitor's own.
+//! The tables that a log becomes.
 
 use crate::mavlink::frame::Frame;
 use crate::names::message_name;

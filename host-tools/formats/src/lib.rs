@@ -1,14 +1,7 @@
 //! Readers of recordings. Each becomes one stream of [`source::item::Item`]s, whatever its format.
 //!
-//! * [`source`]: tlog, raw MAVLink, DataFlash, ULog and HUMS logs, their clocks, and the kind of a file by its
-//!   content
-//! * [`logs`]: HUMS logs on cards and images: file system, sessions, groups, sectors rebuilt from parity
-//! * [`ending`], [`followed`]: the end of a HUMS log, and its proof
-//! * [`card`]: card images and the simulated card
-//! * [`mavlink`], [`names`], [`statustext`]: fields, names and texts
-//! * [`naming`]: names of the files that are made of a recording
-//!
-//! It judges no vehicle and writes no output.
+//! [`logs`] reads HUMS logs on cards and images, [`source`] recordings of every format. The crate
+//! judges no vehicle and writes no output.
 
 #![deny(
     clippy::print_stderr,

@@ -1,5 +1,4 @@
-//! Bit errors anywhere in a log; [`super::pages`] has whole pages and ends. A bit or a burst is flipped in the image,
-//! the log is read against the whole log's frames, and the bits are restored.
+//! Bit errors anywhere in a log; [`super::pages`] has whole pages and ends.
 
 use std::collections::BTreeSet;
 

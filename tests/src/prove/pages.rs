@@ -1,16 +1,10 @@
 //! Damage of whole pages of a log, and lost ends.
 //!
-//! A recorded log is changed in one of these ways:
+//! A recorded log is changed in one of the ways of `Kind`.
 //!
-//! - it is cut;
-//! - pages are erased, zeroed, copied, exchanged or replaced by those of an older session;
-//! - it continues with the second half of another log, or with all of one;
-//! - a sector is altered with a valid check;
-//! - a sector is lost and a parity sector of it is altered with a valid check.
-//!
-//! The rest is read, verified and compared with the whole log. *Noticed* means that `hums info --verify` does not
-//! call it good; that includes lossless repair by parity. A cut behind an end mark looks like a power cut. It is
-//! *told* if `verify` names the mark up to which the log is whole, and all of it is.
+//! *Noticed* means that `hums info --verify` does not call it good; that includes lossless repair by parity. A
+//! cut behind an end mark looks like a power cut. It is *told* if `verify` names the mark up to which the log is
+//! whole, and all of it is.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! Branches by register, special registers, sleep, barriers, calls of the supervisor, breakpoints.
+//! System instructions, and branches by register.
 
 use crate::op::Op;
 use crate::processor::{Core, Sleep};

@@ -1,7 +1,6 @@
 //! Scenarios of exceptions: each prints its observations, which are compared between QEMU and the model.
 //!
-//! Every vector leads to `on_exception`: it prints number, return code and status, acts, and steps over a fault's
-//! instruction.
+//! `on_exception` steps over a fault's instruction.
 #![no_std]
 #![no_main]
 

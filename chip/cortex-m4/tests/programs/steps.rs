@@ -1,4 +1,4 @@
-//! Runs instructions one by one: loads a state, jumps to the instruction, stores the state after it.
+//! Runs instructions one by one, each from a given state.
 //!
 //! Each test is in thread mode on the process stack, and ends by SVC or a fault. `handler` gets every exception: it stores
 //! registers and scratch memory, and returns into a frame with the next test's state.

@@ -1,4 +1,4 @@
-//! A fleet's tables as files: a folder for each table, in it a folder for each date and bucket of vehicles.
+//! A fleet's tables as files, by table, date and bucket of vehicles.
 //!
 //! ```text
 //! FLEET/ATTITUDE/date=2026-11-21/bucket=07/s1a2b3c4d-3f0042000d51373435363338.parquet
@@ -7,8 +7,7 @@
 //! ```
 //!
 //! The files of a session have the name of its recording, so the same recording twice is the same files. All files of a
-//! session take their places in one [`transaction`]. The table `sessions` has a row for
-//! each session, and its file tells that the session is there.
+//! session take their places in one [`transaction`]. The session's file in `sessions` tells that the session is there.
 
 pub mod compact;
 pub(crate) mod sessions;

@@ -249,7 +249,6 @@ fn a_row_group_has_so_many_values_at_most() {
     }
 }
 
-/// Several programs at once, each with the same sessions in another order.
 #[test]
 fn programs_that_add_the_same_sessions_at_once_add_each_once() {
     let dir = tempfile::tempdir().expect("a directory");

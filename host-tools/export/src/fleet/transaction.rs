@@ -230,7 +230,6 @@ fn is_inside(place: &str) -> bool {
     !place.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
-/// Calls `take` with the place of each file below a folder.
 fn each(folder: &Path, prefix: &str, take: &mut dyn FnMut(&str) -> io::Result<()>) -> io::Result<()> {
     let mut entries = fs::read_dir(folder.join(prefix))?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);

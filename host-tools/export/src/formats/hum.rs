@@ -1,5 +1,5 @@
 //! `hums decode --format hum`: a recording becomes one log file. It passes the same framer and writer as on board,
-//! but no card's file system, queues or checks. `hums decode` reads it back.
+//! but no card's file system, queues or checks.
 
 use std::collections::VecDeque;
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! KML 2.2 for Google Earth: the track with time, a placemark for each finding.
+//! KML 2.2 for Google Earth.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Subtitles for a video of the flight: time, height, speed, battery and findings, one cue a second.
+//! Subtitles for a video of the flight, one cue a second.
 
 use std::fmt::Write as _;
 use std::path::Path;

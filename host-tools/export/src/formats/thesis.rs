@@ -1,4 +1,4 @@
-//! The reference system's four tables, one row a second, in its columns and formats (`docs/decode.md`).
+//! The reference system's four tables, one row a second (`docs/decode.md`).
 //!
 //! Only latitude and longitude have seven decimals (1 cm) instead of two (1 km). The flight time counts whole
 //! seconds from the monitor's power-on, as the reference counts from its program's start; in a gap it jumps.

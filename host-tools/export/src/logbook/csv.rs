@@ -356,7 +356,6 @@ mod tests {
         }
     }
 
-    /// A cell that cannot be kept is never lost without a word.
     #[test]
     fn cells_that_would_be_lost_are_refused_with_their_line() {
         let dir = tempfile::tempdir().expect("a directory");

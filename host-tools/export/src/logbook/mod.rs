@@ -1,7 +1,7 @@
 //! `hums logbook`: the flights of aircraft, with their batteries, parts and defects.
 //!
-//! The fields are those of the UK CAA's AMC1 UAS.SPEC.050(1)(g), as far as a recording knows them. The others have empty
-//! columns in the CSV, which people fill in. A CSV that exists is continued: its flights and the cells of people stay.
+//! The fields are those of the UK CAA's AMC1 UAS.SPEC.050(1)(g), as far as a recording knows them. People fill in the
+//! others in the CSV. A CSV that exists is continued: its flights and the cells of people stay.
 
 mod csv;
 mod gutma;

@@ -159,7 +159,7 @@ impl Share {
         Ok(lossy || summary.ending.is_some_and(|ending| !ending.is_sound()))
     }
 
-    /// The frame with the fields that stay; `None` if nothing of it does.
+    /// `None` if no field of the frame stays.
     fn frame<'a>(&mut self, at: Instant, frame: &Frame<'_>, out: &'a mut Vec<u8>) -> Option<&'a [u8]> {
         let name = message_name(frame.id());
         self.see(&name);

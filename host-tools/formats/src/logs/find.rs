@@ -81,7 +81,6 @@ pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
     Ok(())
 }
 
-/// A named file must be something.
 fn named_file(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),

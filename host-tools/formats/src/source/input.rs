@@ -1,6 +1,6 @@
 //! A recording's bytes, plain or gzip, with progress.
 //!
-//! Compression is found by content. Damaged compressed bytes end the input; [`Progress::damage`] has place and reason.
+//! Damaged compressed bytes end the input; [`Progress::damage`] has place and reason.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};

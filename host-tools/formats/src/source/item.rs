@@ -1,7 +1,6 @@
 //! The stream that every recording is read as.
 //!
-//! A format is a file or folder with a [`Reader`]; commands take [`Item`]s. A reader's memory does not grow with its input, and
-//! no input panics it.
+//! A [`Reader`]'s memory does not grow with its input, and no input panics it.
 //!
 //! **Times** count from the recording clock's beginning and never fall ([`super::timeline`]); a clock that falls is an
 //! [`Item::Restart`]. UTC of time zero is an [`Item::Epoch`], again when known better.

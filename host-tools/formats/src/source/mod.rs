@@ -1,5 +1,5 @@
-//! Inputs: recordings of every format as one stream of items ([`item`], [`recording`]). For `hums sim` and its like they are
-//! the UART's bytes: chunks with their times of arrival.
+//! Inputs: recordings of every format as one stream of items ([`item`], [`recording`]). For `hums sim`
+//! they are the UART's bytes.
 //!
 //! | format | read by |
 //! |---|---|
@@ -19,7 +19,7 @@
 //! | raw bytes (file or `-`) | none recorded: paced as on a line at 115,200 baud; [`booted`] has the autopilot's |
 //! | UDP, TCP, serial | the clock's |
 //!
-//! Files and `-` may be compressed by gzip. Times are microseconds since the first byte and never fall ([`tlog::times`]).
+//! Times are microseconds since the first byte and never fall ([`tlog::times`]).
 
 pub mod blocks;
 mod boot;

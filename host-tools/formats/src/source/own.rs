@@ -1,5 +1,4 @@
-//! HUMS logs as the one stream. Groups are decoded in parallel ([`crate::logs::reader`]) and handed on in
-//! order.
+//! HUMS logs as the one stream, read by [`crate::logs::reader`].
 
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Lost, Note, RECORD_BYTES_MAX};

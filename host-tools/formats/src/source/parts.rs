@@ -3,8 +3,8 @@
 //! A HUMS log's groups are decoded, and their results made, in parallel. A command has an [`ItemCollector`] for each part,
 //! and a [`PartReceiver`] that gets them in order. Another format is cut into parts of bounded size, on one thread.
 //!
-//! Parts have frames, observations, rows and records. They lack items that need earlier frames (modes; in HUMS logs
-//! also texts and parameters) and items needed before the first part (clocks).
+//! Parts lack items that need earlier frames (modes; in HUMS logs also texts and parameters) and items needed before the
+//! first part (clocks).
 
 use anyhow::Result;
 use hums_core::clock::Instant;

@@ -56,7 +56,6 @@ pub(super) const EACH: Form = Form {
     columns: &["flight", "vehicle", "class", "fault", "told", "cause named", "autopilot's own text"],
 };
 
-/// Faults that the messages show, with their flights.
 fn shown(judged: &Judged) -> impl Iterator<Item = (&Outcome, &Fault)> {
     let faults = judged.outcomes.iter().filter_map(|one| Some((one, one.fault.as_ref()?)));
     faults.filter(|(_, fault)| fault.visible)

@@ -1,4 +1,4 @@
-//! The judge of the diagnosis: the monitor's findings on known faults, their delays, and its false alarms.
+//! The judge of the monitor's diagnosis.
 //!
 //! Flights are recordings with labels (`labels`), in sets by whether they were known when the limits were chosen
 //! (`sets`); `real` judges real flights, whose findings have labels. It is not a campaign of `docs/proof.md`: those test promises,

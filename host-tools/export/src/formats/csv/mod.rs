@@ -1,4 +1,4 @@
-//! A table for each message type and each record, and for gaps: one file a table.
+//! CSV: one file for each table.
 
 mod tables;
 mod unknown;

@@ -1,6 +1,6 @@
-//! The columns of a Parquet table, gathered until they are written as a row group. Columns of frames have the
-//! sent types, columns of rows those of the first row's cells. A row takes as many bytes as its values. So a
-//! log of thousands of tables, each with a few rows, takes no more than a log of a few tables.
+//! The columns of a Parquet table, gathered until they are written as a row group. Columns of frames have the sent
+//! types, columns of rows those of the first row's cells. A row takes the bytes of its values, so thousands of
+//! small tables take no more than a few large ones.
 
 use hums_core::clock::Instant;
 use hums_dialect::Kind as Sent;
@@ -357,7 +357,6 @@ impl Column {
     }
 }
 
-/// The type of one of the [`NAMES`].
 pub(super) fn name_type(name: &str) -> Result<Type> {
     let text = Type::primitive_type_builder(name, Physical::BYTE_ARRAY).with_repetition(Repetition::REQUIRED);
     text.with_logical_type(Some(LogicalType::String)).build()

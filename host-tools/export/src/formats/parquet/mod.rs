@@ -4,16 +4,11 @@
 //! OUT/ATTITUDE/date=2026-11-21/bucket=07/s1a2b3c4d-3f0042000d51373435363338.parquet
 //! ```
 //!
-//! A folder for each message type and for each table of the monitor's own ([`crate::fleet`]). Columns keep the sent type
-//! (arrays are lists, `char` arrays text); the file's metadata has `units.COLUMN` and `enum.COLUMN`. Each table begins with
-//! `vehicle` and `session`. Then come `boot_s`, seconds since the monitor's power-on, and `utc`, null if unknown. Tables
-//! of frames go on with `system` and `component`.
+//! The folders are those of [`crate::fleet`], the columns are in `docs/decode.md`.
 //!
-//! Rows wait as plain columns, 12 MiB in all; then the largest tables become row groups and are written. So
-//! an encoder, which costs far more than its rows, is open only for one row group. An open file takes memory
-//! for each of its columns, and for the description of its row groups, which is written at its end. The
-//! memory of open files is limited too: beyond the limit the largest are closed, and their tables go on in
-//! `SESSION.2.parquet`.
+//! Rows wait as plain columns, 12 MiB in all; then the largest tables are written as row groups. An encoder costs far
+//! more than its rows, so it is open for one row group only. An open file takes memory for its columns and row
+//! groups: beyond a limit the largest files are closed, and their tables go on in `SESSION.2.parquet`.
 
 mod batches;
 mod columns;

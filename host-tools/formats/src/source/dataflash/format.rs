@@ -1,5 +1,4 @@
-//! The form of messages: FMT defines a type's name, length, columns and their format characters; UNIT, MULT
-//! and FMTU give the units of its numbers. `LogStructure.h` of `ArduPilot` describes both.
+//! The form of messages, by FMT, UNIT, MULT and FMTU. Source: `LogStructure.h` of `ArduPilot`.
 
 use std::sync::Arc;
 

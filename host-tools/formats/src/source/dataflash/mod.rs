@@ -1,9 +1,7 @@
 //! `ArduPilot`'s onboard logs (`DataFlash`), binary (`.bin`) and text (`.log`), since 2012.
 //!
-//! A log describes itself: FMT messages define the others, FMTU, UNIT and MULT their units. `format` keeps
-//! the definitions, `binary` and `text` find the messages, `message` reads their values, `clock` their times.
-//! `observe` makes the MAVLink reports of the same autopilot. Reading keeps one buffer, the definitions (256
-//! at most) and the vehicle's state.
+//! A log describes itself: FMT messages define the others, FMTU, UNIT and MULT their units. Reading keeps one buffer,
+//! the definitions (256 at most) and the vehicle's state.
 //!
 //! The first part of a file is searched first: units may follow a message's first rows, and the kind of
 //! vehicle its first observations.

@@ -1,4 +1,4 @@
-//! Recordings of a ground station, as they should be and as they should not.
+//! Recordings of a ground station.
 
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;

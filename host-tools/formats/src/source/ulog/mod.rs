@@ -1,7 +1,6 @@
 //! PX4's onboard logs (`ULog`): `.ulg`.
 //!
-//! Header and definitions come first: formats, parameters, information. Then data, each of a topic that a
-//! subscription numbered. Source: PX4's guide, "`ULog` File Format".
+//! Source: PX4's guide, "`ULog` File Format".
 //!
 //! | file | does |
 //! |---|---|

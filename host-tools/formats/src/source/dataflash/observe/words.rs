@@ -1,5 +1,5 @@
-//! Numbers of `ArduPilot` in words: vehicles, modes, events, errors. Sources: `AP_Logger.h` (`LogEvent`,
-//! `LogErrorSubsystem`), `mode.h` of `ArduCopter`, `defines.h` of `ArduPlane`, `mode.h` of Rover and `ArduSub`.
+//! Numbers of `ArduPilot` in words. Sources: `AP_Logger.h` (`LogEvent`, `LogErrorSubsystem`), `mode.h` of `ArduCopter`,
+//! `defines.h` of `ArduPlane`, `mode.h` of Rover and `ArduSub`.
 
 use hums_core::cause::{Alert, Cause, Urgency};
 
@@ -231,7 +231,6 @@ pub(super) fn subsystem(number: u8) -> &'static str {
     row(number).map_or("", |(_, name, ..)| name)
 }
 
-/// The failsafes of these bits, by their names.
 pub(super) fn failsafes(bits: u64) -> String {
     let named = SUBSYSTEMS.iter().filter(|(subsystem, ..)| bits & (1 << subsystem) != 0);
     named.map(|(_, name, ..)| *name).collect::<Vec<_>>().join(", ")

@@ -1,4 +1,4 @@
-//! Arming times: from the log's messages, or else from the vehicle's motion.
+//! Arming times.
 
 use std::fmt::Write as _;
 

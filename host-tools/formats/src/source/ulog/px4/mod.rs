@@ -25,7 +25,6 @@ const REPEAT_US: u64 = 1_000_000;
 /// Useful topics.
 const LISTS: [&[Topic]; 4] = [system::TOPICS, motion::TOPICS, power::TOPICS, receivers::TOPICS];
 
-/// The row of a topic, if it is needed.
 pub(super) fn topic(name: &str) -> Option<&'static Topic> {
     LISTS.into_iter().flatten().find(|topic| topic.name == name)
 }

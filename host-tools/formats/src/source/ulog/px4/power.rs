@@ -80,7 +80,6 @@ const fn charge(warning: Option<u8>) -> u8 {
     }
 }
 
-/// The cells' voltages, if the battery measures them.
 fn cells(sample: &Sample<'_>) -> Option<[Option<Volts>; CELLS_MAX]> {
     let fields = &sample.fields;
     let count = fields.count(9).filter(|&count| count > 0)?;
