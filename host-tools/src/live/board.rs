@@ -241,19 +241,15 @@ fn reason(
         let alarm = |worry: &Finding| health::Alarm::of(worry.check, worry.instance, worry.level, worry.at);
         let alarms = craft.worries.values().filter_map(alarm);
         // One cause has its own order.
-        return match alarm(finding).and_then(|effect| health::root_cause(&effect, alarms)) {
-            Some(cause) => {
-                let words =
-                    format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name));
-                (words, action(cause.check.name))
-            }
-            None => {
-                let words = match craft.due(finding) {
-                    Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
-                    None => words(finding),
-                };
-                (words, action(finding.check))
-            }
+        return if let Some(cause) = alarm(finding).and_then(|effect| health::root_cause(&effect, alarms)) {
+            let words = format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name));
+            (words, action(cause.check.name))
+        } else {
+            let words = match craft.due(finding) {
+                Some(due) => format!("{}: {}", part::due_words(&due), words(finding)),
+                None => words(finding),
+            };
+            (words, action(finding.check))
         };
     }
     let reason = match (subsystem, level) {

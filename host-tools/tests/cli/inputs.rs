@@ -43,7 +43,7 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
 )];
 
 /// Commands without a pair of input and output to try, with the reason.
-const NO_PAIRS: [(&str, &str); 12] = [
+const NO_PAIRS: [(&str, &str); 13] = [
     ("check", "prints"),
     ("live", "shows and sends"),
     ("completions", "prints"),
@@ -51,6 +51,7 @@ const NO_PAIRS: [(&str, &str); 12] = [
     ("due", "prints"),
     ("compact", "changes its folder"),
     ("box replaced", "talks with a board"),
+    ("box card-reader", "talks with a board"),
     ("box format-card", "talks with a board"),
     ("box params list", "talks with a board"),
     ("box params get", "talks with a board"),

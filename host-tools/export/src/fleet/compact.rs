@@ -1,6 +1,6 @@
 //! `hums compact`: the files of many sessions become few files, sorted by vehicle and session.
 //!
-//! All tables of a date and bucket are one change ([`super::transaction`]), so a session is never in both
+//! All tables of a date and bucket are one change (a transaction), so a session is never in both
 //! kinds of files. Columns have the encoding that makes them smallest in a sample.
 
 mod column;

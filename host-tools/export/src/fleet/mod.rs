@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The files of a session have the name of its recording, so the same recording twice is the same files. All files of a
-//! session take their places in one [`transaction`]. The session's file in `sessions` tells that the session is there.
+//! session take their places in one transaction. The session's file in `sessions` tells that the session is there.
 
 pub mod compact;
 pub(crate) mod sessions;
