@@ -5,8 +5,8 @@ const OUTSIDE: f64 = 0.05;
 /// Each halving gives a bit; a double has 53.
 const HALVINGS: usize = 60;
 
-/// The upper bound of a Poisson mean for this count. Exact (Garwood 1936): half the 95 % quantile of chi-squared with `2 (count
-/// + 1)` degrees of freedom.
+/// The upper bound of a Poisson mean for this count. Exact (Garwood 1936): half the 95 % quantile of chi-squared with
+/// `2 (count + 1)` degrees of freedom.
 pub(super) fn events_at_most(count: u64) -> f64 {
     let highest = count as f64 + 10.0 * (count as f64 + 10.0).sqrt();
     boundary(highest, |mean| poisson_up_to(count, mean) > OUTSIDE)
