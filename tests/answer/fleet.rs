@@ -162,8 +162,8 @@ fn assert_all_are_told(results: &Value, logs: &[Value]) {
         rows(results, heading).iter().filter_map(|row| row[column].as_f64()).sum::<f64>()
     };
     let flights: usize = logs.iter().map(|log| log["flights"].as_array().unwrap().len()).sum();
-    assert_eq!(sum("Hours and flights by vehicle", "sessions"), logs.len() as f64);
-    assert_eq!(sum("Hours and flights by vehicle", "flights"), flights as f64);
+    assert_eq!(sum("Hours and flights by vehicle", "sessions").round() as usize, logs.len());
+    assert_eq!(sum("Hours and flights by vehicle", "flights").round() as u64, flights as u64);
     let attention = rows(results, "What needs attention");
     let problems = rows(results, "Problems of the fleet");
     let key = |row: &Value| format!("{} {} {}", row["session"], row["check"], row["instance"]);

@@ -424,7 +424,7 @@ fn what_the_autopilot_says_of_gnss_counts_from_the_first_fix_on() {
             quad.gnss.fix = if had_fix && now_ms < FAULT_MS { 3 } else { 1 };
             let says = now_ms == FAULT_MS + 5_000;
             more.extend(
-                says.then(|| Observation::Alert(Alert { cause: Cause::Gnss, urgency: Urgency::Warning })),
+                says.then_some(Observation::Alert(Alert { cause: Cause::Gnss, urgency: Urgency::Warning })),
             );
         });
         run.of_check("gnss_alert").any(|one| one.level == Level::Warning)

@@ -22,7 +22,9 @@ fn rows(fleet: &Path) -> BTreeMap<String, Vec<String>> {
         let rows = rows.map(|row| row.expect("a row").to_string());
         tables.entry(table).or_default().extend(rows);
     }
-    tables.values_mut().for_each(|rows| rows.sort_unstable());
+    for rows in tables.values_mut() {
+        rows.sort_unstable();
+    }
     tables
 }
 

@@ -72,7 +72,8 @@ fn a_manifest_names_each_table_of_a_fleet_once() {
     let mut named: Vec<_> = named.map(|file| file["file"].as_str().expect("a name").to_owned()).collect();
     let tables = contents(&out).into_iter().map(|(name, _)| name).filter(|name| name.ends_with(".parquet"));
     let mut tables: Vec<_> = tables.map(|name| format!("out/{name}")).collect();
-    (named.sort(), tables.sort());
+    named.sort();
+    tables.sort();
     assert!(tables.len() > 5);
     assert_eq!(named, tables);
 }

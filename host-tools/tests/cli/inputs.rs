@@ -63,13 +63,12 @@ const NO_PAIRS: [(&str, &str); 13] = [
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
         ("decode" | "report" | "info", "inputs") | ("check", "past") => "log.hum",
-        ("check", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
+        ("check" | "logbook", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
         ("completions", "shell") => "bash",
         (_, "params") => "hums.param",
         (_, "key") => "key.txt",
         (_, "firmware") => "hums.elf",
         (_, "sd") => "new.img",
-        ("logbook", "inputs") => "flight.tlog",
         ("logbook", "output") => "new.html",
         ("compact", "folder") => "folder",
         (_, "output") => "new.out",
