@@ -159,7 +159,7 @@ pub(crate) fn ensure(needs: &[Need], dry_run: bool) -> Outcome {
     for need in &missing {
         let (purpose, line) = (need.row().0, need.install());
         eprintln!("missing: {purpose}\n  {line}");
-        // What is still missing decides.
+        // The needs that are still missing decide.
         if install && let Err(error) = Shell::new("sh").args(["-c", &line]).quiet().run() {
             eprintln!("warning: {error:#}");
         }

@@ -307,7 +307,7 @@ struct Done {
     name: String,
     outcome: Outcome,
     ending: Option<Ending>,
-    /// What a recording of another program lacks.
+    /// The gaps of a recording of another program.
     lacks: Soundness,
     skipped: bool,
     written: bool,

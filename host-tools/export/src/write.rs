@@ -30,7 +30,7 @@ pub struct Writers<'a> {
     on_board: OnBoard,
     /// Rows of tables without room for their names.
     rows_left_out: u64,
-    /// What the recording lacks, by its gaps.
+    /// The state of the recording, by its gaps.
     lacks: Soundness,
 }
 
@@ -119,7 +119,7 @@ impl<'a> Writers<'a> {
         self.frames == 0 && !has_records && self.files.iter().all(|writer| writer.is_empty())
     }
 
-    /// What the recording lacks, by its gaps.
+    /// The state of the recording, by its gaps.
     pub fn lacks(&self) -> Soundness {
         self.lacks
     }

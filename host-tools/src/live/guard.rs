@@ -47,7 +47,7 @@ impl Guard {
         Ok((Self { token: hashed, host: host.to_ascii_lowercase() }, token))
     }
 
-    /// A name that nobody can take over.
+    /// Whether the host has a name of this computer alone.
     pub fn knows_host(&self, headers: &HeaderMap) -> bool {
         host(headers).is_some_and(|host| {
             let name = without_port(host).to_ascii_lowercase();

@@ -16,7 +16,7 @@ use super::transaction::stop;
 use super::*;
 use crate::identity::Identity;
 
-/// Numbers of vehicles, three of which share a bucket.
+/// Numbers of vehicles; three of them share a bucket.
 const VEHICLES: [u64; 5] = [0, 2, 10, 1, 3];
 const TABLES: [&str; 3] = ["A", "B", SESSIONS];
 

@@ -164,7 +164,7 @@ pub(super) fn write(book: &Book, path: &Path) -> Result<()> {
         }
     }
     make_parent(path)?;
-    // What the existing file has is in the new one.
+    // The rows of the existing file are in the new one.
     let mut output = Output::create(path, &Inputs::none().forcing(true))?;
     settle(output.write_all(&text), path)?;
     output.finish()

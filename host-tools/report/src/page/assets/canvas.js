@@ -1,4 +1,6 @@
-// A canvas as sharp as the screen, cleared.
+// A canvas as sharp as the screen, cleared; the look of axes.
+
+import { colour } from "./colours.js";
 
 export const FONT = "12px system-ui, 'DejaVu Sans', sans-serif";
 
@@ -14,3 +16,12 @@ export const canvas = (node, width, height) => {
   ctx.font = FONT;
   return ctx;
 };
+
+// The look of a plot's axis, with what is its own.
+export const axis = (extra) => ({
+  stroke: colour("dim"),
+  font: FONT,
+  grid: { stroke: colour("grid"), width: 1 },
+  ticks: { stroke: colour("grid"), width: 1, size: 4 },
+  ...extra,
+});

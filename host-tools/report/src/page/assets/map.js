@@ -90,7 +90,7 @@ export const map = ({ id = "map", whose = flight, frame = null, name = "Track ov
       { west: left, east: right, south: bottom, north: top },
       scale,
       (lon, lat) => {
-        const [e, n] = [(lon - track[0][2]) * METRES * Math.cos((track[0][1] * Math.PI) / 180), (lat - track[0][1]) * METRES];
+        const [e, n] = metres([0, lat, lon]);
         return [x(e), y(n)];
       },
       again,

@@ -1,6 +1,6 @@
 // One plot: lines over time with their limits; phases, gaps and findings behind them; one cursor for all.
 
-import { FONT } from "./canvas.js";
+import { axis } from "./canvas.js";
 import { PHASES, colour, isDark, line, printing, whenColoursChange } from "./colours.js";
 import { attribute, panel, say } from "./dom.js";
 import { el } from "./elements.js";
@@ -127,13 +127,6 @@ export const chart = (id, name = null) => {
     const [from, to] = [view.from, view.to].map((at) => clock(Math.round(at - flight.zero)));
     attribute(body, "aria-label", `${title.textContent}, ${unit}, from ${from} to ${to}: ${lines.join("; ")}`);
   };
-  const axis = (extra) => ({
-    stroke: colour("dim"),
-    font: FONT,
-    grid: { stroke: colour("grid"), width: 1 },
-    ticks: { stroke: colour("grid"), width: 1, size: 4 },
-    ...extra,
-  });
   const label = ([number, text]) => {
     const mark = el("i"),
       value = el("b", { "data-value": `${id}:${number}` });

@@ -1,7 +1,7 @@
 // Spectra of acceleration and body rates, of logs with the rate for it.
 
-import { FONT } from "./canvas.js";
-import { colour, line, whenColoursChange } from "./colours.js";
+import { axis } from "./canvas.js";
+import { line, whenColoursChange } from "./colours.js";
 import { data } from "./data.js";
 import { panel } from "./dom.js";
 import { el } from "./elements.js";
@@ -27,13 +27,6 @@ const spectrum = ({ title, unit, rate_hz: rate, step_hz: step, strongest, values
     made?.destroy();
     marks.forEach((mark, i) => {
       mark.style.borderColor = line(i);
-    });
-    const axis = (extra) => ({
-      stroke: colour("dim"),
-      font: FONT,
-      grid: { stroke: colour("grid"), width: 1 },
-      ticks: { stroke: colour("grid"), width: 1, size: 4 },
-      ...extra,
     });
     made = new uPlot(
       {
