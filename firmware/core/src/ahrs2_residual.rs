@@ -10,7 +10,7 @@
 use crate::motion::ground_speed_mps;
 use crate::observation::SecondEstimate;
 use crate::residual::{AT_ONCE, Comparison, Residuals};
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 use crate::units::{Position, norm};
 use crate::vehicle::Vehicle;
 
@@ -21,8 +21,8 @@ const POS_HORIZ_ABS: u16 = 16;
 /// A degree of latitude, m.
 const DEGREE_M: f64 = 111_320.0;
 
-pub(crate) fn take(residuals: &mut Residuals, at: Instant, second: &SecondEstimate, vehicle: &Vehicle) {
-    if !residuals.is_due(Comparison::Ahrs2Tilt, at, Span::ZERO) {
+pub(crate) fn take(residuals: &mut Residuals, at: BootMs, second: &SecondEstimate, vehicle: &Vehicle) {
+    if !residuals.is_due(Comparison::Ahrs2Tilt, at, Millis::ZERO) {
         return;
     }
     if let (Some(attitude), Some([roll, pitch, _])) = (vehicle.attitude.within(at, AT_ONCE), second.attitude)

@@ -13,12 +13,12 @@ pub use events::name as event_name;
 
 use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
 use crate::observation::{Estimator, EstimatorScale, Sensors};
-use crate::time::{Instant, SILENT, Span, Stamp};
+use crate::time::{BootMs, Millis, SILENT, Stamp};
 
 /// Time for which a text or an event holds. PX4 repeats its failing checks when they change, some 2 s apart.
-pub const HOLDS: Span = Span::from_secs(10);
+pub const HOLDS: Millis = Millis::from_secs(10);
 /// A crash or a critical alert counts up to this long after disarming: heartbeats are a second apart.
-const DISARMED: Span = Span::from_secs(2);
+const DISARMED: Millis = Millis::from_secs(2);
 /// `MAV_STATE_CRITICAL`; `MAV_STATE_EMERGENCY` and worse states have larger numbers.
 const CRITICAL_STATE: u8 = 5;
 
@@ -102,11 +102,11 @@ state! {
 }
 
 impl Flags {
-    const fn take(&mut self, at: Instant, causes: Causes) {
+    const fn take(&mut self, at: BootMs, causes: Causes) {
         *self = Self { now: causes, before: self.now, at: Stamp::at(at) };
     }
 
-    fn has(&self, now: Instant, cause: Cause) -> bool {
+    fn has(&self, now: BootMs, cause: Cause) -> bool {
         self.now.both(self.before).has(cause) && self.at.age(now).is_some_and(|age| age <= SILENT)
     }
 }
@@ -137,7 +137,7 @@ state! {
 
 impl Alerts {
     /// Each arming begins anew.
-    pub(crate) fn take_armed(&mut self, at: Instant, armed: bool) {
+    pub(crate) fn take_armed(&mut self, at: BootMs, armed: bool) {
         if armed && !self.armed {
             let Self { had, had_both, .. } = *self;
             *self = Self { had, had_both, ..Self::default() };
@@ -148,7 +148,7 @@ impl Alerts {
         }
     }
 
-    pub(crate) const fn take_state(&mut self, at: Instant, state: u8) {
+    pub(crate) const fn take_state(&mut self, at: BootMs, state: u8) {
         let emergency = state >= CRITICAL_STATE;
         if emergency && !self.emergency {
             self.began_at = Stamp::at(at);
@@ -156,12 +156,12 @@ impl Alerts {
         self.emergency = emergency;
     }
 
-    pub(crate) fn have_begun_within(&self, now: Instant, span: Span) -> bool {
+    pub(crate) fn have_begun_within(&self, now: BootMs, span: Millis) -> bool {
         self.began_at.age(now).is_some_and(|age| age <= span)
     }
 
     /// An autopilot that crashes disarms with that text, and reports the damage right behind it.
-    pub(crate) fn tell(&mut self, at: Instant, alert: Alert) {
+    pub(crate) fn tell(&mut self, at: BootMs, alert: Alert) {
         let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
             && self.armed_at.age(at).is_some_and(|age| age <= DISARMED);
         let place = alert.cause as usize;
@@ -183,7 +183,7 @@ impl Alerts {
     }
 
     /// `SYS_STATUS`: sensors that are not healthy. PX4 calls a lost sensor no longer present.
-    pub(crate) fn take_sensors(&mut self, at: Instant, sensors: &Sensors) {
+    pub(crate) fn take_sensors(&mut self, at: BootMs, sensors: &Sensors) {
         let healthy = Causes::of_sensors(sensors.healthy);
         self.had = self.had.or(healthy);
         let lost = Causes::of_sensors(sensors.lost).both(self.had);
@@ -193,11 +193,11 @@ impl Alerts {
     }
 
     /// `HIGH_LATENCY2`
-    pub(crate) const fn take_failures(&mut self, at: Instant, causes: Causes) {
+    pub(crate) const fn take_failures(&mut self, at: BootMs, causes: Causes) {
         self.failures.take(at, causes);
     }
 
-    pub(crate) fn take_estimator(&mut self, at: Instant, estimator: &Estimator, has_fix: bool, in_air: bool) {
+    pub(crate) fn take_estimator(&mut self, at: BootMs, estimator: &Estimator, has_fix: bool, in_air: bool) {
         self.had_both |= has_both(estimator.flags);
         self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix, in_air));
     }
@@ -216,7 +216,7 @@ impl Alerts {
     /// - 0: the autopilot reports that it is over, or flags call it healthy.
     /// - [`ENDED`]: it is no longer reported.
     /// - `None`: it was never reported.
-    pub fn level(&self, now: Instant, cause: Cause, in_mishap: bool) -> Option<f32> {
+    pub fn level(&self, now: BootMs, cause: Cause, in_mishap: bool) -> Option<f32> {
         let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
         let is_judged = self.armed && !in_mishap;
         let is_flagged = is_judged
@@ -231,7 +231,7 @@ impl Alerts {
     }
 
     /// Whether flags of `SYS_STATUS` cover the cause and call it healthy.
-    fn is_cleared(&self, now: Instant, cause: Cause) -> bool {
+    fn is_cleared(&self, now: BootMs, cause: Cause) -> bool {
         let comes = |flags: &Flags| {
             let has = flags.now.both(flags.before).has(cause);
             !has && flags.at.age(now).is_some_and(|age| age <= SILENT)
@@ -244,7 +244,7 @@ impl Alerts {
 }
 
 /// Times are in milliseconds modulo 2^32.
-const fn is_past(now: Instant, until_ms: u32) -> bool {
+const fn is_past(now: BootMs, until_ms: u32) -> bool {
     (now.as_millis() as u32).wrapping_sub(until_ms).cast_signed() > 0
 }
 

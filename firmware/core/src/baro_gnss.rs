@@ -19,7 +19,7 @@ use crate::motion::{climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{Comparison, LATE_S, RECEIVER_S, Residuals, smooth};
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::units::GRAVITY;
 use crate::vehicle::Vehicle;
 
@@ -46,7 +46,7 @@ state! {
 }
 
 impl Leap {
-    fn take(&mut self, at: Instant, height_m: f32, climb_mps: Option<f32>) {
+    fn take(&mut self, at: BootMs, height_m: f32, climb_mps: Option<f32>) {
         let step = self.at.age(at).filter(|step| *step <= PAUSE);
         let risen_m = height_m - self.height_m;
         (self.at, self.height_m) = (Stamp::at(at), height_m);
@@ -93,7 +93,7 @@ state! {
 }
 
 impl Heights {
-    pub(crate) fn take_pressure(&mut self, to: &mut Residuals, at: Instant, hpa: f32, vehicle: &Vehicle) {
+    pub(crate) fn take_pressure(&mut self, to: &mut Residuals, at: BootMs, hpa: f32, vehicle: &Vehicle) {
         if !to.gates.are(gates::SETTLED) || !hpa.is_finite() || hpa <= 0.0 {
             return;
         }
@@ -115,7 +115,7 @@ impl Heights {
         self.leaps[0].take(at, height_m, climb);
         self.sample = Sample { at: Stamp::at(at), height_m, wind_m, climb_mps: climb.unwrap_or(0.0) };
         // A second leap is a step of the barometer, and no climb.
-        let Some(step) = step.filter(|step| *step > Span::ZERO && !leaps) else { return };
+        let Some(step) = step.filter(|step| *step > Millis::ZERO && !leaps) else { return };
         let step_s = step.as_secs_f32();
         if let Some(climb_mps) = climb {
             let off_m = libm::fabsf(risen_m - climb_mps * step_s);
@@ -133,7 +133,7 @@ impl Heights {
         }
     }
 
-    pub(crate) fn take_gnss(&mut self, to: &mut Residuals, at: Instant, gnss: &Gnss, vehicle: &Vehicle) {
+    pub(crate) fn take_gnss(&mut self, to: &mut Residuals, at: BootMs, gnss: &Gnss, vehicle: &Vehicle) {
         let Some(altitude) = gnss.altitude.filter(|_| gnss.is_exact()) else { return };
         let climb = climb_mps(at, vehicle);
         if to.gates.are(gates::SETTLED) {
@@ -143,7 +143,7 @@ impl Heights {
         // Receivers are some tenths of a second late: in a climb the two heights are not of one moment.
         let climbs = climb.is_none_or(|climb| libm::fabsf(climb) > gates::LEVEL_MPS);
         let is_old = measured.age(at).is_none_or(|age| age > PAUSE);
-        if climbs || is_old || !to.is_due(Comparison::BaroGnss, at, Span::ZERO) {
+        if climbs || is_old || !to.is_due(Comparison::BaroGnss, at, Millis::ZERO) {
             return;
         }
         let airspeed = vehicle.hud.get().and_then(|hud| hud.airspeed).map_or(0.0, |speed| speed.0);
@@ -157,7 +157,7 @@ impl Heights {
         smooth(usual, air, learnt_s / (AIR_S + learnt_s), f32::INFINITY);
     }
 
-    pub(crate) fn receiver_leapt(&self, now: Instant) -> Option<Reading> {
+    pub(crate) fn receiver_leapt(&self, now: BootMs) -> Option<Reading> {
         let [barometer_m, receiver_m] = self.leaps.map(|leap| leap.far_m());
         let alone_m = if receiver_m > 2.0 * barometer_m { receiver_m } else { 0.0 };
         Reading::new(self.leaps[1].at.instant(now), Some(alone_m))

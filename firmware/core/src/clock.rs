@@ -122,7 +122,7 @@ impl Add for Span {
 
 impl Instant {
     /// The point in time that a reading of the millisecond clock means: the one within 24 days of `near`.
-    pub const fn of(at: time::Instant, near: Self) -> Self {
+    pub const fn of(at: time::BootMs, near: Self) -> Self {
         let ahead_ms = (at.as_millis() as u32).wrapping_sub(near.as_millis() as u32).cast_signed() as i64;
         let millis = near.as_millis().saturating_add_signed(ahead_ms);
         // A time within the same millisecond is that time itself.
@@ -130,20 +130,20 @@ impl Instant {
     }
 }
 
-impl From<Instant> for time::Instant {
+impl From<Instant> for time::BootMs {
     fn from(at: Instant) -> Self {
         Self::from_millis(at.as_millis())
     }
 }
 
-impl From<Span> for time::Span {
+impl From<Span> for time::Millis {
     fn from(span: Span) -> Self {
         Self::from_millis(span.as_millis())
     }
 }
 
-impl From<time::Span> for Span {
-    fn from(span: time::Span) -> Self {
+impl From<time::Millis> for Span {
+    fn from(span: time::Millis) -> Self {
         Self::from_millis(span.as_millis())
     }
 }

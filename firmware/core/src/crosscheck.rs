@@ -26,14 +26,14 @@ use crate::pairs::{Kind, Pairs, SENSORS_MAX};
 use crate::rate_tracking::{self, RateSetpoint, Thrust};
 use crate::residual::{Comparison, Residuals};
 use crate::stuck::Repeats;
-use crate::time::{FRESH, Instant, Span, Stamp};
+use crate::time::{BootMs, FRESH, Millis, Stamp};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 use crate::{ahrs2_residual, gnss_constellation};
 
 /// A sample that is not compared: it is apart from none.
 const NOT_COMPARED: [f32; 3] = [f32::NAN; 3];
 /// Between steps.
-const EVERY: Span = Span::from_millis(100);
+const EVERY: Millis = Millis::from_millis(100);
 
 state! {
     #[derive(Clone, Copy, Debug)]
@@ -57,7 +57,7 @@ state! {
 }
 
 impl Crosschecks {
-    fn take(&mut self, at: Instant, kind: Kind, instance: u8, sample: [f32; 3]) {
+    fn take(&mut self, at: BootMs, kind: Kind, instance: u8, sample: [f32; 3]) {
         let is_own = match kind {
             Kind::Accelerometer | Kind::Gyro => instance > 0 || !self.selects,
             Kind::Compass => !self.selects,
@@ -71,7 +71,7 @@ impl Crosschecks {
         }
     }
 
-    pub(crate) fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
+    pub(crate) fn observe(&mut self, at: BootMs, vehicle: &Vehicle, observation: &Observation) {
         let Self { residuals, rate_setpoint, .. } = self;
         match observation {
             Observation::Imu(imu) => self.take_imu(at, imu, vehicle),
@@ -102,7 +102,7 @@ impl Crosschecks {
         }
     }
 
-    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle) {
+    fn take_imu(&mut self, at: BootMs, imu: &Imu, vehicle: &Vehicle) {
         let force = imu.acceleration.map(|force| force.map(|axis| axis.0));
         let rate = imu.rate.map(|rate| rate.map(|axis| axis.0));
         let field = imu.field.map(|field| field.map(|axis| axis.0));
@@ -126,7 +126,7 @@ impl Crosschecks {
         }
     }
 
-    fn take_air(&mut self, at: Instant, air: &Air, vehicle: &Vehicle) {
+    fn take_air(&mut self, at: BootMs, air: &Air, vehicle: &Vehicle) {
         if let Some(pressure) = air.pressure.filter(|pressure| pressure.0 > 0.0) {
             self.take(at, Kind::Barometer, air.instance, [pressure.0, 0.0, 0.0]);
             if air.instance == 0 {
@@ -135,7 +135,7 @@ impl Crosschecks {
         }
     }
 
-    fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle) {
+    fn take_gnss(&mut self, at: BootMs, gnss: &Gnss, vehicle: &Vehicle) {
         let airborne = self.residuals.gates.are(gates::AIRBORNE);
         if airborne {
             self.repeats.take_gnss(at, gnss);
@@ -152,7 +152,7 @@ impl Crosschecks {
         }
     }
 
-    fn take_vibration(&mut self, at: Instant, vehicle: &Vehicle) {
+    fn take_vibration(&mut self, at: BootMs, vehicle: &Vehicle) {
         if let Some(level) = vehicle.vibration.get().and_then(Vibration::acceleration) {
             let lasting = level.min(core::mem::replace(&mut self.vibration, level));
             self.residuals.take(vibration_of(vehicle), at, lasting, 0.0);
@@ -166,7 +166,7 @@ impl Crosschecks {
         self.residuals.gates = gates;
     }
 
-    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+    pub(crate) fn step(&mut self, now: BootMs, vehicle: &Vehicle, flight: &Flight) {
         self.residuals.gates.step(now, vehicle, flight);
         let step = self.stepped_at.age(now);
         if !flight.airborne() || step.is_some_and(|step| step < EVERY) {
@@ -192,12 +192,12 @@ impl Crosschecks {
     }
 
     /// For how long a sensor has repeated one value in flight, s; 0 if it does not.
-    pub(crate) fn stuck(&self, now: Instant, kind: Kind, sensor: u8) -> Option<Reading> {
+    pub(crate) fn stuck(&self, now: BootMs, kind: Kind, sensor: u8) -> Option<Reading> {
         let measures = |other: usize| self.pairs[kind as usize].measures(now, other);
         self.repeats.stuck(now, kind, sensor, measures)
     }
 
-    pub(crate) fn vibration_rise(&self, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
+    pub(crate) fn vibration_rise(&self, now: BootMs, vehicle: &Vehicle) -> Option<Reading> {
         self.residuals.multiple(now, vibration_of(vehicle))
     }
 

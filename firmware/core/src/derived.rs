@@ -11,7 +11,7 @@ use crate::motors::Motors;
 use crate::observation::{Battery, Imu, Observation, Vibration};
 use crate::params::{Param, Params};
 use crate::status::RecorderStatus;
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{BootMs, Millis, Stamp};
 use crate::trend::Resistance;
 use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::{BATTERIES_MAX, RECEIVERS_MAX, Vehicle};
@@ -30,7 +30,7 @@ const SILENCE_PAUSES: f32 = 3.0;
 /// after some hundred.
 const PAUSE_MAX_S: f32 = 1.0;
 const PAUSE_FADES: f32 = 1.0 / 64.0;
-const LOSS_MEMORY: Span = Span::from_secs(10);
+const LOSS_MEMORY: Millis = Millis::from_secs(10);
 
 state! {
     /// The memory of derived quantities.
@@ -42,9 +42,9 @@ state! {
         pub(crate) crosschecks: Crosschecks,
         /// Of the last sample, and smoothed.
         load_factor: Latest<[f32; 2]>,
-        heard: Option<Instant>,
+        heard: Option<BootMs>,
         /// When it was heard again after a silence, or a plane had no throttle last.
-        resumed: Instant,
+        resumed: BootMs,
         /// The longest pause of late between two observations, s.
         pause_s: f32,
         /// Receivers that have had a 3D fix since power-on.
@@ -68,7 +68,7 @@ state! {
 }
 
 impl Lately {
-    fn take(&mut self, now: Instant, count: u64) {
+    fn take(&mut self, now: BootMs, count: u64) {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
         if count > self.count {
             self.count = count;
@@ -86,7 +86,7 @@ impl Lately {
 
 impl Derived {
     /// Anything heard: after a silence of the link, or as usual.
-    fn hear(&mut self, at: Instant) {
+    fn hear(&mut self, at: BootMs) {
         let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
         if pause_s.is_none_or(|pause_s| pause_s > SILENCE_S.max(SILENCE_PAUSES * self.pause_s)) {
             self.resumed = at;
@@ -98,7 +98,7 @@ impl Derived {
     }
 
     /// Takes an observation that the vehicle took.
-    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
+    pub fn observe(&mut self, at: BootMs, vehicle: &Vehicle, flight: &Flight, observation: &Observation) {
         self.hear(at);
         self.crosschecks.observe(at, vehicle, observation);
         match observation {
@@ -138,7 +138,7 @@ impl Derived {
         }
     }
 
-    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle) {
+    fn take_imu(&mut self, at: BootMs, imu: &Imu, vehicle: &Vehicle) {
         // What shakes so has no load factor: its samples are of the vibration, and too few to average that out.
         let shakes =
             |vibration: &Vibration| vibration.levels.iter().flatten().any(|level| *level >= SHAKES_MPS2);
@@ -163,7 +163,7 @@ impl Derived {
     /// One step, at least every 50 ms, after the flight's own.
     pub fn step(
         &mut self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         flight: &Flight,
         event: Option<FlightEvent>,
@@ -243,7 +243,7 @@ impl Derived {
     }
 
     /// Seconds since an ESC last sent speed or current, up to when the vehicle was received last; 0 until it has missed some.
-    pub(crate) fn esc_silence(&self, now: Instant, motor: u8) -> Option<Reading> {
+    pub(crate) fn esc_silence(&self, now: BootMs, motor: u8) -> Option<Reading> {
         let heard = self.heard?;
         Reading::new(Some(heard.earlier(now)), self.motors.silence_s(heard, self.resumed, motor))
     }

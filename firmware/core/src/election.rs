@@ -9,21 +9,21 @@
 //! choice stands once all had theirs. The one at the port then streams more than one that is received over a radio.
 
 use crate::observation::{Autopilot, Source};
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// Autopilots that are compared; others are not counted.
 const CANDIDATES_MAX: usize = 4;
 /// How long after the first heartbeat another system may take its place. Observations are counted in windows of this length.
-pub const SETTLES: Span = Span::from_secs(10);
+pub const SETTLES: Millis = Millis::from_secs(10);
 /// How long the vehicle must have been silent before another one is chosen.
-pub const SILENT: Span = Span::from_secs(30);
+pub const SILENT: Millis = Millis::from_secs(30);
 /// Observations in a window that make a stream: heartbeats alone, one a second, are fewer.
 const STREAM_MIN: u16 = 20;
 /// Time in which one system is asked. Its streams are awaited for 5 s before it is asked message by message, or by
 /// groups.
-const TURN: Span = Span::from_secs(15);
+const TURN: Millis = Millis::from_secs(15);
 /// No system is asked before. One that streams by then does so by itself.
-const UNASKED: Span = Span::from_secs(5);
+const UNASKED: Millis = Millis::from_secs(5);
 /// A system takes the vehicle's place if it has this many times its observations.
 const FAR_MORE: u16 = 2;
 
@@ -33,7 +33,7 @@ struct Candidate {
     autopilot: Autopilot,
     now: u16,
     before: u16,
-    heard: Instant,
+    heard: BootMs,
 }
 
 impl Candidate {
@@ -46,11 +46,11 @@ state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Election {
         candidates: [Option<Candidate>; CANDIDATES_MAX] = [None; CANDIDATES_MAX],
-        window: Instant,
+        window: BootMs,
         /// When the first heartbeat was heard, or the vehicle was chosen anew.
-        since: Option<Instant>,
+        since: Option<BootMs>,
         /// First heartbeat: turns are counted from here.
-        first: Instant,
+        first: BootMs,
         streams: bool,
         /// It did so before anybody was asked.
         by_itself: bool,
@@ -60,11 +60,11 @@ state! {
 }
 
 impl Election {
-    pub(crate) fn is_settled(&self, now: Instant) -> bool {
+    pub(crate) fn is_settled(&self, now: BootMs) -> bool {
         self.settled || (self.lasts(now) >= SETTLES && self.heard(now).count() == 1)
     }
 
-    pub(crate) fn asks(&self, now: Instant, vehicle: Source) -> Option<(Source, Autopilot)> {
+    pub(crate) fn asks(&self, now: BootMs, vehicle: Source) -> Option<(Source, Autopilot)> {
         let count = self.heard(now).count();
         let asked = if self.settled || count < 2 || self.is_decided(now) {
             self.of(vehicle)
@@ -75,24 +75,24 @@ impl Election {
         asked.map(|candidate| (candidate.source, candidate.autopilot))
     }
 
-    fn is_decided(&self, now: Instant) -> bool {
+    fn is_decided(&self, now: BootMs) -> bool {
         let turns = self.heard(now).count() as u64;
         let over = now.since(self.first).as_millis() >= turns * TURN.as_millis();
         self.by_itself || (self.streams && (turns < 2 || over))
     }
 
-    fn heard(&self, now: Instant) -> impl Iterator<Item = &Candidate> {
+    fn heard(&self, now: BootMs) -> impl Iterator<Item = &Candidate> {
         self.candidates.iter().flatten().filter(move |candidate| now.since(candidate.heard) < SILENT)
     }
 
-    pub(crate) fn lasts(&self, now: Instant) -> Span {
-        self.since.map_or(Span::ZERO, |since| now.since(since))
+    pub(crate) fn lasts(&self, now: BootMs) -> Millis {
+        self.since.map_or(Millis::ZERO, |since| now.since(since))
     }
 
     /// `heartbeat`: the autopilot, if the observation is a heartbeat.
     pub(crate) fn hear(
         &mut self,
-        at: Instant,
+        at: BootMs,
         vehicle: Option<Source>,
         source: Source,
         heartbeat: Option<Autopilot>,
@@ -121,14 +121,14 @@ impl Election {
         Some(if says >= STREAM_MIN.max(limit) { self.choose(at, source) } else { vehicle })
     }
 
-    fn choose(&mut self, at: Instant, source: Source) -> Source {
+    fn choose(&mut self, at: BootMs, source: Source) -> Source {
         self.since = Some(at);
         (self.streams, self.by_itself, self.settled) = (false, false, false);
         self.note_stream(at, self.of(source).map_or(0, Candidate::says));
         source
     }
 
-    fn note_stream(&mut self, at: Instant, says: u16) {
+    fn note_stream(&mut self, at: BootMs, says: u16) {
         if !self.streams && says >= STREAM_MIN {
             self.streams = true;
             self.by_itself = at.since(self.first) < UNASKED;
@@ -139,7 +139,7 @@ impl Election {
         self.candidates.iter().flatten().find(|candidate| candidate.source == source)
     }
 
-    fn count(&mut self, at: Instant, vehicle: Option<Source>, source: Source, heartbeat: Option<Autopilot>) {
+    fn count(&mut self, at: BootMs, vehicle: Option<Source>, source: Source, heartbeat: Option<Autopilot>) {
         if at.since(self.window) >= SETTLES {
             self.window = at;
             for candidate in self.candidates.iter_mut().flatten() {
@@ -185,7 +185,7 @@ mod tests {
             for (source, every_ms) in who {
                 if now_ms.is_multiple_of(*every_ms) {
                     let heartbeat = now_ms.is_multiple_of(1_000).then_some(Autopilot::Px4);
-                    vehicle = election.hear(Instant::from_millis(now_ms), vehicle, *source, heartbeat);
+                    vehicle = election.hear(BootMs::from_millis(now_ms), vehicle, *source, heartbeat);
                 }
             }
         }
@@ -195,19 +195,19 @@ mod tests {
     #[test]
     fn the_first_heartbeat_is_taken_at_once_and_one_that_streams_takes_its_place() {
         let mut election = Election::default();
-        let vehicle = election.hear(Instant::ZERO, None, OTHER, Some(Autopilot::Px4));
+        let vehicle = election.hear(BootMs::ZERO, None, OTHER, Some(Autopilot::Px4));
         assert_eq!(vehicle, Some(OTHER));
         // The other one's heartbeats are forwarded; ours streams.
         let vehicle = hear(&mut election, vehicle, 100..5_000, &[(OTHER, 1_000), (OURS, 100)]);
         assert_eq!(vehicle, Some(OURS));
-        assert!(!election.is_settled(Instant::from_millis(5_000)));
+        assert!(!election.is_settled(BootMs::from_millis(5_000)));
     }
 
     #[test]
     fn nothing_but_a_heartbeat_makes_a_vehicle() {
         let mut election = Election::default();
-        assert_eq!(election.hear(Instant::ZERO, None, OURS, None), None);
-        assert_eq!(election.hear(Instant::ZERO, None, OURS, Some(Autopilot::Px4)), Some(OURS));
+        assert_eq!(election.hear(BootMs::ZERO, None, OURS, None), None);
+        assert_eq!(election.hear(BootMs::ZERO, None, OURS, Some(Autopilot::Px4)), Some(OURS));
     }
 
     #[test]
@@ -241,13 +241,13 @@ mod tests {
             let mut election = Election::default();
             let vehicle = hear(&mut election, None, 0..from_ms, &[(OTHER, 1_000), (OURS, 1_000)]);
             assert_eq!(vehicle, Some(OTHER), "it was heard first");
-            assert!(!election.is_settled(Instant::from_millis(from_ms)));
+            assert!(!election.is_settled(BootMs::from_millis(from_ms)));
             let until_ms = from_ms + 3_000;
             let vehicle = hear(&mut election, vehicle, from_ms..until_ms, &[(OTHER, 1_000), (OURS, 100)]);
             assert_eq!(vehicle, Some(OURS));
             let rest = until_ms..until_ms + 60_000;
             assert_eq!(hear(&mut election, vehicle, rest, &[(OURS, 100), (OTHER, 100)]), Some(OURS));
-            assert!(election.is_settled(Instant::from_millis(until_ms + 60_000)));
+            assert!(election.is_settled(BootMs::from_millis(until_ms + 60_000)));
         }
     }
 
@@ -256,7 +256,7 @@ mod tests {
         let mut election = Election::default();
         let (mut vehicle, mut asked) = (None, [(OTHER, 0), (OURS, 0)]);
         for now_ms in (0..120_000).step_by(100) {
-            let now = Instant::from_millis(now_ms);
+            let now = BootMs::from_millis(now_ms);
             if let Some((source, _)) = vehicle.and_then(|vehicle| election.asks(now, vehicle))
                 && let Some((_, for_ms)) = asked.iter_mut().find(|(of, _)| *of == source)
             {
@@ -268,7 +268,7 @@ mod tests {
             });
             vehicle = hear(&mut election, vehicle, now_ms..now_ms + 100, &who);
         }
-        let end = Instant::from_millis(120_000);
+        let end = BootMs::from_millis(120_000);
         let asks = vehicle.and_then(|vehicle| election.asks(end, vehicle));
         (vehicle, asks.map(|(source, _)| source), election.is_settled(end))
     }
@@ -288,7 +288,7 @@ mod tests {
         let mut vehicle = None;
         for system in 10..60 {
             let source = Source { system, component: 1 };
-            vehicle = election.hear(Instant::ZERO, vehicle, source, Some(Autopilot::Px4));
+            vehicle = election.hear(BootMs::ZERO, vehicle, source, Some(Autopilot::Px4));
         }
         let vehicle = hear(&mut election, vehicle, 0..90_000, &[(OURS, 100)]);
         assert_eq!(vehicle, Some(OURS));

@@ -1,7 +1,7 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
-use crate::time::{Instant, PAUSE, SILENT, Span};
+use crate::time::{BootMs, Millis, PAUSE, SILENT};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;
 
@@ -44,7 +44,7 @@ impl ExposureQuantity {
         }
     }
 
-    fn value(self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) -> Option<f32> {
+    fn value(self, now: BootMs, vehicle: &Vehicle, current_a: Option<f32>) -> Option<f32> {
         fn hottest(temperatures: impl Iterator<Item = Option<Celsius>>) -> Option<f32> {
             temperatures.flatten().filter_map(Celsius::sane).reduce(f32::max)
         }
@@ -75,7 +75,7 @@ state! {
     /// Time in ranges.
     #[derive(Clone, Copy, Debug)]
     pub struct Exposure {
-        last: Option<Instant>,
+        last: Option<BootMs>,
         session: Tenths,
         before: Tenths,
         /// The power-on before which `before` counts.
@@ -83,17 +83,17 @@ state! {
     }
 }
 
-const EVERY: Span = Span::from_millis(100);
+const EVERY: Millis = Millis::from_millis(100);
 
 impl Exposure {
-    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, current_a: Option<f32>) {
-        let step = self.last.map_or(Span::ZERO, |last| now.since(last));
+    pub(crate) fn step(&mut self, now: BootMs, vehicle: &Vehicle, current_a: Option<f32>) {
+        let step = self.last.map_or(Millis::ZERO, |last| now.since(last));
         if self.last.is_some() && step < EVERY {
             return;
         }
         // Whole tenths are counted; the rest goes into the next step.
         let tenths = (step.as_millis() / 100) as u32;
-        let rest = Span::from_millis(step.as_millis() % 100);
+        let rest = Millis::from_millis(step.as_millis() % 100);
         self.last = Some(now - rest);
         if step > PAUSE {
             return;
@@ -177,9 +177,9 @@ mod tests {
 
     fn heat(exposure: &mut Exposure, from_ms: u64, to_ms: u64, celsius: f32) {
         let mut vehicle = Vehicle::default();
-        vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(Heartbeat::default()));
+        vehicle.observe(BootMs::ZERO, AUTOPILOT, &Observation::Heartbeat(Heartbeat::default()));
         for now_ms in (from_ms..to_ms).step_by(50) {
-            let now = Instant::from_millis(now_ms);
+            let now = BootMs::from_millis(now_ms);
             let processor = Processor { temperature: Some(Celsius(celsius)), voltage: None };
             vehicle.observe(now, AUTOPILOT, &Observation::Processor(processor));
             exposure.step(now, &vehicle, None);

@@ -17,12 +17,12 @@ use crate::health::Inputs;
 use crate::observation::{MOTORS_MAX, VehicleKind};
 use crate::params::Params;
 use crate::power_draw::drawn;
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::trend::Resistance;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Between samples.
-const EVERY: Span = Span::from_secs(1);
+const EVERY: Millis = Millis::from_secs(1);
 /// Samples from which on a mean is a figure.
 const SAMPLES_MIN: u16 = 20;
 const SAMPLES: u16 = 60;
@@ -192,7 +192,7 @@ impl Figures {
 }
 
 /// Hovering, or cruising on wings, and not leaning.
-fn is_steady(now: Instant, vehicle: &Vehicle, flight: &Flight) -> bool {
+fn is_steady(now: BootMs, vehicle: &Vehicle, flight: &Flight) -> bool {
     let wings = vehicle
         .heartbeat
         .get()

@@ -42,7 +42,7 @@ use crate::observation::VehicleKind;
 use crate::params::Params;
 use crate::pressure::Pressure;
 use crate::thrust::{Power, Thrust};
-use crate::time::{Instant, SILENT, Span, Stamp};
+use crate::time::{BootMs, Millis, SILENT, Stamp};
 use crate::units::norm;
 use crate::vehicle::Vehicle;
 use disarming::DisarmWatch;
@@ -51,7 +51,7 @@ use touchdown::Touchdown;
 use witness::{HEIGHT, THRUST, Votes, WORD, is_on_wings, on_rotors};
 
 /// In the air for so long it has left the ground.
-const SETTLED: Span = Span::from_secs(3);
+const SETTLED: Millis = Millis::from_secs(3);
 /// Steady flight is not tilted further, rad.
 const STEADY_TILT_RAD: f32 = 0.26;
 /// Speed of a climb or a descent, m/s; half of it near the ground.
@@ -59,31 +59,31 @@ const VERTICAL_MPS: f32 = 0.7;
 /// Within this height of the place of arming it takes off or lands, m.
 const NEAR_GROUND_M: f32 = 3.0;
 /// A clear majority moves the phase after so long: one wrong message at 2 Hz does not last.
-const BRIEF: Span = Span::from_millis(600);
+const BRIEF: Millis = Millis::from_millis(600);
 /// A majority against the word begins a flight after so long, as long as a landed state lasts that is not told again.
-const LONG: Span = SILENT;
+const LONG: Millis = SILENT;
 /// A majority without the word ends one after so long: a slow hover near the ground is shorter.
-const LANDS: Span = Span::from_secs(2);
+const LANDS: Millis = Millis::from_secs(2);
 /// On the ground, still armed, for so long: the flight is over, and the vehicle is known to stand. A plane rolls on from a touch-and-go within this.
-const GROUND_LASTS: Span = Span::from_secs(8);
+const GROUND_LASTS: Millis = Millis::from_secs(8);
 /// How long after disarming it is watched.
-const WATCHED: Span = Span::from_secs(10);
+const WATCHED: Millis = Millis::from_secs(10);
 /// A mishap ends this long after its last sign.
-const RECOVERED: Span = Span::from_secs(5);
+const RECOVERED: Millis = Millis::from_secs(5);
 /// A mishap without a majority is decided after so long.
-const GIVEN_UP: Span = Span::from_secs(30);
+const GIVEN_UP: Millis = Millis::from_secs(30);
 /// A vehicle that was down has taken off again after so long.
-const TAKEN_OFF: Span = Span::from_secs(4);
+const TAKEN_OFF: Millis = Millis::from_secs(4);
 /// A vehicle is still after so long.
-const STILL: Span = Span::from_secs(1);
+const STILL: Millis = Millis::from_secs(1);
 /// A still vehicle turns slower, rad/s.
 const STILL_RADPS: f32 = 0.3;
 /// A still vehicle carries about its weight, g.
 const STILL_G: core::ops::Range<f32> = 0.7..1.3;
 /// A pressure that rose no longer ago rises still.
-const RISES: Span = Span::from_millis(300);
+const RISES: Millis = Millis::from_millis(300);
 /// If a vehicle had throttle within this time before it lay over, its rotors turned it over.
-const DRIVEN: Span = Span::from_secs(5);
+const DRIVEN: Millis = Millis::from_secs(5);
 
 numbered! {
     /// A part of the flight.
@@ -144,7 +144,7 @@ struct Arming {
     is_armed: bool,
     /// Armed and not terminated.
     is_on: bool,
-    off_at: Option<Instant>,
+    off_at: Option<BootMs>,
     /// A disarmed vehicle was seen: it is at its place of arming when it is armed next.
     seen_off: bool,
     /// It was level since the arming.
@@ -155,13 +155,13 @@ struct Arming {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Beat {
-    at: Instant,
+    at: BootMs,
     height_m: Option<f32>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Felt {
-    at: Instant,
+    at: BootMs,
     load_g: Option<f32>,
     /// The part of the force that pushes from above, g.
     from_above_g: f32,
@@ -173,15 +173,15 @@ struct Felt {
 pub struct Flight {
     stage: Stage,
     /// Since when it is in the air; kept in a mishap.
-    airborne_since: Option<Instant>,
+    airborne_since: Option<BootMs>,
     /// A flight is open, and when the vehicle was in the air last.
-    flew_at: Option<Instant>,
-    changing_since: Option<Instant>,
+    flew_at: Option<BootMs>,
+    changing_since: Option<BootMs>,
     /// The vehicle was seen on the ground: a take-off follows.
     seen_on_ground: bool,
     arming: Arming,
     beat: Beat,
-    heard_at: Instant,
+    heard_at: BootMs,
     pub(crate) pressure: Pressure,
     pub(crate) thrust: Thrust,
     pub(crate) motion: Kinematics,
@@ -194,13 +194,13 @@ pub struct Flight {
     still_since: Stamp,
     flies_since: Stamp,
     /// Since when it is carried without rotors, and the pressure then, hPa.
-    supported: Option<(Instant, f32)>,
-    hit_at: Instant,
+    supported: Option<(BootMs, f32)>,
+    hit_at: BootMs,
     touchdown: Touchdown,
     /// The hardest touch of this flight, or of its mishap, m/s.
     touch_mps: f32,
     /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
-    tilted_at: Option<Instant>,
+    tilted_at: Option<BootMs>,
     /// The position at which a mishap began, or ended.
     place: Place,
 }
@@ -212,11 +212,11 @@ impl Flight {
     }
 
     /// In the air for a moment, not just leaving the ground.
-    pub(crate) fn is_settled(&self, now: Instant) -> bool {
+    pub(crate) fn is_settled(&self, now: BootMs) -> bool {
         self.airborne_since.is_some_and(|since| now.since(since) > SETTLED)
     }
 
-    pub(crate) fn is_steady(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    pub(crate) fn is_steady(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         self.is_settled(now)
             && vehicle.attitude.get().is_none_or(|attitude| {
                 attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
@@ -224,7 +224,7 @@ impl Flight {
     }
 
     /// When it left the ground last, while it is in the air.
-    pub const fn airborne_since(&self) -> Option<Instant> {
+    pub const fn airborne_since(&self) -> Option<BootMs> {
         self.airborne_since
     }
 
@@ -248,7 +248,7 @@ impl Flight {
     }
 
     /// Whether it stands without thrust.
-    pub(crate) fn is_at_rest(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    pub(crate) fn is_at_rest(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let off = throttle(now, vehicle).map_or(!vehicle.armed(), |throttle| throttle < OFF);
         !self.is_open() && !self.in_mishap() && off && vehicle.heartbeat.get().is_some()
     }
@@ -266,14 +266,14 @@ impl Flight {
         self.stage == Stage::Down
     }
 
-    pub(crate) fn has_tilted(&self, now: Instant) -> bool {
+    pub(crate) fn has_tilted(&self, now: BootMs) -> bool {
         self.tilted_at.is_some_and(|at| now.since(at) <= RECOVERED)
     }
 
     /// One step, at least every 50 ms: changes of a mishap and of the flight.
     pub fn step(
         &mut self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         params: &Params,
     ) -> (Option<MishapChange>, Option<FlightEvent>) {
@@ -303,7 +303,7 @@ impl Flight {
     }
 
     /// In the air a descent may break off; on the ground the last descent was the touch.
-    fn note_touch(&mut self, now: Instant, vehicle: &Vehicle) {
+    fn note_touch(&mut self, now: BootMs, vehicle: &Vehicle) {
         let height_m = height_m(now, vehicle);
         if !self.airborne() {
             let touch_mps = self.touchdown.take(now, height_m);
@@ -313,7 +313,7 @@ impl Flight {
         }
     }
 
-    fn note_power(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+    fn note_power(&mut self, now: BootMs, vehicle: &Vehicle, params: &Params) {
         let Some(heartbeat) = vehicle.heartbeat.get() else { return };
         let armed = heartbeat.armed;
         if armed != self.arming.is_armed {
@@ -357,7 +357,7 @@ impl Flight {
     }
 
     /// Since when it has been still. The sensors are believed, and not the estimate, of a vehicle that is off, lies on its back, or was hit.
-    fn note_still(&mut self, now: Instant, vehicle: &Vehicle) {
+    fn note_still(&mut self, now: BootMs, vehicle: &Vehicle) {
         let ground_mps = ground_speed_mps(now, vehicle).unwrap_or(0.0);
         let speed_mps = ground_mps.max(climb_mps(now, vehicle).map_or(0.0, f32::abs));
         let was_hit = self.signs.worst[MishapKind::Impact as usize] > 0.0 || self.was_dropped();
@@ -378,13 +378,13 @@ impl Flight {
         self.felt.rate_radps < STILL_RADPS
     }
 
-    fn is_still(&self, now: Instant) -> bool {
+    fn is_still(&self, now: BootMs) -> bool {
         self.still_since.age(now).is_some_and(|age| age >= STILL)
     }
 
     fn judge_sign(
         &mut self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         kind: MishapKind,
         params: &Params,
@@ -416,7 +416,7 @@ impl Flight {
         Some(MishapChange::Began(kind))
     }
 
-    fn judge_mishap(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<MishapChange> {
+    fn judge_mishap(&mut self, now: BootMs, vehicle: &Vehicle, votes: Votes) -> Option<MishapChange> {
         let passed = now.since(self.signs.seen_at);
         let (is_long, is_given_up) = (passed >= RECOVERED, passed >= GIVEN_UP);
         let (flies, stands) = votes.count();
@@ -436,7 +436,7 @@ impl Flight {
     }
 
     /// Whether it has taken off again.
-    fn judge_wreck(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<MishapChange> {
+    fn judge_wreck(&mut self, now: BootMs, vehicle: &Vehicle, votes: Votes) -> Option<MishapChange> {
         let is_flying =
             self.arming.is_on && self.takes_off(now, vehicle, votes).is_some() && votes.count().0 >= 2;
         self.flies_since.run(is_flying, now, TAKEN_OFF).then(|| {
@@ -459,7 +459,7 @@ impl Flight {
         self.place = Place::default();
     }
 
-    fn hold(&mut self, now: Instant) -> Option<FlightEvent> {
+    fn hold(&mut self, now: BootMs) -> Option<FlightEvent> {
         self.changing_since = None;
         self.flew_at = self.flew_at.map(|_| now);
         None
@@ -472,7 +472,7 @@ impl Flight {
         is_open.then_some(FlightEvent::Landing)
     }
 
-    fn advance(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<FlightEvent> {
+    fn advance(&mut self, now: BootMs, vehicle: &Vehicle, votes: Votes) -> Option<FlightEvent> {
         if self.airborne() && !self.arming.is_armed {
             (self.airborne_since, self.changing_since) = (None, None);
         }
@@ -488,7 +488,7 @@ impl Flight {
                 if now.since(since) >= debounce {
                     self.changing_since = None;
                     // Both changes have the time at which their majority began. A landing is later if the autopilot's word was flight until now.
-                    let flew_by_word = debounce == Span::ZERO || votes.flies & WORD != 0;
+                    let flew_by_word = debounce == Millis::ZERO || votes.flies & WORD != 0;
                     let since = if self.airborne() && flew_by_word { now } else { since };
                     self.flew_at = self.flew_at.map(|_| since);
                     self.airborne_since = (!self.airborne()).then_some(since);
@@ -517,7 +517,7 @@ impl Flight {
     }
 
     /// For how long the witnesses must say so until it is in the air; `None` if they do not.
-    fn takes_off(&self, now: Instant, vehicle: &Vehicle, votes: Votes) -> Option<Span> {
+    fn takes_off(&self, now: BootMs, vehicle: &Vehicle, votes: Votes) -> Option<Millis> {
         let has_no_thrust = votes.stands & THRUST != 0
             && !is_on_wings(now, vehicle)
             && self.power(now, vehicle) != Some(Power::Full);
@@ -539,10 +539,10 @@ impl Flight {
     }
 
     /// For how long the witnesses must say so until it is on the ground; `None` if they do not.
-    fn lands(votes: Votes) -> Option<Span> {
+    fn lands(votes: Votes) -> Option<Millis> {
         let (flies, stands) = votes.count();
         if stands >= 2 && stands >= flies + 2 && votes.stands & WORD != 0 {
-            Some(Span::ZERO)
+            Some(Millis::ZERO)
         } else {
             let is_alone = stands == 1 && votes.stands == votes.known;
             ((stands >= 2 && stands > flies) || is_alone).then_some(LANDS)
@@ -550,7 +550,7 @@ impl Flight {
     }
 
     /// The part of the flight now.
-    pub fn phase(&self, now: Instant, vehicle: &Vehicle) -> Phase {
+    pub fn phase(&self, now: BootMs, vehicle: &Vehicle) -> Phase {
         if !self.airborne() {
             // The step that ends in a landing belongs to it.
             return if self.flew_at == Some(now) { Phase::Landing } else { Phase::Ground };
@@ -574,7 +574,7 @@ impl Flight {
     }
 
     /// A check's reading: the worst of this mishap, 0 while there is none; `None` if the vehicle does not tell enough to see it.
-    pub(crate) fn reading(&self, kind: MishapKind, now: Instant, vehicle: &Vehicle) -> Option<Reading> {
+    pub(crate) fn reading(&self, kind: MishapKind, now: BootMs, vehicle: &Vehicle) -> Option<Reading> {
         let value = self.signs.worst[kind as usize];
         if value > 0.0 {
             return Some(Reading { at: now, value });
@@ -604,12 +604,12 @@ impl Flight {
     }
 
     /// When the first shock of the latest impact was.
-    pub const fn hit_at(&self) -> Instant {
+    pub const fn hit_at(&self) -> BootMs {
         self.hit_at
     }
 
     /// When it first hit something in this mishap; `None` where it did not.
-    pub fn struck_at(&self) -> Option<Instant> {
+    pub fn struck_at(&self) -> Option<BootMs> {
         (self.signs.worst[MishapKind::Impact as usize] > 0.0).then_some(self.hit_at)
     }
 
@@ -623,7 +623,7 @@ impl Flight {
     }
 }
 
-fn measured<T>(latest: &Latest<T>, has_values: impl Fn(&T) -> bool) -> Option<Instant> {
+fn measured<T>(latest: &Latest<T>, has_values: impl Fn(&T) -> bool) -> Option<BootMs> {
     latest.at().filter(|_| latest.get().is_some_and(has_values))
 }
 

@@ -3,7 +3,7 @@
 use crate::flight::Flight;
 use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
-use crate::time::{FRESH, Instant, PAUSE, SILENT, Span, Stamp};
+use crate::time::{BootMs, FRESH, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::Vehicle;
 
 /// In the air.
@@ -27,8 +27,8 @@ pub(crate) const ONE_CONTROL: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
 
-pub(crate) const TURNED: Span = Span::from_secs(1);
-const EXACT_FOR: Span = Span::from_secs(15);
+pub(crate) const TURNED: Millis = Millis::from_secs(1);
+const EXACT_FOR: Millis = Millis::from_secs(15);
 pub(crate) const LEVEL_MPS: f32 = 2.0;
 /// 34 degrees: a bank in which all the thrust may not carry a multicopter.
 pub(crate) const LEANS_RAD: f32 = 0.6;
@@ -53,7 +53,7 @@ impl Gates {
     }
 
     /// One step.
-    pub(crate) fn step(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight) {
+    pub(crate) fn step(&mut self, now: BootMs, vehicle: &Vehicle, flight: &Flight) {
         let receiver = &vehicle.gnss[0];
         let exact = receiver.within(now, PAUSE).is_some_and(Gnss::is_exact);
         if !exact && receiver.get().is_some() {
@@ -80,13 +80,13 @@ impl Gates {
     }
 }
 
-fn is_level(now: Instant, vehicle: &Vehicle) -> bool {
+fn is_level(now: BootMs, vehicle: &Vehicle) -> bool {
     let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
     let leans = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LEANS_RAD;
     !climbs && !vehicle.attitude.get().is_some_and(leans)
 }
 
-fn is_clear(now: Instant, vehicle: &Vehicle) -> bool {
+fn is_clear(now: BootMs, vehicle: &Vehicle) -> bool {
     let landed = vehicle.landed.within(now, SILENT);
     !matches!(landed, Some(LandedState::TakingOff | LandedState::Landing | LandedState::OnGround))
         && vehicle

@@ -7,12 +7,12 @@
 use crate::latest::Reading;
 use crate::observation::Gnss;
 use crate::residual::{Comparison, Residuals};
-use crate::time::Instant;
+use crate::time::BootMs;
 
 /// The best geometry that counts. Receivers of several systems report less, and then a small change is a large part.
 const HDOP_IDEAL: f32 = 1.0;
 
-pub(crate) fn take(residuals: &mut Residuals, at: Instant, gnss: &Gnss) {
+pub(crate) fn take(residuals: &mut Residuals, at: BootMs, gnss: &Gnss) {
     let fewer = gnss.satellites.filter(|count| *count > 0).map(|count| -libm::logf(count.into()));
     let hdop = gnss.hdop.filter(|hdop| hdop.is_finite()).map(|hdop| libm::logf(hdop.max(HDOP_IDEAL)));
     for (figure, of) in [(fewer, Comparison::SATELLITES), (hdop, Comparison::HDOP)] {
@@ -23,13 +23,13 @@ pub(crate) fn take(residuals: &mut Residuals, at: Instant, gnss: &Gnss) {
 }
 
 /// The lost part of a receiver's usual satellites, percent.
-pub(crate) fn satellites_lost(residuals: &Residuals, now: Instant, receiver: u8) -> Option<Reading> {
+pub(crate) fn satellites_lost(residuals: &Residuals, now: BootMs, receiver: u8) -> Option<Reading> {
     let reading = residuals.reading(now, *Comparison::SATELLITES.get(usize::from(receiver))?)?;
     Some(Reading { value: (1.0 - libm::expf(-reading.value)) * 100.0, ..reading })
 }
 
 /// A receiver's dilution of precision as a multiple of the usual one, 1 at least.
-pub(crate) fn hdop_rise(residuals: &Residuals, now: Instant, receiver: u8) -> Option<Reading> {
+pub(crate) fn hdop_rise(residuals: &Residuals, now: BootMs, receiver: u8) -> Option<Reading> {
     let reading = residuals.reading(now, *Comparison::HDOP.get(usize::from(receiver))?)?;
     Some(Reading { value: libm::expf(reading.value), ..reading })
 }
@@ -40,11 +40,11 @@ mod tests {
     use crate::gates::{self, Gates};
 
     fn told(said: impl Iterator<Item = (usize, u8, f32)>) -> (Option<f32>, Option<f32>) {
-        let (mut residuals, mut now) = (Residuals::default(), Instant::ZERO);
+        let (mut residuals, mut now) = (Residuals::default(), BootMs::ZERO);
         residuals.gates = Gates::open(gates::AIRBORNE);
         for (seconds, satellites, hdop) in said {
             for _ in 0..5 * seconds {
-                now = now + crate::time::Span::from_millis(200);
+                now = now + crate::time::Millis::from_millis(200);
                 let fix = if satellites > 0 { 3 } else { 0 };
                 let gnss = Gnss { fix, satellites: Some(satellites), hdop: Some(hdop), ..Gnss::default() };
                 take(&mut residuals, now, &gnss);

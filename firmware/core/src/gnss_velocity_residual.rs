@@ -13,7 +13,7 @@ use core::num::NonZeroU32;
 use crate::latest::Reading;
 use crate::observation::Gnss;
 use crate::residual::{LATE_S, RECEIVER_S, smooth};
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::units::{Metres, Position};
 
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
@@ -42,7 +42,7 @@ state! {
 }
 
 impl GnssVelocity {
-    pub(crate) fn take(&mut self, at: Instant, gnss: &Gnss, airborne: bool) {
+    pub(crate) fn take(&mut self, at: BootMs, gnss: &Gnss, airborne: bool) {
         let Some(fix) = fix(gnss).filter(|_| airborne) else {
             *self = Self::default();
             return;
@@ -53,7 +53,7 @@ impl GnssVelocity {
             return;
         };
         let step_ms = fix.measured_ms.get().wrapping_sub(before.measured_ms.get());
-        let step = Span::from_millis(step_ms.into());
+        let step = Millis::from_millis(step_ms.into());
         let is_same = fix.place == before.place;
         if is_same && step <= PAUSE {
             self.before = Some(before);
@@ -77,7 +77,7 @@ impl GnssVelocity {
         (self.known_s, self.at) = (self.known_s + step_s, Stamp::at(at));
     }
 
-    pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
+    pub(crate) fn residual(&self, now: BootMs) -> Option<Reading> {
         let velocity = self.before?.velocity;
         let changed_mps = length([0, 1].map(|axis| velocity[axis] - self.mean[axis]));
         let off_mps = (length(self.off) - LATE_S / RECEIVER_S * changed_mps).max(0.0);
@@ -110,7 +110,7 @@ mod tests {
         let mut velocity_residual = GnssVelocity::default();
         let mut place = [47.0, 8.0];
         for step in 0_u64..100 {
-            let now = Instant::from_millis(step * 200);
+            let now = BootMs::from_millis(step * 200);
             let course = step as f32 * 0.2 / turn_s * core::f32::consts::TAU;
             let velocity = [speed_mps * course.cos(), speed_mps * course.sin()];
             let [north, east] = [0, 1].map(|axis| velocity[axis] + error_mps[axis]);
@@ -128,7 +128,7 @@ mod tests {
             place[0] += f64::from(velocity[0]) * 0.2 / 111_320.0;
             place[1] += f64::from(velocity[1]) * 0.2 / (111_320.0 * 47.0_f64.to_radians().cos());
         }
-        velocity_residual.residual(Instant::from_millis(20_000)).map(|reading| reading.value)
+        velocity_residual.residual(BootMs::from_millis(20_000)).map(|reading| reading.value)
     }
 
     const STRAIGHT_S: f32 = 1e6;

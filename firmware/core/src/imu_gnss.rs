@@ -21,12 +21,12 @@ use crate::motion::climb_within;
 use crate::observation::Gnss;
 use crate::residual::{AT_ONCE, smooth};
 use crate::rotation::to_earth;
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::Vehicle;
 
 /// Maximum age of a climb.
-const CLIMB_AGE: Span = Span::from_millis(500);
+const CLIMB_AGE: Millis = Millis::from_millis(500);
 /// Time constant, s.
 const SMOOTHING_S: f32 = 1.0;
 /// Maximum delay of a receiver against the forces, s.
@@ -73,7 +73,7 @@ impl ImuGnssResidual {
         }
     }
 
-    pub(crate) fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
+    pub(crate) fn step(&mut self, now: BootMs, step_s: f32, vehicle: &Vehicle) {
         if self.count > 0 {
             self.mean = core::mem::take(&mut self.sum).map(|sum| sum / f32::from(self.count));
             (self.count, self.mean_at) = (0, Stamp::at(now));
@@ -93,7 +93,7 @@ impl ImuGnssResidual {
         }
     }
 
-    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss, vehicle: &Vehicle, gates: Gates) {
+    pub(crate) fn take_gnss(&mut self, at: BootMs, gnss: &Gnss, vehicle: &Vehicle, gates: Gates) {
         let on_rotors = gates.are(gates::ROTORS);
         let judged = gnss.is_exact() && gates.are(gates::SETTLED | gates::CLEAR | gates::ONE_FRAME);
         let climb_mps = if on_rotors { climb_within(at, vehicle, CLIMB_AGE) } else { Some(0.0) };
@@ -103,7 +103,7 @@ impl ImuGnssResidual {
             return;
         };
         let velocity = [speed.0 * libm::cosf(course.0), speed.0 * libm::sinf(course.0), -climb_mps];
-        let step = self.at.age(at).filter(|step| *step > Span::ZERO && *step <= PAUSE);
+        let step = self.at.age(at).filter(|step| *step > Millis::ZERO && *step <= PAUSE);
         self.at = Stamp::at(at);
         let missing = self.take_velocity(step, velocity, if on_rotors { 3 } else { 2 });
         let shaken = SHAKE_PART * vehicle.inertial.shakes_mps2();
@@ -117,10 +117,10 @@ impl ImuGnssResidual {
 
     /// Takes a velocity, with the time since the one before if the two are compared. Returns the missing force in the
     /// first `axes` of north, east, down, m/s2.
-    fn take_velocity(&mut self, step: Option<Span>, velocity: [f32; 3], axes: usize) -> Option<f32> {
+    fn take_velocity(&mut self, step: Option<Millis>, velocity: [f32; 3], axes: usize) -> Option<f32> {
         let before = core::mem::replace(&mut self.velocity, velocity);
         let delta_v = core::mem::take(&mut self.delta_v);
-        let Some(step_s) = step.map(Span::as_secs_f32) else {
+        let Some(step_s) = step.map(Millis::as_secs_f32) else {
             // The start of the earlier sum is unknown.
             (self.force_before, self.force, self.missing) = (None, [0.0; 3], [0.0; 3]);
             return None;
@@ -150,7 +150,7 @@ impl ImuGnssResidual {
         Some(norm([level, down, 0.0]) - LATE_S * norm(changes))
     }
 
-    pub(crate) fn residual(&self, now: Instant) -> Option<Reading> {
+    pub(crate) fn residual(&self, now: BootMs) -> Option<Reading> {
         Reading::new(self.at.instant(now), self.residual)
     }
 }
@@ -172,7 +172,7 @@ mod tests {
             let time_s = f32::from(step) * STEP_S;
             residual.delta_v[0] += velocity(time_s) - velocity(time_s - STEP_S) + untrue_mps2 * STEP_S;
             let told = velocity(time_s - STEP_S / 2.0 - late_s);
-            residual.take_velocity((step > 0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3)
+            residual.take_velocity((step > 0).then_some(Millis::from_millis(200)), [told, 0.0, 0.0], 3)
         });
         missing.fold(0.0, f32::max)
     }
@@ -186,8 +186,11 @@ mod tests {
             // It brakes and turns back at 2.5 m/s2; the force is turned by 40 degrees.
             let told = velocity * f32::from(step as u8);
             residual.delta_v = [velocity * 0.766, velocity * 0.643, 0.0];
-            let missing =
-                residual.take_velocity((time_s > 0.0).then_some(Span::from_millis(200)), [told, 0.0, 0.0], 3);
+            let missing = residual.take_velocity(
+                (time_s > 0.0).then_some(Millis::from_millis(200)),
+                [told, 0.0, 0.0],
+                3,
+            );
             most = most.max(missing.unwrap_or(0.0));
         }
         assert!(most < 0.6, "{most}");
@@ -202,7 +205,7 @@ mod tests {
                 let step_s = [0.2, 0.4, 0.2][step % 3];
                 residual.delta_v = [(5.0 + untrue_mps2) * step_s, 0.0, 0.0];
                 let told = residual.velocity[0] + 5.0 * step_s;
-                let step = (step > 0).then_some(Span::from_millis((step_s * 1_000.0) as u64));
+                let step = (step > 0).then_some(Millis::from_millis((step_s * 1_000.0) as u64));
                 residual.take_velocity(step, [told, 0.0, 0.0], 3)
             });
             missing.skip(30).flatten().collect::<Vec<_>>()
@@ -232,7 +235,7 @@ mod tests {
         let mut residual =
             ImuGnssResidual { delta_v: [30.0; 3], missing: [5.0; 3], ..ImuGnssResidual::default() };
         let mut take = |step| residual.take_velocity(step, [3.0, 0.0, 0.0], 3);
-        let step = Some(Span::from_millis(200));
+        let step = Some(Millis::from_millis(200));
         assert_eq!([take(None), take(step), take(step)], [None, None, Some(0.0)]);
     }
 

@@ -17,12 +17,12 @@
 
 use crate::motion::TILTED_RAD;
 use crate::observation::Imu;
-use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, FRESH, Millis, PAUSE, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
 
 /// Time constant of the force, of 0.53 Hz: a shock counts for little, a lasting turn fully.
 const SMOOTHING_S: f32 = 0.3;
-const LASTS: Span = Span::from_millis(1_500);
+const LASTS: Millis = Millis::from_millis(1_500);
 /// A fast turn is above 0.7 rad/s (40 degrees a second). A still vehicle turns slower than 0.5 rad/s (29 degrees a second) on the average: more
 /// than the offset of a gyro that still flies.
 const TURNS_RATE: f32 = 0.7;
@@ -33,7 +33,7 @@ const STEADY_RATE: f32 = 0.15;
 const OFFSET_RATE: f32 = 1.2;
 /// An attitude that was contradicted is believed again within 20 degrees.
 const AGREES_RAD: f32 = 0.35;
-const TILTED: Span = Span::from_millis(500);
+const TILTED: Millis = Millis::from_millis(500);
 /// Load factor at rest, with the scale error and the offset of a sensor.
 const REST_G: core::ops::Range<f32> = 0.75..1.25;
 /// The cosines of 30 degrees, within which a vehicle is level, and of 60, beyond which it lies over.
@@ -42,7 +42,7 @@ const OVER: f32 = 0.5;
 /// Time constant of the steps from sample to sample.
 const SHAKES_S: f32 = 0.5;
 /// The steps are known this long after the first sample.
-const STEPS_KNOWN: Span = Span::from_secs(2);
+const STEPS_KNOWN: Millis = Millis::from_secs(2);
 /// Carrying motors make the steps larger than at rest by this factor, and by this many m/s2, the change of a sensor's
 /// noise.
 const SHAKES: f32 = 2.5;
@@ -51,7 +51,7 @@ const SHAKES_MPS2: f32 = 0.01;
 /// logs), the most of standing boards 0.09 (95 % of 6 logs, without handling). Simulators have no noise.
 const CALM_MPS2: f32 = 0.1;
 /// Time that it must lie over.
-pub(crate) const LIES: Span = Span::from_millis(700);
+pub(crate) const LIES: Millis = Millis::from_millis(700);
 
 state! {
     /// The state of accelerometer and gyros.
@@ -62,10 +62,10 @@ state! {
         /// The last sample along the body's downward axis, and its smoothed step from sample to sample; m/s2.
         down: f32,
         step: f32,
-        steps_since: Instant,
+        steps_since: BootMs,
         /// The least step at rest; 0 if unknown.
         step_at_rest: f32,
-        at: Option<Instant>,
+        at: Option<BootMs>,
         rate: [f32; 3],
         rates_at: Stamp,
         still: bool,
@@ -83,7 +83,7 @@ state! {
 }
 
 impl Inertial {
-    pub(crate) fn take(&mut self, at: Instant, imu: &Imu) {
+    pub(crate) fn take(&mut self, at: BootMs, imu: &Imu) {
         self.take_rates(at, imu.rate);
         if let Some(rates) = imu.rate {
             let weight = weight(self.rates_at.age(at), SMOOTHING_S);
@@ -105,7 +105,7 @@ impl Inertial {
         }
     }
 
-    pub(crate) fn take_rates(&mut self, at: Instant, rates: Option<[RadiansPerSecond; 3]>) {
+    pub(crate) fn take_rates(&mut self, at: BootMs, rates: Option<[RadiansPerSecond; 3]>) {
         // No root: this is done with each inertial sample.
         let square = |rates: [RadiansPerSecond; 3]| rates.iter().map(|rate| rate.0 * rate.0).sum::<f32>();
         if rates.is_some_and(|rates| square(rates) > TURNS_RATE * TURNS_RATE) {
@@ -113,7 +113,7 @@ impl Inertial {
         }
     }
 
-    fn take_force(&mut self, at: Instant, force: [f32; 3]) {
+    fn take_force(&mut self, at: BootMs, force: [f32; 3]) {
         let step_s = self.at.map_or(f32::INFINITY, |before| at.since(before).as_secs_f32());
         let [x, y, z] = force;
         let is_measured = x * x + y * y + z * z <= MetresPerSecond2::MAX * MetresPerSecond2::MAX;
@@ -136,12 +136,12 @@ impl Inertial {
         if step_s >= PAUSE.as_secs_f32() {
             (self.rests_since, self.level_since, self.over_since) = (Stamp::NONE, Stamp::NONE, Stamp::NONE);
         }
-        self.rests_since.run(rests && self.still, at, Span::ZERO);
-        self.level_since.run(level, at, Span::ZERO);
-        self.over_since.run(over, at, Span::ZERO);
+        self.rests_since.run(rests && self.still, at, Millis::ZERO);
+        self.level_since.run(level, at, Millis::ZERO);
+        self.over_since.run(over, at, Millis::ZERO);
     }
 
-    fn take_step(&mut self, at: Instant, step_s: f32, down: f32) {
+    fn take_step(&mut self, at: BootMs, step_s: f32, down: f32) {
         let step = libm::fabsf(down - core::mem::replace(&mut self.down, down));
         if step_s < 1.0 && step.is_finite() {
             self.step += step_s / (SHAKES_S + step_s) * (step - self.step);
@@ -150,24 +150,24 @@ impl Inertial {
         }
     }
 
-    fn has_steps(&self, now: Instant) -> bool {
+    fn has_steps(&self, now: BootMs) -> bool {
         self.at.is_some_and(|at| now.since(at) <= FRESH && at.since(self.steps_since) >= STEPS_KNOWN)
     }
 
-    pub(crate) fn rest(&mut self, now: Instant) {
+    pub(crate) fn rest(&mut self, now: BootMs) {
         if self.has_steps(now) && (self.step_at_rest == 0.0 || self.step < self.step_at_rest) {
             self.step_at_rest = self.step;
         }
     }
 
     /// Whether it shakes more than it did at rest; `None` if one of the two is unknown.
-    pub(crate) fn shakes(&self, now: Instant) -> Option<bool> {
+    pub(crate) fn shakes(&self, now: BootMs) -> Option<bool> {
         let known = self.has_steps(now) && self.step_at_rest > 0.0;
         known.then_some(self.step > SHAKES * self.step_at_rest + SHAKES_MPS2)
     }
 
     /// Whether it shakes less than on carrying rotors. Simulators have no noise: they are calm too.
-    pub(crate) fn is_calm(&self, now: Instant) -> bool {
+    pub(crate) fn is_calm(&self, now: BootMs) -> bool {
         self.has_steps(now) && self.step < CALM_MPS2
     }
 
@@ -179,26 +179,26 @@ impl Inertial {
         self.step
     }
 
-    fn is_fresh(&self, now: Instant) -> bool {
+    fn is_fresh(&self, now: BootMs) -> bool {
         self.at.is_some_and(|at| now.since(at) <= FRESH)
             && self.rates_at.age(now).is_some_and(|age| age <= FRESH)
     }
 
-    pub(crate) fn turns_little(&self, now: Instant, span: Span) -> bool {
+    pub(crate) fn turns_little(&self, now: BootMs, span: Millis) -> bool {
         self.turned_at.age(now).is_none_or(|age| age > span)
     }
 
     /// Whether it has been level and still for a while, by the sensors alone.
-    pub fn is_level(&self, now: Instant) -> bool {
+    pub fn is_level(&self, now: BootMs) -> bool {
         self.is_level_for(now, LASTS)
     }
 
-    pub(crate) fn is_level_for(&self, now: Instant, span: Span) -> bool {
+    pub(crate) fn is_level_for(&self, now: BootMs, span: Millis) -> bool {
         self.is_fresh(now) && self.level_since.age(now).is_some_and(|age| age >= span)
     }
 
     /// The estimator's attitude.
-    pub(crate) fn take_attitude(&mut self, at: Instant, roll: Radians, pitch: Radians) {
+    pub(crate) fn take_attitude(&mut self, at: BootMs, roll: Radians, pitch: Radians) {
         let tilt = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
         let tilted = self.tilted_since.run(tilt > TILTED_RAD, at, TILTED);
         let rests = self.is_fresh(at) && self.rests_since.age(at).is_some_and(|age| age >= LASTS);
@@ -219,20 +219,20 @@ impl Inertial {
     }
 
     /// Whether the sensors contradict the estimator's attitude.
-    pub fn contradicts(&self, now: Instant) -> bool {
+    pub fn contradicts(&self, now: BootMs) -> bool {
         self.contradicts && self.is_fresh(now)
     }
 
     /// The angle from upright in radians, once it has lain over for a moment, by the direction of the force.
-    pub fn lies_over(&self, now: Instant) -> Option<f32> {
+    pub fn lies_over(&self, now: BootMs) -> Option<f32> {
         let lasts = self.over_since.age(now).is_some_and(|age| age >= LIES) && self.is_fresh(now);
         let [x, y, z] = self.force;
         lasts.then(|| libm::atan2f(libm::sqrtf(x * x + y * y), -z))
     }
 }
 
-fn weight(step: Option<Span>, constant_s: f32) -> f32 {
-    let step_s = step.map_or(f32::INFINITY, Span::as_secs_f32);
+fn weight(step: Option<Millis>, constant_s: f32) -> f32 {
+    let step_s = step.map_or(f32::INFINITY, Millis::as_secs_f32);
     if step_s < 1.0 { step_s / (constant_s + step_s) } else { 1.0 }
 }
 
@@ -244,11 +244,11 @@ mod tests {
     /// `roll_deg`, and then a level one.
     fn contradicts(force: [f32; 3], roll_deg: f32) -> (bool, bool) {
         let mut inertial = Inertial::default();
-        let mut now = Instant::ZERO;
+        let mut now = BootMs::ZERO;
         let mut said = [false; 2];
         for (roll_deg, said) in [roll_deg, 0.0].into_iter().zip(&mut said) {
             for _ in 0..30 {
-                now = now + Span::from_millis(100);
+                now = now + Millis::from_millis(100);
                 let imu = Imu {
                     acceleration: Some(force.map(MetresPerSecond2)),
                     rate: Some([0.01; 3].map(RadiansPerSecond)),

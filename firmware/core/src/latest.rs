@@ -1,11 +1,11 @@
 //! The latest value of a quantity, with its time.
 
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// The latest value, or nothing yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latest<T> {
-    slot: Option<(Instant, T)>,
+    slot: Option<(BootMs, T)>,
 }
 
 impl<T> Default for Latest<T> {
@@ -16,7 +16,7 @@ impl<T> Default for Latest<T> {
 
 impl<T> Latest<T> {
     /// Replaces the value.
-    pub fn set(&mut self, at: Instant, value: T) {
+    pub fn set(&mut self, at: BootMs, value: T) {
         self.slot = Some((at, value));
     }
 
@@ -29,7 +29,7 @@ impl<T> Latest<T> {
     }
 
     /// When it was set.
-    pub const fn at(&self) -> Option<Instant> {
+    pub const fn at(&self) -> Option<BootMs> {
         match &self.slot {
             Some((at, _)) => Some(*at),
             None => None,
@@ -37,7 +37,7 @@ impl<T> Latest<T> {
     }
 
     /// The value, if it is younger than `limit`.
-    pub fn within(&self, now: Instant, limit: Span) -> Option<&T> {
+    pub fn within(&self, now: BootMs, limit: Millis) -> Option<&T> {
         self.slot.as_ref().filter(|(at, _)| now.since(*at) <= limit).map(|(_, value)| value)
     }
 
@@ -52,14 +52,14 @@ impl<T> Latest<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// When it was measured.
-    pub at: Instant,
+    pub at: BootMs,
     /// In the unit of the caller. NaN counts as not measured.
     pub value: f32,
 }
 
 impl Reading {
     /// A value that was measured at `at`; `None` if either is missing.
-    pub fn new(at: Option<Instant>, value: Option<f32>) -> Option<Self> {
+    pub fn new(at: Option<BootMs>, value: Option<f32>) -> Option<Self> {
         Some(Self { at: at?, value: value? })
     }
 }
@@ -71,10 +71,10 @@ mod tests {
     #[test]
     fn a_value_ages() {
         let mut latest = Latest::default();
-        assert_eq!(latest.within(Instant::ZERO, Span::from_secs(9)), None);
-        latest.set(Instant::from_millis(100), 7);
-        assert_eq!(latest.within(Instant::from_millis(600), Span::from_millis(500)), Some(&7));
-        assert_eq!(latest.within(Instant::from_millis(601), Span::from_millis(500)), None);
+        assert_eq!(latest.within(BootMs::ZERO, Millis::from_secs(9)), None);
+        latest.set(BootMs::from_millis(100), 7);
+        assert_eq!(latest.within(BootMs::from_millis(600), Millis::from_millis(500)), Some(&7));
+        assert_eq!(latest.within(BootMs::from_millis(601), Millis::from_millis(500)), None);
         assert_eq!(latest.get(), Some(&7));
     }
 }

@@ -7,18 +7,18 @@ use crate::gates;
 use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale};
 use crate::residual::{AT_ONCE, Comparison, KNOWN_SAMPLES, Residuals};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{BootMs, Millis, Stamp};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
 /// The maximum rate about each axis, rad/s: field and attitude are not quite of one moment.
 const TURNS_RAD_S: f32 = 0.2;
 /// Samples that come sooner are skipped: angles are expensive.
-const EVERY: Span = Span::from_millis(80);
+const EVERY: Millis = Millis::from_millis(80);
 /// Least change of the heading, degrees, of an unused compass that is faulty.
 const MOVES_DEG: f32 = 2.0;
 
-pub(crate) fn take(residuals: &mut Residuals, at: Instant, [x, y, z]: [f32; 3], vehicle: &Vehicle) {
+pub(crate) fn take(residuals: &mut Residuals, at: BootMs, [x, y, z]: [f32; 3], vehicle: &Vehicle) {
     if !residuals.is_due(Comparison::MagHeading, at, EVERY) {
         return;
     }
@@ -45,7 +45,7 @@ state! {
 
 impl CompassUse {
     /// PX4 sends no ratio of a compass that it does not fuse.
-    pub(crate) fn take(&mut self, at: Instant, estimator: &Estimator, residuals: &Residuals) {
+    pub(crate) fn take(&mut self, at: BootMs, estimator: &Estimator, residuals: &Residuals) {
         if estimator.scale != EstimatorScale::TestRatio || !residuals.gates.are(gates::AIRBORNE) {
             return;
         }
@@ -60,7 +60,7 @@ impl CompassUse {
         }
     }
 
-    pub(crate) fn unused(&self, now: Instant) -> Option<Reading> {
+    pub(crate) fn unused(&self, now: BootMs) -> Option<Reading> {
         let (at, unused) = self.unused;
         Reading::new(at.instant(now), Some(f32::from(u8::from(unused))))
     }

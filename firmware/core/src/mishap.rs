@@ -6,7 +6,7 @@ use heapless::String;
 
 use crate::motion::height_m;
 use crate::params::Param;
-use crate::time::Instant;
+use crate::time::BootMs;
 use crate::vehicle::Vehicle;
 
 numbered! {
@@ -51,7 +51,7 @@ pub struct Place {
 }
 
 impl Place {
-    pub(crate) fn of(now: Instant, vehicle: &Vehicle) -> Self {
+    pub(crate) fn of(now: BootMs, vehicle: &Vehicle) -> Self {
         let e7 = |degrees: f64| (degrees * 1e7) as i32;
         let global = vehicle.global.get().and_then(|global| global.position);
         let position = global.map(|position| (e7(position.latitude_deg), e7(position.longitude_deg)));

@@ -22,12 +22,12 @@ use crate::params::{Param, Params};
 use crate::protect::{Protect, Request, Situation};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 use crate::usage::{Usage, UsageCounter, exposure_number, figure_number};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// How often [`Monitor::tick`] is to be called: a finding comes at most this much after its debounce.
-pub const TICK: Span = Span::from_millis(50);
+pub const TICK: Millis = Millis::from_millis(50);
 
 /// Everything that the monitor knows and decides.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +52,7 @@ pub struct Monitor {
     saving: Saving,
     happenings: Happenings,
     before_tick: Before,
-    ticked_at: Instant,
+    ticked_at: BootMs,
     cells_told: bool,
     /// The autopilot has been asked for all its parameters.
     parameters_asked: bool,
@@ -66,15 +66,15 @@ state! {
         phase: Phase = Phase::Ground,
         changes: u32,
         next_phase: Phase = Phase::Ground,
-        next_since: Instant,
+        next_since: BootMs,
     }
 }
 
 /// A phase that lasts less is not reported: speeds cross their limits back and forth.
-const PHASE_LASTS: Span = Span::from_secs(1);
+const PHASE_LASTS: Millis = Millis::from_secs(1);
 
 /// After this time unknown cells are reported, if the parameters were not asked for.
-const CELLS_COME: Span = Span::from_secs(45);
+const CELLS_COME: Millis = Millis::from_secs(45);
 
 const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 - 64);
 
@@ -117,7 +117,7 @@ impl Monitor {
                 saving: Saving::default(),
                 happenings: Happenings::default(),
                 before_tick: Before::default(),
-                ticked_at: Instant::ZERO,
+                ticked_at: BootMs::ZERO,
                 cells_told: false,
                 parameters_asked: false,
             }
@@ -125,7 +125,7 @@ impl Monitor {
     }
 
     /// Takes an observation from the link; `false` if it is not of the monitored vehicle.
-    pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
+    pub fn observe(&mut self, at: BootMs, source: Source, observation: &Observation) -> bool {
         let known = self.vehicle.observe(at, source, observation);
         if self.before_tick.changes != self.vehicle.changes {
             self.begin_with_another();
@@ -171,7 +171,7 @@ impl Monitor {
     /// One step, every [`TICK`]: flight, checks, usage. Each change of a check's level goes to `findings`, once.
     pub fn tick(
         &mut self,
-        now: Instant,
+        now: BootMs,
         link: &LinkReading,
         recorder: &RecorderStatus,
         findings: &mut impl FnMut(&Finding),
@@ -212,7 +212,7 @@ impl Monitor {
     /// The inputs of the checks now.
     pub const fn inputs<'a>(
         &'a self,
-        now: Instant,
+        now: BootMs,
         link: &'a LinkReading,
         recorder: &'a RecorderStatus,
     ) -> Inputs<'a> {
@@ -228,7 +228,7 @@ impl Monitor {
         }
     }
 
-    fn step_flight(&mut self, now: Instant) -> Option<FlightEvent> {
+    fn step_flight(&mut self, now: BootMs) -> Option<FlightEvent> {
         let Self { vehicle, flight, params, happenings, .. } = self;
         let (change, event) = flight.step(now, vehicle, params);
         if let Some(change) = change {
@@ -282,7 +282,7 @@ impl Monitor {
     }
 
     /// Keeps known cells for the next power-on, reports unknown ones once.
-    fn step_cells(&mut self, now: Instant) {
+    fn step_cells(&mut self, now: BootMs) {
         let Self { vehicle, derived, params, before, saving, happenings, cells_told, .. } = self;
         let come = self.parameters_asked || vehicle.known_for(now) >= CELLS_COME;
         for (battery, kept) in before.cells.iter_mut().enumerate() {
@@ -316,7 +316,7 @@ impl Monitor {
         self.parameters_asked = true;
     }
 
-    fn step_protect(&mut self, now: Instant) {
+    fn step_protect(&mut self, now: BootMs) {
         let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
         let situation = Situation { now, vehicle, flight, health, params };
         if let Some(step) = protect.step(&situation) {
@@ -324,7 +324,7 @@ impl Monitor {
         }
     }
 
-    fn step_happenings(&mut self, now: Instant, event: Option<FlightEvent>) {
+    fn step_happenings(&mut self, now: BootMs, event: Option<FlightEvent>) {
         let Self { vehicle, flight, happenings, before_tick: before, .. } = self;
         let armed = vehicle.armed();
         if armed && !before.armed {
@@ -462,7 +462,7 @@ impl Monitor {
     }
 
     /// Half of a snapshot around a critical finding, each once.
-    pub fn take_snapshot(&mut self, now: Instant) -> Option<Snapshot<'_>> {
+    pub fn take_snapshot(&mut self, now: BootMs) -> Option<Snapshot<'_>> {
         self.snapshots.take(now)
     }
 

@@ -25,7 +25,7 @@ use crate::motion::IDLE_THROTTLE;
 use crate::observation::{EscGroup, MOTORS_MAX, VehicleKind};
 use crate::outputs::MotorOutputs;
 use crate::thrust::CARRIES;
-use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, FRESH, Millis, PAUSE, Stamp};
 use crate::trend::Rate;
 use crate::units::Rpm;
 use crate::vehicle::{Motor, Vehicle};
@@ -44,7 +44,7 @@ const FLYING_PART: f32 = 0.2;
 /// Below this part of the middle speed a motor is lost; no control in steady flight drives it there.
 const LOST_PART: f32 = 0.4;
 /// A vehicle that turned fast within this drives each motor as it needs to.
-const TURNED: Span = Span::from_secs(2);
+const TURNED: Millis = Millis::from_secs(2);
 const SMOOTHING_S: f32 = 1.0;
 /// ESCs that do not measure current say zero for all, and then nothing follows.
 const CURRENT_MIN_A: f32 = 0.5;
@@ -83,11 +83,11 @@ impl Track {
         self.highest_rpm > TURNING_RPM
     }
 
-    fn take(&mut self, at: Instant, motor: &Motor) {
+    fn take(&mut self, at: BootMs, motor: &Motor) {
         if motor.moved_at != Some(at) || self.last == Stamp::at(at) {
             return;
         }
-        let interval_s = self.last.age(at).map(Span::as_secs_f32);
+        let interval_s = self.last.age(at).map(Millis::as_secs_f32);
         self.last = Stamp::at(at);
         // A pause is not a rhythm: it must not make the next pause look normal.
         if let Some(interval_s) = interval_s.filter(|interval_s| *interval_s < 5.0) {
@@ -121,7 +121,7 @@ impl Motors {
         self.messages = self.messages.saturating_add(1);
     }
 
-    pub(crate) fn take(&mut self, at: Instant, group: &EscGroup, vehicle: &Vehicle, airborne: bool) {
+    pub(crate) fn take(&mut self, at: BootMs, group: &EscGroup, vehicle: &Vehicle, airborne: bool) {
         if !vehicle.armed() {
             self.tracks.iter_mut().for_each(|track| track.role = Role::Unknown);
         }
@@ -141,7 +141,7 @@ impl Motors {
         }
     }
 
-    fn find_roles(&mut self, now: Instant, vehicle: &Vehicle, motors: Range<usize>) {
+    fn find_roles(&mut self, now: BootMs, vehicle: &Vehicle, motors: Range<usize>) {
         let on_wings = vehicle.hovers(now) == Some(false);
         let is_known = |role: Role| role == Role::Pushes || (role == Role::Lifts && !on_wings);
         let Some(tracks) = self.tracks.get_mut(motors.clone()) else { return };
@@ -182,11 +182,11 @@ impl Motors {
 
     /// Seconds since an ESC last sent speed or current, once it has missed some of its own intervals; 0 before. Up to when the vehicle was
     /// received last, since the link resumed: a silent link says nothing about an ESC, nor does a slow one that delivers as few other messages.
-    pub(crate) fn silence_s(&self, heard: Instant, resumed: Instant, motor: u8) -> Option<f32> {
+    pub(crate) fn silence_s(&self, heard: BootMs, resumed: BootMs, motor: u8) -> Option<f32> {
         let track = self.track(motor)?;
         let silence_s = heard.since(track.last.instant(heard)?.later(resumed)).as_secs_f32();
         let intervals = if track.interval_s > SLOW_S { INTERVALS_MISSED_SLOW } else { INTERVALS_MISSED };
-        let age_s = |track: &Track| track.last.age(heard).map_or(f32::INFINITY, Span::as_secs_f32);
+        let age_s = |track: &Track| track.last.age(heard).map_or(f32::INFINITY, Millis::as_secs_f32);
         // Groups of ESCs follow each other.
         let others_come = self.tracks.iter().any(|other| age_s(other) + track.interval_s < age_s(track));
         let missed = track.interval_s > 0.0
@@ -197,7 +197,7 @@ impl Motors {
     }
 
     /// Motors that carry the vehicle do not fail together; the wire of their telemetry does.
-    pub(crate) fn are_silent(&self, heard: Instant, resumed: Instant) -> bool {
+    pub(crate) fn are_silent(&self, heard: BootMs, resumed: BootMs) -> bool {
         let mut known =
             (0..).zip(&self.tracks).filter(|(_, track)| track.interval_s > 0.0).map(|(motor, _)| motor);
         let is_silent =
@@ -207,7 +207,7 @@ impl Motors {
 
     /// A motor's share of the current, percent, for the check of lost ones: 0 of a motor that stopped. `None` of a motor that is shut off,
     /// and of one that nothing is known of.
-    pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+    pub(crate) fn share(&self, now: BootMs, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let share = || self.current_share(now, vehicle, motor).filter(|_| !self.outputs.is_off(motor));
         self.stopped(vehicle, motor).or_else(share)
     }
@@ -227,7 +227,7 @@ impl Motors {
 
     /// A motor's current in percent of the mean of the others that lift, while there is thrust and the vehicle hangs
     /// on its rotors; `None` for a motor that was not seen lifting.
-    fn current_share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
+    fn current_share(&self, now: BootMs, vehicle: &Vehicle, motor: u8) -> Option<Reading> {
         let place = Some(usize::from(motor)).filter(|place| self.lifts(*place))?;
         let part = current_part(now, vehicle, place, |motor| self.lifts(motor))?;
         if part < SHARE_PART && (self.slows_down(now, vehicle, place) || self.is_driven_so(now, vehicle)) {
@@ -237,7 +237,7 @@ impl Motors {
         Reading::new(vehicle.motors.get(place)?.moved_at, Some(part * 100.0))
     }
 
-    fn slows_down(&self, now: Instant, vehicle: &Vehicle, motor: usize) -> bool {
+    fn slows_down(&self, now: BootMs, vehicle: &Vehicle, motor: usize) -> bool {
         let rpm = |motor: usize| {
             let motor =
                 vehicle.motors.get(motor).filter(|known| self.lifts(motor) && is_fresh(now, known))?;
@@ -246,7 +246,7 @@ impl Motors {
         against_others(motor, rpm).is_some_and(|(own, mean, _)| SLOWS_PART.contains(&(own / mean)))
     }
 
-    fn is_driven_so(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    fn is_driven_so(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let currents = || {
             let lifting = (0..MOTORS_MAX).filter(|motor| self.lifts(*motor));
             lifting.filter_map(|motor| current_a(now, vehicle, motor))
@@ -266,7 +266,7 @@ impl Motors {
     /// upper ones of coaxial pairs. So a motor is off if no other one is near it.
     pub(crate) fn imbalance(
         &self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         flight: &Flight,
         motor: u8,
@@ -321,7 +321,7 @@ impl Motors {
     }
 
     /// Held speeds, or zeros of ESCs that lost their telemetry, do not count.
-    fn turn_as_in_flight(&self, now: Instant, middle_rpm: f32) -> bool {
+    fn turn_as_in_flight(&self, now: BootMs, middle_rpm: f32) -> bool {
         let mut fitted = self.tracks.iter().filter(|track| track.is_fitted());
         fitted.all(|track| {
             track.last.age(now).is_some_and(|age| age <= FRESH)
@@ -345,18 +345,18 @@ pub(crate) fn turns(vehicle: &Vehicle, motor: usize) -> bool {
 }
 
 /// The current of a motor, A. Noise around zero may be negative.
-fn current_a(now: Instant, vehicle: &Vehicle, motor: usize) -> Option<f32> {
+fn current_a(now: BootMs, vehicle: &Vehicle, motor: usize) -> Option<f32> {
     let motor = vehicle.motors.get(motor).filter(|motor| is_fresh(now, motor))?;
     motor.esc.current.map(|current| current.0.max(0.0)).filter(|current| current.is_finite())
 }
 
-fn is_fresh(now: Instant, motor: &Motor) -> bool {
+fn is_fresh(now: BootMs, motor: &Motor) -> bool {
     motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE)
 }
 
 /// The mean is of the other motors here, while the throttle asks for thrust in hover.
 fn current_part(
-    now: Instant,
+    now: BootMs,
     vehicle: &Vehicle,
     motor: usize,
     is_among: impl Fn(usize) -> bool,

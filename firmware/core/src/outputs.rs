@@ -39,7 +39,7 @@ use crate::figures::OUTPUTS_MAX;
 use crate::flight::Flight;
 use crate::motion::{IDLE_THROTTLE, OFF};
 use crate::observation::{MOTORS_MAX, Outputs};
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::vehicle::Vehicle;
 
 pub(crate) const JUDGED_MAX: usize = 8;
@@ -75,7 +75,7 @@ const YAWS_RAD_S: f32 = 0.5;
 /// A motor's command varies by more than this in flight; a servo that holds its place, as a landing gear's, does not.
 const MOVES: f32 = 0.02;
 /// A state without an observed beginning counts after this time.
-const LASTS: Span = Span::from_secs(3);
+const LASTS: Millis = Millis::from_secs(3);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Range {
@@ -185,7 +185,7 @@ impl MotorOutputs {
 
     pub(crate) fn take(
         &mut self,
-        at: Instant,
+        at: BootMs,
         outputs: &Outputs,
         vehicle: &Vehicle,
         flight: &Flight,
@@ -232,7 +232,7 @@ impl MotorOutputs {
         if !flies_level || yaws(vehicle) || mean < IDLE_THROTTLE || !self.is_of_frame(&parts, mean, count) {
             return;
         }
-        let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Span::as_secs_f32);
+        let step_s = self.at.age(at).filter(|step| *step <= PAUSE).map_or(0.0, Millis::as_secs_f32);
         self.at = Stamp::at(at);
         for (output, given) in self.outputs.iter_mut().zip(given) {
             output.share.follow(given / mean * 100.0 - 100.0, step_s / (SMOOTHING_S + step_s));
@@ -251,7 +251,7 @@ impl MotorOutputs {
     }
 
     /// Without a received take-off only an output alone at an end of its range has a meaning.
-    fn judge_unseen(&mut self, at: Instant, given: &[f32], used: bool, flies_level: bool) -> (u8, Verdict) {
+    fn judge_unseen(&mut self, at: BootMs, given: &[f32], used: bool, flies_level: bool) -> (u8, Verdict) {
         let (place, verdict) = self.verdict;
         // The one opposite may idle then.
         if verdict == Verdict::ShutOff && given.get(usize::from(place)).is_some_and(is_off) {
@@ -384,14 +384,14 @@ impl MotorOutputs {
     }
 
     /// A motor's command against the average of all, percent, smoothed; of frames whose outputs have a past.
-    pub(crate) fn share(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<f32> {
+    pub(crate) fn share(&self, now: BootMs, vehicle: &Vehicle, motor: u8) -> Option<f32> {
         self.at.age(now).filter(|age| *age <= PAUSE)?;
         let judged = Some(self.judged(vehicle)).filter(|count| *count <= OUTPUTS_MAX)?;
         Some(self.outputs.get(..judged)?.get(usize::from(motor))?.share.figure())
     }
 
     /// The verdict on a motor, and when it was made; good for those that are not judged now.
-    pub(crate) fn verdict(&self, now: Instant, vehicle: &Vehicle, motor: u8) -> Option<(Instant, Verdict)> {
+    pub(crate) fn verdict(&self, now: BootMs, vehicle: &Vehicle, motor: u8) -> Option<(BootMs, Verdict)> {
         let at = self.at.instant(now).filter(|at| now.since(*at) <= PAUSE)?;
         let count = self.judged(vehicle);
         // Outputs that all idled on the ground are motors; without a received take-off, if all but one moved.

@@ -13,7 +13,7 @@ use crate::gates::{self, Gates};
 use crate::latest::Reading;
 use crate::pressure::SCALE_HEIGHT_M;
 use crate::residual::{PAIRS as ROWS, Residual, Row, smooth};
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::units::norm;
 
 pub(crate) const SENSORS_MAX: usize = 3;
@@ -49,8 +49,8 @@ impl Kind {
     /// Samples within this time are of one moment, if the vehicle turns slower than 40 degrees a second. `ArduPilot`
     /// sends its sensors within 20 ms, or at different rates if asked. A climb of 2.5 m/s makes 0.6 m. 0: no samples
     /// are compared.
-    fn one_moment(self, gates: Gates) -> Span {
-        Span::from_millis(match self {
+    fn one_moment(self, gates: Gates) -> Millis {
+        Millis::from_millis(match self {
             _ if !self.row().is_open(gates) => 0,
             Self::Gyro if !gates.are(gates::STILL) => AT_ONCE_MS,
             Self::Accelerometer | Self::Gyro => 25,
@@ -92,7 +92,7 @@ state! {
 }
 
 impl Pair {
-    fn take(&mut self, at: Instant, kind: Kind, difference: [f32; 3]) {
+    fn take(&mut self, at: BootMs, kind: Kind, difference: [f32; 3]) {
         if !difference.into_iter().all(AdaptiveBaseline::is_sane) {
             return;
         }
@@ -102,7 +102,7 @@ impl Pair {
         self.residual.take(row, at, norm(self.difference), 0.0);
     }
 
-    fn excess(&self, now: Instant, kind: Kind) -> Option<Reading> {
+    fn excess(&self, now: BootMs, kind: Kind) -> Option<Reading> {
         let at = self.residual.at().instant(now).filter(|at| now.since(*at) <= PAUSE);
         Reading::new(at, self.residual.excess(kind.row()))
     }
@@ -118,20 +118,20 @@ state! {
 
 impl Pairs {
     /// A sample, compared with the others' of the same moment.
-    pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: usize, axes: [f32; 3], gates: Gates) {
+    pub(crate) fn take(&mut self, at: BootMs, kind: Kind, sensor: usize, axes: [f32; 3], gates: Gates) {
         let Self { samples, pairs } = self;
         let moment = kind.one_moment(gates);
         if let Some(sample) = samples.get_mut(sensor) {
             *sample = Sample { at: Stamp::at(at), axes };
         }
-        for ((one, other), pair) in PAIRS.into_iter().zip(pairs).filter(|_| moment > Span::ZERO) {
+        for ((one, other), pair) in PAIRS.into_iter().zip(pairs).filter(|_| moment > Millis::ZERO) {
             let partner = match (one == sensor, other == sensor) {
                 (true, _) => other,
                 (_, true) => one,
                 _ => continue,
             };
             // Newer than when it was compared last.
-            let is_new = |age: Span| pair.residual.at().age(at).is_none_or(|before| age < before);
+            let is_new = |age: Millis| pair.residual.at().age(at).is_none_or(|before| age < before);
             if samples[partner].at.age(at).is_some_and(|age| age <= moment && is_new(age)) {
                 pair.take(at, kind, kind.difference(samples[one].axes, samples[other].axes));
             }
@@ -146,7 +146,7 @@ impl Pairs {
         self.samples.get(sensor).is_some_and(|sample| sample.at.is_set())
     }
 
-    pub(crate) fn measures(&self, now: Instant, sensor: usize) -> bool {
+    pub(crate) fn measures(&self, now: BootMs, sensor: usize) -> bool {
         let sample = self.samples.get(sensor);
         sample.is_some_and(|sample| sample.at.age(now).is_some_and(|age| age <= PAUSE))
     }
@@ -157,7 +157,7 @@ impl Pairs {
 
     /// How far a sensor is apart from all others, beyond what is usual; of two, for the second one. Measured when the first of its pairs
     /// was: one sample is one measurement.
-    pub(crate) fn mismatch(&self, now: Instant, kind: Kind, sensor: usize) -> Option<Reading> {
+    pub(crate) fn mismatch(&self, now: BootMs, kind: Kind, sensor: usize) -> Option<Reading> {
         let beyond = self.pairs.map(|pair| pair.excess(now, kind));
         let three = beyond.iter().all(Option::is_some);
         let mine = PAIRS

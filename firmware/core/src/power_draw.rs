@@ -1,6 +1,6 @@
 //! The power drawn from the batteries, from the best fresh source.
 
-use crate::time::{Instant, PAUSE, SILENT};
+use crate::time::{BootMs, PAUSE, SILENT};
 use crate::units::{Amperes, Volts};
 use crate::vehicle::Vehicle;
 
@@ -13,7 +13,7 @@ pub(crate) struct Drawn {
     pub(crate) power_w: f32,
 }
 
-pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
+pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> Drawn {
     let mut drawn = Drawn::default();
     let batteries = vehicle.batteries.iter();
     for battery in batteries.clone().filter_map(|slot| slot.within(now, SILENT)) {
@@ -24,7 +24,7 @@ pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
         drawn.add(system.voltage, system.current);
     }
     if drawn.current_a.is_none() {
-        let fresh = |at: Option<Instant>| at.is_some_and(|at| now.since(at) <= PAUSE);
+        let fresh = |at: Option<BootMs>| at.is_some_and(|at| now.since(at) <= PAUSE);
         for motor in vehicle.motors.iter().filter(|motor| fresh(motor.moved_at)) {
             drawn.add(motor.esc.voltage, motor.esc.current);
         }
@@ -32,7 +32,7 @@ pub(crate) fn drawn(now: Instant, vehicle: &Vehicle) -> Drawn {
     drawn
 }
 
-pub(crate) fn discharge_a(now: Instant, vehicle: &Vehicle, battery: usize) -> f64 {
+pub(crate) fn discharge_a(now: BootMs, vehicle: &Vehicle, battery: usize) -> f64 {
     let Some(slot) = vehicle.batteries.get(battery) else { return 0.0 };
     let mut drawn = Drawn::default();
     if let Some(reported) = slot.within(now, SILENT) {

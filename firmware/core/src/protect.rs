@@ -41,28 +41,28 @@ use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
 use crate::params::{Param, Params};
-use crate::time::{Instant, PAUSE, SILENT, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Bytes of a text that a ground station shows to the pilot: one `STATUSTEXT`.
 pub const TEXT_BYTES_MAX: usize = 50;
 
-const AGAIN: Span = Span::from_secs(1);
+const AGAIN: Millis = Millis::from_secs(1);
 /// Requests at most.
 const ATTEMPTS_MAX: u8 = 3;
 /// How long `MAV_RESULT_IN_PROGRESS` is waited for.
-const PROGRESS: Span = Span::from_secs(10);
+const PROGRESS: Millis = Millis::from_secs(10);
 /// An accepted request shows in the mode within this time, or nothing came of it.
-const HEEDED: Span = Span::from_secs(5);
+const HEEDED: Millis = Millis::from_secs(5);
 /// A mission's last item is reached this long before the autopilot leaves the mission by itself.
-const MISSION_ENDS: Span = Span::from_secs(3);
+const MISSION_ENDS: Millis = Millis::from_secs(3);
 /// A mission that sinks faster than this, within this height of home, may be landing.
 const APPROACH_MPS: f32 = 0.5;
 const APPROACH_M: f32 = 40.0;
 /// Time after the last sign of landing in which a vehicle still lands: it may flare.
-const LANDING_LASTS: Span = Span::from_secs(15);
+const LANDING_LASTS: Millis = Millis::from_secs(15);
 /// A mode change is the autopilot's own if a sign of that comes within this time, before or after.
-const SIGN: Span = Span::from_secs(2);
+const SIGN: Millis = Millis::from_secs(2);
 /// `MAV_RESULT_ACCEPTED`
 const ACCEPTED: u8 = 0;
 /// `MAV_RESULT_TEMPORARILY_REJECTED`: asked again.
@@ -179,11 +179,11 @@ enum State {
     Asking {
         /// Requests so far; 0: a return was refused, and a landing is asked for next.
         attempt: u8,
-        at: Instant,
+        at: BootMs,
         /// The autopilot is working on it; its result is to come.
         progress: bool,
     },
-    OnItsWay(Way, Instant),
+    OnItsWay(Way, BootMs),
     /// The pilot cancelled by the mode, unless a sign comes that it was the autopilot.
     ModeChanged,
     /// Nothing more in this flight.
@@ -236,7 +236,7 @@ pub struct Protect {
 
 #[derive(Clone, Copy)]
 pub(crate) struct Situation<'a> {
-    pub(crate) now: Instant,
+    pub(crate) now: BootMs,
     pub(crate) vehicle: &'a Vehicle,
     pub(crate) flight: &'a Flight,
     pub(crate) health: &'a Health,
@@ -335,7 +335,7 @@ impl Protect {
         })
     }
 
-    fn note_mode(&mut self, now: Instant, vehicle: &Vehicle) -> Option<Input> {
+    fn note_mode(&mut self, now: BootMs, vehicle: &Vehicle) -> Option<Input> {
         let after = vehicle.heartbeat.get()?.mode;
         let before = self.mode.replace(after).filter(|before| *before != after)?;
         (self.changed_at, self.landing_at) = (Stamp::at(now), Stamp::NONE);
@@ -345,7 +345,7 @@ impl Protect {
     }
 
     /// A change, or an autopilot with unknown modes.
-    fn has_changed_since(&self, now: Instant, vehicle: &Vehicle, at: Instant) -> bool {
+    fn has_changed_since(&self, now: BootMs, vehicle: &Vehicle, at: BootMs) -> bool {
         modes(vehicle).is_none() || self.changed_at.age(now).is_some_and(|age| age <= now.since(at))
     }
 
@@ -387,7 +387,7 @@ impl Protect {
         (State::Counting { left_ms, told_s }, tells.then_some((Stage::Counting, left_s)))
     }
 
-    fn ask(&mut self, now: Instant, attempt: u8) -> Move {
+    fn ask(&mut self, now: BootMs, attempt: u8) -> Move {
         self.request = Some(Request { command: self.action.command(), confirmation: attempt - 1 });
         (State::Asking { attempt, at: now, progress: false }, Some((Stage::Asked, attempt)))
     }
@@ -406,7 +406,7 @@ impl Protect {
         (next, Some((Stage::Answered, result)))
     }
 
-    fn insist(&mut self, now: Instant, attempt: u8, at: Instant, progress: bool) -> Move {
+    fn insist(&mut self, now: BootMs, attempt: u8, at: BootMs, progress: bool) -> Move {
         if attempt == 0 {
             self.action = Action::Land;
         } else if now.since(at) < if progress { PROGRESS } else { AGAIN } {
@@ -506,7 +506,7 @@ fn modes(vehicle: &Vehicle) -> Option<&'static Modes> {
 }
 
 /// Reasons of its own: a failsafe may wait in the mode, or a mission was flown to its end.
-fn is_own_change(now: Instant, vehicle: &Vehicle, before: u32, after: u32) -> bool {
+fn is_own_change(now: BootMs, vehicle: &Vehicle, before: u32, after: u32) -> bool {
     modes(vehicle).is_some_and(|modes| {
         let is_end = before == modes.mission && modes.after_mission.contains(&after);
         after == modes.waits || (is_end && vehicle.mission_reached.within(now, MISSION_ENDS).is_some())

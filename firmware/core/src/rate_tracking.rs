@@ -15,23 +15,23 @@ use crate::observation::{Attitude, Hud, WantedRates};
 use crate::residual::{Comparison, Residuals};
 use crate::rotation;
 use crate::thrust::FULL;
-use crate::time::{Instant, PAUSE, Span};
+use crate::time::{BootMs, Millis, PAUSE};
 use crate::units::RadiansPerSecond;
 use crate::vehicle::Vehicle;
 
-const FRESH: Span = Span::from_millis(150);
+const FRESH: Millis = Millis::from_millis(150);
 /// This part of the rates of the setpoint may be missing.
 const LATE_PART: f32 = 0.3;
 /// At full throttle planes sink more slowly, m/s.
 const SINKS_MPS: f32 = -0.5;
 /// Time after which `THRUST_WARN` reports a lasting loss.
-const IN_VAIN: Span = Span::from_secs(2);
+const IN_VAIN: Millis = Millis::from_secs(2);
 
 pub(crate) type RateSetpoint = Latest<[RadiansPerSecond; 2]>;
 
 pub(crate) fn take_setpoint(
     setpoint: &mut RateSetpoint,
-    at: Instant,
+    at: BootMs,
     rates: Option<WantedRates>,
     vehicle: &Vehicle,
 ) {
@@ -46,7 +46,7 @@ pub(crate) fn take_setpoint(
     setpoint.set(at, [roll, pitch]);
 }
 
-pub(crate) fn take_attitude(to: &mut Residuals, at: Instant, attitude: &Attitude, setpoint: &RateSetpoint) {
+pub(crate) fn take_attitude(to: &mut Residuals, at: BootMs, attitude: &Attitude, setpoint: &RateSetpoint) {
     let (Some(setpoint), Some([roll, pitch, _])) = (setpoint.within(at, FRESH), attitude.rates) else {
         return;
     };
@@ -60,13 +60,13 @@ pub(crate) fn take_attitude(to: &mut Residuals, at: Instant, attitude: &Attitude
 state! {
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct Thrust {
-        full_since: Option<Instant>,
-        full_at: Option<Instant>,
+        full_since: Option<BootMs>,
+        full_at: Option<BootMs>,
     }
 }
 
 impl Thrust {
-    pub(crate) fn take(&mut self, at: Instant, hud: &Hud, vehicle: &Vehicle, is_settled: bool) {
+    pub(crate) fn take(&mut self, at: BootMs, hud: &Hud, vehicle: &Vehicle, is_settled: bool) {
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
         let level = vehicle
             .attitude

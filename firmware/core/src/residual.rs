@@ -24,7 +24,7 @@
 use crate::adaptive_baseline::AdaptiveBaseline;
 use crate::gates::{self, Gates};
 use crate::latest::Reading;
-use crate::time::{Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::vehicle::RECEIVERS_MAX;
 
 /// Delay of one message, or of one of a receiver's figures, against another, s.
@@ -33,7 +33,7 @@ pub(crate) const LATE_S: f32 = 0.3;
 pub(crate) const RECEIVER_S: f32 = 4.0;
 
 /// Values of one moment: messages at 4 Hz, with their jitter.
-pub(crate) const AT_ONCE: Span = Span::from_millis(300);
+pub(crate) const AT_ONCE: Millis = Millis::from_millis(300);
 /// Samples of a flight before anything is usual, or a lack of them says something.
 pub(crate) const KNOWN_SAMPLES: u8 = 20;
 
@@ -59,7 +59,7 @@ pub(crate) struct Row {
     /// Time constant, s; not zero.
     smoothing_s: f32,
     /// A longer step counts as this; it teaches twice as much.
-    step_max: Span,
+    step_max: Millis,
     clamp: f32,
     /// Period of a circular residual; 0 for others.
     period: f32,
@@ -93,7 +93,7 @@ const VIBRATION: Row =
 const RATE: Row = Row {
     gates: gates::SETTLED | gates::ONE_CONTROL,
     smoothing_s: 1.0,
-    step_max: Span::from_millis(500),
+    step_max: Millis::from_millis(500),
     side: Side::Either,
     learn: Learn::Nothing,
     ..ROW
@@ -129,7 +129,7 @@ impl Comparison {
         const MAG_HEADING: Row = Row {
             gates: gates::SETTLED | gates::CLEAR | gates::ONE_FRAME,
             // A stream that is slower than 4 Hz is smoothed over as many samples.
-            step_max: Span::from_millis(250),
+            step_max: Millis::from_millis(250),
             clamp: 30.0,
             period: 360.0,
             side: Side::Either,
@@ -161,7 +161,7 @@ impl Comparison {
 pub(crate) const PAIRS: [Row; 4] = {
     const PAIR: Row = Row {
         gates: gates::SETTLED | gates::ONE_FRAME | gates::STILL,
-        step_max: Span::from_millis(250),
+        step_max: Millis::from_millis(250),
         hold: 4.0,
         ..ROW
     };
@@ -184,7 +184,7 @@ impl Row {
     }
 
     /// The weight of a sample this long after the one before.
-    pub(crate) fn weight(&self, step: Span) -> f32 {
+    pub(crate) fn weight(&self, step: Millis) -> f32 {
         let step_s = step.min(self.step_max).as_secs_f32();
         step_s / (self.smoothing_s + step_s)
     }
@@ -216,7 +216,7 @@ impl Residual {
     }
 
     /// Takes a sample; returns the learnt part, s.
-    pub(crate) fn take(&mut self, row: &Row, at: Instant, sample: f32, allowance: f32) -> f32 {
+    pub(crate) fn take(&mut self, row: &Row, at: BootMs, sample: f32, allowance: f32) -> f32 {
         if !AdaptiveBaseline::is_sane(sample) || !allowance.is_finite() {
             return 0.0;
         }
@@ -225,7 +225,7 @@ impl Residual {
             *self = Self { figure: AdaptiveBaseline::zero(), ..Self::default() };
         }
         let clamp = if self.at.is_set() { row.clamp } else { f32::INFINITY };
-        let step = step.filter(|_| self.at.is_set()).unwrap_or(Span::ZERO);
+        let step = step.filter(|_| self.at.is_set()).unwrap_or(Millis::ZERO);
         let weight = row.weight(step);
         self.at = Stamp::at(at);
         self.allowance += weight * (allowance - self.allowance);
@@ -263,12 +263,12 @@ state! {
 
 impl Residuals {
     /// Whether a sample counts now, and the last one is old enough.
-    pub(crate) fn is_due(&self, of: Comparison, at: Instant, every: Span) -> bool {
+    pub(crate) fn is_due(&self, of: Comparison, at: BootMs, every: Millis) -> bool {
         of.row().is_open(self.gates) && self.each[of as usize].at.age(at).is_none_or(|age| age >= every)
     }
 
     /// Takes a sample if its gates are open; returns the learnt part, s.
-    pub(crate) fn take(&mut self, of: Comparison, at: Instant, sample: f32, allowance: f32) -> f32 {
+    pub(crate) fn take(&mut self, of: Comparison, at: BootMs, sample: f32, allowance: f32) -> f32 {
         let row = of.row();
         if row.is_open(self.gates) { self.each[of as usize].take(row, at, sample, allowance) } else { 0.0 }
     }
@@ -277,16 +277,16 @@ impl Residuals {
         self.each[of as usize].excess(of.row())
     }
 
-    pub(crate) fn reading(&self, now: Instant, of: Comparison) -> Option<Reading> {
+    pub(crate) fn reading(&self, now: BootMs, of: Comparison) -> Option<Reading> {
         self.as_measured(now, of, self.excess(of))
     }
 
-    fn as_measured(&self, now: Instant, of: Comparison, value: Option<f32>) -> Option<Reading> {
+    fn as_measured(&self, now: BootMs, of: Comparison, value: Option<f32>) -> Option<Reading> {
         Reading::new(self.each[of as usize].at.instant(now), value)
     }
 
     /// The figure as a multiple of its baseline, if it exceeds it by more than its hold; 1 otherwise.
-    pub(crate) fn multiple(&self, now: Instant, of: Comparison) -> Option<Reading> {
+    pub(crate) fn multiple(&self, now: BootMs, of: Comparison) -> Option<Reading> {
         let multiple = self.each[of as usize].figure.multiple(of.row().hold);
         self.as_measured(now, of, multiple)
     }
@@ -306,7 +306,7 @@ mod tests {
     fn taken(row: &Row, figures: impl Iterator<Item = f32>) -> Residual {
         let mut residual = Residual::default();
         for (tenth, figure) in (0..).zip(figures) {
-            residual.take(row, Instant::from_millis(tenth * 100), figure, 0.0);
+            residual.take(row, BootMs::from_millis(tenth * 100), figure, 0.0);
         }
         residual
     }
@@ -373,7 +373,7 @@ mod tests {
         let leapt = taken(&row, core::iter::repeat_n(0.0, 200).chain([1_000.0]));
         assert!(leapt.excess(&row).is_some_and(|excess| (3.9..=4.0).contains(&excess)));
         let mut allowed = taken(&row, core::iter::repeat_n(0.0, 200));
-        allowed.take(&row, Instant::from_millis(20_100), -4.0, 3.0);
+        allowed.take(&row, BootMs::from_millis(20_100), -4.0, 3.0);
         assert!(allowed.excess(&row).is_some_and(|excess| (0.9..=1.1).contains(&excess)));
     }
 
@@ -382,7 +382,7 @@ mod tests {
         let row = Row { learn: Learn::Nothing, ..EITHER };
         let mut residual = taken(&row, core::iter::repeat_n(9.0, 100));
         assert!(residual.excess(&row).is_some_and(|excess| excess > 8.9));
-        residual.take(&row, Instant::from_millis(15_000), 9.0, 0.0);
+        residual.take(&row, BootMs::from_millis(15_000), 9.0, 0.0);
         assert_eq!(residual.excess(&row), Some(0.0));
     }
 }

@@ -8,18 +8,18 @@ use crate::half;
 use crate::health::{Finding, Inputs, Level, Subsystem};
 use crate::motion::MOTION_AGE;
 use crate::observation::{Battery, Estimator, SystemStatus};
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 use crate::vehicle::Vehicle;
 
 /// Between two samples.
-pub const INTERVAL: Span = Span::from_millis(200);
+pub const INTERVAL: Millis = Millis::from_millis(200);
 /// Samples before a finding, and after it.
 pub const SAMPLES: usize = 25;
 /// Columns of one snapshot at most.
 pub const COLUMNS_MAX: usize = 8;
 const PENDING_MAX: usize = 4;
 
-const AFTER: Span = Span::from_millis(INTERVAL.as_millis() * SAMPLES as u64);
+const AFTER: Millis = Millis::from_millis(INTERVAL.as_millis() * SAMPLES as u64);
 
 type Read = fn(&Inputs<'_>) -> Option<f32>;
 
@@ -50,7 +50,7 @@ const KEPT: [Quantity; 24] = [
     Quantity("rpm_lowest", |it| speeds(it).reduce(f32::min)),
     Quantity("rpm_highest", |it| speeds(it).reduce(f32::max)),
     Quantity("esc_hottest_degc", |it| {
-        let fresh = |at: Instant| it.now.since(at) <= MOTION_AGE;
+        let fresh = |at: BootMs| it.now.since(at) <= MOTION_AGE;
         let motors = it.vehicle.motors.iter().filter(|motor| motor.state_at.is_some_and(fresh));
         motors.filter_map(|motor| Some(motor.esc.temperature?.0)).reduce(f32::max)
     }),
@@ -99,7 +99,7 @@ pub fn columns(subsystem: Subsystem) -> impl Iterator<Item = &'static str> {
 
 #[derive(Clone, Copy, Debug)]
 struct Pending {
-    at: Instant,
+    at: BootMs,
     check: &'static str,
     instance: u8,
     subsystem: Subsystem,
@@ -114,7 +114,7 @@ state! {
         ring: [[u16; KEPT.len()]; SAMPLES] = [[0; KEPT.len()]; SAMPLES],
         next: u8,
         filled: u8,
-        newest: Instant,
+        newest: BootMs,
         pending: [Option<Pending>; PENDING_MAX] = [None; PENDING_MAX],
         left_out: u16,
     }
@@ -124,7 +124,7 @@ state! {
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot<'a> {
     /// When the finding was made.
-    pub at: Instant,
+    pub at: BootMs,
     /// The finding's check.
     pub check: &'static str,
     /// The finding's instance.
@@ -134,7 +134,7 @@ pub struct Snapshot<'a> {
     /// `false`: before the finding; `true`: after it.
     pub after: bool,
     /// The time of the first sample; the others follow every [`INTERVAL`].
-    pub first: Instant,
+    pub first: BootMs,
     snapshots: &'a Snapshots,
 }
 
@@ -192,7 +192,7 @@ impl Snapshots {
         });
     }
 
-    pub(crate) fn take(&mut self, now: Instant) -> Option<Snapshot<'_>> {
+    pub(crate) fn take(&mut self, now: BootMs) -> Option<Snapshot<'_>> {
         let ready = |pending: &Pending| !pending.before_told || now.since(pending.at) >= AFTER;
         let place = self.pending.iter_mut().find(|place| place.as_ref().is_some_and(ready))?;
         let Pending { at, check, instance, subsystem, before_told } = (*place)?;
@@ -201,7 +201,7 @@ impl Snapshots {
             _ => *place = None,
         }
         let length = INTERVAL.as_millis() * u64::from(self.filled.saturating_sub(1));
-        let first = self.newest - Span::from_millis(length);
+        let first = self.newest - Millis::from_millis(length);
         Some(Snapshot { at, check, instance, subsystem, after: before_told, first, snapshots: self })
     }
 

@@ -1,6 +1,6 @@
 //! The monitor's own state for the checks: its port and its recording.
 
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// The autopilot's port.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -9,7 +9,7 @@ pub struct LinkReading {
     /// enough came.
     pub frames_lost: Option<f32>,
     /// When that was computed.
-    pub at: Instant,
+    pub at: BootMs,
 }
 
 /// The state of the recording.
@@ -34,7 +34,7 @@ pub struct RecorderStatus {
     /// Frames lost since power-on, anywhere.
     pub frames_lost: u64,
     /// Time for which the card has kept storage waiting now; zero if it does not.
-    pub stall: Span,
+    pub stall: Millis,
     /// Block writes that the card refused since power-on, retries included.
     pub write_errors: u64,
     /// The share of the card that logs can have, 0 to 1: free clusters and existing logs, because the oldest log

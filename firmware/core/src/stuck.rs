@@ -18,7 +18,7 @@ use crate::motion::{HANGS_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Gnss;
 use crate::pairs::{Kind, SENSORS_MAX};
 use crate::residual::KNOWN_SAMPLES;
-use crate::time::{Instant, PAUSE};
+use crate::time::{BootMs, PAUSE};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 
 const REPEATS_MIN: u8 = 3;
@@ -64,7 +64,7 @@ state! {
 
 impl Stuck {
     /// Takes a value, as the bits of all it consists of; and how far it has moved in this flight.
-    fn take(&mut self, at: Instant, bits: impl IntoIterator<Item = u32>, moved: f32) {
+    fn take(&mut self, at: BootMs, bits: impl IntoIterator<Item = u32>, moved: f32) {
         // FNV-1a, of words.
         let sum = bits.into_iter().fold(0x811C_9DC5_u32, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193));
         let value = (sum ^ sum >> 16) as u16;
@@ -107,7 +107,7 @@ impl Stuck {
 
     /// For how long it has been stuck, s; 0 while it is not. The vehicle has moved so far, and must have moved by `least`
     /// meanwhile, and again by as much each [`MOVES_MS`].
-    fn lasts(&self, now: Instant, moved: f32, least: f32) -> Option<Reading> {
+    fn lasts(&self, now: BootMs, moved: f32, least: f32) -> Option<Reading> {
         let stuck = self.repeats >= REPEATS_MIN
             && u32::from(self.lasts_ms) > (u32::from(self.usual_ms) * TIMES).min(LASTS_MAX_MS)
             && moved - self.moved >= least * (f32::from(self.lasts_ms) / MOVES_MS).max(1.0);
@@ -128,7 +128,7 @@ state! {
 }
 
 impl Moved {
-    fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
+    fn step(&mut self, now: BootMs, step_s: f32, vehicle: &Vehicle) {
         let climb_mps = climb_mps(now, vehicle).map_or(0.0, libm::fabsf);
         self.climbed_m += if climb_mps > HANGS_MPS { climb_mps * step_s } else { 0.0 };
         self.travelled_m += ground_speed_mps(now, vehicle).map_or(0.0, |speed| speed * step_s);
@@ -167,7 +167,7 @@ impl Repeats {
         begun
     }
 
-    pub(crate) fn step(&mut self, now: Instant, step_s: f32, vehicle: &Vehicle) {
+    pub(crate) fn step(&mut self, now: BootMs, step_s: f32, vehicle: &Vehicle) {
         self.moved.step(now, step_s, vehicle);
     }
 
@@ -180,14 +180,14 @@ impl Repeats {
     }
 
     /// Takes a sample of a sensor: of a barometer always, of others in flight.
-    pub(crate) fn take(&mut self, at: Instant, kind: Kind, sensor: u8, sample: [f32; 3]) {
+    pub(crate) fn take(&mut self, at: BootMs, kind: Kind, sensor: u8, sample: [f32; 3]) {
         let (moved, _) = self.moved(kind);
         if let Some(stuck) = self.sensors[kind as usize].get_mut(usize::from(sensor)) {
             stuck.take(at, sample.map(f32::to_bits), moved);
         }
     }
 
-    pub(crate) fn take_gnss(&mut self, at: Instant, gnss: &Gnss) {
+    pub(crate) fn take_gnss(&mut self, at: BootMs, gnss: &Gnss) {
         let place = gnss.position.filter(|_| gnss.fix >= 3);
         let altitude = gnss.altitude.map_or(0.0, |altitude| altitude.0).to_bits();
         let speed = gnss.speed.map_or(0.0, |speed| speed.0).to_bits();
@@ -205,7 +205,7 @@ impl Repeats {
     /// For how long a sensor has repeated one value in flight, s; 0 if it does not. `measures`: whether another one of its kind does.
     pub(crate) fn stuck(
         &self,
-        now: Instant,
+        now: BootMs,
         kind: Kind,
         sensor: u8,
         measures: impl Fn(usize) -> bool,
@@ -231,7 +231,7 @@ impl Repeats {
         stuck.lasts(now, moved, least * times)
     }
 
-    pub(crate) fn receiver_stuck(&self, now: Instant, receiver: u8) -> Option<Reading> {
+    pub(crate) fn receiver_stuck(&self, now: BootMs, receiver: u8) -> Option<Reading> {
         self.receivers.get(usize::from(receiver))?.lasts(now, self.moved.travelled_m, TRAVELLED_M)
     }
 }
@@ -243,9 +243,9 @@ mod tests {
     fn taken(values: impl IntoIterator<Item = u32>) -> Option<f32> {
         let mut stuck = Stuck::default();
         for (tenth, value) in (0_u64..).zip(values) {
-            stuck.take(Instant::from_millis(tenth * 100), [value, 7], 0.0);
+            stuck.take(BootMs::from_millis(tenth * 100), [value, 7], 0.0);
         }
-        stuck.lasts(Instant::from_millis(999_999), 100.0, 0.5).map(|reading| reading.value)
+        stuck.lasts(BootMs::from_millis(999_999), 100.0, 0.5).map(|reading| reading.value)
     }
 
     #[test]
@@ -262,7 +262,7 @@ mod tests {
             let mut stuck = Stuck::default();
             for tenth in 0_u64..100 + repeats {
                 let moved = moves * tenth as f32;
-                stuck.take(Instant::from_millis(tenth * 100), [tenth.min(100) as u32], moved);
+                stuck.take(BootMs::from_millis(tenth * 100), [tenth.min(100) as u32], moved);
             }
             stuck.fell_silent()
         };
@@ -277,9 +277,9 @@ mod tests {
             let mut stuck = Stuck::default();
             for tenth in 0..60 + repeats {
                 let hole_ms = if tenth > 60 { 8_000 } else { 0 };
-                stuck.take(Instant::from_millis(tenth * 100 + hole_ms), [tenth.min(60) as u32], 0.0);
+                stuck.take(BootMs::from_millis(tenth * 100 + hole_ms), [tenth.min(60) as u32], 0.0);
             }
-            stuck.lasts(Instant::from_millis(999_999), 100.0, 0.5).map(|reading| reading.value)
+            stuck.lasts(BootMs::from_millis(999_999), 100.0, 0.5).map(|reading| reading.value)
         };
         assert!(after(10).is_some_and(|lasts_s| lasts_s < 1.1), "{:?}", after(10));
         assert!(after(40).is_some_and(|lasts_s| lasts_s > 3.5), "it is stuck after it too");
@@ -297,7 +297,7 @@ mod tests {
         let taken = |values: &mut dyn Iterator<Item = u32>| {
             let mut stuck = Stuck::default();
             for (tenth, value) in (0_u64..).zip(values) {
-                stuck.take(Instant::from_millis(u64::from(u32::MAX) - 3_000 + tenth * 100), [value], 0.0);
+                stuck.take(BootMs::from_millis(u64::from(u32::MAX) - 3_000 + tenth * 100), [value], 0.0);
             }
             stuck
         };

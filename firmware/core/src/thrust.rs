@@ -4,7 +4,7 @@
 //! is learnt, a multicopter hovers at a quarter to three quarters of its throttle and idles below a tenth.
 
 use crate::motion::IDLE_THROTTLE;
-use crate::time::{Instant, PAUSE, Span};
+use crate::time::{BootMs, Millis, PAUSE};
 
 pub(crate) const CARRIES: f32 = 0.2;
 /// Full throttle. Controllers keep some back for attitude.
@@ -27,9 +27,9 @@ pub(crate) enum Power {
 pub(crate) struct Thrust {
     hover: f32,
     hovered_s: f32,
-    at: Instant,
+    at: BootMs,
     /// Last time armed with more than idle throttle; zero for never.
-    driven_at: Instant,
+    driven_at: BootMs,
     /// Whether the throttle reached its level of flight since arming: only then its values have a meaning.
     has_flown: bool,
 }
@@ -39,7 +39,7 @@ impl Thrust {
         (self.hovered_s, self.has_flown) = (0.0, false);
     }
 
-    pub(crate) fn take(&mut self, at: Instant, part: f32, hovers: bool) {
+    pub(crate) fn take(&mut self, at: BootMs, part: f32, hovers: bool) {
         let step_s = at.since(core::mem::replace(&mut self.at, at)).min(PAUSE).as_secs_f32();
         if part > self.idle().min(IDLE_THROTTLE) {
             self.driven_at = at;
@@ -74,8 +74,8 @@ impl Thrust {
         self.has_flown
     }
 
-    pub(crate) fn was_driven(&self, now: Instant, within: Span) -> bool {
-        self.driven_at != Instant::ZERO && now.since(self.driven_at) <= within
+    pub(crate) fn was_driven(&self, now: BootMs, within: Millis) -> bool {
+        self.driven_at != BootMs::ZERO && now.since(self.driven_at) <= within
     }
 }
 
@@ -91,7 +91,7 @@ mod tests {
             [Power::Idle, Power::Little, Power::Carries, Power::Full]
         );
         for at_ms in (0..12_000).step_by(200) {
-            thrust.take(Instant::from_millis(at_ms), 0.09, true);
+            thrust.take(BootMs::from_millis(at_ms), 0.09, true);
         }
         assert_eq!([0.03, 0.09].map(|part| thrust.power(part)), [Power::Idle, Power::Carries]);
         thrust.forget();

@@ -9,27 +9,27 @@ use core::ops::{Add, Sub};
 
 /// A time that is later than `now` by up to this is in the future: messages may be processed in another order than
 /// they came. A time 49.7 days less this in the past would be mistaken for a future one.
-const AHEAD_MAX: Span = Span::from_secs(3_600);
+const AHEAD_MAX: Millis = Millis::from_secs(3_600);
 
 /// A point in time: milliseconds since power-on, modulo 2^32. Kept one higher, so that an optional one takes no more room.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub struct Instant(NonZeroU32);
+pub struct BootMs(NonZeroU32);
 
-const _: () = assert!(size_of::<Option<Instant>>() == size_of::<u32>());
+const _: () = assert!(size_of::<Option<BootMs>>() == size_of::<u32>());
 
-impl Default for Instant {
+impl Default for BootMs {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
-impl fmt::Debug for Instant {
+impl fmt::Debug for BootMs {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_tuple("Instant").field(&self.as_millis()).finish()
+        formatter.debug_tuple("BootMs").field(&self.as_millis()).finish()
     }
 }
 
-impl Instant {
+impl BootMs {
     /// Power-on.
     pub const ZERO: Self = Self(NonZeroU32::MIN);
 
@@ -47,9 +47,9 @@ impl Instant {
     }
 
     /// The span from `earlier` to here; zero if `earlier` is the later one.
-    pub const fn since(self, earlier: Self) -> Span {
+    pub const fn since(self, earlier: Self) -> Millis {
         let millis = self.0.get().wrapping_sub(earlier.0.get());
-        if millis > u32::MAX - AHEAD_MAX.0 { Span::ZERO } else { Span(millis) }
+        if millis > u32::MAX - AHEAD_MAX.0 { Millis::ZERO } else { Millis(millis) }
     }
 
     /// Whether this is later than `other`; both are within 24.8 days.
@@ -70,19 +70,19 @@ impl Instant {
     }
 }
 
-impl Add<Span> for Instant {
+impl Add<Millis> for BootMs {
     type Output = Self;
 
-    fn add(self, span: Span) -> Self {
+    fn add(self, span: Millis) -> Self {
         let millis = self.0.get().wrapping_add(span.0);
         Self(NonZeroU32::new(millis).unwrap_or(NonZeroU32::MIN))
     }
 }
 
-impl Sub<Span> for Instant {
+impl Sub<Millis> for BootMs {
     type Output = Self;
 
-    fn sub(self, span: Span) -> Self {
+    fn sub(self, span: Millis) -> Self {
         let millis = self.0.get().wrapping_sub(span.0);
         Self(NonZeroU32::new(millis).unwrap_or(NonZeroU32::MAX))
     }
@@ -90,12 +90,12 @@ impl Sub<Span> for Instant {
 
 /// A point in time, or none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Stamp(Option<Instant>);
+pub(crate) struct Stamp(Option<BootMs>);
 
 impl Stamp {
     pub(crate) const NONE: Self = Self(None);
 
-    pub(crate) const fn at(at: Instant) -> Self {
+    pub(crate) const fn at(at: BootMs) -> Self {
         Self(Some(at))
     }
 
@@ -103,24 +103,24 @@ impl Stamp {
         self.0.is_some()
     }
 
-    pub(crate) fn older_than(self, now: Instant, span: Span) -> bool {
+    pub(crate) fn older_than(self, now: BootMs, span: Millis) -> bool {
         self.age(now).is_some_and(|age| age > span)
     }
 
-    pub(crate) fn age(self, now: Instant) -> Option<Span> {
+    pub(crate) fn age(self, now: BootMs) -> Option<Millis> {
         Some(now.since(self.0?))
     }
 
-    pub(crate) fn age_ms(self, now: Instant) -> Option<u64> {
+    pub(crate) fn age_ms(self, now: BootMs) -> Option<u64> {
         Some(self.age(now)?.as_millis())
     }
 
-    pub(crate) fn instant(self, now: Instant) -> Option<Instant> {
+    pub(crate) fn instant(self, now: BootMs) -> Option<BootMs> {
         Some(self.0?.earlier(now))
     }
 
     /// Runs while `on`; whether it has run for `span`.
-    pub(crate) fn run(&mut self, on: bool, now: Instant, span: Span) -> bool {
+    pub(crate) fn run(&mut self, on: bool, now: BootMs, span: Millis) -> bool {
         let began = self.0.filter(|_| on).or_else(|| on.then_some(now));
         *self = Self(began);
         began.is_some_and(|began| now.since(began) >= span)
@@ -128,19 +128,19 @@ impl Stamp {
 }
 
 /// Longest gap between samples of one course, and largest age of a current sample: two messages of a stream at 1 Hz.
-pub(crate) const PAUSE: Span = Span::from_secs(2);
+pub(crate) const PAUSE: Millis = Millis::from_secs(2);
 
 /// Age up to which a message of a stream at 2 Hz or more counts as current.
-pub(crate) const FRESH: Span = Span::from_secs(1);
+pub(crate) const FRESH: Millis = Millis::from_secs(1);
 
 /// Age from which a stream at 0.5 Hz or more counts as stopped.
-pub(crate) const SILENT: Span = Span::from_secs(5);
+pub(crate) const SILENT: Millis = Millis::from_secs(5);
 
 /// A length of time in milliseconds, up to 49.7 days.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Span(u32);
+pub struct Millis(u32);
 
-impl Span {
+impl Millis {
     /// No time.
     pub const ZERO: Self = Self(0);
 
@@ -165,7 +165,7 @@ impl Span {
     }
 }
 
-impl Add for Span {
+impl Add for Millis {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -182,13 +182,13 @@ mod tests {
     fn times_are_compared_across_the_wrap() {
         const WRAP_MS: u64 = 1 << 32;
         for start_ms in [0, 1, WRAP_MS - 60_000, WRAP_MS - 2, WRAP_MS + 5] {
-            let start = Instant::from_millis(start_ms);
+            let start = BootMs::from_millis(start_ms);
             for span_ms in [0, 1, 50, 60_000, 3_000_000, 30 * 86_400_000] {
-                let later = start + Span::from_millis(span_ms);
+                let later = start + Millis::from_millis(span_ms);
                 assert!(later.since(start).as_millis().abs_diff(span_ms) <= 1, "{start:?} {span_ms}");
-                assert!((later - Span::from_millis(span_ms)).since(start) <= Span::from_millis(1));
+                assert!((later - Millis::from_millis(span_ms)).since(start) <= Millis::from_millis(1));
                 if (2..=3_000_000).contains(&span_ms) {
-                    assert_eq!(start.since(later), Span::ZERO);
+                    assert_eq!(start.since(later), Millis::ZERO);
                     assert!(later.is_after(start) && !start.is_after(later));
                     assert_eq!((start.later(later), start.earlier(later)), (later, start));
                 }
@@ -198,11 +198,11 @@ mod tests {
 
     #[test]
     fn what_is_a_month_old_is_old() {
-        let month = Span::from_secs(30 * 86_400);
+        let month = Millis::from_secs(30 * 86_400);
         for start_ms in [5, 1_u64 << 31, (1 << 32) - 5] {
-            let start = Instant::from_millis(start_ms);
+            let start = BootMs::from_millis(start_ms);
             let now = start + month;
-            assert!(Stamp::at(start).older_than(now, Span::from_secs(2)));
+            assert!(Stamp::at(start).older_than(now, Millis::from_secs(2)));
             assert_eq!(start.earlier(now), start);
         }
     }

@@ -1,6 +1,6 @@
 //! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
 
-use crate::time::Instant;
+use crate::time::BootMs;
 use crate::units::{Amperes, Volts};
 
 state! {
@@ -101,11 +101,11 @@ impl Rate {
     /// A larger step is a counter that started again.
     const STEP_MAX: u32 = 10_000;
 
-    pub(crate) const fn new(at: Instant, count: u32) -> Self {
+    pub(crate) const fn new(at: BootMs, count: u32) -> Self {
         Self { count, events: [0; 2], half_began_ms: at.as_millis() as u32 }
     }
 
-    pub(crate) fn take(&mut self, at: Instant, count: u32) {
+    pub(crate) fn take(&mut self, at: BootMs, count: u32) {
         let now_ms = at.as_millis() as u32;
         let age_ms = now_ms.wrapping_sub(self.half_began_ms);
         if age_ms >= Self::HALF_MS {
@@ -183,14 +183,14 @@ mod tests {
 
     #[test]
     fn a_counter_that_wraps_goes_on_and_one_that_starts_again_counts_nothing() {
-        let mut rate = Rate::new(Instant::ZERO, u32::MAX - 1);
-        rate.take(Instant::from_millis(1_000), 3);
+        let mut rate = Rate::new(BootMs::ZERO, u32::MAX - 1);
+        rate.take(BootMs::from_millis(1_000), 3);
         assert_eq!(rate.per_minute(), 5);
-        rate.take(Instant::from_millis(2_000), 0);
+        rate.take(BootMs::from_millis(2_000), 0);
         assert_eq!(rate.per_minute(), 5, "a step back is a restart");
-        rate.take(Instant::from_millis(31_000), 1);
+        rate.take(BootMs::from_millis(31_000), 1);
         assert_eq!(rate.per_minute(), 6);
-        rate.take(Instant::from_millis(200_000), 1);
+        rate.take(BootMs::from_millis(200_000), 1);
         assert_eq!(rate.per_minute(), 0, "long ago");
     }
 }

@@ -13,7 +13,7 @@ use crate::observation::{
     MOTORS_MAX, Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime,
     TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
-use crate::time::{Instant, SILENT, Span};
+use crate::time::{BootMs, Millis, SILENT};
 use crate::units::{MetresPerSecond, Radians, Rpm};
 
 /// Batteries that are monitored.
@@ -27,7 +27,7 @@ const BATTERY_COMPONENTS: [u8; 2] = [180, 181];
 const REBOOT_MS: i64 = 3_000;
 /// The longest restart of an autopilot in flight. After a longer silence the link is lost (PX4: `COM_DL_LOSS_T`, 10
 /// s), and a landing, a disarming or another battery may have passed unseen.
-const OFF: Span = Span::from_secs(10);
+const OFF: Millis = Millis::from_secs(10);
 
 state! {
     /// One motor, put together from two kinds of ESC messages: PX4 sends both, ArduPilot's one message is of both kinds. The fields of a kind
@@ -37,14 +37,14 @@ state! {
         /// The fields of the last message of each kind.
         pub esc: Esc = Esc { rpm: None, voltage: None, current: None, temperature: None, failures: None, errors: None },
         /// When `rpm`, `voltage` and `current` came (`ESC_STATUS`).
-        pub moved_at: Option<Instant>,
+        pub moved_at: Option<BootMs>,
         /// When `temperature`, `failures` and `errors` came (`ESC_INFO`).
-        pub state_at: Option<Instant>,
+        pub state_at: Option<BootMs>,
     }
 }
 
 impl Motor {
-    fn take(&mut self, at: Instant, esc: Esc) {
+    fn take(&mut self, at: BootMs, esc: Esc) {
         let Esc { rpm, voltage, current, temperature, failures, errors } = esc;
         if rpm.is_some() || voltage.is_some() || current.is_some() {
             self.esc = Esc { rpm, voltage, current, ..self.esc };
@@ -136,20 +136,20 @@ state! {
         /// How often the autopilot has rebooted since our power-on.
         pub reboots: u32,
         /// When it did last.
-        pub rebooted_at: Option<Instant>,
+        pub rebooted_at: Option<BootMs>,
         /// Whether it was armed then: a restart on the ground is none that endangers anybody.
         pub rebooted_armed: bool,
         /// How often another system has become the vehicle: everything else here is then of that one.
         pub changes: u32,
         election: Election,
         /// The highest boot time since its last boot, milliseconds, and when it came.
-        boot: Option<(u32, Instant)>,
+        boot: Option<(u32, BootMs)>,
         /// One that does not follow it, until the next one agrees with either.
-        odd_boot: Option<(u32, Instant)>,
+        odd_boot: Option<(u32, BootMs)>,
         /// Whether it was armed when a boot time was believed last.
         boot_armed: bool,
         /// Since when it has called its flight terminated.
-        pub terminated_since: Option<Instant>,
+        pub terminated_since: Option<BootMs>,
         /// The mildest `MAV_STATE` since arming, 0 if the arming was not received. Whoever arms a vehicle in a failsafe knows of it.
         pub state_since_arming: u8,
         pub(crate) climb_wanted: Latest<MetresPerSecond>,
@@ -207,7 +207,7 @@ impl Vehicle {
 
     /// Whether it hangs on its rotors now (`Some(false)`: it flies on wings); `None` if that is unknown. Of a VTOL
     /// its own word counts, and its speed where it says none: between the two it may be either.
-    pub fn hovers(&self, now: Instant) -> Option<bool> {
+    pub fn hovers(&self, now: BootMs) -> Option<bool> {
         const WINGS_MPS: f32 = 12.0;
         const ROTORS_MPS: f32 = 6.0;
         match self.kind() {
@@ -230,22 +230,22 @@ impl Vehicle {
     }
 
     /// Whether this is surely the vehicle: no other one takes its place for as long as it is heard.
-    pub fn is_settled(&self, now: Instant) -> bool {
+    pub fn is_settled(&self, now: BootMs) -> bool {
         self.election.is_settled(now)
     }
 
     /// Who is to be asked for streams: the vehicle, and until that is settled each autopilot on the port in turn.
-    pub fn asks(&self, now: Instant) -> Option<(Source, Autopilot)> {
+    pub fn asks(&self, now: BootMs) -> Option<(Source, Autopilot)> {
         self.election.asks(now, self.source?)
     }
 
     /// For how long this has been the vehicle.
-    pub fn known_for(&self, now: Instant) -> Span {
+    pub fn known_for(&self, now: BootMs) -> Millis {
         self.election.lasts(now)
     }
 
     /// Takes an observation; `false` when it is not of this vehicle.
-    pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
+    pub fn observe(&mut self, at: BootMs, source: Source, observation: &Observation) -> bool {
         let heartbeat = match observation {
             Observation::Heartbeat(heartbeat) => Some(heartbeat.autopilot),
             _ => None,
@@ -272,7 +272,7 @@ impl Vehicle {
         }
     }
 
-    fn take(&mut self, at: Instant, component: u8, observation: &Observation) {
+    fn take(&mut self, at: BootMs, component: u8, observation: &Observation) {
         match *observation {
             Observation::Heartbeat(heartbeat) => self.take_heartbeat(at, heartbeat),
             Observation::SystemStatus(system) => {
@@ -343,7 +343,7 @@ impl Vehicle {
         }
     }
 
-    fn take_heartbeat(&mut self, at: Instant, heartbeat: Heartbeat) {
+    fn take_heartbeat(&mut self, at: BootMs, heartbeat: Heartbeat) {
         self.alerts.take_armed(at, heartbeat.armed);
         self.alerts.take_state(at, heartbeat.state);
         if heartbeat.armed && self.heartbeat.within(at, SILENT).is_some_and(|before| !before.armed) {
@@ -355,16 +355,16 @@ impl Vehicle {
         self.heartbeat.set(at, heartbeat);
     }
 
-    fn take_time(&mut self, at: Instant, time: SystemTime) {
+    fn take_time(&mut self, at: BootMs, time: SystemTime) {
         self.take_boot_time(at, time.boot_ms);
         self.time.set(at, time);
     }
 
     /// A boot time that falls, and which the next one agrees with, is a reboot. One wrong time is none, nor are messages that
     /// overtake each other a little, nor the end of 32 bits of milliseconds after 49.7 days.
-    fn take_boot_time(&mut self, at: Instant, boot_ms: u32) {
+    fn take_boot_time(&mut self, at: BootMs, boot_ms: u32) {
         // How far this one is ahead of an earlier one, and how far it should be.
-        let ahead_ms = |(told_ms, told_at): (u32, Instant)| {
+        let ahead_ms = |(told_ms, told_at): (u32, BootMs)| {
             (i64::from(boot_ms.wrapping_sub(told_ms).cast_signed()), at.since(told_at).as_millis() as i64)
         };
         if let Some((ahead, passed)) = self.boot.map(ahead_ms)
@@ -396,21 +396,21 @@ impl Vehicle {
     }
 
     /// The first sensor's figures serve; the others measure the same thing.
-    fn take_imu(&mut self, at: Instant, imu: Imu) {
+    fn take_imu(&mut self, at: BootMs, imu: Imu) {
         if imu.instance == 0 {
             self.imu.set(at, imu);
             self.inertial.take(at, &imu);
         }
     }
 
-    fn take_air(&mut self, at: Instant, air: Air) {
+    fn take_air(&mut self, at: BootMs, air: Air) {
         if air.instance == 0 {
             self.air.set(at, air);
         }
     }
 
     /// The same message on two scales: only the heartbeat tells which.
-    fn take_vibration(&mut self, at: Instant, vibration: Vibration) {
+    fn take_vibration(&mut self, at: BootMs, vibration: Vibration) {
         let px4 = self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::Px4);
         let scale = if px4 { VibrationScale::Px4Metrics } else { VibrationScale::PerAxis };
         self.vibration.set(at, Vibration { scale, ..vibration });
@@ -418,7 +418,7 @@ impl Vehicle {
 
     /// A battery of unknown use is the vehicle's if the autopilot or a battery of its own component reports it, and
     /// not if a gimbal does.
-    fn take_battery(&mut self, at: Instant, component: u8, mut battery: Battery) {
+    fn take_battery(&mut self, at: BootMs, component: u8, mut battery: Battery) {
         let is_own = BATTERY_COMPONENTS.contains(&component)
             || self.source.is_some_and(|vehicle| vehicle.component == component);
         if battery.feeds == Feeds::Unsaid && is_own {
@@ -435,7 +435,7 @@ impl Vehicle {
         }
     }
 
-    fn take_generator(&mut self, at: Instant, generator: Generator) {
+    fn take_generator(&mut self, at: BootMs, generator: Generator) {
         let before = self.generator_top.filter(|_| self.armed());
         self.generator_top = match generator.speed {
             _ if generator.is_off => before.map(|_| Rpm(0.0)),
@@ -445,7 +445,7 @@ impl Vehicle {
         self.generator.set(at, generator);
     }
 
-    fn take_escs(&mut self, at: Instant, group: &EscGroup) {
+    fn take_escs(&mut self, at: BootMs, group: &EscGroup) {
         for (offset, esc) in group.escs.iter().enumerate() {
             if let (Some(esc), Some(motor)) = (esc, self.motors.get_mut(usize::from(group.first) + offset)) {
                 motor.take(at, *esc);
@@ -454,7 +454,7 @@ impl Vehicle {
     }
 }
 
-fn set_instance<T, const N: usize>(slots: &mut [Latest<T>; N], instance: u8, at: Instant, value: T) {
+fn set_instance<T, const N: usize>(slots: &mut [Latest<T>; N], instance: u8, at: BootMs, value: T) {
     if let Some(slot) = slots.get_mut(usize::from(instance)) {
         slot.set(at, value);
     }
@@ -470,7 +470,7 @@ mod tests {
     fn known() -> Vehicle {
         let mut vehicle = Vehicle::default();
         let heartbeat = Heartbeat { autopilot: Autopilot::Px4, ..Heartbeat::default() };
-        assert!(vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat)));
+        assert!(vehicle.observe(BootMs::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat)));
         vehicle
     }
 
@@ -478,12 +478,12 @@ mod tests {
     fn only_the_first_vehicle_is_monitored() {
         let mut vehicle = known();
         let other = Source { system: 2, component: 1 };
-        assert!(!vehicle.observe(Instant::ZERO, other, &Observation::Heartbeat(Heartbeat::default())));
-        assert!(!vehicle.observe(Instant::ZERO, other, &Observation::Attitude(Attitude::default())));
+        assert!(!vehicle.observe(BootMs::ZERO, other, &Observation::Heartbeat(Heartbeat::default())));
+        assert!(!vehicle.observe(BootMs::ZERO, other, &Observation::Attitude(Attitude::default())));
         let gimbal = Source { system: 1, component: 154 };
-        assert!(!vehicle.observe(Instant::ZERO, gimbal, &Observation::Attitude(Attitude::default())));
+        assert!(!vehicle.observe(BootMs::ZERO, gimbal, &Observation::Attitude(Attitude::default())));
         let battery = Source { system: 1, component: 180 };
-        assert!(vehicle.observe(Instant::ZERO, battery, &Observation::Battery(Battery::default())));
+        assert!(vehicle.observe(BootMs::ZERO, battery, &Observation::Battery(Battery::default())));
     }
 
     #[test]
@@ -493,12 +493,12 @@ mod tests {
         let info = Esc { errors: Some(3), ..Esc::default() };
         for (at, esc) in [(1, status), (2, info)] {
             let group = EscGroup { first: 11, escs: [Some(esc); 4] };
-            vehicle.observe(Instant::from_millis(at), AUTOPILOT, &Observation::Escs(group));
+            vehicle.observe(BootMs::from_millis(at), AUTOPILOT, &Observation::Escs(group));
         }
         let motor = vehicle.motors[11];
         assert_eq!((motor.esc.rpm, motor.esc.errors), (Some(Rpm(5_000.0)), Some(3)));
-        assert_eq!(motor.moved_at, Some(Instant::from_millis(1)));
-        assert_eq!(motor.state_at, Some(Instant::from_millis(2)));
+        assert_eq!(motor.moved_at, Some(BootMs::from_millis(1)));
+        assert_eq!(motor.state_at, Some(BootMs::from_millis(2)));
     }
 
     #[test]
@@ -506,7 +506,7 @@ mod tests {
         let mut vehicle = known();
         for boot_ms in [5_000, 6_000, 5_500, 7_000, 300, 400] {
             let time = SystemTime { boot_ms, utc_micros: None };
-            vehicle.observe(Instant::ZERO, AUTOPILOT, &Observation::SystemTime(time));
+            vehicle.observe(BootMs::ZERO, AUTOPILOT, &Observation::SystemTime(time));
         }
         assert_eq!(vehicle.reboots, 1);
     }
@@ -516,19 +516,19 @@ mod tests {
         let mut vehicle = known();
         for boot_ms in [u32::MAX - 10, 5, 90_000, 90_400, 90_100, 1_000, 1_100] {
             let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
-            vehicle.observe(Instant::from_millis(7), AUTOPILOT, &Observation::Attitude(attitude));
+            vehicle.observe(BootMs::from_millis(7), AUTOPILOT, &Observation::Attitude(attitude));
         }
-        assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(Instant::from_millis(7))));
+        assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(BootMs::from_millis(7))));
     }
 
     /// The boot times of an autopilot that has run for 200 s, every tenth of a second, but for one of them.
-    fn reboots_with(odd_ms: u32, restarts: bool) -> (u32, Option<Instant>) {
+    fn reboots_with(odd_ms: u32, restarts: bool) -> (u32, Option<BootMs>) {
         let mut vehicle = known();
         for step in 0..600 {
             let ran_ms = if restarts && step >= 300 { step - 300 } else { 2_000 + step } * 100;
             let boot_ms = if step == 200 { odd_ms } else { ran_ms };
             let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
-            let at = Instant::from_millis(u64::from(step) * 100);
+            let at = BootMs::from_millis(u64::from(step) * 100);
             vehicle.observe(at, AUTOPILOT, &Observation::Attitude(attitude));
         }
         (vehicle.reboots, vehicle.rebooted_at)
@@ -538,7 +538,7 @@ mod tests {
     fn one_wrong_boot_time_is_no_restart_and_a_restart_after_it_is_seen_within_a_second() {
         for odd_ms in [0, 7, 100_000, 1_000_000, u32::MAX / 2, u32::MAX] {
             assert_eq!(reboots_with(odd_ms, false), (0, None), "{odd_ms}");
-            assert_eq!(reboots_with(odd_ms, true), (1, Some(Instant::from_millis(30_100))), "{odd_ms}");
+            assert_eq!(reboots_with(odd_ms, true), (1, Some(BootMs::from_millis(30_100))), "{odd_ms}");
         }
     }
 
@@ -549,10 +549,10 @@ mod tests {
         {
             let mut vehicle = known();
             let source = Source { system: 1, component };
-            vehicle.observe(Instant::ZERO, source, &Observation::Battery(Battery::default()));
+            vehicle.observe(BootMs::ZERO, source, &Observation::Battery(Battery::default()));
             assert_eq!(vehicle.batteries[0].get().map(|battery| battery.feeds), Some(feeds), "{component}");
             let propels = Battery { feeds: Feeds::Vehicle, ..Battery::default() };
-            vehicle.observe(Instant::ZERO, source, &Observation::Battery(propels));
+            vehicle.observe(BootMs::ZERO, source, &Observation::Battery(propels));
             assert_eq!(vehicle.batteries[0].get().map(|battery| battery.feeds), Some(Feeds::Vehicle));
         }
     }

@@ -12,7 +12,7 @@ use hums_core::observation::{
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::units::{
     Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,
 };
@@ -184,7 +184,7 @@ fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<F
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
     for now_ms in (0..END_MS).step_by(if rhythm == [(100, 0); 3] { 50 } else { 25 }) {
-        let now = Instant::from_millis(now_ms);
+        let now = BootMs::from_millis(now_ms);
         let mut fitted = Fitted::healthy(now_ms);
         fitted.speaks = rhythm.map(|(every_ms, from_ms)| now_ms % every_ms == from_ms);
         script(now_ms, &mut fitted);

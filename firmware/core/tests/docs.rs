@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use hums_core::exposure;
 use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
 use hums_core::params::{Param, Params, TABLE};
-use hums_core::time::Span;
+use hums_core::time::Millis;
 use hums_core::usage::UsageCounter;
 
 /// The inputs of each check, and the source of its limits unless a parameter is.
@@ -226,7 +226,7 @@ fn limit(param: Option<Param>) -> String {
     )
 }
 
-fn seconds(span: Span) -> String {
+fn seconds(span: Millis) -> String {
     format!("{} s", span.as_secs_f32())
 }
 

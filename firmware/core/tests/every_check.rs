@@ -10,7 +10,7 @@ use hums_core::observation::{
 };
 use hums_core::params::Params;
 use hums_core::status::Recording;
-use hums_core::time::Span;
+use hums_core::time::Millis;
 use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Metres, Radians, Rpm, Volts};
 
 const FAULT_MS: u64 = 20_000;
@@ -164,8 +164,8 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     }),
     ("record_queue", 0, Level::Critical, |quad, _| quad.recorder.queue = 0.95),
     ("record_lost", 0, Level::Warning, |quad, _| quad.recorder.frames_lost = 5),
-    ("card_stall", 0, Level::Critical, |quad, _| quad.recorder.stall = Span::from_millis(3_000)),
-    ("card_stall", 0, Level::Warning, |quad, _| quad.recorder.stall = Span::from_millis(800)),
+    ("card_stall", 0, Level::Critical, |quad, _| quad.recorder.stall = Millis::from_millis(3_000)),
+    ("card_stall", 0, Level::Warning, |quad, _| quad.recorder.stall = Millis::from_millis(800)),
     ("card_errors", 0, Level::Warning, |quad, _| quad.recorder.write_errors = 3),
     ("card_room", 0, Level::Critical, |quad, _| quad.recorder.room = Some(0.005)),
     ("card_room", 0, Level::Warning, |quad, _| quad.recorder.room = Some(0.05)),

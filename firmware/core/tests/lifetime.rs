@@ -11,7 +11,7 @@ use hums_core::observation::{
 };
 use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::units::{Amperes, Metres, MetresPerSecond, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 
@@ -27,7 +27,7 @@ impl Store {
         monitor
     }
 
-    fn save(&mut self, monitor: &mut Monitor, now: Instant) -> Vec<ItemKey> {
+    fn save(&mut self, monitor: &mut Monitor, now: BootMs) -> Vec<ItemKey> {
         let mut keys = Vec::new();
         while let Some(key) = self.save_one(monitor, now) {
             keys.push(key);
@@ -35,7 +35,7 @@ impl Store {
         keys
     }
 
-    fn save_one(&mut self, monitor: &mut Monitor, now: Instant) -> Option<ItemKey> {
+    fn save_one(&mut self, monitor: &mut Monitor, now: BootMs) -> Option<ItemKey> {
         let key = monitor.save_due(now, Room::Enough)?;
         let mut item = [0; ITEM_BYTES_MAX];
         let length = monitor.encode_item(key, &mut item);
@@ -47,7 +47,7 @@ impl Store {
 
 /// One tick of a flight from `from_s` to `to_s`, at 10 m/s, armed a second before, that draws 20 A and has one ESC.
 fn step(monitor: &mut Monitor, now_ms: u64, from_s: u64, to_s: u64, vehicle: (u8, u64)) {
-    let now = Instant::from_millis(now_ms);
+    let now = BootMs::from_millis(now_ms);
     let source = Source { system: vehicle.0, component: 1 };
     let flies = (from_s * 1_000..to_s * 1_000).contains(&now_ms);
     let armed = (from_s * 1_000 - 1_000..to_s * 1_000 + 1_000).contains(&now_ms);
@@ -81,7 +81,7 @@ fn run(
 ) -> Vec<(u64, ItemKey)> {
     let mut saves = Vec::new();
     for now_ms in (0..seconds * 1_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
+        let now = BootMs::from_millis(now_ms);
         step(monitor, now_ms, from_s, to_s, vehicle);
         saves.extend(store.save(monitor, now).into_iter().map(|key| (now_ms / 1_000, key)));
     }
@@ -165,7 +165,7 @@ fn power_that_goes_at_any_moment_costs_two_minutes_at_most_and_counts_nothing_tw
         let live = sums(&monitor);
         let mut saved = 0;
         loop {
-            let key = store.save_one(&mut monitor, Instant::from_millis(now_ms));
+            let key = store.save_one(&mut monitor, BootMs::from_millis(now_ms));
             if key.is_some() || now_ms.is_multiple_of(5_000) {
                 let again = sums(&store.start(&params));
                 assert_eq!(again.len(), live.len());
@@ -246,7 +246,7 @@ fn a_component_wears_over_sessions_and_is_replaced_at_once() {
     assert_eq!(monitor.replace_component(0, Label::new("S1")), None, "there is none");
     let old = monitor.replace_component(2, Label::new("S2")).unwrap();
     assert_eq!(old.ran().flights, 2.0);
-    assert_eq!(store.save(&mut monitor, Instant::from_millis(50)), [ItemKey::Component(2)]);
+    assert_eq!(store.save(&mut monitor, BootMs::from_millis(50)), [ItemKey::Component(2)]);
     let again = store.start(&params);
     let component = again.components()[2];
     assert_eq!((component.serial.as_str(), component.replaced, component.ran().flights), ("S2", 1, 0.0));

@@ -15,7 +15,7 @@ use hums_core::observation::{
 };
 use hums_core::params::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
-use hums_core::time::{Instant, Span};
+use hums_core::time::{BootMs, Millis};
 use hums_core::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
     Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
@@ -327,7 +327,7 @@ impl Random {
     }
 
     fn link(&mut self) -> LinkReading {
-        LinkReading { frames_lost: self.maybe(Self::f32), at: Instant::from_millis(self.next() >> 30) }
+        LinkReading { frames_lost: self.maybe(Self::f32), at: BootMs::from_millis(self.next() >> 30) }
     }
 
     fn recorder(&mut self) -> RecorderStatus {
@@ -335,14 +335,14 @@ impl Random {
             recording: self.pick(&[Recording::Starting, Recording::Running, Recording::Stopped]),
             queue: self.f32(),
             frames_lost: self.next(),
-            stall: Span::from_millis(self.next() >> 16),
+            stall: Millis::from_millis(self.next() >> 16),
             write_errors: self.next(),
             room: self.maybe(Self::f32),
         }
     }
 }
 
-fn check(monitor: &mut Monitor, now: Instant) {
+fn check(monitor: &mut Monitor, now: BootMs) {
     let sane = |counter: u8, value: f64| {
         let sign = counter >= FIGURE_FIRST || value >= 0.0;
         assert!(value.is_finite() && sign, "counter {counter} is {value}");
@@ -388,11 +388,11 @@ fn not_better(whole: Level, part: Level) -> bool {
     rank(whole) >= rank(part)
 }
 
-fn run(random: &mut Random) -> (Monitor, Instant) {
+fn run(random: &mut Random) -> (Monitor, BootMs) {
     let mut monitor = Monitor::new(random.params());
     // At power-on, and where the clock wraps.
     let start_ms = if random.below(2) == 0 { 0 } else { u64::from(u32::MAX) - random.below(40_000_000) };
-    let mut now = Instant::from_millis(start_ms);
+    let mut now = BootMs::from_millis(start_ms);
     monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(random.heartbeat()));
     for _ in 0..1_000 {
         let step_ms = match random.below(20) {
@@ -401,10 +401,10 @@ fn run(random: &mut Random) -> (Monitor, Instant) {
             2 => 0,
             _ => 50,
         };
-        now = now + Span::from_millis(step_ms);
+        now = now + Millis::from_millis(step_ms);
         for _ in 0..random.below(4) {
             // A frame may wait for a while, and the clock may have gone on since it was read.
-            let late = Span::from_millis(random.below(3) * random.below(2_000));
+            let late = Millis::from_millis(random.below(3) * random.below(2_000));
             let at = if random.below(8) == 0 { now + late } else { now };
             let observation = random.observation();
             for _ in 0..=random.below(2) {
@@ -436,7 +436,7 @@ fn after_anything_at_all_a_vehicle_that_falls_silent_is_critical_and_nothing_tha
         let mut now = end;
         // Longer than any debounce, and than any observed time in the future.
         for _ in 0..600 {
-            now = now + Span::from_millis(200);
+            now = now + Millis::from_millis(200);
             monitor.tick(now, &LinkReading::default(), &RecorderStatus::default(), &mut |_| {});
         }
         for (check, instance, level) in monitor.health().levels() {
@@ -466,7 +466,7 @@ fn what_is_said_to_be_unknown_is_never_ok() {
         let mut random = Random { state: seed, values: Values::Unknown };
         let mut monitor = Monitor::new(Params::defaults());
         for now_ms in (0..120_000).step_by(50) {
-            let now = Instant::from_millis(now_ms);
+            let now = BootMs::from_millis(now_ms);
             let heartbeat = Heartbeat {
                 armed: now_ms > 1_000,
                 state: 4,

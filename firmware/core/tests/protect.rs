@@ -10,7 +10,7 @@ use hums_core::observation::{
 };
 use hums_core::params::Params;
 use hums_core::protect::{Action, Request, Stage, Step};
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::units::{Fraction, MetresPerSecond2, RadiansPerSecond};
 
 use Autopilot::{ArduPilot, Px4};
@@ -87,7 +87,7 @@ fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad, &mut Monitor)) -> O
 
 fn say(now_ms: u64, monitor: &mut Monitor, at_ms: u64, source: Source, observation: Observation) {
     if now_ms == at_ms {
-        monitor.observe(Instant::from_millis(now_ms), source, &observation);
+        monitor.observe(BootMs::from_millis(now_ms), source, &observation);
     }
 }
 

@@ -4,7 +4,7 @@ use hums_core::alert;
 use hums_core::cause::Alert;
 use hums_core::clock::Instant;
 use hums_core::observation::Source;
-use hums_core::time::{self, Span};
+use hums_core::time::{self, Millis};
 use hums_dialect::ids::STATUSTEXT;
 
 use crate::frame::{Check, Frame};
@@ -12,7 +12,7 @@ use crate::packet::Fields;
 use crate::text::TEXT_BYTES_MAX;
 
 /// Time after which a text without its last part counts as complete. Autopilots send the parts in one go.
-const COMPLETE_AFTER: Span = Span::from_secs(1);
+const COMPLETE_AFTER: Millis = Millis::from_secs(1);
 /// Bytes of a text that are looked up: two parts. Longer texts of autopilots begin with their subject.
 const BYTES_MAX: usize = 2 * TEXT_BYTES_MAX;
 /// The autopilot, and a companion computer that talks at the same time.
@@ -52,7 +52,7 @@ pub(crate) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
 /// Lacks its last part.
 #[derive(Clone, Debug)]
 struct Open {
-    at: time::Instant,
+    at: time::BootMs,
     source: Source,
     id: u16,
     severity: u8,
@@ -72,7 +72,7 @@ impl LongTexts {
 
     /// Gives the alerts of complete texts.
     pub fn frame(&mut self, at: Instant, frame: &Frame<'_>, give: &mut impl FnMut(Source, Alert)) {
-        let at = time::Instant::from(at);
+        let at = time::BootMs::from(at);
         for open in &mut self.0 {
             complete(open, give, |open| at.since(open.at) > COMPLETE_AFTER);
         }

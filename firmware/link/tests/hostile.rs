@@ -8,7 +8,7 @@ use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::params::{Params, TABLE};
 use hums_core::snapshot::{COLUMNS_MAX, SAMPLES};
 use hums_core::status::{LinkReading, RecorderStatus};
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::usage::FIGURE_FIRST;
 use hums_link::sequence::Sequences;
 use hums_link::{Framer, observe};
@@ -72,7 +72,7 @@ fn params(settings: &[(usize, f32)]) -> Params {
     params
 }
 
-fn look(monitor: &mut Monitor, now: Instant) {
+fn look(monitor: &mut Monitor, now: BootMs) {
     let sane = |counter: u8, value: f64| {
         // A figure may be negative: a motor slower than the others.
         let sign = counter >= FIGURE_FIRST || value >= 0.0;
@@ -137,7 +137,7 @@ proptest! {
             messages.iter().map(|(at, payload, gap_ms, sequence)| (frame(USED[*at], *sequence, payload), *gap_ms)),
         ) {
             now_ms += bytes.1;
-            let now = Instant::from_millis(now_ms);
+            let now = BootMs::from_millis(now_ms);
             let heard = clock::Instant::from_millis(now_ms);
             framer.push(&bytes.0, &mut |frame| {
                 sequences.frame(heard, &frame);
@@ -161,7 +161,7 @@ proptest! {
         let mut monitor = Monitor::new(Params::defaults());
         let mut framer = Framer::new();
         for beat in 0..beats {
-            let now = Instant::from_millis(u64::from(beat) * 500);
+            let now = BootMs::from_millis(u64::from(beat) * 500);
             let mut bytes = frame(0, beat, &heartbeat(beat % 2 == 0, 3));
             // Every integer at its unknown value, every float NaN.
             bytes.extend(frame(unknown, beat, &[0xff; 100]));

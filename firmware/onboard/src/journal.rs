@@ -7,7 +7,7 @@ use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::params::Param;
-use hums_core::time::Span;
+use hums_core::time::Millis;
 use hums_link::text::Text;
 use hums_recorder::status::CardStatus;
 
@@ -19,7 +19,7 @@ use crate::queues::SectorsIn;
 const BY_HAND: u8 = 12;
 
 /// Maximum age of a current heartbeat; autopilots send one each second.
-const HEARTBEAT_AGE_MAX: Span = Span::from_secs(3);
+const HEARTBEAT_AGE_MAX: Millis = Millis::from_secs(3);
 
 /// The author of an action: MAVLink system and component id; 0, 0 is the monitor itself.
 pub(crate) type By = (u8, u8);

@@ -9,14 +9,14 @@ use hums_core::clock::Instant;
 use hums_core::flight::Flight;
 use hums_core::observation::{Esc, Observation, Source};
 use hums_core::params::Params;
-use hums_core::time::{self, Span};
+use hums_core::time::{self, Millis};
 use hums_core::units::{MetresPerSecond, MetresPerSecond2};
 use hums_core::vehicle::{Motor, Vehicle};
 
 use crate::mavlink::values::Scalar;
 
 /// Slow streams: 2 to 5 s.
-const AGE_MAX: Span = Span::from_secs(10);
+const AGE_MAX: Millis = Millis::from_secs(10);
 
 /// Motors of the reference system's tables.
 pub const MOTORS: usize = 4;
@@ -126,7 +126,7 @@ pub struct Reference {
     vehicle: Vehicle,
     flight: Flight,
     /// Last complete flight.
-    flown: Span,
+    flown: Millis,
     heard: Option<Instant>,
 }
 
@@ -142,7 +142,7 @@ impl Reference {
         Self {
             vehicle: Vehicle::default(),
             flight: Flight::default(),
-            flown: Span::from_secs(0),
+            flown: Millis::from_secs(0),
             heard: None,
         }
     }
@@ -153,14 +153,14 @@ impl Reference {
             return false;
         }
         self.heard = Some(at);
-        let at = time::Instant::from(at);
+        let at = time::BootMs::from(at);
         let since = self.flight.airborne_since();
         let params = Params::defaults();
         self.flight.observe(at, &self.vehicle, observation, &params);
         self.flight.step(at, &self.vehicle, &params);
         match (since, self.flight.airborne_since()) {
             (Some(since), None) => self.flown = at.since(since),
-            (None, Some(_)) => self.flown = Span::ZERO,
+            (None, Some(_)) => self.flown = Millis::ZERO,
             _ => {}
         }
         true
@@ -178,7 +178,7 @@ impl Reference {
 
     /// Present value.
     pub fn value(&self, now: Instant, quantity: Quantity) -> Option<Scalar> {
-        let now = time::Instant::from(now);
+        let now = time::BootMs::from(now);
         let single = |value: f32| Some(Scalar::Single(value));
         let vehicle = &self.vehicle;
         let gnss = || vehicle.gnss.first().and_then(|gnss| gnss.within(now, AGE_MAX));
@@ -222,17 +222,17 @@ impl Reference {
         }
     }
 
-    fn acceleration(&self, now: time::Instant) -> Option<[MetresPerSecond2; 3]> {
+    fn acceleration(&self, now: time::BootMs) -> Option<[MetresPerSecond2; 3]> {
         self.vehicle.imu.within(now, AGE_MAX)?.acceleration
     }
 
-    fn velocity(&self, now: time::Instant) -> Option<[MetresPerSecond; 3]> {
+    fn velocity(&self, now: time::BootMs) -> Option<[MetresPerSecond; 3]> {
         let local = self.vehicle.local.within(now, AGE_MAX).map(|local| local.velocity);
         local.or_else(|| self.vehicle.global.within(now, AGE_MAX).map(|global| global.velocity))
     }
 
     /// The first one, or the autopilot's status.
-    fn battery(&self, now: time::Instant, quantity: Quantity) -> Option<Scalar> {
+    fn battery(&self, now: time::BootMs, quantity: Quantity) -> Option<Scalar> {
         let battery = self.vehicle.batteries.first().and_then(|battery| battery.within(now, AGE_MAX));
         let system = || self.vehicle.system.within(now, AGE_MAX);
         if quantity == Quantity::BatteryVolts {
@@ -243,7 +243,7 @@ impl Reference {
         Some(Scalar::Single(percent(remaining?.0)))
     }
 
-    fn esc(&self, now: time::Instant, motor: usize, at: fn(&Motor) -> Option<time::Instant>) -> Option<&Esc> {
+    fn esc(&self, now: time::BootMs, motor: usize, at: fn(&Motor) -> Option<time::BootMs>) -> Option<&Esc> {
         let motor = self.vehicle.motors.get(motor)?;
         at(motor).filter(|at| now.since(*at) <= AGE_MAX).map(|_| &motor.esc)
     }

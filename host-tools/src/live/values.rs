@@ -43,7 +43,7 @@ impl Serialize for Shown {
     }
 }
 
-type Told = (Option<time::Instant>, Option<f32>);
+type Told = (Option<time::BootMs>, Option<f32>);
 
 fn of<T>(message: &Latest<T>, value: impl FnOnce(&T) -> Option<f32>) -> Told {
     (message.at(), message.get().and_then(value))

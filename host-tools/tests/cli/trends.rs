@@ -13,7 +13,7 @@ use hums_core::health::Level;
 use hums_core::observation::{Observation, Outputs};
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::units::{Amperes, Rpm, Volts};
 
 type Change = fn(&mut Quad);
@@ -23,7 +23,7 @@ type Expected = (&'static str, u8, Level);
 fn fly(past: &mut Baselines, change: Change, pulses: Option<[u16; 4]>) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     for now_ms in (0..100_000).step_by(50) {
-        let now = Instant::from_millis(now_ms);
+        let now = BootMs::from_millis(now_ms);
         let mut quad = Quad::healthy();
         change(&mut quad);
         quad.armed = now_ms < 90_000;

@@ -1,10 +1,10 @@
 use super::*;
 use crate::bytes::fnv1a;
 
-const T0: Instant = Instant::from_millis(1_000);
+const T0: BootMs = BootMs::from_millis(1_000);
 
-fn after(seconds: u64) -> Instant {
-    T0 + Span::from_secs(seconds)
+fn after(seconds: u64) -> BootMs {
+    T0 + Millis::from_secs(seconds)
 }
 
 #[test]

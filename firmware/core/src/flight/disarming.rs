@@ -8,10 +8,10 @@ use super::{Flight, STILL};
 use crate::mishap::MishapKind;
 use crate::motion::{STILL_MPS, WINGS_MPS, WindowMax, climb_mps, ground_speed_mps};
 use crate::params::{Param, Params};
-use crate::time::{Instant, PAUSE, Span};
+use crate::time::{BootMs, Millis, PAUSE};
 use crate::vehicle::Vehicle;
 
-const WATCH: Span = Span::from_secs(3);
+const WATCH: Millis = Millis::from_secs(3);
 /// A disarmed vehicle that sinks so fast sinks through the air, m/s.
 pub(super) const FALLING_MPS: f32 = 2.5;
 /// One that is lower by so much fell, m.
@@ -21,7 +21,7 @@ const DROPS_MPS: f32 = 10.0;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DisarmWatch {
-    since: Instant,
+    since: BootMs,
     pub(super) height_m: Option<f32>,
     /// Height above mean sea level, m.
     altitude_m: Option<f32>,
@@ -33,14 +33,14 @@ pub(super) struct DisarmWatch {
 impl Flight {
     pub(super) fn note_disarming(
         &mut self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         params: &Params,
         height_m: Option<f32>,
     ) {
         // A valley below home has air too. At an unknown height rotorcraft are watched if their forces are measured; a plane rolls on after a
         // landing.
-        let is_felt = self.felt.at != Instant::ZERO && on_rotors(now, vehicle);
+        let is_felt = self.felt.at != BootMs::ZERO && on_rotors(now, vehicle);
         let is_high = height_m.map_or(is_felt, |height_m| height_m.abs() > params.get(Param::MisDisarm));
         if is_high || self.motion.sink.greatest(now) > FALLING_MPS {
             self.watch = Some(DisarmWatch {
@@ -53,7 +53,7 @@ impl Flight {
         }
     }
 
-    pub(super) fn judge_disarming(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+    pub(super) fn judge_disarming(&mut self, now: BootMs, vehicle: &Vehicle, params: &Params) {
         let Some(mut watch) = self.watch else { return };
         // A terminated vehicle stays armed.
         let says_so = vehicle.armed() && self.calls_itself_landed(now, vehicle);
@@ -68,7 +68,7 @@ impl Flight {
         }
     }
 
-    fn was_in_air(&self, now: Instant, vehicle: &Vehicle, watch: &DisarmWatch) -> bool {
+    fn was_in_air(&self, now: BootMs, vehicle: &Vehicle, watch: &DisarmWatch) -> bool {
         let passed = now.since(watch.since);
         let is_lower = watch
             .altitude_m
@@ -87,15 +87,15 @@ impl Flight {
     }
 
     /// Whether it was terminated and did not stand after that. Sensors and speeds that are told no more do not say that it stands.
-    fn is_lost_off(&self, now: Instant, vehicle: &Vehicle, watch: &DisarmWatch) -> bool {
+    fn is_lost_off(&self, now: BootMs, vehicle: &Vehicle, watch: &DisarmWatch) -> bool {
         !watch.stood
-            && self.felt.at != Instant::ZERO
+            && self.felt.at != BootMs::ZERO
             && on_rotors(now, vehicle)
             && vehicle.armed()
             && now.since(watch.since) > WATCH
     }
 
-    fn stands_off(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    fn stands_off(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let slow = |speed_mps: Option<f32>| speed_mps.is_some_and(|speed_mps| speed_mps.abs() < STILL_MPS);
         now.since(self.felt.at) <= STILL
             && vehicle.inertial.is_level_for(now, STILL)
@@ -105,6 +105,6 @@ impl Flight {
 }
 
 /// Height above mean sea level, m: home is another one once it is disarmed.
-pub(super) fn altitude_m(now: Instant, vehicle: &Vehicle) -> Option<f32> {
+pub(super) fn altitude_m(now: BootMs, vehicle: &Vehicle) -> Option<f32> {
     vehicle.global.within(now, PAUSE).map(|global| global.altitude.0)
 }

@@ -12,7 +12,7 @@ use crate::motion::{STILL_MPS, TILTED_RAD, climb_mps, ground_speed_mps, height_m
 use crate::observation::{Attitude, EstimatorScale, Imu, Observation, VehicleKind};
 use crate::params::{Param, Params};
 use crate::thrust::{FULL, Power};
-use crate::time::{FRESH, Instant, PAUSE, Span, Stamp};
+use crate::time::{BootMs, FRESH, Millis, PAUSE, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 use crate::vehicle::Vehicle;
 
@@ -21,15 +21,15 @@ const FALL_G: f32 = 0.3;
 /// Below this load factor, g, it falls: no multicopter sinks so hard on purpose. A bounce is shorter than the first of these; a fall from
 /// half a metre lasts as long as the second.
 const UNLOADED_G: f32 = 0.65;
-const UNLOADED: Span = Span::from_millis(200);
-const DROPS: Span = Span::from_millis(300);
+const UNLOADED: Millis = Millis::from_millis(200);
+const DROPS: Millis = Millis::from_millis(300);
 /// A speed has broken off when it is below this part of it within so long.
 const BROKEN_OFF: f32 = 0.4;
-pub(super) const BREAKS_OFF: Span = Span::from_secs(1);
+pub(super) const BREAKS_OFF: Millis = Millis::from_secs(1);
 /// A vehicle whose speed broke off thrashes about for so long at most.
-const THRASHES: Span = Span::from_secs(8);
+const THRASHES: Millis = Millis::from_secs(8);
 /// A shock counts if the vehicle lies still within this time.
-const AFTER_SHOCK: Span = Span::from_secs(4);
+const AFTER_SHOCK: Millis = Millis::from_secs(4);
 /// A shock stops a vehicle that was this fast, m/s.
 const IMPACT_MPS: f32 = 3.5;
 /// Shock, g, and sink, m/s, of a landing on legs. The fastest landing speed that can be set is 2.5 m/s.
@@ -42,9 +42,9 @@ const SKIDS_MPS: f32 = 15.0;
 /// Wings pull out of a dive with so much at most, g: the limit of CS-23 for the aerobatic category.
 const PULL_OUT_G: f32 = 6.0;
 /// Tumbling and sinking last so long at least.
-const LASTS: Span = Span::from_millis(500);
+const LASTS: Millis = Millis::from_millis(500);
 /// A roll on wings takes a second.
-const TUMBLES_ON_WINGS: Span = Span::from_millis(1_500);
+const TUMBLES_ON_WINGS: Millis = Millis::from_millis(1_500);
 /// Rotors that pull downwards for a moment more than level, by the estimator's attitude alone.
 const OVERTURNED_DEG: f32 = 100.0;
 /// A vehicle may sink so much faster than its setpoint, m/s.
@@ -62,13 +62,13 @@ const SAMPLES: u8 = 3;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Lasting {
-    since: Instant,
+    since: BootMs,
     samples: u8,
-    last: Instant,
+    last: BootMs,
 }
 
 impl Lasting {
-    fn take(&mut self, at: Instant, so: bool) -> Option<Span> {
+    fn take(&mut self, at: BootMs, so: bool) -> Option<Millis> {
         if !so {
             self.samples = 0;
             return None;
@@ -81,7 +81,7 @@ impl Lasting {
         (self.samples >= SAMPLES).then(|| at.since(self.since))
     }
 
-    fn lasts(&self, now: Instant, span: Span) -> bool {
+    fn lasts(&self, now: BootMs, span: Millis) -> bool {
         self.samples >= 2 && now.since(self.last) <= PAUSE && now.since(self.since) >= span
     }
 }
@@ -92,7 +92,7 @@ pub(super) struct Signs {
     pub(super) worst: [f32; MishapKind::COUNT],
     /// A sign of this step; the time of the last one.
     pub(super) seen: Option<MishapKind>,
-    pub(super) seen_at: Instant,
+    pub(super) seen_at: BootMs,
     /// Since when an inertial sensor has fallen or turned while the others say that it flies.
     doubted_since: Stamp,
     falls: Lasting,
@@ -105,12 +105,12 @@ pub(super) struct Signs {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Peak {
     height_m: Option<f32>,
-    at: Instant,
+    at: BootMs,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shock {
-    at: Instant,
+    at: BootMs,
     pub(super) load_g: f32,
     /// Speed just before it, m/s; 0 if the estimator is not to be believed.
     speed_mps: f32,
@@ -124,7 +124,7 @@ pub(super) struct Shock {
 
 impl Flight {
     /// An observation that the vehicle took.
-    pub fn observe(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation, params: &Params) {
+    pub fn observe(&mut self, at: BootMs, vehicle: &Vehicle, observation: &Observation, params: &Params) {
         self.estimate(at, vehicle, observation);
         let watched = self.arming.is_on
             || matches!(self.stage, Stage::Falling | Stage::Impacted)
@@ -153,7 +153,7 @@ impl Flight {
         }
     }
 
-    fn take_imu(&mut self, at: Instant, imu: &Imu, vehicle: &Vehicle, params: &Params) {
+    fn take_imu(&mut self, at: BootMs, imu: &Imu, vehicle: &Vehicle, params: &Params) {
         if let Some(acceleration) = imu.acceleration {
             self.take_force(at, acceleration, vehicle, params);
         }
@@ -162,7 +162,7 @@ impl Flight {
         }
     }
 
-    fn estimate(&mut self, at: Instant, vehicle: &Vehicle, observation: &Observation) {
+    fn estimate(&mut self, at: BootMs, vehicle: &Vehicle, observation: &Observation) {
         match observation {
             Observation::Air(air) | Observation::ImuAndAir(_, air) if air.instance == 0 => {
                 if let Some(pressure) = air.pressure {
@@ -186,7 +186,7 @@ impl Flight {
     }
 
     /// Two report flight, none reports standing, and the vehicle does not sink: the inertial sensor is bad.
-    pub(super) fn doubt(&mut self, now: Instant, vehicle: &Vehicle, votes: Votes) {
+    pub(super) fn doubt(&mut self, now: BootMs, vehicle: &Vehicle, votes: Votes) {
         let holds = climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps > -FALLING_MPS)
             && self.pressure.follows(now, -FALLING_MPS) != Some(true);
         let others_fly = (votes.flies & !INERTIAL).count_ones() >= 2 && votes.stands == 0;
@@ -194,7 +194,7 @@ impl Flight {
         self.signs.doubted_since.run(goes_on && others_fly && holds, now, RECOVERED);
     }
 
-    pub(super) fn see(&mut self, at: Instant, kind: MishapKind, value: f32, params: &Params) {
+    pub(super) fn see(&mut self, at: BootMs, kind: MishapKind, value: f32, params: &Params) {
         let is_felt = matches!(kind, MishapKind::FreeFall | MishapKind::Tumbling);
         if is_felt && self.signs.doubted_since.older_than(at, RECOVERED) {
             return;
@@ -212,7 +212,7 @@ impl Flight {
         }
     }
 
-    fn take_force(&mut self, at: Instant, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
+    fn take_force(&mut self, at: BootMs, force: [MetresPerSecond2; 3], vehicle: &Vehicle, params: &Params) {
         let Some(load_g) = load_factor_g(force) else {
             // Without a valid force the vehicle is not at rest.
             self.felt.load_g = Some(f32::INFINITY);
@@ -249,7 +249,7 @@ impl Flight {
     }
 
     /// A shock, which may come between two samples.
-    fn take_shock(&mut self, at: Instant, load_g: f32, vehicle: &Vehicle, params: &Params) {
+    fn take_shock(&mut self, at: BootMs, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
             // What broke off a speed goes on while it bounces, or thrashes about.
             let before = self.shock.and_then(|shock| {
@@ -280,7 +280,7 @@ impl Flight {
         }
     }
 
-    fn take_rates(&mut self, at: Instant, rates: [RadiansPerSecond; 3], vehicle: &Vehicle, params: &Params) {
+    fn take_rates(&mut self, at: BootMs, rates: [RadiansPerSecond; 3], vehicle: &Vehicle, params: &Params) {
         let rate = norm(rates.map(|rate| rate.0));
         if !rate.is_finite() {
             return;
@@ -295,7 +295,7 @@ impl Flight {
     }
 
     /// No autopilot or pilot asks for rotors that pull downwards, except in modes for it.
-    fn take_attitude(&mut self, at: Instant, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
+    fn take_attitude(&mut self, at: BootMs, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
         let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
         if (most > TILTED_RAD || self.felt.rate_radps > TURNS_RADPS) && self.arming.is_on {
@@ -315,7 +315,7 @@ impl Flight {
         }
     }
 
-    fn take_motion(&mut self, at: Instant, vehicle: &Vehicle, params: &Params) {
+    fn take_motion(&mut self, at: BootMs, vehicle: &Vehicle, params: &Params) {
         let (Some(climb_mps), Some(ground_mps)) = (climb_mps(at, vehicle), ground_speed_mps(at, vehicle))
         else {
             return;
@@ -339,13 +339,13 @@ impl Flight {
         }
     }
 
-    pub(super) fn touch(&mut self, at: Instant, sink_mps: f32) {
+    pub(super) fn touch(&mut self, at: BootMs, sink_mps: f32) {
         if self.pressure.follows(at, -sink_mps) != Some(false) {
             self.touch_mps = self.touch_mps.max(sink_mps);
         }
     }
 
-    fn take_sink(&mut self, at: Instant, sink_mps: f32, vehicle: &Vehicle, params: &Params) {
+    fn take_sink(&mut self, at: BootMs, sink_mps: f32, vehicle: &Vehicle, params: &Params) {
         let limit_mps = params.get(Param::MisSink);
         let on_wings = vehicle.hovers(at) == Some(false);
         let least = if on_wings { FULL_ON_WINGS } else { FULL };
@@ -368,7 +368,7 @@ impl Flight {
     }
 
     /// Height below the highest since full thrust, less that of a glide path.
-    fn lose_height(&mut self, at: Instant, thrust: bool, vehicle: &Vehicle) -> f32 {
+    fn lose_height(&mut self, at: BootMs, thrust: bool, vehicle: &Vehicle) -> f32 {
         let since_s = at.since(core::mem::replace(&mut self.peak.at, at)).as_secs_f32();
         let height_m = height_m(at, vehicle).filter(|_| thrust && self.arming.is_on);
         let faded_m = self.peak.height_m.map(|peak_m| peak_m - GLIDES_MPS * since_s);
@@ -378,13 +378,13 @@ impl Flight {
     }
 
     /// Whether the throttle asks for thrust; not known is yes. Thrown into the air to start (`ArduCopter`'s THROW), it falls.
-    fn asks_for_thrust(&self, at: Instant, vehicle: &Vehicle) -> bool {
+    fn asks_for_thrust(&self, at: BootMs, vehicle: &Vehicle) -> bool {
         let asks = |part: f32| self.thrust.power(part) != Power::Idle;
         !is_thrown(vehicle) && throttle(at, vehicle).is_none_or(asks)
     }
 
     /// A shock after which it is still, and nothing carries it in the air.
-    pub(super) fn judge_shock(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+    pub(super) fn judge_shock(&mut self, now: BootMs, vehicle: &Vehicle, params: &Params) {
         let Some(shock) = self.shock else { return };
         if now.since(shock.at) > AFTER_SHOCK {
             self.shock = None;
@@ -413,21 +413,21 @@ impl Flight {
 
     /// Whether a still vehicle cannot hang in the air: it is off, landed by its own report, on its side, without
     /// thrust or at full thrust.
-    fn hangs_not(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>) -> bool {
+    fn hangs_not(&self, now: BootMs, vehicle: &Vehicle, power: Option<Power>) -> bool {
         !self.arming.is_on
             || self.calls_itself_landed(now, vehicle)
             || self.lies(now, vehicle)
             || matches!(power, Some(Power::Idle | Power::Full))
     }
 
-    pub(super) fn is_turned_over(&self, now: Instant, vehicle: &Vehicle, kind: MishapKind) -> bool {
+    pub(super) fn is_turned_over(&self, now: BootMs, vehicle: &Vehicle, kind: MishapKind) -> bool {
         self.thrust.was_driven(now, DRIVEN)
             && on_rotors(now, vehicle)
             && (kind == MishapKind::Tumbling || self.lies_turned(now, vehicle).is_some())
     }
 
     /// How far it lies over, rad, if it stood level while it was armed and turned since.
-    fn lies_turned(&self, now: Instant, vehicle: &Vehicle) -> Option<f32> {
+    fn lies_turned(&self, now: BootMs, vehicle: &Vehicle) -> Option<f32> {
         let over = vehicle.inertial.lies_over(now)?;
         let turned = self.arming.stood && !vehicle.inertial.turns_little(now, DRIVEN);
         (turned && !is_fast(now, vehicle)).then_some(over)
@@ -448,13 +448,13 @@ impl Flight {
 }
 
 /// A mission, a script or an offboard computer asks for such a sink.
-fn is_told_to_sink(at: Instant, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
+fn is_told_to_sink(at: BootMs, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
     let wanted_mps = vehicle.climb_wanted.within(at, FRESH).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)
 }
 
 /// In such a bank all the thrust of a multicopter may not carry it.
-fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
+fn is_told_to_bank(at: BootMs, vehicle: &Vehicle) -> bool {
     vehicle
         .wanted
         .within(at, FRESH)
@@ -463,7 +463,7 @@ fn is_told_to_bank(at: Instant, vehicle: &Vehicle) -> bool {
 
 /// True also without a displayed climb, or with zeros only. A receiver that loses its satellites reports a
 /// fall that neither barometer nor inertial sensors see.
-fn is_displayed(at: Instant, sink_mps: f32, vehicle: &Vehicle) -> bool {
+fn is_displayed(at: BootMs, sink_mps: f32, vehicle: &Vehicle) -> bool {
     const PART: f32 = 0.3;
     let climb_mps = vehicle.hud.within(at, PAUSE).and_then(|hud| hud.climb).map(|climb| climb.0);
     climb_mps

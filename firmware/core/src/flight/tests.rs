@@ -54,7 +54,7 @@ fn fly(kind: VehicleKind, script: &str) -> String {
         let (until_s, words) = piece.split_once(' ').unwrap();
         let (since_ms, until_ms) = (now_ms, (until_s.parse::<f32>().unwrap() * 1_000.0) as u64);
         while now_ms < until_ms {
-            let now = Instant::from_millis(now_ms);
+            let now = BootMs::from_millis(now_ms);
             for observation in observations(words, (now_ms - since_ms) as f32 / 1_000.0, kind) {
                 if now_ms.is_multiple_of(500) || !matches!(observation, Observation::Landed(..)) {
                     vehicle.observe(now, AUTOPILOT, &observation);
@@ -64,7 +64,7 @@ fn fly(kind: VehicleKind, script: &str) -> String {
             if flight.airborne() && !flight.may_have_landed() {
                 flew_ms = now_ms;
             }
-            let of_ms = flight.airborne_since().map_or(flew_ms, Instant::as_millis);
+            let of_ms = flight.airborne_since().map_or(flew_ms, BootMs::as_millis);
             events.extend(
                 event.map(|event| {
                     format!("{event:?} {} of {}", now_ms as f32 / 1_000.0, of_ms as f32 / 1_000.0)

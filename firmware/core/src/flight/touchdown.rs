@@ -6,14 +6,14 @@
 
 use super::GROUND_LASTS;
 use crate::motion::HANGS_MPS;
-use crate::time::Instant;
+use crate::time::BootMs;
 
 /// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
 const SAME_HEIGHT_M: f32 = 1.5;
 
 #[derive(Clone, Copy, Debug)]
 struct Stop {
-    at: Instant,
+    at: BootMs,
     height_m: f32,
     sink_mps: f32,
 }
@@ -23,7 +23,7 @@ pub(super) struct Touchdown(Option<Stop>);
 
 impl Touchdown {
     /// Sink is negative in a climb; the other sink is the most in the last second.
-    pub(super) fn step(&mut self, at: Instant, sink_mps: f32, fastest_mps: f32, height_m: f32) {
+    pub(super) fn step(&mut self, at: BootMs, sink_mps: f32, fastest_mps: f32, height_m: f32) {
         if fastest_mps < HANGS_MPS || sink_mps > fastest_mps / 2.0 {
             return;
         }
@@ -35,7 +35,7 @@ impl Touchdown {
     }
 
     /// The vehicle stands at this height: how fast it touched, m/s. 0 where nothing broke off: it came down gently.
-    pub(super) fn take(&mut self, at: Instant, height_m: Option<f32>) -> f32 {
+    pub(super) fn take(&mut self, at: BootMs, height_m: Option<f32>) -> f32 {
         let here = |stop: &Stop| {
             at.since(stop.at) <= GROUND_LASTS
                 && height_m.is_none_or(|height_m| (stop.height_m - height_m).abs() <= SAME_HEIGHT_M)
@@ -56,12 +56,12 @@ mod tests {
             for _ in 0..(seconds * 5.0) as u32 {
                 now_ms += 200;
                 height_m -= sink_mps * 0.2;
-                let now = Instant::from_millis(now_ms);
+                let now = BootMs::from_millis(now_ms);
                 sink.take(now, *sink_mps);
                 touchdown.step(now, *sink_mps, sink.greatest(now), height_m);
             }
         }
-        touchdown.take(Instant::from_millis(now_ms), Some(height_m))
+        touchdown.take(BootMs::from_millis(now_ms), Some(height_m))
     }
 
     #[test]

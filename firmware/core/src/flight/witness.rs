@@ -22,7 +22,7 @@ use crate::observation::{LandedState, VehicleKind};
 use crate::params::Params;
 use crate::pressure::NOISE_M;
 use crate::thrust::Power;
-use crate::time::{Instant, PAUSE, SILENT, Span};
+use crate::time::{BootMs, Millis, PAUSE, SILENT};
 use crate::units::{GRAVITY, norm};
 use crate::vehicle::Vehicle;
 
@@ -30,13 +30,13 @@ use crate::vehicle::Vehicle;
 const ON_BACK_G: f32 = 0.5;
 /// A vehicle with idle throttle, its weight on it and a steady pressure for this long stands. A flare takes its
 /// weight from the ground speed for less.
-const SUPPORTED: Span = Span::from_secs(4);
+const SUPPORTED: Millis = Millis::from_secs(4);
 /// The weight, g, with the scale error of a sensor; more is a bias, which may be what lost the estimate.
 const WEIGHT_G: core::ops::Range<f32> = 0.85..2.0;
 /// The pressure stays within this meanwhile, m.
 const STAYS_M: f32 = 1.2;
 /// A vehicle without power that has not sunk for so long, by the pressure, is down.
-const STEADY: Span = Span::from_secs(3);
+const STEADY: Millis = Millis::from_secs(3);
 /// A climb or sink by this, m/s, shows in the pressure, or the estimate is lost.
 const LOST_MPS: f32 = 2.0;
 
@@ -83,7 +83,7 @@ impl Votes {
 
 impl Flight {
     /// Asks all witnesses.
-    pub(super) fn ask(&self, now: Instant, vehicle: &Vehicle) -> Votes {
+    pub(super) fn ask(&self, now: BootMs, vehicle: &Vehicle) -> Votes {
         let mut votes = Votes::default();
         let is_lost = self.is_lost(now, vehicle);
         let heights = self.heights(now, vehicle, is_lost);
@@ -105,7 +105,7 @@ impl Flight {
         votes
     }
 
-    fn word(&self, now: Instant, vehicle: &Vehicle) -> Vote {
+    fn word(&self, now: BootMs, vehicle: &Vehicle) -> Vote {
         match vehicle.landed.within(now, SILENT) {
             Some(LandedState::OnGround) => Stands,
             Some(LandedState::InAir | LandedState::Landing) if self.arming.is_on => Flies,
@@ -115,11 +115,11 @@ impl Flight {
         }
     }
 
-    pub(super) fn calls_itself_landed(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    pub(super) fn calls_itself_landed(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         self.word(now, vehicle) == Stands
     }
 
-    fn heights(&self, now: Instant, vehicle: &Vehicle, is_lost: bool) -> [Vote; 2] {
+    fn heights(&self, now: BootMs, vehicle: &Vehicle, is_lost: bool) -> [Vote; 2] {
         let by_position = self.motion.rise_m(now, vehicle).filter(|_| !is_lost);
         [(self.pressure.height_m(now), NOISE_M), (by_position, LOW_M)].map(|(height_m, low_m)| match height_m
         {
@@ -131,9 +131,9 @@ impl Flight {
         })
     }
 
-    fn height(&self, now: Instant, heights: [Vote; 2]) -> Vote {
+    fn height(&self, now: BootMs, heights: [Vote; 2]) -> Vote {
         if !self.arming.is_on && self.stage.is_mishap() {
-            let passed = self.arming.off_at.map_or(Span::ZERO, |since| now.since(since));
+            let passed = self.arming.off_at.map_or(Millis::ZERO, |since| now.since(since));
             let steady_for = self.pressure.steady_for(now).map(|span| span.min(passed));
             return steady_for.map_or(Unknown, |span| if span >= STEADY { Stands } else { Flies });
         }
@@ -145,19 +145,19 @@ impl Flight {
         }
     }
 
-    pub(super) fn is_away(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    pub(super) fn is_away(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         are_away(self.heights(now, vehicle, self.is_lost(now, vehicle)))
     }
 
     /// The effect of the throttle. `None` if it is not reported, or if it is reported as zero while motors shake the vehicle.
-    pub(super) fn power(&self, now: Instant, vehicle: &Vehicle) -> Option<Power> {
+    pub(super) fn power(&self, now: BootMs, vehicle: &Vehicle) -> Option<Power> {
         let power = throttle(now, vehicle).map(|part| self.thrust.power(part));
         power.filter(|power| {
             *power != Power::Idle || self.thrust.has_flown() || vehicle.inertial.shakes(now) != Some(true)
         })
     }
 
-    fn thrust_vote(&self, now: Instant, vehicle: &Vehicle, power: Option<Power>, speed: Vote) -> Vote {
+    fn thrust_vote(&self, now: BootMs, vehicle: &Vehicle, power: Option<Power>, speed: Vote) -> Vote {
         let climbs = || climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps.abs() > STILL_MPS);
         match power {
             _ if !self.arming.is_on => Stands,
@@ -174,7 +174,7 @@ impl Flight {
 
     fn inertial(
         &self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         power: Option<Power>,
         [by_pressure, _]: [Vote; 2],
@@ -183,7 +183,7 @@ impl Flight {
         if self.stage.has_hit() {
             return Stands;
         }
-        if self.felt.at == Instant::ZERO {
+        if self.felt.at == BootMs::ZERO {
             return Unknown;
         }
         let turns = !vehicle.inertial.turns_little(now, TURNED);
@@ -201,7 +201,7 @@ impl Flight {
 
     fn speed(
         &self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         is_lost: bool,
         power: Option<Power>,
@@ -251,19 +251,19 @@ impl Flight {
 
     /// Whether the estimate of height and speed is lost. The pressure does not follow a climb or a sink; or, in a
     /// mishap, the receiver stands.
-    fn is_lost(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    fn is_lost(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let climbs = climb_mps(now, vehicle).filter(|climb_mps| climb_mps.abs() > LOST_MPS);
         self.has_strayed(now)
             || climbs.is_some_and(|climb_mps| self.pressure.follows(now, climb_mps) == Some(false))
     }
 
-    fn has_strayed(&self, now: Instant) -> bool {
+    fn has_strayed(&self, now: BootMs) -> bool {
         self.stage.is_mishap() && self.motion.has_strayed(now)
     }
 
     /// Whether it lies on its side or its back: by an attitude that the sensors do not contradict, or by the force that carries it. Wings bank,
     /// and tail-sitters look up.
-    pub(super) fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    pub(super) fn lies(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let flies = vehicle.hovers(now) == Some(false) && is_fast(now, vehicle);
         let is_over =
             self.arming.stood && on_rotors(now, vehicle) && vehicle.inertial.lies_over(now).is_some();
@@ -278,12 +278,12 @@ impl Flight {
 
     /// Whether something other than its rotors carries it, by no estimate: idle throttle, its weight on it, and a
     /// steady pressure for a while.
-    pub(super) fn is_supported(&self, now: Instant) -> bool {
+    pub(super) fn is_supported(&self, now: BootMs) -> bool {
         self.supported.is_some_and(|(since, _)| now.since(since) >= SUPPORTED)
     }
 
     /// One step of the same. An autopilot whose estimate climbs takes the thrust away, and flies into the ground.
-    pub(super) fn note_support(&mut self, now: Instant, vehicle: &Vehicle, params: &Params) {
+    pub(super) fn note_support(&mut self, now: BootMs, vehicle: &Vehicle, params: &Params) {
         let rests = self.arming.is_on
             && self.thrust.is_learnt()
             && self.power(now, vehicle) == Some(Power::Idle)
@@ -311,16 +311,16 @@ fn are_away(heights: [Vote; 2]) -> bool {
     heights.iter().any(|vote| matches!(vote, Flies | Below))
 }
 
-pub(super) fn on_rotors(now: Instant, vehicle: &Vehicle) -> bool {
+pub(super) fn on_rotors(now: BootMs, vehicle: &Vehicle) -> bool {
     vehicle.hovers(now) == Some(true)
 }
 
-pub(super) fn is_on_wings(now: Instant, vehicle: &Vehicle) -> bool {
+pub(super) fn is_on_wings(now: BootMs, vehicle: &Vehicle) -> bool {
     let has_wings = matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol);
     !vehicle.hovers(now).unwrap_or(!has_wings)
 }
 
-fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
+fn is_tilted(now: BootMs, vehicle: &Vehicle) -> bool {
     !vehicle.inertial.contradicts(now)
         && vehicle
             .attitude
@@ -328,7 +328,7 @@ fn is_tilted(now: Instant, vehicle: &Vehicle) -> bool {
             .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD)
 }
 
-pub(super) fn is_fast(now: Instant, vehicle: &Vehicle) -> bool {
+pub(super) fn is_fast(now: BootMs, vehicle: &Vehicle) -> bool {
     const DRAGS_MPS: f32 = 12.0;
     ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > DRAGS_MPS)
 }

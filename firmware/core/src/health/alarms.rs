@@ -2,23 +2,23 @@
 
 use super::finding::Level;
 use super::tables::STATES;
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// Alarms that are kept. One more is reported, explains nothing and is not explained.
 pub(super) const ALARMS_MAX: usize = 32;
 
 /// An explained alarm is reported by itself if it lasts this long after its cause ended or fell below it. A disturbed
 /// estimator needs some seconds to settle.
-pub(super) const OUTLIVES: Span = Span::from_secs(8);
+pub(super) const OUTLIVES: Millis = Millis::from_secs(8);
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
     pub(super) slot: u16,
     pub(super) level: Level,
-    pub(super) since: Instant,
+    pub(super) since: BootMs,
     /// The state whose alarm explains it, and when that ended or fell below this one.
     cause: Option<u16>,
-    cause_ended: Option<Instant>,
+    cause_ended: Option<BootMs>,
 }
 
 state! {
@@ -30,7 +30,7 @@ state! {
         silenced: [u32; STATES.div_ceil(32)] = [0; STATES.div_ceil(32)],
         /// The state whose alarm explains these, and when that ended.
         silence: Option<u16>,
-        silence_ended: Option<Instant>,
+        silence_ended: Option<BootMs>,
     }
 }
 
@@ -41,7 +41,7 @@ impl Alarms {
 
     /// A state's level changes. Gives since when it has an alarm; `None` where it has none, or no place is left for it. A rise is
     /// an onset of its own, with no cause yet. From now on an effect outlives this alarm if that no longer explains it at its new level.
-    pub(super) fn change(&mut self, slot: u16, level: Level, now: Instant) -> Option<Instant> {
+    pub(super) fn change(&mut self, slot: u16, level: Level, now: BootMs) -> Option<BootMs> {
         let is_alarm = matches!(level, Level::Warning | Level::Critical);
         for known in self.standing.iter_mut().flatten() {
             let explains = is_alarm && level as u8 >= known.level as u8;
@@ -78,7 +78,7 @@ impl Alarms {
         }
     }
 
-    pub(super) fn outliving(&self, place: usize, now: Instant) -> Option<u16> {
+    pub(super) fn outliving(&self, place: usize, now: BootMs) -> Option<u16> {
         let known = self.standing.get(place)?.as_ref()?;
         (now.since(known.cause_ended?) >= OUTLIVES).then_some(known.slot)
     }
@@ -95,7 +95,7 @@ impl Alarms {
     }
 
     /// A state that is stale still when its silence is over for [`OUTLIVES`]; each once.
-    pub(super) fn outliving_silence(&mut self, now: Instant) -> Option<u16> {
+    pub(super) fn outliving_silence(&mut self, now: BootMs) -> Option<u16> {
         if now.since(self.silence_ended?) < OUTLIVES {
             return None;
         }

@@ -25,7 +25,7 @@ use super::suppression::Role;
 use crate::latest::Reading;
 use crate::observation::Feeds;
 use crate::params::{Param, Params};
-use crate::time::{Instant, Span, Stamp};
+use crate::time::{BootMs, Millis, Stamp};
 
 /// Which side of its limits is the bad one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,8 +164,8 @@ impl Debounce {
     }
 
     /// As a span.
-    pub const fn span(self) -> Span {
-        Span::from_millis(self.0 as u64)
+    pub const fn span(self) -> Millis {
+        Millis::from_millis(self.0 as u64)
     }
 }
 
@@ -240,18 +240,18 @@ pub struct Check {
 }
 
 /// How long a value must be good before the level falls, so that a value at its limit does not flicker.
-pub const CLEAR: Span = Span::from_secs(2);
+pub const CLEAR: Millis = Millis::from_secs(2);
 
 /// The longest that it must be good, once it was bad again twice.
-pub const CLEAR_MAX: Span = Span::from_secs(128);
+pub const CLEAR_MAX: Millis = Millis::from_secs(128);
 
 /// The same for checks that apply on the ground too: they have no end of a flight to begin anew at.
-pub const CLEAR_MAX_ALWAYS: Span = Span::from_secs(16);
+pub const CLEAR_MAX_ALWAYS: Millis = Millis::from_secs(16);
 
 const _: () = assert!(CLEAR.as_millis() << (3 * Repeats::MOST) == CLEAR_MAX.as_millis());
 
 /// An alarm whose value is never stale is stale itself this long after its last value.
-const UNSEEN: Span = Span::from_secs(15);
+const UNSEEN: Millis = Millis::from_secs(15);
 
 /// Bad measurements in a row that make an alarm: one wrong message is none.
 pub const SAMPLES: u8 = 2;
@@ -283,8 +283,8 @@ impl Repeats {
     }
 
     /// Eightfold for each.
-    fn grown(self, span: Span) -> Span {
-        Span::from_millis(span.as_millis() << (3 * self.count()))
+    fn grown(self, span: Millis) -> Millis {
+        Millis::from_millis(span.as_millis() << (3 * self.count()))
     }
 
     fn note(&mut self, previous: Level, level: Level) {
@@ -345,9 +345,9 @@ pub struct LevelChange {
 
 impl Check {
     /// How old the value may be; `None` for values that are ages themselves.
-    pub const fn stale_after(&self) -> Option<Span> {
+    pub const fn stale_after(&self) -> Option<Millis> {
         match self.stale_s {
-            Some(seconds) => Some(Span::from_secs(seconds.get() as u64)),
+            Some(seconds) => Some(Millis::from_secs(seconds.get() as u64)),
             None => None,
         }
     }
@@ -360,7 +360,7 @@ impl Check {
     pub(super) const fn finding(
         &self,
         instance: u8,
-        at: Instant,
+        at: BootMs,
         change: LevelChange,
         feeds: Feeds,
     ) -> Finding {
@@ -402,8 +402,8 @@ impl State {
     }
 
     /// Whether it has no alarm, or its value was bad for so long and is not good just now.
-    pub(super) fn lasts(&self, now: Instant, span: Span) -> bool {
-        self.alarm().is_none() || (!self.better.is_set() && self.bad.age(now).unwrap_or(Span::ZERO) >= span)
+    pub(super) fn lasts(&self, now: BootMs, span: Millis) -> bool {
+        self.alarm().is_none() || (!self.better.is_set() && self.bad.age(now).unwrap_or(Millis::ZERO) >= span)
     }
 
     /// Whether it never had a value since it began to apply, nor a level: then a step without a value changes nothing.
@@ -422,7 +422,7 @@ impl State {
     pub(super) fn stays_good(
         &mut self,
         check: &Check,
-        now: Instant,
+        now: BootMs,
         reading: Reading,
         params: &Params,
     ) -> bool {
@@ -439,7 +439,7 @@ impl State {
         true
     }
 
-    pub(super) fn see(&mut self, now: Instant, reading: Option<Reading>) {
+    pub(super) fn see(&mut self, now: BootMs, reading: Option<Reading>) {
         if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
             self.seen = Stamp::at(reading.at.earlier(now));
         }
@@ -453,7 +453,7 @@ impl State {
     pub fn step(
         &mut self,
         check: &Check,
-        now: Instant,
+        now: BootMs,
         reading: Option<Reading>,
         applies: bool,
         params: &Params,
@@ -501,7 +501,7 @@ impl State {
         }
     }
 
-    fn clear(&self, check: &Check) -> Span {
+    fn clear(&self, check: &Check) -> Millis {
         // The detector ends a mishap. The next sign is a new mishap, and reported.
         if check.subsystem == Subsystem::Mishap {
             return CLEAR;
@@ -511,7 +511,7 @@ impl State {
     }
 
     /// How old the value may be. An alarm that came back after a pause of its stream has more time.
-    fn stale_after(&self, check: &Check) -> Option<Span> {
+    fn stale_after(&self, check: &Check) -> Option<Millis> {
         match self.level {
             // Also of a value that is never stale: without its input it has none.
             Some(Level::Warning | Level::Critical) => {
@@ -525,7 +525,7 @@ impl State {
     fn judge(
         &mut self,
         check: &Check,
-        now: Instant,
+        now: BootMs,
         value: f32,
         measured: bool,
         params: &Params,

@@ -10,12 +10,12 @@ use crate::latest::Reading;
 use crate::motion::{STILL_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Heartbeat;
 use crate::params::Param;
-use crate::time::Span;
+use crate::time::Millis;
 
 /// A vehicle that was killed at its touchdown is at rest after [`COMES_TO_REST`]: level and still for [`RESTS`], slower than [`STILL_MPS`]. In
 /// two real landings the sensors were still 0.6 and 1.2 s after the kill.
-const COMES_TO_REST: Span = Span::from_secs(2);
-const RESTS: Span = Span::from_millis(300);
+const COMES_TO_REST: Millis = Millis::from_secs(2);
+const RESTS: Millis = Millis::from_millis(300);
 
 const LOAD: Check = Check {
     name: "load",
@@ -64,7 +64,7 @@ fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
 /// 1 for half a minute after a restart while it was armed.
 fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let Inputs { now, vehicle, .. } = *inputs;
-    let recently = |at| now.since(at) <= Span::from_secs(30);
+    let recently = |at| now.since(at) <= Millis::from_secs(30);
     let is_new = vehicle.rebooted_armed && vehicle.rebooted_at.is_some_and(recently);
     vehicle.heartbeat.get().and_then(|_| inputs.reading(f32::from(u8::from(is_new))))
 }

@@ -8,7 +8,7 @@ use super::check::{Check, Side};
 use super::finding::{Finding, Level};
 use super::tables::checks;
 use crate::bytes::{Fields, Unreadable, fields, fnv1a};
-use crate::time::Instant;
+use crate::time::BootMs;
 
 /// Checks and instances that are kept.
 pub const EXCEEDANCES_MAX: usize = 24;
@@ -77,18 +77,18 @@ struct Entry {
     instance: u8,
     /// [`Level::Ok`] while nothing is exceeded.
     level: Level,
-    since: Instant,
+    since: BootMs,
     session: Crossings,
     before: Crossings,
 }
 
 impl Entry {
-    fn extend(&mut self, now: Instant) {
+    fn extend(&mut self, now: BootMs) {
         self.session.extend(self.level, (now.since(self.since).as_millis() / 100) as u32);
         self.since = now;
     }
 
-    fn now(mut self, now: Instant) -> Option<Exceedance> {
+    fn now(mut self, now: BootMs) -> Option<Exceedance> {
         self.extend(now);
         let check = checks().nth(self.check.into())?;
         let lifetime = self.before.join(self.session, check.limits.side);
@@ -188,17 +188,17 @@ impl Exceedances {
     }
 
     /// Every exceedance, counted up to now.
-    pub fn iter(&self, now: Instant) -> impl Iterator<Item = Exceedance> {
+    pub fn iter(&self, now: BootMs) -> impl Iterator<Item = Exceedance> {
         self.entries.iter().flatten().filter_map(move |entry| entry.now(now))
     }
 
     /// Every exceedance that began, ended or lasted at a time or after it, counted up to now.
-    pub fn changed(&self, now: Instant, since: Instant) -> impl Iterator<Item = Exceedance> {
+    pub fn changed(&self, now: BootMs, since: BootMs) -> impl Iterator<Item = Exceedance> {
         let changed = move |entry: &&Entry| rank(entry.level) > 0 || !since.is_after(entry.since);
         self.entries.iter().flatten().filter(changed).filter_map(move |entry| entry.now(now))
     }
 
-    pub(crate) fn end(&mut self, now: Instant) {
+    pub(crate) fn end(&mut self, now: BootMs) {
         for entry in self.entries.iter_mut().flatten() {
             entry.extend(now);
             entry.level = Level::Ok;
@@ -225,7 +225,7 @@ impl Exceedances {
     }
 
     /// Writes the stored form of the entries in use; returns its length.
-    pub fn encode(&self, now: Instant, out: &mut [u8]) -> usize {
+    pub fn encode(&self, now: BootMs, out: &mut [u8]) -> usize {
         let mut fields = Fields::write(out, VERSION);
         for Exceedance { check, mut instance, mut lifetime, .. } in self.iter(now) {
             // Writing has no errors.
@@ -252,7 +252,7 @@ impl Exceedances {
                 check: check as u16,
                 instance,
                 level: Level::Ok,
-                since: Instant::ZERO,
+                since: BootMs::ZERO,
                 session: Crossings::default(),
                 before,
             });

@@ -1,7 +1,7 @@
 //! A finding: one check changed its level. The numbers and names here are stored in logs and never change meaning.
 
 use crate::observation::Feeds;
-use crate::time::Instant;
+use crate::time::BootMs;
 
 numbered! {
     /// How bad it is. The numbers are stored in logs.
@@ -49,7 +49,7 @@ numbered! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finding {
     /// When the level changed (after the debounce).
-    pub at: Instant,
+    pub at: BootMs,
     /// The part of the vehicle.
     pub subsystem: Subsystem,
     /// The check's stable name, at most 16 characters of `a-z0-9_`, for instance `batt_remaining`.

@@ -6,14 +6,14 @@ use crate::flight::Flight;
 use crate::latest::Reading;
 use crate::params::Params;
 use crate::status::{LinkReading, RecorderStatus};
-use crate::time::Instant;
+use crate::time::BootMs;
 use crate::vehicle::Vehicle;
 
 /// Inputs of checks. They do not change during a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a> {
     /// Now.
-    pub now: Instant,
+    pub now: BootMs,
     /// The vehicle as it is known.
     pub vehicle: &'a Vehicle,
     /// On the ground, in the air, or in a mishap.

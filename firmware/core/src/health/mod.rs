@@ -35,7 +35,7 @@ pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
 use crate::params::Param;
-use crate::time::{Instant, SILENT, Span};
+use crate::time::{BootMs, Millis, SILENT};
 use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
@@ -151,7 +151,7 @@ impl Health {
 
     /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as
     /// bad, until it rises itself.
-    fn explain(&mut self, slot: u16, level: Level, now: Instant) -> &'static str {
+    fn explain(&mut self, slot: u16, level: Level, now: BootMs) -> &'static str {
         let since = match self.alarms.change(slot, level, now) {
             Some(since) => since,
             None if level == Level::Stale => now,
@@ -204,9 +204,9 @@ impl Health {
     }
 
     /// Whether an alarm's value is still bad, and was for as long as its text waits. True of what has no alarm.
-    pub fn lasts(&self, check: &Check, instance: u8, now: Instant) -> bool {
+    pub fn lasts(&self, check: &Check, instance: u8, now: BootMs) -> bool {
         let state = slot_of(check.name, instance).and_then(|slot| self.states.get(usize::from(slot)));
-        state.is_none_or(|state| state.lasts(now, Span::from_secs(check.told_after_s.into())))
+        state.is_none_or(|state| state.lasts(now, Millis::from_secs(check.told_after_s.into())))
     }
 
     /// Of each check, in the order of [`checks`], the levels of its instances.

@@ -10,12 +10,12 @@
 use super::check::Check;
 use super::finding::{Level, Subsystem};
 use super::tables::{check_of, slot_of};
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// The longest time between the onsets of a cause and its effect: the longest debounce of an effect is 10 s, and values are smoothed.
-const NEAR: Span = Span::from_secs(12);
+const NEAR: Millis = Millis::from_secs(12);
 /// An alarm that begins this long before a mishap begins with it: both are found at a step, and by samples.
-const WITH_MISHAP: Span = Span::from_millis(200);
+const WITH_MISHAP: Millis = Millis::from_millis(200);
 
 /// Checks that explain the same other checks. A group explains later groups only, so nothing explains itself by way of others. Of several
 /// causes the first in this order is named.
@@ -180,7 +180,7 @@ pub const fn is_of_mishap(part: Subsystem) -> bool {
 }
 
 /// Whether an alarm since a time begins with a mishap or after it.
-pub fn is_with_mishap(since: Instant, mishap_since: Instant) -> bool {
+pub fn is_with_mishap(since: BootMs, mishap_since: BootMs) -> bool {
     mishap_since.since(since) <= WITH_MISHAP
 }
 
@@ -193,7 +193,7 @@ pub const fn explains(cause: &Check, effect: &Check) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub struct Alarm {
     /// Its onset: when it began, or rose to its level.
-    pub since: Instant,
+    pub since: BootMs,
     /// Its level.
     pub level: Level,
     /// The check.
@@ -205,11 +205,11 @@ pub struct Alarm {
 
 impl Alarm {
     /// An alarm by its check's name; `None` if the name is unknown.
-    pub fn of(check: &str, instance: u8, level: Level, since: Instant) -> Option<Self> {
+    pub fn of(check: &str, instance: u8, level: Level, since: BootMs) -> Option<Self> {
         Self::at(slot_of(check, instance)?, level, since)
     }
 
-    pub(super) fn at(slot: u16, level: Level, since: Instant) -> Option<Self> {
+    pub(super) fn at(slot: u16, level: Level, since: BootMs) -> Option<Self> {
         let (check, instance) = check_of(slot)?;
         Some(Self { since, level, check, instance, slot })
     }
@@ -262,7 +262,7 @@ mod tests {
             _ => Level::Stale,
         };
         let (name, instance) = name.split_once('.').unwrap_or((name, "0"));
-        let since = Instant::from_millis(100_000 + (since.parse::<f32>().unwrap() * 1e3) as u64);
+        let since = BootMs::from_millis(100_000 + (since.parse::<f32>().unwrap() * 1e3) as u64);
         Alarm::of(name, instance.parse().unwrap(), level, since).unwrap_or_else(|| panic!("{text}"))
     }
 

@@ -11,14 +11,14 @@
 //! hour, 63 in three, 81 in five and a half. The flash sets this limit; `hums_onboard::persist` has the sums.
 
 use super::ItemKey;
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// The first save: late enough for the store to be ready and the vehicle to be heard.
-const FIRST: Span = Span::from_secs(10);
+const FIRST: Millis = Millis::from_secs(10);
 /// The longest time until a change is saved.
-pub const EVERY: Span = Span::from_secs(15 * 60);
+pub const EVERY: Millis = Millis::from_secs(15 * 60);
 /// The longest time until counters are saved in flight, in the first hour of a power-on; a power cut loses no more.
-pub const EVERY_ARMED: Span = Span::from_secs(2 * 60);
+pub const EVERY_ARMED: Millis = Millis::from_secs(2 * 60);
 const EVERY_PART: u64 = 30;
 
 /// Whether the store has room to spare.
@@ -39,8 +39,8 @@ state! {
         changed: u32 = Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),
         /// Of these, the ones whose time has come.
         due: u32,
-        next: Instant = Instant::from_millis(FIRST.as_millis()),
-        session_at: Instant,
+        next: BootMs = BootMs::from_millis(FIRST.as_millis()),
+        session_at: BootMs,
     }
 }
 
@@ -63,13 +63,13 @@ impl Saving {
     }
 
     /// The same one until it is [`Self::saved`].
-    pub(crate) fn due(&mut self, now: Instant, armed: bool, room: Room) -> Option<ItemKey> {
+    pub(crate) fn due(&mut self, now: BootMs, armed: bool, room: Room) -> Option<ItemKey> {
         if room == Room::Enough {
             if !self.next.is_after(now) {
                 self.next = now + EVERY;
                 self.hurry_all();
             }
-            let every = EVERY_ARMED.max(Span::from_millis(now.as_millis() / EVERY_PART));
+            let every = EVERY_ARMED.max(Millis::from_millis(now.as_millis() / EVERY_PART));
             if armed && now.since(self.session_at) >= every {
                 self.due |= self.changed & Self::bit(ItemKey::Session);
             }
@@ -98,7 +98,7 @@ mod tests {
 
     fn take(saving: &mut Saving, at_s: u64, armed: bool) -> Vec<ItemKey> {
         let mut keys = Vec::new();
-        while let Some(key) = saving.due(Instant::from_millis(at_s * 1_000), armed, Room::Enough) {
+        while let Some(key) = saving.due(BootMs::from_millis(at_s * 1_000), armed, Room::Enough) {
             saving.saved(key);
             keys.push(key);
         }
@@ -108,10 +108,10 @@ mod tests {
     #[test]
     fn a_change_waits_for_its_time_and_a_hand_does_not() {
         let mut saving = Saving::default();
-        assert_eq!(saving.due(Instant::from_millis(9_999), false, Room::Enough), NOTHING);
+        assert_eq!(saving.due(BootMs::from_millis(9_999), false, Room::Enough), NOTHING);
         let first = Some(ItemKey::Lifetime);
-        assert_eq!(saving.due(Instant::from_millis(10_000), false, Room::Enough), first);
-        assert_eq!(saving.due(Instant::from_millis(10_050), false, Room::Enough), first, "until it is saved");
+        assert_eq!(saving.due(BootMs::from_millis(10_000), false, Room::Enough), first);
+        assert_eq!(saving.due(BootMs::from_millis(10_050), false, Room::Enough), first, "until it is saved");
         assert_eq!(take(&mut saving, 11, false), [ItemKey::Lifetime, ItemKey::Exposure]);
         saving.change(ItemKey::Exceedances);
         saving.hurry(ItemKey::Component(3));
@@ -142,7 +142,7 @@ mod tests {
         let mut saving = Saving::default();
         take(&mut saving, 10, true);
         saving.change(ItemKey::Session);
-        let at = Instant::from_millis(2_000_000);
+        let at = BootMs::from_millis(2_000_000);
         assert_eq!(saving.due(at, true, Room::Reserve), NOTHING);
         saving.hurry_all();
         assert_eq!(saving.due(at, true, Room::Reserve), Some(ItemKey::Session));

@@ -7,13 +7,13 @@ use crate::flight::FlightEvent;
 use crate::happening::Happening;
 use crate::health::exceedance::Exceedances;
 use crate::lifetime::{Airframe, ITEM_BYTES_MAX, Item as _, ItemKey, Lifetime, Room, Session, Unreadable};
-use crate::time::{Instant, Span};
+use crate::time::{BootMs, Millis};
 
 /// Time after which an autopilot without a unique id has none: the answer to `AUTOPILOT_VERSION` comes long before.
-const UID_COMES: Span = Span::from_secs(60);
+const UID_COMES: Millis = Millis::from_secs(60);
 
 impl Monitor {
-    pub(super) fn step_life(&mut self, now: Instant, event: Option<FlightEvent>) {
+    pub(super) fn step_life(&mut self, now: BootMs, event: Option<FlightEvent>) {
         let uid = self.vehicle.identity.get().map_or(0, |identity| identity.uid);
         // A system id can be set, so a known unique id is waited for. Nothing is decided before the vehicle is
         // settled.
@@ -76,7 +76,7 @@ impl Monitor {
 
     /// The item to be saved next, if any is due; the same until it is [`Self::saved`]. Items must be saved in this
     /// order.
-    pub fn save_due(&mut self, now: Instant, room: Room) -> Option<ItemKey> {
+    pub fn save_due(&mut self, now: BootMs, room: Room) -> Option<ItemKey> {
         self.saving.due(now, self.vehicle.armed(), room)
     }
 

@@ -18,7 +18,7 @@ use crate::observation::Observation;
 use crate::params::{Param, Params};
 use crate::power_draw::{Drawn, discharge_a, drawn};
 use crate::rainflow::Rainflow;
-use crate::time::{Instant, PAUSE, SILENT, Span};
+use crate::time::{BootMs, Millis, PAUSE, SILENT};
 use crate::units::{Metres, Rpm};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
@@ -38,7 +38,7 @@ state! {
     /// Usage since power-on.
     #[derive(Clone, Copy, Debug)]
     pub struct Usage {
-        last: Option<Instant>,
+        last: Option<BootMs>,
         current_a: Option<f32>,
         /// All counters but the cycles of the load factor, which are computed when asked for.
         totals: Totals,
@@ -61,7 +61,7 @@ impl Usage {
     /// Takes an observation's extremes, which a step could miss.
     pub fn observe(
         &mut self,
-        at: Instant,
+        at: BootMs,
         vehicle: &Vehicle,
         flight: &Flight,
         derived: &Derived,
@@ -89,7 +89,7 @@ impl Usage {
         }
     }
 
-    fn take_battery(&mut self, at: Instant, vehicle: &Vehicle) {
+    fn take_battery(&mut self, at: BootMs, vehicle: &Vehicle) {
         let Drawn { voltage_v, current_a, .. } = drawn(at, vehicle);
         if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
             self.totals.extend(UsageCounter::VoltageMin, f64::from(voltage_v));
@@ -111,7 +111,7 @@ impl Usage {
         }
         if event.is_some_and(|event| event != FlightEvent::Landing) {
             // The event is found some time after it happened.
-            let late = flight.airborne_since().map_or(Span::ZERO, |since| now.since(since));
+            let late = flight.airborne_since().map_or(Millis::ZERO, |since| now.since(since));
             self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
         }
         if event == Some(FlightEvent::Landing) {
@@ -121,8 +121,8 @@ impl Usage {
         let set_ah = params.get(Param::BatCapacity);
         self.capacity_ah = if set_ah > 0.0 { set_ah } else { derived.cells.capacity_ah() };
         let before = self.last.replace(now);
-        let step = before.map_or(Span::ZERO, |last| now.since(last));
-        let powered = now.since(before.unwrap_or(Instant::ZERO));
+        let step = before.map_or(Millis::ZERO, |last| now.since(last));
+        let powered = now.since(before.unwrap_or(BootMs::ZERO));
         self.totals.add(UsageCounter::Powered, f64::from(powered.as_secs_f32()));
         if step > PAUSE {
             return;
@@ -139,7 +139,7 @@ impl Usage {
 
     /// A silence counts once the vehicle reports again and is still armed or in the air. So does the time of a
     /// possible landing.
-    fn step_times(&mut self, now: Instant, vehicle: &Vehicle, flight: &Flight, step_s: f64) {
+    fn step_times(&mut self, now: BootMs, vehicle: &Vehicle, flight: &Flight, step_s: f64) {
         let reports = vehicle.heartbeat.within(now, SILENT).is_some();
         let is_known = reports && !flight.may_have_landed();
         let states = [
@@ -162,7 +162,7 @@ impl Usage {
         }
     }
 
-    fn step_battery(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
+    fn step_battery(&mut self, now: BootMs, vehicle: &Vehicle, step_s: f64) {
         let drawn = drawn(now, vehicle);
         self.current_a = drawn.current_a;
         let charge_ah = f64::from(drawn.current_a.unwrap_or(0.0)) * step_s / 3_600.0;
@@ -191,7 +191,7 @@ impl Usage {
         (self.held_s, self.landing_s) = ([0.0; 2], 0.0);
     }
 
-    fn step_motors(&mut self, now: Instant, vehicle: &Vehicle, step_s: f64) {
+    fn step_motors(&mut self, now: BootMs, vehicle: &Vehicle, step_s: f64) {
         for (number, usage) in self.totals.motors.iter_mut().enumerate() {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE);
@@ -226,7 +226,7 @@ impl Usage {
         }
     }
 
-    pub(crate) fn until(&self) -> Instant {
+    pub(crate) fn until(&self) -> BootMs {
         self.last.unwrap_or_default()
     }
 

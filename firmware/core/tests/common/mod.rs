@@ -13,7 +13,7 @@ use hums_core::observation::{
 use hums_core::params::Params;
 use hums_core::protect::Request;
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::units::{
     Amperes, Celsius, Fraction, Metres, MetresPerSecond, MetresPerSecond2, Radians, Rpm, Volts,
 };
@@ -208,7 +208,7 @@ impl Run {
     }
 
     fn tick(&mut self, now_ms: u64, quad: &Quad) {
-        let now = Instant::from_millis(now_ms);
+        let now = BootMs::from_millis(now_ms);
         let link = LinkReading { frames_lost: Some(quad.lost), at: now };
         self.monitor.tick(now, &link, &quad.recorder, &mut |finding| self.findings.push(*finding));
         while let Some(happening) = self.monitor.take_happening() {
@@ -279,6 +279,6 @@ pub fn observe(
     said: impl IntoIterator<Item = Observation>,
 ) {
     for observation in said {
-        monitor.observe(Instant::from_millis(now_ms), source, &observation);
+        monitor.observe(BootMs::from_millis(now_ms), source, &observation);
     }
 }

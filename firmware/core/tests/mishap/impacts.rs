@@ -190,7 +190,7 @@ fn a_shock_between_two_samples_of_what_fell_is_an_impact_at_its_own_time() {
     });
     let impact = outcome.findings.iter().find(|finding| finding.check == "impact").expect("hit");
     assert!((impact.value - 17.0).abs() < 0.1, "{impact:?}");
-    assert_eq!(outcome.monitor.flight().hit_at(), Instant::from_millis(AT_MS + 450));
+    assert_eq!(outcome.monitor.flight().hit_at(), BootMs::from_millis(AT_MS + 450));
     assert_eq!(fly(&hovering(ROTORS[0]), drop_low).told(), [""; 0]);
 }
 
@@ -303,7 +303,7 @@ fn a_second_shock_does_not_hide_the_first() {
             }
         });
         assert_eq!(outcome.told(), ["impact"], "{of:?}: {:?}", outcome.changes);
-        assert_eq!(outcome.monitor.flight().hit_at(), Instant::from_millis(AT_MS + 500), "{of:?}");
+        assert_eq!(outcome.monitor.flight().hit_at(), BootMs::from_millis(AT_MS + 500), "{of:?}");
     }
 }
 

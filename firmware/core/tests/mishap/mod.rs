@@ -15,7 +15,7 @@ use hums_core::observation::{
     VehicleKind, VtolState, Wanted,
 };
 use hums_core::params::Params;
-use hums_core::time::Instant;
+use hums_core::time::BootMs;
 use hums_core::units::{
     Amperes, Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
     RadiansPerSecond,
@@ -117,7 +117,7 @@ fn fly_between(
 ) -> Outcome {
     let mut run = Run::new(&Params::defaults());
     run.steps(0..end_ms, |now_ms, monitor| {
-        let now = Instant::from_millis(now_ms);
+        let now = BootMs::from_millis(now_ms);
         let (mut quad, mut motion) = (vehicle.clone(), CALM);
         if now_ms >= at_ms {
             script(now_ms - at_ms, &mut quad, &mut motion);

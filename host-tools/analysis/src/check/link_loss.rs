@@ -22,20 +22,20 @@ use hums_core::modes::has_pilots_throttle;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m, throttle};
 use hums_core::observation::{Air, Attitude, Imu, LandedState, Observation, VehicleKind};
 use hums_core::params::{Param, Params};
-use hums_core::time::{Instant, Span};
+use hums_core::time::{BootMs, Millis};
 use hums_core::vehicle::Vehicle;
 
 use super::problem::IMPACT;
 use crate::source::told::Finding;
 
 /// May hide a fall.
-const SILENT: Span = Span::from_secs(5);
+const SILENT: Millis = Millis::from_secs(5);
 /// Attitude after reception; a disarmed, restarted vehicle reports forces later.
-const SHOWS: Span = Span::from_millis(2_400);
-const STARTS: Span = Span::from_secs(20);
+const SHOWS: Millis = Millis::from_millis(2_400);
+const STARTS: Millis = Millis::from_secs(20);
 /// Old values are replaced.
-const SETTLED: Span = Span::from_secs(1);
-const SIGN_LASTS: Span = Span::from_millis(500);
+const SETTLED: Millis = Millis::from_secs(1);
+const SIGN_LASTS: Millis = Millis::from_millis(500);
 /// Lost height, m.
 const CAME_DOWN_M: f32 = 3.0;
 /// m above home.
@@ -51,16 +51,16 @@ const ON_BACK_G: f32 = 0.5;
 const IDLE_THROTTLE: f32 = 0.1;
 const FULL_THROTTLE: f32 = 0.9;
 /// Older values are not used.
-const FRESH: Span = Span::from_secs(2);
+const FRESH: Millis = Millis::from_secs(2);
 /// m: a receiver's height at rest.
 const STANDS_M: f32 = 3.0;
 /// Sink, m/s.
 const FALLING_MPS: f32 = 2.5;
 /// A metre at sea level; at 4,000 m 35 % too much, so a fall must be deeper.
 const HPA_PER_METRE: f32 = 0.12;
-const FIRST: Span = Span::from_secs(10);
+const FIRST: Millis = Millis::from_secs(10);
 /// Sinks are kept for this long.
-const WINDOW: Span = Span::from_millis(900);
+const WINDOW: Millis = Millis::from_millis(900);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Verdict {
@@ -69,9 +69,9 @@ pub(super) struct Verdict {
     /// `None` if not measured.
     value: Option<f32>,
     /// Time of the finding; for an impact, the next reception.
-    pub at: Instant,
+    pub at: BootMs,
     /// Last reception before.
-    pub from: Option<Instant>,
+    pub from: Option<BootMs>,
 }
 
 impl Verdict {
@@ -97,13 +97,13 @@ impl Verdict {
 #[derive(Clone, Copy, Debug)]
 struct Silence {
     /// Last reception, less lost spans, over which time stops.
-    from: Instant,
-    last_heard_at: Instant,
-    again_at: Option<Instant>,
+    from: BootMs,
+    last_heard_at: BootMs,
+    again_at: Option<BootMs>,
     /// Forces and position again.
-    state_at: Option<Instant>,
+    state_at: Option<BootMs>,
     /// Last act of no wreck.
-    no_sign_at: Instant,
+    no_sign_at: BootMs,
     altitude_m: Option<f32>,
     sink_mps: f32,
 }
@@ -126,29 +126,29 @@ impl Silence {
 
 #[derive(Debug, Default)]
 pub(super) struct LinkLoss {
-    heard_at: Instant,
+    heard_at: BootMs,
     armed: bool,
     /// Level while armed: no tail-sitter.
     stood: bool,
-    first_at: Option<Instant>,
+    first_at: Option<BootMs>,
     /// Has flown, or received for [`FIRST`].
     is_known: bool,
     found: Option<Verdict>,
     silence: Option<Silence>,
     /// Sinks, and pressures in hPa, of the last seconds.
-    sinks: VecDeque<(Instant, f32)>,
-    pressures: VecDeque<(Instant, f32)>,
+    sinks: VecDeque<(BootMs, f32)>,
+    pressures: VecDeque<(BootMs, f32)>,
     /// Last other pressure.
-    changed_at: Option<Instant>,
+    changed_at: Option<BootMs>,
     rate: f32,
     from_above_g: f32,
     /// Start of the receiver's rest, and its altitude.
-    stands_since: Option<Instant>,
+    stands_since: Option<BootMs>,
     stands_at_m: f32,
 }
 
 impl LinkLoss {
-    pub(super) fn observe(&mut self, at: Instant, observation: &Observation, vehicle: &Vehicle) {
+    pub(super) fn observe(&mut self, at: BootMs, observation: &Observation, vehicle: &Vehicle) {
         match observation {
             // Received without the autopilot.
             Observation::TelemetryRadio(_)
@@ -186,7 +186,7 @@ impl LinkLoss {
         }
     }
 
-    fn take_air(&mut self, at: Instant, air: &Air) {
+    fn take_air(&mut self, at: BootMs, air: &Air) {
         let Some(hpa) = air.pressure.map(|it| it.0).filter(|hpa| air.instance == 0 && hpa.is_finite()) else {
             return;
         };
@@ -197,13 +197,13 @@ impl LinkLoss {
     }
 
     /// Lost span: the monitor's time stopped.
-    pub(super) fn lose(&mut self, span: Span, monitor: &Monitor, in_mishap: bool) {
+    pub(super) fn lose(&mut self, span: Millis, monitor: &Monitor, in_mishap: bool) {
         if span >= SILENT && self.silence.is_none() {
             self.begin(self.heard_at - span, monitor, in_mishap);
         }
     }
 
-    fn begin(&mut self, from: Instant, monitor: &Monitor, in_mishap: bool) {
+    fn begin(&mut self, from: BootMs, monitor: &Monitor, in_mishap: bool) {
         if self.armed && monitor.flight().airborne() && !in_mishap {
             self.silence = Some(Silence {
                 from,
@@ -220,7 +220,7 @@ impl LinkLoss {
     /// A step after the monitor's: an alarm that begins or ends.
     pub(super) fn step(
         &mut self,
-        now: Instant,
+        now: BootMs,
         monitor: &Monitor,
         in_mishap: bool,
     ) -> Option<(Level, Verdict)> {
@@ -245,7 +245,7 @@ impl LinkLoss {
         Some((Level::Critical, found))
     }
 
-    fn judge_first(&mut self, now: Instant, monitor: &Monitor) -> Option<Verdict> {
+    fn judge_first(&mut self, now: BootMs, monitor: &Monitor) -> Option<Verdict> {
         let since = *self.first_at.get_or_insert(now);
         let passed = now.since(since);
         self.is_known |= passed > FIRST || monitor.flight().airborne();
@@ -263,7 +263,7 @@ impl LinkLoss {
 
     fn judge_silence(
         &mut self,
-        now: Instant,
+        now: BootMs,
         monitor: &Monitor,
         params: &Params,
         in_mishap: bool,
@@ -279,7 +279,7 @@ impl LinkLoss {
             return None;
         }
         let again_at = *silence.again_at.get_or_insert(now);
-        let tells = |at: Option<Instant>| at.is_none_or(|at| at.is_after(silence.last_heard_at));
+        let tells = |at: Option<BootMs>| at.is_none_or(|at| at.is_after(silence.last_heard_at));
         if tells(vehicle.imu.at()) && tells(vehicle.global.at()) {
             silence.state_at.get_or_insert(now);
         }
@@ -309,7 +309,7 @@ impl LinkLoss {
     /// A sign of a crash, and its value.
     fn sign(
         &self,
-        now: Instant,
+        now: BootMs,
         vehicle: &Vehicle,
         params: &Params,
         silence: &Silence,
@@ -343,14 +343,14 @@ impl LinkLoss {
     }
 
     /// Whether it lies by an attitude that no sensor contradicts, or on its back.
-    fn lies(&self, now: Instant, vehicle: &Vehicle) -> bool {
+    fn lies(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let tilts = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD;
         let is_tilted =
             !vehicle.inertial.contradicts(now) && vehicle.attitude.within(now, FRESH).is_some_and(tilts);
         is_tilted || (vehicle.is_multicopter() && self.from_above_g > ON_BACK_G)
     }
 
-    fn note_receiver(&mut self, now: Instant, vehicle: &Vehicle) {
+    fn note_receiver(&mut self, now: BootMs, vehicle: &Vehicle) {
         let receiver = vehicle.gnss[0].within(now, FRESH).filter(|gnss| gnss.is_exact());
         let slow = receiver.filter(|gnss| gnss.speed.is_some_and(|speed| speed.0 < STILL_MPS));
         let altitude_m = receiver.and_then(|gnss| gnss.altitude).map_or(0.0, |altitude| altitude.0);
@@ -361,30 +361,30 @@ impl LinkLoss {
     }
 
     /// Rest for a second, without a fall's rising pressure.
-    fn rests(&self, now: Instant) -> bool {
+    fn rests(&self, now: BootMs) -> bool {
         self.stands_since.is_some_and(|since| now.since(since) >= SETTLED)
             && self.is_sinking(now, FALLING_MPS) == Some(false)
     }
 
-    fn sink_mps(&self, now: Instant) -> f32 {
+    fn sink_mps(&self, now: BootMs) -> f32 {
         let recent = self.sinks.iter().filter(|(at, _)| now.since(*at) <= FRESH);
         recent.fold(0.0, |greatest: f32, (_, sink_mps)| greatest.max(*sink_mps))
     }
 
     /// `None` if unknown, or constant.
-    fn is_sinking(&self, now: Instant, sink_mps: f32) -> Option<bool> {
+    fn is_sinking(&self, now: BootMs, sink_mps: f32) -> Option<bool> {
         /// The sink may be young; wind and propellers do as much.
         const PART_S: f32 = 0.3;
         const NOISE_M: f32 = 0.8;
         let (at, now_hpa) = *self.pressures.back()?;
         let is_live = now.since(at) <= FRESH && self.changed_at.is_some_and(|at| now.since(at) <= FRESH);
         let (_, before_hpa) =
-            self.pressures.iter().find(|(then, _)| at.since(*then) >= Span::from_secs(1))?;
+            self.pressures.iter().find(|(then, _)| at.since(*then) >= Millis::from_secs(1))?;
         is_live.then(|| now_hpa - before_hpa > HPA_PER_METRE * (PART_S * sink_mps).max(NOISE_M))
     }
 }
 
-fn push(values: &mut VecDeque<(Instant, f32)>, span: Span, at: Instant, value: f32) {
+fn push(values: &mut VecDeque<(BootMs, f32)>, span: Millis, at: BootMs, value: f32) {
     values.push_back((at, value));
     while values.front().is_some_and(|(then, _)| at.since(*then) > span) {
         values.pop_front();

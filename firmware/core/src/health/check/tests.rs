@@ -41,7 +41,7 @@ fn changes(check: &Check, script: &str, start_ms: u64) -> String {
                 b'+' => now_ms + 20,
                 _ => now_ms,
             };
-            let [now, at] = [now_ms, measured_ms].map(|ms| Instant::from_millis(start_ms + ms));
+            let [now, at] = [now_ms, measured_ms].map(|ms| BootMs::from_millis(start_ms + ms));
             let reading = value.map(|value| Reading { at, value });
             let change = state.step(check, now, reading, what != "off", &Params::defaults());
             told.extend(change.map(|change| format!("{now_ms} {}", change.level.name())));
@@ -122,7 +122,7 @@ fn a_change_tells_its_value_and_the_limit_it_crossed() {
     ] {
         let (mut state, mut told) = (State::default(), Vec::new());
         for now_ms in (0..6_000).step_by(50) {
-            let at = Instant::from_millis(now_ms);
+            let at = BootMs::from_millis(now_ms);
             let value = if now_ms <= 2_000 { value } else { 10.0 };
             told.extend(state.step(check, at, Some(Reading { at, value }), true, &Params::defaults()));
         }
@@ -183,10 +183,10 @@ fn a_text_waits_until_the_value_was_bad_for_so_long_and_a_shorter_rise_has_none(
         let (mut state, mut alarmed) = (State::default(), false);
         let told = (0..30_000).step_by(50).find(|now_ms| {
             let value = if (1_000..good_again_ms).contains(now_ms) { 50.0 } else { 10.0 };
-            let now = Instant::from_millis(*now_ms);
+            let now = BootMs::from_millis(*now_ms);
             state.step(&check, now, Some(Reading { at: now, value }), true, &Params::defaults());
             alarmed |= state.alarm().is_some();
-            state.alarm().is_some() && state.lasts(now, Span::from_millis(10_000))
+            state.alarm().is_some() && state.lasts(now, Millis::from_millis(10_000))
         });
         assert!(alarmed);
         assert_eq!(told, told_ms, "good again at {good_again_ms} ms");

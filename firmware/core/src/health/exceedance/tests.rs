@@ -8,7 +8,7 @@ const TILT: u16 = 3;
 
 fn finding(at_ms: u64, previous: Level, level: Level, value: f32) -> Finding {
     Finding {
-        at: Instant::from_millis(at_ms),
+        at: BootMs::from_millis(at_ms),
         subsystem: Subsystem::Attitude,
         check: "tilt",
         instance: 0,
@@ -34,7 +34,7 @@ fn a_crossing_is_counted_with_its_peak_and_its_time() {
     exceedances.change(TILT, Side::Above, &finding(13_500, Level::Critical, Level::Warning, 50.0));
     exceedances.change(TILT, Side::Above, &finding(14_500, Level::Warning, Level::Ok, 20.0));
     exceedances.change(TILT, Side::Above, &finding(20_000, Level::Ok, Level::Warning, 46.0));
-    let tilt = exceedances.iter(Instant::from_millis(21_000)).next().expect("exceeded");
+    let tilt = exceedances.iter(BootMs::from_millis(21_000)).next().expect("exceeded");
     let expected =
         Crossings { warnings: 2, criticals: 1, warning_tenths: 40, critical_tenths: 15, peak: 70.0 };
     assert_eq!(tilt.session, expected);
@@ -45,8 +45,8 @@ fn what_is_exceeded_ends_with_its_vehicle_in_the_session_and_in_the_life() {
     for level in [Level::Warning, Level::Critical] {
         let mut exceedances = Exceedances::default();
         exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, level, 50.0));
-        exceedances.end(Instant::from_millis(14_000));
-        let tilt = exceedances.iter(Instant::from_millis(90_000)).next().expect("exceeded");
+        exceedances.end(BootMs::from_millis(14_000));
+        let tilt = exceedances.iter(BootMs::from_millis(90_000)).next().expect("exceeded");
         for crossings in [tilt.session, tilt.lifetime] {
             assert_eq!(crossings.warning_tenths + crossings.critical_tenths, 40, "{level:?}");
         }
@@ -59,24 +59,24 @@ fn what_neither_began_nor_lasted_nor_ended_since_has_not_changed() {
     let mut exceedances = Exceedances::default();
     exceedances.change(TILT, Side::Above, &finding(10_000, Level::Ok, Level::Warning, 50.0));
     let changed = |exceedances: &Exceedances, since_ms| {
-        let now = Instant::from_millis(60_000);
-        exceedances.changed(now, Instant::from_millis(since_ms)).count()
+        let now = BootMs::from_millis(60_000);
+        exceedances.changed(now, BootMs::from_millis(since_ms)).count()
     };
     assert_eq!(changed(&exceedances, 50_000), 1, "it lasts");
     exceedances.change(TILT, Side::Above, &finding(30_000, Level::Warning, Level::Ok, 20.0));
     assert_eq!(changed(&exceedances, 30_000), 1, "it ended");
     assert_eq!(changed(&exceedances, 30_100), 0);
-    assert_eq!(exceedances.iter(Instant::from_millis(60_000)).count(), 1);
+    assert_eq!(exceedances.iter(BootMs::from_millis(60_000)).count(), 1);
 }
 
 #[test]
 fn not_knowing_is_neither_a_crossing_nor_a_time() {
     let mut exceedances = Exceedances::default();
     exceedances.change(TILT, Side::Above, &finding(1_000, Level::Ok, Level::Stale, f32::NAN));
-    assert_eq!(exceedances.iter(Instant::from_millis(2_000)).count(), 0);
+    assert_eq!(exceedances.iter(BootMs::from_millis(2_000)).count(), 0);
     exceedances.change(TILT, Side::Above, &finding(3_000, Level::Stale, Level::Warning, 50.0));
     exceedances.change(TILT, Side::Above, &finding(4_000, Level::Warning, Level::Stale, f32::NAN));
-    let tilt = exceedances.iter(Instant::from_millis(99_000)).next().expect("exceeded");
+    let tilt = exceedances.iter(BootMs::from_millis(99_000)).next().expect("exceeded");
     assert_eq!((tilt.session.warnings, tilt.session.warning_tenths), (1, 10));
 }
 
@@ -91,7 +91,7 @@ fn a_life_adds_up_over_sessions() {
             Side::Above,
             &finding(0, Level::Ok, Level::Warning, f32::from(4 - session.min(3))),
         );
-        let now = Instant::from_millis(2_000);
+        let now = BootMs::from_millis(2_000);
         let tilt = exceedances.iter(now).next().expect("exceeded");
         assert_eq!((tilt.session.warnings, tilt.lifetime.warnings), (1, u16::from(session)));
         assert_eq!((tilt.lifetime.warning_tenths, tilt.lifetime.peak), (20 * u32::from(session), 3.0));
@@ -116,13 +116,13 @@ fn only_a_warning_or_worse_that_is_there_now_lasts() {
 fn what_is_no_longer_exceeded_or_was_only_before_has_no_peak_now() {
     let mut exceedances = Exceedances::decode(&ROLL).expect("readable");
     exceedances.change(place("roll"), Side::Above, &finding(1_000, Level::Stale, Level::Ok, 20.0));
-    let roll = exceedances.iter(Instant::from_millis(1_000)).next().expect("there was one before");
+    let roll = exceedances.iter(BootMs::from_millis(1_000)).next().expect("there was one before");
     assert!(!roll.session.happened() && roll.session.peak.is_nan(), "{roll:?}");
     assert_eq!(roll.lifetime.peak.to_bits(), 70.5_f32.to_bits());
 }
 
 fn kept(exceedances: &Exceedances) -> Vec<u8> {
-    exceedances.iter(Instant::ZERO).map(|exceedance| exceedance.instance).collect()
+    exceedances.iter(BootMs::ZERO).map(|exceedance| exceedance.instance).collect()
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn another_airframe_keeps_what_this_session_exceeded_and_nothing_from_before() {
     exceedances.change(again, Side::Below, &finding(0, Level::Ok, Level::Warning, 3.3));
     exceedances.change(worse, Side::Above, &finding(0, Level::Ok, Level::Critical, 0.4));
     exceedances.forget_life();
-    let left: Vec<_> = exceedances.iter(Instant::from_millis(1_000)).collect();
+    let left: Vec<_> = exceedances.iter(BootMs::from_millis(1_000)).collect();
     let names: Vec<_> = left.iter().map(|exceedance| exceedance.check.name).collect();
     assert_eq!(names, ["cell_voltage", "cell_deviation"]);
     assert!(left.iter().all(|exceedance| exceedance.lifetime == exceedance.session), "{left:?}");
@@ -213,7 +213,7 @@ fn a_crossing_is_stored_as_it_always_was() {
         exceedances.change(roll, Side::Above, &finding(at_ms, previous, level, value));
     }
     let mut stored = [0xFF; Exceedances::BYTES];
-    let length = exceedances.encode(Instant::from_millis(90_000), &mut stored);
+    let length = exceedances.encode(BootMs::from_millis(90_000), &mut stored);
     assert_eq!(stored[..length], ROLL);
 }
 
@@ -222,7 +222,7 @@ fn what_was_stored_is_read_back_and_stored_again_alike_up_to_the_last_place() {
     for before in [vec![VERSION], ROLL.to_vec(), full()] {
         let exceedances = Exceedances::decode(&before).expect("readable");
         let mut stored = [0xFF; Exceedances::BYTES];
-        let length = exceedances.encode(Instant::from_millis(90_000), &mut stored);
+        let length = exceedances.encode(BootMs::from_millis(90_000), &mut stored);
         assert_eq!(stored[..length], before);
     }
     assert_eq!(full().len(), Exceedances::BYTES, "no more is set aside than there is");
@@ -234,7 +234,7 @@ fn a_later_version_is_read_as_far_as_it_is_known() {
     later[0] = VERSION + 1;
     later.extend([0xAB; 7]);
     let exceedances = Exceedances::decode(&later).expect("readable");
-    assert_eq!(exceedances.iter(Instant::ZERO).count(), EXCEEDANCES_MAX);
+    assert_eq!(exceedances.iter(BootMs::ZERO).count(), EXCEEDANCES_MAX);
 }
 
 #[test]
@@ -253,7 +253,7 @@ fn a_check_or_an_instance_that_there_is_no_longer_is_left_out() {
     for gone in [no_check, no_instance] {
         let with_one_that_is_there = [&gone[..], &ROLL[1..]].concat();
         let exceedances = Exceedances::decode(&with_one_that_is_there).expect("readable");
-        let left: Vec<_> = exceedances.iter(Instant::ZERO).collect();
+        let left: Vec<_> = exceedances.iter(BootMs::ZERO).collect();
         assert_eq!(left.len(), 1, "{left:?}");
         assert_eq!((left[0].check.name, left[0].instance, left[0].lifetime.warnings), ("roll", 0, 2));
     }
