@@ -238,12 +238,13 @@ fn print(checks: &[Check]) -> Result<()> {
 #[derive(Debug, Serialize)]
 struct LogJson {
     name: String,
+    /// All checks hold, and the log is complete at least to its last end mark.
     ok: bool,
-    /// The session ended in order.
+    /// The log ended in order.
     closed: bool,
-    /// The original's name; a copy is not examined again.
+    /// The original, if the log is a copy.
     copy_of: Option<String>,
-    /// Overwritten by newer sessions: missing parts are no damage.
+    /// Sectors outside of any file: deleted, without a name, or partly overwritten.
     left_over: bool,
     end: EndJson,
     blocks: BlocksJson,
@@ -255,7 +256,9 @@ struct LogJson {
 #[derive(Debug, Serialize)]
 struct Check {
     name: &'static str,
+    /// Number of checked things.
     checked: u64,
+    /// Number of failed things.
     failed: u64,
     detail: String,
 }

@@ -17,11 +17,15 @@ use crate::utc::iso8601;
 /// A card image's file system.
 #[derive(Debug, Serialize)]
 pub struct ImageJson {
+    /// Card, or image of a card.
     path: String,
+    /// Sentences about damage of the file system.
     damage: Vec<String>,
+    /// Clusters without a file.
     lost_clusters: u64,
+    /// The logs were found by a scan of all blocks.
     found_by_scan: bool,
-    /// `null`: every block was searched.
+    /// Sentence about sectors that were not read.
     not_looked_at: Option<String>,
 }
 
@@ -46,52 +50,76 @@ pub fn images_json(images: &[logs::find::Image]) -> ImagesJson {
 /// One log.
 #[derive(Debug, Serialize)]
 pub struct LogJson {
+    /// Name for `--session`.
     name: String,
     /// `hums`, `tlog`, `raw`, `dataflash`, `ulog`.
     format: &'static str,
     files: Vec<String>,
-    /// As its sectors name it, hexadecimal.
+    /// Session number of its sectors, hexadecimal.
     session: Option<String>,
+    /// The log ended in order.
     closed: bool,
-    /// `null` for another format.
+    /// `null` for recordings of other programs.
     end: Option<EndJson>,
+    /// First entry.
     start_utc: Option<String>,
+    /// Last entry.
     end_utc: Option<String>,
-    /// Seconds since the monitor's power-on.
+    /// First entry.
     start_s: Option<f64>,
+    /// Last entry.
     end_s: Option<f64>,
     duration_s: f64,
+    /// The recorder.
     monitor: Option<BootLine>,
+    /// `null` without an autopilot.
     vehicle: Option<VehicleJson>,
+    /// MAVLink frames.
     frames: u64,
     frame_bytes: u64,
+    /// Records of the monitor.
     records: u64,
     messages: Vec<MessageJson>,
-    /// Frames of ids beyond the list, without definitions here.
+    /// Frames with ids beyond the listed ones.
     frames_of_other_messages: u64,
     gaps_count: u64,
-    /// As far as they were counted.
+    /// Known number of frames in gaps.
     frames_missing: u64,
-    /// Unknown numbers.
+    /// Gaps with an unknown number of frames.
     gaps_uncounted: u64,
+    /// At most 10,000.
     gaps: Vec<GapJson>,
+    /// Losses of the recorder.
     losses: Vec<LossJson>,
-    /// `board`; `hums` (this program); `nobody`.
+    /// `board`, `hums` (this program), `nobody`.
     checked_by: &'static str,
+    /// As in `hums-info-list`.
     checks_judged: Option<usize>,
+    /// As in `hums-info-list`.
     checks_all: Option<usize>,
+    /// Sentence about the vehicle's last state.
     ends_in_air: Option<String>,
+    /// Take-offs and landings.
     flights: Vec<FlightJson>,
+    /// Changes of level.
     findings_count: u64,
+    /// At most 10,000.
     findings: Vec<FindingJson>,
+    /// Counters of the session (`docs/usage.md`); those without data are left out.
     usage: serde_json::Map<String, serde_json::Value>,
+    /// Counters of the airframe's life.
     lifetime: serde_json::Map<String, serde_json::Value>,
+    /// Limits that were exceeded.
     exceedances: Vec<ExceedanceJson>,
+    /// Parts that wear.
     components: Vec<ComponentJson>,
+    /// Bytes of its sectors.
     log_bytes: u64,
+    /// Bytes of a tlog with the same frames.
     tlog_bytes: u64,
-    /// `null` for a recording of another format.
+    /// `null` for recordings of other programs.
     ratio: Option<f64>,
+    /// Room of its files.
     bytes_on_card: u64,
     sectors: u64,
     sectors_damaged: u64,
@@ -121,6 +149,7 @@ struct MessageJson {
     /// The id, for MAVLink messages.
     id: Option<u32>,
     name: String,
+    /// The checksum fits a known definition.
     verified: bool,
     frames: u64,
     bytes: u64,
@@ -130,6 +159,7 @@ struct MessageJson {
 struct GapJson {
     from_s: Option<f64>,
     to_s: Option<f64>,
+    /// `missing`, `damaged`, `unknown_layouts`, `corrupt`, `altered`, `disarmed`.
     cause: &'static str,
     sectors_lost: Option<u32>,
     sectors_skipped: u32,
@@ -147,7 +177,7 @@ struct LossJson {
 #[derive(Debug, Serialize)]
 struct FlightJson {
     from_s: f64,
-    /// `null`: no landing in the log.
+    /// `null` if the landing is not in the log.
     to_s: Option<f64>,
 }
 
@@ -156,17 +186,18 @@ struct FlightJson {
 pub struct FindingJson {
     subsystem: &'static str,
     check: String,
+    /// From 0.
     instance: u8,
     level: &'static str,
+    /// Level before.
     previous: &'static str,
     time_s: f64,
     time_utc: Option<String>,
     /// `null` if the input stopped.
     value: Option<f32>,
-    /// The worst value of this check and part in the log; `null` in all findings but the one from which the problem
-    /// counts.
+    /// Worst value of this check and part in the log; only in the finding from which the problem counts.
     worst: Option<f32>,
-    /// The state in the value, if it is not a quantity.
+    /// Word for a value without a unit.
     state: Option<&'static str>,
     limit: Option<f32>,
     unit: String,
@@ -200,31 +231,39 @@ struct ExceedanceJson {
     name: String,
     unit: String,
     session: CrossingsJson,
-    /// `null` if unknown.
+    /// `null` in recordings of other programs.
     lifetime: Option<CrossingsJson>,
 }
 
 #[derive(Debug, Serialize)]
 struct CrossingsJson {
+    /// Number of warnings.
     warnings: u16,
+    /// Number of criticals.
     criticals: u16,
+    /// Duration of warnings.
     warning_s: f64,
+    /// Duration of criticals.
     critical_s: f64,
+    /// Worst value.
     peak: Option<f32>,
+    /// Word for a peak without a unit.
     state: Option<&'static str>,
 }
 
 #[derive(Debug, Serialize)]
 struct ComponentJson {
+    /// Component, from 1.
     place: u8,
     kind: &'static str,
     number: u8,
     name: String,
     serial: String,
+    /// `green`, `yellow`, `red`.
     status: &'static str,
-    /// `null` without a limit.
+    /// Of the limit that it reaches first.
     used_percent: Option<f32>,
-    /// Reached first.
+    /// The limit that it reaches first, in words.
     limit: Option<String>,
     powered_s: f64,
     flight_s: f64,

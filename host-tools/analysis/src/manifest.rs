@@ -24,10 +24,13 @@ const SCHEMA: Schema = Schema::first("hums-manifest");
 /// A manifest in the making.
 #[derive(Debug, Default, Serialize)]
 pub struct Manifest {
-    /// This program and its commit.
+    /// Version and commit of hums.
     program: &'static str,
+    /// By this computer's clock.
     made_utc: String,
+    /// Each file that was read.
     inputs: Vec<FileJson>,
+    /// Each file that was made.
     outputs: Vec<FileJson>,
     logs: Vec<LogJson>,
 }
@@ -44,14 +47,15 @@ struct FileJson {
 #[derive(Debug, Serialize)]
 struct LogJson {
     name: String,
-    /// Session by its sectors, hexadecimal; `null` for other recordings.
+    /// `null` for recordings of other programs.
     session: Option<String>,
-    /// `null` for other recordings.
+    /// `null` for recordings of other programs.
     frames: Option<u64>,
     gaps: Option<u64>,
     frames_missing: Option<u64>,
+    /// From parity.
     sectors_rebuilt: Option<u64>,
-    /// A word; empty if whole.
+    /// A word; empty if the log is whole.
     lacks: &'static str,
     /// Sentences.
     faults: Vec<String>,

@@ -10,7 +10,7 @@ use crate::plural::{count, noun};
 /// Output of `hums decode --json`.
 #[derive(Debug, Default, Serialize)]
 pub struct MadeJson {
-    /// By log.
+    /// Decoded logs.
     pub logs: Vec<LogJson>,
 }
 
@@ -19,7 +19,7 @@ pub struct MadeJson {
 pub struct LogJson {
     /// Its name.
     pub name: String,
-    /// The log is complete, undamaged and proved, and all requested outputs are there.
+    /// No loss, no damage, a proved end, and all requested outputs.
     pub whole: bool,
     /// Its files and folders.
     pub files: Vec<OutputFile>,
@@ -28,10 +28,12 @@ pub struct LogJson {
 /// A file, or a folder of tables.
 #[derive(Debug, Serialize)]
 pub struct OutputFile {
+    /// A file, or a folder of tables.
     path: PathBuf,
-    /// The name of a format, or `gaps`.
+    /// Name of a format (`docs/decode.md`), or `gaps` (beside a tlog).
     format: &'static str,
-    /// Counts of its content: `frames`, `records`, `rows`, `tables`, `objects` and so on.
+    /// Those that apply: `frames`, `records`, `rows`, `tables`, `objects`, `points`, `seconds`, `bytes`, `messages`,
+    /// `parameters`, `places`, `findings`, `subtitles`.
     counts: BTreeMap<String, u64>,
     #[serde(skip)]
     words: String,

@@ -158,46 +158,54 @@ impl Vehicle {
 
 #[derive(Debug, Serialize)]
 struct DueJson {
+    /// By their names.
     vehicles: Vec<VehicleJson>,
 }
 
 #[derive(Debug, Serialize)]
 struct VehicleJson {
+    /// Unique id, folder or `--vehicle`.
     vehicle: String,
+    /// Number of logs.
     logs: u64,
     flights: u64,
     flight_s: f64,
+    /// Start of the first log.
     first_utc: Option<String>,
+    /// Start of the last log.
     last_utc: Option<String>,
     #[serde(skip)]
     is_of_box: bool,
-    /// The most used first.
+    /// The most used first; empty without a box.
     parts: Vec<PartJson>,
 }
 
 #[derive(Debug, Serialize)]
 struct PartJson {
-    /// Its component, from 1.
+    /// Component, from 1.
     place: u8,
     part: String,
     serial: String,
+    /// `green`, `yellow`, `red`.
     status: &'static str,
-    /// `null` without a limit.
+    /// Of the limit that it reaches first; `null` without a limit.
     used_percent: Option<f32>,
     run: Option<f64>,
     limit: Option<f64>,
     left: Option<f64>,
-    /// `h`, `flights` or `cycles`.
+    /// Of `run`, `limit`, `left`: `h`, `flights`, `cycles`.
     unit: Option<&'static str>,
-    /// How hours count: in the air, powered, turning.
+    /// Hours that count: `in the air`, `powered`, `turning`.
     hours: Option<&'static str>,
-    /// Flights left at the present rate; `null` if unknown.
+    /// At the rate of the logs read.
     left_flights: Option<f64>,
+    /// At the rate of the logs read.
     due_utc: Option<String>,
-    /// The first log that has it; the part may be older if `since_known` is false.
+    /// Start of the first log with this part.
     since_utc: Option<String>,
+    /// False: the part may be older.
     since_known: bool,
-    /// The parameter that sets the limit.
+    /// The limit's parameter.
     rule: Option<String>,
 }
 

@@ -73,28 +73,36 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
 #[derive(Debug, Serialize)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 struct LogJson {
+    /// Name for `--session`.
     name: String,
+    /// `hums`, `tlog`, `raw`, `dataflash`, `ulog`.
     format: &'static str,
     files: Vec<String>,
-    /// `null` if the time of day is unknown.
+    /// UTC of the first entry.
     start_utc: Option<String>,
+    /// First to last entry.
     duration_s: f64,
-    /// `null` if not counted.
+    /// In the air, by the usage counters.
     flight_s: Option<f64>,
+    /// `board`, `hums` (this program), `nobody`.
     checked_by: &'static str,
+    /// Changes of level.
     findings_count: u64,
-    /// `null` without findings.
+    /// First finding of `hums check`; `null` without a warning or critical finding.
     worst: Option<WorstJson>,
-    /// `null` if not counted.
+    /// Checks with data, or `null` for most logs that a board checked. Below a tenth of all: too little to judge.
     checks_judged: Option<usize>,
+    /// All checks.
     checks_all: Option<usize>,
-    /// First received in the air.
+    /// The log begins in the air.
     begins_in_air: bool,
+    /// The log ends in the air; false for a log that a board checked.
     ends_in_air: bool,
-    /// Unrecorded time, in another program's recording.
+    /// Part of the time was not recorded (recordings of other programs).
     lossy: bool,
+    /// Recorded bytes, without reserved room on the card.
     bytes: u64,
-    /// Complete, undamaged and proved.
+    /// No loss, no damage, and a proved end.
     whole: bool,
 }
 
@@ -102,6 +110,7 @@ struct LogJson {
 struct WorstJson {
     level: &'static str,
     check: String,
+    /// From 0.
     instance: u8,
     time_s: f64,
 }

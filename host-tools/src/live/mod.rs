@@ -85,6 +85,7 @@ const SCHEMA: Schema = Schema::first("hums-live");
 
 #[derive(Debug, Serialize)]
 struct PagesJson<'a> {
+    /// Addresses for this PC, then for other machines.
     pages: &'a [String],
 }
 

@@ -24,41 +24,41 @@ const SCHEMA: Schema = Schema::first("hums-run");
 /// The object of `--json`; its names are a contract.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RunReport {
-    /// Frames that came in.
+    /// Frames received.
     pub frames_in: u64,
-    /// Frames that are on the card.
+    /// Frames on the card.
     pub frames_logged: u64,
-    /// Frames that came in and are not.
+    /// Frames not on the card.
     pub frames_lost: u64,
-    /// Bytes that came in.
+    /// Bytes received.
     pub bytes_in: u64,
     /// Bytes outside frames.
     pub bytes_not_frames: u64,
     /// Bytes of log on the card.
     pub bytes_logged: u64,
-    /// 512-byte blocks written.
+    /// Blocks of 512 bytes, file system included.
     pub blocks_written: u64,
-    /// The fullest the sector queue was.
+    /// Largest fill of the sector queue.
     pub queue_bytes_max: u64,
-    /// Its size.
+    /// Size of the sector queue.
     pub queue_bytes_capacity: u64,
-    /// Longest call of the card, ms.
+    /// Longest call of the card.
     pub sd_stall_ms_max: u64,
     /// Frames sent to the ground station.
     pub gs_frames: u64,
     /// Bytes sent to the ground station.
     pub gs_bytes: u64,
-    /// Changes of level, in order, up to [`FINDINGS_MAX`]; the log has all of them.
+    /// At most 10,000, up to `unit`; times since the first byte.
     #[serde(serialize_with = "findings")]
     pub findings: Vec<Finding>,
-    /// How many more there were.
+    /// Further findings.
     #[serde(skip_serializing_if = "is_none")]
     pub findings_left_out: u64,
-    /// Usage counters, units in their names.
+    /// Counters (`docs/usage.md`).
     pub usage: serde_json::Map<String, serde_json::Value>,
-    /// The run's log files on the card.
+    /// Files of this run on the card.
     pub log_files: Vec<String>,
-    /// Sessions overwritten in whole or in part, for want of room.
+    /// Earlier sessions that were overwritten.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub overwritten: Vec<String>,
     /// Allowed by the command line.
@@ -67,22 +67,22 @@ pub struct RunReport {
     /// No room in the end, and no session to overwrite.
     #[serde(skip)]
     pub card_full: bool,
-    /// A power cut at a chosen block write.
+    /// Power failed as the command line asked.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub power_cut: bool,
-    /// Deepest use, if known.
+    /// With `--firmware`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_bytes_max: Option<u64>,
-    /// Its size.
+    /// With `--firmware`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_bytes: Option<u64>,
-    /// Deepest use by urgency, if measured.
+    /// Largest stack by urgency, with `--firmware --costs`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_by_urgency: Option<serde_json::Value>,
-    /// Cycles of the processor by stage, if measured.
+    /// Cycles of the processor by stage, with `--firmware --costs`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycles: Option<serde_json::Value>,
-    /// Percent in the worst second but the first, if measured.
+    /// In the worst second but the first, with `--firmware --costs`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub busy_percent_max: Option<f64>,
 }

@@ -25,7 +25,9 @@ const SCHEMA: Schema = Schema::first("hums-card-reader");
 
 #[derive(Debug, Serialize)]
 struct CardReaderJson {
+    /// MAVLink system id of the box's vehicle.
     system: u8,
+    /// True; a refusal gives exit code 1.
     restarts: bool,
 }
 

@@ -30,7 +30,9 @@ const SCHEMA: Schema = Schema::first("hums-format");
 
 #[derive(Debug, Serialize)]
 struct FormattedJson {
+    /// MAVLink system id of the box's vehicle.
     system: u8,
+    /// True; a failure gives exit code 1.
     formatted: bool,
 }
 

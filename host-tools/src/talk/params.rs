@@ -96,7 +96,9 @@ const SIGNED: Schema = Schema::first("hums-params-sign");
 
 #[derive(Debug, Serialize)]
 struct KeyJson {
+    /// MAVLink system id of the box's vehicle.
     system: u8,
+    /// False after its removal.
     has_key: bool,
 }
 

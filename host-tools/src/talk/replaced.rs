@@ -36,7 +36,7 @@ const SCHEMA: Schema = Schema::first("hums-replaced");
 
 #[derive(Debug, Serialize)]
 struct ReplacedJson {
-    /// The component, from 1.
+    /// Component, from 1.
     place: usize,
     part: String,
     serial: String,

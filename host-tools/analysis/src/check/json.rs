@@ -1,4 +1,4 @@
-//! `hums check --json`: an object a line. Its names are a contract: `docs/check.md`.
+//! `hums check --json`: an object a line. Its names are a contract: `docs/json.md`.
 
 use hums_core::clock::Instant;
 use serde::Serialize;
@@ -21,29 +21,51 @@ const VERSION: u32 = 1;
 struct LogJson<'a> {
     schema: &'static str,
     version: u32,
+    /// Path, with the session of a card: `card.img:00002`.
     log: &'a str,
+    /// `hums`, `tlog`, `raw`, `dataflash`, `ulog`.
     format: &'static str,
+    /// `ok`, `warning`, `critical`; `too_little`: no finding, and fewer than one check in ten had data; `unknown`: no autopilot,
+    /// or no times.
     verdict: &'static str,
     damaged: bool,
+    /// Sentences: why a log of HUMS is not proved complete, and sectors rebuilt from parity.
     not_proved: Vec<String>,
+    /// `hums` (this program), `board`, or `nobody` if the verdict is `unknown`; `checked_by` in `hums info`.
     judged_by: &'static str,
+    /// `null` without an autopilot.
     vehicle: Option<VehicleJson>,
+    /// UTC of the first observation.
     start_utc: Option<String>,
+    /// First observation, in the recording's time.
     from_s: Option<f64>,
+    /// Last observation.
     to_s: Option<f64>,
+    /// Without gaps.
     armed_s: f64,
+    /// In the air, without gaps.
     flight_s: f64,
     flights: Vec<FlightJson>,
+    /// The last state, if the log ends in the air.
     ends_in_air: Option<EndsInAirJson>,
+    /// Restarts of the clock, joined recordings included.
     clock_restarts: u64,
+    /// The worst first.
     problems: Vec<ProblemJson<'a>>,
+    /// Changes of level.
     findings_count: u64,
+    /// In order, at most 10,000.
     findings: Vec<FindingJson>,
+    /// Checks that had data; an `_alert` only if it was raised.
     judged: &'a [&'static str],
     not_judged: Vec<NotJudgedJson<'a>>,
+    /// Sentences about other things that were not judged.
     remarks: &'a [String],
+    /// Damaged places.
     damage_count: u64,
+    /// Losses reported by the recorder. `not_kept` is in neither count.
     loss_count: u64,
+    /// At most 10,000.
     gaps: Vec<GapJson<'a>>,
 }
 
@@ -61,20 +83,29 @@ struct VehicleJson {
 
 #[derive(Serialize)]
 struct FlightJson {
+    /// Take-off.
     from_s: f64,
+    /// Last time in the air.
     to_s: f64,
+    /// Without stops and gaps.
     air_s: f64,
+    /// False if the log begins in the air.
     took_off: bool,
     landed: bool,
+    /// Height of a disarming in the air.
     disarmed_at_m: Option<f32>,
+    /// Time of an impact.
     impact_s: Option<f64>,
+    /// Time of a mishap with or without an impact.
     down_s: Option<f64>,
+    /// Last message before a crash in a radio gap.
     unheard_from_s: Option<f64>,
 }
 
 #[derive(Serialize)]
 struct EndsInAirJson {
     time_s: f64,
+    /// Above home.
     height_m: Option<f32>,
     climb_mps: Option<f32>,
     speed_mps: Option<f32>,
@@ -86,19 +117,26 @@ struct EndsInAirJson {
 struct ProblemJson<'a> {
     subsystem: &'static str,
     check: &'a str,
+    /// From 0.
     instance: u8,
     level: &'static str,
     time_s: f64,
     time_utc: Option<String>,
+    /// In all.
     seconds: f64,
     times: u32,
     to_the_end: bool,
+    /// Value at `time_s`.
     onset: Option<f32>,
+    /// The worst.
     value: Option<f32>,
+    /// Word for a value without a unit.
     state: Option<&'static str>,
     limit: Option<f32>,
     unit: &'a str,
+    /// The check that caused it.
     because: Option<&'a str>,
+    /// Texts, failsafes or sensors.
     detail: Option<String>,
     meaning: &'static str,
     action: &'static str,
@@ -112,9 +150,11 @@ struct NotJudgedJson<'a> {
 
 #[derive(Serialize)]
 struct GapJson<'a> {
+    /// `damaged`, `cut`, `lost`, `not_kept`, `silent`, `no_times`.
     cause: &'static str,
     from_s: Option<f64>,
     to_s: Option<f64>,
+    /// Byte of the uncompressed file.
     place: Option<u64>,
     bytes: u64,
     why: &'a str,

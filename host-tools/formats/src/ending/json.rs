@@ -11,25 +11,31 @@ use crate::utc::iso8601;
 /// The end of a log as JSON.
 #[derive(Debug, Serialize)]
 pub struct EndJson {
-    /// `closed`, `next_start`, `mark`, `none`, `short`.
+    /// `closed`, `next_start`, `mark`, `none`, `short`, `differs`.
     proof: &'static str,
+    /// The proof in words.
     words: String,
+    /// The last end mark.
     mark: Option<MarkJson>,
+    /// Number of marks.
     marks: u64,
-    /// Seconds after the last mark, without a proof of their end.
+    /// Recorded seconds after the last mark.
     after_mark_s: Option<f64>,
-    /// Arming or take-off after the last mark, seconds since power-on.
+    /// An arming or take-off after the last mark.
     moved_s: Option<f64>,
-    /// Found by the next start.
+    /// Counted by the next start, but lost.
     sectors_missing: u32,
+    /// Counted by the next start, but lost.
     frames_missing: Option<u32>,
+    /// Blocks behind the last sector.
     behind: BlocksJson,
-    /// Sentences: why the log does not count as whole, and a remark on rebuilt sectors.
+    /// Sentences: why the log is not proved complete, and rebuilt sectors.
     not_proved: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
 struct MarkJson {
+    /// `landed`, `disarmed`, `mishap`.
     why: &'static str,
     time_s: f64,
     time_utc: Option<String>,
@@ -67,21 +73,30 @@ impl EndJson {
 /// Blocks of 512 bytes.
 #[derive(Debug, Serialize)]
 pub struct BlocksJson {
+    /// All.
     blocks: u64,
-    /// Copies of a sector in progress, and older content of this session.
+    /// Older copies of a sector in progress, or left over from this session.
     superseded: u64,
+    /// Sectors of this log at a wrong place.
     misplaced: u64,
+    /// Damaged sectors.
     damaged: u64,
+    /// Sectors of another session.
     other_session: u64,
     parity: u64,
-    /// Rebuilt from parity.
+    /// Sectors rebuilt from parity.
     repaired: u64,
+    /// Only zeros.
     zero: u64,
+    /// Only ones.
     erased: u64,
-    /// Heads without a valid check, of other sessions as far as known.
+    /// The head of a sector with a wrong check.
     unsound: u64,
+    /// Other data.
     foreign: u64,
+    /// Sectors of another version.
     older_format: u64,
+    /// Sectors of a newer version, and sealed ones.
     newer_format: u64,
 }
 

@@ -45,15 +45,16 @@ const SCHEMA: Schema = Schema::first("hums-report");
 
 #[derive(Debug, Default, Serialize)]
 struct PagesJson {
+    /// Written pages.
     pages: Vec<PageJson>,
-    /// Pages of sessions that exist, and were not overwritten.
+    /// Paths of pages that exist, and were not overwritten.
     skipped: Vec<PathBuf>,
 }
 
 #[derive(Debug, Serialize)]
 struct PageJson {
     path: PathBuf,
-    /// `null` of a table or a comparison.
+    /// `null` for a table of a folder and for a comparison.
     session: Option<String>,
     bytes: u64,
 }

@@ -21,13 +21,15 @@ const NEEDS_LOG_BEFORE: &str = "session before";
 
 #[derive(Debug, Serialize)]
 pub(super) struct LogJson {
-    /// As the board calls it.
+    /// Name on the box.
     pub(super) name: String,
+    /// The file.
     pub(super) path: PathBuf,
+    /// Downloaded in this run.
     pub(super) is_new: bool,
-    /// No fault, and a proved end if all files were requested.
+    /// `hums info --verify` finds no fault, and the end is proved if all files of the log were requested; false for a part.
     pub(super) whole: bool,
-    /// The end in the last file, as far as known.
+    /// In the last file of a log, if all of its files were requested.
     pub(super) end: Option<EndJson>,
 }
 

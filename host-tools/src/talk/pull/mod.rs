@@ -35,16 +35,18 @@ const SCHEMA: Schema = Schema::first("hums-pull");
 
 #[derive(Debug, Serialize)]
 struct PulledJson {
-    /// The board's identity.
+    /// MAVLink system id of the box's vehicle.
     system: u8,
+    /// Logs on the PC.
     logs: Vec<LogJson>,
-    /// With `--around`.
+    /// Moment of `--around`.
     around: Option<MomentJson>,
 }
 
 #[derive(Debug, Serialize)]
 struct MomentJson {
     time_s: f64,
+    /// The requested finding, or `null`.
     check: Option<String>,
     instance: Option<u8>,
     level: Option<&'static str>,

@@ -1,0 +1,225 @@
+//! `docs/json.md`: a table for the object of each command, made from the structs behind it and their doc comments.
+//! `HUMS_WRITE_DOCS=1 cargo test -p hums-base --test json_page` writes it.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const HEAD: &str = "\
+# Output for programs: `--json`
+
+For people who write scripts around `hums`. After this page you know the names in the JSON of each command. The tables are made from
+the code's structs by `host-tools/base/tests/json_page.rs`.
+
+* With `--json` a command prints one object on standard output. `schema` and `version` name it. `version` rises when a name goes or changes
+  its meaning. New names may come at any time.
+* Names carry units: `_s` seconds, `_us` microseconds, `_utc` ISO 8601. Other times count from the monitor's power-on, in other recordings
+  from their own zero. `null` means \"not known\" or \"none\". A name with `[]` is an element of a list.
+* Standard error is for people. [cli.md](cli.md) has the exit codes. `hums completions` and `hums man` have no `--json`.
+
+Example: the logs of a folder with a critical finding, and the parts of each vehicle that are due:
+```
+hums check --json logs/ | jq -r 'select(.verdict == \"critical\") | .log'
+hums due --json logs/ | jq -r '.vehicles[] | .vehicle as $v | .parts[] | select(.status == \"red\") | \"\\($v) \\(.part)\"'
+```
+";
+
+/// Heading, introduction, files with the structs, and the root: a struct's name, or its fields.
+const OBJECTS: [(&str, &str, &str, &str); 16] = [
+    (
+        "`hums-check` 1",
+        "One object a line for each log. A log that cannot be read has `schema`, `version`, `log` and `error` only.",
+        "analysis/src/check/json.rs",
+        "LogJson",
+    ),
+    (
+        "`hums-info-list` 1",
+        "",
+        "src/info/list.rs",
+        "images: Vec<ImageJson>,\n/// The oldest first.\nlogs: Vec<LogJson>,",
+    ),
+    (
+        "`hums-info` 1",
+        "",
+        "analysis/src/log_json.rs analysis/src/summary.rs",
+        "images: Vec<ImageJson>,\nlogs: Vec<LogJson>,",
+    ),
+    (
+        "`hums-info-verify` 1",
+        "",
+        "src/verify.rs",
+        "images: Vec<ImageJson>,\nlogs: Vec<LogJson>,\n/// All logs are, and no image is damaged.\nok: bool,",
+    ),
+    (
+        "`hums-manifest` 1",
+        "The file of `--manifest FILE` of `hums info --verify` and `hums decode`.",
+        "analysis/src/manifest.rs",
+        "Manifest",
+    ),
+    ("`hums-due` 1", "", "src/info/due.rs", "DueJson"),
+    ("`hums-decode` 1", "", "export/src/made.rs", "MadeJson"),
+    ("`hums-report` 1", "", "report/src/report/mod.rs", "PagesJson"),
+    ("`hums-run` 1", "Of `hums sim`.", "src/run/report.rs", "RunReport"),
+    ("`hums-pull` 1", "Of `hums box pull`.", "src/talk/pull/mod.rs src/talk/pull/judge.rs", "PulledJson"),
+    (
+        "`hums-params` 1",
+        "Of `hums box params list`, `get` and `set`. Each parameter is a name with its value; unusual characters in a name are `\\u{a}`.",
+        "",
+        "/// MAVLink system id of the box's vehicle.\nsystem: u8,",
+    ),
+    ("`hums-params-sign` 1", "Of `hums box params sign`.", "src/talk/params.rs", "KeyJson"),
+    ("`hums-replaced` 1", "Of `hums box replaced`.", "src/talk/replaced.rs", "ReplacedJson"),
+    ("`hums-card-reader` 1", "Of `hums box card-reader`.", "src/talk/card_reader.rs", "CardReaderJson"),
+    ("`hums-format` 1", "Of `hums box format-card`.", "src/talk/format.rs", "FormattedJson"),
+    ("`hums-live` 1", "Of `hums live`, at its start.", "src/live/mod.rs", "PagesJson"),
+];
+
+/// Structs in several objects: heading, introduction, file.
+const SHARED: [(&str, &str, &str, &str); 5] = [
+    ("ImageJson", "`image`", "A card, or an image of one.", "analysis/src/log_json.rs"),
+    (
+        "EndJson",
+        "`end`",
+        "[decode.md](decode.md#whether-a-log-is-whole) explains the proof of a log's end.",
+        "formats/src/ending/json.rs",
+    ),
+    ("BlocksJson", "`blocks`", "Numbers of blocks of 512 bytes, by kind.", "formats/src/ending/json.rs"),
+    (
+        "FindingJson",
+        "`finding`",
+        "A change of level. [health.md](health.md) lists the checks.",
+        "analysis/src/log_json.rs",
+    ),
+    ("CrossingsJson", "`exceedance`", "", "analysis/src/log_json.rs"),
+];
+
+struct Field {
+    name: String,
+    kind: String,
+    words: String,
+    may_be_absent: bool,
+}
+
+/// The fields that serde writes.
+fn fields(body: &str) -> Vec<Field> {
+    let (mut fields, mut words, mut attributes) = (Vec::new(), Vec::new(), String::new());
+    for line in body.lines().map(str::trim) {
+        if let Some(text) = line.strip_prefix("///") {
+            words.push(text.trim());
+        } else if line.starts_with("#[") {
+            attributes += line;
+        } else if let Some((name, kind)) = line.split_once(": ") {
+            let name = name.rsplit(' ').next().unwrap_or_default().trim_start_matches("r#");
+            if !attributes.contains("serde(skip)")
+                && !(body.contains("schema: ") && ["schema", "version"].contains(&name))
+            {
+                fields.push(Field {
+                    name: name.to_owned(),
+                    kind: kind.trim_end_matches(',').to_owned(),
+                    words: words
+                        .join(" ")
+                        .trim_end_matches('.')
+                        .replace("[`", "`")
+                        .replace("`]", "`")
+                        .replace("`docs/", "`"),
+                    may_be_absent: attributes.contains("skip_serializing_if"),
+                });
+            }
+            words.clear();
+            attributes.clear();
+        }
+    }
+    fields
+}
+
+fn body<'a>(sources: &'a str, name: &str) -> Option<&'a str> {
+    let start = ["", "<'a>"].iter().find_map(|with| sources.find(&format!("struct {name}{with} {{\n")))?;
+    sources[start..].split_once('\n')?.1.split_once("\n}").map(|(body, _)| body)
+}
+
+/// The innermost type: `Vec<Option<&'a str>>` has `str`.
+fn innermost(kind: &str) -> &str {
+    let inner = kind.rsplit('<').find(|part| !part.starts_with("'a>")).unwrap_or(kind);
+    let inner = inner.trim_end_matches(['>', ']']).trim_start_matches(['&', '[']);
+    inner.trim_start_matches("'a ").trim_start_matches("'static ")
+}
+
+/// The heading of a struct in several objects.
+fn shared(inner: &str) -> Option<&'static str> {
+    let inner = if inner == "Finding" { "FindingJson" } else { inner };
+    SHARED.iter().find(|(name, ..)| *name == inner).map(|(_, heading, ..)| heading.trim_matches('`'))
+}
+
+fn kind_in_words(Field { kind, may_be_absent, .. }: &Field, is_struct: bool) -> String {
+    let inner = innermost(kind);
+    let one = match inner {
+        _ if let Some(name) = shared(inner) => format!("[{name}](#{name})"),
+        _ if is_struct || kind.contains("Map<") || inner.contains("Value") => "object".to_owned(),
+        "bool" => "true or false".to_owned(),
+        "f32" | "f64" => "number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "whole number".to_owned(),
+        _ => "text".to_owned(),
+    };
+    let list = if kind.contains("Vec<") || kind.contains('[') { "list: " } else { "" };
+    let or = match (may_be_absent, kind.starts_with("Option<")) {
+        (true, _) => ", or left out",
+        (false, true) => ", or null",
+        (false, false) => "",
+    };
+    format!("{list}{one}{or}")
+}
+
+fn rows(sources: &str, body: &str, around: &str, table: &mut String) {
+    for field in fields(body) {
+        let inner = innermost(&field.kind);
+        let is_shared = shared(inner).is_some();
+        let inner = self::body(sources, inner).filter(|_| !is_shared);
+        let element =
+            format!("{around}{}{}", field.name, if field.kind.contains("Vec<") { "[]" } else { "" });
+        let name = if is_shared { element.as_str() } else { element.trim_end_matches("[]") };
+        let _ =
+            writeln!(table, "| `{name}` | {} | {} |", kind_in_words(&field, inner.is_some()), field.words);
+        if let Some(inner) = inner {
+            rows(sources, inner, &format!("{element}."), table);
+        }
+    }
+}
+
+fn section(heading: &str, about: &str, files: &str, root: &str) -> String {
+    let root_folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |file: &str| {
+        fs::read_to_string(root_folder.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+    };
+    let sources: String = files.split_whitespace().map(read).collect();
+    let mut text = format!("\n## {heading}\n");
+    if !about.is_empty() {
+        let _ = write!(text, "\n{about}\n");
+    }
+    text += "\n| name | type | content |\n|---|---|---|\n";
+    let fields = if root.contains(':') {
+        root
+    } else {
+        body(&sources, root).unwrap_or_else(|| panic!("{files} has no struct {root}"))
+    };
+    rows(&sources, fields, "", &mut text);
+    text
+}
+
+#[test]
+fn the_page_of_json_has_every_name() {
+    let mut text = HEAD.to_owned();
+    for (heading, about, files, root) in OBJECTS {
+        text += &section(heading, about, files, root);
+    }
+    for (root, heading, about, file) in SHARED {
+        text += &section(heading, about, file, root);
+    }
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "../../docs/json.md"].iter().collect();
+    if std::env::var_os("HUMS_WRITE_DOCS").is_some() {
+        fs::write(&path, &text).expect("the page");
+    }
+    assert!(
+        fs::read_to_string(&path).expect("the page") == text,
+        "docs/json.md is old: see this test's file"
+    );
+}
