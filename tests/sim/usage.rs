@@ -58,7 +58,7 @@ fn finding_rows(flight: &Path, json: &Value) -> Vec<String> {
 
 #[test]
 fn the_documentation_shows_the_findings_and_the_usage_of_the_recordings() {
-    let document = fs::read_to_string(root().join("docs/usage.md")).unwrap();
+    let document = fs::read_to_string(root().join("tests/flights/README.md")).unwrap();
     let (mut rows, mut shown) = (0, String::new());
     for flight in OWN.map(own) {
         let json = Recording::make(Machine::Sim, &flight, &[]).json();
@@ -68,10 +68,10 @@ fn the_documentation_shows_the_findings_and_the_usage_of_the_recordings() {
         }
     }
     let missing: Vec<&str> = shown.lines().filter(|row| !document.contains(*row)).collect();
-    assert!(missing.is_empty(), "docs/usage.md has not:\n{}", missing.join("\n"));
+    assert!(missing.is_empty(), "tests/flights/README.md has not:\n{}", missing.join("\n"));
     let documented =
         document.lines().filter(|line| OWN.iter().any(|name| line.starts_with(&format!("| {name} |"))));
-    assert_eq!(documented.count(), rows, "docs/usage.md has rows that there are not:\n{shown}");
+    assert_eq!(documented.count(), rows, "tests/flights/README.md has rows that there are not:\n{shown}");
 }
 
 #[cfg(feature = "oracle")]

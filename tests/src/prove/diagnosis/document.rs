@@ -21,7 +21,7 @@ fewer faults are found or more false alarms come than before.
   the part that failed (`tests/src/prove/diagnosis/causes.rs`). Faults that no message shows are not counted.
 * An alarm is false if nothing was wrong: without a fault, before it, or in weather that the autopilot holds against. Each rise counts.
 * Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air.
-* [real-flights.md](real-flights.md) compares the ArduPilot flights before and after a change of the checks.
+* [real-flights.csv](real-flights.csv) lists the real ArduPilot flights, [real-flights-px4.csv](real-flights-px4.csv) those of PX4.
 ";
 
 /// No table shows these.
