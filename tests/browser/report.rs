@@ -561,7 +561,7 @@ fn flights_of_one_file_and_a_single_one_cannot_be_compared() {
     let mut make = command(["report", "--compare"]);
     make.arg(own("ap_quad_guided.tlog")).arg("-o").arg(&out);
     let refused = child::run(&mut make, LIMIT).expect_code(&[1]);
-    assert!(refused.stderr.contains("not two flights"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("fewer than two flights"), "{}", refused.stderr);
     assert!(!out.exists());
 }
 

@@ -447,12 +447,12 @@ fn a_card_from_the_shop_is_formatted_by_command_and_one_with_logs_is_not() {
                 .chain(flags.iter().copied()),
         )
     };
-    assert!(format(&[]).expect_code(&[2]).stderr.contains("will be lost"));
+    assert!(format(&[]).expect_code(&[2]).stderr.contains("erases all files"));
     assert_eq!(fs::read(&image).unwrap(), card, "nobody said --yes");
     let done = format(&["--yes"]).expect_code(&[0]).text();
     assert_eq!(done, "system 1: formatted, and recorded on\n");
     let again = format(&["--yes"]).expect_code(&[1]);
-    assert!(again.stderr.contains("is not formatted over a link"), "{}", again.stderr);
+    assert!(again.stderr.contains("format such a card on a PC"), "{}", again.stderr);
     let log = board.end();
     assert!(log.contains("card is formatted by 255/190"), "the record says who did it");
 }

@@ -17,7 +17,7 @@ pub fn read(path: Option<&Path>) -> Result<Vec<(&'static ParamSpec, f32)>> {
     let Some(path) = path else { return Ok(Vec::new()) };
     let bytes = read_short(path, BYTES_MAX).context("--params")?;
     let text = String::from_utf8(bytes).map_err(|_| {
-        usage(format!("--params {}: is no text; it wants lines of NAME VALUE", path.display()))
+        usage(format!("--params {}: is not a text file; give lines of NAME VALUE", path.display()))
     })?;
     let mut params = Vec::new();
     for (index, line) in text.lines().enumerate() {

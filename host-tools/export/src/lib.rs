@@ -200,7 +200,7 @@ pub fn run(args: &DecodeRequest) -> Result<Outcome> {
         manifest.write(args.program, to, &roots, &read, &made, &task.inputs)?;
     }
     if !written {
-        bail!("nothing of what was asked for is there, so nothing was written");
+        bail!("no data match the selection, so nothing was written");
     }
     Ok(outcome)
 }
@@ -232,7 +232,7 @@ fn remark(found: &FoundRecordings, remarks: &[String]) {
         note!("{}: {}", image.path.display(), image.damage.join("; "));
     }
     if found.places.is_empty() {
-        note!("no log is in there, so nothing was written");
+        note!("no log was found, so nothing was written");
     }
 }
 

@@ -34,22 +34,22 @@ pub struct Check {
     /// Limits other than the defaults: a parameter file, as a ground station writes it
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
-    /// Earlier flights of the same vehicle, three or more, in which it was well: trends are judged against them. May be given several times
+    /// Earlier flights of the same vehicle without faults, three or more: the baseline of trends. May be given several times
     #[arg(long, value_name = "LOG", value_parser = input())]
     pub past: Vec<PathBuf>,
     /// Only this session of a card or folder, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
-    /// Of several vehicles in a recording only this one, by its system id
+    /// MAVLink system id of the vehicle, if a recording has several
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    /// Search every block of an image for deleted logs and remains of overwritten ones
     #[arg(long)]
     pub salvage: bool,
     /// List the checks that were not judged, each with the reason
     #[arg(long, short)]
     pub verbose: bool,
-    /// Print a line with a JSON object for each log (docs/check.md)
+    /// Print a line with a JSON object for each log (docs/json.md)
     #[arg(long)]
     pub json: bool,
 }

@@ -32,12 +32,12 @@ const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
   serial:DEVICE:BAUD    a serial port, e.g. serial:/dev/ttyUSB0:921600
 
 Examples:
-  hums flight.tlog                                           what is wrong with a flight: the same as hums check flight.tlog
+  hums flight.tlog                                           the faults of a flight: the same as hums check flight.tlog
   hums sim flight.tlog --sd card.img                 record a flight onto an SD card image
   hums info --list card.img                                  the flights on a card, a line each
-  hums info card.img --session 00001                         all that is known of one of them
+  hums info card.img --session 00001                         all facts about one of them
   hums decode card.img -o out --format tlog,csv              a card's logs for other tools
-  hums live udpin:0.0.0.0:14550 --open               the vehicle as it flies, in the browser
+  hums live udpin:0.0.0.0:14550 --open               a live page of the vehicle in the browser
 
 Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage (all that could be read was read);
 4 done, and `hums check` found something wrong with the vehicle, also in a damaged log.
@@ -58,29 +58,29 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Say what is wrong with a flight, from the log of any autopilot or ground station
+    /// Find the faults of a flight in a log of an autopilot, a ground station or the box
     Check(Check),
     /// Write a page about a flight: plots, map, findings, usage, trend; one HTML file, no network
     Report(Report),
-    /// Show the vehicle as it flies, on a page that this program serves: from a link, a recording or a log
+    /// Show a vehicle live in the browser, from a link, a recording or a log
     Live(Live),
     /// Turn logs into files for other tools: tlog, CSV, JSON lines, Parquet, MCAP, ULog, KML and others
     Decode(Decode),
-    /// Copy a log without where and who: places and times moved, names, numbers and secrets removed
+    /// Copy a log for publication: places and times are moved, names, numbers and secrets removed
     Share(Share),
-    /// Say what is in a log: sessions, vehicle, frames, gaps, findings, usage, sizes
+    /// Show the contents of a log: sessions, vehicle, frames, gaps, findings, usage, sizes
     Info(Info),
-    /// Say which parts are due: used, limit, left at the present rate; and the hours of each vehicle
+    /// List the parts that are due, with limit and remaining life, and the hours of each vehicle
     Due(Due),
     /// Write a logbook of flights, batteries and parts with their defects: a page, CSV, or JSON of GUTMA
     Logbook(Logbook),
-    /// Make few large files of a fleet's Parquet tables; may be stopped and started again at any time
+    /// Merge a fleet's Parquet files into few large ones; may be stopped and started again at any time
     Compact(Compact),
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
     Sim(Sim),
     /// Talk with the box over MAVLink: its logs, its parameters, its card
     Box(BoxArgs),
-    /// Print a script that has a shell complete commands, flags and file names
+    /// Print a script for a shell, which completes commands, flags and file names
     #[command(hide = true)]
     Completions(Completions),
     /// Print the manual page of the program or of one command

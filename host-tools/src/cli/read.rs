@@ -53,7 +53,7 @@ pub struct Decode {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
-    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    /// Search every block of an image for deleted logs and remains of overwritten ones
     #[arg(long)]
     pub salvage: bool,
     /// Only this session of a card or folder, by the name that `hums info --list` prints
@@ -62,16 +62,16 @@ pub struct Decode {
     /// The file or directory to write
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// What to write, several with commas
+    /// Formats, separated by commas
     #[arg(long, value_parser = format(), value_delimiter = ',', required = true)]
     pub format: Vec<&'static Format>,
-    /// Leave out what is earlier: seconds as the tables have them (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
+    /// First moment: seconds since power-on (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
     #[arg(long, value_name = "T")]
     pub from: Option<When>,
-    /// Leave out what is later
+    /// Last moment, in the same forms as --from
     #[arg(long, value_name = "T")]
     pub to: Option<When>,
-    /// Write files of their own for each flight; the time on the ground between two is cut in its middle
+    /// Write separate files for each flight; the time on the ground between two is cut in its middle
     #[arg(long, value_enum, value_name = "WHAT", conflicts_with_all = ["from", "to"])]
     pub split: Option<Split>,
     /// Write the findings into a tlog, as texts of the box at their times, for programs that show texts
@@ -80,7 +80,7 @@ pub struct Decode {
     /// Write a manifest of the files read and made, as JSON: SHA-256, repairs, losses (docs/json.md)
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
-    /// For srt: the video begins this long after the log; negative if it begins before
+    /// For srt: start of the video, seconds after the log's; negative if it is earlier
     #[arg(
         long,
         value_name = "SECONDS",
@@ -90,7 +90,7 @@ pub struct Decode {
         value_parser = offset
     )]
     pub offset: f64,
-    /// For parquet and influx: the vehicle of all logs that have no unique id
+    /// For parquet and influx: name of the vehicle for logs without a unique id of the autopilot
     #[arg(long, value_name = "NAME")]
     pub vehicle: Option<String>,
     /// Only these messages, by name; HUMS records and gaps stay
@@ -146,7 +146,7 @@ const SHARE_EXAMPLES: &str = "Examples:
   hums share flight.ulg -o shared.ulg
 
 A recording of a link becomes a tlog, an autopilot's own log a ULog. The output lists the data that was moved and removed.
-Look at the copy before you publish it: docs/decode.md says what the rest of it still tells.";
+Look at the copy before you publish it: docs/decode.md lists the data that remain.";
 
 /// `hums share`
 #[derive(Args, Clone, Debug)]
@@ -199,7 +199,7 @@ pub struct Info {
     /// Print a line a log: date, length, time in the air, size, worst finding
     #[arg(long)]
     pub list: bool,
-    /// Check all that can be checked about HUMS logs and cards, and print each check
+    /// Verify HUMS logs and cards, and print each check: checksums, order, ends
     #[arg(long, conflicts_with_all = ["list", "session", "system"])]
     pub verify: bool,
     /// As --verify, and write a manifest of the files read, as JSON: SHA-256, repairs, losses (docs/json.md)
@@ -208,10 +208,10 @@ pub struct Info {
     /// Only this session, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
-    /// Of several vehicles in a recording only this one, by its system id
+    /// MAVLink system id of the vehicle, if a recording has several
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Look at every block of an image: finds logs that were deleted, and what is left of overwritten ones
+    /// Search every block of an image for deleted logs and remains of overwritten ones
     #[arg(long)]
     pub salvage: bool,
     /// Print the result as one JSON object (docs/json.md)
@@ -235,7 +235,7 @@ pub struct Due {
     /// Cards, card images, logs, recordings, or directories with such
     #[arg(required = true, value_name = "CARD|LOG|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
-    /// The vehicle of all logs that have no unique id
+    /// Name of the vehicle for logs without a unique id of the autopilot
     #[arg(long, value_name = "NAME")]
     pub vehicle: Option<String>,
     /// Print the result as one JSON object (docs/json.md)
@@ -263,7 +263,7 @@ pub struct Logbook {
     /// The file to write, or a folder; may be given several times
     #[arg(short, long, value_name = "OUT", required = true)]
     pub output: Vec<PathBuf>,
-    /// The aircraft of all logs that have no unique id
+    /// Name of the aircraft for logs without a unique id of the autopilot
     #[arg(long, value_name = "NAME")]
     pub vehicle: Option<String>,
     /// Overwrite pages and JSON that exist
@@ -327,7 +327,7 @@ pub struct Report {
     /// Show the newest flight and up to ten before it side by side on one page; with a directory such a page for each airframe too
     #[arg(long)]
     pub compare: bool,
-    /// Of several vehicles in a recording only this one, by its system id
+    /// MAVLink system id of the vehicle, if a recording has several
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
     /// Show map tiles of this server under the track: an address with {z}, {x} and {y}; a page asks no server without it

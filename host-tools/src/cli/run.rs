@@ -33,13 +33,13 @@ pub struct Sim {
     /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
     #[arg(long, value_name = "IMAGE")]
     pub sd: PathBuf,
-    /// Where the messages for the ground station go; over udp, tcp and serial the ground station is heard too
+    /// Output for the ground station; a UDP, TCP or serial link also receives its messages
     #[arg(long, value_name = "SINK")]
     pub gs: Option<Endpoint>,
-    /// A recording of what the ground station sends, each message at its time
+    /// A recording of the ground station's messages, each sent at its time
     #[arg(long, value_name = "SRC")]
     pub gs_input: Option<Endpoint>,
-    /// The flash in which counters and parameters outlive power (32 KiB; made when missing); without it all begin anew
+    /// File of the flash with counters and parameters (32 KiB; made when missing); without it all begin at zero
     #[arg(long, value_name = "FILE")]
     pub store: Option<PathBuf>,
     /// Set these parameters before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
@@ -48,10 +48,10 @@ pub struct Sim {
     /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
     #[arg(long, value_enum)]
     pub speed: Option<Speed>,
-    /// Overwrite the oldest sessions where the card has no room, as on a vehicle
+    /// Overwrite the oldest sessions if the card is full, as on a vehicle
     #[arg(long)]
     pub overwrite_oldest: bool,
-    /// Also write the bytes as they arrived at the UART, noise and all, to this file
+    /// Also write the bytes of the UART, with their noise, to this file
     #[arg(long, value_name = "FILE")]
     pub tap: Option<PathBuf>,
     /// Run this firmware image (ELF, DFU or raw) on a model of its board's chip, instead of the pipeline on this PC
@@ -97,7 +97,7 @@ pub struct FaultFlags {
     /// Each block write fails with this probability
     #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "write_error")]
     pub write_error: Option<f64>,
-    /// The size of the card image that is made, in MiB
+    /// Size of a new card image, MiB
     #[arg(long, value_name = "MIB", overrides_with = "card_size")]
     pub card_size: Option<u64>,
     /// Each byte from the autopilot is damaged with this probability
@@ -109,7 +109,7 @@ pub struct FaultFlags {
     /// Cut the board's own power for a moment, T seconds after the first byte; the card stays in its slot
     #[arg(long = "reboot-at", value_name = "T", value_parser = micros)]
     pub reboot_at_us: Vec<u64>,
-    /// The seed of all that is random: the same number gives the same faults
+    /// Seed of the random faults: the same number gives the same faults
     #[arg(long, value_name = "N", default_value_t = 0, overrides_with = "seed")]
     pub seed: u64,
 }

@@ -16,7 +16,7 @@ from ~/.config/fish/completions/hums.fish, PowerShell from a line in $PROFILE.";
 #[derive(Args, Clone, Debug)]
 #[command(after_help = COMPLETIONS_EXAMPLES)]
 pub struct Completions {
-    /// The shell that is to complete commands, flags and file names
+    /// The shell
     #[arg(value_enum, value_name = "SHELL")]
     pub shell: Shell,
 }

@@ -34,11 +34,11 @@ pub enum BoxAction {
     Pull(Pull),
     /// List, read or set the board's parameters over MAVLink
     Params(Params),
-    /// Say that a part was replaced: over the link, or by a file on the card
+    /// Report a replaced part to the box, over a link or by a file on its card
     Replaced(Replaced),
-    /// Have the board show its card to a PC as a read-only USB disk
+    /// Show the board's card to a PC as a read-only USB disk
     CardReader(CardReader),
-    /// Have the board format a card that it cannot record on
+    /// Format the board's card, if the board cannot record on it
     FormatCard(FormatCard),
 }
 
@@ -62,10 +62,10 @@ pub struct Params {
 /// Where the board is.
 #[derive(Args, Clone, Debug)]
 pub struct Link {
-    /// Where the board is: udpin:, udpout:, tcp: or serial:
+    /// Link to the board: udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub link: Endpoint,
-    /// Sign what is sent with the key in this file: 64 hexadecimal digits, or a passphrase as Mission Planner takes it
+    /// Sign messages with the key in this file: 64 hexadecimal digits, or a passphrase (as in Mission Planner)
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
     /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
@@ -97,24 +97,24 @@ pub enum ParamsAction {
         #[arg(long)]
         json: bool,
     },
-    /// Give the board the key of --key, over the port from which it takes keys (parameter `SIGN_PORT`)
+    /// Send the board the signing key of --key, over the port that the parameter `SIGN_PORT` trusts
     Sign {
         /// The address of the board.
         #[command(flatten)]
         at: Link,
-        /// Take the key away
+        /// Remove the key
         #[arg(long)]
         remove: bool,
         /// Print the result as one JSON object (docs/json.md)
         #[arg(long)]
         json: bool,
     },
-    /// Set a parameter; fails where the board keeps another value
+    /// Set a parameter; fails if the board keeps another value
     Set {
         /// The name
         #[arg(value_name = "NAME")]
         name: String,
-        /// The value; of single precision, so that it may be rounded, which is said
+        /// The value; rounded to single precision, with a message
         #[arg(value_name = "VALUE", allow_negative_numbers = true)]
         value: f64,
         /// The address of the board.
@@ -149,7 +149,7 @@ pub struct Pull {
     /// The directory for the logs; made when missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Only these, by the names that the board has for them
+    /// Names of log files on the board; without names all of them
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
     /// Only the newest N logs, each with all of its files
@@ -224,10 +224,10 @@ pub struct Replaced {
     /// The serial number of the new part
     #[arg(long, value_name = "S")]
     pub serial: Option<String>,
-    /// Where the board is: udpin:, udpout:, tcp: or serial:
+    /// Link to the board: udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub link: Option<Endpoint>,
-    /// Sign what is sent with the key in this file
+    /// Sign messages with the key in this file
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
     /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
@@ -262,7 +262,7 @@ pub struct FormatCard {
     /// The address of the board.
     #[command(flatten)]
     pub at: Link,
-    /// Yes, everything on the card may be lost
+    /// Confirm that all files on the card are erased
     #[arg(long)]
     pub yes: bool,
     /// Print the result as one JSON object (docs/json.md)

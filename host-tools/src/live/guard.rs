@@ -32,12 +32,16 @@ impl Guard {
     pub fn new(listen: SocketAddr, host: &str, token: Option<&str>) -> Result<(Self, Option<String>)> {
         let token = match token {
             Some(short) if short.len() < TOKEN_CHARS_MIN => {
-                return Err(usage(format!("--listen-token: at least {TOKEN_CHARS_MIN} characters")));
+                return Err(usage(format!(
+                    "--listen-token: is too short; give at least {TOKEN_CHARS_MIN} characters"
+                )));
             }
             Some(given)
                 if !given.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte)) =>
             {
-                return Err(usage("--listen-token: letters, digits, and - _ . only"));
+                return Err(usage(
+                    "--listen-token: has other characters; give letters, digits, and - _ . only",
+                ));
             }
             Some(given) => Some(given.to_owned()),
             None if listen.ip().is_loopback() => None,

@@ -278,8 +278,7 @@ impl Player {
         let name = &self.source.name;
         let [given, end_s] = [given_to, end].map(Instant::as_secs_f64);
         if self.read_to.is_some() {
-            influx
-                .leave_out(format!("{name}: its points go to {given:.1} s: it was ended while it was read"));
+            influx.leave_out(format!("{name}: was interrupted; its points go to {given:.1} s"));
         } else if given_to < end {
             influx.leave_out(format!(
                 "{name}: its points go to {given:.1} s of {end_s:.1} s, where it was ended"

@@ -50,8 +50,7 @@ impl EarlierSessions {
         };
         if let Some(damage) = card.damage.as_ref().filter(|_| !run.overwrite_oldest) {
             return Err(usage(format!(
-                "{}: the card's file system is damaged ({damage}), and the run might overwrite what lies on it; name another image, \
-                 or say --overwrite-oldest",
+                "{}: the card's file system is damaged ({damage}), so the run may overwrite logs; name another image, or add --overwrite-oldest",
                 run.sd.display()
             )));
         }
@@ -59,8 +58,7 @@ impl EarlierSessions {
         let oldest = oldest(&card.logs).filter(|_| !run.overwrite_oldest);
         if let Some(oldest) = oldest.filter(|_| !has_room(&card, run, unknown)) {
             return Err(usage(format!(
-                "{}: the card is full or may become so, and the run would overwrite its oldest session ({}); name another \
-                 image, or say --overwrite-oldest",
+                "{}: the card is full or may become so, and the run would overwrite its oldest session ({}); name another image, or add --overwrite-oldest",
                 run.sd.display(),
                 oldest.name
             )));

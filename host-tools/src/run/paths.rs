@@ -17,8 +17,7 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
     run.gs_input.iter().for_each(|input| inputs.add_endpoint(input));
     if run.sd.metadata().is_ok_and(|about| is_seekable(&about) && !about.is_file()) {
         return Err(usage(format!(
-            "--sd {}: is a disk or a card, and a run records into a file only; nothing was written; name an image file, and copy \
-             it to a card with a program for that (dd)",
+            "--sd {}: is a disk or a card, and a run records into a file only; name an image file",
             run.sd.display()
         )));
     }

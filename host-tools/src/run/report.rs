@@ -163,7 +163,7 @@ impl RunReport {
         }
         if self.card_full {
             note!(
-                "the card is full, and earlier sessions were kept: name another image, or say --overwrite-oldest"
+                "the card is full, and earlier sessions were kept: name another image, or add --overwrite-oldest"
             );
         }
         if !self.overwritten.is_empty() {

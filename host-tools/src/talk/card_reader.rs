@@ -55,11 +55,13 @@ fn tell(client: &mut Client) -> Result<()> {
         let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == RESTART;
         (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
     })?;
-    match answer.context("no answer; look whether the PC has a new disk, otherwise say this again")? {
+    match answer.context("no answer; if the PC has no new disk, send the command again")? {
         0 => Ok(()),
-        1 => bail!("not now: the vehicle is armed, or too much was asked of the board at once"),
-        2 => bail!("the board refused: the command is not signed as GS_SIGN asks"),
-        3 => bail!("the board has no card reader; is its firmware as new as this program?"),
+        1 => bail!(
+            "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
+        ),
+        2 => bail!("the board refused: GS_SIGN needs a signed command; give --key FILE"),
+        3 => bail!("the firmware has no card reader; flash the one of this version"),
         result => bail!("the board refused (MAV_RESULT {result})"),
     }
 }

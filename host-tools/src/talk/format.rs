@@ -39,7 +39,7 @@ struct FormattedJson {
 /// Runs `hums box format-card`.
 pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     if !args.yes {
-        return Err(usage("everything on the board's card will be lost; say --yes if that is meant"));
+        return Err(usage("this erases all files on the board's card; add --yes to confirm"));
     }
     let mut client = Client::connect_alone(&args.at)?;
     let system = client.system();
@@ -81,7 +81,7 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
         Some(Answer::Result(result)) => Some(result),
         _ => None,
     })?;
-    let mut result = answer.context("no answer; is its firmware as new as this program?")?;
+    let mut result = answer.context("no answer; check the link, or flash the firmware of this version")?;
     check(result)?;
     let minutes = LIMIT.as_secs() / 60;
     output::aside(&format!(
@@ -98,16 +98,15 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
             }
             Some(Some(Answer::Card(state))) if state == "recording" => return Ok(()),
             Some(Some(Answer::Card(state))) if !state.starts_with("is being") => {
-                bail!("it did not work, the board says of its card: {state}")
+                bail!("the card was not formatted; the board reports: {state}")
             }
             Some(_) => {}
             None if Instant::now() < end => bail!(
-                "the board has said nothing for {} s, and not that it is done; is it switched off?",
+                "the board has sent nothing for {} s, so the result is not known; check its power, and try again",
                 silence.as_secs()
             ),
             None => bail!(
-                "the board has not said within {minutes} minutes that it is done; its word may be lost: say this command again, \
-                 which is refused where the card can be recorded on"
+                "no result within {minutes} minutes; send the command again (a card that is ready is refused)"
             ),
         }
     }
@@ -116,13 +115,14 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
 fn check(result: u8) -> Result<()> {
     match result {
         ACCEPTED | IN_PROGRESS => Ok(()),
-        1 => bail!("not now: the vehicle is armed, or too much was asked of the board at once"),
-        2 => bail!(
-            "the board refused: its card can be recorded on, or is full of other files, and is not formatted over \
-             a link; or the command is not signed as GS_SIGN asks"
+        1 => bail!(
+            "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
         ),
-        3 => bail!("the board does not know the command; is its firmware as new as this program?"),
-        4 => bail!("there is no card that can be formatted"),
+        2 => bail!(
+            "the board refused: its card works, is full of other files, or GS_SIGN needs a signed command; format such a card on a PC, or give --key FILE"
+        ),
+        3 => bail!("the firmware does not know the command; flash the one of this version"),
+        4 => bail!("there is no card to format; insert one"),
         _ => bail!("the board refused (MAV_RESULT {result})"),
     }
 }

@@ -139,7 +139,7 @@ fn sign(at: &Link, remove: bool) -> Result<u8> {
     let key = match path {
         Some(path) => talk::key(path)?,
         None if remove => Key([0; KEY_BYTES]),
-        None => return Err(usage("params sign: which key? --key FILE")),
+        None => return Err(usage("params sign: no key is given; add --key FILE")),
     };
     // Unsigned: the board trusts this port.
     let mut client = Client::connect(&Link { key: None, ..at.clone() })?;
@@ -154,7 +154,7 @@ fn sign(at: &Link, remove: bool) -> Result<u8> {
     })?;
     said.with_context(|| {
         format!(
-            "system {system}: the board does not take the key: does its SIGN_PORT trust this port? See docs/companion.md"
+            "system {system}: the board does not take the key; set SIGN_PORT to this port (docs/companion.md)"
         )
     })?;
     Ok(system)
@@ -197,9 +197,9 @@ fn read(client: &mut Client, name: &str) -> Result<Param> {
 fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     let (system, component) = client.target();
     let request = Packet::new(PARAM_REQUEST_LIST).u8(0, system).u8(1, component);
-    let first = client
-        .ask(&request, GAP, TRIES, value_of)?
-        .with_context(|| format!("system {system}: no list of parameters comes"))?;
+    let first = client.ask(&request, GAP, TRIES, value_of)?.with_context(|| {
+        format!("system {system}: no parameters were received; check the link, and call again")
+    })?;
     let said = first.count;
     let count = said.min(COUNT_MAX);
     let mut wrong = Vec::new();

@@ -66,7 +66,7 @@ pub fn run(args: &cli::Replaced) -> Result<Outcome> {
             tell(&mut client, place, serial)?;
             (place, None)
         }
-        (None, None) => return Err(usage("where is the box? --link SRC, or --card DIR of its card")),
+        (None, None) => return Err(usage("no box is given; add --link SRC, or --card DIR of its card")),
     };
     if args.json {
         output::json(SCHEMA, &ReplacedJson { place, part, serial: serial.to_owned(), file })?;
@@ -131,15 +131,15 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
         let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == REPLACED;
         (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
     })?;
-    match answer
-        .with_context(|| format!("system {system}: no answer; is its firmware as new as this program?"))?
-    {
+    match answer.with_context(|| {
+        format!("system {system}: no answer; check the link, or flash the firmware of this version")
+    })? {
         0 => Ok(()),
         1 => bail!(
-            "system {system}: not now: the vehicle is armed, or too much was asked of the board at once"
+            "system {system}: refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
         ),
         2 => bail!(
-            "system {system}: the board refused: the command is not signed as GS_SIGN asks, or there is no such component"
+            "system {system}: the board refused: there is no such component, or GS_SIGN needs a signed command; give --key FILE"
         ),
         result => bail!("system {system}: the board refused (MAV_RESULT {result})"),
     }

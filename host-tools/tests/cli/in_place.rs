@@ -268,7 +268,7 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
         let before = fs::read(at(name)).expect("there");
         let said = run(dir.path(), &format!("sim PX4 --sd {name}"), 1);
         let said = String::from_utf8_lossy(&said.stderr);
-        assert!(said.contains(why) && said.contains("what is in it stays; name an image"), "{name}: {said}");
+        assert!(said.contains(why) && said.contains("it stays. Name an image"), "{name}: {said}");
         assert!(fs::read(at(name)).expect("there") == before, "{name}");
     }
     fs::write(at("few.tlog"), &tlog[..4000]).expect("written");

@@ -14,7 +14,7 @@ pub fn read_short(path: &Path, most: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.take(most + 1).read_to_end(&mut bytes).with_context(context)?;
     if bytes.len() as u64 > most {
-        bail!("{}: has more than {most} bytes, which no such file has; is it the right one?", path.display());
+        bail!("{}: has more than {most} bytes, which no such file has; name another file", path.display());
     }
     Ok(bytes)
 }

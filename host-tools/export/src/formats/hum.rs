@@ -95,7 +95,7 @@ fn run(args: &DecodeRequest) -> Result<Outcome> {
     }
     if done.bytes_not_frames > 0 {
         let bytes = count(done.bytes_not_frames, "byte");
-        note!("of no frame, and only counted: {bytes} of the recording");
+        note!("{bytes} of the recording are outside of frames; the log only counts them");
     }
     if let Some(words) = &done.wrong_checksums {
         note!("{name}: {words}");

@@ -193,7 +193,7 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     }
     let flights: u64 = book.values().map(|aircraft| aircraft.totals().flights as u64).sum();
     if book.is_empty() {
-        bail!("no flight is in there, so nothing was written");
+        bail!("no flight was found, so nothing was written");
     }
     for (form, path) in forms {
         match form {

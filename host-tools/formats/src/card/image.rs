@@ -49,7 +49,7 @@ fn open(path: &Path, about: &Metadata, size_mib: Option<u64>) -> Result<File> {
         bail!("{shown}: is a directory; --sd takes an image file");
     }
     if !about.is_file() {
-        bail!("{shown}: is no file; --sd takes an image file");
+        bail!("{shown}: is not a file; --sd takes an image file");
     }
     if about.permissions().readonly() {
         bail!("{shown}: is read-only; make it writable or name another image");
@@ -71,8 +71,7 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
     let bytes = length(file).with_context(context)?;
     if bytes < SIZE_MIB_MIN << 20 {
         bail!(
-            "{}: is no image of an SD card: it has {bytes} bytes, and a FAT32 card has {SIZE_MIB_MIN} MiB at least; name an \
-             image of a card, or a new file, which is made as one",
+            "{}: is no image of an SD card: it has {bytes} bytes, and a FAT32 card has {SIZE_MIB_MIN} MiB at least; name an image of a card, or a new file",
             path.display()
         );
     }
@@ -85,13 +84,11 @@ pub fn check(file: &File, path: &Path) -> Result<Option<String>> {
     let from = if matches!(why, LayoutError::NoPartitionTable) { 0 } else { BLOCK_BYTES as u64 };
     if is_zero(file, from).with_context(context)? {
         return Ok(Some(format!(
-            "{why}, so that nothing can be recorded on it before it is formatted; name an image of a card, or a new file, \
-             which is made as one"
+            "{why}, so that nothing can be recorded on it before it is formatted; name an image of a card, or a new file"
         )));
     }
     bail!(
-        "{}: {why}, so that nothing can be recorded on it, and what is in it stays; name an image of a card, or a new file, \
-         which is made as one (logs may be in it all the same: hums info --salvage)",
+        "{}: {why}, so that nothing can be recorded on it, and it stays. Name an image of a card, or a new file; `hums info --salvage` looks for logs in it",
         path.display()
     )
 }

@@ -73,10 +73,7 @@ fn search(inputs: &[PathBuf], salvage: bool, none: impl Fn(&Path) -> Result<()>)
 /// Refuses inputs without random access before they are opened: a pipe may never have another end.
 pub fn check_seekable(path: &Path, about: &Metadata) -> Result<()> {
     if !about.is_dir() && !is_seekable(about) {
-        bail!(
-            "{}: is a pipe, a socket, a terminal or the like, and a log is read from any place; copy it into a file first",
-            path.display()
-        );
+        bail!("{}: is a pipe, a socket, a terminal or the like; copy it into a file first", path.display());
     }
     Ok(())
 }

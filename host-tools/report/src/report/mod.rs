@@ -355,7 +355,7 @@ impl Making<'_> {
             comparisons.push((airframe, file));
         }
         if comparisons.is_empty() && !self.wanted.directory {
-            bail!("there are not two flights in it, so there is nothing to compare");
+            bail!("fewer than two flights were found, so there is nothing to compare; name more logs");
         }
         Ok(comparisons)
     }
@@ -434,7 +434,7 @@ struct Wanted {
 fn wanted(args: &Request<'_>, output: &Path, found: &FoundRecordings) -> Result<Wanted> {
     let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
-        bail!("no log is in there, so there is nothing to report")
+        bail!("no log was found, so there is nothing to report")
     };
     let directory = says_directory(output);
     let sessions = match args.session {

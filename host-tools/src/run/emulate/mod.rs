@@ -45,7 +45,10 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     let flown = drive(&mut arrivals, &mut ground, speed, live, Instant::now(), &mut board)
         .and_then(|_| board.settle());
     if is_card && medium.get(0) != table {
-        bail!("{}: was formatted by command in this run, and is left as it was before", run.sd.display());
+        bail!(
+            "{}: was formatted by a command in this run; the file stays as it was before",
+            run.sd.display()
+        );
     }
     // Also after an early end.
     medium.save(&card).with_context(|| format!("{}: cannot be written", run.sd.display()))?;

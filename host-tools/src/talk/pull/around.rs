@@ -88,7 +88,7 @@ pub(super) fn pull(
 fn check_recorded(at: Instant, overview: &Overview, is_to_end: bool) -> Result<()> {
     let summary = &overview.ending.summary;
     let (Some(first), Some(last)) = (summary.first, summary.last) else {
-        bail!("no sector around {} can be read", moment(at));
+        bail!("no sector around {} can be read; read the card itself", moment(at));
     };
     let utc = |at: Instant| {
         let utc_us = summary.epoch_us.map(|epoch_us| epoch_us.saturating_add(at.as_micros()));
@@ -169,7 +169,7 @@ impl<'a> RemoteLog<'a> {
         };
         for (name, bytes) in files {
             if *bytes < SECTOR {
-                note!("{name}: has no data, or its first sector cannot be read");
+                note!("{name}: has no data, or its first sector cannot be read; left out");
                 log.empty = Outcome::Losses;
                 continue;
             }
@@ -180,7 +180,7 @@ impl<'a> RemoteLog<'a> {
             log.files.push(RemoteFile { name, first, sectors, partial: None });
         }
         if log.files.is_empty() {
-            bail!("the board has no log with data");
+            bail!("the board has no log with data; record one first");
         }
         Ok(log)
     }

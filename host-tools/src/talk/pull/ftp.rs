@@ -170,15 +170,15 @@ impl Ftp {
                 let (name, bytes) = entry.split_once('\t').context("a directory entry without a length")?;
                 // A plain file name in our directory.
                 if name.contains(['/', '\\']) || name.starts_with('.') {
-                    bail!("the board names a file that is none: {name:?}");
+                    bail!("the board's list has an invalid file name: {name:?}");
                 }
                 logs.push((name.to_owned(), bytes.parse().context("a directory entry's length")?));
             }
             if answer.opcode != ACK || logs.len() + skipped == before {
-                bail!("the board's directory cannot be read");
+                bail!("the board's directory cannot be read; call again, or read the card itself");
             }
             if logs.len() + skipped > LOGS_MAX {
-                bail!("the board's directory has no end: more than {LOGS_MAX} logs are no card's");
+                bail!("the board lists more than {LOGS_MAX} logs, which no card has; read the card itself");
             }
         }
     }

@@ -66,7 +66,7 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     logs.sort();
     if skipped > 0 {
         note!(
-            "the board's card does not give {} now, with names that are not known: call again, or read the card itself",
+            "the board could not read {}, whose names are not known; call again, or read the card itself",
             count(skipped, "more log")
         );
     }
@@ -169,7 +169,7 @@ fn around(
 ) -> Result<Outcome> {
     let newest = logs.iter().rev().find(|(_, bytes)| *bytes > 0).and_then(|(log, _)| number(log));
     if !args.names.is_empty() && logs.iter().any(|(log, _)| number(log) != newest) {
-        return Err(usage("a moment is of one log: name only files of one number"));
+        return Err(usage("--around needs one log; name files of one number only"));
     }
     logs.retain(|(log, _)| number(log) == newest);
     let around::Brought { files, at, found, outcome } =
@@ -234,13 +234,13 @@ fn complete(
     fetch(ftp, name, file, have, length)?;
     if !is_whole(ftp, name, file, length)? {
         file.begin_anew()?;
-        note!("{name}: what came differs from the board's log; once more from its beginning");
+        note!("{name}: the download differs from the board's log; it starts again");
         length = ftp.open(name)?.min(length);
         check_same(heading, &heading_of(ftp, name, length)?)?;
         fetch(ftp, name, file, 0, length)?;
         if !is_whole(ftp, name, file, length)? {
             bail!(
-                "what came differs from the board's log twice; does its card give the same bytes each time? {} has what came",
+                "two downloads differ from the board's log, so its card may be failing; read the card itself ({} has the last download)",
                 file.part().display()
             );
         }
@@ -255,12 +255,12 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
     match (first.session, now.session) {
         (first, now) if first == now => Ok(()),
         (_, Some(_)) => bail!(
-            "another log has come in its place while it was read, {}: nothing of it has the first one's name: call again",
+            "another log, {}, replaced it during the download, of which nothing is kept; call again",
             now.name
         ),
-        (_, None) => bail!(
-            "its beginning can no longer be read on the board, so nothing tells whether it is the same log still: call again"
-        ),
+        (_, None) => {
+            bail!("the board can no longer read its beginning, so it may be another log; call again")
+        }
     }
 }
 
@@ -276,10 +276,7 @@ enum LocalCopy {
 fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCopy> {
     let Ok(about) = path.metadata() else { return Ok(LocalCopy::Nothing) };
     if !about.is_file() {
-        bail!(
-            "{}: is no file, and stands where the log is to be: move it away, or name another directory with -o",
-            path.display()
-        );
+        bail!("{}: is not a file; move it away, or name another directory with -o", path.display());
     }
     let bytes = u32::try_from(about.len()).unwrap_or(u32::MAX);
     if bytes == 0 {
@@ -287,8 +284,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
     }
     match compare(ftp, name, path, bytes.min(length))? {
         Likeness::Same | Likeness::SameEnds if about.len() > u64::from(length) => bail!(
-            "{} begins as the board's log, and has {} more than that has; it is left as it is: move it away, or name \
-             another directory with -o",
+            "{} is the board's log with {} more, and stays; move it away, or name another directory with -o",
             path.display(),
             count(about.len() - u64::from(length), "byte")
         ),
@@ -297,8 +293,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
         // Not proved: downloaded again, and replaced once complete.
         Likeness::SameEnds => Ok(LocalCopy::Nothing),
         Likeness::Other => bail!(
-            "{} differs from the board's log of the same session: one of both is damaged or was changed, and `hums info --verify` \
-             says whether this one is; it is left as it is: move it away, or name another directory with -o",
+            "{} differs from the board's log of the same session, and stays. Check it with `hums info --verify`; then move it away, or name another directory with -o",
             path.display()
         ),
     }
@@ -313,7 +308,7 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
         return Ok((bytes, likeness));
     }
     file.begin_anew()?;
-    note!("{name}: what was begun is not the beginning of the board's log; it begins anew");
+    note!("{name}: the unfinished download differs from the board's log; it starts again");
     Ok((0, likeness))
 }
 

@@ -136,7 +136,7 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
             assert!(is_new && fs::read(path).expect("there") == lost);
         } else {
             let told = pulled.expect_err("it is another one").to_string();
-            assert!(told.contains("another log has come in its place"), "{told}");
+            assert!(told.contains("replaced it during the download"), "{told}");
             // Deleted.
             assert_eq!(names_in(&output), Vec::<String>::new());
         }
@@ -146,7 +146,7 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
     fs::create_dir(&output).expect("made");
     let mut ftp = board(log.clone(), other.clone(), 8 * 3 + 1);
     let told = pull(&mut ftp, NAME, &output).expect_err("it is another one").to_string();
-    assert!(told.contains("another log has come in its place"), "{told}");
+    assert!(told.contains("replaced it during the download"), "{told}");
     assert_eq!(names_in(&output), Vec::<String>::new());
 }
 
@@ -156,10 +156,9 @@ fn a_card_that_loses_the_beginning_of_a_log_is_not_called_another_log() {
     let (log, _, name) = two_logs(dir.path());
     // The first sector alone, then the whole first page.
     let without = |bytes: usize| [&vec![0; bytes][..], &log[bytes..]].concat();
-    for (next, words) in [
-        (without(SECTOR_BYTES), None),
-        (without(8 * SECTOR_BYTES), Some("its beginning can no longer be read on the board")),
-    ] {
+    for (next, words) in
+        [(without(SECTOR_BYTES), None), (without(8 * SECTOR_BYTES), Some("can no longer read its beginning"))]
+    {
         let output = tempfile::tempdir().expect("a folder");
         let mut ftp = board(log.clone(), next.clone(), 8 * 3 + 5);
         let pulled = pull(&mut ftp, NAME, output.path());
@@ -185,7 +184,7 @@ fn what_is_no_file_in_the_place_of_a_log_is_told_and_left() {
     fs::create_dir_all(output.join(&name)).expect("made");
     let mut ftp = board(log, other, u32::MAX);
     let told = pull(&mut ftp, NAME, &output).expect_err("a folder").to_string();
-    assert!(told.contains("is no file, and stands where the log is to be: move it away"), "{told}");
+    assert!(told.contains("is not a file; move it away"), "{told}");
     assert_eq!(names_in(&output), [name]);
 }
 
