@@ -1,6 +1,5 @@
-//! The documents that the tables make: `docs/parameters.md` and the tables of checks in `docs/health.md` and
-//! `docs/check.md` follow the code, and `docs/usage.md` names every counter. `HUMS_WRITE_DOCS=1 cargo test -p
-//! hums-core-tests docs` writes the first three.
+//! The documents that the tables make: `docs/parameters.md`, the checks in `docs/health.md` and `docs/check.md`, and the
+//! counters in `docs/usage.md` follow the code. `HUMS_WRITE_DOCS=1 cargo test -p hums-core-tests docs` writes them.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
 use std::fmt::Write as _;
@@ -312,11 +311,32 @@ fn every_text_of_a_check_is_in_the_runbook() {
 
 #[test]
 fn every_counter_is_documented() {
-    let text = fs::read_to_string(path("usage.md")).unwrap();
-    for counter in UsageCounter::ALL {
-        let cell = format!("| `{}` |", counter.name());
-        assert!(text.contains(&cell), "docs/usage.md does not say what {} is", counter.name());
+    let mut table = "| counter | over sessions | definition |\n|---|---|---|\n".to_owned();
+    let mut words = Vec::new();
+    for line in include_str!("../src/usage/counters.rs").split_once("counters! {").unwrap().1.lines() {
+        if let Some(text) = line.trim().strip_prefix("/// ") {
+            words.push(text);
+        } else if let Some((form, name)) = line.split_once(" \"") {
+            let over = if form.ends_with("Highest") {
+                "greatest"
+            } else if form.ends_with("Lowest") {
+                "least"
+            } else {
+                "sum"
+            };
+            let _ = writeln!(
+                table,
+                "| `{}` | {over} | {} |",
+                name.trim_end_matches("\";"),
+                words.join(" ").trim_end_matches('.')
+            );
+            words.clear();
+        } else if line == "}" {
+            break;
+        }
     }
+    assert_holds("usage.md", "counters", &table);
+    let text = fs::read_to_string(path("usage.md")).unwrap();
     for quantity in exposure::ExposureQuantity::ALL {
         assert!(text.contains(&format!("`{}_", quantity.name())), "docs/usage.md does not know {quantity:?}");
     }

@@ -24,55 +24,27 @@ hums due --json logs/ | jq -r '.vehicles[] | .vehicle as $v | .parts[] | select(
 ```
 ";
 
-/// Heading, introduction, files with the structs, and the root: a struct's name, or its fields.
-const OBJECTS: [(&str, &str, &str, &str); 16] = [
-    (
-        "`hums-check` 1",
-        "One object a line for each log. A log that cannot be read has `schema`, `version`, `log` and `error` only.",
-        "analysis/src/check/json.rs",
-        "LogJson",
-    ),
-    (
-        "`hums-info-list` 1",
-        "",
-        "src/info/list.rs",
-        "images: Vec<ImageJson>,\n/// The oldest first.\nlogs: Vec<LogJson>,",
-    ),
-    (
-        "`hums-info` 1",
-        "",
-        "analysis/src/log_json.rs analysis/src/summary.rs",
-        "images: Vec<ImageJson>,\nlogs: Vec<LogJson>,",
-    ),
-    (
-        "`hums-info-verify` 1",
-        "",
-        "src/verify.rs",
-        "images: Vec<ImageJson>,\nlogs: Vec<LogJson>,\n/// All logs are, and no image is damaged.\nok: bool,",
-    ),
-    (
-        "`hums-manifest` 1",
-        "The file of `--manifest FILE` of `hums info --verify` and `hums decode`.",
-        "analysis/src/manifest.rs",
-        "Manifest",
-    ),
-    ("`hums-due` 1", "", "src/info/due.rs", "DueJson"),
-    ("`hums-decode` 1", "", "export/src/made.rs", "MadeJson"),
-    ("`hums-report` 1", "", "report/src/report/mod.rs", "PagesJson"),
-    ("`hums-run` 1", "Of `hums sim`.", "src/run/report.rs", "RunReport"),
-    ("`hums-pull` 1", "Of `hums box pull`.", "src/talk/pull/mod.rs src/talk/pull/judge.rs", "PulledJson"),
-    (
-        "`hums-params` 1",
-        "Of `hums box params list`, `get` and `set`. Each parameter is a name with its value; unusual characters in a name are `\\u{a}`.",
-        "",
-        "/// MAVLink system id of the box's vehicle.\nsystem: u8,",
-    ),
-    ("`hums-params-sign` 1", "Of `hums box params sign`.", "src/talk/params.rs", "KeyJson"),
-    ("`hums-replaced` 1", "Of `hums box replaced`.", "src/talk/replaced.rs", "ReplacedJson"),
-    ("`hums-card-reader` 1", "Of `hums box card-reader`.", "src/talk/card_reader.rs", "CardReaderJson"),
-    ("`hums-format` 1", "Of `hums box format-card`.", "src/talk/format.rs", "FormattedJson"),
-    ("`hums-live` 1", "Of `hums live`, at its start.", "src/live/mod.rs", "PagesJson"),
-];
+/// Of each object: the heading, the root (a struct's name, or its fields), the files with the structs, an introduction.
+const OBJECTS: &str = "\
+`hums-check` 1; LogJson; analysis/src/check/json.rs; One object a line for each log. \
+    A log that cannot be read has `schema`, `version`, `log` and `error` only.
+`hums-info-list` 1; images: Vec<ImageJson>, /// The oldest first. logs: Vec<LogJson>,; src/info/list.rs;
+`hums-info` 1; images: Vec<ImageJson>, logs: Vec<LogJson>,; analysis/src/log_json.rs analysis/src/summary.rs;
+`hums-info-verify` 1; images: Vec<ImageJson>, logs: Vec<LogJson>, /// Of all logs and images. ok: bool,; src/verify.rs;
+`hums-manifest` 1; Manifest; analysis/src/manifest.rs; The file of `--manifest FILE` of `hums info --verify` and `hums decode`.
+`hums-due` 1; DueJson; src/info/due.rs;
+`hums-decode` 1; MadeJson; export/src/made.rs;
+`hums-report` 1; PagesJson; report/src/report/mod.rs;
+`hums-run` 1; RunReport; src/run/report.rs; Of `hums sim`.
+`hums-pull` 1; PulledJson; src/talk/pull/mod.rs src/talk/pull/judge.rs; Of `hums box pull`.
+`hums-params` 1; /// MAVLink system id of the box's vehicle. system: u8,;; Of `hums box params list`, `get` and `set`. \
+    Each parameter is a name with its value, and unusual characters in a name are `\\u{a}`.
+`hums-params-sign` 1; KeyJson; src/talk/params.rs; Of `hums box params sign`.
+`hums-replaced` 1; ReplacedJson; src/talk/replaced.rs; Of `hums box replaced`.
+`hums-card-reader` 1; CardReaderJson; src/talk/card_reader.rs; Of `hums box card-reader`.
+`hums-format` 1; FormattedJson; src/talk/format.rs; Of `hums box format-card`.
+`hums-live` 1; PagesJson; src/live/mod.rs; Of `hums live`, at its start.
+";
 
 /// Structs in several objects: heading, introduction, file.
 const SHARED: [(&str, &str, &str, &str); 5] = [
@@ -208,8 +180,11 @@ fn section(heading: &str, about: &str, files: &str, root: &str) -> String {
 #[test]
 fn the_page_of_json_has_every_name() {
     let mut text = HEAD.to_owned();
-    for (heading, about, files, root) in OBJECTS {
-        text += &section(heading, about, files, root);
+    for object in OBJECTS.lines() {
+        let parts: Vec<&str> = object.split(';').map(str::trim).collect();
+        let [heading, root, files, about] = parts[..] else { panic!("{object}") };
+        let root = root.replace(", ", ",\n").replace(". ", ".\n");
+        text += &section(heading, about, files, &root);
     }
     for (root, heading, about, file) in SHARED {
         text += &section(heading, about, file, root);

@@ -158,7 +158,7 @@ mod tests {
     fn what_is_in_progress_has_not_failed_and_may_fail_yet() {
         end(5_000, 5_000, || vec![ack(5, 255), ack(5, 255), ack(0, 255), recording(1)]).expect("done");
         let failed = end(5_000, 5_000, || vec![ack(5, 255), ack(4, 255), recording(1)]);
-        assert!(failed.expect_err("it failed").to_string().contains("no card that can be formatted"));
+        assert!(failed.expect_err("it failed").to_string().contains("there is no card to format"));
         // The second answer came during formatting.
         end(5_000, 5_000, || vec![ack(0, 255), ack(2, 255), recording(1)]).expect("done");
     }
@@ -166,8 +166,8 @@ mod tests {
     #[test]
     fn a_board_that_never_says_how_its_card_is_is_not_waited_for_without_end() {
         let never = end(5_000, 50, || vec![ack(0, 255), recording(2)]);
-        assert!(never.expect_err("no word").to_string().contains("has not said within"));
+        assert!(never.expect_err("no word").to_string().contains("no result within"));
         let silent = end(50, 5_000, || vec![ack(0, 255)]);
-        assert!(silent.expect_err("no word").to_string().contains("is it switched off?"));
+        assert!(silent.expect_err("no word").to_string().contains("check its power"));
     }
 }

@@ -83,71 +83,76 @@ macro_rules! counters {
 }
 
 counters! {
-    /// Seconds since power-on.
+    /// Since power-on of the box.
     Powered = 0 Tenths "powered_time_s";
-    /// Seconds armed.
+    /// The autopilot's heartbeat says armed.
     Armed = 1 Tenths "armed_time_s";
-    /// Seconds in the air.
+    /// In the air, by `EXTENDED_SYS_STATE` if the autopilot sends it. Otherwise from armed and 1 m above the place of arming
+    /// for 0.5 s (a plane: 8 m/s), until disarmed, or below 0.5 m and still for 2 s. The time until detection counts too.
     Flight = 2 Tenths "flight_time_s";
-    /// Take-offs.
+    /// Take-offs by that definition.
     Flights = 3 Count "flights";
-    /// Landings.
+    /// Landings by that definition; a flight ended by a mishap has no landing.
     Landings = 4 Count "landings";
-    /// Metres over ground while in the air.
+    /// Speed over ground (`GLOBAL_POSITION_INT`, else `LOCAL_POSITION_NED`, else `VFR_HUD`) over time in the air.
     Distance = 5 Amount "distance_m";
-    /// The greatest height above home, metres.
+    /// Height above home in the air, `GLOBAL_POSITION_INT`.
     HeightMax = 6 Highest "height_max_m";
-    /// The greatest speed over ground, m/s.
+    /// Speed over ground in the air.
     SpeedMax = 7 Highest "speed_max_m_s";
-    /// The greatest load factor in the air, units of gravity.
+    /// Magnitude of the specific force over 9.80665 m/s² in the air. Each axis passes a first-order filter of 0.3 s: a shock
+    /// counts little, a held turn nearly in full. Not counted while VIBRATION is 60 m/s² or more: such samples give no load
+    /// factor.
     LoadFactorMax = 8 Highest "load_factor_max_g";
-    /// Charge taken from all batteries, ampere hours.
+    /// Discharge current of all batteries over time, from `BATTERY_STATUS`; else from `SYS_STATUS`; else the sum of all ESCs.
     Charge = 9 Amount "charge_ah";
-    /// Energy taken from all batteries, watt hours.
+    /// The same times voltage.
     Energy = 10 Amount "energy_wh";
-    /// The highest current of all batteries together, amperes.
+    /// That current while armed.
     CurrentMax = 11 Highest "current_max_a";
-    /// The lowest battery voltage while armed, volts.
+    /// The first battery's voltage while armed.
     VoltageMin = 12 Lowest "voltage_min_v";
-    /// The highest vibration while armed, on the autopilot's own scale, m/s2.
+    /// The worst of VIBRATION's three figures while armed, on the autopilot's own scale.
     VibrationMax = 13 Highest "vibration_max_m_s2";
-    /// Reboots of the autopilot.
+    /// The autopilot's boot time fell by more than 3 s.
     AutopilotReboots = 14 Count "autopilot_reboots";
-    /// Landings faster than the limit of a hard one.
+    /// Touchdowns faster than `HARD_LANDING`, including the impact of a mishap.
     HardLandings = 15 Count "hard_landings";
-    /// The fastest touchdown, m/s downwards.
+    /// Descent speed just before the vehicle stopped at the height where it then stood. In a mishap: the fastest descent that
+    /// stopped abruptly.
     TouchdownMax = 16 Highest "touchdown_max_m_s";
-    /// Full discharges of all batteries together that the charge taken makes.
+    /// Charge over `BAT_CAPACITY`, in full discharges; not counted without a capacity.
     BatteryCycles = 17 Amount "battery_cycles";
-    /// Seconds on the ground with an autopilot that is heard.
+    /// Regime: not in the air, and a message of the autopilot within 5 s.
     Ground = 20 Tenths "ground_time_s";
-    /// Seconds in the first metres up.
+    /// Regime: climbing faster than 0.35 m/s below 3 m.
     TakeOff = 21 Tenths "take_off_time_s";
-    /// Seconds standing in the air.
+    /// Regime: in the air, none of the others.
     Hover = 22 Tenths "hover_time_s";
-    /// Seconds going up.
+    /// Regime: climbing faster than 0.7 m/s.
     Climb = 23 Tenths "climb_time_s";
-    /// Seconds going somewhere.
+    /// Regime: faster than 1.5 m/s over ground.
     Cruise = 24 Tenths "cruise_time_s";
-    /// Seconds going down.
+    /// Regime: descending faster than 0.7 m/s.
     Descent = 25 Tenths "descent_time_s";
-    /// Seconds in the last metres down.
+    /// Regime: descending faster than 0.35 m/s below 3 m.
     Landing = 26 Tenths "landing_time_s";
-    /// Rainflow cycles of the load factor in the air, ranges from 0.25 g.
+    /// Rainflow cycles (ASTM E1049-85) of the load factor in the air with a range of 0.25 to 0.5 g; turns of less than 0.1 g
+    /// are ignored.
     LoadCycles0 = 30 Halves "load_cycles_from_0_25_g";
-    /// Ranges from 0.5 g.
+    /// Range 0.5 to 1 g.
     LoadCycles1 = 31 Halves "load_cycles_from_0_5_g";
-    /// Ranges from 1 g.
+    /// Range 1 to 1.5 g.
     LoadCycles2 = 32 Halves "load_cycles_from_1_g";
-    /// Ranges from 1.5 g.
+    /// Range 1.5 to 2 g.
     LoadCycles3 = 33 Halves "load_cycles_from_1_5_g";
-    /// Ranges from 2 g.
+    /// Range 2 to 3 g.
     LoadCycles4 = 34 Halves "load_cycles_from_2_g";
-    /// Ranges from 3 g.
+    /// Range 3 to 4 g.
     LoadCycles5 = 35 Halves "load_cycles_from_3_g";
-    /// Ranges from 4 g.
+    /// Range from 4 g on.
     LoadCycles6 = 36 Halves "load_cycles_from_4_g";
-    /// Flights that a mishap ended.
+    /// Flights ended by a mishap.
     Mishaps = 18 Count "mishaps";
 }
 
