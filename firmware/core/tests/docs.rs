@@ -10,7 +10,6 @@ use hums_core::exposure;
 use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Millis;
-use hums_core::usage::UsageCounter;
 
 /// The inputs of each check, and the source of its limits unless a parameter is.
 const INPUTS: &str = "\
