@@ -46,24 +46,14 @@ const OBJECTS: &str = "\
 `hums-live` 1; PagesJson; src/live/mod.rs; Of `hums live`, at its start.
 ";
 
-/// Structs in several objects: heading, introduction, file.
-const SHARED: [(&str, &str, &str, &str); 5] = [
-    ("ImageJson", "`image`", "A card, or an image of one.", "analysis/src/log_json.rs"),
-    (
-        "EndJson",
-        "`end`",
-        "[decode.md](decode.md#whether-a-log-is-whole) explains the proof of a log's end.",
-        "formats/src/ending/json.rs",
-    ),
-    ("BlocksJson", "`blocks`", "Numbers of blocks of 512 bytes, by kind.", "formats/src/ending/json.rs"),
-    (
-        "FindingJson",
-        "`finding`",
-        "A change of level. [health.md](health.md) lists the checks.",
-        "analysis/src/log_json.rs",
-    ),
-    ("CrossingsJson", "`exceedance`", "", "analysis/src/log_json.rs"),
-];
+/// Structs in several objects, in the same form.
+const SHARED: &str = "\
+`image`; ImageJson; analysis/src/log_json.rs; A card, or an image of one.
+`end`; EndJson; formats/src/ending/json.rs; [decode.md](decode.md#whether-a-log-is-whole) explains the proof of a log's end.
+`blocks`; BlocksJson; formats/src/ending/json.rs; Numbers of blocks of 512 bytes, by kind.
+`finding`; FindingJson; analysis/src/log_json.rs; A change of level. [health.md](health.md) lists the checks.
+`exceedance`; CrossingsJson; analysis/src/log_json.rs;
+";
 
 struct Field {
     name: String,
@@ -118,8 +108,9 @@ fn innermost(kind: &str) -> &str {
 
 /// The heading of a struct in several objects.
 fn shared(inner: &str) -> Option<&'static str> {
-    let inner = if inner == "Finding" { "FindingJson" } else { inner };
-    SHARED.iter().find(|(name, ..)| *name == inner).map(|(_, heading, ..)| heading.trim_matches('`'))
+    let root = if inner == "Finding" { "; FindingJson;".to_owned() } else { format!("; {inner};") };
+    let (heading, _) = SHARED.lines().find(|line| line.contains(&root))?.split_once(';')?;
+    Some(heading.trim_matches('`'))
 }
 
 fn kind_in_words(Field { kind, may_be_absent, .. }: &Field, is_struct: bool) -> String {
@@ -180,14 +171,10 @@ fn section(heading: &str, about: &str, files: &str, root: &str) -> String {
 #[test]
 fn the_page_of_json_has_every_name() {
     let mut text = HEAD.to_owned();
-    for object in OBJECTS.lines() {
+    for object in OBJECTS.lines().chain(SHARED.lines()) {
         let parts: Vec<&str> = object.split(';').map(str::trim).collect();
         let [heading, root, files, about] = parts[..] else { panic!("{object}") };
-        let root = root.replace(", ", ",\n").replace(". ", ".\n");
-        text += &section(heading, about, files, &root);
-    }
-    for (root, heading, about, file) in SHARED {
-        text += &section(heading, about, file, root);
+        text += &section(heading, about, files, &root.replace(", ", ",\n").replace(". ", ".\n"));
     }
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "../../docs/json.md"].iter().collect();
     if std::env::var_os("HUMS_WRITE_DOCS").is_some() {
