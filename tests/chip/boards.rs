@@ -39,42 +39,37 @@ fn fly(board: &Board) {
         rig.run(rig.machine.now() + 20 * US, false).unwrap();
     }
     assert_held(&rig);
-    rig.run(2 * SECOND, false).unwrap();
-    rig.run(4 * SECOND, true).unwrap();
+    rig.run(SECOND, false).unwrap();
+    rig.run(2 * SECOND, true).unwrap();
     assert!(rig.machine.chip.rcc.pll_on_hse(), "{}: not on its crystal", board.name);
     let blinks = |rig: &Rig| rig.led.len();
     let before = blinks(&rig);
     rig.slot.event(Event::Pull);
-    rig.run(6 * SECOND, true).unwrap();
+    rig.run(3 * SECOND, true).unwrap();
     let blinks_without_a_card = blinks(&rig) - before;
-    assert!(blinks_without_a_card > 10, "{}: {blinks_without_a_card} changes of the LED", board.name);
+    assert!(blinks_without_a_card > 5, "{}: {blinks_without_a_card} changes of the LED", board.name);
     rig.slot.event(Event::Insert(Model::new(Kind::Sdhc, rig.medium.clone())));
-    rig.run(8 * SECOND, false).unwrap();
-    rig.run(9 * SECOND, true).unwrap();
+    rig.run(5 * SECOND, false).unwrap();
+    rig.run(6 * SECOND, true).unwrap();
     rig.machine.power_off();
-    rig.run(9 * SECOND + 100 * MS, false).unwrap();
+    rig.run(6 * SECOND + 100 * MS, false).unwrap();
     rig.machine.power_on();
-    rig.run(11 * SECOND, false).unwrap();
-    rig.run(12 * SECOND, true).unwrap();
-    rig.run(14 * SECOND, false).unwrap();
+    rig.run(7 * SECOND, false).unwrap();
+    rig.run(8 * SECOND, true).unwrap();
+    rig.run(9 * SECOND, false).unwrap();
     assert_held(&rig);
     assert!(rig.machine.resets.iter().all(|(_, cause)| *cause == Cause::Power), "{:?}", rig.machine.resets);
     assert!(rig.slot.violations().is_empty(), "{}: {:?}", board.name, rig.slot.violations());
     let compared = rig.compared();
-    let rate = rig.sent.len() / 6;
     println!("{compared:?} of {}", rig.sent.len());
-    // Frames without a card, which the queue held in part, and those in memory when power went.
-    assert!(
-        compared.wrong == 0 && compared.missing < 2 * rate + 2 * IN_MEMORY_MAX,
-        "{}: {compared:?}",
-        board.name
-    );
+    // The queue held those of the time without a card; what was in memory went with the power.
+    assert!(compared.wrong == 0 && compared.missing < IN_MEMORY_MAX, "{}: {compared:?}", board.name);
     assert!(rig.sessions().len() >= 2, "{}", board.name);
 }
 
 #[test]
 fn a_board_of_each_family_records_and_survives_the_loss_of_card_and_power() {
-    hums_boards::families().for_each(fly);
+    std::thread::scope(|scope| hums_boards::families().for_each(|board| drop(scope.spawn(|| fly(board)))));
 }
 
 #[test]

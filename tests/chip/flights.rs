@@ -21,7 +21,6 @@ use stm32f405_model::time::SECOND;
 
 use super::bench;
 
-const FLIGHT: &str = "ap_quad_faults.tlog";
 /// Percent of 168 MHz in the worst second, at 921,600 baud back to back.
 const BUSY_PERCENT_MAX: f64 = 40.0;
 /// Prefetch, both caches, five wait states.
@@ -269,8 +268,8 @@ fn assert_same_stream(of_chip: &[u8], of_pc: &[u8], seeds: &Seeds) {
 }
 
 #[test]
-fn the_demos_flight_leaves_the_record_that_this_pc_makes_of_it() {
-    the_record_is_the_one_of_this_pc(&own(FLIGHT), Manifest::own(), Against::Kinds);
+fn a_flight_leaves_the_record_that_this_pc_makes_of_it() {
+    the_record_is_the_one_of_this_pc(&own("px4_hil_quad_low.tlog"), Manifest::own(), Against::Kinds);
 }
 
 #[test]
@@ -297,7 +296,7 @@ fn a_signed_flight_is_recorded_bit_for_bit() {
 #[test]
 #[ignore = "further recordings on the model of the chip (cargo xtask prove chip)"]
 fn every_further_recording_leaves_the_record_that_this_pc_makes_of_it() {
-    let own = ["ap_quad_guided.tlog", "px4_hil_quad_low.tlog"].map(own);
+    let own = ["ap_quad_faults.tlog", "ap_quad_guided.tlog", "px4_hil_quad_low.tlog"].map(own);
     for file in &own {
         the_record_is_the_one_of_this_pc(file, Manifest::own(), Against::Numbers);
     }

@@ -321,7 +321,7 @@ fn any_actions(bus: &mut Bus, mut random: impl FnMut(u64) -> u64, count: u32) ->
         let action = match random(10) {
             0 => Action::Reset,
             1 => Action::Sleep((1 + random(20)) * MS),
-            2 => Action::Wait(random(1_500) * MS),
+            2 => Action::Wait(random(400) * MS),
             3 | 4 => Action::Out(address, endpoint, random(2) == 1, vec![0x55; random(65) as usize]),
             5 | 6 => Action::In(address, endpoint),
             _ => {

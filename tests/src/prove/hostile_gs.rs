@@ -70,7 +70,7 @@ pub(super) const LABELS: Labels = Labels {
 };
 
 pub(super) fn run(options: &Options) -> Result<Figures> {
-    let seconds = options.runs(24 * 3600, 300);
+    let seconds = options.runs(24 * 3600, 120);
     let mut figures = Figures::new(&LABELS);
     figures.fact("simulated hours", format!("{:.1}", seconds as f64 / 3600.0));
     // Half of the time the key is needed.

@@ -1,7 +1,7 @@
 //! CI's checks as named steps.
 //!
-//! The build comes first; lints run beside the tests. A table has each step's seconds. A step without its tool is left out, and
-//! the run fails at its end.
+//! The build comes first; then what computes runs beside what waits. A table has each step's seconds. A step without its tool is
+//! left out, and the run fails at its end.
 
 mod quick;
 mod steps;
@@ -65,13 +65,13 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         };
         let mut rows = run(Stage::Build);
         if rows.iter().all(|row| row.failed.is_none()) {
-            let (lints, tests) = std::thread::scope(|scope| {
-                let lints = scope.spawn(|| run(Stage::Lint));
-                let tests = run(Stage::Test);
-                (lints.join(), tests)
+            let (waiting, computing) = std::thread::scope(|scope| {
+                let waiting = scope.spawn(|| run(Stage::Wait));
+                let computing = run(Stage::Compute);
+                (waiting.join(), computing)
             });
-            let Ok(lints) = lints else { bail!("the lints panicked") };
-            rows.extend(lints.into_iter().chain(tests));
+            let Ok(waiting) = waiting else { bail!("the tests that wait panicked") };
+            rows.extend(computing.into_iter().chain(waiting));
         }
         println!("\n{:<16} {:>8}", "step", "seconds");
         for row in &rows {

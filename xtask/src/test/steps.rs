@@ -4,7 +4,7 @@ use std::fs;
 
 use anyhow::{Context as _, Result};
 
-use Stage::{Build, Lint, Test};
+use Stage::{Build, Compute, Wait};
 
 use crate::browser;
 use crate::budgets;
@@ -54,15 +54,15 @@ impl Step {
     }
 }
 
-/// Lints keep one core busy while tests wait for links and browsers.
+/// Two run side by side after the build.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
     /// First.
     Build,
-    /// After the build, beside the tests.
-    Lint,
-    /// After the build.
-    Test,
+    /// Keeps the processor busy.
+    Compute,
+    /// Waits half of its time for links, browsers and databases.
+    Wait,
 }
 
 /// Each after its needs; `--list` and the table have this order.
@@ -75,29 +75,35 @@ pub(super) const STEPS: [Step; 19] = [
     Step::new(Build, "wasm", "the check in a browser compiles", &[BrowserTarget], browser::build),
     Step::new(Build, "budgets", "the size of the firmware, within budgets.toml", &[FirmwareTarget], size),
     Step::new(
-        Lint,
+        Compute,
         "clippy-firmware",
         "lints of the firmware, and the types of every board",
         &[Clippy, FirmwareTarget],
         lint,
     ),
-    Step::new(Lint, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
-    Step::new(Lint, "doc", "the documentation builds without a warning", &[], pc::document),
-    Step::new(Test, "chip", "the image that is flashed, on the model of its chip", CHIP, chip),
-    Step::new(Test, "unit", "tests of each crate on this PC", &[], pc::unit_tests),
+    Step::new(Compute, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
+    Step::new(Compute, "doc", "the documentation builds without a warning", &[], pc::document),
+    Step::new(Compute, "chip", "the image that is flashed, on the model of its chip", CHIP, chip),
+    Step::new(Compute, "unit", "tests of each crate on this PC", &[], pc::unit_tests),
     Step::new(
-        Test,
+        Wait,
         "sim",
         "end to end on this PC, against pymavlink",
         &[Mtools, Dosfstools, PythonVenv],
         sim,
     ),
-    Step::new(Test, "browser", "all pages in Chromium, the check in Firefox too", BROWSERS, browser),
-    Step::new(Test, "prove", "the campaigns in their short form", prove::NEEDS, pc::short_campaigns),
-    Step::new(Test, "answer", "every format against other readers", &[PythonVenv, Influx], answer),
-    Step::new(Test, "live", "databases and Grafana dashboards", &[PythonVenv, Influx, Victoria], live),
-    Step::new(Test, "costs", "cycles, load and stack, within budgets.toml", &[FirmwareTarget], measure_costs),
-    Step::new(Test, "demo", "cargo xtask demo", &[FirmwareTarget], demo::as_test),
+    Step::new(Wait, "browser", "all pages in Chromium, the check in Firefox too", BROWSERS, browser),
+    Step::new(Compute, "prove", "the campaigns in their short form", prove::NEEDS, pc::short_campaigns),
+    Step::new(Wait, "answer", "every format against other readers", &[PythonVenv, Influx], answer),
+    Step::new(Wait, "live", "databases and Grafana dashboards", &[PythonVenv, Influx, Victoria], live),
+    Step::new(
+        Compute,
+        "costs",
+        "cycles, load and stack, within budgets.toml",
+        &[FirmwareTarget],
+        measure_costs,
+    ),
+    Step::new(Wait, "demo", "cargo xtask demo", &[FirmwareTarget], demo::as_test),
 ];
 
 const BROWSERS: &[Need] = &[PythonVenv, Chromium, Firefox, BrowserTarget];
@@ -135,8 +141,8 @@ fn chip() -> Result<()> {
 }
 
 fn sim() -> Result<()> {
-    // They wait half of the time: links are slow.
-    let threads = (2 * std::thread::available_parallelism().map_or(1, usize::from)).to_string();
+    // Slow links: each test needs a quarter of a processor.
+    let threads = (4 * std::thread::available_parallelism().map_or(1, usize::from)).to_string();
     pc::end_to_end(&[&["sim::", "--test-threads", &threads], further()].concat())
 }
 
