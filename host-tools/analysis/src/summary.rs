@@ -163,7 +163,7 @@ pub struct ComponentLine {
 }
 
 /// How a box counts time in the air.
-pub const BOX_COUNTS: &str = "in the air: as the box counts it, to the time at which it recognised the landing; hums check says when it touched down";
+pub const BOX_COUNTS: &str = "in the air: as the box counts it, to the time at which it recognised the landing; the check says when it touched down";
 
 /// The seconds of one log, from a counter at its end and at its beginning, with the number of its first sector in the
 /// power-on.
@@ -174,7 +174,7 @@ pub fn since_power_on(all: f64, before: f64, first_number: Option<u32>) -> f64 {
 
 /// Why a recording of another program is not whole, as a part of a sentence.
 pub fn damaged_places(count: u64) -> String {
-    format!("{} damaged or cut; hums check says where", are(count, "place"))
+    format!("{} damaged or cut", are(count, "place"))
 }
 
 /// A log, counted.

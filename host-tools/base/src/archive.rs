@@ -2,24 +2,21 @@
 
 /// First bytes, and advice: the end of a sentence that begins with the file's name.
 const KNOWN: [(&[u8], &str); 8] = [
-    (b"PK\x03\x04", "is a ZIP archive; unpack it (unzip), and give what is in it"),
-    (b"\xfd7zXZ\0", "is compressed with xz; unpack it (xz -dk), or compress it with gzip instead"),
-    (
-        b"\x28\xb5\x2f\xfd",
-        "is compressed with Zstandard; unpack it (zstd -dk), or compress it with gzip instead",
-    ),
-    (b"7z\xbc\xaf\x27\x1c", "is a 7-Zip archive; unpack it (7z x), and give what is in it"),
+    (b"PK\x03\x04", "is a ZIP archive; unpack it, and give what is in it"),
+    (b"\xfd7zXZ\0", "is compressed with xz; unpack it, or compress it with gzip instead"),
+    (b"\x28\xb5\x2f\xfd", "is compressed with Zstandard; unpack it, or compress it with gzip instead"),
+    (b"7z\xbc\xaf\x27\x1c", "is a 7-Zip archive; unpack it, and give what is in it"),
     (b"Rar!\x1a\x07", "is a RAR archive; unpack it, and give what is in it"),
     (
         b"ULogEnc",
         "is an encrypted log of PX4 (.ulge); decrypt it with the key of its vehicle (PX4: Tools/decrypt_ulog.py)",
     ),
     (b"PK\x05\x06", "is a ZIP archive with nothing in it"),
-    (b"PK\x07\x08", "is a part of a ZIP archive; unpack it (unzip), and give what is in it"),
+    (b"PK\x07\x08", "is a part of a ZIP archive; unpack it, and give what is in it"),
 ];
-const BZIP2: &str = "is compressed with bzip2; unpack it (bzip2 -dk), or compress it with gzip instead";
-const TAR: &str = "is a tar archive; unpack it (tar -xf), and give what is in it";
-const UTF_16: &str = "is text in UTF-16; a text log is read as UTF-8: convert it (iconv -f UTF-16 -t UTF-8)";
+const BZIP2: &str = "is compressed with bzip2; unpack it, or compress it with gzip instead";
+const TAR: &str = "is a tar archive; unpack it, and give what is in it";
+const UTF_16: &str = "is text in UTF-16; a text log is read as UTF-8: convert it";
 /// The first bytes of a gzip file (RFC 1952), with the only compression method there is.
 pub const GZIP: [u8; 3] = [0x1f, 0x8b, 8];
 /// Offset of the format's name in a tar's first header (POSIX.1-1988 and later, GNU).

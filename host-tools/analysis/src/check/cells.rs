@@ -51,7 +51,7 @@ impl Cells {
                 .unknown
                 .map_or_else(String::new, |(from, to)| format!(" from {} to {}", moment(from), moment(to)));
             return Some(format!(
-                "cells not known{when}: the battery's voltage raised no alarm; a file with BAT_CELLS (--params) tells how many"
+                "cells not known{when}: the battery's voltage raised no alarm; the parameter BAT_CELLS tells how many"
             ));
         }
         let is_guess =

@@ -169,7 +169,7 @@ impl Details {
     fn vehicles(&self, judged: Option<u8>) -> Option<String> {
         let first = self.autopilots.first()?;
         let how = match judged.filter(|_| self.autopilots.iter().any(|heard| heard.system != first.system)) {
-            Some(system) => format!("system {system} is judged: --system ID judges one of them alone"),
+            Some(system) => format!("system {system} is judged"),
             None => {
                 "one system id is judged, as if it were one vehicle: give each vehicle's recording by itself"
                     .to_owned()
@@ -351,13 +351,13 @@ mod tests {
     }
 
     #[test]
-    fn of_two_vehicles_the_one_that_is_judged_is_named_and_how_the_other_is_asked_for() {
+    fn of_two_vehicles_the_one_that_is_judged_is_named() {
         let mut details = Details::default();
         for system in [1, 1, 7] {
             details.heartbeat(Source { system, component: 1 }, &heartbeat());
         }
-        let words = "more than one vehicle is in it: system 1 (ArduPilot), system 7 (ArduPilot); system 7 is judged: \
-                     --system ID judges one of them alone";
+        let words =
+            "more than one vehicle is in it: system 1 (ArduPilot), system 7 (ArduPilot); system 7 is judged";
         assert_eq!(details.remarks(Some(7)), [words]);
     }
 

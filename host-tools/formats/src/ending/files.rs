@@ -53,8 +53,7 @@ impl Ending {
         let parts = self.files.iter().filter(|name| is_part(Path::new(name)));
         let part_words = |name: &String| {
             format!(
-                "{name} is a part of its log, as `hums box pull --around` brings it: what it lacks was not brought, or came damaged; `hums box pull` \
-                 brings what the card has"
+                "{name} is a part of its log: the rest was not downloaded, or came damaged; the card has the whole log"
             )
         };
         let mut all: Vec<_> = parts.map(part_words).collect();

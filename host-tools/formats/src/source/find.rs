@@ -107,7 +107,7 @@ impl FoundRecordings {
             let stem = place.path()?.file_name()?.to_str()?.strip_suffix(".tlog")?;
             let original = self.places.iter().find(|other| made_of(stem, other))?;
             Some(format!(
-                "{}: hums decode made it of {}, which is read, and it is passed over",
+                "{}: was made of {}, which is read, and is passed over",
                 place.title, original.title
             ))
         };
@@ -469,7 +469,7 @@ mod tests {
                 let Err(error) = found.places[0].open() else { panic!("{what} is read") };
                 assert!(error.to_string().contains(what), "{error}");
                 let error = find(&[dir.path().to_owned()], false).expect_err("no recording").to_string();
-                assert!(error.contains("unpack") || error.contains("iconv"), "{error}");
+                assert!(error.contains("unpack") || error.contains("UTF-8"), "{error}");
             }
         }
     }

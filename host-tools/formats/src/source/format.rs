@@ -126,10 +126,10 @@ pub(super) fn detect(start: &[u8]) -> Option<Detected> {
 
 /// Known but not read, with advice.
 pub(super) fn hint(start: &[u8]) -> Option<&'static str> {
-    const TWICE: &str = "is compressed twice with gzip; unpack it once (gzip -dk)";
-    const STORE: &str = "is the memory of a simulated board (--store), and no recording; it may stay there";
-    const OWN: &str = "is a log of HUMS in another file, compressed or joined; unpack it (gzip -dk)";
-    const TABLE: &str = "is a Parquet table, which hums decode makes of a recording; give the recording";
+    const TWICE: &str = "is compressed twice with gzip; unpack it once";
+    const STORE: &str = "is the memory of a simulated board, and no recording; it may stay there";
+    const OWN: &str = "is a log of HUMS in another file, compressed or joined; unpack it";
+    const TABLE: &str = "is a Parquet table, which was made of a recording; give the recording";
     let is_own = || start.first_chunk().is_some_and(|block| Header::read(block).is_ok());
     archive::hint(start)
         .or_else(|| start.starts_with(&archive::GZIP).then_some(TWICE))

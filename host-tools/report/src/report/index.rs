@@ -104,7 +104,7 @@ fn faults(log: &Overview) -> Vec<String> {
     let mut faults = log.faults();
     let losses = log.ending.summary.losses;
     if log.format.is_some() && losses > 0 {
-        faults.push(format!("{} of loss or noise; hums check says what", plural::count(losses, "place")));
+        faults.push(format!("{} of loss or noise", plural::count(losses, "place")));
     }
     faults
 }

@@ -108,7 +108,7 @@ main.append(
           comparisons.map(([airframe, file]) => el("li", {}, el("a", { href: encodeURIComponent(file) }, airframe))),
         ),
       )
-    : el("p", { class: "dim" }, "hums report with --compare adds a page with the last flights of each airframe side by side."),
+    : "",
 );
 draw();
 root.dataset.ready = "true";

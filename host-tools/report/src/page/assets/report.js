@@ -65,7 +65,7 @@ document
       ? el(
           "p",
           { class: "dim", id: "unjudged" },
-          `Not judged: ${data.judged[1] - data.judged[0]} of ${data.judged[1]} checks, which lack data; hums check -v lists them.`,
+          `Not judged: ${data.judged[1] - data.judged[0]} of ${data.judged[1]} checks, which lack data.`,
         )
       : "",
     data.missing.length
@@ -73,7 +73,7 @@ document
           "p",
           { class: "verdict warning", id: "missing" },
           `${data.missing[0].from_s == null ? "" : `${moment(data.missing[0].from_s - flight.zero)}: `}${data.missing[0].words}`,
-          data.missing.length > 1 ? `; and ${plural(data.missing.length - 1, "more place")}, see hums check` : "",
+          data.missing.length > 1 ? `; and ${plural(data.missing.length - 1, "more place")}` : "",
         )
       : "",
     data.ends_in_air
@@ -159,7 +159,7 @@ section("sent", "Messages sent").append(
 document
   .getElementById("foot")
   .append(
-    `Made by hums ${data.version}. Times count from ${ZEROS[log.format] ?? "the first frame"}, as in hums check and hums info; intervals of ${
+    `Made by hums ${data.version}. Times count from ${ZEROS[log.format] ?? "the first frame"}; intervals of ${
       flight.step >= 1 ? `${flight.step} s` : `${flight.step * 1000} ms`
     } keep their lowest and highest value. Plots: uPlot, MIT.`,
   );
