@@ -1,14 +1,17 @@
 //! `hums-check.html`: what it says of a log is what `hums check` and `hums report` say.
 
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write as _};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
 
 use hums_tests::child;
 use hums_tests::flights::{own, root};
+use hums_tests::hostile;
 use hums_tests::oracle::{self, LivePage};
-use hums_tests::program::{LIMIT, Machine, Recording, browser, command};
+use hums_tests::program::{LIMIT, Machine, Recording, browser, command, release};
 
 use super::live::shoot;
 
@@ -23,13 +26,17 @@ struct Page {
 
 impl Page {
     fn open(width: u32) -> Self {
+        Self::sized(width, 844)
+    }
+
+    fn sized(width: u32, height: u32) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let html = hums_report::browser::page(&fs::read(browser()).unwrap()).unwrap();
         assert!(html.len() < PAGE_BYTES_MAX, "{} bytes", html.len());
         let path = dir.path().join("hums-check.html");
         fs::write(&path, html).unwrap();
         let mut shown = LivePage::start();
-        shown.open(&format!("file://{}", path.display()), "light", width, 844);
+        shown.open(&format!("file://{}", path.display()), "light", width, height);
         shown.wait("return document.documentElement.dataset.ready === 'true'", 30);
         fs::create_dir(dir.path().join("saved")).unwrap();
         shown.downloads(&dir.path().join("saved"));
@@ -49,11 +56,46 @@ impl Page {
         self.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
     }
 
+    /// Seconds from the choice of this log to its verdict; returns when its report is there too.
+    fn first_verdict_s(&mut self, log: &Path) -> f64 {
+        self.shown.run(
+            "window.times = {};
+             addEventListener('change', () => { times.begun = performance.now(); }, { capture: true, once: true });
+             const look = () => { if (document.querySelector('.log')) times.told ??= performance.now(); };
+             new MutationObserver(look).observe(document.getElementById('logs'), { childList: true });
+             return null",
+        );
+        self.check("#files", &[log.to_owned()]);
+        self.shown.run("return (times.told - times.begun) / 1000").as_f64().unwrap()
+    }
+
+    /// The page's words on a program (WebAssembly in hex) that ended early.
+    fn reason(&mut self, program: &str) -> String {
+        self.shown.run(&format!(
+            "const bytes = Uint8Array.from({program:?}.match(/../g), (two) => parseInt(two, 16));
+             const text = document.getElementById('worker').textContent;
+             const worker = new Worker(URL.createObjectURL(new Blob([text], {{ type: 'text/javascript' }})));
+             window.ended = null;
+             worker.onmessage = ({{ data }}) => {{ if (data.kind === 'end') window.ended = data; }};
+             WebAssembly.compile(bytes).then((module) => worker.postMessage({{ module, command: ['check'], files: [] }}));
+             return null"
+        ));
+        self.shown.wait("return window.ended", 20)["why"].as_str().unwrap().to_owned()
+    }
+
     fn text(&mut self, selector: &str) -> String {
         let script = format!(
             "return [...document.querySelectorAll({selector:?})].map((node) => node.textContent).join('\\n')"
         );
         self.shown.run(&script).as_str().unwrap().to_owned()
+    }
+
+    /// The shown text, without any words of the command line.
+    #[track_caller]
+    fn all_text(&mut self) -> String {
+        let text = self.text("main, header, footer");
+        assert_no_command(&text);
+        text
     }
 
     #[track_caller]
@@ -74,6 +116,29 @@ impl Page {
         }
         panic!("{words}: {:?} were saved, not {count} files", files());
     }
+}
+
+/// Options and commands are the command line's: a page has buttons.
+#[track_caller]
+fn assert_no_command(text: &str) {
+    const COMMANDS: [&str; 6] =
+        ["hums check", "hums report", "hums info", "hums decode", "hums box", "hums due"];
+    let is_option = |word: &str| {
+        let word = word.trim_start_matches(['(', '`']);
+        word.strip_prefix('-')
+            .is_some_and(|rest| rest.trim_start_matches('-').starts_with(|c: char| c.is_ascii_lowercase()))
+    };
+    let option = text.split_whitespace().find(|word| is_option(word));
+    let command = COMMANDS.into_iter().find(|command| text.contains(command));
+    assert_eq!((option, command), (None, None));
+}
+
+/// The data of a saved report.
+fn data_of(html: &str) -> &str {
+    html.split_once("id=\"data\"")
+        .and_then(|(_, rest)| rest.split_once("</script>"))
+        .expect("a report has data")
+        .0
 }
 
 #[track_caller]
@@ -104,6 +169,10 @@ fn recordings(folder: &Path) -> Vec<String> {
             }
         }
     }
+    let whole = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
+    let (before, after) = whole.split_at(whole.len() / 2);
+    fs::write(folder.join("damaged.tlog"), [before, &[0; 600], after].concat()).unwrap();
+    names.push("damaged.tlog".to_owned());
     names.sort();
     assert!(names.len() > 100, "{} recordings", names.len());
     names
@@ -116,10 +185,8 @@ fn every_recording_of_the_repository_is_judged_to_the_byte_as_on_the_command_lin
     fs::create_dir(&folder).unwrap();
     let names = recordings(&folder);
     let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
-    page.shown.run("document.documentElement.dataset.state = ''; return null");
-    page.shown.files("#files", &paths);
-    page.shown.wait("return ['checked', 'done'].includes(document.documentElement.dataset.state)", 300);
-    let saved = page.save("Save all findings (JSON lines)", 1);
+    page.check("#files", &paths);
+    let saved = page.save("Save all findings", 1);
     let expected = hums_in(&folder, &["check", "--json"], &names);
     let (shown, expected) = (fs::read_to_string(&saved[0]).unwrap(), expected.text());
     // A recording of two vehicles has a line for each.
@@ -128,7 +195,22 @@ fn every_recording_of_the_repository_is_judged_to_the_byte_as_on_the_command_lin
     for (shown, expected) in shown.lines().zip(expected.lines()) {
         assert_eq!(shown, expected);
     }
+    // The mark has the word of a folder's lines: an `ok` is of a whole log.
+    let lines = hums_in(&folder, &["check"], &names).text();
+    let words: Vec<&str> = lines.lines().take_while(|line| !line.is_empty()).map(first_word).collect();
+    let marks = page.text("#logs .badge b");
+    let marks: Vec<&str> = marks.lines().filter(|mark| *mark != "not read").collect();
+    assert_eq!(marks, words);
+    for word in ["ok", "warning", "critical", "damaged", "unknown"] {
+        assert!(words.contains(&word), "no log is {word}");
+    }
+    page.all_text();
+    assert_eq!(page.text("[role=status]").split_whitespace().last(), Some("checked."));
     assert_eq!(page.shown.console(), serde_json::json!([]));
+}
+
+fn first_word(line: &str) -> &str {
+    line.split_whitespace().next().unwrap_or_default()
 }
 
 #[test]
@@ -148,31 +230,38 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
     let names: Vec<String> = ["a.tlog", "b.bin.gz", "c.ulg.gz", "card.img"].map(str::to_owned).into();
     let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     page.check("#files", &paths);
-    hums_in(&folder, &["report", "--compare", "-o", "../pages/"], &names).expect_code(&[0, 3]);
+    hums_in(&folder, &["report", "-o", "../pages/"], &names).expect_code(&[0, 3]);
+    hums_in(&folder, &["report", "--compare", "-o", "../pages/flights.html"], &names).expect_code(&[0, 3]);
     let pages = page.dir.path().join("pages");
-    let expected: Vec<_> = fs::read_dir(&pages).unwrap().map(|entry| entry.unwrap().path()).collect();
-    let saved = page.save("Save it", expected.len() - 1);
+    let mut saved = page.save("Save report", names.len());
+    saved.extend(page.save("Save flights side by side", 1));
     for path in saved {
-        let name = path.file_name().unwrap();
-        assert!(
-            fs::read(&path).unwrap() == fs::read(pages.join(name)).unwrap(),
-            "{} differs",
-            name.display()
-        );
+        let (name, html) = (path.file_name().unwrap(), fs::read_to_string(&path).unwrap());
+        assert!(html == fs::read_to_string(pages.join(name)).unwrap(), "{} differs", name.display());
+        assert_no_command(data_of(&html));
     }
     // A report runs inside the page.
     let screen = hums_in(&folder, &["check"], &names[..1]).text();
-    assert!(
-        page.text("[data-log='a.tlog'] .screen") == screen.trim_end(),
-        "{}",
-        page.text("[data-log='a.tlog'] .screen")
-    );
-    page.shown.run(
-        "document.querySelector('[data-log=\"a.tlog\"]').querySelectorAll('button')[1].click(); return null",
-    );
-    page.shown.wait("return document.querySelector('iframe')?.srcdoc.length > 10000", 10);
-    shoot(&mut page.shown, "check");
+    let shown = page.text("[data-log='a.tlog'] .verdict, [data-log='a.tlog'] > .screen");
+    assert_eq!(shown, screen.replace(" (-v lists them)", "").trim_end());
+    let listed = hums_in(&folder, &["check", "-v"], &names[..1]).text();
+    let reasons = page.text("[data-log='a.tlog'] details .screen");
+    assert!(reasons.lines().count() > 3 && listed.contains(&reasons), "{reasons}");
+    page.shown.run("document.querySelector('[data-log=\"a.tlog\"] button').click(); return null");
+    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
     assert_eq!(page.shown.console(), serde_json::json!([]), "a script of the report is refused");
+}
+
+#[test]
+fn the_report_of_a_single_log_stands_below_its_verdict_unasked() {
+    let mut page = Page::sized(1000, 1300);
+    let flight = page.dir.path().join("flight.tlog");
+    fs::copy(own("ap_quad_faults.tlog"), &flight).unwrap();
+    page.check("#files", &[flight]);
+    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
+    assert_eq!(page.text("[role=status]"), "1 log checked.");
+    shoot(&mut page.shown, "browser");
+    assert_eq!(page.shown.console(), serde_json::json!([]));
 }
 
 #[test]
@@ -200,9 +289,86 @@ fn what_is_dropped_is_judged_also_folders_and_two_files_of_one_name() {
         assert!(shown.contains(name), "{name}: {shown}");
     }
     // A link of a report inside the page scrolls the report.
-    page.shown.run("document.querySelector('[data-log=\"flight.tlog\"]').querySelectorAll('button')[1].click(); return null");
-    page.shown.wait("return document.querySelector('iframe')?.srcdoc.length > 10000", 10);
+    page.shown.run("document.querySelector('[data-log=\"flight.tlog\"] button').click(); return null");
+    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
     assert_eq!(page.shown.console(), serde_json::json!([]));
+}
+
+#[test]
+fn each_vehicle_of_a_recording_of_several_has_its_answer_and_its_report() {
+    let mut page = Page::open(1280);
+    let folder = page.dir.path().join("logs");
+    fs::create_dir(&folder).unwrap();
+    let names = ["two.tlog.gz".to_owned()];
+    fs::copy(root().join("tests/monitor/d7.tlog.gz"), folder.join(&names[0])).unwrap();
+    page.check("#files", &[folder.join(&names[0])]);
+    let shown = page.text("#logs h2");
+    let systems: Vec<&str> =
+        shown.lines().filter_map(|line| line.rsplit_once("two.tlog.gz, system ")).map(|(_, id)| id).collect();
+    assert!(systems.len() == 2 && systems[0] != systems[1], "{shown}");
+    let frames = page.shown.run("return document.querySelectorAll('iframe').length");
+    assert_eq!(frames, 0, "a report nobody asked for");
+    let saved = page.save("Save report", 2);
+    for system in systems {
+        let pages = format!("../pages-{system}/");
+        hums_in(&folder, &["report", "--system", system, "-o", &pages], &names).expect_code(&[0, 3]);
+        let mut made = fs::read_dir(folder.join(&pages)).unwrap().map(|entry| entry.unwrap().path());
+        let end = format!("-system{system}.html");
+        let expected = made.find(|path| path.to_string_lossy().ends_with(&end)).unwrap();
+        let same =
+            saved.iter().find(|path| path.file_name() == expected.file_name()).expect("it has its name");
+        assert!(fs::read(same).unwrap() == fs::read(&expected).unwrap(), "system {system} differs");
+    }
+    page.all_text();
+    // A folder of pages has both, and so has its table.
+    hums_in(&folder, &["report", "-o", "../both/"], &names).expect_code(&[0, 3]);
+    let both: Vec<_> =
+        fs::read_dir(page.dir.path().join("both")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(both.len(), 3, "{both:?}");
+}
+
+/// One recording again and again: each is judged by itself.
+fn large(folder: &Path, name: &str, bytes: usize) -> PathBuf {
+    let flight = fs::read(own("ap_quad_faults.tlog")).unwrap();
+    let path = folder.join(name);
+    let mut file = fs::File::create(&path).unwrap();
+    (0..bytes.div_ceil(flight.len())).for_each(|_| file.write_all(&flight).unwrap());
+    path
+}
+
+const MB: usize = 1_000_000;
+
+#[test]
+fn a_log_ten_times_as_large_takes_no_more_memory() {
+    let mut page = Page::open(1280);
+    let [small, large] = [5, 50].map(|mb| large(page.dir.path(), &format!("{mb}.tlog"), mb * MB));
+    let [small, large] = [small, large].map(|log| {
+        page.check("#files", &[log]);
+        page.shown.peak_bytes()
+    });
+    let more = large - small;
+    assert!(more < 25 * MB as u64, "{small} bytes for 5 MB, {more} more for 50 MB");
+}
+
+#[test]
+#[ignore = "takes minutes, and the program of a release: cargo xtask prove browser"]
+fn a_verdict_comes_within_seconds_and_a_file_of_500_mb_at_a_third_of_the_programs_speed() {
+    let mut page = Page::open(1280);
+    let (ten, other) = (large(page.dir.path(), "10.tlog", 10 * MB), own("px4_hil_quad_low.tlog"));
+    let chromium_s = page.first_verdict_s(&ten);
+    let html = page.dir.path().join("hums-check.html");
+    let firefox_s = oracle::firefox(&html, &[ten, other])["seconds"].as_f64().unwrap();
+    let huge = large(page.dir.path(), "500.tlog", 500 * MB);
+    let page_s = page.first_verdict_s(&huge);
+    let peak = page.shown.peak_bytes() / MB as u64;
+    let begun = Instant::now();
+    child::run(Command::new(release()).arg("check").arg(&huge), LIMIT).expect_code(&[4]);
+    let native_s = begun.elapsed().as_secs_f64();
+    println!(
+        "10 MB: {chromium_s:.2} s in Chromium, {firefox_s:.2} s in Firefox; 500 MB: {page_s:.1} s in Chromium, \
+         {native_s:.1} s by hums; {peak} MB of memory"
+    );
+    assert!(chromium_s < 3.0 && firefox_s < 3.0 && page_s < 3.0 * native_s && peak < 450);
 }
 
 #[test]
@@ -229,20 +395,36 @@ fn firefox_judges_and_saves_what_the_command_line_does() {
 const TRAP: &str = "0061736d0100000001040160000003020100050301000107130206\
                     6d656d6f72790200065f737461727400000a05010300000b";
 
+/// One that ends as Rust's do without memory: it writes `memory allocation of 9 bytes failed` (`fd_write`), then traps.
+const NO_MEMORY: &str = "0061736d01000000010c0260047f7f7f7f017f60000002230116776173695f736e617073686f745f7072657669657731\
+                           0866645f77726974650000030201010503010001071302066d656d6f72790200065f737461727400010a11010f004102\
+                           4100410141c00010001a000b0b32010041000b2c08000000240000006d656d6f727920616c6c6f636174696f6e206f66\
+                           2039206279746573206661696c65640a";
+
 #[test]
-fn a_program_that_stops_by_itself_ends_with_a_sentence() {
+fn a_program_that_stops_by_itself_or_lacks_memory_ends_with_a_sentence() {
     let mut page = Page::open(1280);
-    page.shown.run(&format!(
-        "const bytes = Uint8Array.from({TRAP:?}.match(/../g), (two) => parseInt(two, 16));
-         const text = document.getElementById('worker').textContent;
-         const worker = new Worker(URL.createObjectURL(new Blob([text], {{ type: 'text/javascript' }})));
-         worker.onmessage = (event) => {{ window.ended = event.data; }};
-         WebAssembly.compile(bytes).then((module) => worker.postMessage({{ module, command: 'check', inputs: [], files: [] }}));
-         return null"
-    ));
-    let ended = page.shown.wait("return window.ended", 20);
-    let why = ended["why"].as_str().unwrap();
+    let why = page.reason(TRAP);
     assert!(why.contains("the program stopped") && why.contains("unreachable"), "{why}");
+    let why = page.reason(NO_MEMORY);
+    assert!(why.contains("the memory of this page does not suffice"), "{why}");
+}
+
+#[test]
+fn a_large_or_hostile_file_is_judged_as_on_the_command_line() {
+    let mut page = Page::open(1280);
+    let folder = page.dir.path().to_owned();
+    for log in [hostile::expanding(&folder), hostile::wide_ulog(&folder), hostile::texts(&folder, 100_000)] {
+        let name = log.file_name().unwrap().to_str().unwrap().to_owned();
+        page.check("#files", std::slice::from_ref(&log));
+        page.all_text();
+        let saved = page.save("Save findings", 1);
+        let expected = hums_in(&folder, &["check", "--json"], &[name]).text();
+        assert_eq!(fs::read_to_string(&saved[0]).unwrap(), expected);
+        fs::remove_file(&saved[0]).unwrap();
+    }
+    let peak = page.shown.peak_bytes();
+    assert!(peak < 500 * MB as u64, "{peak} bytes");
 }
 
 #[test]
@@ -255,7 +437,7 @@ fn a_card_folder_is_one_card_and_a_phone_shows_all_of_the_page() {
     fs::copy(own("ap_quad_signed.raw"), folder.join("other.raw")).unwrap();
     page.check("#folder", &[folder]);
     let expected = hums_in(page.dir.path(), &["check", "--json"], &["card".to_owned()]).text();
-    let saved = page.save("Save all findings (JSON lines)", 1);
+    let saved = page.save("Save all findings", 1);
     assert_eq!(fs::read_to_string(&saved[0]).unwrap(), expected);
     let width = page.shown.run("return [document.documentElement.scrollWidth, innerWidth]");
     assert!(width[0].as_f64() <= width[1].as_f64(), "wider than a phone: {width}");
@@ -280,8 +462,9 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
     ] {
         let path = page.file(name, &bytes);
         page.check("#files", &[path]);
-        let shown = page.text("#logs .screen, [role=status], #remarks");
+        let shown = page.text("#logs .log, [role=status], #remarks");
         assert!(shown.contains(words) && !shown.contains("panicked"), "{name}: {shown}");
+        page.all_text();
         let expected = hums_in(page.dir.path(), &["check", "--json"], &[name.to_owned()]).text();
         let error =
             serde_json::from_str::<serde_json::Value>(expected.lines().next().unwrap_or("{}")).unwrap();
@@ -294,7 +477,7 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
     page.shown.run("[...document.querySelectorAll('button')].find((one) => one.textContent === 'Cancel').click(); return null");
     assert_eq!(page.text("[role=status]"), "Cancelled.");
     page.check("#files", &[own("ap_quad_faults.tlog")]);
-    assert!(page.text("#logs .screen").contains("2 critical findings"), "{}", page.text("#logs"));
+    assert!(page.text("#logs .verdict").contains("2 critical findings"), "{}", page.text("#logs"));
 }
 
 #[test]

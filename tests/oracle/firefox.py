@@ -2,7 +2,7 @@
 
 usage: firefox.py FIREFOX PAGE INPUT...      at least two files; the answer is a JSON object:
 
-  {"seconds": from the choice to the last verdict, "saved": findings as JSON lines, "reports": names of the saved pages}
+  {"seconds": from the choice to the first verdict, "saved": findings as JSON lines, "reports": names of the saved pages}
 """
 
 import json
@@ -103,8 +103,8 @@ class Firefox:
 
 SAVE = """
 const named = (words) => [...document.querySelectorAll("button")].filter((button) => button.textContent === words);
-for (const button of [...named("Save all findings (JSON lines)"), ...named("Save it")]) button.click();
-return named("Save it").length;
+for (const button of [...named("Save all findings"), ...named("Save report")]) button.click();
+return named("Save report").length;
 """
 
 
@@ -121,10 +121,9 @@ def main():
             firefox.wait("return document.documentElement.dataset.ready === 'true'", 60)
             begun = time.monotonic()
             firefox.choose("#files", inputs)
-            state = "document.documentElement.dataset.state"
-            firefox.wait(f"return ['checked', 'done'].includes({state})", 300)
+            firefox.wait("return document.querySelector('.log') !== null", 300)
             seconds = time.monotonic() - begun
-            firefox.wait(f"return {state} === 'done'", 300)
+            firefox.wait("return document.documentElement.dataset.state === 'done'", 300)
             pages = firefox.run(SAVE)
             saved = firefox.saved(folder / "saved", pages + 1)
         finally:

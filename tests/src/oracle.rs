@@ -208,6 +208,31 @@ impl LivePage {
         self.ask(&serde_json::json!({ "do": "shot", "path": path, "whole": whole }));
     }
 
+    /// The most memory that one of its processes with a page ever had (`VmHWM`), in bytes.
+    ///
+    /// # Panics
+    /// No process has a page.
+    pub fn peak_bytes(&self) -> u64 {
+        let of = |pid: &u32, file: &str| {
+            std::fs::read_to_string(format!("/proc/{pid}/{file}")).unwrap_or_default()
+        };
+        let number = |pid: &u32, name: &str| {
+            let status = of(pid, "status");
+            let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+            line.split_whitespace().next()?.parse::<u64>().ok()
+        };
+        let all = std::fs::read_dir("/proc").expect("processes").flatten();
+        let all: Vec<u32> = all.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
+        let (mut family, mut peak) = (vec![self.browser.id()], None);
+        while let Some(pid) = family.pop() {
+            family.extend(all.iter().filter(|child| number(child, "PPid:") == Some(u64::from(pid))));
+            if of(&pid, "cmdline").contains("--type=renderer") {
+                peak = peak.max(number(&pid, "VmHWM:").map(|kib| kib * 1_024));
+            }
+        }
+        peak.expect("a browser has pages")
+    }
+
     /// The browser's complaints.
     #[track_caller]
     pub fn console(&mut self) -> Value {

@@ -39,6 +39,17 @@ fn build() -> PathBuf {
     executable.expect("the package hums has a program")
 }
 
+/// The users' build, beside that of the tests.
+///
+/// # Panics
+///
+/// There is none.
+pub fn release() -> PathBuf {
+    let release = path().with_file_name("../release/hums");
+    assert!(release.is_file(), "{} is missing: `cargo xtask prove` builds it", release.display());
+    release
+}
+
 /// The default board's ELF file: `HUMS_FIRMWARE`, or xtask's.
 ///
 /// # Panics

@@ -45,7 +45,7 @@ enum Command {
     Test(test::Options),
     /// Run the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise
     ///
-    /// All of them take an hour and make docs/proof.md. Four names are no campaigns:
+    /// All of them take an hour and make docs/proof.md. Five names are no campaigns:
     ///
     /// `prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]` counts found faults and false alarms in labelled
     /// flights; --write makes docs/diagnosis.md.
@@ -56,6 +56,8 @@ enum Command {
     ///
     /// `prove foreign [EMBASSY]` runs other people's programs on that model: examples of registry packages, and of a
     /// checkout of embassy's repository.
+    ///
+    /// `prove browser` measures time and memory of the check in Chromium and Firefox.
     Prove {
         /// [NAME]... [--short] [--seed N] [--runs N] [--list]
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]

@@ -1,12 +1,15 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
 //! They are in the tests' crate; this builds them. Apart: `diagnosis` (labelled flights, `docs/diagnosis.md`), `chip` (long
-//! tests on the model), `boards` (every board's image), `foreign` (foreign programs on the model).
+//! tests on the model), `boards` (every board's image), `foreign` (foreign programs on the model), `browser` (the check in a
+//! browser: time and memory).
 
 use anyhow::Result;
 
+use crate::browser;
 use crate::firmware::{self, Board};
 use crate::foreign;
+use crate::hums;
 use crate::oracle;
 use crate::pc;
 use crate::setup::{self, Need};
@@ -21,6 +24,8 @@ const BOARDS: &str = "boards";
 
 const FOREIGN: &str = "foreign";
 
+const BROWSER: &str = "browser";
+
 const DIAGNOSIS: &str = "diagnosis";
 
 /// Names, `--short`, `--seed N`, `--runs N`; `diagnosis`, `chip` and `foreign` have their own.
@@ -31,6 +36,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
             return chip(&hums_boards::all().iter().collect::<Vec<_>>(), &["boards::".to_owned()]);
         }
         Some((FOREIGN, rest)) => return foreign::run(rest),
+        Some((BROWSER, [])) => return in_browsers(),
         _ => {}
     }
     let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
@@ -50,4 +56,14 @@ fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
     let names = names.iter().map(String::as_str);
     let names: Vec<&str> = if names.len() == 0 { vec!["chip::"] } else { names.collect() };
     pc::end_to_end(&[&["--ignored", "--nocapture"], &names[..]].concat())
+}
+
+/// Against the users' build of `hums`.
+fn in_browsers() -> Result<()> {
+    setup::require(&[Need::Linker, Need::BrowserTarget, Need::PythonVenv, Need::Chromium, Need::Firefox])?;
+    hums::build_release()?;
+    browser::build()?;
+    oracle::prepare()?;
+    pc::build()?;
+    pc::end_to_end(&["--ignored", "--nocapture", "browser::"])
 }

@@ -4,20 +4,22 @@
 //! its files, read in slices. So the readers, the checks and the report are those of `hums`.
 //!
 //! ```text
-//! hums-browser check INPUT...      two lines for each log: {"screen": TEXT}, then the object of `hums check --json`
-//! hums-browser report INPUT...     a line for each page: {"page": FILE, "log": LOG or null, "system": ID or null, "html": TEXT}
-//! hums-browser compare INPUT...    the same with the flights side by side
+//! hums-browser check INPUT...          two lines for each log: {"screen": TEXT, "state": WORD, "reasons": TEXT}, of which
+//!                                      the last is the list of checks without data; then the object of `hums check --json`
+//! hums-browser report SYSTEM INPUT...  a line for each page: {"page": FILE, "log": LOG or null, "html": TEXT}; SYSTEM is the
+//!                                      id of one vehicle of a recording of several, or `-`
+//! hums-browser compare INPUT...        the same of the flights side by side
 //! ```
 //!
 //! Remarks and errors go to standard error.
 
 use std::env;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use hums_analysis::check::{self, text};
+use hums_analysis::check::{self, text, text::NotJudged};
 use hums_base::colour::shown;
 use hums_base::outcome::{Outcome, exit_code, usage};
 use hums_base::{output, printable};
@@ -31,10 +33,12 @@ fn main() -> ExitCode {
 fn run(mut arguments: impl Iterator<Item = OsString>) -> Result<Outcome> {
     let command = arguments.next().unwrap_or_default();
     let inputs: Vec<PathBuf> = arguments.map(PathBuf::from).collect();
-    match command.to_str() {
-        Some("check") => check(&inputs),
-        Some("report") => report(&inputs, false),
-        Some("compare") => report(&inputs, true),
+    match (command.to_str(), inputs.as_slice()) {
+        (Some("check"), _) => check(&inputs),
+        (Some("report"), [system, inputs @ ..]) => {
+            report(inputs, "pages/", system.to_str().and_then(|id| id.parse().ok()))
+        }
+        (Some("compare"), _) => report(&inputs, "flights.html", None),
         _ => Err(usage("the first argument is check, report or compare")),
     }
 }
@@ -51,33 +55,29 @@ fn check(inputs: &[PathBuf]) -> Result<Outcome> {
         json: true,
     };
     check::run_showing(&request, |checked| {
-        output::json_line(
-            &json!({ "screen": shown(&printable::lines(&text::screen(checked, false)), false) }).to_string(),
-        )
+        let plain = |text: &str| shown(&printable::lines(text), false).to_string();
+        let screen = plain(&text::screen(checked, NotJudged::Counted("")));
+        let reasons = plain(&text::reasons(&checked.judged));
+        let line = json!({ "screen": screen, "state": text::state(checked), "reasons": reasons });
+        output::json_line(&line.to_string())
     })
 }
 
-fn report(inputs: &[PathBuf], compare: bool) -> Result<Outcome> {
-    let output = Some(Path::new("pages/"));
+/// A folder is for a page of each session, a file for one of all side by side.
+fn report(inputs: &[PathBuf], output: &str, system: Option<u8>) -> Result<Outcome> {
     let request = report::Request {
         inputs,
-        output,
+        output: Some(output.as_ref()),
         session: None,
-        compare,
-        system: None,
+        compare: !output.ends_with('/'),
+        system,
         map: None,
         force: false,
         json: false,
     };
     report::run_into(&request, &mut |path, what, html, _| {
-        let (log, system) = if let What::Session(place, system) = what {
-            (Some(&place.title), *system)
-        } else {
-            (None, None)
-        };
-        output::json_line(
-            &json!({ "page": path.file_name().map(Path::new), "log": log, "system": system, "html": html })
-                .to_string(),
-        )
+        let log = if let What::Session(place) = what { Some(&place.title) } else { None };
+        let page = path.file_name().map(|name| name.to_string_lossy());
+        output::json_line(&json!({ "page": page, "log": log, "html": html }).to_string())
     })
 }

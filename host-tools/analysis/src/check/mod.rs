@@ -39,12 +39,13 @@ use crate::output;
 use crate::params;
 use crate::progress;
 use crate::source::find::{FoundRecordings, find, sessions_of};
-use crate::source::recording::Place;
+use crate::source::recording::{Format, Place};
 use checked::Checked;
 use judge::{Heard, Limits};
+use judged::Judged;
 use overview::Read;
 use past::{Past, Series};
-use text::Table;
+use text::{NotJudged, Table};
 
 /// The request of `hums check`.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +82,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     found.tell();
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1 && wanted.is_none();
+    let mention = if args.verbose { NotJudged::Listed } else { NotJudged::Counted(" (-v lists them)") };
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = EndResolver::new(sessions_of(&found.places));
     // The next log shows how this one ends.
@@ -97,7 +99,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
                 table.add(&checked);
                 text::line(&checked)
             } else {
-                text::screen(&checked, args.verbose)
+                text::screen(&checked, mention)
             };
             bar.suspend(|| {
                 checked.aside().iter().chain(&checked.faults()).for_each(|why| note!("{name}: {why}"));
@@ -121,7 +123,9 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
         &found.places,
         |place| {
             let told = told(&past, place, !many);
-            let vehicles = vehicles(place, &told);
+            let checked = told.checked.as_ref().ok();
+            let vehicles =
+                checked.map_or_else(Vec::new, |checked| vehicles(place, checked.format, &checked.judged));
             if vehicles.is_empty() {
                 return vec![told];
             }
@@ -155,12 +159,23 @@ fn told(past: &Past, place: &Place, shows: bool) -> Told {
 }
 
 /// A link's recording, once for each of several vehicles; empty for one. Of standard input, read once, one is judged.
-fn vehicles(place: &Place, told: &Told) -> Vec<Place> {
-    let Ok(checked) = &told.checked else { return Vec::new() };
-    let systems = &checked.judged.systems;
-    let is_of_several = place.system.is_none() && checked.format.is_of_link() && systems.len() > 1;
+fn vehicles(place: &Place, format: Format, judged: &Judged) -> Vec<Place> {
+    let is_of_several = place.system.is_none() && format.is_of_link() && judged.systems.len() > 1;
     let is_apart = is_of_several && place.path().is_some();
-    if is_apart { systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
+    if is_apart { judged.systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
+}
+
+/// A recording, once for each of its vehicles: those that `hums check` judges, with their system ids in the names. An
+/// unreadable recording is returned as it is.
+pub fn by_vehicle(place: &Place) -> Vec<Place> {
+    let is_of_link = place.path().is_some() && place.open().is_ok_and(|open| open.format.is_of_link());
+    let read = is_of_link.then(|| overview::judge(place, &Limits::default(), Heard::Somewhere, false));
+    let read = read.and_then(Result::ok);
+    let mut all = read.map(|read| vehicles(place, read.format, &read.judged)).unwrap_or_default();
+    for vehicle in &mut all {
+        vehicle.name = format!("{}, system {}", place.name, vehicle.system.unwrap_or_default());
+    }
+    if all.is_empty() { vec![place.clone()] } else { all }
 }
 
 /// And the number of inputs without a log; with `--json` these have an object too.

@@ -35,8 +35,17 @@ const LINES_MAX: usize = 8;
 const HEADLINE_DETAILS_MAX: usize = 2;
 const CRITICAL: &str = "CRITICAL";
 
-/// `verbose`: with unjudged checks.
-pub fn screen(checked: &Checked, verbose: bool) -> String {
+/// Mention of the checks without data.
+#[derive(Clone, Copy, Debug)]
+pub enum NotJudged {
+    /// Each, with its reason.
+    Listed,
+    /// Their number, and where the list is.
+    Counted(&'static str),
+}
+
+/// A log's answer.
+pub fn screen(checked: &Checked, mention: NotJudged) -> String {
     let judged = &checked.judged;
     let mut text = format!("{}: {}{}\n", word(&checked.name), word(&verdict(judged)), but(checked));
     let has_data = judged.worst().is_some() && judged.checks().judged > 0;
@@ -51,7 +60,7 @@ pub fn screen(checked: &Checked, verbose: bool) -> String {
     if judged.by == JudgedBy::Board && judged.findings_count > 0 {
         text.push_str("  (found by the monitor on board)\n");
     }
-    not_judged(&mut text, judged, verbose);
+    not_judged(&mut text, judged, mention);
     damage(&mut text, judged);
     if let Some(end) = &judged.ends_in_air {
         let _ = writeln!(text, "  the end  {:>9}  {}", moment(end.at), end);
@@ -62,16 +71,19 @@ pub fn screen(checked: &Checked, verbose: bool) -> String {
     text
 }
 
-/// One log of many, as a line.
-pub fn line(checked: &Checked) -> String {
-    let judged = &checked.judged;
-    let level = match (judged.verdict(), checked.soundness()) {
+/// A log's state in a word: its verdict, or the fault of a log without findings.
+pub fn state(checked: &Checked) -> &'static str {
+    match (checked.judged.verdict(), checked.soundness()) {
         ("too_little", _) => "little",
-        // Damage without problems.
         ("ok", Soundness::Damaged) => "damaged",
         ("ok", Soundness::NotProved) => "unproved",
         (verdict, _) => verdict,
-    };
+    }
+}
+
+/// One log of many, as a line.
+pub fn line(checked: &Checked) -> String {
+    let judged = &checked.judged;
     let mut names: Vec<String> = Vec::new();
     for group in grouped(&judged.problems) {
         for problem in group.members.iter().chain(group.effects.iter().flatten()) {
@@ -88,7 +100,7 @@ pub fn line(checked: &Checked) -> String {
         .filter(|words| !words.is_empty())
         .collect();
     let air = clock(judged.flown());
-    format!("{:<8}  {air:>8}  {}  {}", coloured(level), word(&checked.name), what.join("; "))
+    format!("{:<8}  {air:>8}  {}  {}", coloured(state(checked)), word(&checked.name), what.join("; "))
         .trim_end()
         .to_owned()
 }
@@ -480,20 +492,23 @@ fn name(check: &str) -> &str {
     vocabulary(check).map_or(check, |words| words.said.name)
 }
 
-fn not_judged(text: &mut String, judged: &Judged, verbose: bool) {
+fn not_judged(text: &mut String, judged: &Judged, mention: NotJudged) {
     let checks = judged.checks();
-    let count = checks.all - checks.judged;
-    if judged.worst().is_none() || judged.not_judged.is_empty() || checks.judged == 0 && !verbose {
+    if judged.worst().is_none() || judged.not_judged.is_empty() {
         return;
     }
-    if !verbose {
-        let _ = writeln!(
-            text,
-            "  not judged: {count} of {} checks, which lack data in this log (-v lists them)",
-            checks.all
-        );
-        return;
-    }
+    let count = format!("  not judged: {} of {} checks", checks.all - checks.judged, checks.all);
+    let _ = match mention {
+        NotJudged::Counted(_) if checks.judged == 0 => Ok(()),
+        NotJudged::Counted(list) => writeln!(text, "{count}, which lack data in this log{list}"),
+        NotJudged::Listed => {
+            writeln!(text, "{count}, and those that need a box or earlier flights\n{}", reasons(judged))
+        }
+    };
+}
+
+/// Checks without data, by reason: a line each.
+pub fn reasons(judged: &Judged) -> String {
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
     for (check, why) in &judged.not_judged {
         let check = &name(check);
@@ -503,14 +518,8 @@ fn not_judged(text: &mut String, judged: &Judged, verbose: bool) {
         }
     }
     reasons.sort_by_key(|(_, checks)| Reverse(checks.len()));
-    let _ = writeln!(
-        text,
-        "  not judged: {count} of {} checks, and those that need a box or earlier flights",
-        checks.all
-    );
-    for (reason, checks) in &reasons {
-        let _ = writeln!(text, "    {reason}: {}", checks.join("; "));
-    }
+    let lines = reasons.iter().map(|(reason, checks)| format!("    {reason}: {}", checks.join("; ")));
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 fn damage(text: &mut String, judged: &Judged) {
@@ -532,7 +541,7 @@ fn damage(text: &mut String, judged: &Judged) {
     }
     let more = (judged.damages + judged.losses).saturating_sub(LINES_MAX as u64);
     if more > 0 {
-        let _ = writeln!(text, "  and {more} more such places (--json)");
+        let _ = writeln!(text, "  and {more} more such places");
     }
 }
 

@@ -92,7 +92,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
 pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
     let output = &args.output.map_or_else(|| beside(args.inputs), |output| Ok(output.to_owned()))?;
     let (given, remarks) = without_made(args.inputs);
-    let found = find(&given, false)?.of_system(args.system)?;
+    let mut found = find(&given, false)?.of_system(args.system)?;
     for remark in remarks.iter().chain(&found.remarks) {
         note!("{remark}");
     }
@@ -103,6 +103,14 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
         bail!("{}: is read twice for a page; give a file", place.title)
     }
     let sessions = sessions_of(&found.places);
+    if says_directory(output) && args.session.is_none() {
+        let mut all = Vec::new();
+        side_by_side(&found.places, check::by_vehicle, |vehicles| {
+            all.extend(vehicles);
+            Ok(())
+        })?;
+        found.places = all;
+    }
     let wanted = wanted(args, output, &found)?;
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
         return Err(usage(format!(
@@ -127,7 +135,7 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
         pages: BTreeMap::new(),
         rows: Vec::new(),
         table: Some(output).filter(|_| wanted.directory).and_then(|folder| index::Pages::of(folder)),
-        names: Names::default(),
+        names: BTreeMap::new(),
         outcome: Outcome::lossy(found.is_lossy()),
         parameters: None,
         json: args.json,
@@ -177,7 +185,8 @@ struct Making<'a> {
     rows: Vec<index::Row>,
     /// The folder's table of earlier runs.
     table: Option<index::Pages>,
-    names: Names,
+    /// By the system id of the vehicle, if a recording has several.
+    names: BTreeMap<Option<u8>, Names>,
     outcome: Outcome,
     parameters: Option<(usize, Vec<(String, f64)>)>,
     json: bool,
@@ -196,7 +205,7 @@ impl Making<'_> {
             let original = original.and_then(|of| self.places.iter().position(|place| place.name == of));
             let named = match original.filter(|of| self.wanted.sessions.contains(of)) {
                 Some(of) => Named::Copy(of),
-                None => self.names.name(index, place, &traits),
+                None => self.names.entry(place.system).or_default().name(index, place, &traits),
             };
             match named {
                 Named::Copy(of) => {
@@ -204,7 +213,7 @@ impl Making<'_> {
                     note!("{}: is a copy of {of}, whose page is written once", place.name);
                 }
                 Named::As(name, _) => {
-                    let path = self.wanted.path(&name);
+                    let path = self.wanted.path(&of_vehicle(name, place.system));
                     let free = Output::check(&path, self.inputs);
                     // A single page that cannot be written is an error, as any output.
                     if self.wanted.sessions.end() <= self.wanted.sessions.start() {
@@ -257,8 +266,7 @@ impl Making<'_> {
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        let system = overview.contents.vehicle.as_ref().map(|vehicle| vehicle.system);
-        self.write(path, &html, &What::Session(place, system), self.inputs)?;
+        self.write(path, &html, &What::Session(place), self.inputs)?;
         self.rows.push(index::Row::new(file.clone(), overview, &replay));
         self.pages.insert(index, file);
         Ok(())
@@ -361,6 +369,11 @@ impl Making<'_> {
     }
 }
 
+/// The name of a vehicle's page, if its recording has several.
+fn of_vehicle(name: String, system: Option<u8>) -> String {
+    system.map_or(name.clone(), |system| format!("{name}-system{system}"))
+}
+
 fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |file| file.to_string_lossy().into_owned())
 }
@@ -379,8 +392,8 @@ fn without_folders(overview: &Overview) -> Overview {
 /// The kind of a page.
 #[derive(Clone, Copy, Debug)]
 pub enum What<'a> {
-    /// Of this recording, and of the vehicle with this system id.
-    Session(&'a Place, Option<u8>),
+    /// Of this recording.
+    Session(&'a Place),
     /// The table of this many pages.
     Table(usize),
     /// Of flights side by side.
@@ -389,14 +402,14 @@ pub enum What<'a> {
 
 impl What<'_> {
     fn session(&self) -> Option<String> {
-        if let Self::Session(place, _) = self { Some(place.name.clone()) } else { None }
+        if let Self::Session(place) = self { Some(place.name.clone()) } else { None }
     }
 }
 
 impl Display for What<'_> {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Session(place, _) => write!(formatter, "session {}", word(&place.name)),
+            Self::Session(place) => write!(formatter, "session {}", word(&place.name)),
             Self::Table(pages) => write!(formatter, "table of {}", count(*pages as u64, "page")),
             Self::Comparison => formatter.write_str("flights side by side"),
         }

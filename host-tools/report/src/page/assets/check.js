@@ -64,63 +64,71 @@ const save = (name, content, type) => {
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 };
 const button = (words, onclick) => el("button", { type: "button", onclick }, words);
-const show = async (title, page) => {
-  const html = await page.text();
+const show = async (title, { html }) => {
   // The report runs apart from this page, under the same policy.
-  const frame = el("iframe", { title, sandbox: "allow-scripts allow-modals", srcdoc: html });
+  const frame = el("iframe", { title, sandbox: "allow-scripts allow-modals", srcdoc: await html.text() });
+  frame.addEventListener("load", () => frame.setAttribute("data-ready", ""));
   shown.replaceChildren(el("h2", {}, title), frame);
   shown.hidden = false;
-  shown.scrollIntoView({ behavior: "smooth" });
 };
-const pageButtons = (host, words, { page, html, title }) => {
-  // Out of the script's memory: reports are large, and a card may have hundreds.
-  const content = new Blob([html]);
+// Pages are made when they are first asked for. `make` resolves to a page, or to nothing if its run ended early.
+const pageButtons = (host, words, title, make) => {
+  let made = null;
+  const page = async (use) => {
+    made ??= await make();
+    if (made) use(made);
+  };
+  const open = () => page((page) => show(title, page).then(() => shown.scrollIntoView({ behavior: "smooth" })));
   host.append(
-    button(words, () => show(title, content)),
-    button("Save it", () => save(page, content, "text/html")),
+    button(words, open),
+    button(`Save ${words.toLowerCase()}`, () => page(({ file, html }) => save(file, html, "text/html"))),
   );
+  return page;
 };
 
 // ---- A log's verdict.
-const LEVELS = { ok: "ok", advisory: "advisory", warning: "warning", critical: "critical" };
-// What was said of each log, and of each vehicle of a log of several.
+const LEVELS = ["ok", "advisory", "warning", "critical"];
+// The answer for each log, and for each vehicle of a log of several.
 let logs = [];
-const addLog = (line, told, screen) => {
+const addLog = (line, told, { screen, state, reasons }) => {
   const mark = badge();
-  const level = LEVELS[told.verdict] ?? "stale";
-  mark.set(level, told.error ? "not read" : told.verdict.replaceAll("_", " "));
+  const level = LEVELS.includes(state) ? state : "stale";
+  mark.set(level, told.error ? "not read" : state);
+  // Its first line is the verdict.
+  const [verdict, ...lines] = (told.error ?? screen).trimEnd().split("\n");
   const buttons = el("p", { class: "choices" });
   const node = el(
     "section",
     { class: "panel log", "data-log": told.log },
     el("h2", {}, mark.node, ` ${told.log}`),
-    el("pre", { class: "screen" }, told.error ?? screen.trimEnd()),
-    buttons,
+    el("p", { class: `verdict ${level}` }, verdict),
+    el("pre", { class: "screen" }, lines.join("\n")),
   );
-  if (!told.error)
-    buttons.append(
-      button("Save findings (JSON)", () => save(`${told.log.replace(/[^\w.-]+/g, "_")}.json`, `${line}\n`, "application/json")),
-    );
-  logs.push({ line, told, buttons });
+  if (reasons) node.append(el("details", {}, el("summary", {}, "Checks without data"), el("pre", { class: "screen" }, reasons)));
+  node.append(buttons);
+  logs.push({ line, told, buttons, heading: node.firstChild });
   list.append(node);
 };
 
 // ---- Runs of the program, one at a time, each in a worker of its own: its memory ends with it.
 // A run ends with `why` it ended early, or null, and the program's exit code.
-let worker = null;
+let endRun = () => {};
 let turn = 0;
 const idle = (words) => {
-  worker = null;
   status.textContent = words;
   meter.hidden = stop.hidden = true;
   root.dataset.state = "done";
 };
 const cancel = (words) => {
-  worker?.terminate();
   turn++;
+  endRun({ why: null });
   idle(words);
 };
-const run = (words, command, inputs, files, takeLine) => {
+// Once each: a report repeats those of the check.
+const remark = (words) => {
+  if (![...remarks.children].some((item) => item.textContent === words)) remarks.append(el("li", {}, words));
+};
+const run = (words, command, files, takeLine) => {
   const mine = turn;
   return compiled.then(
     (module) =>
@@ -132,23 +140,46 @@ const run = (words, command, inputs, files, takeLine) => {
           own.terminate();
           resolve(result);
         };
-        worker = own;
+        endRun = end;
         status.textContent = words;
         meter.removeAttribute("value");
         meter.hidden = stop.hidden = false;
         own.onmessage = ({ data }) => {
           if (data.kind === "line") takeLine(data.line);
-          else if (data.kind === "remark") remarks.append(el("li", {}, data.line.replace(/^hums: /, "")));
+          else if (data.kind === "remark") remark(data.line.replace(/^hums: /, ""));
           else if (data.kind === "progress") {
             meter.value = data.part;
             status.textContent = `${words} ${data.name}, ${Math.round(data.part * 100)} %`;
           } else end(data);
         };
         own.onerror = ({ message }) => end({ why: `the program stopped (${message})` });
-        own.postMessage({ module, command, inputs, files });
+        own.postMessage({ module, command, files });
       }),
     (error) => ({ why: `this browser cannot run the program (${error.message}); use a newer one` }),
   );
+};
+
+// The pages of a run, by log; nothing if it was cancelled, or ended early. One run after the other; `words` are shown after it.
+let lastRun = Promise.resolve();
+const pagesOf = (command, files, words) => {
+  const mine = turn;
+  lastRun = lastRun.then(async () => {
+    if (mine !== turn) return null;
+    root.dataset.state = "busy";
+    const pages = new Map();
+    const { why, code } = await run("Reporting", command, files, (line) => {
+      if (!line.startsWith("{")) return;
+      const { page, log, html } = JSON.parse(line);
+      // Out of the script's memory: reports are large, and a card may have hundreds.
+      pages.set(log, { file: page, html: new Blob([html]) });
+    });
+    if (mine !== turn) return null;
+    // Exit codes 1 and 2: an input or a request that the program refused.
+    const early = why ?? ([1, 2].includes(code) ? "see the remarks" : null);
+    idle(early ? `The report ended early: ${early}.` : words);
+    return early ? null : pages;
+  });
+  return lastRun;
 };
 
 // What was chosen or dropped has names of its own: two files or folders may have one name.
@@ -169,49 +200,56 @@ const start = async (items, unread = []) => {
   if (given.length + unread.length === 0) return;
   cancel("");
   const mine = turn;
-  const isOld = () => mine !== turn;
   root.dataset.state = "busy";
   logs = [];
   for (const node of [list, beside, remarks, shown]) node.replaceChildren();
   shown.hidden = true;
-  for (const words of unread) remarks.append(el("li", {}, words));
+  unread.forEach(remark);
   if (given.length === 0) return idle("Nothing could be read.");
   const inputs = [...new Set(given.map(({ path }) => path.split("/")[0]))];
-  let screen = "";
-  const checked = await run("Checking", "check", inputs, given, (line) => {
+  let answer = {};
+  const checked = await run("Checking", ["check", ...inputs], given, (line) => {
     const told = JSON.parse(line);
-    if (told.screen != null) screen = told.screen;
-    else addLog(line, told, screen);
+    if (told.screen != null) answer = told;
+    else addLog(line, told, answer);
   });
-  if (isOld()) return;
+  if (mine !== turn) return;
   const read = logs.filter(({ told }) => !told.error);
   if (read.length > 1)
     beside.append(
-      button("Save all findings (JSON lines)", () =>
-        save("findings.jsonl", logs.map(({ line }) => `${line}\n`).join(""), "application/json"),
-      ),
+      button("Save all findings", () => save("findings.jsonl", logs.map(({ line }) => `${line}\n`).join(""), "application/json")),
     );
   if (checked.why) return idle(`The check ended early: ${checked.why}.`);
   if (read.length === 0) return idle(`No log could be read${logs.length ? "" : " in what was given"}.`);
-  // A report for each, and one of the flights side by side.
-  const flights = read.reduce((sum, { told }) => sum + told.flights.length, 0);
+  const end = `${plural(new Set(logs.map(({ told }) => told.log)).size, "log")} checked.`;
+  idle(end);
   const failed = new Set(logs.filter(({ told }) => told.error).map(({ told }) => told.log));
   const good = inputs.filter((input) => !failed.has(input));
   const files = given.filter(({ path }) => !failed.has(path) && good.includes(path.split("/")[0]));
-  root.dataset.state = "checked";
-  const reported = await run("Reporting", flights > 1 ? "compare" : "report", good, files, (line) => {
-    if (!line.startsWith("{")) return;
-    const { page, log, system, html } = JSON.parse(line);
-    if (log != null) {
-      const own = logs.filter(({ told }) => told.log === log);
-      const of = own.length === 1 ? own[0] : own.find(({ told }) => told.vehicle?.system === system);
-      if (of) pageButtons(of.buttons, "Report", { page, html, title: log });
-    } else if (page !== "index.html") pageButtons(beside, "Flights side by side", { page, html, title: "Flights side by side" });
-  });
-  if (isOld()) return;
-  // Exit codes 1 and 2: an input or a request that the program refused.
-  const early = reported.why ?? ([1, 2].includes(reported.code) ? "see the remarks" : null);
-  idle(early ? `The reports ended early: ${early}.` : `${plural(new Set(logs.map(({ told }) => told.log)).size, "log")} checked.`);
+  // A run each for a file, for all cards together, whose sessions are compared, and for the flights side by side.
+  const runs = new Map();
+  const page = async (log, command, files) => {
+    const key = command.join("\n");
+    if (!runs.has(key)) runs.set(key, pagesOf(command, files, end));
+    const made = await runs.get(key);
+    // It may be tried again.
+    if (!made) runs.delete(key);
+    return made?.get(log);
+  };
+  if (read.reduce((sum, { told }) => sum + told.flights.length, 0) > 1)
+    pageButtons(beside, "Flights side by side", "Flights side by side", () => page(null, ["compare", ...good], files));
+  for (const { line, told, buttons, heading } of read) {
+    const isOfSeveral = read.filter((other) => other.told.log === told.log).length > 1;
+    const system = isOfSeveral ? String(told.vehicle.system) : "-";
+    const name = isOfSeveral ? `${told.log}, system ${system}` : told.log;
+    heading.lastChild.textContent = ` ${name}`;
+    const file = told.format === "hums" ? null : given.find(({ path }) => path === told.log);
+    const [own, of] = file ? [[told.log], [file]] : [good, files];
+    const use = pageButtons(buttons, "Report", `Report of ${name}`, () => page(told.log, ["report", system, ...own], of));
+    const saved = `${name.replace(/[^\w.-]+/g, "_")}.json`;
+    buttons.append(button("Save findings", () => save(saved, `${line}\n`, "application/json")));
+    if (read.length === 1) use((page) => show(`Report of ${name}`, page));
+  }
 };
 
 // ---- Dropping: files, and folders with all that is in them.

@@ -271,7 +271,7 @@ const reason = (error, remarks) => {
   return `the program stopped (${error.message}); the program hums may read more, and a report of this fault helps`;
 };
 
-self.onmessage = async ({ data: { module, command, inputs, files } }) => {
+self.onmessage = async ({ data: { module, command, files } }) => {
   const remarks = [];
   const say = (message) => {
     if (message.kind === "remark") remarks.push(message.line);
@@ -280,7 +280,7 @@ self.onmessage = async ({ data: { module, command, inputs, files } }) => {
   let why = null,
     code = null;
   try {
-    const { imports, attach } = system(files, ["hums", command, ...inputs], say);
+    const { imports, attach } = system(files, ["hums", ...command], say);
     const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: imports });
     attach(instance.exports.memory);
     instance.exports._start();
