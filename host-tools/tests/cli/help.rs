@@ -19,6 +19,30 @@ const SERVES: &str = "live";
 /// Examples that need a firmware image (`tests/chip` runs one) or a board (`tests/sim/companion.rs` simulates one).
 const ELSEWHERE: [&str; 2] = ["--firmware", "box "];
 
+/// The files of the documents' examples.
+const DOCUMENTED: [(&str, &str); 2] = [
+    ("flight.tlog", "tests/flights/ap_quad_faults.tlog"),
+    ("f12.bin", "tests/labelled/bin/f12_gps_jump.bin.gz"),
+];
+
+/// `$ hums ...`, and the beginning of its answer.
+#[test]
+fn the_documents_show_what_the_program_prints() {
+    let (dir, root) =
+        (tempfile::tempdir().expect("directory"), Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
+    for (name, from) in DOCUMENTED {
+        fs::copy(root.join(from), dir.path().join(name)).expect("a copy");
+    }
+    for document in ["README.md", "docs/check.md"] {
+        let words = fs::read_to_string(root.join(document)).expect("a document");
+        let (_, example) = words.split_once("\n$ hums ").expect("an example");
+        let (arguments, shown) = example.split_once('\n').expect("its answer");
+        let (shown, _) = shown.split_once("```").expect("its end");
+        let printed = text(&run(dir.path(), arguments, 4));
+        assert!(printed.starts_with(shown), "{document}: hums {arguments} prints\n{printed}");
+    }
+}
+
 fn examples(help: &str) -> Vec<String> {
     let lines = help.lines().filter_map(|line| line.strip_prefix("  hums "));
     let plain = |line: &str| {
