@@ -230,7 +230,9 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
     let names: Vec<String> = ["a.tlog", "b.bin.gz", "c.ulg.gz", "card.img"].map(str::to_owned).into();
     let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     page.check("#files", &paths);
-    hums_in(&folder, &["report", "-o", "../pages/"], &names).expect_code(&[0, 3]);
+    for name in &names {
+        hums_in(&folder, &["report", "-o", "../pages/"], std::slice::from_ref(name)).expect_code(&[0, 3]);
+    }
     hums_in(&folder, &["report", "--compare", "-o", "../pages/flights.html"], &names).expect_code(&[0, 3]);
     let pages = page.dir.path().join("pages");
     let mut saved = page.save("Save report", names.len());
@@ -339,15 +341,15 @@ fn large(folder: &Path, name: &str, bytes: usize) -> PathBuf {
 const MB: usize = 1_000_000;
 
 #[test]
-fn a_log_ten_times_as_large_takes_no_more_memory() {
+fn a_log_twenty_times_as_large_takes_no_more_memory() {
     let mut page = Page::open(1280);
-    let [small, large] = [5, 50].map(|mb| large(page.dir.path(), &format!("{mb}.tlog"), mb * MB));
+    let [small, large] = [5, 100].map(|mb| large(page.dir.path(), &format!("{mb}.tlog"), mb * MB));
     let [small, large] = [small, large].map(|log| {
         page.check("#files", &[log]);
         page.shown.peak_bytes()
     });
     let more = large - small;
-    assert!(more < 25 * MB as u64, "{small} bytes for 5 MB, {more} more for 50 MB");
+    assert!(more < 60 * MB as u64, "{small} bytes for 5 MB, {more} more for 100 MB");
 }
 
 #[test]

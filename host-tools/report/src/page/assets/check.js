@@ -288,6 +288,7 @@ addEventListener("drop", async (event) => {
   event.preventDefault();
   const items = [...event.dataTransfer.items].filter(({ kind }) => kind === "file").map(dropped);
   cancel("Listing what was dropped.");
+  root.dataset.state = "busy";
   const mine = turn;
   const ended = await Promise.allSettled(items);
   if (mine !== turn) return;
