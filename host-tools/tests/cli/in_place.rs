@@ -186,7 +186,7 @@ fn a_store_beside_recordings_is_named_and_is_no_loss() {
     {
         let ended = run(dir.path(), line, 0);
         let said = String::from_utf8_lossy(&ended.stderr);
-        assert!(said.contains("store.bin: is the memory of a simulated board (--store)"), "{line}: {said}");
+        assert!(said.contains("store.bin: is the memory of a simulated board, and"), "{line}: {said}");
     }
     let said = run(dir.path(), "check store.bin", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("is the memory of a simulated board"));

@@ -68,6 +68,12 @@ pub struct Request<'a> {
     pub json: bool,
 }
 
+impl Request<'_> {
+    const fn mention(&self) -> NotJudged {
+        if self.verbose { NotJudged::Listed } else { NotJudged::Counted(" (-v lists them)") }
+    }
+}
+
 /// Runs `hums check`.
 pub fn run(args: &Request<'_>) -> Result<Outcome> {
     run_showing(args, |_| Ok(()))
@@ -82,7 +88,6 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     found.tell();
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() > 1 && wanted.is_none();
-    let mention = if args.verbose { NotJudged::Listed } else { NotJudged::Counted(" (-v lists them)") };
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = EndResolver::new(sessions_of(&found.places));
     // The next log shows how this one ends.
@@ -99,7 +104,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
                 table.add(&checked);
                 text::line(&checked)
             } else {
-                text::screen(&checked, mention)
+                text::screen(&checked, args.mention())
             };
             bar.suspend(|| {
                 checked.aside().iter().chain(&checked.faults()).for_each(|why| note!("{name}: {why}"));
@@ -123,9 +128,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
         &found.places,
         |place| {
             let told = told(&past, place, !many);
-            let checked = told.checked.as_ref().ok();
-            let vehicles =
-                checked.map_or_else(Vec::new, |checked| vehicles(place, checked.format, &checked.judged));
+            let vehicles = told.vehicles(place);
             if vehicles.is_empty() {
                 return vec![told];
             }
@@ -204,6 +207,14 @@ struct Told {
     name: String,
     of: String,
     checked: Result<Checked>,
+}
+
+impl Told {
+    /// `place` is its recording.
+    fn vehicles(&self, place: &Place) -> Vec<Place> {
+        let checked = self.checked.as_ref().ok();
+        checked.map_or_else(Vec::new, |checked| vehicles(place, checked.format, &checked.judged))
+    }
 }
 
 impl HasEnding for Told {

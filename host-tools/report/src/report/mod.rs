@@ -371,7 +371,7 @@ impl Making<'_> {
 
 /// The name of a vehicle's page, if its recording has several.
 fn of_vehicle(name: String, system: Option<u8>) -> String {
-    system.map_or(name.clone(), |system| format!("{name}-system{system}"))
+    if let Some(system) = system { format!("{name}-system{system}") } else { name }
 }
 
 fn file_name(path: &Path) -> String {

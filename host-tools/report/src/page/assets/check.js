@@ -225,7 +225,8 @@ const start = async (items, unread = []) => {
   idle(end);
   const failed = new Set(logs.filter(({ told }) => told.error).map(({ told }) => told.log));
   const good = inputs.filter((input) => !failed.has(input));
-  const files = given.filter(({ path }) => !failed.has(path) && good.includes(path.split("/")[0]));
+  const filesOf = (some) => given.filter(({ path }) => !failed.has(path) && some.includes(path.split("/")[0]));
+  const cards = good.filter((input) => !read.some(({ told }) => told.log === input && told.format !== "hums"));
   // A run each for a file, for all cards together, whose sessions are compared, and for the flights side by side.
   const runs = new Map();
   const page = async (log, command, files) => {
@@ -237,14 +238,14 @@ const start = async (items, unread = []) => {
     return made?.get(log);
   };
   if (read.reduce((sum, { told }) => sum + told.flights.length, 0) > 1)
-    pageButtons(beside, "Flights side by side", "Flights side by side", () => page(null, ["compare", ...good], files));
+    pageButtons(beside, "Flights side by side", "Flights side by side", () => page(null, ["compare", ...good], filesOf(good)));
   for (const { line, told, buttons, heading } of read) {
     const isOfSeveral = read.filter((other) => other.told.log === told.log).length > 1;
     const system = isOfSeveral ? String(told.vehicle.system) : "-";
     const name = isOfSeveral ? `${told.log}, system ${system}` : told.log;
     heading.lastChild.textContent = ` ${name}`;
     const file = told.format === "hums" ? null : given.find(({ path }) => path === told.log);
-    const [own, of] = file ? [[told.log], [file]] : [good, files];
+    const [own, of] = file ? [[told.log], [file]] : [cards, filesOf(cards)];
     const use = pageButtons(buttons, "Report", `Report of ${name}`, () => page(told.log, ["report", system, ...own], of));
     const saved = `${name.replace(/[^\w.-]+/g, "_")}.json`;
     buttons.append(button("Save findings", () => save(saved, `${line}\n`, "application/json")));
