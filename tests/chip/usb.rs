@@ -16,6 +16,10 @@ use super::bench;
 
 /// `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`
 const RESTART: u16 = 246;
+/// `base_mode` of a heartbeat.
+const DISARMED: u8 = 0x51;
+/// The same with `MAV_MODE_FLAG_SAFETY_ARMED`.
+const ARMED: u8 = 0xD1;
 /// In kB/s. The first guess of a person's patience: an hour's log in a minute and a half.
 const READ_KBPS_MIN: u64 = 600;
 
@@ -119,8 +123,6 @@ fn the_card_reader_shows_the_card_as_it_is_and_the_board_records_after_the_eject
 
 #[test]
 fn no_cable_and_no_other_command_stops_a_record() {
-    /// `MAV_MODE_FLAG_SAFETY_ARMED`, with the flags of a disarmed heartbeat.
-    const ARMED: u8 = 0xD1;
     let mut rig = on_the_ground();
     let resets = rig.machine.resets.len();
     let answers = use_host(&mut rig, 10 * SECOND, |bus| {
@@ -311,6 +313,61 @@ fn a_configuration_begins_anew_without_a_reset() {
         ensure!(disk.read(0, 1)?.data == first, "configured again");
         Ok(())
     });
+}
+
+/// Two seconds of heartbeats.
+fn heartbeats(rig: &mut Rig, base_mode: u8) {
+    for second in 0..2 {
+        let now = rig.machine.now();
+        let beat = heartbeat_in(base_mode, 100 + second);
+        rig.machine.send(usart(&rig.wired.autopilot), &beat, now, 921_600.0);
+        rig.run(now + SECOND, false).unwrap();
+    }
+}
+
+#[test]
+fn an_arming_ends_the_card_reader_and_the_board_records() {
+    let (mut rig, resets) = reading();
+    use_host(&mut rig, 60 * SECOND, |bus| Disk::attach(bus)?.blocks());
+    let (changes, now) = (rig.led.len(), rig.machine.now());
+    rig.run(now + 2 * SECOND, false).unwrap();
+    assert!(rig.led.len() == changes && rig.led.last().is_some_and(|(_, lit)| *lit), "the LED is not lit");
+    let before = rig.sessions().len();
+    heartbeats(&mut rig, DISARMED);
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+    let (now, sent) = (rig.machine.now(), rig.sent.len());
+    heartbeats(&mut rig, ARMED);
+    let armed = rig.machine.now();
+    rig.run(armed + 3 * SECOND, true).unwrap();
+    rig.run(armed + 5 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets + 1, "{:?}", rig.machine.resets);
+    assert_eq!(rig.machine.resets[resets].1, Cause::Software);
+    assert!(rig.machine.resets[resets].0 < now + 1_100 * MS, "late: {:?}", rig.machine.resets);
+    assert_eq!(rig.sessions().len(), before + 1);
+    let frames = rig.sessions().pop().unwrap().frames;
+    assert_eq!(frames.len(), rig.sent.len() - sent, "the board recorded late");
+}
+
+#[test]
+fn a_fault_of_the_card_reader_is_recorded_as_one_of_it() {
+    /// `udf #0`
+    const UNDEFINED: [u8; 2] = [0x00, 0xDE];
+    let (mut rig, resets) = reading();
+    let (host, thread) = host(|bus| bus.enumerate());
+    rig.machine.plug(host);
+    let address = rig.replace("OTG_FS", &UNDEFINED, false).unwrap();
+    drop(thread);
+    assert_eq!(rig.machine.resets.len(), resets + 1, "{:?}", rig.machine.resets);
+    rig.machine.unplug();
+    let now = rig.machine.now();
+    rig.run(now + 4 * SECOND, true).unwrap();
+    rig.run(now + 6 * SECOND, false).unwrap();
+    let texts = rig.sessions().pop().unwrap().texts;
+    let fault = format!("fault: processor fault in interrupt at pc {address:08x}");
+    assert!(texts.contains(&fault), "{texts:?}");
+    let note = texts.iter().find(|text| text.contains("restart at"));
+    let note = note.unwrap_or_else(|| panic!("no note in {texts:?}"));
+    assert!(note.starts_with("card reader: restart at ") && note.ends_with("last messages:"), "{note}");
 }
 
 /// Any actions of a host, without sense.

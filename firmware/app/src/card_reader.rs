@@ -1,9 +1,9 @@
 //! Card-reader mode: the card as a read-only USB disk. Nothing is recorded.
 //!
 //! A station's command ends the log, leaves a mark in memory that survives a reset, and resets the board. So
-//! no task of a recording runs beside USB, and its memory and stack are free. A fault, the watchdog, an eject
-//! or ten minutes without a host end the mode by a reset. Only the start after an eject counts as one by
-//! hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
+//! no task of a recording runs beside USB, and its memory and stack are free. An armed vehicle, a fault, the
+//! watchdog, an eject or ten minutes without a host end the mode by a reset. Only the start after an eject counts
+//! as one by hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
 //!
 //! One loop without an executor polls the USB stack and the disk. The card's driver blocks it for 8 s at
 //! most; [`watch`] feeds the watchdog meanwhile.
@@ -15,7 +15,7 @@ use core::task::Poll;
 use embassy_futures::block_on;
 use embassy_futures::select::{Either3, select3};
 use hums_core::clock::{Instant, Span};
-use hums_onboard::ResetCause;
+use hums_onboard::{ArmingWatch, ResetCause};
 use hums_recorder::Block;
 use hums_usb::class::{Control, MassStorage};
 use hums_usb::guard::{Guarded, Link, Port};
@@ -25,13 +25,15 @@ use hums_usb::{Builder, Config, PACKET_BYTES};
 
 use crate::boards::board;
 use crate::links::now;
-use crate::watch;
+use crate::{fault, watch};
 
 const HOST_MAX: Span = Span::from_secs(600);
 /// After an eject the host still fetches its status.
 const PARTING: Span = Span::from_secs(1);
 /// `SysTick` feeds the watchdog for this many turns without the loop: 10 s, of which the card's driver has 8.
 const LOOP_TURNS_MAX: u32 = 100;
+/// How often the autopilot's port is looked at: its ring holds 22 ms. After a longer call of the card's driver its bytes are lost.
+const LISTEN_EVERY: Span = Span::from_millis(1);
 /// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
 const LOOK_EVERY: Span = Span::from_millis(100);
 
@@ -57,16 +59,27 @@ pub(crate) fn cause(reset: ResetCause) -> ResetCause {
     reset.with_mark(MARK.swap(0, Ordering::Relaxed))
 }
 
+/// The autopilot's port, and its rate.
+pub(crate) struct Autopilot {
+    pub(crate) port: (board::PortRx, board::PortTx),
+    pub(crate) baud: u32,
+}
+
 /// The mode, until the board restarts. `buffer` is for blocks on their way.
 #[inline(never)]
 pub(crate) fn run(
     card: board::Card,
     usb: board::Usb,
     led: board::Led,
+    autopilot: Autopilot,
     id: [u8; 12],
     buffer: &mut [Block],
 ) -> ! {
     watch::allow(LOOP_TURNS_MAX);
+    fault::begin(true);
+    let Autopilot { port: (autopilot, mut sender), baud } = autopilot;
+    // Nothing was sent: it does not wait.
+    block_on(sender.set_baud(baud));
     let link = Link::new();
     let serial = digits(id);
     let mut disk = Disk::new(card, serial);
@@ -97,22 +110,33 @@ pub(crate) fn run(
         let end = now() + PARTING;
         poll_fn(|_| if now() < end { Poll::Pending } else { Poll::Ready(()) }).await;
     };
-    let end = block_on(select3(device.run(), serve, supervise(led, &link)));
+    let end = block_on(select3(device.run(), serve, supervise(led, autopilot, &link)));
     // Only an eject proves a cable. A vehicle without one may have been armed since the mode began.
     restart_with(if matches!(end, Either3::Second(())) { ResetCause::MARK_EJECT } else { 0 })
 }
 
-async fn supervise(mut led: board::Led, link: &Link) {
+/// Until the mode ends by itself: the vehicle is armed, or no host is there.
+async fn supervise(mut led: board::Led, mut autopilot: board::PortRx, link: &Link) {
     let (mut presence, mut looked) = (Presence::new(now()), Instant::ZERO);
+    let (mut arming, mut listened) = (ArmingWatch::new(), Instant::ZERO);
     poll_fn(|_| {
         watch::fed();
         let now = now();
+        if now.since(listened) >= LISTEN_EVERY {
+            listened = now;
+            match autopilot.look(arming.room()) {
+                Ok(count) => arming.received(count),
+                Err(_overrun) => arming.lost(),
+            }
+        }
         if now.since(looked) >= LOOK_EVERY {
             looked = now;
             led.set(true);
+            fault::tick(now);
             presence.look(now, link.is_configured(), board::frame_number());
         }
-        if presence.absent(now) < HOST_MAX { Poll::Pending } else { Poll::Ready(()) }
+        let is_over = arming.is_armed() || presence.absent(now) >= HOST_MAX;
+        if is_over { Poll::Ready(()) } else { Poll::Pending }
     })
     .await;
 }

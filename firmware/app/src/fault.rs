@@ -60,6 +60,8 @@ static NOTE: Note = Note {
 
 /// The last messages of the autopilot: which, and when in milliseconds since the start.
 struct Seen {
+    /// [`MARK`] in card-reader mode.
+    card_reader: AtomicU32,
     now_ms: AtomicU32,
     next: AtomicU32,
     messages: [(AtomicU32, AtomicU32); SEEN],
@@ -67,6 +69,7 @@ struct Seen {
 
 #[unsafe(link_section = ".uninit.seen")]
 static LAST_SEEN: Seen = Seen {
+    card_reader: AtomicU32::new(0),
     now_ms: AtomicU32::new(0),
     next: AtomicU32::new(0),
     messages: [const { (AtomicU32::new(0), AtomicU32::new(0)) }; SEEN],
@@ -132,7 +135,8 @@ pub(crate) fn take() -> Option<Fault> {
 }
 
 /// Forgets the messages that came before this start: after [`take`], and before the first [`seen`].
-pub(crate) fn begin() {
+pub(crate) fn begin(card_reader: bool) {
+    LAST_SEEN.card_reader.store(if card_reader { MARK } else { 0 }, Ordering::Relaxed);
     LAST_SEEN.now_ms.store(0, Ordering::Relaxed);
     for (_, id) in &LAST_SEEN.messages {
         id.store(NOTHING, Ordering::Relaxed);
@@ -161,6 +165,9 @@ impl Seen {
         let mut text = String::new();
         let at_ms = NOTE.at_ms.load(Ordering::Relaxed);
         let next = self.next.load(Ordering::Relaxed) as usize;
+        if self.card_reader.load(Ordering::Relaxed) == MARK {
+            let _ = text.push_str("card reader: ");
+        }
         // The text is cut if full, so the newest come first.
         let _ = write!(text, "restart at {at_ms} ms; last messages:");
         for back in 1..=SEEN {

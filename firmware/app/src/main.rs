@@ -28,7 +28,7 @@ mod watch;
 use hums_blackbox::Writer;
 use hums_blackbox::record::{Before, Boot};
 use hums_core::Monitor;
-use hums_core::params::Params;
+use hums_core::params::{Param, Params};
 use hums_onboard::persist::mailbox::MailboxOut;
 use hums_onboard::queues::{Ends, Queues};
 use hums_onboard::{Handover, Mailbox, Monitoring, ResetCause, StoreWriter};
@@ -67,19 +67,6 @@ fn start() -> board::Idle {
     parts.boot.cause = card_reader::cause(parts.boot.cause);
     log::log!(info, "start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
 
-    let is_button = parts.button && !parts.boot.cause.may_be_in_flight();
-    if parts.boot.cause == ResetCause::CardReader || is_button {
-        // Ports stay as they are: nothing reads them.
-        core::mem::forget((parts.autopilot, parts.gs));
-        card_reader::run(
-            parts.card,
-            parts.usb,
-            parts.led,
-            parts.boot.id,
-            tasks::storage::BUFFERS.take().blocks(),
-        );
-    }
-
     let queues = QUEUES.take().split();
     let Ends { frames_in, frames_out, sectors_in, sectors_out, gs_in, gs_out, .. } = queues;
     let identity = Boot {
@@ -95,6 +82,23 @@ fn start() -> board::Idle {
     let monitor = Monitor::begin(MONITOR.uninit(), &Params::defaults());
     let (items_in, items_out) = MAILBOX.take().split();
     let store_writer = restore(parts.store, items_out, parts.boot.cause, monitor);
+    let is_button = parts.button && !parts.boot.cause.may_be_in_flight();
+    if parts.boot.cause == ResetCause::CardReader || is_button {
+        // Nothing reads the radio's port.
+        core::mem::forget(parts.gs);
+        let autopilot = card_reader::Autopilot {
+            port: parts.autopilot,
+            baud: monitor.params().get(Param::ApBaud) as u32,
+        };
+        card_reader::run(
+            parts.card,
+            parts.usb,
+            parts.led,
+            autopilot,
+            parts.boot.id,
+            tasks::storage::BUFFERS.take().blocks(),
+        );
+    }
     let entropy = parts.boot.entropy.unwrap_or_else(|| counted(store_writer.mounts(), &identity));
     let handover = HANDOVER.init_with(|| Handover::new(items_in, &status::STORE_STATUS, monitor));
     let monitoring = monitoring(monitor, identity, parts.boot.cause);

@@ -10,6 +10,7 @@
 //! [`queues`] has all queues, their capacities, and their behaviour when full.
 #![cfg_attr(not(test), no_std)]
 
+mod arming;
 mod companion;
 mod journal;
 mod loss;
@@ -27,6 +28,7 @@ pub mod supervisor;
 pub mod uplink;
 pub mod wait;
 
+pub use arming::ArmingWatch;
 pub use monitoring::Monitoring;
 pub use persist::{Handover, Mailbox, StoreStatus, StoreWriter};
 pub use port::PortStatus;

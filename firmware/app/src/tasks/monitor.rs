@@ -146,7 +146,7 @@ fn save(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) -> boo
 #[inline(never)]
 fn tell_fault(body: &mut Monitoring<'static>, ends: &mut Ends, cause: ResetCause) {
     let noted = fault::take();
-    fault::begin();
+    fault::begin(false);
     let unnoted = noted.is_none() && cause == ResetCause::Watchdog;
     if let Some(fault) = noted.or_else(|| unnoted.then(Fault::without_note)) {
         body.fault(now(), &fault.record(), fault.last_messages(), &mut ends.sectors);

@@ -97,18 +97,26 @@ impl PortRx {
             if !self.is_behind {
                 Timer::at(self.looked + self.fetch_every).await;
             }
-            let now = Instant::now();
-            let blind = now - self.looked;
-            self.looked = now;
-            let read = self.ring.read(buffer);
-            self.is_behind = read.as_ref().is_ok_and(|(count, _)| *count == buffer.len());
-            match read {
-                Ok((0, _)) => {}
-                Ok((count, _)) if blind < self.holds() => return Ok(count),
-                Ok(_) | Err(_) => {
-                    self.ring.clear();
-                    return Err(Overrun { blind_ms: blind.as_millis() as u32 });
-                }
+            match self.look(buffer) {
+                Ok(0) => {}
+                received => return received,
+            }
+        }
+    }
+
+    /// The bytes that have come, at most as many as fit, without waiting for one. To be called once in the ring's time.
+    pub(crate) fn look(&mut self, buffer: &mut [u8]) -> Result<usize, Overrun> {
+        let now = Instant::now();
+        let blind = now - self.looked;
+        self.looked = now;
+        let read = self.ring.read(buffer);
+        self.is_behind = read.as_ref().is_ok_and(|(count, _)| *count == buffer.len());
+        match read {
+            Ok((0, _)) => Ok(0),
+            Ok((count, _)) if blind < self.holds() => Ok(count),
+            Ok(_) | Err(_) => {
+                self.ring.clear();
+                Err(Overrun { blind_ms: blind.as_millis() as u32 })
             }
         }
     }
