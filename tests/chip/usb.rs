@@ -1,12 +1,14 @@
-//! Card-reader mode: a USB host at the board's plug, from the command to the next record.
+//! A USB host at the board's plug: the serial port while it records, and card-reader mode from the command to the next record.
 
 use anyhow::{Result, ensure};
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
+use hums_link::frame::Frame;
+use hums_link::framer::Framer;
 use hums_link::messages;
 use hums_sdcard::{Event, Kind, Model};
-use hums_tests::chip::rig::{Rig, heartbeat, heartbeat_in};
+use hums_tests::chip::rig::{Rig, frame, heartbeat, heartbeat_in, set};
 use hums_tests::chip::usart;
-use hums_tests::chip::usb::{Bus, Disk, host};
+use hums_tests::chip::usb::{Bus, Disk, Serial, host};
 use stm32f405_model::machine::Board;
 use stm32f405_model::otg::{Action, Reply};
 use stm32f405_model::rcc::Cause;
@@ -20,6 +22,9 @@ const RESTART: u16 = 246;
 const DISARMED: u8 = 0x51;
 /// The same with `MAV_MODE_FLAG_SAFETY_ARMED`.
 const ARMED: u8 = 0xD1;
+/// Urgencies that serve the USB port: exception (16 and the interrupt's number), and limit of the stack as in `budgets.toml`.
+const STACKS: [(&str, u16, u32); 3] =
+    [("monitor", 16 + 20, 5_344), ("downlink", 16 + 21, 1_360), ("USB", 16 + 67, 1_360)];
 /// In kB/s. The first guess of a person's patience: an hour's log in a minute and a half.
 const READ_KBPS_MIN: u64 = 600;
 
@@ -63,12 +68,22 @@ fn use_host<T: Send + 'static>(
     limit: Ps,
     program: impl FnOnce(&mut Bus) -> Result<T> + Send + 'static,
 ) -> T {
+    use_host_while(rig, limit, false, program)
+}
+
+/// `busy`: the autopilot's line is full of frames.
+fn use_host_while<T: Send + 'static>(
+    rig: &mut Rig,
+    limit: Ps,
+    busy: bool,
+    program: impl FnOnce(&mut Bus) -> Result<T> + Send + 'static,
+) -> T {
     let (host, thread) = host(program);
     let end = rig.machine.now() + limit;
     rig.machine.plug(host);
     while !thread.is_finished() {
         assert!(rig.machine.now() < end, "the host is not done");
-        rig.run(rig.machine.now() + 10 * MS, false).unwrap();
+        rig.run(rig.machine.now() + 10 * MS, busy).unwrap();
     }
     thread.join().unwrap().unwrap_or_else(|why| panic!("at {} ms: {why:#}", rig.machine.ms()))
 }
@@ -121,16 +136,123 @@ fn the_card_reader_shows_the_card_as_it_is_and_the_board_records_after_the_eject
     assert!(rig.slot.violations().is_empty(), "{:?}", rig.slot.violations());
 }
 
+type Told = (u32, u8, u8, Vec<u8>);
+
+/// Message, sequence, component and payload of each frame.
+fn told(bytes: &[u8]) -> Vec<Told> {
+    let mut told = Vec::new();
+    let mut framer = Framer::new();
+    let mut take = |frame: Frame<'_>| {
+        told.push((frame.id(), frame.sequence(), frame.component(), frame.payload().to_vec()));
+    };
+    framer.push(bytes, &mut take);
+    framer.idle(&mut take);
+    told
+}
+
+fn ours(told: &[Told]) -> impl Iterator<Item = &Told> {
+    told.iter().filter(|(_, _, component, _)| *component == COMPONENT)
+}
+
+/// Two seconds of a serial port: the vehicle and the box are heard, and no frame is missing.
+fn hears_all(serial: &mut Serial<'_>) -> Result<Vec<Told>> {
+    let told = told(&serial.listen(2 * SECOND)?);
+    let has = |id: u32, component: u8| told.iter().any(|one| (one.0, one.2) == (id, component));
+    ensure!(has(0, 1) && has(0, COMPONENT) && has(30, 1) && has(251, COMPONENT), "{told:?}");
+    let numbers: Vec<u8> = ours(&told).map(|one| one.1).collect();
+    ensure!(
+        numbers.windows(2).all(|two| two[1] == two[0].wrapping_add(1)),
+        "frames are missing: {numbers:?}"
+    );
+    Ok(told)
+}
+
+/// The answers to a request within a second.
+fn answers_to(serial: &mut Serial<'_>, request: &[u8]) -> Result<Vec<Told>> {
+    serial.send(request)?;
+    Ok(told(&serial.listen(SECOND)?))
+}
+
+/// A parameter set, and logs listed.
+fn asks(serial: &mut Serial<'_>, budget: f32) -> Result<()> {
+    let answers = answers_to(serial, &set("GS_BUDGET", budget, 1))?;
+    let is_value = |one: &&Told| one.0 == 22 && one.3.starts_with(&budget.to_le_bytes());
+    ensure!(ours(&answers).any(|one| is_value(&one)), "no PARAM_VALUE: {answers:?}");
+    let list = frame(117, &[0, 0, 0xFF, 0xFF, 1, COMPONENT], 128, 2);
+    let answers = answers_to(serial, &list)?;
+    ensure!(ours(&answers).any(|one| one.0 == 118), "no LOG_ENTRY: {answers:?}");
+    Ok(())
+}
+
+#[test]
+fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let now = rig.machine.now();
+    rig.run(now + SECOND, false).unwrap();
+    rig.run(now + 3 * SECOND, true).unwrap();
+    let resets = rig.machine.resets.len();
+    use_host_while(&mut rig, 60 * SECOND, true, |bus| {
+        let serial = &mut Serial::attach(bus)?;
+        hears_all(serial)?;
+        asks(serial, 4_000.0)?;
+        // All parameters: more than the queue holds.
+        let answers = answers_to(serial, &frame(21, &[1, COMPONENT], 159, 3))?;
+        ensure!(ours(&answers).filter(|one| one.0 == 22).count() > 100, "{} parameters", answers.len());
+        // The program stops reading, then reads on.
+        serial.bus.act(Action::Wait(3 * SECOND))?;
+        serial.listen(100 * MS)?;
+        serial.bus.act(Action::Wait(20 * MS))?;
+        serial.listen(2 * SECOND)?;
+        hears_all(serial)?;
+        for kind in [0x00, 0x01, 0x02, 0x03, 0x20, 0x21, 0x22, 0x40, 0x41, 0x5F] {
+            for request in [0, 2, 7, 11, 0x20, 0x21, 0x22, 0x23, 0xFD, 0xFE] {
+                serial.bus.control(kind, request, 0xFFFF, 0xFFFF)?;
+                serial.bus.control_in(kind, request, 0xFFFF, 0, 64)?;
+            }
+        }
+        // Line codings of all lengths, and a transfer that is given up.
+        for length in [0, 1, 6, 7, 8, 64, 65] {
+            serial.bus.setup(0x21, 0x20, 0, 0, length)?;
+        }
+        let mut state = 1_u64;
+        any_actions(serial.bus, |below| next(&mut state) % below, 60)?;
+        let serial = &mut Serial::attach(serial.bus)?;
+        serial.send(&[0xFD; 500])?;
+        hears_all(serial)?;
+        asks(serial, 4_500.0)
+    });
+    // Pulled in the middle of the stream, and plugged in again.
+    rig.machine.unplug();
+    let now = rig.machine.now();
+    rig.run(now + 2 * SECOND, true).unwrap();
+    use_host_while(&mut rig, 60 * SECOND, true, |bus| {
+        let serial = &mut Serial::attach(bus)?;
+        hears_all(serial)?;
+        asks(serial, 5_000.0)
+    });
+    let now = rig.machine.now();
+    rig.run(now + 2 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+    let compared = rig.compared();
+    assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
+    let losses: Vec<_> = rig.sessions().into_iter().flat_map(|session| session.losses).collect();
+    assert!(losses.is_empty(), "{losses:?}");
+    // Also with a host, which `cargo xtask costs` does not have.
+    for (name, exception, limit) in STACKS {
+        let depth = rig.machine.core.stack_depth(exception);
+        println!("{name}: {depth} bytes of stack");
+        assert!(depth <= limit, "{name}: {depth} bytes of stack");
+    }
+}
+
 #[test]
 fn no_cable_and_no_other_command_stops_a_record() {
     let mut rig = on_the_ground();
     let resets = rig.machine.resets.len();
-    let answers = use_host(&mut rig, 10 * SECOND, |bus| {
-        bus.act(Action::Wait(SECOND))?;
-        bus.act(Action::Reset)?;
-        bus.act(Action::Setup(0, [0x80, 6, 0, 1, 0, 0, 18, 0]))
+    use_host(&mut rig, 10 * SECOND, |bus| {
+        Serial::attach(bus)?;
+        Ok(())
     });
-    assert_eq!(answers, Reply::Nothing);
     command(&mut rig, 1.0);
     let now = rig.machine.now();
     rig.run(now + SECOND, false).unwrap();
@@ -370,6 +492,12 @@ fn a_fault_of_the_card_reader_is_recorded_as_one_of_it() {
     assert!(note.starts_with("card reader: restart at ") && note.ends_with("last messages:"), "{note}");
 }
 
+/// Constants: Knuth, MMIX.
+fn next(state: &mut u64) -> u64 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *state >> 33
+}
+
 /// Any actions of a host, without sense.
 fn any_actions(bus: &mut Bus, mut random: impl FnMut(u64) -> u64, count: u32) -> Result<()> {
     for _ in 0..count {
@@ -406,12 +534,7 @@ fn after_any_actions_of_a_host_the_disk_can_be_attached() {
         for seed in 1..=4_u64 {
             println!("seed {seed}");
             let mut state = seed;
-            let random = move |below: u64| {
-                // Constants: Knuth, MMIX.
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 33) % below
-            };
-            any_actions(bus, random, 60)?;
+            any_actions(bus, |below| next(&mut state) % below, 60)?;
             let begun = bus.now;
             ensure!(Disk::attach(bus)?.read(0, 1)?.data == first, "seed {seed}");
             ensure!(bus.now - begun < 2 * SECOND, "seed {seed}: after {} ms", (bus.now - begun) / MS);

@@ -1,7 +1,7 @@
 //! Card-reader mode: the card as a read-only USB disk. Nothing is recorded.
 //!
 //! A station's command ends the log, leaves a mark in memory that survives a reset, and resets the board. So
-//! no task of a recording runs beside USB, and its memory and stack are free. An armed vehicle, a fault, the
+//! no task of a recording runs beside the disk, and its memory and stack are free. An armed vehicle, a fault, the
 //! watchdog, an eject or ten minutes without a host end the mode by a reset. Only the start after an eject counts
 //! as one by hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
 //!
@@ -17,14 +17,15 @@ use embassy_futures::select::{Either3, select3};
 use hums_core::clock::{Instant, Span};
 use hums_onboard::{ArmingWatch, ResetCause};
 use hums_recorder::Block;
+use hums_usb::Builder;
 use hums_usb::class::{Control, MassStorage};
-use hums_usb::guard::{Guarded, Link, Port};
+use hums_usb::guard::Link;
 use hums_usb::presence::Presence;
-use hums_usb::scsi::{Disk, SERIAL_BYTES};
-use hums_usb::{Builder, Config, PACKET_BYTES};
+use hums_usb::scsi::Disk;
 
 use crate::boards::board;
 use crate::links::now;
+use crate::usb::{self, Identity, Packets};
 use crate::{fault, watch};
 
 const HOST_MAX: Span = Span::from_secs(600);
@@ -37,9 +38,7 @@ const LISTEN_EVERY: Span = Span::from_millis(1);
 /// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
 const LOOK_EVERY: Span = Span::from_millis(100);
 
-/// The test number of pid.codes: the project has none of its own.
-const VENDOR: u16 = 0x1209;
-const PRODUCT: u16 = 0x0001;
+const IDENTITY: Identity = Identity { product: 1, name: "HUMS card reader" };
 
 /// Mark of a restart by this module, for the next start.
 #[unsafe(link_section = ".uninit.card_reader")]
@@ -69,7 +68,7 @@ pub(crate) struct Autopilot {
 #[inline(never)]
 pub(crate) fn run(
     card: board::Card,
-    usb: board::Usb,
+    plug: board::Usb,
     led: board::Led,
     autopilot: Autopilot,
     id: [u8; 12],
@@ -81,25 +80,14 @@ pub(crate) fn run(
     // Nothing was sent: it does not wait.
     block_on(sender.set_baud(baud));
     let link = Link::new();
-    let serial = digits(id);
+    let serial = usb::digits(id);
     let mut disk = Disk::new(card, serial);
-    // One packet of each endpoint: control and class.
-    let mut packets = [0; 2 * PACKET_BYTES];
-    let port = Port {
-        begin_with_data0: board::begin_with_data0,
-        drop_control_packet: board::drop_control_packet,
-        has_bus_event: board::has_bus_event,
-        now,
-    };
-    let driver = Guarded::new(usb.driver(&mut packets), &link, port);
+    let mut packets: Packets = [0; _];
+    let driver = usb::driver(plug, &mut packets, &link);
     // Some hosts take the class from the interface only.
-    let mut config = Config::new(VENDOR, PRODUCT);
+    let mut config = usb::config(IDENTITY, &serial);
     (config.device_class, config.device_sub_class, config.device_protocol) = (0, 0, 0);
     config.composite_with_iads = false;
-    config.self_powered = true;
-    config.manufacturer = Some("HUMS");
-    config.product = Some("HUMS card reader");
-    config.serial_number = core::str::from_utf8(&serial).ok();
     let (mut descriptor, mut bos, mut control_data) = ([0; 64], [0; 16], [0; 64]);
     let mut control = Control::new(&link);
     let mut builder = Builder::new(driver, config, &mut descriptor, &mut bos, &mut [], &mut control_data);
@@ -139,14 +127,4 @@ async fn supervise(mut led: board::Led, mut autopilot: board::PortRx, link: &Lin
         if is_over { Poll::Ready(()) } else { Poll::Pending }
     })
     .await;
-}
-
-/// The chip's unique id in hexadecimal, as the class wants a serial number (BOT, 4.1.1).
-fn digits(id: [u8; 12]) -> [u8; SERIAL_BYTES] {
-    let mut digits = [0; SERIAL_BYTES];
-    let nibbles = id.into_iter().flat_map(|byte| [byte >> 4, byte & 15]);
-    for (digit, nibble) in digits.iter_mut().zip(nibbles) {
-        *digit = if nibble < 10 { b'0' + nibble } else { b'A' + nibble - 10 };
-    }
-    digits
 }

@@ -8,7 +8,7 @@
 //! | 2 | the clock's interrupt | wakes tasks |
 //! | 3 | reception | the ring holds 22 ms |
 //! | 5 | monitor | the frame queue holds 16 ms |
-//! | 7 | downlink | an alert has 50 ms; with it requests and uplink, which only move bytes between ports and queues |
+//! | 7 | downlink | an alert has 50 ms; with it requests, uplink and USB with its interrupt, which only move bytes between ports and queues |
 //! | 9 | storage | the sector queue holds 2.5 s; its library waits for the card with the processor |
 
 use embassy_executor::{InterruptExecutor, SendSpawner};
@@ -40,6 +40,7 @@ pub(crate) fn start() -> Spawners {
     RECEPTION.set_priority(Priority::P3);
     MONITOR.set_priority(Priority::P5);
     DOWNLINK.set_priority(Priority::P7);
+    interrupt::OTG_FS.set_priority(Priority::P7);
     STORAGE.set_priority(Priority::P9);
     Spawners {
         reception: RECEPTION_EXECUTOR.start(RECEPTION),

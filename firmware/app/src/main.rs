@@ -3,6 +3,7 @@
 //! ```text
 //! autopilot -> reception -> monitor -> storage -> card
 //!        gs -> uplink    -/       \\-> downlink -> gs
+//!       usb -> usb       -/        |\-> usb -> usb
 //!                                  \-> requests -> autopilot
 //! ```
 //! Everything is allocated here and once: queues, the codec, the tasks. The logic of the tasks is in `hums_onboard` and tested on
@@ -23,6 +24,7 @@ mod registers;
 mod status;
 mod tasks;
 mod trap;
+mod usb;
 mod watch;
 
 use hums_blackbox::Writer;
@@ -30,7 +32,7 @@ use hums_blackbox::record::{Before, Boot};
 use hums_core::Monitor;
 use hums_core::params::{Param, Params};
 use hums_onboard::persist::mailbox::MailboxOut;
-use hums_onboard::queues::{Ends, Queues};
+use hums_onboard::queues::{Ends, Queues, UplinkIn};
 use hums_onboard::{Handover, Mailbox, Monitoring, ResetCause, StoreWriter};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -44,6 +46,8 @@ static WRITER: ConstStaticCell<Writer> = ConstStaticCell::new(Writer::new());
 static MONITOR: StaticCell<Monitor> = StaticCell::new();
 static MONITORING: StaticCell<Monitoring<'static>> = StaticCell::new();
 static ENDS: StaticCell<monitor::Ends> = StaticCell::new();
+/// Of uplink and USB, which are as urgent as each other.
+static UPLINK_IN: StaticCell<UplinkIn<'static>> = StaticCell::new();
 static STORE_WRITER: StaticCell<StoreWriter<'static, board::StoreFlash>> = StaticCell::new();
 /// In CCM too: no DMA reads it.
 #[unsafe(link_section = ".bss.ccm.mailbox")]
@@ -104,6 +108,7 @@ fn start() -> board::Idle {
     let monitoring = monitoring(monitor, identity, parts.boot.cause);
     monitoring.restore_signing(store_writer);
 
+    let plug = tasks::usb::plug(parts.usb, parts.boot.id);
     let on = executors::start();
     let (autopilot_rx, autopilot_tx) = parts.autopilot;
     let (gs_rx, gs_tx) = parts.gs;
@@ -118,7 +123,9 @@ fn start() -> board::Idle {
         .spawn(monitor::run(monitoring, ends, handover, parts.boot, parts.watchdog, parts.led).expect(ONCE));
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
-    on.downlink.spawn(tasks::uplink::run(gs_rx, queues.uplink_in).expect(ONCE));
+    let uplink = &*UPLINK_IN.init(queues.uplink_in);
+    on.downlink.spawn(tasks::uplink::run(gs_rx, uplink).expect(ONCE));
+    on.downlink.spawn(tasks::usb::run(plug, queues.usb_out, uplink).expect(ONCE));
     let storage = storage::body(parts.card, entropy, sectors_out, queues.shelf, store_writer);
     on.storage.spawn(storage::run(storage).expect(ONCE));
     parts.idle

@@ -48,6 +48,16 @@ impl Encoder {
         self.system
     }
 
+    /// The message of a frame that was made with these addresses, to be sent at another port; `None` for other frames.
+    pub fn message_of(&self, frame: &[u8]) -> Option<Packet> {
+        let (header, rest) = frame.split_first_chunk::<HEADER_V2_BYTES>()?;
+        let [START_V2, len, _, _, _, system, component, id0, id1, id2] = *header else { return None };
+        if (system, component) != (self.system, self.component) {
+            return None;
+        }
+        Some(Packet::new(u32::from_le_bytes([id0, id1, id2, 0])).bytes(0, rest.get(..usize::from(len))?))
+    }
+
     /// The sequence number of the next frame.
     pub const fn set_sequence(&mut self, sequence: u8) {
         self.sequence = sequence;
@@ -117,5 +127,11 @@ mod tests {
             assert_eq!(frame.sequence(), sequence);
         }
         assert_eq!(encoder.frame(&mut buffer, &Packet::new(0xff_fffe)), [0; 0], "no such message");
+        let text = messages::status_text(crate::text::Severity::Notice, "HUMS: ready");
+        let frame = encoder.frame(&mut buffer, &text).to_vec();
+        let again = encoder.message_of(&frame).expect("ours");
+        assert_eq!((again.id(), again.payload()), (text.id(), text.payload()));
+        assert!(Encoder::of(7, 1).message_of(&frame).is_none());
+        assert!((0..frame.len() - 2).all(|cut| encoder.message_of(&frame[..cut]).is_none()));
     }
 }

@@ -20,6 +20,8 @@ use crate::encode::{Encoder, FRAME_BYTES_MAX};
 use crate::packet::Packet;
 use crate::signing::Seal;
 
+/// Rate of a port whose queue is its only limit: each frame leaves at once.
+pub const NO_LINE: u32 = u32::MAX;
 /// Longest backlog of the line at which a frame other than a finding is accepted.
 pub const BACKLOG: Span = Span::from_millis(50);
 /// Findings come in bursts. It limits the size of the queue.
@@ -357,6 +359,19 @@ mod tests {
         outlet.set(Instant::from_millis(110), 5_000, 57_600);
         assert_eq!(outlet.baud(), 57_600);
         assert!(outlet.pass(Instant::from_millis(110), Class::Critical, &[0; 12], &mut |_| {}));
+    }
+
+    #[test]
+    fn a_port_without_a_line_takes_its_budget_at_once_and_no_more() {
+        let mut outlet = Outlet::new(20_000, NO_LINE, FRAME_BYTES_MAX as u32);
+        let mut bytes = 0;
+        while outlet
+            .pass(Instant::ZERO, Class::Bulk, &[0; FRAME_BYTES_MAX], &mut |frame| bytes += frame.len())
+        {
+        }
+        let share = outlet.mark(Class::Bulk) as usize / 5 * 3;
+        assert!(bytes <= share && bytes + FRAME_BYTES_MAX > share, "{bytes} of {share}");
+        assert_eq!(outlet.bulk_frame_max(), FRAME_BYTES_MAX);
     }
 
     #[test]

@@ -18,11 +18,13 @@ pub enum Port {
     Gs = 0,
     /// The autopilot's, also for ground stations behind it.
     Autopilot = 1,
+    /// The serial port on the board's USB plug: a second one for ground stations.
+    Usb = 2,
 }
 
 impl Port {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Gs, Self::Autopilot];
+    /// All, each at the place of its number.
+    pub const ALL: [Self; 3] = [Self::Gs, Self::Autopilot, Self::Usb];
 }
 
 /// A request to us.
@@ -136,7 +138,7 @@ pub enum Reply {
 #[derive(Clone, Debug, Default)]
 pub struct Replies {
     line: Deque<(Port, Reply), REPLIES_MAX>,
-    lists: [List; 2],
+    lists: [List; Port::ALL.len()],
     dropped: u32,
 }
 
@@ -151,7 +153,7 @@ struct List {
 impl Replies {
     /// Nothing to answer.
     pub const fn new() -> Self {
-        Self { line: Deque::new(), lists: [List { next: 0, left: 0 }; 2], dropped: 0 }
+        Self { line: Deque::new(), lists: [List { next: 0, left: 0 }; Port::ALL.len()], dropped: 0 }
     }
 
     /// Queues an answer once; a full queue drops it.
@@ -200,6 +202,11 @@ impl Replies {
     pub fn listed(&self, port: Port) -> Option<u16> {
         let list = self.lists[port as usize];
         (list.left > 0).then_some(list.next)
+    }
+
+    /// Ends this port's list.
+    pub fn end_list(&mut self, port: Port) {
+        self.lists[port as usize].left = 0;
     }
 
     /// Sent; `count` in all.
@@ -266,6 +273,8 @@ mod tests {
         }
         assert!(seen.iter().all(|count| *count >= 3), "{seen:?}");
         assert_eq!(replies.listed(Port::Autopilot), None);
+        replies.end_list(Port::Gs);
+        assert_eq!(replies.listed(Port::Gs), None);
     }
 
     #[test]

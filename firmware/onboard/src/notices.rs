@@ -13,7 +13,7 @@ use hums_link::packet::Packet;
 use hums_link::text::{Severity, Text};
 
 use crate::journal::Journal;
-use crate::queues::{GsIn, SectorsIn};
+use crate::queues::SectorsIn;
 
 const WAITING_MAX: usize = 4;
 /// Time that a restart's text waits for a known vehicle.
@@ -72,7 +72,13 @@ impl Notices {
 
     /// As far as the budget allows; our system is unknown before the vehicle is.
     #[inline(never)]
-    pub(crate) fn tell(&mut self, now: Instant, is_known: bool, outlet: &mut Outlet, gs: &mut GsIn) {
+    pub(crate) fn tell(
+        &mut self,
+        now: Instant,
+        is_known: bool,
+        outlet: &mut Outlet,
+        out: &mut impl FnMut(&[u8]),
+    ) {
         while let Some(notice) = self.0.first() {
             // No ground station would show it yet.
             let waits = matches!(notice, Notice::Restarted(..)) && !is_known;
@@ -80,7 +86,7 @@ impl Notices {
                 return;
             }
             let (class, packet) = notice.packet();
-            if !outlet.send(now, class, &packet, &mut |bytes| gs.tell(bytes)) {
+            if !outlet.send(now, class, &packet, out) {
                 return;
             }
             self.0.remove(0);

@@ -21,7 +21,7 @@ const PROTOCOL: u8 = 0x50;
 const RESET: u8 = 0xFF;
 const GET_MAX_LUN: u8 = 0xFE;
 
-/// Control requests of the class, and events of the bus.
+/// Control requests of the class, and events of the bus. Without a class it has the events only.
 pub struct Control<'d> {
     interface: Option<InterfaceNumber>,
     link: &'d Link,

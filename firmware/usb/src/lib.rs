@@ -1,4 +1,4 @@
-//! The card as a read-only disk of a USB host (*card-reader mode*).
+//! The USB plug: the card as a read-only disk (*card-reader mode*), and a serial port while the box records ([`serial`]).
 //!
 //! ```text
 //! host -> bulk OUT -> Transport (wrappers, lengths) -> Disk (SCSI commands) -> CardDevice
@@ -19,10 +19,11 @@ pub mod class;
 pub mod guard;
 pub mod presence;
 pub mod scsi;
+pub mod serial;
 pub mod transport;
 
 pub use embassy_usb::driver;
-pub use embassy_usb::{Builder, Config};
+pub use embassy_usb::{Builder, Config, UsbDevice};
 
 /// Bytes of a packet on a bulk endpoint at full speed.
 pub const PACKET_BYTES: usize = 64;

@@ -120,11 +120,19 @@ impl FromStr for Endpoint {
     }
 }
 
+/// Beginnings of the names of ports without a line, on Linux and macOS: a device on USB that is a port itself.
+const USB_PORTS: [&str; 2] = ["/dev/ttyACM", "/dev/cu.usbmodem"];
+/// Their rate, which has no effect.
+const ANY_RATE: u32 = 115_200;
+
 fn serial(text: &str) -> Result<Endpoint, String> {
     let wrong =
         || format!("`serial:{text}` is not serial:DEVICE:BAUD, for instance serial:/dev/ttyUSB0:57600");
-    let (device, baud) = text.rsplit_once(':').ok_or_else(wrong)?;
-    let baud: u32 = baud.parse().map_err(|_| wrong())?;
+    let (device, baud) = match text.rsplit_once(':') {
+        Some((device, baud)) => (device, baud.parse().map_err(|_| wrong())?),
+        None if USB_PORTS.iter().any(|start| text.starts_with(start)) => (text, ANY_RATE),
+        None => return Err(wrong()),
+    };
     if device.is_empty() || baud == 0 {
         return Err(wrong());
     }
@@ -171,6 +179,14 @@ mod tests {
         ] {
             let endpoint: Endpoint = text.parse().expect(text);
             assert_eq!(endpoint.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn a_port_on_usb_needs_no_rate() {
+        for device in ["/dev/ttyACM0", "/dev/cu.usbmodem1234"] {
+            let endpoint: Endpoint = format!("serial:{device}").parse().expect(device);
+            assert_eq!(endpoint, Endpoint::Serial { device: device.to_owned(), baud: ANY_RATE });
         }
     }
 

@@ -10,6 +10,8 @@ use stm32f405_model::time::{MS, Ps, SECOND};
 const PACKET_BYTES: usize = 64;
 /// A device that takes or gives no packet for so long counts as hung.
 const HUNG: Ps = 10 * SECOND;
+/// Class of the interface with a serial port's data (CDC 1.2, table 7).
+const SERIAL_DATA: u8 = 0x0A;
 /// Of a card reader.
 const MASS_STORAGE: [u8; 3] = [0x08, 0x06, 0x50];
 
@@ -282,6 +284,63 @@ impl<'a> Disk<'a> {
     pub fn eject(&mut self) -> Result<()> {
         let done = self.command(&[0x1B, 0, 0, 0, 2, 0], 0)?;
         ensure!(done.status == 0, "eject {done:?}");
+        Ok(())
+    }
+}
+
+/// A serial port on the bus.
+#[derive(Debug)]
+pub struct Serial<'a> {
+    /// The bus.
+    pub bus: &'a mut Bus,
+    /// Endpoints to the device and from it, without the direction.
+    pub endpoints: (u8, u8),
+}
+
+impl<'a> Serial<'a> {
+    /// Enumerates the device, which must be a serial port, and opens it as Linux does.
+    pub fn attach(bus: &'a mut Bus) -> Result<Self> {
+        let (device, configuration) = bus.enumerate()?;
+        ensure!(device.len() == 18 && device[4..7] == [0xEF, 2, 1], "device descriptor {device:x?}");
+        let (mut to, mut from, mut is_data, mut rest) = (0, 0, false, &configuration[..]);
+        while let [length, kind, ..] = *rest {
+            let (one, others) = rest.split_at_checked(length.into()).context("a descriptor is cut")?;
+            match kind {
+                4 => is_data = one[5] == SERIAL_DATA,
+                5 if is_data && one[2] & 0x80 != 0 => from = one[2] & 15,
+                5 if is_data => to = one[2] & 15,
+                _ => {}
+            }
+            rest = others;
+        }
+        ensure!(to > 0 && from > 0, "no endpoints");
+        // SET_CONTROL_LINE_STATE: DTR and RTS.
+        ensure!(bus.control(0x21, 0x22, 3, 0)?, "no line state");
+        Ok(Self { bus, endpoints: (to, from) })
+    }
+
+    /// Bytes of the device for this long.
+    pub fn listen(&mut self, long: Ps) -> Result<Vec<u8>> {
+        let (end, from) = (self.bus.now + long, self.endpoints.1);
+        let mut bytes = Vec::new();
+        while self.bus.now < end {
+            match self.bus.act(Action::In(self.bus.address, from))? {
+                Reply::Nak => drop(self.bus.act(Action::Wait(MS))?),
+                Reply::Data(data1, packet) => {
+                    let toggle = &mut self.bus.toggles[1][usize::from(from)];
+                    ensure!(*toggle == data1, "DATA0 and DATA1 are not in turn");
+                    *toggle = !data1;
+                    bytes.extend_from_slice(&packet);
+                }
+                reply => bail!("{reply:?}"),
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// Sends bytes.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        ensure!(self.bus.write(self.endpoints.0, bytes)?, "halted");
         Ok(())
     }
 }

@@ -46,6 +46,8 @@ const SELECT_SPEED: Speed = Speed::Low;
 #[allow(dead_code, reason = "not every board has a button")]
 const PULL_CYCLES: u32 = 168_000;
 
+pub(crate) type UsbDriver<'d> = usb::Driver<'d, peripherals::USB_OTG_FS>;
+
 /// The USB port, which is off until it is used.
 pub(crate) struct Usb {
     port: Peri<'static, peripherals::USB_OTG_FS>,
@@ -55,7 +57,7 @@ pub(crate) struct Usb {
 
 impl Usb {
     /// The port's driver. `packets` is for one received packet of each endpoint.
-    pub(crate) fn driver(self, packets: &mut [u8]) -> usb::Driver<'_, peripherals::USB_OTG_FS> {
+    pub(crate) fn driver(self, packets: &mut [u8]) -> UsbDriver<'_> {
         // Without the bus's voltage at PA9, which is a port's pin on most boards.
         let config = usb::Config::default();
         usb::Driver::new_fs(self.port, Irqs, self.plus, self.minus, packets, config)

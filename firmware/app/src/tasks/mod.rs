@@ -5,3 +5,4 @@ pub(crate) mod monitor;
 pub(crate) mod reception;
 pub(crate) mod storage;
 pub(crate) mod uplink;
+pub(crate) mod usb;

@@ -2,14 +2,14 @@
 
 use embassy_time::with_timeout;
 use hums_onboard::queues::UplinkIn;
-use hums_onboard::uplink::{SILENCE, Uplink};
+use hums_onboard::uplink::{Port, SILENCE, Uplink};
 
 use crate::boards::board;
-use crate::links::{self, now};
+use crate::links;
 
 #[embassy_executor::task]
-pub(crate) async fn run(mut port: board::PortRx, mut frames: UplinkIn<'static>) -> ! {
-    let mut body = Uplink::new();
+pub(crate) async fn run(mut port: board::PortRx, frames: &'static UplinkIn<'static>) -> ! {
+    let mut body = Uplink::new(Port::Gs);
     let mut begun = false;
     loop {
         let received = if begun {
@@ -19,10 +19,10 @@ pub(crate) async fn run(mut port: board::PortRx, mut frames: UplinkIn<'static>) 
         };
         begun = received.is_ok();
         match received {
-            Ok(Ok(count)) => body.received(now(), count, &mut frames),
+            Ok(Ok(count)) => body.received(count, frames),
             // A checksum detects lost bytes, and the ground station repeats the message.
             Ok(Err(_overrun)) => {}
-            Err(_silence) => body.idle(now(), &mut frames),
+            Err(_silence) => body.idle(frames),
         }
         links::UPLINK.signal(());
     }

@@ -71,14 +71,19 @@ pub(crate) const fn only_asks(command: u16) -> bool {
 #[derive(Clone, Debug)]
 pub(crate) struct Commands {
     pub(crate) replies: Replies,
-    limits: [Limiter; 2],
+    limits: [Limiter; Port::ALL.len()],
     stopped: bool,
     card_reader_asked: Option<Instant>,
 }
 
 impl Commands {
     pub(crate) const fn new() -> Self {
-        Self { replies: Replies::new(), limits: [Limiter::new(); 2], stopped: false, card_reader_asked: None }
+        Self {
+            replies: Replies::new(),
+            limits: [Limiter::new(); Port::ALL.len()],
+            stopped: false,
+            card_reader_asked: None,
+        }
     }
 
     pub(crate) fn allows(&mut self, now: Instant, port: Port) -> bool {

@@ -1,7 +1,8 @@
 //! The monitor as a companion: its requests to the autopilot, and its answers to others.
 //!
 //! A part of the monitor task. A request comes as a frame from the frame queue (the autopilot's port) or from the
-//! uplink queue (the ground station's own port). The answer goes out at the same port, within its budget.
+//! uplink queue (the ports for ground stations: the radio's, and the one on USB). The answer goes out at the same port,
+//! within its budget. The USB port gets the summary stream too, with numbers and signatures of its own.
 //!
 //! Requests change settings, stop recording and ask for data, and nothing else. A flood of requests is cut by
 //! [`limiter`] and by the short queue of answers.
@@ -20,13 +21,13 @@ use hums_core::clock::{Instant, Span};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, Known};
-use hums_link::encode::COMPONENT;
+use hums_link::encode::{COMPONENT, FRAME_BYTES_MAX};
 use hums_link::events::Events;
 use hums_link::frame::Frame;
 use hums_link::ids;
 use hums_link::messages;
-use hums_link::outlet::{Class, Outlet};
-use hums_link::packet::Fields;
+use hums_link::outlet::{self, Class, Outlet};
+use hums_link::packet::{Fields, Packet};
 use hums_link::request::{self, AddressedRequest, Port, Reply, Request};
 use hums_link::signing::{Key, Seal};
 use hums_link::summary::{self, Summary};
@@ -46,6 +47,8 @@ use ways::Ways;
 /// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
 /// autopilot carries it, and for the longest frame.
 const WAITING_BYTES: u32 = 400;
+/// Budget of the USB port, bytes a second. A packet of 64 bytes takes some 5,000 cycles, so this takes 1 % of the processor.
+const USB_BUDGET: u32 = 20_000;
 /// Interval of heartbeats to the autopilot, which routes messages only to known systems.
 const HEARTBEAT: Span = Span::from_secs(1);
 /// The monitor itself: no answer is expected.
@@ -54,6 +57,7 @@ const NOBODY: Asker = Asker { port: Port::Gs, by: (0, 0) };
 #[derive(Clone, Debug)]
 pub(crate) struct Companion {
     outlet: Outlet,
+    usb: Outlet,
     asking: Asking,
     events: Events,
     commands: Commands,
@@ -73,6 +77,7 @@ impl Companion {
                 params.get(Param::ApBaud) as u32,
                 WAITING_BYTES,
             ),
+            usb: Outlet::new(USB_BUDGET, outlet::NO_LINE, FRAME_BYTES_MAX as u32),
             asking: Asking::new(),
             events: Events::new(),
             commands: Commands::new(),
@@ -112,22 +117,53 @@ impl Companion {
     }
 
     pub(crate) fn save(&mut self, now: Instant, summary: &Summary, handover: &mut Handover<'_>) -> bool {
-        let seals = [&summary.outlet.seal, &self.outlet.seal];
+        let seals = [&summary.outlet.seal, &self.outlet.seal, &self.usb.seal];
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover)
+    }
+
+    /// The summary stream: to its carrier, and to the USB port while that is open.
+    pub(crate) fn tell(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
+        if !gs.is_open(Port::Usb) {
+            gs.tell(frame);
+            return;
+        }
+        let message = self.usb.encoder.message_of(frame);
+        // The autopilot does not carry its own frames: those are for USB only.
+        if message.is_some() || gs.route() != SummaryRoute::Autopilot {
+            gs.tell(frame);
+        }
+        self.tell_usb(now, frame, message.as_ref(), gs);
+    }
+
+    // Own stack frame (ARCHITECTURE.md, Memory).
+    #[inline(never)]
+    fn tell_usb(&mut self, now: Instant, frame: &[u8], message: Option<&Packet>, gs: &mut GsIn) {
+        let has_room = gs.has_room(Port::Usb);
+        let mut out = |bytes: &[u8]| gs.send(Port::Usb, bytes);
+        // The stream has been selected: here it has no class.
+        let is_sent = has_room
+            && match message {
+                Some(packet) => self.usb.send(now, Class::Critical, packet, &mut out),
+                None => self.usb.pass(now, Class::Critical, frame, &mut out),
+            };
+        if !is_sent {
+            gs.lose(Port::Usb);
+        }
     }
 
     pub(crate) fn uplink(
         &mut self,
         now: Instant,
+        port: Port,
         frame: &Frame<'_>,
         book: &mut Logbook<'_>,
         summary: &mut Summary,
         sectors: &mut SectorsIn,
         gs: &mut GsIn,
     ) {
-        self.asked(now, Port::Gs, frame, book, sectors);
-        let mut ways = Ways { gs: &mut summary.outlet, autopilot: &mut self.outlet, queues: gs };
-        self.pass.up(now, frame, book.monitor, &mut ways);
+        self.asked(now, port, frame, book, sectors);
+        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
+        self.pass.up(now, port, frame, book.monitor, &mut Ways { outlets, queues: gs });
     }
 
     /// An answer to us, a request, or data.
@@ -169,8 +205,8 @@ impl Companion {
         summary: &mut Summary,
         gs: &mut GsIn,
     ) {
-        let mut ways = Ways { gs: &mut summary.outlet, autopilot: &mut self.outlet, queues: gs };
-        self.pass.down(now, frame, book.monitor, &mut ways);
+        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
+        self.pass.down(now, frame, book.monitor, &mut Ways { outlets, queues: gs });
     }
 
     fn asked(
@@ -333,17 +369,18 @@ impl Companion {
             2 => SummaryRoute::Autopilot,
             _ => SummaryRoute::Port,
         });
-        summary.forwards = gs.route() == SummaryRoute::Port;
+        summary.forwards = gs.route() == SummaryRoute::Port || gs.is_open(Port::Usb);
         if self.commands.stopped() && book.monitor.vehicle().armed() {
             self.commands.stop_or_record(now, false, NOBODY, &mut book.journal, sectors);
         }
-        self.secure.seal(now, gs.route(), book.monitor, [&mut summary.outlet, &mut self.outlet]);
+        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
+        self.secure.seal(now, gs.route(), book.monitor, outlets);
         self.tell_autopilot(now, book.monitor, gs);
         self.settings.tick(now, &mut self.library, book, notices, sectors, &mut gs.shelf);
     }
 
     fn tell_autopilot(&mut self, now: Instant, monitor: &mut Monitor, gs: &mut GsIn) {
-        let Self { outlet, asking, events, heartbeat_at, protect, .. } = self;
+        let Self { outlet, usb, asking, events, heartbeat_at, protect, .. } = self;
         if let Some(request) = monitor.take_request() {
             *protect = Some(request);
         }
@@ -352,6 +389,7 @@ impl Companion {
         let mut out = |bytes: &[u8]| gs.autopilot.put(bytes);
         if let Some(source) = monitor.vehicle().source {
             outlet.encoder.set_system(source.system);
+            usb.encoder.set_system(source.system);
             // Before our system is known, the autopilot gets no heartbeat.
             if heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
                 && outlet.send(now, Class::Own, &summary::heartbeat(monitor), &mut out)
@@ -387,14 +425,20 @@ impl Companion {
         summary: &mut Summary,
         gs: &mut GsIn,
     ) {
-        let mut ways = Ways { gs: &mut summary.outlet, autopilot: &mut self.outlet, queues: gs };
+        let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
+        let mut ways = Ways { outlets, queues: gs };
         let replies = &mut self.commands.replies;
         for _ in 0..replies.len() {
             let Some((port, reply)) = replies.first() else { break };
             let packet = commands::packet(now, reply, monitor, identity);
-            replies.done(ways.send(now, port, Class::Own, &packet));
+            let sent = ways.send(now, port, Class::Own, &packet);
+            // Nobody is there any more to get it.
+            replies.done(sent || !ways.queues.is_open(port));
         }
         for port in Port::ALL {
+            if !ways.queues.is_open(port) {
+                replies.end_list(port);
+            }
             while let Some(index) = replies.listed(port) {
                 let packet = commands::packet(now, Reply::Param(index), monitor, identity);
                 if !ways.send(now, port, Class::Bulk, &packet) {

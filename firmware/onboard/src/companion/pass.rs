@@ -1,4 +1,4 @@
-//! The back-channel (`GS_PASS`): one radio, at our port, serves the autopilot too.
+//! The back-channel (`GS_PASS`): our ports for ground stations serve the autopilot too.
 //!
 //! Frames of others pass unaltered, with their signatures, within each port's budget. Without room they are lost and
 //! counted, and the sender repeats them, as on any radio.
@@ -56,7 +56,14 @@ impl Pass {
         Self { lost: 0, unknown_at: None }
     }
 
-    pub(crate) fn up(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
+    pub(crate) fn up(
+        &mut self,
+        now: Instant,
+        port: Port,
+        frame: &Frame<'_>,
+        monitor: &Monitor,
+        ways: &mut Ways,
+    ) {
         let Some(vehicle) = monitor.vehicle().source else { return };
         let of = (frame.system(), frame.component());
         let pretends = of == (vehicle.system, vehicle.component) || of == (vehicle.system, COMPONENT);
@@ -64,7 +71,7 @@ impl Pass {
             || frame.target() == Some((vehicle.system, COMPONENT))
             || frame.id() == ids::SETUP_SIGNING
             || RADIO.contains(&frame.id());
-        if stays || !is_on(monitor, ways) {
+        if stays || !is_on(port, monitor, ways) {
             return;
         }
         let sent = ways.pass(now, Port::Autopilot, Class::Forward, frame.bytes());
@@ -72,7 +79,8 @@ impl Pass {
     }
 
     pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
-        if !is_on(monitor, ways) || frame.id() == ids::SETUP_SIGNING {
+        let to = [Port::Gs, Port::Usb].map(|port| Some(port).filter(|port| is_on(*port, monitor, ways)));
+        if to == [None; 2] || frame.id() == ids::SETUP_SIGNING {
             return;
         }
         let Some(vehicle) = monitor.vehicle().source else { return };
@@ -89,13 +97,15 @@ impl Pass {
                 || ANSWERS.contains(&frame.id())
                 || frame.id() == ids::HEARTBEAT && is_other
         };
-        if passes {
-            let sent = ways.pass(now, Port::Gs, Class::Bulk, frame.bytes());
+        for port in to.into_iter().flatten().filter(|_| passes) {
+            let sent = ways.pass(now, port, Class::Bulk, frame.bytes());
             self.lost = self.lost.saturating_add(u32::from(!sent));
         }
     }
 }
 
-fn is_on(monitor: &Monitor, ways: &Ways) -> bool {
-    ways.queues.route() == SummaryRoute::Port && monitor.params().get(Param::GsPass) > 0.5
+fn is_on(port: Port, monitor: &Monitor, ways: &Ways) -> bool {
+    let is_used =
+        if port == Port::Gs { ways.queues.route() == SummaryRoute::Port } else { ways.queues.is_open(port) };
+    is_used && monitor.params().get(Param::GsPass) > 0.5
 }

@@ -2,6 +2,8 @@
 //!
 //! With a key, `GS_SIGN` and `AP_SIGN` set the guard of a port:
 //!
+//! The USB port has the guard of the radio's.
+//!
 //! - 0: none.
 //! - 1: our frames are signed, and a signature must be right.
 //! - 2: unsigned requests are refused as well.
@@ -45,19 +47,23 @@ const TIMES_BYTES: usize = 24;
 const SAVE: Span = Span::from_secs(1);
 /// The same while the store has little more than its reserve, and then [`SIGNED_MAX`] times at most.
 const SAVE_SCARCE: Span = Span::from_secs(60);
-/// Link ids: summary stream and answers at the ground station's port, and frames to the autopilot.
-const LINKS: [u8; 2] = [0, 1];
+/// Link ids by the port's number: summary stream and answers at the radio's port, frames to the autopilot, USB.
+const LINKS: [u8; Port::ALL.len()] = [0, 1, 2];
 
 /// 0 to 2.
 fn guard(params: &Params, port: Port) -> u8 {
     params.get(match port {
-        Port::Gs => Param::GsSign,
+        Port::Gs | Port::Usb => Param::GsSign,
         Port::Autopilot => Param::ApSign,
     }) as u8
 }
 
 pub(crate) fn is_trusted(params: &Params, port: Port) -> bool {
-    params.get(Param::SignPort) as u8 == port as u8 + 1
+    let number = match port {
+        Port::Gs | Port::Usb => 1,
+        Port::Autopilot => 2,
+    };
+    params.get(Param::SignPort) as u8 == number
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +83,7 @@ pub(crate) struct Secure {
     /// Times stored since the store had more than its reserve.
     scarce: u8,
     last: u64,
-    /// A key was set together with the time: both outlets begin anew.
+    /// A key was set together with the time: all outlets begin anew.
     reseal: bool,
     pub(super) refused: u32,
 }
@@ -191,17 +197,17 @@ impl Secure {
         (self.key_due, self.times_due) = (true, true);
     }
 
-    /// Keeps both outlets signing by the settings, in our time: the summary stream's, and the autopilot's.
+    /// Keeps all outlets signing by the settings, in our time.
     pub(crate) fn seal(
         &mut self,
         now: Instant,
         route: SummaryRoute,
         monitor: &Monitor,
-        outlets: [&mut Outlet; 2],
+        outlets: [&mut Outlet; Port::ALL.len()],
     ) {
         let params = monitor.params();
         let carries = if route == SummaryRoute::Autopilot { Port::Autopilot } else { Port::Gs };
-        let guards = [guard(params, carries), guard(params, Port::Autopilot)];
+        let guards = [carries, Port::Autopilot, Port::Usb].map(|port| guard(params, port));
         let Self { signing, last, reseal, .. } = self;
         let reseal = core::mem::take(reseal);
         let time = &monitor.vehicle().time;

@@ -8,33 +8,26 @@ use hums_link::request::Port;
 use crate::queues::GsIn;
 
 pub(crate) struct Ways<'w, 'q> {
-    pub(crate) gs: &'w mut Outlet,
-    pub(crate) autopilot: &'w mut Outlet,
+    /// By the port's number.
+    pub(crate) outlets: [&'w mut Outlet; Port::ALL.len()],
     pub(crate) queues: &'w mut GsIn<'q>,
 }
 
 impl Ways<'_, '_> {
     pub(crate) fn send(&mut self, now: Instant, port: Port, class: Class, packet: &Packet) -> bool {
-        let Self { gs, autopilot, queues } = self;
-        match port {
-            Port::Gs => gs.send(now, class, packet, &mut |bytes| queues.put(bytes)),
-            Port::Autopilot => autopilot.send(now, class, packet, &mut |bytes| queues.autopilot.put(bytes)),
-        }
+        let Self { outlets, queues } = self;
+        let has_room = queues.has_room(port);
+        has_room && outlets[port as usize].send(now, class, packet, &mut |bytes| queues.send(port, bytes))
     }
 
     /// Passes a frame of another system on, likewise.
     pub(crate) fn pass(&mut self, now: Instant, port: Port, class: Class, frame: &[u8]) -> bool {
-        let Self { gs, autopilot, queues } = self;
-        match port {
-            Port::Gs => gs.pass(now, class, frame, &mut |bytes| queues.put(bytes)),
-            Port::Autopilot => autopilot.pass(now, class, frame, &mut |bytes| queues.autopilot.put(bytes)),
-        }
+        let Self { outlets, queues } = self;
+        let has_room = queues.has_room(port);
+        has_room && outlets[port as usize].pass(now, class, frame, &mut |bytes| queues.send(port, bytes))
     }
 
     pub(crate) fn bulk_frame_max(&self, port: Port) -> usize {
-        match port {
-            Port::Gs => self.gs.bulk_frame_max(),
-            Port::Autopilot => self.autopilot.bulk_frame_max(),
-        }
+        self.outlets[port as usize].bulk_frame_max()
     }
 }

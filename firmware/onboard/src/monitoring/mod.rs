@@ -18,6 +18,7 @@ use hums_core::{Monitor, monitor};
 use hums_link::LongTexts;
 use hums_link::frame::{Check, Frame};
 use hums_link::ids;
+use hums_link::request::Port;
 use hums_link::sequence::Sequences;
 use hums_link::summary::Summary;
 use hums_recorder::status::CardStatus;
@@ -196,7 +197,7 @@ impl<'a> Monitoring<'a> {
         let Self { book, summary, companion, .. } = self;
         companion.heard(at, &frame, book, summary, sectors, gs);
         begin(Step::Summary);
-        summary.frame(at, &frame, &mut |bytes| gs.tell(bytes));
+        summary.frame(at, &frame, &mut |bytes| companion.tell(at, bytes, gs));
     }
 
     #[inline(never)]
@@ -219,14 +220,15 @@ impl<'a> Monitoring<'a> {
         sectors: &mut SectorsIn,
         gs: &mut GsIn,
     ) -> bool {
-        uplink.take(|_, message, bytes| {
-            // If the autopilot carries our stream, the port has no user.
-            if gs.route() == SummaryRoute::Autopilot {
+        uplink.take(|number, message, bytes| {
+            let Some(port) = Port::ALL.get(number as usize).copied() else { return };
+            // If the autopilot carries our stream, the radio's port has no user.
+            if port == Port::Gs && gs.route() == SummaryRoute::Autopilot {
                 return;
             }
             let Self { book, summary, companion, identity, .. } = self;
             if let Some(frame) = Frame::from_queue(bytes, message) {
-                companion.uplink(now, &frame, book, summary, sectors, gs);
+                companion.uplink(now, port, &frame, book, summary, sectors, gs);
             }
             companion.answer(now, book.monitor, identity, summary, gs);
         })
@@ -275,9 +277,9 @@ impl<'a> Monitoring<'a> {
     fn talk(&mut self, now: Instant, sectors: &mut SectorsIn, gs: &mut GsIn) {
         let Self { book, summary, companion, notices, figures, identity, .. } = self;
         let is_known = book.monitor.vehicle().source.is_some();
-        notices.tell(now, is_known, &mut summary.outlet, gs);
+        notices.tell(now, is_known, &mut summary.outlet, &mut |bytes| companion.tell(now, bytes, gs));
         summary.own = figures.own(now, book.card, [companion.baud(), summary.outlet.baud()], gs);
-        summary.tick(now, book.monitor, &mut |bytes| gs.tell(bytes));
+        summary.tick(now, book.monitor, &mut |bytes| companion.tell(now, bytes, gs));
         companion.converse(now, book, summary, notices, sectors, gs);
         companion.answer(now, book.monitor, identity, summary, gs);
     }
@@ -351,7 +353,7 @@ impl<'a> Monitoring<'a> {
                 let event = Event { number: CRITICAL, text: finding.check };
                 journal.record(now, &Record::Event(event), sectors);
             }
-            summary.finding(now, finding, &mut |bytes| gs.tell(bytes));
+            summary.finding(now, finding, &mut |bytes| companion.tell(now, bytes, gs));
             findings(finding);
         });
     }

@@ -13,6 +13,10 @@ pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 /// for the longest frame.
 pub const GS_QUEUE_BYTES: usize = (summary::WAITING_BYTES + outlet::FINDINGS) as usize + 2 * FRAME_BYTES_MAX;
 
+/// Three of the longest frames, one of them being sent, and an end of the queue too short for a fourth. A host fetches 64 bytes in
+/// less than a millisecond.
+pub const USB_QUEUE_BYTES: usize = 4 * FRAME_BYTES_MAX + 16;
+
 /// 0.17 s of a radio at 57,600 baud: the monitor looks at least every 50 ms. Three of the longest frames.
 pub const UPLINK_QUEUE_BYTES: usize = 1024;
 

@@ -1,6 +1,6 @@
-//! The fill level of a queue.
+//! The fill level of a queue, and the state of its reader.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Bytes of the length that the queue puts before each frame.
 const HEAD_BYTES: usize = 2;
@@ -11,11 +11,20 @@ const HEAD_BYTES: usize = 2;
 pub(super) struct Level {
     bytes: AtomicU32,
     bytes_max: AtomicU32,
+    /// Somebody takes the bytes. Only of a port that may have nobody.
+    is_open: AtomicBool,
+    /// Frames that the reader dropped.
+    dropped: AtomicU32,
 }
 
 impl Level {
     pub(super) const fn new() -> Self {
-        Self { bytes: AtomicU32::new(0), bytes_max: AtomicU32::new(0) }
+        Self {
+            bytes: AtomicU32::new(0),
+            bytes_max: AtomicU32::new(0),
+            is_open: AtomicBool::new(false),
+            dropped: AtomicU32::new(0),
+        }
     }
 
     pub(super) fn rise(&self, bytes: usize) {
@@ -26,6 +35,26 @@ impl Level {
 
     pub(super) fn fall(&self, bytes: usize) {
         self.bytes.fetch_sub((HEAD_BYTES + bytes) as u32, Ordering::Relaxed);
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes.load(Ordering::Relaxed) as usize
+    }
+
+    pub(super) fn set_open(&self, is_open: bool) {
+        self.is_open.store(is_open, Ordering::Relaxed);
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        self.is_open.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn drop_one(&self) {
+        self.dropped.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn dropped(&self) -> u32 {
+        self.dropped.load(Ordering::Relaxed)
     }
 
     pub(super) fn max(&self) -> u32 {

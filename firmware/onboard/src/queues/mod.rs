@@ -5,7 +5,8 @@
 //! | frames | reception | monitor | [`FRAME_QUEUE_BYTES`] | the frame is lost, counted in [`crate::PortStatus`] |
 //! | sectors | monitor | storage | [`SECTOR_QUEUE_SECTORS`] | frames are refused before they are encoded, and counted; [`SECTOR_RESERVE`] stays for records |
 //! | GS | monitor | downlink | [`GS_QUEUE_BYTES`] | the frame is lost, counted; the summary stream repeats what matters |
-//! | uplink | uplink | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost, counted; whoever asks the ground station's port must ask again |
+//! | uplink | uplink, USB | monitor | [`UPLINK_QUEUE_BYTES`] | the frame is lost, counted; whoever asks at a port for ground stations must ask again |
+//! | USB | monitor | USB | [`USB_QUEUE_BYTES`] | answers wait; a frame of the summary stream is lost, counted |
 //! | autopilot | monitor | requests | [`AUTOPILOT_QUEUE_BYTES`] | the frame is lost, counted; requests are repeated |
 
 mod capacities;
@@ -21,11 +22,11 @@ pub use hums_link::encode::FRAME_BYTES_MAX;
 use crate::shelf::{Server, Shelf};
 pub use capacities::{
     AUTOPILOT_QUEUE_BYTES, FRAME_QUEUE_BYTES, GS_QUEUE_BYTES, SECTOR_QUEUE_BYTES, SECTOR_QUEUE_SECTORS,
-    SECTOR_RESERVE, UPLINK_QUEUE_BYTES,
+    SECTOR_RESERVE, UPLINK_QUEUE_BYTES, USB_QUEUE_BYTES,
 };
 pub use frames::{FramesIn, FramesOut, UplinkIn, UplinkOut};
 use level::Level;
-pub use ports::{AutopilotOut, GsIn, GsOut, PortIn, PortOut, SummaryRoute};
+pub use ports::{AutopilotOut, GsIn, GsOut, PortIn, PortOut, SummaryRoute, UsbOut};
 use sectors::SectorQueue;
 pub use sectors::{SectorsIn, SectorsOut};
 
@@ -36,6 +37,7 @@ type FrameQueue = Churrasco<FRAME_QUEUE_BYTES>;
 type GsQueue = Churrasco<GS_QUEUE_BYTES>;
 type UplinkQueue = Churrasco<UPLINK_QUEUE_BYTES>;
 type AutopilotQueue = Churrasco<AUTOPILOT_QUEUE_BYTES>;
+type UsbQueue = Churrasco<USB_QUEUE_BYTES>;
 
 /// The firmware's queues.
 pub struct Queues {
@@ -43,9 +45,10 @@ pub struct Queues {
     gs: GsQueue,
     uplink: UplinkQueue,
     autopilot: AutopilotQueue,
+    usb: UsbQueue,
     sectors: SectorQueue,
     shelf: Shelf,
-    levels: [Level; 4],
+    levels: [Level; 5],
 }
 
 /// Ends by task.
@@ -70,6 +73,8 @@ pub struct Ends<'a> {
     pub shelf: Server<'a>,
     /// For the task that sends to the autopilot.
     pub autopilot_out: AutopilotOut<'a>,
+    /// For the USB port.
+    pub usb_out: UsbOut<'a>,
 }
 
 impl Default for Queues {
@@ -86,9 +91,10 @@ impl Queues {
             gs: Churrasco::new(),
             uplink: Churrasco::new(),
             autopilot: Churrasco::new(),
+            usb: Churrasco::new(),
             sectors: sectors::sector_queue(),
             shelf: Shelf::new(),
-            levels: [const { Level::new() }; 4],
+            levels: [const { Level::new() }; 5],
         }
     }
 
@@ -96,7 +102,7 @@ impl Queues {
     pub fn split(&mut self) -> Ends<'_> {
         let (sectors_in, sectors_out) = sectors::split(&mut self.sectors, SECTOR_RESERVE);
         let (reader, shelf) = self.shelf.split();
-        let [frames, gs, uplink, autopilot] = &self.levels;
+        let [frames, gs, uplink, autopilot, usb] = &self.levels;
         Ends {
             frames_in: FramesIn(self.frames.framed_producer(), frames),
             frames_out: FramesOut(self.frames.framed_consumer(), frames),
@@ -105,6 +111,7 @@ impl Queues {
             gs_in: GsIn {
                 gs: PortIn::new(self.gs.framed_producer(), gs),
                 autopilot: PortIn::new(self.autopilot.framed_producer(), autopilot),
+                usb: PortIn::new(self.usb.framed_producer(), usb),
                 shelf: reader,
                 route: SummaryRoute::Port,
             },
@@ -113,6 +120,7 @@ impl Queues {
             uplink_in: FramesIn(self.uplink.framed_producer(), uplink),
             uplink_out: FramesOut(self.uplink.framed_consumer(), uplink),
             autopilot_out: PortOut(self.autopilot.framed_consumer(), autopilot),
+            usb_out: PortOut(self.usb.framed_consumer(), usb),
         }
     }
 }
@@ -124,12 +132,13 @@ mod tests {
     use hums_link::encode::Encoder;
     use hums_link::frame::Frame;
     use hums_link::packet::Packet;
+    use hums_link::request::Port;
     use hums_recorder::recorder::ROW_BLOCKS;
 
     use super::*;
 
     /// The first ones are a MAVLink 1 header.
-    fn put<const BYTES: usize>(frames: &mut FramesIn, at_micros: u64, mut bytes: [u8; BYTES]) -> bool {
+    fn put<const BYTES: usize>(frames: &FramesIn, at_micros: u64, mut bytes: [u8; BYTES]) -> bool {
         bytes[..6].copy_from_slice(&[0xFE, BYTES as u8 - 8, 0, 1, 1, 255]);
         frames.put(at_micros, &Frame::parse(&bytes).expect("a frame"))
     }
@@ -156,7 +165,7 @@ mod tests {
         let mut queues = Box::new(Queues::new());
         let mut ends = queues.split();
         let mut taken = 0;
-        while put(&mut ends.frames_in, taken, [taken as u8; 100]) {
+        while put(&ends.frames_in, taken, [taken as u8; 100]) {
             taken += 1;
         }
         assert!(taken as usize >= FRAME_QUEUE_BYTES / 120, "{taken} frames of 100 bytes");
@@ -177,7 +186,7 @@ mod tests {
         let mut out = [0; FRAME_BYTES_MAX];
         for frames in [3, 1] {
             for _ in 0..frames {
-                put(&mut ends.frames_in, 0, [1; 50]);
+                put(&ends.frames_in, 0, [1; 50]);
                 ends.gs_in.put(&[7; 100]);
             }
             while ends.frames_out.take(|_, _, _| {}) && ends.gs_out.take(&mut out).is_some() {}
@@ -246,6 +255,28 @@ mod tests {
             assert!(core::pin::pin!(sent).poll(&mut context).is_ready());
             assert_eq!(gs_in.lost(), 0, "from byte {shift} on");
         }
+    }
+
+    #[test]
+    fn a_usb_port_takes_frames_while_it_is_open_and_counts_those_that_its_end_drops() {
+        let mut queues = Box::new(Queues::new());
+        let Ends { mut gs_in, mut usb_out, .. } = queues.split();
+        let mut out = [0; FRAME_BYTES_MAX];
+        assert!(gs_in.is_open(Port::Gs) && !gs_in.is_open(Port::Usb) && !gs_in.has_room(Port::Usb));
+        for _ in 0..200 {
+            usb_out.open();
+            let mut frames = 0;
+            while gs_in.has_room(Port::Usb) {
+                gs_in.send(Port::Usb, &[7; FRAME_BYTES_MAX - 13]);
+                frames += 1;
+            }
+            assert_eq!((frames, gs_in.lost()), (3, 0), "from any place in the queue");
+            while usb_out.take(&mut out).is_some() {}
+        }
+        gs_in.send(Port::Usb, &[7; 60]);
+        gs_in.send(Port::Usb, &[7; 60]);
+        usb_out.close();
+        assert!(gs_in.lost() == 2 && !gs_in.has_room(Port::Usb) && usb_out.take(&mut out).is_none());
     }
 
     #[test]

@@ -1,18 +1,23 @@
 //! Output of the ports: a queue each, and the way of the summary stream.
+//!
+//! The USB port has no line of its own speed: its queue is its limit, and it is closed while no host takes its bytes.
 
 use bbqueue::nicknames::Churrasco;
 use bbqueue::prod_cons::framed::{FramedConsumer, FramedProducer};
 use hums_link::encode::FRAME_BYTES_MAX;
 
-use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES};
+use hums_link::request::Port;
+
+use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES, USB_QUEUE_BYTES};
 use super::level::Level;
 use crate::shelf::Reader;
 
-/// Both ports, and the logs on the card.
+/// All ports, and the logs on the card.
 pub struct GsIn<'a> {
     pub(super) gs: PortIn<'a, GS_QUEUE_BYTES>,
     /// To the autopilot.
     pub autopilot: PortIn<'a, AUTOPILOT_QUEUE_BYTES>,
+    pub(super) usb: PortIn<'a, USB_QUEUE_BYTES>,
     /// The logs on the card.
     pub shelf: Reader<'a>,
     pub(super) route: SummaryRoute,
@@ -33,6 +38,34 @@ impl GsIn<'_> {
     /// Queues a frame, or counts it as lost.
     pub fn put(&mut self, frame: &[u8]) {
         self.gs.put(frame);
+    }
+
+    /// Queues a frame at this port, or counts it as lost.
+    pub fn send(&mut self, port: Port, frame: &[u8]) {
+        match port {
+            Port::Gs => self.gs.put(frame),
+            Port::Autopilot => self.autopilot.put(frame),
+            Port::Usb => self.usb.put(frame),
+        }
+    }
+
+    /// Counts a frame for this port that was not queued.
+    pub fn lose(&mut self, port: Port) {
+        match port {
+            Port::Gs => self.gs.lost += 1,
+            Port::Autopilot => self.autopilot.lost += 1,
+            Port::Usb => self.usb.lost += 1,
+        }
+    }
+
+    /// Whether somebody takes the frames of this port.
+    pub fn is_open(&self, port: Port) -> bool {
+        port != Port::Usb || self.usb.level.is_open()
+    }
+
+    /// Whether the longest frame has room. The outlets of the other ports know their queues by a model of the line.
+    pub fn has_room(&self, port: Port) -> bool {
+        port != Port::Usb || (self.usb.level.is_open() && self.usb.level.bytes() <= 2 * FRAME_BYTES_MAX)
     }
 
     /// Queues a frame of the summary stream.
@@ -64,9 +97,9 @@ impl GsIn<'_> {
         self.gs.bytes
     }
 
-    /// Lost frames.
-    pub const fn lost(&self) -> u64 {
-        self.gs.lost
+    /// Lost frames to ground stations, at both ports.
+    pub fn lost(&self) -> u64 {
+        self.gs.lost + self.usb.lost + u64::from(self.usb.level.dropped())
     }
 
     /// Most waiting bytes.
@@ -122,6 +155,8 @@ pub struct PortOut<'a, const BYTES: usize>(
 /// Reading end.
 pub type GsOut<'a> = PortOut<'a, GS_QUEUE_BYTES>;
 /// Reading end.
+pub type UsbOut<'a> = PortOut<'a, USB_QUEUE_BYTES>;
+/// Reading end.
 pub type AutopilotOut<'a> = PortOut<'a, AUTOPILOT_QUEUE_BYTES>;
 
 impl<const BYTES: usize> PortOut<'_, BYTES> {
@@ -133,6 +168,21 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         self.1.fall(grant.len());
         grant.release();
         Some(len)
+    }
+
+    /// A host takes the frames from now on.
+    pub fn open(&self) {
+        self.1.set_open(true);
+    }
+
+    /// Nobody takes the frames any more: those that wait are dropped and counted.
+    pub fn close(&mut self) {
+        self.1.set_open(false);
+        while let Ok(grant) = self.0.read() {
+            self.1.fall(grant.len());
+            self.1.drop_one();
+            grant.release();
+        }
     }
 
     /// Lends the oldest frame in place; then removes it; `false` if there is none.

@@ -7,6 +7,7 @@ use std::path::Path;
 use anyhow::Result;
 use hums_blackbox::record::Boot;
 use hums_core::clock::{Instant, Span};
+use hums_link::request::Port;
 use hums_onboard::monitoring::TICK;
 use hums_onboard::persist::Saved;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
@@ -87,7 +88,7 @@ impl Machine for Pipeline<'_, '_> {
         if !self.advance(at)? {
             return Ok(false);
         }
-        self.uplink.bytes(self.now, &chunk.bytes, &mut self.ends.uplink_in);
+        self.uplink.bytes(&chunk.bytes, &self.ends.uplink_in);
         self.uplink_silent_at = Some(self.now + uplink::SILENCE);
         self.listen()?;
         Ok(!self.is_dead())
@@ -118,7 +119,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
             store_writer,
             handover,
             reception: Reception::new(port_status),
-            uplink: Uplink::new(),
+            uplink: Uplink::new(Port::Gs),
             monitoring,
             storage: Storage::new(
                 Slot { card: outside.card, power_on_us: outside.power_on_us },
@@ -154,7 +155,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
                 }
                 Event::UplinkSilence => {
                     self.uplink_silent_at = None;
-                    self.uplink.idle(self.now, &mut self.ends.uplink_in);
+                    self.uplink.idle(&self.ends.uplink_in);
                     self.listen()?;
                 }
                 Event::Tick => {

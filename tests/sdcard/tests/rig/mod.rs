@@ -11,6 +11,7 @@ use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
 use hums_core::params::Params;
 use hums_link::frame::{Check, Frame};
+use hums_link::request::Port;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};
 use hums_onboard::storage::NO_CARD_RETRY;
 use hums_onboard::{Monitoring, PortStatus, ResetCause, Service, Storage, Supervisor, Task};
@@ -219,7 +220,7 @@ impl Rig {
         let bytes = frame(255, 190, id, payload);
         let now = self.slot.now();
         let frame = Frame::parse(&bytes).expect("a frame");
-        assert!(self.ends.uplink_in.put(now.as_micros(), &frame));
+        assert!(self.ends.uplink_in.put(Port::Gs as u64, &frame));
         let Ends { uplink_out, sectors_in, gs_in, .. } = &mut self.ends;
         while self.monitoring.uplink(now, uplink_out, sectors_in, gs_in) {}
     }

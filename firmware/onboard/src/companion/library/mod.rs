@@ -110,6 +110,8 @@ impl Library {
             let ticket = self.next_ticket();
             self.erases = !ways.queues.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
         }
+        // Nobody is there any more to get the rest.
+        self.job = self.job.filter(|job| ways.queues.is_open(job.asker.port));
         for _ in 0..LOOKS_MAX {
             let Some(mut job) = self.job else {
                 ways.queues.shelf.release();

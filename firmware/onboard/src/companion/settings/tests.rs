@@ -8,6 +8,7 @@ use hums_core::params::{Param, Params};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::Frame;
 use hums_link::packet::Packet;
+use hums_link::request::Port;
 use hums_recorder::{CardState, CardStatus};
 
 use crate::monitoring::TICK;
@@ -87,7 +88,7 @@ fn after<T>(
                 Baud(value) => {
                     let packet = Packet::new(23).f32(0, value).u8(4, 1).u8(5, 191).text(6, 16, "AP_BAUD");
                     let frame = Frame::parse(station.frame(&mut out, &packet.u8(22, 9))).expect("a frame");
-                    ends.uplink_in.put(now.as_micros(), &frame);
+                    ends.uplink_in.put(Port::Gs as u64, &frame);
                 }
                 Card | OtherCard => {
                     card.set_volume(if matches!(come, Card) { 0x1234 } else { 0x5678 });
