@@ -166,7 +166,7 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
         },
     )?;
     let new: Vec<String> = new.into_iter().collect();
-    transaction.commit(&lock, &replaced, &new)?;
+    transaction.sync()?.commit(&lock, &replaced, &new)?;
     Ok(sum)
 }
 

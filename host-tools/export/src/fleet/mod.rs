@@ -204,6 +204,7 @@ impl Session {
     pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<Option<Vec<PathBuf>>> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
         let Self { transaction, name, .. } = self;
+        let transaction = transaction.sync()?;
         let lock = transaction::lock(&fleet.root)?;
         let mut written = fleet.written.lock().unwrap_or_else(PoisonError::into_inner);
         let found = fleet.find(&name)?;

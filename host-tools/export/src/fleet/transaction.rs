@@ -1,6 +1,6 @@
 //! Changes of a fleet's files that happen as a whole, also if the program or the computer stops at any step.
 //!
-//! 1. The new files are written in a hidden folder, by the places that they will have.
+//! 1. The new files are written in a hidden folder, by the places that they will have, and go to the disk.
 //! 2. The folder gets the list of the files that they replace. It is renamed: from here on the change counts.
 //! 3. The replaced files are removed, and the new ones are moved to their places.
 //!
@@ -17,6 +17,7 @@ use tempfile::TempDir;
 
 use super::{names, shard};
 use crate::files::{check_parent, settle};
+use crate::logs::in_order::in_order;
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
 pub(crate) const OWN: &str = ".hums-fleet";
@@ -99,11 +100,23 @@ fn is_begun(name: &str) -> bool {
     name.starts_with(COMMIT) && !name.ends_with(PART)
 }
 
+/// Files that go to the disk at once. File systems with a journal write one entry for all that wait: 45 files took 200 ms one
+/// after the other, and 5 ms so (ext4).
+const SYNCS_AT_ONCE: usize = 8;
+
 /// A change that does not count yet. Dropped, it leaves nothing.
 #[derive(Debug)]
 pub(crate) struct Transaction {
     root: PathBuf,
     part: TempDir,
+}
+
+/// A change with all of its new files on the disk.
+pub(crate) struct Synced {
+    root: PathBuf,
+    part: TempDir,
+    /// Places of the new files.
+    places: Vec<String>,
 }
 
 impl Transaction {
@@ -122,6 +135,24 @@ impl Transaction {
         self.part.path().join(FILES).join(place)
     }
 
+    /// All files are there and closed: they go to the disk. A change that counts must have them after a power cut.
+    /// Other changes may be made meanwhile.
+    pub(crate) fn sync(self) -> Result<Synced> {
+        let Self { root, part } = self;
+        let (folder, mut places) = (part.path().join(FILES), Vec::new());
+        let listed = each(&folder, "", &mut |place| {
+            places.push(place.to_owned());
+            Ok(())
+        });
+        settle(listed, &root)?;
+        let mut next = places.iter();
+        let sync = |place: &String| File::open(folder.join(place)).and_then(|file| file.sync_all());
+        in_order(SYNCS_AT_ONCE, places.len(), || Ok(next.next()), sync, |synced| settle(synced, &root))?;
+        Ok(Synced { root, part, places })
+    }
+}
+
+impl Synced {
     /// The change counts from here on, and is carried out. `replaced` are the places of files that go, `compacted` the
     /// sessions that are in a file of several. Returns the paths of the new files.
     pub(crate) fn commit(
@@ -130,13 +161,8 @@ impl Transaction {
         replaced: &BTreeSet<String>,
         compacted: &[String],
     ) -> Result<Vec<PathBuf>> {
-        let Self { root, part } = self;
-        let mut places = Vec::new();
-        let listed = each(&part.path().join(FILES), "", &mut |place| {
-            places.push(root.join(place));
-            Ok(())
-        });
-        settle(listed, &root)?;
+        let Self { root, part, places } = self;
+        let places: Vec<PathBuf> = places.iter().map(|place| root.join(place)).collect();
         // A change that counts must be possible.
         for place in &places {
             check_parent(place)?;
@@ -169,7 +195,6 @@ impl Transaction {
             file.write_all(text.as_bytes())?;
             file.sync_all()?;
         }
-        sync_all(&files)?;
         let unique = part.path().file_name().unwrap_or_default().to_string_lossy();
         let unique = unique.trim_matches('.').trim_end_matches(PART);
         let folder = root.join(OWN).join(format!("{COMMIT}{unique}"));
@@ -179,11 +204,6 @@ impl Transaction {
         let _ = part.keep();
         Ok(folder)
     }
-}
-
-/// Writes all files of a folder to the disk. A change that counts must have them after a power cut.
-fn sync_all(folder: &Path) -> io::Result<()> {
-    each(folder, "", &mut |place| File::open(folder.join(place))?.sync_all())
 }
 
 /// Each step may have been done before.
