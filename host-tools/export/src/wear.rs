@@ -1,9 +1,49 @@
 //! Wear records as rows: `HUMS_LIFETIME`, `HUMS_EXCEEDANCE`, `HUMS_COMPONENT`; and `HUMS_SNAPSHOT`.
 
+use hums_analysis::log_json::finite;
 use hums_blackbox::record::{Component, Exceedance, Lifetime, Snapshot};
+
+use serde::Serialize;
 
 use super::row::{Cell, Row};
 use crate::names::counter_name;
+use crate::summary::Contents;
+
+/// A part of the vehicle by the last record of it, also as JSON of the table `sessions`.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct PartLine {
+    #[serde(rename = "part")]
+    pub(crate) name: String,
+    #[serde(skip)]
+    pub(crate) is_battery: bool,
+    pub(crate) serial: String,
+    pub(crate) status: &'static str,
+    /// `None` without a limit.
+    pub(crate) used_percent: Option<f32>,
+    pub(crate) limit: Option<String>,
+    pub(crate) flight_s: f64,
+    pub(crate) flights: f64,
+    pub(crate) cycles: f64,
+}
+
+/// All parts of a recording.
+pub(crate) fn parts_of(contents: &Contents) -> Vec<PartLine> {
+    let line = |(place, line): (&u8, &crate::summary::ComponentLine)| {
+        let (name, limit) = contents.part(*place, line);
+        PartLine {
+            name,
+            is_battery: line.kind == "battery",
+            serial: line.serial.clone(),
+            status: line.status,
+            used_percent: finite(line.used_percent).filter(|_| limit.is_some()),
+            limit,
+            flight_s: line.figures.flight_s,
+            flights: line.figures.flights,
+            cycles: line.figures.cycles,
+        }
+    };
+    contents.components.iter().map(line).collect()
+}
 
 /// One row a counter.
 pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {

@@ -3,7 +3,6 @@
 use std::sync::LazyLock;
 
 use hums_analysis::log_json::{VehicleJson, duration_s, finite, vehicle};
-use hums_core::component::ComponentFigures;
 use hums_core::figures::Quantity;
 use hums_core::health::Level;
 use hums_core::usage::{CounterName, counter_name as meaning};
@@ -19,6 +18,7 @@ use crate::names::counter_name;
 use crate::row::{Cell, CellType, Row};
 use crate::source::recording::Format;
 use crate::summary::BootLine;
+use crate::wear::parts_of;
 
 static COUNTERS: LazyLock<Vec<String>> = LazyLock::new(|| {
     let has_column = |number: &u8| match meaning(*number) {
@@ -44,19 +44,6 @@ struct ProblemJson<'a> {
     value: Option<f32>,
     limit: Option<f32>,
     unit: &'a str,
-}
-
-#[derive(Serialize)]
-struct PartJson<'a> {
-    part: String,
-    serial: &'a str,
-    status: &'a str,
-    /// `null` without a limit.
-    used_percent: Option<f32>,
-    limit: Option<String>,
-    flight_s: f64,
-    flights: f64,
-    cycles: f64,
 }
 
 fn text(text: impl Into<String>) -> Cell {
@@ -164,17 +151,7 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
             unit: &problem.unit,
         })
         .collect();
-    let parts: Vec<PartJson<'_>> = contents
-        .components
-        .iter()
-        .map(|(place, line)| {
-            let (part, limit) = contents.part(*place, line);
-            let used_percent = finite(line.used_percent).filter(|_| limit.is_some());
-            let (serial, status) = (line.serial.as_str(), line.status);
-            let ComponentFigures { flight_s, flights, cycles, .. } = line.figures;
-            PartJson { part, serial, status, used_percent, limit, flight_s, flights, cycles }
-        })
-        .collect();
+    let parts = parts_of(contents);
     let due = parts.iter().filter(|part| part.used_percent.is_some());
     let due = due
         .max_by(|one, other| one.used_percent.unwrap_or(0.0).total_cmp(&other.used_percent.unwrap_or(0.0)));
@@ -184,7 +161,7 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
         ("worst_check", known(worst.map(|worst| worst.check.clone()), Cell::Text, CellType::Text)),
         ("worst_level", known(worst.map(|worst| worst.level.name().to_owned()), Cell::Text, CellType::Text)),
         ("problems", text(serde_json::to_string(&json).unwrap_or_default())),
-        ("most_used_part", known(due.map(|part| part.part.clone()), Cell::Text, CellType::Text)),
+        ("most_used_part", known(due.map(|part| part.name.clone()), Cell::Text, CellType::Text)),
         ("most_used[%]", known(due.and_then(|part| part.used_percent), Cell::Single, CellType::Single)),
         ("parts", text(serde_json::to_string(&parts).unwrap_or_default())),
     ]);

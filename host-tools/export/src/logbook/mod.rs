@@ -29,6 +29,7 @@ use crate::plural::count;
 use crate::printable::word;
 use crate::source::find::{find, sessions_of};
 use crate::utc::iso8601;
+use crate::wear::{PartLine, parts_of};
 use crate::works::works;
 
 pub(crate) const BY_HAND: [&str; 6] =
@@ -79,19 +80,6 @@ pub(crate) struct LogbookEntry {
     pub(crate) utc_us: Option<(u64, u64)>,
     /// The recording, if the output needs its tracks.
     pub(crate) known: Option<Arc<Known>>,
-}
-
-#[derive(Clone, Debug)]
-pub(crate) struct PartLine {
-    pub(crate) name: String,
-    pub(crate) is_battery: bool,
-    pub(crate) serial: String,
-    pub(crate) status: &'static str,
-    pub(crate) used_percent: Option<f32>,
-    pub(crate) limit: Option<String>,
-    pub(crate) flight_s: f64,
-    pub(crate) flights: f64,
-    pub(crate) cycles: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -258,7 +246,7 @@ impl Session {
             frames: overview.contents.frames(),
             start_us: overview.ending.summary.first.and_then(|first| identity.epochs.utc_us(first)),
             entries: entries(&record, &known),
-            parts: parts(about),
+            parts: parts_of(&about.overview.contents),
             life: life.map(|(flights, flight_s)| Life { flights, flight_s }),
         };
         if has_tracks {
@@ -289,25 +277,6 @@ fn book(sessions: impl Iterator<Item = Session>) -> Book {
 
 fn kind(about: &RecordingContent) -> String {
     vehicle(&about.overview).map_or_else(String::new, |of| format!("{}, {}", of.r#type, of.autopilot))
-}
-
-fn parts(about: &RecordingContent) -> Vec<PartLine> {
-    let contents = &about.overview.contents;
-    let line = |(place, line): (&u8, &crate::summary::ComponentLine)| {
-        let (name, limit) = contents.part(*place, line);
-        PartLine {
-            name,
-            is_battery: line.kind == "battery",
-            serial: line.serial.clone(),
-            status: line.status,
-            used_percent: Some(line.used_percent).filter(|used| used.is_finite() && limit.is_some()),
-            limit,
-            flight_s: line.figures.flight_s,
-            flights: line.figures.flights,
-            cycles: line.figures.cycles,
-        }
-    };
-    contents.components.iter().map(line).collect()
 }
 
 fn entries(record: &str, known: &Known) -> Vec<LogbookEntry> {

@@ -6,9 +6,10 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::{Aircraft, Book, LogbookEntry, PartLine, Spot, hours};
+use super::{Aircraft, Book, LogbookEntry, Spot, hours};
 use crate::files::{Inputs, Output, make_parent, settle};
 use crate::journey::push_xml;
+use crate::wear::PartLine;
 
 const STYLE: &str = "@page{size:A4 landscape;margin:12mm}\
 body{font:10px/1.35 system-ui,sans-serif;color:#111;margin:1rem auto;max-width:273mm}\
