@@ -7,6 +7,7 @@ use hums_core::health::Level;
 use super::row::{Cell, CellType, Row};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
 use crate::check::problem::{Problem, problems};
+use crate::names::{check_name, unit_name};
 use crate::source::told::Finding;
 use crate::summary::Contents;
 
@@ -167,12 +168,12 @@ pub fn problem_words(problem: &Problem) -> String {
     })
 }
 
-/// A finding in words: `cell_voltage 1 critical: 3.4 V (limit 3.5 V)`.
+/// A finding in words: `battery 1 cell voltage critical: 3.4 V (limit 3.5 V)`.
 pub fn finding_words(finding: &Finding) -> String {
     let Finding { check, instance, level, value, limit, unit, .. } = finding;
-    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {}", unit_name(unit)) };
     let number = |number: f32| format!("{}{unit}", (f64::from(number) * 1000.0).round() / 1000.0);
     let value = if value.is_nan() { String::new() } else { format!(": {}", number(*value)) };
     let limit = if limit.is_nan() { String::new() } else { format!(" (limit {})", number(*limit)) };
-    format!("{check} {} {}{value}{limit}", u32::from(*instance) + 1, level.name())
+    format!("{} {}{value}{limit}", check_name(check, *instance), level.name())
 }

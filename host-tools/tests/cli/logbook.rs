@@ -65,14 +65,17 @@ fn totals_are_the_counters_on_board_and_a_card_that_is_there_twice_counts_once()
     let hours = total("ArduPilot") + total("PX4");
     assert!((hours * 3600.0 - of("flight_time_s")).abs() < 3.0, "{hours} h, {} s", of("flight_time_s"));
     let defects: Vec<&str> = rows.iter().filter_map(|row| row["defects"].as_str()).collect();
-    assert_eq!(defects.iter().filter(|words| words.contains("cell_voltage 1 critical: 3.4 V")).count(), 1);
+    assert_eq!(
+        defects.iter().filter(|words| words.contains("battery 1 cell voltage critical: 3.4 V")).count(),
+        1
+    );
     assert!(
         rows.iter().filter(|row| number(&row["take_off_latitude_deg"]).abs() > 1.0).count() >= 2,
         "{rows:?}"
     );
 
     let page = fs::read_to_string(dir.path().join("book.html")).expect("a page");
-    assert!(page.contains("size:A4") && page.contains("cell_voltage 1 critical"), "{page}");
+    assert!(page.contains("size:A4") && page.contains("battery 1 cell voltage critical"), "{page}");
     assert!(
         page.contains("Total in this logbook: 2 flights") && page.contains("Counters of the box"),
         "{page}"
