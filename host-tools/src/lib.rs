@@ -32,6 +32,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser as _};
 
 use cli::{BoxAction, Cli, Command};
+use decode::fleet::overview;
 use outcome::Outcome;
 
 /// The first argument is the program's name.
@@ -61,10 +62,18 @@ fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
+/// Of recordings, or of the fleet in a folder of tables.
+fn report_page(request: &report::Request<'_>) -> anyhow::Result<Outcome> {
+    match request.inputs {
+        [folder] if overview::is_fleet(folder) => report::fleet::page(request, &overview::read(folder)?),
+        _ => report::run(request),
+    }
+}
+
 fn command(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Check(args) => check::run(&args.request()),
-        Command::Report(args) => report::run(&args.request()),
+        Command::Report(args) => report_page(&args.request()),
         Command::Live(args) => live::run(args),
         Command::Decode(args) => decode::run(&args.request()),
         Command::Share(args) => decode::share::run(&args.request()),

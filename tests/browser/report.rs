@@ -770,3 +770,38 @@ fn the_map_has_tiles_of_the_server_that_the_user_named_at_the_place_of_the_fligh
     assert!((x - wanted[0]).abs() < 6.0 && (y - wanted[1]).abs() < 6.0, "{first}, home is at {wanted:?}");
     assert_eq!(shown.console(), serde_json::json!([]), "the policy refuses a tile");
 }
+
+#[test]
+fn a_fleet_has_a_page_of_its_vehicles_and_worst_findings() {
+    let dir = tempfile::tempdir().unwrap();
+    let (fleet, html) = (dir.path().join("fleet"), dir.path().join("fleet.html"));
+    let mut decode = command(["decode", "--format", "parquet", "-o"]);
+    decode.arg(&fleet).args(["ap_quad_guided.tlog", "ap_quad_faults.tlog"].map(own));
+    child::run(&mut decode, LIMIT).expect_code(&[0]);
+    // Beside the folder, with its name.
+    child::run(command(["report"]).arg(&fleet), LIMIT).expect_code(&[0]);
+    child::run(command(["report"]).arg(&fleet), LIMIT).expect_code(&[1]);
+    child::run(command(["report", "--compare", "--force"]).arg(&fleet), LIMIT).expect_code(&[2]);
+    let mut page = LivePage::start();
+    page.open(&format!("file://{}", html.display()), "light", 1280, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    let vehicles = table(&mut page, "#vehicles-table");
+    let [vehicle] = vehicles.as_slice() else { panic!("{vehicles:?}") };
+    assert_eq!(
+        (vehicle[1].as_str(), vehicle[3].as_str(), vehicle[4].as_str()),
+        ("ArduPilot quadrotor", "2", "2")
+    );
+    let findings = table(&mut page, "#findings-table");
+    assert!(findings[0][0] == "critical" && findings[4][0] == "warning", "{findings:?}");
+    assert!(
+        findings.iter().any(|row| row[2] == "battery 1 cell voltage" && row[5] == "3.4 V"),
+        "{findings:?}"
+    );
+    page.run("const word = document.querySelector('#findings input'); word.value = 'nothing has this'; word.dispatchEvent(new Event('input'))");
+    assert!(table(&mut page, "#findings-table").is_empty());
+    assert_eq!(page.console(), serde_json::json!([]));
+    page.open(&format!("file://{}", html.display()), "light", 390, 844);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    let width = page.run("return [document.documentElement.scrollWidth, innerWidth]");
+    assert!(width[0].as_f64() <= width[1].as_f64(), "{width}");
+}

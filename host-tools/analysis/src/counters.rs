@@ -141,7 +141,8 @@ fn of_vehicle(name: &str) -> (String, &'static str, u8) {
     (title.to_owned(), unit, decimals)
 }
 
-fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
+/// Title, unit and decimals of a figure of steady flight.
+pub fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
     match quantity {
         Quantity::Vibration => ("Vibration in steady flight".to_owned(), "m/s\u{b2}", 2),
         Quantity::HoverThrottle => ("Hover throttle".to_owned(), "", 3),

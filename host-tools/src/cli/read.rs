@@ -307,9 +307,10 @@ const REPORT_EXAMPLES: &str = "Examples:
   hums report card.img -o pages/
   hums report card.img --session 00001 -o report.html
   hums report before.tlog after.tlog --compare -o both.html
+  hums report fleet
 
 Without -o the page of flight.tlog is flight.html, beside it. With a directory for -o each session gets a page, named after log, box and session, and index.html is a table of them; otherwise only the
-newest session gets a page. A page compares with the sessions before on the same card, and the parameters with those of the airframe's last flight.";
+newest session gets a page. The folder of hums decode --format parquet gets one page about its vehicles, fleet.html beside it. A page compares with the sessions before on the same card, and the parameters with those of the airframe's last flight.";
 
 /// `hums report`
 #[derive(Args, Clone, Debug)]

@@ -10,6 +10,7 @@
 //! session take their places in one transaction. The session's file in `sessions` tells that the session is there.
 
 pub mod compact;
+pub mod overview;
 pub(crate) mod sessions;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 //!
 //! The files in `assets/` are ECMAScript modules, with two habits that make joining them simple. An `import`
 //! is one line, and an export is a `const` at its definition. Each becomes a function that is called once and
-//! returns its exports; an import takes from that. `live`, `report`, `index`, `compare`, `check` and `worker` are imported by no
+//! returns its exports; an import takes from that. `live`, `report`, `index`, `compare`, `fleet`, `check` and `worker` are imported by no
 //! other module: each with its imports is one program.
 
 use std::fmt::Write as _;
@@ -18,8 +18,8 @@ modules! {
     "badge" "canvas" "colours" "dom" "elements" "flight" "layout" "map" "notes" "parameters" "plot" "plots" "text" "tiles" "timeline" "view"
     // The whole one.
     "data" "recorder" "report" "spectrum" "summary" "trend" "usage"
-    // The table of a folder's pages, and the comparison of flights.
-    "index" "compare"
+    // The table of a folder's pages, the comparison of flights, and a fleet.
+    "index" "compare" "fleet" "sorted"
     // The check in a browser, and its worker.
     "check" "worker"
     // The one that grows.
@@ -127,8 +127,10 @@ mod tests {
 
     #[test]
     fn every_module_is_needed_and_what_it_exports_too() {
-        let used: BTreeSet<&str> =
-            ["live", "report", "index", "compare", "check", "worker"].into_iter().flat_map(needed).collect();
+        let used: BTreeSet<&str> = ["live", "report", "index", "compare", "fleet", "check", "worker"]
+            .into_iter()
+            .flat_map(needed)
+            .collect();
         for (name, text) in MODULES {
             assert!(used.contains(name), "nobody needs {name}");
             for line in text.lines().filter(|line| line.starts_with("export")) {
@@ -185,7 +187,7 @@ mod tests {
 
     #[test]
     fn nothing_that_a_vehicle_sent_becomes_markup_and_nothing_is_loaded() {
-        for program in ["live", "report", "index", "compare", "check"].map(program) {
+        for program in ["live", "report", "index", "compare", "fleet", "check"].map(program) {
             for markup in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval("] {
                 assert!(!program.contains(markup), "{markup}");
             }

@@ -10,6 +10,7 @@
 //! The page's own policy blocks other scripts and all loading except the map's tiles.
 
 pub mod compare;
+pub mod fleet;
 pub mod flights;
 pub mod index;
 pub mod page;

@@ -2,6 +2,7 @@
 
 import { el } from "./elements.js";
 import { bar, main } from "./layout.js";
+import { sorted } from "./sorted.js";
 import { counted, fixed, plural, span } from "./text.js";
 
 const { pages, comparisons, version } = JSON.parse(document.getElementById("data").textContent);
@@ -25,7 +26,6 @@ const verdict = (page) => `${found(page)}${page.begins_in_air ? "; begins in the
 // Sessions of two cards may have one name: the file's names the box too.
 const called = ({ name, file }) => (pages.filter((page) => page.name === name).length > 1 ? file.replace(/\.html$/, "") : name);
 const brief = (name) => (name.length > 48 ? `\u2026${name.slice(-47)}` : name);
-// Title, kind of cell, what it is sorted by, what stands there.
 const COLUMNS = [
   ["Begin, UTC", "t", ({ start_utc }) => start_utc ?? "", ({ start_utc }) => when(start_utc)],
   ["Recording", "words", called, (page) => el("a", { href: encodeURIComponent(page.file) }, brief(called(page)))],
@@ -55,48 +55,8 @@ const COLUMNS = [
   ["Recording is", "words", ({ faults }) => faults.length, ({ faults }) => faults.join("; ") || "whole"],
 ];
 
-let by = 0,
-  down = true;
-const body = el("tbody");
-const word = el("input", {
-  type: "search",
-  placeholder: "vehicle, name, date",
-  "aria-label": "Only recordings that have this in their row",
-});
-const heads = COLUMNS.map(([title, kind], i) => {
-  const button = el("button", { type: "button", class: "sort", onclick: () => sort(i) }, title);
-  return el("th", { class: kind === "n" ? "n" : "", scope: "col" }, button);
-});
-const rows = pages.map((page) => ({
-  page,
-  node: el(
-    "tr",
-    {},
-    COLUMNS.map(([, kind, , shown]) => el("td", { class: kind }, shown(page))),
-  ),
-}));
-const draw = () => {
-  const [, , key] = COLUMNS[by];
-  rows.sort((one, other) => {
-    const [a, b] = [key(one.page), key(other.page)];
-    return (a < b ? -1 : a > b ? 1 : 0) * (down ? -1 : 1);
-  });
-  const part = word.value.toLowerCase();
-  body.replaceChildren(...rows.map(({ node }) => node).filter((node) => node.textContent.toLowerCase().includes(part)));
-  heads.forEach((head, i) => {
-    head.setAttribute("aria-sort", i !== by ? "none" : down ? "descending" : "ascending");
-  });
-};
-const sort = (column) => {
-  down = column === by ? !down : COLUMNS[column][1] === "n" || column === 0;
-  by = column;
-  draw();
-};
-word.addEventListener("input", draw);
-
 main.append(
-  word,
-  el("div", { class: "panel scroll", id: "pages" }, el("table", {}, el("thead", {}, el("tr", {}, heads)), body)),
+  ...sorted("pages", pages, COLUMNS, { placeholder: "vehicle, name, date", label: "Only recordings that have this in their row" }),
   comparisons.length
     ? el(
         "div",
@@ -110,5 +70,4 @@ main.append(
       )
     : "",
 );
-draw();
 root.dataset.ready = "true";

@@ -1,0 +1,421 @@
+//! The fleet by its table `sessions`: vehicles, parts that are due, worst findings, and vehicles that differ from the others.
+//!
+//! Vehicles of one autopilot and type are compared by each figure of steady flight. A vehicle's figure is the median of its
+//! sessions. It is an outlier if its modified z-score is above 3.5: 0.6745 |x - median| / MAD, with the median of the
+//! vehicles, and MAD the median of their distances from it (Iglewicz and Hoaglin 1993, in the NIST/SEMATECH e-Handbook of
+//! Statistical Methods, 1.3.5.17). Distances below the figure's grain count as none ([`Quantity::grain`]).
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use hums_analysis::counters::of_figure;
+use hums_core::figures::Quantity;
+use hums_core::usage::{CounterName, counter_name as meaning};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::record::{Field, Row};
+use parquet::schema::types::Type;
+use serde::{Deserialize, Serialize};
+
+use super::transaction::{self, OWN};
+use super::{EXTENSION, SESSIONS, folders, names};
+use crate::names::{check_name, counter_name, unit_name};
+
+/// Vehicles of a kind at least: the median of fewer says little.
+const VEHICLES_MIN: usize = 5;
+const SCORE_MAX: f64 = 3.5;
+/// The normal distribution's quartile, which makes MAD comparable with a standard deviation.
+const QUARTILE: f64 = 0.6745;
+/// Findings of a page at most: vehicles and checks.
+const FINDINGS_MAX: usize = 2_000;
+const COLUMNS: &str =
+    "vehicle session utc autopilot type firmware flights flight_time_s criticals warnings problems parts";
+
+/// A fleet, for its page.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Overview {
+    /// Rows of the table.
+    pub sessions: u64,
+    /// In the order of their names.
+    pub vehicles: Vec<Vehicle>,
+    /// Parts that are due or soon due by their vehicle's last session, most used first.
+    pub due: Vec<Due>,
+    /// Worst first.
+    pub findings: Vec<Found>,
+    /// Findings that a page has no room for.
+    pub findings_left_out: usize,
+    /// Farthest first.
+    pub outliers: Vec<Outlier>,
+    /// Vehicles of kinds that are too few to compare.
+    pub not_compared: usize,
+}
+
+/// A vehicle with the sums of its sessions.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Vehicle {
+    /// Its name.
+    pub vehicle: String,
+    /// Autopilot and type.
+    pub kind: String,
+    /// Of its last session.
+    pub firmware: String,
+    /// Their number.
+    pub sessions: u64,
+    /// Their number.
+    pub flights: f64,
+    /// Seconds in the air.
+    pub flight_s: f64,
+    /// First and last day, UTC; empty if unknown.
+    pub days: (String, String),
+    /// Critical problems.
+    pub critical: f64,
+    /// Problems with a warning.
+    pub warning: f64,
+}
+
+/// A part, as in the table's JSON.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Due {
+    #[serde(default)]
+    vehicle: String,
+    part: String,
+    serial: String,
+    status: String,
+    used_percent: Option<f64>,
+    limit: Option<String>,
+}
+
+/// A problem, as in the table's JSON.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Problem {
+    level: String,
+    check: String,
+    instance: u8,
+    value: Option<f64>,
+    limit: Option<f64>,
+    unit: String,
+}
+
+/// A problem of a vehicle in all of its sessions, as it was in the last one of the worst level.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Found {
+    vehicle: String,
+    sessions: u64,
+    session: String,
+    day: String,
+    #[serde(skip)]
+    at: Option<f64>,
+    #[serde(flatten)]
+    problem: Problem,
+}
+
+/// A figure that differs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outlier {
+    vehicle: String,
+    kind: String,
+    figure: String,
+    value: f64,
+    median: f64,
+    unit: &'static str,
+    decimals: u8,
+    score: f64,
+    vehicles: usize,
+}
+
+#[derive(Default)]
+struct Gathered {
+    vehicle: Vehicle,
+    /// Time of the last session, and of the last one with parts.
+    last: Option<f64>,
+    last_parts: Option<f64>,
+    due: Vec<Due>,
+    findings: BTreeMap<(String, u8), Found>,
+    figures: BTreeMap<usize, Vec<f64>>,
+}
+
+/// Figures that vehicles are compared by: their columns, quantities.
+fn figures() -> Vec<(String, Quantity)> {
+    let figure = |number| match meaning(number) {
+        // A motor differs from its neighbours, not from other vehicles.
+        Some(CounterName::Figure(Quantity::MotorSpeed(_) | Quantity::MotorOutput(_))) | None => None,
+        Some(CounterName::Figure(quantity)) => Some((counter_name(number), quantity)),
+        Some(_) => None,
+    };
+    (0..=u8::MAX).filter_map(figure).collect()
+}
+
+/// Whether a folder has the tables of a fleet.
+pub fn is_fleet(folder: &Path) -> bool {
+    folder.join(OWN).is_dir() && folder.join(SESSIONS).is_dir()
+}
+
+/// Reads the table `sessions` of a folder.
+///
+/// # Errors
+/// A file of it cannot be read.
+pub fn read(root: &Path) -> Result<Overview> {
+    transaction::recover(root)?;
+    let figures = figures();
+    let mut vehicles: BTreeMap<String, Gathered> = BTreeMap::new();
+    let table = root.join(SESSIONS);
+    for date in folders(&table)? {
+        for bucket in folders(&table.join(&date))? {
+            let folder = table.join(&date).join(bucket);
+            let day = date.strip_prefix("date=").filter(|day| *day != super::NO_DATE).unwrap_or_default();
+            for name in names(&folder)?.iter().filter(|name| name.ends_with(EXTENSION)) {
+                let path = folder.join(name);
+                read_file(&path, &figures, |row| {
+                    let name = text(&row, "vehicle").unwrap_or("unknown").to_owned();
+                    vehicles.entry(name).or_default().add(&row, day, &figures);
+                })
+                .with_context(|| format!("{}: cannot be read as a table", path.display()))?;
+            }
+        }
+    }
+    Ok(Overview::of(vehicles, &figures))
+}
+
+type Cells = BTreeMap<String, Field>;
+
+fn read_file(path: &Path, figures: &[(String, Quantity)], mut take: impl FnMut(Cells)) -> Result<()> {
+    let reader = SerializedFileReader::new(File::open(path)?)?;
+    let schema = reader.metadata().file_metadata().schema();
+    let is_wanted = |field: &&Arc<Type>| {
+        COLUMNS.split(' ').any(|name| name == field.name())
+            || figures.iter().any(|(name, _)| name == field.name())
+    };
+    let fields = schema.get_fields().iter().filter(is_wanted).cloned().collect();
+    let projection = Type::group_type_builder(schema.name()).with_fields(fields).build()?;
+    for row in reader.get_row_iter(Some(projection))? {
+        let row: Row = row?;
+        take(row.get_column_iter().map(|(name, field)| (name.clone(), field.clone())).collect());
+    }
+    Ok(())
+}
+
+fn text<'a>(row: &'a Cells, name: &str) -> Option<&'a str> {
+    match row.get(name)? {
+        Field::Str(text) => Some(text),
+        _ => None,
+    }
+}
+
+fn number(row: &Cells, name: &str) -> Option<f64> {
+    match row.get(name)? {
+        Field::Double(value) => Some(*value),
+        Field::Float(value) => Some(f64::from(*value)),
+        Field::ULong(value) => Some(*value as f64),
+        Field::Long(value) | Field::TimestampMicros(value) => Some(*value as f64),
+        _ => None,
+    }
+    .filter(|value| value.is_finite())
+}
+
+fn list<T: for<'a> Deserialize<'a>>(row: &Cells, name: &str) -> Vec<T> {
+    text(row, name).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+}
+
+impl Gathered {
+    fn add(&mut self, row: &Cells, day: &str, figures: &[(String, Quantity)]) {
+        let sum = |name| number(row, name).unwrap_or(0.0);
+        let said = |name| text(row, name).unwrap_or_default().to_owned();
+        let at = number(row, "utc");
+        let vehicle = &mut self.vehicle;
+        vehicle.sessions += 1;
+        vehicle.flights += sum("flights");
+        vehicle.flight_s += sum("flight_time_s");
+        vehicle.critical += sum("criticals");
+        vehicle.warning += sum("warnings");
+        let (first, last) = &mut vehicle.days;
+        if !day.is_empty() && (first.is_empty() || day < first.as_str()) {
+            day.clone_into(first);
+        }
+        if day > last.as_str() {
+            day.clone_into(last);
+        }
+        let name = said("vehicle");
+        if vehicle.vehicle.is_empty() || at >= self.last {
+            self.last = at;
+            vehicle.vehicle.clone_from(&name);
+            vehicle.kind = format!("{} {}", said("autopilot"), said("type")).trim().to_owned();
+            vehicle.firmware = said("firmware");
+        }
+        let parts: Vec<Due> = list(row, "parts");
+        if !parts.is_empty() && at >= self.last_parts {
+            self.last_parts = at;
+            let due = parts.into_iter().filter(|part| part.status != "green");
+            self.due = due.map(|part| Due { vehicle: name.clone(), ..part }).collect();
+        }
+        let mut counted = BTreeSet::new();
+        for problem in list::<Problem>(row, "problems") {
+            if !matches!(problem.level.as_str(), "critical" | "warning") {
+                continue;
+            }
+            let key = (problem.check.clone(), problem.instance);
+            let check = check_name(&problem.check, problem.instance);
+            let unit = unit_name(&problem.unit).to_owned();
+            let (vehicle, session, day) = (name.clone(), said("session"), day.to_owned());
+            let found =
+                Found { vehicle, sessions: 0, session, day, at, problem: Problem { check, unit, ..problem } };
+            let known = self.findings.entry(key.clone()).or_insert_with(|| found.clone());
+            if (found.is_critical(), at) >= (known.is_critical(), known.at) {
+                *known = Found { sessions: known.sessions, ..found };
+            }
+            known.sessions += u64::from(counted.insert(key));
+        }
+        for (index, (name, _)) in figures.iter().enumerate() {
+            if let Some(value) = number(row, name) {
+                self.figures.entry(index).or_default().push(value);
+            }
+        }
+    }
+}
+
+impl Found {
+    fn is_critical(&self) -> bool {
+        self.problem.level == "critical"
+    }
+}
+
+impl Overview {
+    fn of(vehicles: BTreeMap<String, Gathered>, figures: &[(String, Quantity)]) -> Self {
+        let mut fleet = Self::default();
+        let mut kinds: BTreeMap<String, Vec<(String, BTreeMap<usize, f64>)>> = BTreeMap::new();
+        for (name, gathered) in vehicles {
+            let Gathered { vehicle, due, findings, figures, .. } = gathered;
+            let medians =
+                figures.into_iter().map(|(index, mut values)| (index, median(&mut values))).collect();
+            kinds.entry(vehicle.kind.clone()).or_default().push((name, medians));
+            fleet.sessions += vehicle.sessions;
+            fleet.vehicles.push(vehicle);
+            fleet.due.extend(due);
+            fleet.findings.extend(findings.into_values());
+        }
+        let used = |part: &Due| part.used_percent.unwrap_or(0.0);
+        fleet.due.sort_by(|one, other| used(other).total_cmp(&used(one)));
+        fleet.findings.sort_by_key(|found| (!found.is_critical(), Reverse(found.sessions)));
+        fleet.findings_left_out = fleet.findings.len().saturating_sub(FINDINGS_MAX);
+        fleet.findings.truncate(FINDINGS_MAX);
+        for (kind, vehicles) in kinds {
+            if vehicles.len() < VEHICLES_MIN {
+                fleet.not_compared += vehicles.len();
+                continue;
+            }
+            for (index, (_, quantity)) in figures.iter().enumerate() {
+                let values = vehicles.iter().filter_map(|(name, values)| Some((name, *values.get(&index)?)));
+                fleet.outliers.extend(outliers(&kind, *quantity, &values.collect::<Vec<_>>()));
+            }
+        }
+        fleet.outliers.sort_by(|one, other| other.score.total_cmp(&one.score));
+        fleet
+    }
+}
+
+/// Of an even number of values the mean of both in the middle; 0 without any.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
+    f64::midpoint(at(values.len().saturating_sub(1) / 2), at(values.len() / 2))
+}
+
+fn outliers(kind: &str, quantity: Quantity, values: &[(&String, f64)]) -> Vec<Outlier> {
+    if values.len() < VEHICLES_MIN {
+        return Vec::new();
+    }
+    let middle = median(&mut values.iter().map(|(_, value)| *value).collect::<Vec<_>>());
+    let mad = median(&mut values.iter().map(|(_, value)| (value - middle).abs()).collect::<Vec<_>>());
+    let mad = mad.max(f64::from(quantity.grain()) * QUARTILE);
+    let (figure, unit, decimals) = of_figure(quantity);
+    let outlier = |(vehicle, value): &(&String, f64)| {
+        let score = QUARTILE * (value - middle).abs() / mad;
+        (score > SCORE_MAX).then(|| Outlier {
+            vehicle: (*vehicle).clone(),
+            kind: kind.to_owned(),
+            figure: figure.clone(),
+            value: *value,
+            median: middle,
+            unit,
+            decimals,
+            score,
+            vehicles: values.len(),
+        })
+    };
+    values.iter().filter_map(outlier).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(vehicle: &str, session: u64, vibration: f64) -> Cells {
+        let problems = r#"[{"level":"warning","check":"cell_voltage","instance":0,"times":1,"at_s":3.0,"value":3.4,"limit":3.5,"unit":"V"},
+            {"level":"ok","check":"hover_power","instance":0,"times":0,"at_s":0.0,"value":null,"limit":null,"unit":""}]"#;
+        let parts = r#"[{"part":"motor 1","serial":"m1","status":"red","used_percent":104.5,"limit":"100 h","flight_s":1.0,"flights":1.0,"cycles":0.0},
+            {"part":"frame","serial":"","status":"green","used_percent":null,"limit":null,"flight_s":1.0,"flights":1.0,"cycles":0.0}]"#;
+        let text = |text: &str| Field::Str(text.to_owned());
+        [
+            ("vehicle", text(vehicle)),
+            ("session", text(&format!("s{session:08x}"))),
+            ("utc", Field::TimestampMicros(session as i64)),
+            ("autopilot", text("PX4")),
+            ("type", text("quadrotor")),
+            ("firmware", text(&format!("1.{session}"))),
+            ("flights", Field::Double(2.0)),
+            ("flight_time_s", Field::Double(600.0)),
+            ("criticals", Field::ULong(0)),
+            ("warnings", Field::ULong(1)),
+            ("problems", text(problems)),
+            ("parts", text(if session == 1 { parts } else { "[]" })),
+            ("steady_vibration_m_s2", Field::Double(vibration)),
+        ]
+        .map(|(name, field)| (name.to_owned(), field))
+        .into()
+    }
+
+    fn fleet(vibrations: &[f64]) -> Overview {
+        let (figures, mut vehicles) = (figures(), BTreeMap::<String, Gathered>::new());
+        for (number, vibration) in vibrations.iter().enumerate() {
+            for session in [2, 1, 3] {
+                let name = format!("uid-{number}");
+                let row = row(&name, session, *vibration);
+                vehicles.entry(name).or_default().add(&row, &format!("2026-05-0{session}"), &figures);
+            }
+        }
+        Overview::of(vehicles, &figures)
+    }
+
+    #[test]
+    fn a_vehicle_that_shakes_more_than_the_others_is_an_outlier() {
+        let found = fleet(&[10.0, 12.0, 11.0, 9.0, 10.5, 11.5, 40.0]);
+        let [outlier] = found.outliers.as_slice() else { panic!("{:?}", found.outliers) };
+        assert_eq!((outlier.vehicle.as_str(), outlier.vehicles), ("uid-6", 7));
+        // The median is 11, MAD is 1.
+        assert!(
+            (outlier.median - 11.0).abs() < 1e-9 && (outlier.score - 0.6745 * 29.0).abs() < 1e-6,
+            "{outlier:?}"
+        );
+        // Equal vehicles: a difference within the grain is none.
+        assert!(fleet(&[10.0, 10.0, 10.0, 10.0, 10.9]).outliers.is_empty());
+        assert_eq!(fleet(&[10.0, 10.0, 10.0, 10.0, 20.0]).outliers.len(), 1);
+        let few = fleet(&[10.0, 10.0, 40.0]);
+        assert_eq!((few.outliers.len(), few.not_compared), (0, 3));
+    }
+
+    #[test]
+    fn sessions_of_a_vehicle_are_summed_and_the_last_one_tells_its_firmware_and_parts() {
+        let found = fleet(&[10.0, 10.0]);
+        assert_eq!((found.sessions, found.vehicles.len()), (6, 2));
+        let vehicle = &found.vehicles[0];
+        assert_eq!((vehicle.flights, vehicle.flight_s, vehicle.warning), (6.0, 1800.0, 3.0));
+        assert_eq!((vehicle.firmware.as_str(), vehicle.kind.as_str()), ("1.3", "PX4 quadrotor"));
+        assert_eq!(vehicle.days, ("2026-05-01".to_owned(), "2026-05-03".to_owned()));
+        assert_eq!((found.due.len(), found.due[0].part.as_str()), (2, "motor 1"));
+        let finding = &found.findings[0];
+        assert_eq!((found.findings.len(), finding.sessions, finding.day.as_str()), (2, 3, "2026-05-03"));
+        assert!(!finding.is_critical() && finding.problem.check == "battery 1 cell voltage", "{finding:?}");
+    }
+}
