@@ -66,6 +66,14 @@ pub(crate) fn prepare() -> Result<()> {
     Ok(())
 }
 
+/// Half a gigabyte, for `prove fleet` alone.
+pub(crate) fn prepare_spark() -> Result<()> {
+    let list = repo::root().join(FOLDER).join("requirements-spark.txt");
+    let pip =
+        Shell::new(python()).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]);
+    pip.arg(list).run().context("Spark cannot be installed: is there a network?")
+}
+
 /// Definitions in the `mavlink` crate of `Cargo.lock`.
 fn definitions() -> Result<PathBuf> {
     let metadata = MetadataCommand::new().current_dir(repo::root()).exec()?;

@@ -1,8 +1,8 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
-//! They are in the tests' crate; this builds them. Apart: `diagnosis` (labelled flights, `docs/diagnosis.md`), `chip` (long
-//! tests on the model), `boards` (every board's image), `foreign` (foreign programs on the model), `browser` (the check in a
-//! browser: time and memory).
+//! They are in the tests' crate; this builds them. Apart: `diagnosis` (labelled flights, `docs/diagnosis.md`), `fleet` (20,000
+//! sessions as tables), `chip` (long tests on the model), `boards` (every board's image), `foreign` (foreign programs on the
+//! model), `browser` (the check in a browser: time and memory).
 
 use anyhow::Result;
 
@@ -28,6 +28,8 @@ const BROWSER: &str = "browser";
 
 const DIAGNOSIS: &str = "diagnosis";
 
+const FLEET: &str = "fleet";
+
 /// Names, `--short`, `--seed N`, `--runs N`; `diagnosis`, `chip` and `foreign` have their own.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
@@ -37,14 +39,30 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
         }
         Some((FOREIGN, rest)) => return foreign::run(rest),
         Some((BROWSER, [])) => return in_browsers(),
+        Some((FLEET, _)) => return fleet(arguments),
         _ => {}
     }
     let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
     let mut needs = if is_diagnosis { Vec::new() } else { NEEDS.to_vec() };
     needs.push(Need::Linker);
     setup::require(&needs)?;
+    campaigns(arguments).run()
+}
+
+fn campaigns(arguments: &[String]) -> Shell {
     let run = ["run", "--release", "--quiet", "--package=hums-tests", "--bin", "prove", "--"];
-    Shell::cargo().args(run).args(arguments).run()
+    Shell::cargo().args(run).args(arguments)
+}
+
+/// The users' `hums`, DuckDB, and Spark if Java is there.
+fn fleet(arguments: &[String]) -> Result<()> {
+    setup::require(&[Need::Linker, Need::PythonVenv])?;
+    oracle::prepare()?;
+    if setup::ensure(&[Need::Java], false).has(Need::Java) {
+        oracle::prepare_spark()?;
+    }
+    let hums = hums::build_release()?;
+    campaigns(arguments).env("HUMS_BIN", hums).env("HUMS_PYTHON", oracle::python()).run()
 }
 
 /// Some or all.

@@ -43,6 +43,7 @@ pub(crate) enum Need {
     Victoria,
     Chromium,
     Firefox,
+    Java,
 }
 
 /// Found and installed.
@@ -55,7 +56,7 @@ enum Source {
 }
 
 /// Each need with its purpose.
-const TABLE: [(Need, &str, Source); 17] = [
+const TABLE: [(Need, &str, Source); 18] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
     (Need::BrowserTarget, "Rust's target of the check in a browser", Target(BROWSER_TARGET)),
@@ -73,6 +74,11 @@ const TABLE: [(Need, &str, Source); 17] = [
     (Need::Victoria, "VictoriaMetrics", Packages("command -v victoria-metrics", "victoria-metrics")),
     (Need::Chromium, "Chromium and its driver", Packages(FIND_CHROMIUM, CHROMIUM)),
     (Need::Firefox, "Firefox", Packages("command -v firefox-esr", "firefox-esr")),
+    (
+        Need::Java,
+        "Java, which runs Spark for prove fleet",
+        Packages("command -v java", "default-jre-headless"),
+    ),
 ];
 
 const FIND_MINGW: &str = "command -v x86_64-w64-mingw32-gcc";

@@ -8,18 +8,21 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail};
 use hums_tests::flights::root;
 use hums_tests::prove::diagnosis::{self, DIAGNOSIS, Flights};
+use hums_tests::prove::fleet::{self, FLEET, Fleet};
 use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Part, Provenance, write_report};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
 const USAGE: &str = "prove [NAME...] [--short] [--seed N] [--runs N] [--no-report] [--list]
-prove diagnosis [FOLDER]... [--unseen FOLDER]... [--short] [--write]";
+prove diagnosis [FOLDER]... [--unseen FOLDER]... [--short] [--write]
+prove fleet [--short] [--runs N]";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let run = match words.split_first() {
         Some((first, rest)) if first == DIAGNOSIS => Flights::parse(rest).map(|flights| judge(&flights)),
+        Some((first, rest)) if first == FLEET => Fleet::parse(rest).map(|extent| analyse(&extent)),
         _ => Arguments::parse(words.into_iter()).map(|arguments| run(&arguments)),
     };
     match run {
@@ -45,6 +48,13 @@ fn judge(flights: &Flights) -> Result<()> {
     let start = Instant::now();
     let text = diagnosis::run(flights, || commit("docs/diagnosis.md"))?;
     println!("{DIAGNOSIS} took {:.1} s\n{text}", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn analyse(extent: &Fleet) -> Result<()> {
+    let start = Instant::now();
+    let text = fleet::run(extent)?;
+    println!("{FLEET} held in {:.1} s\n{text}", start.elapsed().as_secs_f64());
     Ok(())
 }
 
@@ -91,6 +101,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         if all {
             println!("{DIAGNOSIS:<12} {}", diagnosis::ABOUT);
+            println!("{FLEET:<12} {}", fleet::ABOUT);
         }
         return Ok(());
     }

@@ -8,6 +8,7 @@ mod damage;
 pub mod diagnosis;
 mod endurance;
 mod figures;
+pub mod fleet;
 mod hostile_gs;
 mod memory;
 mod mutations;

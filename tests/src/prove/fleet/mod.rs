@@ -1,0 +1,311 @@
+//! A fleet of 10,000 vehicles with 20,000 sessions: their ingest, the size and speed of their tables, and the sum for a year.
+//!
+//! It is not a campaign of `docs/proof.md`: its figures are of the machine that runs it.
+
+mod sessions;
+
+use std::ffi::OsStr;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use serde_json::Value;
+
+use crate::child;
+use crate::flights::{OWN, own, root};
+use crate::oracle;
+use crate::program::command;
+use sessions::{Stretch, VEHICLES};
+
+/// Its name for `prove`.
+pub const FLEET: &str = "fleet";
+/// Its description for a list.
+pub const ABOUT: &str = "20,000 sessions of 10,000 vehicles: ingest, size, queries, and the sum for a year";
+
+/// A call takes its share of a day's sessions.
+const LIMIT: Duration = Duration::from_hours(1);
+/// Of the issue: sessions of a year, ingest against one file at a time, size against the log, seconds of a query, disk.
+const YEAR: f64 = 18e6;
+const SPEED_MIN: f64 = 1.3;
+const SIZE_MAX: f64 = 1.5;
+const QUERY_S_MAX: f64 = 1.0;
+const DISK_MAX: u64 = 3 << 30;
+
+/// Extent of the fleet.
+#[derive(Clone, Copy, Debug)]
+pub struct Fleet {
+    sessions: u64,
+    days: u64,
+    /// Seconds of each session.
+    seconds: u64,
+    /// Sessions for the comparison of speeds.
+    compared: u64,
+    /// Only the tables of the documented queries, and no limits of size and speed.
+    is_short: bool,
+}
+
+impl Fleet {
+    /// All of it.
+    pub const LONG: Self = Self { sessions: 20_000, days: 20, seconds: 20, compared: 200, is_short: false };
+    /// For `cargo xtask test`.
+    pub const SHORT: Self = Self { sessions: 60, days: 1, seconds: 1, compared: 3, is_short: true };
+
+    /// From `--short` and `--runs N`.
+    pub fn parse(words: &[String]) -> Result<Self> {
+        match words.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+            [] => Ok(Self::LONG),
+            ["--short"] => Ok(Self::SHORT),
+            ["--runs", count] => {
+                let sessions = count.parse().with_context(|| format!("{count} is no number"))?;
+                Ok(Self { sessions, days: sessions.div_ceil(1_000), ..Self::LONG })
+            }
+            _ => bail!("prove {FLEET} takes --short or --runs N"),
+        }
+    }
+}
+
+/// Makes, ingests and asks the fleet, in a temporary folder. Returns the figures as text.
+///
+/// # Errors
+/// A promise is broken.
+pub fn run(fleet: &Fleet) -> Result<String> {
+    let dir = tempfile::tempdir()?;
+    let dir = dir.path();
+    let mut text = String::new();
+    let stretches = Stretch::all(fleet.seconds)?;
+    let ratio = compare(fleet, &stretches, dir, &mut text)?;
+    let bytes = if fleet.is_short { None } else { Some(size(dir, &mut text)?) };
+    let cost = ingest(fleet, &stretches, dir, &mut text)?;
+    let query_s = ask(fleet, dir, &mut text)?;
+    year(fleet, &cost, bytes, query_s, &mut text);
+    // The speed of a short run is of the machine's other work.
+    ensure!(
+        fleet.is_short || ratio >= SPEED_MIN && query_s <= QUERY_S_MAX,
+        "{text}ingest is {ratio:.2} times as fast, {SPEED_MIN} are needed; the slowest query took {query_s:.2} s, {QUERY_S_MAX} s are \
+         allowed: does this machine have other work?"
+    );
+    Ok(text)
+}
+
+fn decode(inputs: &[PathBuf], output: &Path, format: &str, more: &[&str]) -> f64 {
+    let begun = Instant::now();
+    let mut decode = command([OsStr::new("decode"), "--format".as_ref(), format.as_ref(), "-o".as_ref()]);
+    child::run(decode.arg(output).args(inputs).args(more), LIMIT).expect_code(&[0]);
+    begun.elapsed().as_secs_f64()
+}
+
+fn compact(folder: &Path) -> f64 {
+    let begun = Instant::now();
+    child::run(&mut command([OsStr::new("compact"), folder.as_os_str()]), LIMIT).expect_code(&[0]);
+    begun.elapsed().as_secs_f64()
+}
+
+/// Bytes and number of the files below a folder.
+fn taken(folder: &Path) -> Result<(u64, u64)> {
+    let mut sum = (0, 0);
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let (bytes, files) = if path.is_dir() { taken(&path)? } else { (fs::metadata(&path)?.len(), 1) };
+        sum = (sum.0 + bytes, sum.1 + files);
+    }
+    Ok(sum)
+}
+
+/// Sessions `from..to` as files of a new folder. Returns the number of their frames.
+fn make(stretches: &[Stretch], sessions: std::ops::Range<u64>, day: u64, folder: &Path) -> Result<u64> {
+    fs::create_dir_all(folder)?;
+    let mut frames = 0;
+    for index in sessions {
+        // Both sessions of a vehicle are of one recording.
+        let stretch = stretches.get((index % VEHICLES) as usize % stretches.len()).context("no stretch")?;
+        frames += stretch.write(index, day, &folder.join(format!("{index:05}.tlog")))?;
+    }
+    Ok(frames)
+}
+
+/// The same files one by one, and in one call.
+fn compare(fleet: &Fleet, stretches: &[Stretch], dir: &Path, text: &mut String) -> Result<f64> {
+    let (files, one, all) = (dir.join("compared"), dir.join("one"), dir.join("all"));
+    make(stretches, 0..fleet.compared, 0, &files)?;
+    let mut paths = fs::read_dir(&files)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
+    paths.sort();
+    let alone: f64 = paths.iter().map(|path| decode(&[path.clone()], &one, "parquet", &[])).sum();
+    let together = decode(&[files.clone()], &all, "parquet", &[]);
+    let (a, b) = (taken(&one)?, taken(&all)?);
+    ensure!(a.1 == b.1, "one by one gave {} files, in one call {}", a.1, b.1);
+    let ratio = alone / together;
+    let _ = writeln!(
+        text,
+        "ingest of {} sessions: {together:.2} s in one call, {alone:.2} s one file at a time: {ratio:.2} times as fast",
+        fleet.compared
+    );
+    [files, one, all].iter().try_for_each(fs::remove_dir_all)?;
+    Ok(ratio)
+}
+
+/// Different recordings of one vehicle: logs of the box, and their compacted tables. Returns bytes of these for each recording.
+fn size(dir: &Path, text: &mut String) -> Result<f64> {
+    let mut recordings = fs::read_dir(root().join("tests/labelled"))?
+        .map(|entry| Ok(entry?.path()))
+        .collect::<Result<Vec<_>>>()?;
+    recordings.retain(|path| path.extension().is_some_and(|extension| extension == "gz"));
+    recordings.extend(OWN.map(own));
+    recordings.sort();
+    let (logs, tables) = (dir.join("logs"), dir.join("tables"));
+    fs::create_dir(&logs)?;
+    for (number, recording) in recordings.iter().enumerate() {
+        decode(&[recording.clone()], &logs.join(format!("{number:02}.hum")), "hum", &[]);
+    }
+    let log_bytes = taken(&logs)?.0;
+    decode(&[logs.clone()], &tables, "parquet", &["--vehicle", "one"]);
+    let (bytes, files) = taken(&tables)?;
+    compact(&tables);
+    let (compact_bytes, compact_files) = taken(&tables)?;
+    let ratio = compact_bytes as f64 / log_bytes as f64;
+    let _ = writeln!(
+        text,
+        "size of {} different recordings of one vehicle: logs {log_bytes} bytes; tables {bytes} bytes in {files} files, compacted \
+         {compact_bytes} in {compact_files}: {ratio:.2} times the logs",
+        recordings.len()
+    );
+    ensure!(ratio <= SIZE_MAX, "compacted tables are {ratio:.2} times the logs, {SIZE_MAX} are allowed");
+    [logs, tables].iter().try_for_each(fs::remove_dir_all)?;
+    Ok(compact_bytes as f64 / recordings.len() as f64)
+}
+
+/// Seconds of ingest and of compaction, and files, for each session.
+struct Cost {
+    ingest_s: f64,
+    compact_s: f64,
+    files: f64,
+    compact_files: f64,
+}
+
+/// Day by day: a day's sessions are made, decoded and compacted.
+fn ingest(fleet: &Fleet, stretches: &[Stretch], dir: &Path, text: &mut String) -> Result<Cost> {
+    let (day_folder, tables) = (dir.join("day"), dir.join("fleet"));
+    let few: &[&str] = &[
+        "--message",
+        "ATTITUDE",
+        "--message",
+        "VIBRATION",
+        "--message",
+        "BATTERY_STATUS",
+        "--message",
+        "HEARTBEAT",
+    ];
+    let few = if fleet.is_short { few } else { &[] };
+    let (mut frames, mut ingest_s, mut compact_s, mut most, mut files) = (0, 0.0, 0.0, 0, 0);
+    for day in 0..fleet.days {
+        let sessions = fleet.sessions * day / fleet.days..fleet.sessions * (day + 1) / fleet.days;
+        frames += make(stretches, sessions, day, &day_folder)?;
+        let before = if day == 0 { 0 } else { taken(&tables)?.1 };
+        ingest_s += decode(&[day_folder.clone()], &tables, "parquet", few);
+        fs::remove_dir_all(&day_folder)?;
+        let (bytes, now) = taken(&tables)?;
+        (most, files) = (most.max(bytes), files + now - before);
+        compact_s += compact(&tables);
+    }
+    let (bytes, compact_files) = taken(&tables)?;
+    ensure!(most <= DISK_MAX, "the fleet took {most} bytes, {DISK_MAX} are allowed");
+    let count = fleet.sessions as f64;
+    let _ = writeln!(
+        text,
+        "fleet: {} sessions of {} s, {} vehicles, {} days, {frames} frames; ingest {ingest_s:.1} s ({:.1} sessions/s), compact \
+         {compact_s:.1} s; {files} files became {compact_files}, {bytes} bytes; at most {most} bytes at a time",
+        fleet.sessions,
+        fleet.seconds,
+        VEHICLES.min(fleet.sessions),
+        fleet.days,
+        count / ingest_s
+    );
+    // Tables of a box need a box.
+    let image = dir.join("box.img");
+    let sim = [
+        OsStr::new("sim"),
+        "--speed".as_ref(),
+        "max".as_ref(),
+        "--seed".as_ref(),
+        "1".as_ref(),
+        "--sd".as_ref(),
+    ];
+    child::run(command(sim).arg(&image).arg(own("ap_quad_faults.tlog")), LIMIT).expect_code(&[0]);
+    decode(&[image], &tables, "parquet", &[]);
+    fs::write(
+        dir.join("expected.json"),
+        serde_json::json!({ "sessions": fleet.sessions, "frames": frames }).to_string(),
+    )?;
+    Ok(Cost {
+        ingest_s: ingest_s / count,
+        compact_s: compact_s / count,
+        files: files as f64 / count,
+        compact_files: compact_files as f64 / count,
+    })
+}
+
+/// The documented queries, in DuckDB and, if it is there, Spark. Returns seconds of the slowest one on the summary.
+fn ask(fleet: &Fleet, dir: &Path, text: &mut String) -> Result<f64> {
+    let answers = oracle::fleet_proof(&root().join("docs/fleet.md"), dir, !fleet.is_short);
+    let (mut slowest, mut count) = (0.0_f64, 0);
+    for query in answers["queries"].as_array().context("no queries")? {
+        let (heading, seconds) =
+            (query["heading"].as_str().unwrap_or_default(), query["seconds"].as_f64().unwrap_or(f64::MAX));
+        let rows = query["rows"].as_u64().unwrap_or_default();
+        if let (Some(read), Some(all)) = (query["files_read"].as_u64(), query["files"].as_u64()) {
+            let _ = writeln!(
+                text,
+                "raw: {heading}: {read} of {all} files for one vehicle and day, {seconds:.3} s, {rows} rows"
+            );
+            ensure!(read <= 1, "{heading} reads {read} files for one vehicle and day");
+        } else {
+            let _ = writeln!(text, "summary: {heading}: {seconds:.3} s, {rows} rows");
+            slowest = slowest.max(seconds);
+        }
+        count += 1;
+    }
+    ensure!(count > 10, "{count} queries are few");
+    match &answers["spark"] {
+        Value::String(why) => writeln!(text, "NOT TESTED: Spark: {why}")?,
+        spark => writeln!(
+            text,
+            "Spark {}: {} of {} queries of the summary run as they are, with DuckDB's rows; one vehicle and day: {} of {} files",
+            spark["version"].as_str().unwrap_or_default(),
+            spark["same"],
+            spark["queries"],
+            spark["files_read"],
+            spark["files"]
+        )?,
+    }
+    Ok(slowest)
+}
+
+/// A year of sessions like those of the proof; its bytes are of the different recordings.
+fn year(fleet: &Fleet, cost: &Cost, bytes: Option<f64>, query_s: f64, text: &mut String) {
+    let times = YEAR / fleet.sessions as f64;
+    let hours = |seconds: f64| YEAR * seconds / 3600.0;
+    let _ = writeln!(
+        text,
+        "a year, {YEAR:.0} sessions, on this machine:\n\
+         ingest {:.4} s x {YEAR:.0} / 3600 = {:.0} h; compact {:.4} s x {YEAR:.0} / 3600 = {:.0} h; {:.1} machines the whole year\n\
+         files {:.2} a session before compact, {:.3} after it, x {YEAR:.0} = {:.0}\n\
+         slowest query of the summary {query_s:.3} s x {times:.0} times the rows = {:.0} s; a condition on the date makes it less",
+        cost.ingest_s,
+        hours(cost.ingest_s),
+        cost.compact_s,
+        hours(cost.compact_s),
+        hours(cost.ingest_s + cost.compact_s) / 8766.0,
+        cost.files,
+        cost.compact_files,
+        YEAR * cost.compact_files,
+        query_s * times
+    );
+    if let Some(bytes) = bytes {
+        let _ = writeln!(
+            text,
+            "bytes of a session like the different recordings, compacted: {bytes:.0} x {YEAR:.0} = {:.2} TB",
+            YEAR * bytes / 1e12
+        );
+    }
+}
