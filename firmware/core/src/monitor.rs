@@ -56,6 +56,8 @@ pub struct Monitor {
     cells_told: bool,
     /// The autopilot has been asked for all its parameters.
     parameters_asked: bool,
+    /// The parts in the vehicle are known: their wear is judged.
+    parts_known: bool,
 }
 
 state! {
@@ -120,6 +122,7 @@ impl Monitor {
                 ticked_at: BootMs::ZERO,
                 cells_told: false,
                 parameters_asked: false,
+                parts_known: true,
             }
         )
     }
@@ -257,7 +260,7 @@ impl Monitor {
         let subsystem = self.components.get(place).and_then(|component| component.kind.subsystem());
         let used_percent = self.component_used_percent(place);
         if let Some(wear) = self.wear.get_mut(place) {
-            *wear = subsystem.zip(used_percent);
+            *wear = subsystem.zip(used_percent).filter(|_| self.parts_known);
         }
         self.wear_next = (self.wear_next + 1) % COMPONENTS_MAX as u8;
     }

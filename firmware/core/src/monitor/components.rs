@@ -19,6 +19,11 @@ impl Monitor {
         self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
     }
 
+    /// Whether the wear of parts is judged. Until a card's settings are read, a stored part may be a replaced one.
+    pub const fn set_parts_known(&mut self, known: bool) {
+        self.parts_known = known;
+    }
+
     /// Takes a component from another monitor of this vehicle in this session: later counts add to it.
     pub fn learn_component(&mut self, place: usize, known: Component) {
         let known = known.in_session(&self.usage.wear());

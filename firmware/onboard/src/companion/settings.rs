@@ -6,11 +6,13 @@
 //! serial number, ends that. If heartbeats stop, reading begins anew with the next one. The parameters that may be
 //! set in flight follow one rule for the file and for ground stations ([`Logbook::set_parameter`]).
 //!
+//! A line may replace a part that is due, so the wear of parts is judged only after the file.
+//!
 //! Each line is set, recorded and stored like a setting by a ground station, at every power-on as long as the file is
 //! there. A refused line is an event in the record and a text for the ground station. [`BYTES_MAX`] of the file are
 //! read, [`LINE_MAX`] of a line. The last line is refused if the file's end was not read.
 
-use hums_core::clock::Instant;
+use hums_core::clock::{Instant, Span};
 use hums_core::component::Label;
 use hums_link::param_line::{self, Line};
 use hums_recorder::CardState;
@@ -24,6 +26,8 @@ use crate::shelf::{Reader, Want, What, Which};
 
 /// Enough for all parameters, each in the longest line.
 const BYTES_MAX: u32 = 16 * 1024;
+/// A card that is there is open by then; without one, no file replaces a part.
+const CARD_COMES: Span = Span::from_secs(10);
 /// A line without its comment.
 const LINE_MAX: usize = 64;
 
@@ -83,6 +87,8 @@ impl Settings {
         let reading = book.card.read();
         let has_card = reading.state == CardState::Recording;
         let done = State::Done(reading.volume);
+        let is_read = matches!(self.state, State::Done(_));
+        book.monitor.set_parts_known(is_read || !has_card && now.since(Instant::ZERO) >= CARD_COMES);
         match (self.state, book.arming(now)) {
             (State::Done(_), _) if !has_card || self.state == done => {}
             _ if !has_card => self.state = State::Waiting,

@@ -4,6 +4,7 @@ use hums_blackbox::Writer;
 use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
+use hums_core::component::{Component, ComponentFigures, ComponentKind, Label};
 use hums_core::params::{Param, Params};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::Frame;
@@ -50,7 +51,8 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
 
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let is = |params: &Params, param, value: f32| params.get(param).to_bits() == value.to_bits();
-    after(text, cause, ticks_an_answer, comes, |monitor| {
+    let monitor = Monitor::new(Params::defaults());
+    after(monitor, text, cause, ticks_an_answer, comes, |monitor| {
         let params = monitor.params();
         let set = [is(params, Param::BatRemWarn, 31.0), is(params, Param::ProtAction, 1.0)];
         (set, params.get(Param::ApBaud))
@@ -58,6 +60,7 @@ fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, 
 }
 
 fn after<T>(
+    monitor: Monitor,
     text: &str,
     cause: ResetCause,
     ticks_an_answer: u64,
@@ -65,7 +68,7 @@ fn after<T>(
     known: impl FnOnce(&Monitor) -> T,
 ) -> T {
     let (card, port) = (CardStatus::new(), PortStatus::new());
-    let (mut monitor, mut writer) = (Box::new(Monitor::new(Params::defaults())), Box::new(Writer::new()));
+    let (mut monitor, mut writer) = (Box::new(monitor), Box::new(Writer::new()));
     let mut queues = Box::new(Queues::new());
     let mut ends = queues.split();
     let mut body = Monitoring::new(&mut monitor, &mut writer, Boot::default(), cause, &card, &port);
@@ -176,9 +179,35 @@ fn a_line_replaces_the_part_that_it_names_once() {
     let once = [(0, Card), (1, DISARMED), (2, DISARMED)];
     let twice = [&once[..], &[(4, NoCard), (6, OtherCard), (7, DISARMED), (8, DISARMED)]].concat();
     for comes in [&once[..], &twice[..]] {
-        let part = after(text, ResetCause::PowerOn, 1, comes, |monitor| monitor.components()[1]);
+        let monitor = Monitor::new(Params::defaults());
+        let part = after(monitor, text, ResetCause::PowerOn, 1, comes, |monitor| monitor.components()[1]);
         assert_eq!((part.serial.as_str(), part.replaced), ("A-4711", 1));
     }
+}
+
+/// A life of two flights, and five of them flown.
+#[test]
+fn a_part_that_is_due_is_reported_only_if_the_card_does_not_replace_it() {
+    let mut params = Params::defaults();
+    params.set("CMP1_FLIGHTS", 2.0).expect("a parameter");
+    params.set("CMP1_KIND", 1.0).expect("a parameter");
+    let mut part = Component::default();
+    (part.kind, part.serial) = (ComponentKind::Airframe, Label::new("old"));
+    let mut monitor = Monitor::new(params);
+    let flown = ComponentFigures { flights: 5.0, ..ComponentFigures::default() };
+    monitor.learn_component(0, part.having_run(flown));
+    let is_due = |text, comes: &[(u64, Comes)]| {
+        after(monitor, text, ResetCause::PowerOn, 1, comes, |monitor| {
+            let mut exceeded = monitor.exceedances().changed(Instant::ZERO.into(), Instant::ZERO.into());
+            exceeded.any(|exceedance| exceedance.check.name == "airframe_due")
+        })
+    };
+    // The autopilot starts after the box.
+    let comes = [(0, Card), (20, DISARMED), (21, DISARMED), (22, DISARMED), (23, DISARMED)];
+    assert!(!is_due("CMP1_SERIAL new<old\n", &comes));
+    assert!(is_due("CMP1_SERIAL new<other\n", &comes));
+    assert!(is_due("", &[(20, DISARMED)]), "no card is there");
+    assert!(is_due("", &[(0, Card), (1, ARMED)]), "no file is read in flight");
 }
 
 #[test]
