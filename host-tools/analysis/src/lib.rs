@@ -4,7 +4,8 @@
 //!   reason
 //! * [`summary`]: the contents of a recording, counted; [`soundness`]: what it lacks
 //! * [`series`], [`track`]: quantities over time and the way over ground, for pages
-//! * [`mod@reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON; [`manifest`]: the files of a reading
+//! * [`mod@reference`]: the quantities of the reference system; [`log_json`]: a recording as JSON; [`manifest`]: the files of a reading;
+//!   [`order`]: logs in the order of time
 //! * [`counters`], [`part`], [`states`], [`params`]: usage, components, words for states, limits from a file
 
 #![deny(
@@ -22,6 +23,7 @@ pub mod check;
 pub mod counters;
 pub mod log_json;
 pub mod manifest;
+pub mod order;
 pub mod params;
 pub mod part;
 pub mod reference;

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use crate::ending::Ending;
 use crate::followed::HasEnding;
+use crate::logs::board::Board;
 use crate::logs::{Log, marks};
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::names::counter_name;
@@ -56,6 +57,9 @@ pub struct BootLine {
     pub reset: String,
     /// Number of power-ons.
     pub boots: u32,
+    /// The box's unique id; zeros if unknown.
+    #[serde(skip)]
+    pub uid: Board,
 }
 
 /// Judged checks of those for the vehicle.
@@ -349,6 +353,7 @@ impl Contents {
                     board: boot.board.to_owned(),
                     reset: boot.reset_name.to_owned(),
                     boots: boot.boots,
+                    uid: boot.uid,
                 });
             }
             Record::Vehicle(vehicle) => self.vehicle = Some(*vehicle),

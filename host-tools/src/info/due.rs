@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use hums_analysis::log_json::finite;
+use hums_analysis::order::{self, LogTime};
 use serde::Serialize;
 
 use super::each::each;
-use super::list::start_utc_us;
 use super::number::short;
 use crate::cli;
 use crate::colour::level;
@@ -32,21 +32,15 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
     let mut logs = Vec::new();
     let read = each(&found, None, |log| {
         if log.ending.is_counted() {
-            logs.push((vehicle(log, &found, args.vehicle.as_deref()), Log::of(log)));
+            logs.push((LogTime::of(log), (vehicle(log, &found, args.vehicle.as_deref()), Log::of(log))));
         }
         Ok(())
     })?;
     let outcome = read.end()?;
-    // A log without a start stays after the one before it.
-    let mut begun_us = 0;
-    for (_, log) in &mut logs {
-        begun_us = log.start_us.unwrap_or(begun_us);
-        log.order_us = begun_us;
-    }
-    logs.sort_by_key(|(_, log)| log.order_us);
     let mut vehicles: BTreeMap<String, Vehicle> = BTreeMap::new();
-    for (name, log) in logs {
-        vehicles.entry(name.clone()).or_insert_with(|| Vehicle { name, ..Vehicle::default() }).add(log);
+    for (time, (name, log)) in order::sort(logs) {
+        let vehicle = vehicles.entry(name.clone()).or_insert_with(|| Vehicle { name, ..Vehicle::default() });
+        vehicle.add(log, time.start_us);
     }
     let vehicles: Vec<VehicleJson> = vehicles.into_values().map(VehicleJson::from).collect();
     let is_due = vehicles.iter().flat_map(|vehicle| &vehicle.parts).any(|part| part.status == "red");
@@ -78,8 +72,6 @@ fn vehicle(log: &Overview, found: &FoundRecordings, given: Option<&str>) -> Stri
 }
 
 struct Log {
-    start_us: Option<u64>,
-    order_us: u64,
     flight_s: f64,
     flights: u64,
     parts: Vec<(u8, ComponentLine, Option<Limit>)>,
@@ -92,8 +84,6 @@ impl Log {
         let part =
             |(place, line): (&u8, &ComponentLine)| (*place, line.clone(), contents.first_limit(*place, line));
         Self {
-            start_us: start_utc_us(log),
-            order_us: 0,
             flight_s: log.flight_s().unwrap_or(0.0),
             flights: contents.flights().len() as u64,
             parts: contents.components.iter().map(part).collect(),
@@ -126,18 +116,18 @@ struct Part {
 }
 
 impl Vehicle {
-    fn add(&mut self, log: Log) {
+    fn add(&mut self, log: Log, start_us: Option<u64>) {
         self.logs += 1;
         self.flights += log.flights;
         self.flight_s += log.flight_s;
         self.is_of_box |= log.is_of_box;
-        if let Some(at) = log.start_us {
+        if let Some(at) = start_us {
             let (first, last) = self.span_us.unwrap_or((at, at));
             self.span_us = Some((first.min(at), last.max(at)));
         }
         for (place, line, limit) in log.parts {
-            let first = (limit.map_or(0.0, |limit| limit.run), line.figures.flights, log.start_us);
-            let new = |is_new| Part { line: line.clone(), limit, first, last_us: log.start_us, is_new };
+            let first = (limit.map_or(0.0, |limit| limit.run), line.figures.flights, start_us);
+            let new = |is_new| Part { line: line.clone(), limit, first, last_us: start_us, is_new };
             let part = self.parts.entry(place).or_insert_with(|| new(false));
             let is_same = |of: &Part| {
                 (of.line.kind, of.line.number, &of.line.serial, of.line.replaced)
@@ -148,7 +138,7 @@ impl Vehicle {
                 if part.limit.map(|limit| limit.end) != limit.map(|limit| limit.end) {
                     part.first = first;
                 }
-                (part.line, part.limit, part.last_us) = (line, limit, log.start_us.or(part.last_us));
+                (part.line, part.limit, part.last_us) = (line, limit, start_us.or(part.last_us));
             } else {
                 *part = new(true);
             }

@@ -22,6 +22,7 @@ use crate::source::recording::Format;
 use crate::summary::{BOX_COUNTS, Overview};
 use crate::utc::{clock, date_and_time, iso8601};
 use hums_analysis::log_json::{duration_s, images_json};
+use hums_analysis::order::{self, LogTime};
 
 const SCHEMA: Schema = Schema::first("hums-info-list");
 
@@ -39,25 +40,19 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
             output::line(&heading(width))?;
         }
     }
-    // In the order of their starts; a log without a start stays after the one before it.
-    let (mut lines, mut elements, mut begun_us, mut box_counts) = (Vec::new(), Vec::new(), 0, false);
+    let (mut lines, mut elements, mut box_counts) = (Vec::new(), Vec::new(), false);
     let read = each(&found, wanted, |overview| {
-        begun_us = start_utc_us(overview).unwrap_or(begun_us);
         if args.json {
-            elements.push((begun_us, LogJson::of(overview)));
+            elements.push((LogTime::of(overview), LogJson::of(overview)));
         } else {
-            lines.push((begun_us, line(overview, width)));
+            lines.push((LogTime::of(overview), line(overview, width)));
             box_counts |= overview.contents.boot.is_some() && overview.flight_s() > Some(0.0);
         }
         Ok(())
     })?;
-    lines.sort_by_key(|(begun_us, _)| *begun_us);
-    elements.sort_by_key(|(begun_us, _)| *begun_us);
-    for (_, line) in &lines {
-        output::line(line)?;
-    }
-    for (_, element) in &elements {
-        list.as_mut().map_or(Ok(()), |list| list.element(element))?;
+    order::sort(lines).iter().try_for_each(|(_, line)| output::line(line))?;
+    for (_, element) in order::sort(elements) {
+        list.as_mut().map_or(Ok(()), |list| list.element(&element))?;
     }
     if let Some(list) = list {
         list.end()?;
@@ -205,7 +200,7 @@ fn worst(log: &Overview) -> Option<WorstJson> {
     })
 }
 
-pub(super) fn start_utc_us(log: &Overview) -> Option<u64> {
+fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 

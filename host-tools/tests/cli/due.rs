@@ -105,6 +105,26 @@ fn a_card_says_which_part_is_due_and_what_is_left_of_the_others() {
     assert_eq!(motor["rule"], "CMP2_HOURS");
 }
 
+/// The second log's clock is 23 minutes before that of the first.
+#[test]
+fn the_newest_log_of_a_card_is_the_last_one_whatever_its_clock_says() {
+    let dir = tempfile::tempdir().expect("directory");
+    fs::write(dir.path().join("parts.param"), "CMP1_KIND 1\nCMP1_FLIGHTS 9\n").expect("a file");
+    for name in ["ap_quad_faults.tlog", "ap_quad_guided.tlog"] {
+        let flight = flight(name).display().to_string();
+        run(dir.path(), &format!("sim {flight} --sd card.img --store store.bin --params parts.param"), 0);
+    }
+    let vehicle = json(&run(dir.path(), "due card.img --json", 0))["vehicles"][0].clone();
+    assert_eq!((&vehicle["logs"], &vehicle["parts"][0]["run"]), (&2.into(), &2.0.into()), "{vehicle}");
+    assert_eq!(vehicle["parts"][0]["since_utc"], serde_json::Value::Null, "one clock is wrong: {vehicle}");
+    let logs = json(&run(dir.path(), "info --list card.img --json", 0));
+    let names = [0, 1].map(|log| logs["logs"][log]["name"].as_str().unwrap_or_default().to_owned());
+    assert_eq!(names, ["00001", "00002"], "{logs}");
+    run(dir.path(), "logbook card.img -o book.html", 0);
+    let book = fs::read_to_string(dir.path().join("book.html")).expect("a page");
+    assert!(book.contains("22 %") && !book.contains("11 %"), "two of nine: {book}");
+}
+
 #[test]
 fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_named() {
     let dir = tempfile::tempdir().expect("directory");

@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use hums_analysis::log_json::vehicle;
+use hums_analysis::order::{self, LogTime};
 use hums_core::clock::Instant;
 use hums_core::health::{Level, Subsystem};
 use hums_core::usage::UsageCounter;
@@ -143,7 +144,7 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     let works = works(&found.places, &sessions)?;
     let mut outcome = Outcome::lossy(found.is_lossy());
     let has_tracks = forms.iter().any(|(form, _)| *form == Form::Gutma);
-    let mut read: BTreeMap<String, Session> = BTreeMap::new();
+    let (mut read, mut order) = (BTreeMap::<String, (usize, Session)>::new(), 0..);
     side_by_side(
         &works,
         |work| match &work.named {
@@ -157,9 +158,10 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
             let Some(session) = session? else { return Ok(()) };
             outcome = outcome.and(Outcome::lossy(!session.is_sound));
             let recording = session.recording.clone();
-            let is_longer = read.get(&recording).is_none_or(|other| other.frames < session.frames);
+            let is_longer = read.get(&recording).is_none_or(|(_, other)| other.frames < session.frames);
+            let place = order.next().unwrap_or_default();
             if is_longer {
-                read.insert(recording, session);
+                read.insert(recording, (place, session));
             } else {
                 remarks.push(format!("{recording}: is there twice, and is counted once"));
             }
@@ -169,7 +171,9 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     for remark in &remarks {
         note!("{remark}");
     }
-    let mut book = book(read.into_values());
+    let mut sessions: Vec<(usize, Session)> = read.into_values().collect();
+    sessions.sort_by_key(|(place, _)| *place);
+    let mut book = book(sessions.into_iter().map(|(_, session)| session));
     for (_, path) in forms.iter().filter(|(form, _)| *form == Form::Csv) {
         csv::merge(&mut book, path)?;
     }
@@ -224,8 +228,7 @@ struct Session {
     vehicle: String,
     is_sound: bool,
     frames: u64,
-    /// Microseconds since 1970, if known.
-    start_us: Option<u64>,
+    time: LogTime,
     entries: Vec<LogbookEntry>,
     parts: Vec<PartLine>,
     life: Option<Life>,
@@ -244,7 +247,7 @@ impl Session {
             vehicle: identity.vehicle.clone(),
             is_sound: overview.is_sound(),
             frames: overview.contents.frames(),
-            start_us: overview.ending.summary.first.and_then(|first| identity.epochs.utc_us(first)),
+            time: LogTime::of(overview),
             entries: entries(&record, &known),
             parts: parts_of(&about.overview.contents),
             life: life.map(|(flights, flight_s)| Life { flights, flight_s }),
@@ -258,10 +261,9 @@ impl Session {
 }
 
 fn book(sessions: impl Iterator<Item = Session>) -> Book {
-    let mut sessions: Vec<Session> = sessions.collect();
-    sessions.sort_by_key(|session| session.start_us);
+    let sessions = sessions.map(|session| (session.time.clone(), session)).collect();
     let mut book = Book::new();
-    for session in sessions {
+    for (_, session) in order::sort(sessions) {
         if session.entries.is_empty() && session.parts.is_empty() {
             continue;
         }
