@@ -11,7 +11,7 @@ extern crate hums_base;
 pub use hums_analysis::{check, counters, params, part, reference, series, states, summary, track};
 pub use hums_base::{
     archive, colour, duplex, endpoint, files, hex, interrupt, outcome, output, plural, printable, progress,
-    rng, sink, utc,
+    rng, sink, table, utc,
 };
 pub use hums_export as decode;
 pub use hums_formats::{card, ending, followed, logs, loss, mavlink, names, naming, source, statustext};

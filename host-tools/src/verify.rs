@@ -25,6 +25,7 @@ use crate::plural::count;
 use crate::printable::{path, word};
 use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
+use crate::table::{Table, left};
 use hums_analysis::log_json::images_json;
 use hums_analysis::manifest::Manifest;
 use hums_analysis::soundness::Soundness;
@@ -220,19 +221,18 @@ fn print_log(log: &LogJson, overview: &Overview) -> Result<()> {
 }
 
 fn print(checks: &[Check]) -> Result<()> {
-    for check in checks {
-        let verdict = level(match check.name {
-            _ if check.failed == 0 => "ok",
+    let mut table = Table::new(2, [left(6), left(17), left(0)]);
+    for Check { name, checked, failed, detail } in checks {
+        let verdict = level(match *name {
+            _ if *failed == 0 => "ok",
             INTACT => "rebuilt",
             _ => "FAILED",
         });
-        let detail = if check.detail.is_empty() { String::new() } else { format!("; {}", check.detail) };
-        output::line(&format!(
-            "  {verdict:<7} {:<18} {} checked, {} failed{detail}",
-            check.name, check.checked, check.failed
-        ))?;
+        let detail = if detail.is_empty() { String::new() } else { format!("; {detail}") };
+        let words = format!("{checked} checked, {failed} failed{detail}");
+        table.row([verdict.to_string(), (*name).to_owned(), words]);
     }
-    Ok(())
+    output::line(&table.text())
 }
 
 #[derive(Debug, Serialize)]

@@ -16,7 +16,7 @@
 #[macro_use(note)]
 extern crate hums_base;
 
-use hums_base::{colour, files, hex, outcome, output, plural, printable, progress, utc};
+use hums_base::{colour, files, hex, outcome, output, plural, printable, progress, table, utc};
 use hums_formats::{ending, followed, logs, loss, mavlink, names, source};
 
 pub mod check;

@@ -33,4 +33,5 @@ pub mod progress;
 pub mod rng;
 #[cfg(not(target_family = "wasm"))]
 pub mod sink;
+pub mod table;
 pub mod utc;

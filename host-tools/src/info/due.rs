@@ -21,6 +21,7 @@ use crate::printable::word;
 use crate::source::find::{FoundRecordings, find};
 use crate::source::recording::Place;
 use crate::summary::{ComponentLine, Overview};
+use crate::table::{Table, left};
 use crate::utc::{clock, iso8601};
 
 const SCHEMA: Schema = Schema::first("hums-due");
@@ -307,23 +308,11 @@ fn text(vehicle: &VehicleJson) -> String {
         text.push_str(if vehicle.is_of_box { why } else { "" });
         return text;
     }
-    let rows: Vec<[String; 7]> = vehicle.parts.iter().map(row).collect();
-    let heading =
-        ["", "used", "part", "serial", "run of limit", "left at this rate", "since"].map(str::to_owned);
-    let width = |column: usize| {
-        let cells = rows.iter().chain([&heading]).filter_map(|row| row.get(column));
-        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: [usize; 7] = std::array::from_fn(width);
-    for row in [&heading].into_iter().chain(&rows) {
-        let mut cells = row.iter().zip(widths);
-        let status = cells.next().map_or("", |(status, _)| status);
-        let mut line = format!("  {:<8}", level(status));
-        for (cell, width) in cells {
-            let _ = write!(line, "  {cell:<width$}");
-        }
-        let _ = writeln!(text, "{}", line.trim_end());
-    }
+    let columns = [left(8), left(0), left(0), left(0), left(0), left(0), left(0)];
+    let mut table = Table::new(2, columns);
+    table.heading(["", "used", "part", "serial", "run of limit", "left at this rate", "since"]);
+    vehicle.parts.iter().map(row).for_each(|row| table.row(row));
+    let _ = write!(text, "{table}");
     let rules = vehicle.parts.iter().filter_map(|part| part.rule.as_deref()).collect::<Vec<_>>().join(", ");
     if !rules.is_empty() {
         let _ = writeln!(text, "  limits by {rules}");
@@ -350,7 +339,7 @@ fn row(part: &PartJson) -> [String; 7] {
         (since, false) => format!("before {since}"),
     };
     [
-        status.to_owned(),
+        level(status).to_string(),
         used,
         word(&part.part).into_owned(),
         word(&part.serial).into_owned(),

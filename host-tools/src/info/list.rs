@@ -20,6 +20,7 @@ use crate::printable::word;
 use crate::source::find::find;
 use crate::source::recording::Format;
 use crate::summary::{BOX_COUNTS, Overview};
+use crate::table::{Table, left, right};
 use crate::utc::{clock, date_and_time, iso8601};
 use hums_analysis::log_json::{duration_s, images_json};
 use hums_analysis::order::{self, LogTime};
@@ -31,13 +32,9 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
     let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
     let mut list =
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
-    let width = found.places.iter().map(|place| word(&place.name).chars().count()).max().unwrap_or(0);
     if list.is_none() {
         for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
             output::line(&image_text(image))?;
-        }
-        if !found.places.is_empty() {
-            output::line(&heading(width))?;
         }
     }
     let (mut lines, mut elements, mut box_counts) = (Vec::new(), Vec::new(), false);
@@ -45,12 +42,14 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
         if args.json {
             elements.push((LogTime::of(overview), LogJson::of(overview)));
         } else {
-            lines.push((LogTime::of(overview), line(overview, width)));
+            lines.push((LogTime::of(overview), row(overview)));
             box_counts |= overview.contents.boot.is_some() && overview.flight_s() > Some(0.0);
         }
         Ok(())
     })?;
-    order::sort(lines).iter().try_for_each(|(_, line)| output::line(line))?;
+    if !lines.is_empty() {
+        output::line(&table(order::sort(lines).into_iter().map(|(_, row)| row)).text())?;
+    }
     for (_, element) in order::sort(elements) {
         list.as_mut().map_or(Ok(()), |list| list.element(&element))?;
     }
@@ -133,14 +132,14 @@ impl LogJson {
     }
 }
 
-fn heading(width: usize) -> String {
-    format!(
-        "{:<width$}  {:<19}  {:>8}  {:>8}  {:>10}  {}",
-        "log", "date (UTC)", "length", "in air", "size", "worst finding"
-    )
+fn table(rows: impl Iterator<Item = [String; 6]>) -> Table<6> {
+    let mut table = Table::new(0, [left(0), left(19), right(8), right(8), right(10), left(0)]);
+    table.heading(["log", "date (UTC)", "length", "in air", "size", "worst finding"]);
+    rows.for_each(|row| table.row(row));
+    table
 }
 
-fn line(log: &Overview, width: usize) -> String {
+fn row(log: &Overview) -> [String; 6] {
     let date = start_utc_us(log).map_or_else(|| "unknown".to_owned(), date_and_time);
     let length = clock(span(duration_s(log)));
     // The last stored count is a lower bound.
@@ -148,9 +147,7 @@ fn line(log: &Overview, width: usize) -> String {
     let least = if is_least { ">" } else { "" };
     let air =
         log.flight_s().map_or_else(|| "-".to_owned(), |seconds| format!("{least}{}", clock(span(seconds))));
-    let size = binary(bytes(log));
-    let name = word(&log.ending.name);
-    let mut text = format!("{name:<width$}  {date:<19}  {length:>8}  {air:>8}  {size:>10}  {}", found(log));
+    let mut text = found(log);
     if let Some(aside) = log.ending.aside() {
         // Writing to a `String` cannot fail.
         let _ = write!(text, "; {}", word(&aside));
@@ -170,7 +167,7 @@ fn line(log: &Overview, width: usize) -> String {
         let teller = if log.format.is_some() { "check says where" } else { "info --verify says why" };
         let _ = write!(text, "; {} (hums {teller})", warning(lacks));
     }
-    text
+    [word(&log.ending.name).into_owned(), date, length, air, binary(bytes(log)), text]
 }
 
 fn found(log: &Overview) -> String {
@@ -233,6 +230,10 @@ mod tests {
 
     use super::*;
     use crate::source::told::Finding;
+
+    fn line(log: &Overview) -> String {
+        table([row(log)].into_iter()).text()
+    }
 
     fn finding(check: &str, level: &str, at_s: u64) -> Finding {
         Finding {
@@ -302,7 +303,7 @@ mod tests {
         let told = |format| {
             let mut log = Overview { format, ..Overview::default() };
             (log.ending.summary.gaps, log.ending.summary.session) = (1, Some(7));
-            line(&log, 5)
+            line(&log)
         };
         assert!(told(Some(Format::DataFlash)).contains("(hums check says where)"));
         assert!(told(None).contains("(hums info --verify says why)"));
@@ -315,21 +316,21 @@ mod tests {
         log.contents.usage.insert(UsageCounter::Flight.name().to_owned(), 192.0);
         log.contents.usage_at = Some(Instant::from_millis(240_000));
         log.ending.summary.last = Some(Instant::from_millis(244_700));
-        assert!(line(&log, 5).contains("   3:12 "), "on the ground nothing is counted after that");
+        assert!(line(&log).contains("   3:12 "), "on the ground nothing is counted after that");
         log.ending.summary.marks.moved = Some(Instant::from_millis(40_000));
-        assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
+        assert!(line(&log).contains("  >3:12 "), "{}", line(&log));
         // Its log ended before the landing was known.
         (log.ending.summary.marks.moved, log.ending.summary.marks.took_off) = (None, Some(true));
-        assert!(line(&log, 5).contains("  >3:12 "), "{}", line(&log, 5));
+        assert!(line(&log).contains("  >3:12 "), "{}", line(&log));
         log.ending.summary.marks.took_off = Some(false);
-        assert!(line(&log, 5).contains("   3:12 "), "its landing is there");
+        assert!(line(&log).contains("   3:12 "), "its landing is there");
     }
 
     #[test]
     fn what_is_missing_at_its_beginning_or_within_it_stands_in_its_line() {
         let mut log = Overview { format: Some(Format::Tlog), ..Overview::default() };
         (log.contents.begins_in_air, log.contents.is_lossy) = (true, true);
-        let line = crate::colour::shown(&line(&log, 5), false).into_owned();
+        let line = crate::colour::shown(&line(&log), false).into_owned();
         assert!(
             line.ends_with("; begins in the air; part of it was not recorded (hums check says where)"),
             "{line}"
@@ -338,10 +339,10 @@ mod tests {
 
     #[test]
     fn columns_stand_under_their_heading() {
-        let line = crate::colour::shown(&line(&Overview::default(), 5), false).into_owned();
-        let heading = heading(5);
+        let text = line(&Overview::default());
+        let (heading, line) = text.split_once('\n').expect("two lines");
         let end = |text: &str, of: &str| text.find(of).map(|at| at + of.len());
-        assert_eq!(end(&heading, "length"), end(&line, "0:00"));
+        assert_eq!(end(heading, "length"), end(line, "0:00"));
         assert_eq!(heading.find("worst"), line.find("not checked"));
     }
 }

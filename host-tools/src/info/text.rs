@@ -24,6 +24,7 @@ use crate::source::item::MessageCount;
 use crate::source::told::Finding;
 use crate::states::{Shown, Values, quantity, shown};
 use crate::summary::{LISTED_MAX, Overview};
+use crate::table::{Table, left, right};
 use crate::utc::{clock, iso8601_ms, moment};
 use hums_analysis::log_json::{duration_s, vehicle};
 
@@ -332,21 +333,23 @@ fn why(log: &Overview, gap: &Gap) -> &'static str {
 fn messages_text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
     let seconds = duration_s(log);
-    text.push_str("  messages                                   frames     per s      bytes\n");
-    let mut line = |name: &str, frames: u64, bytes: u64| {
-        let rate = if seconds > 0.0 { format!("{:.2}", frames as f64 / seconds) } else { String::new() };
-        let name = word(name);
-        let _ = writeln!(text, "    {name:<36} {frames:>10} {rate:>9} {bytes:>10}");
+    let mut table = Table::new(2, [left(37), right(10), right(8), right(9)]);
+    table.heading(["messages", "frames", "per s", "bytes"]);
+    let mut line = |name: &str, frames: u64, bytes: u64, rate: String| {
+        table.row([format!("  {}", word(name)), frames.to_string(), rate, bytes.to_string()]);
     };
     for MessageCount { id, name, amount } in &contents.messages {
         let is_other = id.is_some_and(|(id, verified)| !verified && hums_dialect::message(id).is_some());
         let other = if is_other { " (unverified)" } else { "" };
-        line(&format!("{name}{other}"), amount.count, amount.bytes);
+        let rate =
+            if seconds > 0.0 { format!("{:.2}", amount.count as f64 / seconds) } else { String::new() };
+        line(&format!("{name}{other}"), amount.count, amount.bytes, rate);
     }
     let other = contents.other_messages;
     if other.count > 0 {
-        let _ = writeln!(text, "    {:<36} {:>10} {:>20}", "ids beyond these", other.count, other.bytes);
+        line("ids beyond these", other.count, other.bytes, String::new());
     }
+    let _ = write!(text, "{table}");
 }
 
 #[cfg(test)]

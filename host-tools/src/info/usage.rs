@@ -8,6 +8,7 @@ use super::number::short;
 use crate::counters::{self, Band, Motor, Plain};
 use crate::plural::count;
 use crate::summary::Overview;
+use crate::table::{Table, left, right};
 use crate::utc::clock;
 
 pub(super) fn text(text: &mut String, log: &Overview) {
@@ -30,9 +31,9 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     if let Some(remark) = counters.remark {
         let _ = writeln!(text, "    ({remark})");
     }
-    for [title, session, life] in lines {
-        let _ = writeln!(text, "{}", format!("    {title:<34} {session:>14} {life:>14}").trim_end());
-    }
+    let mut table = Table::new(4, [left(33), right(14), right(13)]);
+    lines.into_iter().for_each(|line| table.row(line));
+    let _ = write!(text, "{table}");
     for ranges in counters.ranges {
         let bands: Vec<String> =
             ranges.bands.iter().filter_map(|band| self::band(band, ranges.unit)).collect();

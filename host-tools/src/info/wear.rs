@@ -10,16 +10,15 @@ use crate::plural::count;
 use crate::printable::word;
 use crate::states::{Shown, quantity, shown};
 use crate::summary::Overview;
+use crate::table::{Table, left, right};
 use crate::utc::moment;
 use hums_analysis::log_json::finite;
 
 pub(super) fn text(text: &mut String, log: &Overview) {
     let contents = &log.contents;
-    if !contents.exceedances.is_empty() {
-        text.push_str(
-            "  exceeded                             of        warnings      for  criticals      for  worst\n",
-        );
-    }
+    let columns = [left(35), left(8), right(8), right(7), right(9), right(7), left(0)];
+    let mut table = Table::new(2, columns);
+    table.heading(["exceeded", "of", "warnings", "for", "criticals", "for", "worst"]);
     for ((check, instance), line) in &contents.exceedances {
         for (of, crossings) in [("session", &line.session), ("life", &line.lifetime)] {
             // A check made here is of this recording alone.
@@ -32,15 +31,19 @@ pub(super) fn text(text: &mut String, log: &Overview) {
                 Shown::State(state) => state.unwrap_or_default().to_owned(),
                 Shown::Quantity(peak, _) => peak.map_or_else(String::new, |peak| quantity(peak, &line.unit)),
             };
-            let _ = writeln!(
-                text,
-                "    {:<34} {of:<8} {warnings:>9} {:>8} {criticals:>10} {:>8}  {}",
-                word(&check_name(check, *instance)),
+            table.row([
+                format!("  {}", word(&check_name(check, *instance))),
+                of.to_owned(),
+                warnings.to_string(),
                 seconds(warning_tenths),
+                criticals.to_string(),
                 seconds(critical_tenths),
-                word(worst.trim_end()),
-            );
+                word(worst.trim_end()).into_owned(),
+            ]);
         }
+    }
+    if !contents.exceedances.is_empty() {
+        let _ = write!(text, "{table}");
     }
     if !contents.components.is_empty() {
         text.push_str("  components\n");

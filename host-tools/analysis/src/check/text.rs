@@ -25,6 +25,7 @@ use crate::source::item::{About, Cause, Gap};
 use crate::source::recording::Format;
 use crate::states::{Shown, Values, meaning, quantity, shown};
 use crate::summary::since_power_on;
+use crate::table::{self, left, right};
 use crate::utc::{clock, iso8601, moment};
 
 /// Problems in words; the rest is one line.
@@ -182,17 +183,16 @@ impl Table {
                 let _ = writeln!(text, "  {count:>6}  {what}");
             }
         }
-        if !self.checks.is_empty() {
-            let _ = writeln!(text, "\n  logs with  critical  warning");
-        }
+        let mut table = table::Table::new(2, [left(9), right(8), right(7), left(0)]);
+        table.heading(["logs with", "critical", "warning", ""]);
         let mut checks: Vec<_> = self.checks.iter().collect();
         checks.sort_by_key(|(_, (critical, warning))| Reverse((*critical, *warning)));
-        for (check, (critical, warning)) in checks {
-            let _ = writeln!(
-                text,
-                "             {critical:>8}  {warning:>7}  {} [{check}]",
-                kind_of_alarm(check)
-            );
+        for (check, (critical, warning)) in &checks {
+            let name = format!("{} [{check}]", kind_of_alarm(check));
+            table.row([String::new(), critical.to_string(), warning.to_string(), name]);
+        }
+        if !checks.is_empty() {
+            let _ = write!(text, "\n{table}");
         }
         text.trim_end().to_owned()
     }
