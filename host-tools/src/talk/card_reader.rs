@@ -3,13 +3,10 @@
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
-use hums_link::messages;
-use hums_link::packet::Fields;
 use serde::Serialize;
 
-use super::{Client, is_for_us};
+use super::{Client, accepted};
 use crate::cli;
-use crate::mavlink::ids::COMMAND_ACK;
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 
@@ -48,27 +45,17 @@ pub fn run(args: &cli::CardReader) -> Result<Outcome> {
 }
 
 fn tell(client: &mut Client) -> Result<()> {
-    let (system, component) = client.target();
-    let packet = messages::command_long(RESTART, &[MASS_STORAGE], system, component);
-    let answer = client.ask(&packet, ANSWER, TRIES, |frame| {
-        let fields = Fields(frame.payload());
-        let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == RESTART;
-        (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
-    })?;
+    let answer = client.command(RESTART, &[MASS_STORAGE], ANSWER, TRIES)?;
     match answer.context("no answer; if the PC has no new disk, send the command again")? {
-        0 => Ok(()),
-        1 => bail!(
-            "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
-        ),
-        2 => bail!("the board refused: GS_SIGN needs a signed command; give --key FILE"),
         3 => bail!("the firmware has no card reader; flash the one of this version"),
-        result => bail!("the board refused (MAV_RESULT {result})"),
+        result => accepted(result, "GS_SIGN needs a signed command; give --key FILE"),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use hums_link::messages::command_ack;
+    use hums_link::packet::Fields;
 
     use super::*;
     use crate::talk::tests::fake::found;

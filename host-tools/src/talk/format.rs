@@ -3,13 +3,13 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
+use hums_link::Frame;
 use hums_link::packet::Fields;
-use hums_link::{Frame, messages};
 use serde::Serialize;
 
-use super::{Client, is_for_us};
+use super::{Client, IN_PROGRESS, accepted, result_of};
 use crate::cli;
-use crate::mavlink::ids::{COMMAND_ACK, STATUSTEXT};
+use crate::mavlink::ids::STATUSTEXT;
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
 
@@ -21,10 +21,6 @@ const TRIES: usize = 8;
 const LIMIT: Duration = Duration::from_mins(5);
 /// Silence of any message: the board is gone.
 const SILENCE: Duration = Duration::from_secs(15);
-
-/// `MAV_RESULT`
-const ACCEPTED: u8 = 0;
-const IN_PROGRESS: u8 = 5;
 
 const SCHEMA: Schema = Schema::first("hums-format");
 
@@ -60,27 +56,17 @@ enum Answer {
 
 impl Answer {
     fn read(frame: &Frame<'_>) -> Option<Self> {
-        let fields = Fields(frame.payload());
-        match frame.id() {
-            COMMAND_ACK if fields.u16(0) == FORMAT && is_for_us(fields.u8(8), fields.u8(9)) => {
-                Some(Self::Result(fields.u8(2)))
-            }
-            STATUSTEXT => {
-                let state = fields.text(1, 50)?.strip_prefix("HUMS: card: ")?;
-                Some(Self::Card(state.to_owned()))
-            }
-            _ => None,
-        }
+        let state = || {
+            let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT);
+            text?.strip_prefix("HUMS: card: ").map(str::to_owned)
+        };
+        result_of(frame, FORMAT).map(Self::Result).or_else(|| state().map(Self::Card))
     }
 }
 
 fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
-    let (system, component) = client.target();
-    let packet = messages::command_long(FORMAT, &[1.0, 1.0], system, component);
-    let answer = client.ask(&packet, ANSWER, TRIES, |frame| match Answer::read(frame) {
-        Some(Answer::Result(result)) => Some(result),
-        _ => None,
-    })?;
+    let system = client.system();
+    let answer = client.command(FORMAT, &[1.0, 1.0], ANSWER, TRIES)?;
     let mut result = answer.context("no answer; check the link, or flash the firmware of this version")?;
     check(result)?;
     let minutes = LIMIT.as_secs() / 60;
@@ -114,16 +100,12 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
 
 fn check(result: u8) -> Result<()> {
     match result {
-        ACCEPTED | IN_PROGRESS => Ok(()),
-        1 => bail!(
-            "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
-        ),
-        2 => bail!(
-            "the board refused: its card works, is full of other files, or GS_SIGN needs a signed command; format such a card on a PC, or give --key FILE"
-        ),
         3 => bail!("the firmware does not know the command; flash the one of this version"),
         4 => bail!("there is no card to format; insert one"),
-        _ => bail!("the board refused (MAV_RESULT {result})"),
+        result => accepted(
+            result,
+            "its card works, is full of other files, or GS_SIGN needs a signed command; format such a card on a PC, or give --key FILE",
+        ),
     }
 }
 

@@ -24,9 +24,12 @@ use crate::files::read_short;
 use crate::hex;
 use crate::interrupt;
 use crate::logs::board::Board;
-use crate::mavlink::ids::{AUTOPILOT_VERSION, HEARTBEAT};
+use crate::mavlink::ids::{AUTOPILOT_VERSION, COMMAND_ACK, HEARTBEAT};
 use crate::outcome::usage;
 
+/// `MAV_RESULT`
+const ACCEPTED: u8 = 0;
+const IN_PROGRESS: u8 = 5;
 /// `MAV_CMD_REQUEST_MESSAGE`
 const REQUEST_MESSAGE: u16 = 512;
 /// Offset of `uid2` in `AUTOPILOT_VERSION`.
@@ -57,6 +60,8 @@ pub struct Client {
     begun: Instant,
     /// 0 until known.
     system: u8,
+    /// The component of the system that is spoken to.
+    component: u8,
     frames: VecDeque<Vec<u8>>,
     heartbeat_at: Option<Instant>,
 }
@@ -98,6 +103,7 @@ impl Client {
             seal,
             begun: Instant::now(),
             system: 0,
+            component: COMPONENT,
             frames: VecDeque::new(),
             heartbeat_at: None,
         }
@@ -141,9 +147,14 @@ impl Client {
         self.system
     }
 
-    /// System and component of the board.
+    /// System and component that is spoken to: the board, unless [`Self::turn_to`] named another one.
     pub const fn target(&self) -> (u8, u8) {
-        (self.system, COMPONENT)
+        (self.system, self.component)
+    }
+
+    /// Speaks with this component of the vehicle from now on.
+    pub const fn turn_to(&mut self, component: u8) {
+        self.component = component;
     }
 
     /// Sends a message.
@@ -157,7 +168,7 @@ impl Client {
         self.duplex.writer.write_all(frame).and_then(|()| self.duplex.writer.flush()).context("--link")
     }
 
-    /// Until `look` accepts a frame of this board, or time is up.
+    /// Until `look` accepts a frame of the component that is spoken to, or time is up.
     pub fn until<T>(
         &mut self,
         end: Instant,
@@ -172,7 +183,7 @@ impl Client {
         loop {
             while let Some(bytes) = self.frames.pop_front() {
                 let frame =
-                    Frame::again(&bytes, Check::Verified).filter(|frame| frame.component() == COMPONENT);
+                    Frame::again(&bytes, Check::Verified).filter(|frame| frame.component() == self.component);
                 let Some(frame) = frame else { continue };
                 if frame.id() == HEARTBEAT && (self.system == 0 || frame.system() == self.system) {
                     self.duplex.reader.keep_to();
@@ -206,6 +217,19 @@ impl Client {
             }
         }
         Ok(None)
+    }
+
+    /// Sends a command until it is answered: a `MAV_RESULT`.
+    pub fn command(
+        &mut self,
+        command: u16,
+        params: &[f32],
+        patience: Duration,
+        tries: usize,
+    ) -> Result<Option<u8>> {
+        let (system, component) = self.target();
+        let packet = messages::command_long(command, params, system, component);
+        self.ask(&packet, patience, tries, |frame| result_of(frame, command))
     }
 
     fn receive(&mut self) -> Result<()> {
@@ -254,6 +278,25 @@ fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> any
         Some(wanted) => anyhow!(
             "no board of system {wanted} is heard (component {COMPONENT}), but of {systems}; is --system as it should be?"
         ),
+    }
+}
+
+/// The result of a command of ours.
+fn result_of(frame: &Frame<'_>, command: u16) -> Option<u8> {
+    let fields = Fields(frame.payload());
+    let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == command;
+    (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
+}
+
+/// Accepts [`ACCEPTED`] and [`IN_PROGRESS`]. `denied`: the reasons of a denial.
+fn accepted(result: u8, denied: &str) -> Result<()> {
+    match result {
+        ACCEPTED | IN_PROGRESS => Ok(()),
+        1 => bail!(
+            "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
+        ),
+        2 => bail!("the board refused: {denied}"),
+        result => bail!("the board refused (MAV_RESULT {result})"),
     }
 }
 

@@ -23,15 +23,19 @@ use crate::talk;
 const GAP: Duration = Duration::from_millis(1_500);
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
+/// `MAV_PARAM_TYPE_REAL32`
+const REAL32: u8 = 9;
 /// More parameters than a board has.
 const COUNT_MAX: u16 = 4_096;
 
 /// `PARAM_VALUE`
-struct Param {
-    name: String,
-    value: f32,
+pub(super) struct Param {
+    pub(super) name: String,
+    pub(super) value: f32,
     index: u16,
     count: u16,
+    /// `MAV_PARAM_TYPE`
+    pub(super) kind: u8,
 }
 
 /// Runs `hums box params`.
@@ -72,16 +76,8 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
                 note!("{name}: {value} is rounded to {wanted}: a parameter has single precision");
             }
             let mut client = Client::connect(at)?;
-            let (system, component) = client.target();
-            let packet = Packet::new(PARAM_SET)
-                .f32(0, wanted)
-                .u8(4, system)
-                .u8(5, component)
-                .text(6, 16, name)
-                .u8(22, 9);
-            let kept = client
-                .ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == *name))?
-                .with_context(|| no_answer(system, name))?;
+            let system = client.system();
+            let kept = set(&mut client, name, wanted, REAL32)?;
             if kept.value.to_bits() != wanted.to_bits() {
                 bail!("system {system}: {name}: the board refused {wanted} and keeps {}", kept.value);
             }
@@ -177,6 +173,7 @@ fn value_of(frame: &Frame<'_>) -> Option<Param> {
         value: fields.f32(0),
         index: fields.u16(6),
         count: fields.u16(4),
+        kind: fields.u8(24),
     })
 }
 
@@ -185,12 +182,25 @@ pub(super) fn value(client: &mut Client, name: &str) -> Result<f32> {
 }
 
 fn read(client: &mut Client, name: &str) -> Result<Param> {
+    ask(client, name, TRIES)?.with_context(|| no_answer(client.system(), name))
+}
+
+/// `None` if no answer comes: an autopilot does not answer for an unknown name.
+pub(super) fn ask(client: &mut Client, name: &str, tries: usize) -> Result<Option<Param>> {
     let (system, component) = client.target();
     let packet =
         Packet::new(PARAM_REQUEST_READ).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name);
-    let answer =
+    client.ask(&packet, ANSWER, tries, |frame| value_of(frame).filter(|value| value.name == name))
+}
+
+/// Returns the value that the other side keeps. `kind`: `MAV_PARAM_TYPE`.
+pub(super) fn set(client: &mut Client, name: &str, value: f32, kind: u8) -> Result<Param> {
+    let (system, component) = client.target();
+    let packet =
+        Packet::new(PARAM_SET).f32(0, value).u8(4, system).u8(5, component).text(6, 16, name).u8(22, kind);
+    let kept =
         client.ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == name))?;
-    answer.with_context(|| no_answer(system, name))
+    kept.with_context(|| no_answer(system, name))
 }
 
 /// And its faults; lost values are requested one by one.

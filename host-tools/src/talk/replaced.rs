@@ -7,16 +7,13 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use hums_core::component::{COMPONENTS_MAX, ComponentKind, LABEL_BYTES};
-use hums_link::messages;
-use hums_link::packet::Fields;
 use hums_link::param_line::{self, Line};
 use serde::Serialize;
 
-use super::{Client, is_for_us, params};
+use super::{Client, accepted, params};
 use crate::check;
 use crate::cli::{self, Link};
 use crate::files::{Inputs, Output, settle};
-use crate::mavlink::ids::COMMAND_ACK;
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
 use crate::part;
@@ -117,7 +114,6 @@ fn on_board(client: &mut Client, part: ComponentKind, number: u8) -> Result<usiz
 }
 
 fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
-    let (system, component) = client.target();
     let number = |characters: &[u8]| {
         let mut number = [0; 4];
         number.iter_mut().skip(1).zip(characters).for_each(|(to, from)| *to = *from);
@@ -125,24 +121,10 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     };
     let mut values = vec![place as f32];
     values.extend(serial.as_bytes().chunks(CHARACTERS).map(number));
-    let packet = messages::command_long(REPLACED, &values, system, component);
-    let answer = client.ask(&packet, ANSWER, TRIES, |frame| {
-        let fields = Fields(frame.payload());
-        let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == REPLACED;
-        (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
-    })?;
-    match answer.with_context(|| {
-        format!("system {system}: no answer; check the link, or flash the firmware of this version")
-    })? {
-        0 => Ok(()),
-        1 => bail!(
-            "system {system}: refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
-        ),
-        2 => bail!(
-            "system {system}: the board refused: there is no such component, or GS_SIGN needs a signed command; give --key FILE"
-        ),
-        result => bail!("system {system}: the board refused (MAV_RESULT {result})"),
-    }
+    let answer = client.command(REPLACED, &values, ANSWER, TRIES)?;
+    let answer = answer.context("no answer; check the link, or flash the firmware of this version");
+    let denied = "there is no such component, or GS_SIGN needs a signed command; give --key FILE";
+    answer.and_then(|result| accepted(result, denied)).with_context(|| format!("system {}", client.system()))
 }
 
 /// Place and serial number, by the newest log with components.
@@ -189,10 +171,10 @@ fn write(card: &Path, place: usize, serial: &str, old: &str) -> Result<PathBuf> 
 #[cfg(test)]
 mod tests {
     use hums_link::messages::command_ack;
-    use hums_link::packet::Packet;
+    use hums_link::packet::{Fields, Packet};
 
     use super::*;
-    use crate::mavlink::ids::PARAM_VALUE;
+    use crate::mavlink::ids::{PARAM_REQUEST_READ, PARAM_VALUE};
     use crate::talk::tests::fake::found;
 
     #[test]
@@ -207,7 +189,8 @@ mod tests {
                 let is_it = told == [3, 4_271_412, 3_617_073, 0];
                 return vec![(1, command_ack(REPLACED, if is_it { 0 } else { 3 }, 255, 190))];
             }
-            let Some(name) = fields.text(4, 16) else { return Vec::new() };
+            let name = fields.text(4, 16).filter(|_| frame.id() == PARAM_REQUEST_READ);
+            let Some(name) = name else { return Vec::new() };
             let place = usize::from(name.as_bytes()[3] - b'1');
             let value = if name.ends_with("KIND") { kinds[place] } else { numbers[place] };
             vec![(1, Packet::new(PARAM_VALUE).f32(0, value).u16(4, 16).text(8, 16, name))]

@@ -24,7 +24,8 @@ struct Line {
     coming: VecDeque<u8>,
 }
 
-/// Boards of these systems answer heartbeats with their own, and all else so.
+/// Boards of these systems answer heartbeats with their own. The addressed component gives the other answers, the autopilot
+/// those to heartbeats.
 pub(in crate::talk) fn client(
     systems: &'static [u8],
     answer: impl FnMut(&Frame<'_>) -> Answers + Send + 'static,
@@ -63,14 +64,19 @@ impl Write for End {
         let mut line = self.0.lock().expect("no panic");
         let Line { framer, systems, answer, coming } = &mut *line;
         framer.push(bytes, &mut |frame| {
-            let said = if frame.id() == HEARTBEAT {
-                systems.iter().map(|system| (*system, messages::heartbeat(4))).collect()
-            } else {
-                answer(&frame)
+            let mut send = |component: u8, said: Answers| {
+                for (system, packet) in said {
+                    let mut buffer = [0; FRAME_BYTES_MAX];
+                    coming.extend(Encoder::of(system, component).frame(&mut buffer, &packet));
+                }
             };
-            for (system, packet) in said {
-                let mut buffer = [0; FRAME_BYTES_MAX];
-                coming.extend(Encoder::of(system, COMPONENT).frame(&mut buffer, &packet));
+            if frame.id() == HEARTBEAT {
+                send(COMPONENT, systems.iter().map(|system| (*system, messages::heartbeat(4))).collect());
+                // The autopilot's own one, if any.
+                send(1, answer(&frame));
+            } else {
+                let component = frame.target().map_or(COMPONENT, |(_, component)| component);
+                send(component, answer(&frame));
             }
         });
         Ok(bytes.len())
