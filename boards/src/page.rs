@@ -12,7 +12,7 @@ settings. The wiring tables here are made from the files in [`boards/`](../board
 
 **No board of this page was tried on hardware.** `cargo xtask test` runs the image of one board for each SPI on the [model of the chip](chip.md),
 `cargo xtask prove boards` that of every board. Pins, crystals and levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If
-you have tried a board, please report it.
+you have tried a board, please report it, with the file of `hums box report`.
 
 * A flight controller is used here as a recorder only. Its own sensors, OSD and motor outputs stay unused. Do not connect motors.
 * The USB plug loads the firmware, and shows the card as a [read-only disk](runbook.md#read-the-card-over-usb).

@@ -88,6 +88,8 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
             BoxAction::Replaced(args) => talk::replaced::run(args),
             BoxAction::CardReader(args) => talk::card_reader::run(args),
             BoxAction::FormatCard(args) => talk::format::run(args),
+            BoxAction::Setup(args) => talk::setup::run(args),
+            BoxAction::Report(args) => talk::report::run(args),
         },
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),

@@ -72,9 +72,8 @@ fn tried(command: &str) -> Tried {
         "sim" => lines(&["sim --json IN --sd OUT/card.img --gs OUT/gs --tap OUT/tap"]),
         "live" => Tried::Live,
         "completions" | "man" => Tried::Nothing("it reads no file"),
-        "box" => Tried::Nothing(
-            "a line's bytes; what is kept of them has a limit (host-tools/src/talk), and a key 4 KiB",
-        ),
+        // Of a line's bytes a limited part is kept (host-tools/src/talk), of a key 4 KiB.
+        "box" => lines(&["box report IN -o OUT/report.json"]),
         unknown => panic!("how does `hums {unknown}` read a file? Say so in `tried`"),
     }
 }

@@ -22,6 +22,7 @@ mod raw_device;
 mod round_trip;
 mod salvage;
 mod second_decoder;
+mod setup;
 mod texts;
 mod usage;
 

@@ -100,8 +100,16 @@ const WANTED: [Wanted; 34] = [
     (ids::LOCAL_POSITION_NED, By::Both, 5, 40),
 ];
 
+/// The messages that the box requests of this autopilot over a line of this rate, the most important first, with their
+/// rates in Hz.
+pub fn wanted(autopilot: Autopilot, baud: u32) -> impl Iterator<Item = (u32, f32)> {
+    let stretch = stretch(autopilot, baud) as f32;
+    let sent = WANTED.into_iter().filter(move |wanted| is_sent_by(wanted, autopilot));
+    sent.map(move |(id, _, rate_hz, _)| (id, f32::from(rate_hz) / stretch))
+}
+
 /// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.
-const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
+pub const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Has {
@@ -268,7 +276,7 @@ impl Asking {
     }
 
     fn look(&mut self, known: &Known) {
-        let stretch = stretch(known);
+        let stretch = stretch(known.autopilot, known.baud);
         let window_ms = self.window.as_millis() as u32;
         let mut missing = false;
         for (message, wanted) in self.messages.iter_mut().zip(&WANTED) {
@@ -329,7 +337,7 @@ impl Asking {
         }
         if let Some(group) = self.groups {
             if let Some((stream, rate)) = GROUPS.get(group) {
-                let rate = (*rate / stretch(known) as u16).max(1);
+                let rate = (*rate / stretch(known.autopilot, known.baud) as u16).max(1);
                 let Source { system, component } = known.source;
                 if send(&messages::request_data_stream(*stream, rate, system, component)) {
                     self.groups = Some(group + 1);
@@ -393,10 +401,10 @@ const fn is_sent_by(wanted: &Wanted, autopilot: Autopilot) -> bool {
 }
 
 /// Factor by which all intervals are stretched to fit the line.
-fn stretch(known: &Known) -> u32 {
-    let sent = WANTED.iter().filter(|wanted| is_sent_by(wanted, known.autopilot));
+fn stretch(autopilot: Autopilot, baud: u32) -> u32 {
+    let sent = WANTED.iter().filter(|wanted| is_sent_by(wanted, autopilot));
     let bytes_per_s: u32 = sent.map(|wanted| u32::from(wanted.2) * u32::from(wanted.3)).sum();
-    let carried = (known.baud / 10 * SHARE / 100).max(1);
+    let carried = (baud / 10 * SHARE / 100).max(1);
     bytes_per_s.div_ceil(carried).max(1)
 }
 
@@ -405,7 +413,7 @@ fn packet(what: What, known: &Known) -> Packet {
     match what {
         What::Interval(index) => {
             let (id, _, rate_hz, _) = WANTED[index];
-            let interval_us = 1_000_000 / u32::from(rate_hz) * stretch(known);
+            let interval_us = 1_000_000 / u32::from(rate_hz) * stretch(known.autopilot, known.baud);
             messages::command_long(SET_MESSAGE_INTERVAL, &[id as f32, interval_us as f32], system, component)
         }
         What::One(index) => {

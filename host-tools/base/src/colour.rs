@@ -68,7 +68,7 @@ impl fmt::Display for Coloured<'_> {
 /// The word of a level or a verdict; one that is neither good nor bad has no colour.
 pub fn level(word: &str) -> Coloured<'_> {
     let colour = match word {
-        "critical" | "CRITICAL" | "FAILED" | "DUE" => Some(Colour::Critical),
+        "critical" | "CRITICAL" | "FAILED" | "DUE" | "MISSING" => Some(Colour::Critical),
         "warning" | "damaged" | "unproved" | "rebuilt" | "soon" => Some(Colour::Warning),
         "ok" => Some(Colour::Good),
         _ => None,

@@ -15,7 +15,8 @@ pub use read::{Compact, Decode, Due, Info, Logbook, Report, Share, Split};
 pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{
-    BoxAction, BoxArgs, CardReader, FormatCard, Link, LogMoment, Params, ParamsAction, Pull, Replaced,
+    BoxAction, BoxArgs, BoxReport, CardReader, FormatCard, Link, LogMoment, Params, ParamsAction, Pull,
+    Replaced, Setup,
 };
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.
@@ -78,7 +79,7 @@ pub enum Command {
     Compact(Compact),
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
     Sim(Sim),
-    /// Talk with the box over MAVLink: its logs, its parameters, its card
+    /// Set up the box, and talk with it over MAVLink: its logs, its parameters, its card
     Box(BoxArgs),
     /// Print a script for a shell, which completes commands, flags and file names
     #[command(hide = true)]

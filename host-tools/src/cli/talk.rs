@@ -1,4 +1,4 @@
-//! The commands that talk with the board: `hums box pull`, `hums box params`, `hums box card-reader`, `hums box format-card`.
+//! The commands of `hums box`.
 
 use std::path::PathBuf;
 
@@ -15,6 +15,8 @@ const BOX_EXAMPLES: &str = "Examples:
   hums box pull --link serial:/dev/ttyUSB0:57600 -o logs
   hums box params list --link serial:/dev/ttyUSB0:57600
   hums box replaced motor 3 --serial 4711 --link serial:/dev/ttyUSB0:57600
+  hums box setup --board speedybee-f405-v4 --link serial:/dev/ttyUSB0:57600
+  hums box report /media/card -o report.json
   hums box card-reader --link serial:/dev/ttyUSB0:57600
   hums box format-card --yes --link serial:/dev/ttyUSB0:57600";
 
@@ -40,6 +42,10 @@ pub enum BoxAction {
     CardReader(CardReader),
     /// Format the board's card, if the board cannot record on it
     FormatCard(FormatCard),
+    /// Lead through wiring and the autopilot's settings, and say what is missing before a flight
+    Setup(Setup),
+    /// Write a file for the maintainers about a box, without where and who
+    Report(BoxReport),
 }
 
 const PARAMS_EXAMPLES: &str = "Examples:
@@ -287,4 +293,69 @@ pub struct CardReader {
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,
+}
+
+const SETUP_EXAMPLES: &str = "Examples:
+  hums box setup --board speedybee-f405-v4 --link serial:/dev/ttyUSB0:57600
+  hums box setup --link udpin:0.0.0.0:14550 --port 1
+  hums box setup --link serial:/dev/ttyACM0:115200 --set --undo before.param
+  hums box setup --link serial:/dev/ttyACM0:115200 --restore before.param
+
+The autopilot answers over its own USB or radio link, or through the box while its GS_PASS is 1. The last line is `ready to fly`, or
+what is missing (exit code 4).";
+
+/// `hums box setup`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = SETUP_EXAMPLES)]
+pub struct Setup {
+    /// The address of the board.
+    #[command(flatten)]
+    pub at: Link,
+    /// Show the pads of this board, and check that the image is for it (docs/boards.md)
+    #[arg(long, value_name = "NAME")]
+    pub board: Option<String>,
+    /// The autopilot's telemetry port with the box: TELEM n of PX4, SERIALn of ArduPilot
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=9))]
+    pub port: u8,
+    /// Set the autopilot's parameters that differ, after writing their values to the file of --undo
+    #[arg(long, requires = "undo")]
+    pub set: bool,
+    /// With --set: a new file for the present values
+    #[arg(long, value_name = "FILE", requires = "set")]
+    pub undo: Option<PathBuf>,
+    /// Set the values of a file that --undo wrote, and nothing else
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["set", "json"])]
+    pub restore: Option<PathBuf>,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+const REPORT_EXAMPLES: &str = "Examples:
+  hums box report /media/card -o report.json
+  hums box report --link serial:/dev/ttyUSB0:57600 -o report.json
+
+The file has the box's starts, chip id, faults, losses, figures, parameters and harmless texts. It has no place, vehicle, person
+or key. Attach it to a report about a board that you tried.";
+
+/// `hums box report`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = REPORT_EXAMPLES)]
+#[command(group = clap::ArgGroup::new("source").args(["inputs", "link"]).required(true))]
+pub struct BoxReport {
+    /// A card, an image or logs of the box
+    #[arg(value_name = "PATH")]
+    pub inputs: Vec<PathBuf>,
+    /// Where the board is: udpin:, udpout:, tcp: or serial:
+    #[arg(long, value_name = "SRC")]
+    pub link: Option<Endpoint>,
+    /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    pub system: Option<u8>,
+    /// The file to write
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
 }

@@ -5,6 +5,8 @@ pub mod format;
 pub mod params;
 pub mod pull;
 pub mod replaced;
+pub mod report;
+pub mod setup;
 #[cfg(test)]
 mod tests;
 

@@ -19,14 +19,16 @@ enum Role {
 /// An argument that is not listed fails the test: decide its kind, and the test covers it from then on.
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
-        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" => Role::Input,
+        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" | "restore" => Role::Input,
         "output" | "sd" | "gs" | "tap" | "store" | "manifest" => Role::Output,
-        "around" | "bucket" | "number" | "part" | "serial" | "card" | "card_out" | "command"
-        | "card_size" | "cut_after_writes" | "cut_store_after" | "folder" | "format" | "from" | "influx"
-        | "last" | "line_rate" | "link" | "listen" | "listen_token" | "map" | "message" | "name"
-        | "names" | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session"
+        "around" | "board" | "port" | "bucket" | "number" | "part" | "serial" | "card" | "card_out"
+        | "command" | "card_size" | "cut_after_writes" | "cut_store_after" | "folder" | "format" | "from"
+        | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token" | "map" | "message"
+        | "name" | "names" | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session"
         | "shell" | "span" | "speed" | "split" | "stall" | "system" | "to" | "token" | "value"
         | "vehicle" | "write_error" => Role::Other,
+        // A file that exists is refused.
+        "undo" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }
@@ -43,7 +45,7 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
 )];
 
 /// Commands without a pair of input and output to try, with the reason.
-const NO_PAIRS: [(&str, &str); 13] = [
+const NO_PAIRS: [(&str, &str); 14] = [
     ("check", "prints"),
     ("live", "shows and sends"),
     ("completions", "prints"),
@@ -51,6 +53,7 @@ const NO_PAIRS: [(&str, &str); 13] = [
     ("due", "prints"),
     ("compact", "changes its folder"),
     ("box replaced", "talks with a board"),
+    ("box setup", "talks with a board"),
     ("box card-reader", "talks with a board"),
     ("box format-card", "talks with a board"),
     ("box params list", "talks with a board"),
@@ -62,7 +65,7 @@ const NO_PAIRS: [(&str, &str); 13] = [
 /// A valid value for an argument that needs one.
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
-        ("decode" | "report" | "info", "inputs") | ("check", "past") => "log.hum",
+        ("decode" | "report" | "info" | "box", "inputs") | ("check", "past") => "log.hum",
         ("check" | "logbook", "inputs") | (_, "input" | "gs_input") => "flight.tlog",
         ("completions", "shell") => "bash",
         (_, "params") => "hums.param",

@@ -45,6 +45,27 @@ const OBSERVATIONS: &str = "observations";
 const TEXTS: &str = "texts";
 const PARAMETERS: &str = "parameters";
 
+/// The rules of texts, for other files that people give away.
+pub struct TextRules(Rules);
+
+impl TextRules {
+    /// All of them.
+    pub fn new() -> Self {
+        Self(Rules::new())
+    }
+
+    /// Whether a text names neither place nor person.
+    pub fn keeps(&self, text: &str) -> bool {
+        self.0.keeps_text(text)
+    }
+}
+
+impl Default for TextRules {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// The request of `hums share`.
 #[derive(Clone, Debug)]
 pub struct ShareRequest {

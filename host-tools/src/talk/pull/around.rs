@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use hums_blackbox::{GROUP_SECTORS, Header, SECTOR_BYTES, Sector};
@@ -19,6 +20,7 @@ use tempfile::NamedTempFile;
 
 use super::compare::{beginning_of, bytes_of, heading_of};
 use super::ftp::Ftp;
+use super::{Client, first_of_newest, number};
 use crate::cli::LogMoment;
 use crate::files::{begin, cannot_write};
 use crate::logs::fat::Extent;
@@ -82,6 +84,57 @@ pub(super) fn pull(
     }
     let outcome = log.tell_unread().and(tell_faults(&overview, is_to_end.then_some(to)));
     Ok(Brought { files: log.finish(&places)?, at, found, outcome: outcome.and(searched) })
+}
+
+/// The sectors of a group, which begins with the records of a start.
+pub(in crate::talk) const WHOLE_GROUP: u32 = GROUP_SECTORS as u32;
+/// Time in which a log that is recorded grows: the box writes every 0.2 s.
+const GROWS: Duration = Duration::from_secs(5);
+const LOOK_AGAIN: Duration = Duration::from_millis(500);
+
+/// Both ends of the box's newest log, as logs in temporary files.
+pub(in crate::talk) struct NewestLog {
+    pub(in crate::talk) begin: Log,
+    /// At least a whole group.
+    pub(in crate::talk) end: Log,
+    pub(in crate::talk) is_growing: bool,
+}
+
+/// Brings the newest log's first sectors and its last groups, and looks at them. `None` if no log has data.
+pub(in crate::talk) fn newest<T>(
+    client: Client,
+    head_sectors: u32,
+    look: impl FnOnce(&NewestLog) -> Result<T>,
+) -> Result<Option<T>> {
+    let mut ftp = Ftp::new(client)?;
+    let (mut all, _) = ftp.list()?;
+    all.sort();
+    let newest = first_of_newest(&all, 1);
+    let is_its = |(name, bytes): &&(String, u32)| *bytes > 0 && number(name) == Some(newest);
+    let files: Vec<(String, u32)> = all.iter().filter(is_its).cloned().collect();
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let folder = tempfile::tempdir().context("a folder for temporary files")?;
+    let mut log = RemoteLog::new(&mut ftp, &files, folder.path())?;
+    let count = log.count();
+    let last = log.group_before(count)?.start;
+    let end = log.group_before(last)?.start..count;
+    let begin = 0..head_sectors.min(end.start);
+    for places in [&begin, &end].into_iter().filter(|places| !places.is_empty()) {
+        log.bring(places.clone())?;
+    }
+    let until = std::time::Instant::now() + GROWS;
+    let is_growing = loop {
+        let (mut now, _) = log.ftp.list()?;
+        now.sort();
+        if now != all || std::time::Instant::now() >= until {
+            break now != all;
+        }
+        std::thread::sleep(LOOK_AGAIN);
+    };
+    let newest = NewestLog { begin: log.read_as_log(&begin), end: log.read_as_log(&end), is_growing };
+    look(&newest).map(Some)
 }
 
 /// Refuses a moment without a recording.

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use serde::Serialize;
 
+pub(super) use self::around::{WHOLE_GROUP, newest};
 use self::compare::{Heading, Likeness, compare, heading_here, heading_of};
 use self::ftp::Ftp;
 use self::judge::{LogJson, judge};

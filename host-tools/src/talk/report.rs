@@ -1,0 +1,158 @@
+//! `hums box report`: what a maintainer needs about a box, without where and who.
+//!
+//! The records of [`KEPT`], from a card, a log or the newest log of a box on a link. Other records have places, vehicles or
+//! persons. Texts pass the rules of `hums share`.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+
+use anyhow::{Context as _, Result, bail};
+use hums_blackbox::Record;
+use hums_core::clock::Instant;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{Client, pull};
+use crate::cli::{self, Link};
+use crate::decode::{record, share};
+use crate::files::{Inputs, Output, settle};
+use crate::logs::Log;
+use crate::outcome::Outcome;
+use crate::output::{self, Schema};
+use crate::plural::count;
+use crate::printable;
+use crate::source::find::{FoundRecordings, find};
+use crate::source::item::Item;
+use crate::summary::Overview;
+
+const SCHEMA: Schema = Schema::first("hums-box-report");
+/// Tables of the report; `true`: only the last row counts.
+const KEPT: [(&str, bool); 6] = [
+    ("HUMS_BOOT", false),
+    ("HUMS_FAULT", false),
+    ("HUMS_LOSS", false),
+    ("HUMS_NOTE", false),
+    ("HUMS_PARAM", false),
+    ("HUMS_STATS", true),
+];
+/// Records of a log: bounded memory.
+const RECORDS_MAX: usize = 2_000;
+/// Newest logs of a card.
+const LOGS_MAX: usize = 20;
+
+#[derive(Debug, Serialize)]
+struct ReportJson {
+    /// Version and commit of `hums`.
+    program: &'static str,
+    /// For the owner: what was tried, and what happened.
+    remarks: &'static str,
+    /// The newest last.
+    logs: Vec<LogJson>,
+}
+
+#[derive(Debug, Default, Serialize)]
+struct LogJson {
+    /// Number on the card.
+    name: String,
+    /// What the log lacks; empty for a whole one.
+    lacks: &'static str,
+    /// In order of time.
+    records: Vec<RecordJson>,
+    /// Texts that may name a place or a person.
+    texts_removed: u64,
+    /// Records beyond the limit.
+    records_left_out: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct RecordJson {
+    /// Time.
+    time_s: f64,
+    /// Table, as in `--format jsonl`.
+    record: &'static str,
+    /// Its columns.
+    fields: Value,
+}
+
+/// Runs `hums box report`.
+pub fn run(args: &cli::BoxReport) -> Result<Outcome> {
+    let found = if args.inputs.is_empty() { None } else { Some(find(&args.inputs, false)?) };
+    let inputs = Inputs::of(found.iter().flat_map(FoundRecordings::paths)).forcing(args.force);
+    inputs.refuse(&args.output)?;
+    let mut logs = Vec::new();
+    if let Some(found) = &found {
+        found.tell();
+        let all: Vec<&Log> = found.places.iter().filter_map(|place| place.own()).collect();
+        if all.is_empty() {
+            bail!("no log of a HUMS box is in there; name a card, an image or a log");
+        }
+        for log in all.get(all.len().saturating_sub(LOGS_MAX)..).unwrap_or_default() {
+            logs.push(LogJson::of(log)?);
+        }
+    }
+    if let Some(link) = &args.link {
+        let at = Link { link: link.clone(), key: None, system: args.system };
+        let newest = pull::newest(Client::connect(&at)?, pull::WHOLE_GROUP, |newest| {
+            let pieces = newest.begin.pieces.iter().chain(&newest.end.pieces).cloned().collect();
+            LogJson::of(&Log { pieces, ..newest.end.clone() })
+        })?;
+        logs.push(newest.context("the box has no log with data: is a card in its slot?")?);
+    }
+    let records: u64 = logs.iter().map(|log| log.records.len() as u64).sum();
+    let remarks = "what was tried, on which board and autopilot, and what happened:";
+    let report = output::json_text(SCHEMA, &ReportJson { program: cli::PROGRAM, remarks, logs })?;
+    let mut file = Output::create(&args.output, &inputs)?;
+    settle(file.write_all(printable::json(&report).as_bytes()), &args.output)?;
+    file.finish()?;
+    let path = args.output.display();
+    output::line(&format!(
+        "{path}: {}; read it, add what happened, and attach it",
+        count(records, "record")
+    ))?;
+    Ok(Outcome::Done)
+}
+
+impl LogJson {
+    fn of(log: &Log) -> Result<Self> {
+        let name = log.name.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
+        let mut this = Self { name, ..Self::default() };
+        let mut last = BTreeMap::new();
+        let rules = share::TextRules::new();
+        let overview = Overview::told(log, None, &mut |at, item| {
+            if let Item::Record(record) = item {
+                this.take(at, record, &rules, &mut last);
+            }
+            Ok(())
+        })?;
+        this.records.extend(last.into_values());
+        this.lacks = overview.soundness().words();
+        Ok(this)
+    }
+
+    fn take(
+        &mut self,
+        at: Instant,
+        record: &Record<'_>,
+        rules: &share::TextRules,
+        last: &mut BTreeMap<&'static str, RecordJson>,
+    ) {
+        for row in record::rows(record) {
+            let Some((table, is_last)) = KEPT.iter().find(|(table, _)| *table == row.table) else { continue };
+            if matches!(record, Record::Note(note) if !rules.keeps(note.text)) {
+                self.texts_removed += 1;
+                continue;
+            }
+            let mut fields = Vec::new();
+            row.push_json_object(&mut fields);
+            let fields = serde_json::from_slice(&fields).unwrap_or_default();
+            let record = RecordJson { time_s: at.as_secs_f64(), record: table, fields };
+            if *is_last {
+                last.insert(table, record);
+            } else if self.records.len() < RECORDS_MAX {
+                self.records.push(record);
+            } else {
+                self.records_left_out += 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,749 @@
+//! `hums box setup`: the wiring of a board, the autopilot's settings for it, and a bench check.
+//!
+//! The settings are those of `docs/wiring.md`, of the autopilot's telemetry port `--port`. The autopilot answers over its own USB
+//! or radio link, or through the box while `GS_PASS` is 1. The bench check reads both ends of the log that the box records
+//! now: so the messages and rates are those that the box received.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context as _, Result, bail};
+use hums_analysis::log_json::duration_s;
+use hums_boards::{Board, Wire};
+use hums_core::observation::Autopilot;
+use hums_link::asking::{GROUPS, wanted};
+use hums_link::encode::COMPONENT;
+use hums_link::messages;
+use hums_link::packet::Fields;
+use hums_link::param_line::{self, Line};
+use serde::Serialize;
+
+use super::params::{self, Param};
+use super::{Client, pull};
+use crate::cli;
+use crate::colour::level;
+use crate::files::{Inputs, Output, read_short, settle};
+use crate::mavlink::ids::{
+    ATTITUDE, BATTERY_STATUS, EKF_STATUS_REPORT, ESTIMATOR_STATUS, GLOBAL_POSITION_INT, GPS_RAW_INT,
+    HEARTBEAT, STATUSTEXT, SYS_STATUS, SYSTEM_TIME, VFR_HUD, VIBRATION,
+};
+use crate::names::message_name;
+use crate::outcome::{Outcome, usage};
+use crate::output::{self, Schema};
+use crate::plural::count;
+use crate::printable::word;
+use crate::summary::Overview;
+use crate::table::{Table, left, right};
+use crate::utc::date_and_time;
+
+const SCHEMA: Schema = Schema::first("hums-setup");
+/// `MAV_COMP_ID_AUTOPILOT1`
+const AUTOPILOT: u8 = 1;
+/// `MAV_AUTOPILOT_ARDUPILOTMEGA`, `MAV_AUTOPILOT_PX4`
+const ARDUPILOT: u8 = 3;
+const PX4: u8 = 12;
+/// `MAV_MODE_FLAG_SAFETY_ARMED`
+const ARMED: u8 = 0x80;
+/// `MAV_PARAM_TYPE`: integers up to 32 bits, of which PX4 sends the bits in the place of a float.
+const INTEGERS: std::ops::RangeInclusive<u8> = 1..=6;
+/// `MAV_CMD_RUN_PREARM_CHECKS`
+const PREARM: u16 = 401;
+/// Three heartbeats.
+const HEARTBEATS: Duration = Duration::from_secs(3);
+const ANSWER: Duration = Duration::from_secs(3);
+const TRIES: usize = 3;
+/// Sectors with the record of the start.
+const HEAD_SECTORS: u32 = 8;
+const UNDO_BYTES_MAX: u64 = 64 * 1024;
+/// PX4's `MAV_X_RATE` at 921,600 baud, bytes per second.
+const RATE_BYTES: u32 = 80_000;
+/// Names of ArduPilot's groups of `SRn_`, in the order of [`GROUPS`].
+const STREAMS: [&str; 7] = ["RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3"];
+/// The checks of every vehicle need them; of the last two one autopilot has one.
+const NEEDED: [u32; 10] = [
+    SYS_STATUS,
+    ATTITUDE,
+    GLOBAL_POSITION_INT,
+    GPS_RAW_INT,
+    BATTERY_STATUS,
+    VFR_HUD,
+    VIBRATION,
+    SYSTEM_TIME,
+    ESTIMATOR_STATUS,
+    EKF_STATUS_REPORT,
+];
+/// A message is slow below this part of its rate.
+const SLOW: f64 = 0.5;
+
+#[derive(Debug, Serialize)]
+struct SetupJson {
+    /// MAVLink system id of the box's vehicle.
+    system: u8,
+    /// Of the board of `--board`.
+    wiring: Vec<Wiring>,
+    /// Parameters of the autopilot; empty if it is not heard on the link.
+    settings: Vec<Setting>,
+    /// The bench check.
+    checks: Vec<CheckLine>,
+    /// No check is `missing`.
+    ready: bool,
+}
+
+/// A wire or a part of the board.
+#[derive(Debug, Serialize)]
+struct Wiring {
+    /// The other end of the wire.
+    wire: &'static str,
+    /// Pad and pin of the board.
+    pad: String,
+}
+
+/// A parameter of the autopilot.
+#[derive(Debug, Serialize)]
+struct Setting {
+    /// Name of the parameter.
+    name: String,
+    /// `null` if the autopilot did not answer.
+    now: Option<f64>,
+    /// The value for the box.
+    wanted: f64,
+    /// A larger value is good too.
+    at_least: bool,
+    /// The reason.
+    why: &'static str,
+    #[serde(skip)]
+    kind: u8,
+    /// Not every autopilot has it.
+    #[serde(skip)]
+    is_optional: bool,
+}
+
+impl Setting {
+    fn new(name: String, wanted: impl Into<f64>, why: &'static str) -> Self {
+        let wanted = wanted.into();
+        Self { name, now: None, wanted, at_least: false, why, kind: 0, is_optional: false }
+    }
+
+    fn differs(&self) -> bool {
+        self.now.is_some_and(|now| {
+            let is_equal = (now - self.wanted).abs() < 1e-6;
+            !(is_equal || self.at_least && now > self.wanted)
+        })
+    }
+
+    fn state(&self) -> &'static str {
+        match self.now {
+            None if self.is_optional => "ok",
+            None => "unknown",
+            Some(_) if self.differs() => "warning",
+            Some(_) => "ok",
+        }
+    }
+}
+
+/// A line of the bench check.
+#[derive(Debug, Serialize)]
+struct CheckLine {
+    /// `box`, `settings`, `image`, `card`, `clock`, `messages`, `checks`.
+    check: &'static str,
+    /// `ok`, `missing`, `unknown`.
+    state: &'static str,
+    /// The reason, as a sentence.
+    detail: String,
+}
+
+fn line(check: &'static str, is_ok: bool, detail: impl Into<String>) -> CheckLine {
+    CheckLine { check, state: if is_ok { "ok" } else { "missing" }, detail: detail.into() }
+}
+
+/// Parameters of the box.
+struct Own {
+    baud: u32,
+    path: u8,
+    has_streams: bool,
+}
+
+impl Own {
+    fn read(client: &mut Client) -> Result<Self> {
+        Ok(Self {
+            baud: params::value(client, "AP_BAUD")? as u32,
+            path: params::value(client, "GS_PATH")? as u8,
+            has_streams: params::value(client, "AP_STREAMS")? > 0.0,
+        })
+    }
+}
+
+/// The autopilot on the link.
+#[derive(Clone, Copy)]
+struct Heard {
+    autopilot: u8,
+    is_armed: bool,
+}
+
+/// Runs `hums box setup`.
+pub fn run(args: &cli::Setup) -> Result<Outcome> {
+    let board = args.board.as_deref().map(|name| hums_boards::find(name).map_err(usage)).transpose()?;
+    if let Some(board) = board.filter(|_| !args.json) {
+        output::line(&format!("wiring of {}, all grounds together, 3.3 V signals", board.title))?;
+        let mut table = Table::new(2, [left(0), left(0)]);
+        wiring(board).into_iter().for_each(|Wiring { wire, pad }| table.row([wire.to_owned(), pad]));
+        output::line(&table.text())?;
+        board.owner.notes.iter().try_for_each(|note| output::line(&format!("  {note}")))?;
+    }
+    let restored = args.restore.as_deref().map(values_of).transpose()?;
+    let mut client = Client::connect(&args.at).context(
+        "the box sends nothing before it hears the autopilot: check its LED, power, the autopilot's TX wire, and the port's rate",
+    )?;
+    let system = client.system();
+    let own = Own::read(&mut client)?;
+    client.turn_to(AUTOPILOT);
+    let heard = autopilot(&mut client)?;
+    if let Some(values) = restored {
+        return restore(&mut client, heard, &values);
+    }
+    let mut settings = match heard {
+        Some(heard) => settings(&mut client, heard.autopilot, args.port, &own)?,
+        None => Vec::new(),
+    };
+    if args.set {
+        let file = args.undo.as_deref().context("--undo FILE is missing")?;
+        change(&mut client, heard, &mut settings, file)?;
+    }
+    if !args.json {
+        show_settings(heard, &settings)?;
+    }
+    client.turn_to(COMPONENT);
+    let mut checks = vec![own_line(&own, &args.at.link.to_string()), settings_line(&settings)];
+    let ready = prearm(&mut client)?;
+    checks.extend(bench(client, &own, board, heard)?);
+    checks.push(ready);
+    let missing: Vec<&str> =
+        checks.iter().filter(|check| check.state == "missing").map(|check| check.check).collect();
+    let is_ready = missing.is_empty();
+    if args.json {
+        let wiring = board.map_or_else(Vec::new, wiring);
+        output::json(SCHEMA, &SetupJson { system, wiring, settings, checks, ready: is_ready })?;
+    } else {
+        let mut table = Table::new(2, [left(7), left(0), left(0)]);
+        for CheckLine { check, state, detail } in &checks {
+            let state = level(if *state == "missing" { "MISSING" } else { state }).to_string();
+            table.row([state, (*check).to_owned(), word(detail).into_owned()]);
+        }
+        output::line(&format!("bench check\n{}", table.text()))?;
+        let words = missing.join(", ");
+        output::line(&if is_ready { "ready to fly".to_owned() } else { format!("not ready: {words}") })?;
+    }
+    Ok(if is_ready { Outcome::Done } else { Outcome::Findings })
+}
+
+/// The other end of each wire, and its pad on the board.
+fn wiring(board: &Board) -> Vec<Wiring> {
+    let pad = |wire: &Wire| format!("{} ({})", wire.pad, wire.pin);
+    let Board { autopilot, radio, card, led, owner, .. } = board;
+    let all = [
+        ("autopilot's TX", pad(&autopilot.rx)),
+        ("autopilot's RX", pad(&autopilot.tx)),
+        ("radio's TX", pad(&radio.rx)),
+        ("radio's RX", pad(&radio.tx)),
+        ("card", card.slot.clone()),
+        ("LED", format!("{}, lit when {}; it blinks slowly while it records", led.pin, led.lit.name())),
+        ("power", owner.power.clone()),
+    ];
+    all.into_iter().map(|(wire, pad)| Wiring { wire, pad }).collect()
+}
+
+fn autopilot(client: &mut Client) -> Result<Option<Heard>> {
+    client.until(Instant::now() + HEARTBEATS, |frame| {
+        let fields = Fields(frame.payload());
+        let heard = Heard { autopilot: fields.u8(5), is_armed: fields.u8(6) & ARMED != 0 };
+        (frame.id() == HEARTBEAT).then_some(heard)
+    })
+}
+
+/// The wanted settings with the present values; empty for another autopilot.
+fn settings(client: &mut Client, autopilot: u8, port: u8, own: &Own) -> Result<Vec<Setting>> {
+    let mut settings = match autopilot {
+        ARDUPILOT => ardupilot(port, own),
+        PX4 => px4(port, instance(client, port)?, own),
+        _ => return Ok(Vec::new()),
+    };
+    for setting in &mut settings {
+        let Some(param) = params::ask(client, &setting.name, TRIES)? else {
+            // A link on which nothing is answered is not asked further.
+            if setting.is_optional { continue } else { break }
+        };
+        (setting.now, setting.kind) = (Some(value(autopilot, &param)), param.kind);
+    }
+    Ok(settings)
+}
+
+/// `SERIALn_BAUD` is in thousands, cut off.
+fn ardupilot(port: u8, own: &Own) -> Vec<Setting> {
+    let flow = Setting::new(format!("BRD_SER{port}_RTSCTS"), 0, "CTS and RTS are open");
+    let mut settings = vec![
+        Setting::new(format!("SERIAL{port}_PROTOCOL"), 2, "MAVLink 2"),
+        Setting::new(format!("SERIAL{port}_BAUD"), own.baud / 1_000, "the box's AP_BAUD"),
+        Setting { is_optional: true, ..flow },
+    ];
+    if !own.has_streams {
+        let why = "the box requests no streams (AP_STREAMS 0)";
+        settings.extend(STREAMS.iter().zip(GROUPS).map(|(name, (_, rate_hz))| Setting {
+            at_least: true,
+            ..Setting::new(format!("SR{port}_{name}"), rate_hz, why)
+        }));
+    }
+    settings
+}
+
+/// TELEM 1 to 3 are 101 to 103 in `MAV_n_CONFIG`.
+fn px4(port: u8, instance: u8, own: &Own) -> Vec<Setting> {
+    let rate = RATE_BYTES.min(own.baud / 12);
+    let mut settings = vec![
+        Setting::new(format!("MAV_{instance}_CONFIG"), 100 + port, "MAVLink at this port"),
+        Setting::new(format!("SER_TEL{port}_BAUD"), own.baud, "the box's AP_BAUD"),
+        Setting::new(format!("MAV_{instance}_MODE"), 2, "Onboard: the streams for companions"),
+        Setting { at_least: true, ..Setting::new(format!("MAV_{instance}_RATE"), rate, "bytes per second") },
+        Setting::new(format!("MAV_{instance}_FLOW_CTRL"), 0, "CTS and RTS are open"),
+    ];
+    if own.path == 2 {
+        let why = "the autopilot's radio carries the box's texts (GS_PATH 2)";
+        settings.push(Setting::new(format!("MAV_{instance}_FORWARD"), 1, why));
+    }
+    settings
+}
+
+/// The MAVLink instance of this port, else the one that is free, else the second.
+fn instance(client: &mut Client, port: u8) -> Result<u8> {
+    let mut free = None;
+    for instance in 0..3 {
+        let Some(param) = params::ask(client, &format!("MAV_{instance}_CONFIG"), TRIES)? else { break };
+        let config = value(PX4, &param);
+        if (config - f64::from(100 + port)).abs() < 0.5 {
+            return Ok(instance);
+        }
+        free = free.or((config.abs() < 0.5).then_some(instance));
+    }
+    Ok(free.unwrap_or(1))
+}
+
+fn value(autopilot: u8, param: &Param) -> f64 {
+    if autopilot == PX4 && INTEGERS.contains(&param.kind) {
+        f64::from(param.value.to_bits().cast_signed())
+    } else {
+        f64::from(param.value)
+    }
+}
+
+/// The value as a message has it.
+fn sent(autopilot: u8, kind: u8, value: f64) -> f32 {
+    if autopilot == PX4 && INTEGERS.contains(&kind) {
+        f32::from_bits((value as i32).cast_unsigned())
+    } else {
+        value as f32
+    }
+}
+
+/// Sets what differs, after the present values are in a file.
+fn change(client: &mut Client, heard: Option<Heard>, settings: &mut [Setting], file: &Path) -> Result<()> {
+    let heard = settable(heard)?;
+    if settings.iter().all(|setting| setting.now.is_none()) {
+        bail!(
+            "the autopilot does not answer: nothing is set; connect to its USB or radio, or set the box's GS_PASS to 1"
+        );
+    }
+    let different: Vec<&mut Setting> = settings.iter_mut().filter(|setting| setting.differs()).collect();
+    if different.is_empty() {
+        note!("all settings are as wanted: nothing is set, and {} is not written", file.display());
+        return Ok(());
+    }
+    let mut undo = Output::create(file, &Inputs::none())?;
+    for setting in &different {
+        let line = format!("{},{}\n", setting.name, setting.now.unwrap_or_default());
+        settle(undo.write_all(line.as_bytes()), file)?;
+    }
+    undo.finish()?;
+    for setting in different {
+        set(client, heard.autopilot, &setting.name, setting.kind, setting.wanted).with_context(|| {
+            format!("{}; --restore {} sets the former values", setting.name, file.display())
+        })?;
+        setting.now = Some(setting.wanted);
+    }
+    note!("restart the autopilot; --restore {} sets the former values", file.display());
+    Ok(())
+}
+
+fn settable(heard: Option<Heard>) -> Result<Heard> {
+    let heard = heard.context(
+        "the autopilot is not heard on this link: connect to the autopilot's USB or radio, or set the box's GS_PASS to 1",
+    )?;
+    if heard.is_armed {
+        bail!("the vehicle is armed: nothing is set; disarm it first");
+    }
+    Ok(heard)
+}
+
+fn set(client: &mut Client, autopilot: u8, name: &str, kind: u8, wanted: f64) -> Result<()> {
+    let kept = params::set(client, name, sent(autopilot, kind, wanted), kind)?;
+    let kept = value(autopilot, &kept);
+    if (kept - wanted).abs() > wanted.abs() * 1e-6 {
+        bail!("the autopilot refused {wanted} and keeps {kept}");
+    }
+    Ok(())
+}
+
+/// The lines of a file of former values.
+fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
+    let wrong = |number: usize| usage(format!("{}: line {number} is no NAME,VALUE", file.display()));
+    let bytes = read_short(file, UNDO_BYTES_MAX).context("--restore")?;
+    let text = String::from_utf8(bytes).map_err(|_| usage(format!("{}: is no text", file.display())))?;
+    let mut values = Vec::new();
+    for (number, line) in (1..).zip(text.lines()) {
+        match param_line::read(line) {
+            Line::Nothing => {}
+            Line::Set(name, value) => {
+                let value = value.parse::<f64>().ok().filter(|value| value.is_finite());
+                values.push((name.to_owned(), value.ok_or_else(|| wrong(number))?));
+            }
+            Line::Wrong => return Err(wrong(number)),
+        }
+    }
+    Ok(values)
+}
+
+fn restore(client: &mut Client, heard: Option<Heard>, values: &[(String, f64)]) -> Result<Outcome> {
+    let heard = settable(heard)?;
+    for (name, wanted) in values {
+        let param = params::ask(client, name, TRIES)?;
+        let param = param.with_context(|| format!("{name}: the autopilot does not answer; call again"))?;
+        set(client, heard.autopilot, name, param.kind, *wanted).with_context(|| name.clone())?;
+        output::line(&format!("{} {wanted}", word(name)))?;
+    }
+    output::line("restored; restart the autopilot")?;
+    Ok(Outcome::Done)
+}
+
+fn show_settings(heard: Option<Heard>, settings: &[Setting]) -> Result<()> {
+    let name = match heard.map(|heard| heard.autopilot) {
+        Some(ARDUPILOT) => "ArduPilot's settings",
+        Some(PX4) => "PX4's settings",
+        Some(_) => return output::line("settings of this autopilot are not known: its port sends MAVLink 2"),
+        None => return output::line("the autopilot is not heard on this link: its settings were not read"),
+    };
+    let mut table = Table::new(2, [left(7), left(0), right(0), right(0), left(0)]);
+    table.heading(["", "parameter", "now", "wanted", "because"]);
+    for setting in settings {
+        let least = if setting.at_least { "at least " } else { "" };
+        let now = setting.now.map_or_else(|| "-".to_owned(), |now| now.to_string());
+        let wanted = format!("{least}{}", setting.wanted);
+        table.row([
+            level(setting.state()).to_string(),
+            setting.name.clone(),
+            now,
+            wanted,
+            setting.why.to_owned(),
+        ]);
+    }
+    output::line(&format!("{name}\n{}", table.text()))
+}
+
+fn own_line(own: &Own, link: &str) -> CheckLine {
+    let path = match own.path {
+        1 => "its radio",
+        2 => "the autopilot's radio",
+        _ => "nobody: GS_PATH is 0",
+    };
+    let streams = if own.has_streams { "requests its streams" } else { "requests no streams" };
+    let detail =
+        format!("reached over {link}; {} baud to the autopilot, {streams}, texts to {path}", own.baud);
+    line("box", own.path > 0, detail)
+}
+
+fn settings_line(settings: &[Setting]) -> CheckLine {
+    let of = |is_it: fn(&Setting) -> bool| {
+        let names = settings.iter().filter(|setting| is_it(setting)).map(|setting| setting.name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    let (different, unknown) = (of(Setting::differs), of(|setting| setting.state() == "unknown"));
+    match (different.is_empty(), unknown.is_empty() && !settings.is_empty()) {
+        (false, _) => line("settings", false, format!("{different}: --set --undo FILE sets them")),
+        (true, true) => line("settings", true, "as wanted"),
+        (true, false) => CheckLine {
+            check: "settings",
+            state: "unknown",
+            detail: "the autopilot does not answer here: connect to its USB or radio, or set GS_PASS to 1"
+                .to_owned(),
+        },
+    }
+}
+
+/// The box's answer to the command for the checks before arming.
+fn prearm(client: &mut Client) -> Result<CheckLine> {
+    const READY: &str = "HUMS: ready";
+    let (system, component) = client.target();
+    let packet = messages::command_long(PREARM, &[], system, component);
+    let text = client.ask(&packet, ANSWER, TRIES, |frame| {
+        let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT)?;
+        (text.starts_with(READY) || text.starts_with("HUMS: not ready")).then(|| text.to_owned())
+    })?;
+    let text = text.unwrap_or_else(|| "no answer".to_owned());
+    Ok(line("checks", text.starts_with(READY), text.trim_start_matches("HUMS: ")))
+}
+
+/// What the box records now.
+fn bench(client: Client, own: &Own, board: Option<&Board>, heard: Option<Heard>) -> Result<Vec<CheckLine>> {
+    let checks = pull::newest(client, HEAD_SECTORS, |newest| {
+        let (end, mut boot) = (Overview::verified(&newest.end)?, None);
+        if !newest.begin.pieces.is_empty() {
+            boot = Overview::verified(&newest.begin)?.contents.boot;
+        }
+        let mut checks = Vec::new();
+        if let Some(boot) = boot.or_else(|| end.contents.boot.clone()) {
+            let is_it = board.is_none_or(|board| board.name == boot.board);
+            checks.push(line("image", is_it, format!("{} {} for {}", boot.version, boot.git, boot.board)));
+        }
+        let lost = end.contents.stats.map_or(0, |stats| stats.frames_lost);
+        let words = match (newest.is_growing, lost) {
+            (false, _) => "the newest log does not grow: the box does not record".to_owned(),
+            (true, 0) => "it records".to_owned(),
+            (true, lost) => format!("it records, and has lost {}", count(lost, "frame")),
+        };
+        checks.push(line("card", newest.is_growing && lost == 0, words));
+        let autopilot = end.contents.vehicle.map(|vehicle| vehicle.autopilot);
+        let autopilot = autopilot.or(heard.map(|heard| heard.autopilot));
+        checks.extend([clock(&end), received(&end, own, autopilot)]);
+        Ok(checks)
+    })?;
+    Ok(checks.unwrap_or_else(|| vec![line("card", false, "no log on it: is a card in the slot?")]))
+}
+
+fn clock(end: &Overview) -> CheckLine {
+    let last = end.ending.summary.last;
+    let Some(utc_us) =
+        last.zip(end.ending.summary.epoch_us).map(|(last, epoch)| epoch.saturating_add(last.as_micros()))
+    else {
+        return line("clock", false, "no UTC from the autopilot: it needs GPS time, or a ground station");
+    };
+    let here_us = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u64;
+    let apart_s = here_us.abs_diff(utc_us) / 1_000_000;
+    let apart =
+        if apart_s > 60 { format!(", {apart_s} s from this computer's clock") } else { String::new() };
+    line("clock", true, format!("{} UTC{apart}", date_and_time(utc_us)))
+}
+
+/// Messages and rates at the box's port.
+fn received(end: &Overview, own: &Own, autopilot: Option<u8>) -> CheckLine {
+    let autopilot = match autopilot {
+        Some(ARDUPILOT) => Autopilot::ArduPilot,
+        Some(PX4) => Autopilot::Px4,
+        _ => Autopilot::Other,
+    };
+    let seconds = duration_s(end);
+    let rate = |id: u32| {
+        let its = |message: &&crate::source::item::MessageCount| message.id.is_some_and(|(of, _)| of == id);
+        let frames = end.contents.messages.iter().find(its).map_or(0, |message| message.amount.count);
+        if seconds > 0.0 { frames as f64 / seconds } else { 0.0 }
+    };
+    if rate(HEARTBEAT) <= 0.0 {
+        return line(
+            "messages",
+            false,
+            "the box does not hear the autopilot: check its TX wire and the rate",
+        );
+    }
+    let (mut bad, mut all, mut other) = (Vec::new(), 0_u64, 0_u64);
+    for (id, wanted_hz) in wanted(autopilot, own.baud) {
+        let (hz, wanted_hz) = (rate(id), f64::from(wanted_hz));
+        let is_slow = hz < wanted_hz * SLOW;
+        if NEEDED.contains(&id) {
+            all += 1;
+            if is_slow {
+                bad.push(format!("{} {hz:.1} of {wanted_hz:.1} Hz", message_name(id)));
+            }
+        } else {
+            other += u64::from(!is_slow);
+        }
+    }
+    let words = if bad.is_empty() {
+        format!(
+            "{} at their rates, and {other} for parts that not every vehicle has",
+            count(all, "needed message")
+        )
+    } else if own.has_streams {
+        format!("{}; connect the autopilot's RX, over which the box requests them", bad.join(", "))
+    } else {
+        format!("{}; AP_STREAMS 1 has the box request them", bad.join(", "))
+    };
+    line("messages", bad.is_empty(), words)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use hums_link::packet::Packet;
+
+    use super::*;
+    use crate::mavlink::ids::{PARAM_REQUEST_READ, PARAM_SET};
+    use crate::talk::tests::fake::found;
+
+    const OWN: Own = Own { baud: 57_600, path: 2, has_streams: false };
+
+    /// An autopilot with these parameters, each with its type; values are as on the line.
+    fn vehicle(autopilot: u8, mode: u8, values: &[(&str, f32, u8)]) -> Client {
+        let mut values: BTreeMap<String, (f32, u8)> =
+            values.iter().map(|(name, value, kind)| ((*name).to_owned(), (*value, *kind))).collect();
+        let mut client = found(&[1], move |frame| {
+            let fields = Fields(frame.payload());
+            let at = match frame.id() {
+                HEARTBEAT => {
+                    return vec![(1, Packet::new(HEARTBEAT).u8(4, 2).u8(5, autopilot).u8(6, mode).u8(7, 3))];
+                }
+                PARAM_REQUEST_READ => 4,
+                PARAM_SET => 6,
+                _ => return Vec::new(),
+            };
+            let name = fields.text(at, 16).unwrap_or_default();
+            let Some((value, kind)) = values.get_mut(name) else { return Vec::new() };
+            // It refuses one.
+            if frame.id() == PARAM_SET && name != "SR2_EXTRA3" {
+                *value = fields.f32(0);
+            }
+            vec![(1, messages::param_value(name, *value, 0, 9).u8(24, *kind))]
+        });
+        client.turn_to(AUTOPILOT);
+        client
+    }
+
+    fn bits(value: i32) -> f32 {
+        f32::from_bits(value.cast_unsigned())
+    }
+
+    #[test]
+    fn an_ardupilot_is_compared_set_and_restored() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (first, second) = (dir.path().join("undo.param"), dir.path().join("again.param"));
+        let streams = STREAMS.map(|name| format!("SR2_{name}"));
+        let mut values =
+            vec![("SERIAL2_PROTOCOL", 1.0, 2), ("SERIAL2_BAUD", 57.0, 4), ("BRD_SER2_RTSCTS", 0.0, 2)];
+        values.extend(
+            streams
+                .iter()
+                .map(|name| (name.as_str(), if name.ends_with("_POSITION") { 2.0 } else { 50.0 }, 4)),
+        );
+        let mut client = vehicle(ARDUPILOT, 0, &values);
+        let heard = autopilot(&mut client).expect("a link");
+        let differ = |client: &mut Client| {
+            let all = settings(client, ARDUPILOT, 2, &OWN).expect("a link");
+            let names: Vec<String> =
+                all.iter().filter(|setting| setting.differs()).map(|setting| setting.name.clone()).collect();
+            (all, names)
+        };
+        let (mut all, names) = differ(&mut client);
+        assert_eq!((names, all.len()), (vec!["SERIAL2_PROTOCOL".to_owned(), "SR2_POSITION".to_owned()], 10));
+        assert_eq!(settings_line(&all).state, "missing");
+        change(&mut client, heard, &mut all, &first).expect("set");
+        assert_eq!(std::fs::read_to_string(&first).expect("a file"), "SERIAL2_PROTOCOL,1\nSR2_POSITION,2\n");
+        let (mut all, names) = differ(&mut client);
+        assert!(names.is_empty() && settings_line(&all).state == "ok", "{names:?}");
+        change(&mut client, heard, &mut all, &second).expect("nothing to do");
+        assert!(!second.exists(), "nothing was changed");
+        assert!(change(&mut client, heard, &mut [], &second).is_err(), "nothing was answered");
+        restore(&mut client, heard, &values_of(&first).expect("values")).expect("restored");
+        assert_eq!(differ(&mut client).1, ["SERIAL2_PROTOCOL", "SR2_POSITION"]);
+    }
+
+    #[test]
+    fn a_px4_has_whole_numbers_as_bits_and_the_instance_of_the_port() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let mut client = vehicle(
+            PX4,
+            0,
+            &[
+                ("MAV_0_CONFIG", bits(101), 6),
+                ("MAV_1_CONFIG", bits(0), 6),
+                ("MAV_2_CONFIG", bits(0), 6),
+                ("SER_TEL2_BAUD", bits(921_600), 6),
+                ("MAV_1_MODE", bits(2), 6),
+                ("MAV_1_RATE", bits(0), 6),
+                ("MAV_1_FLOW_CTRL", bits(0), 6),
+                ("MAV_1_FORWARD", bits(1), 6),
+            ],
+        );
+        let heard = autopilot(&mut client).expect("a link");
+        let mut all = settings(&mut client, PX4, 2, &OWN).expect("a link");
+        let now: Vec<(&str, Option<f64>, bool)> =
+            all.iter().map(|setting| (setting.name.as_str(), setting.now, setting.differs())).collect();
+        assert_eq!(
+            now,
+            [
+                ("MAV_1_CONFIG", Some(0.0), true),
+                ("SER_TEL2_BAUD", Some(921_600.0), true),
+                ("MAV_1_MODE", Some(2.0), false),
+                ("MAV_1_RATE", Some(0.0), true),
+                ("MAV_1_FLOW_CTRL", Some(0.0), false),
+                ("MAV_1_FORWARD", Some(1.0), false),
+            ]
+        );
+        change(&mut client, heard, &mut all, &dir.path().join("undo")).expect("set");
+        let kept = params::ask(&mut client, "SER_TEL2_BAUD", 1).expect("a link").expect("an answer");
+        assert_eq!((kept.value.to_bits(), instance(&mut client, 2).expect("a link")), (57_600, 1));
+        assert_eq!(instance(&mut client, 1).expect("a link"), 0);
+    }
+
+    #[test]
+    fn nothing_is_set_while_armed_nor_on_an_autopilot_that_is_not_heard() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("undo");
+        let mut client = vehicle(ARDUPILOT, ARMED, &[("SERIAL2_BAUD", 57.0, 4)]);
+        let heard = autopilot(&mut client).expect("a link");
+        let mut all = vec![Setting { now: Some(57.0), ..Setting::new("SERIAL2_BAUD".to_owned(), 921, "") }];
+        for (heard, words) in [(heard, "armed"), (None, "not heard")] {
+            let error = change(&mut client, heard, &mut all, &file).expect_err("refused").to_string();
+            assert!(error.contains(words) && !file.exists(), "{error}");
+        }
+        // A refused value is an error that names the file.
+        let mut client = vehicle(ARDUPILOT, 0, &[("SR2_EXTRA3", 0.0, 4)]);
+        let heard = autopilot(&mut client).expect("a link");
+        let mut all = vec![Setting { now: Some(0.0), ..Setting::new("SR2_EXTRA3".to_owned(), 2, "") }];
+        let error = format!("{:#}", change(&mut client, heard, &mut all, &file).expect_err("refused"));
+        assert!(error.contains("refused 2 and keeps 0") && error.contains("--restore"), "{error}");
+    }
+
+    #[test]
+    fn a_file_of_former_values_with_another_line_is_refused_as_a_whole() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("values");
+        for (text, is_good) in [("A,1\n# note\nB 2.5\n", true), ("A,1\nB\n", false), ("A,inf\n", false)] {
+            std::fs::write(&file, text).expect("written");
+            assert_eq!(values_of(&file).is_ok(), is_good, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_messages_that_a_box_lacks_are_named_with_their_rates() {
+        use crate::source::item::{Amount, MessageCount};
+        let mut end = Overview::default();
+        let received = |end: &Overview, own: &Own| received(end, own, Some(ARDUPILOT));
+        assert!(received(&end, &OWN).detail.contains("does not hear"));
+        let instant = |s: u64| hums_core::clock::Instant::from_millis(s * 1_000);
+        (end.ending.summary.first, end.ending.summary.last) = (Some(instant(100)), Some(instant(110)));
+        let own = Own { baud: 921_600, ..OWN };
+        end.contents.messages = [&NEEDED[..], &[HEARTBEAT]]
+            .concat()
+            .into_iter()
+            .map(|id| MessageCount {
+                id: Some((id, true)),
+                name: String::new(),
+                amount: Amount { count: if id == ATTITUDE { 30 } else { 60 }, bytes: 0 },
+            })
+            .collect();
+        let told = received(&end, &own);
+        assert!(told.detail.starts_with("ATTITUDE 3.0 of 10.0 Hz; AP_STREAMS 1"), "{}", told.detail);
+        // A slow line carries less.
+        assert_eq!(received(&end, &OWN).state, "ok");
+        assert_eq!(clock(&end).state, "missing");
+        end.ending.summary.epoch_us = Some(1_700_000_000_000_000);
+        assert_eq!(clock(&end).state, "ok");
+    }
+}

@@ -1,0 +1,183 @@
+//! `hums box setup` and `hums box report` over the port of a box whose autopilot answers for its parameters.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::net::UdpSocket;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
+use hums_link::packet::Fields;
+use hums_link::{Frame, Framer, ids, messages};
+use hums_tests::child::Outcome;
+use hums_tests::flights::own;
+use hums_tests::live::free_port;
+use hums_tests::program::hums;
+use serde_json::Value;
+
+use super::board::Board;
+
+type Values = Arc<Mutex<BTreeMap<String, f32>>>;
+
+/// Plays the recording from power-on in real time.
+struct Autopilot {
+    values: Values,
+    over: Arc<AtomicBool>,
+}
+
+impl Autopilot {
+    fn start(port: u16, values: &[(&str, f32)]) -> Self {
+        let values = values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+        let (values, over): (Values, _) = (Arc::new(Mutex::new(values)), Arc::new(AtomicBool::new(false)));
+        let (known, ended) = (Arc::clone(&values), Arc::clone(&over));
+        thread::spawn(move || play(port, &known, &ended));
+        Self { values, over }
+    }
+
+    fn values(&self) -> Vec<(String, f32)> {
+        self.values.lock().unwrap().clone().into_iter().collect()
+    }
+}
+
+impl Drop for Autopilot {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+    }
+}
+
+fn play(port: u16, values: &Values, over: &AtomicBool) {
+    let tlog = fs::read(own("ap_quad_guided.tlog")).unwrap();
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.connect(("127.0.0.1", port)).unwrap();
+    socket.set_nonblocking(true).unwrap();
+    let (mut framer, mut encoder) = (Framer::new(), Encoder::of(1, 1));
+    let (start, mut first_us, mut rest) = (Instant::now(), None, &tlog[..]);
+    while let Some((time, frames)) = rest.split_first_chunk::<8>().filter(|_| !over.load(Ordering::Relaxed)) {
+        let us = u64::from_be_bytes(*time);
+        let due = Duration::from_micros(us - *first_us.get_or_insert(us));
+        while start.elapsed() < due {
+            answer(&socket, &mut framer, &mut encoder, values);
+            thread::sleep(Duration::from_millis(1));
+        }
+        // MAVLink 2 without signatures.
+        let (frame, after) = frames.split_at(12 + usize::from(frames[1]));
+        if frame[5] == 1 {
+            let _ = socket.send(frame);
+        }
+        rest = after;
+    }
+}
+
+fn answer(socket: &UdpSocket, framer: &mut Framer, encoder: &mut Encoder, values: &Values) {
+    let mut buffer = [0; 2048];
+    while let Ok(count) = socket.recv(&mut buffer) {
+        framer.push(&buffer[..count], &mut |frame: Frame<'_>| {
+            let fields = Fields(frame.payload());
+            let at = match frame.id() {
+                ids::PARAM_REQUEST_READ => 4,
+                ids::PARAM_SET => 6,
+                _ => return,
+            };
+            let mut values = values.lock().unwrap();
+            let name = fields.text(at, 16).unwrap_or_default();
+            let Some(value) = values.get_mut(name).filter(|_| frame.target() == Some((1, 1))) else { return };
+            if frame.id() == ids::PARAM_SET {
+                *value = fields.f32(0);
+            }
+            let mut out = [0; FRAME_BYTES_MAX];
+            let _ = socket.send(encoder.frame(&mut out, &messages::param_value(name, *value, 0, 3)));
+        });
+    }
+}
+
+fn on(address: &str, words: &[&str]) -> Outcome {
+    hums(["box"].into_iter().chain(words.iter().copied()).chain(["--link", address, "--system", "1"]))
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
+    let dir = tempfile::tempdir().unwrap();
+    let files = tempfile::tempdir().unwrap();
+    let file = |name: &str| files.path().join(name).display().to_string();
+    fs::write(file("params.txt"), "GS_BUDGET 5000\nGS_PASS 1\n").unwrap();
+    let port = free_port();
+    let before = [("BRD_SER2_RTSCTS", 2.0), ("SERIAL2_BAUD", 57.0), ("SERIAL2_PROTOCOL", 2.0)];
+    let input = format!("udpin:127.0.0.1:{port}");
+    let board = Board::start_with(input.as_ref(), dir, &["--params", &file("params.txt")]);
+    let autopilot = Autopilot::start(port, &before);
+    let address = format!("udpout:127.0.0.1:{}", board.port);
+
+    let undo = file("before.param");
+    let set = on(&address, &["setup", "--set", "--undo", &undo, "--json"]).expect_code(&[0, 4]);
+    let told = json(&set.text());
+    assert_eq!(fs::read_to_string(&undo).unwrap(), "SERIAL2_BAUD,57\nBRD_SER2_RTSCTS,2\n");
+    let wanted = [("BRD_SER2_RTSCTS", 0.0), ("SERIAL2_BAUD", 921.0), ("SERIAL2_PROTOCOL", 2.0)];
+    let owned = |values: [(&str, f32); 3]| values.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    assert_eq!(autopilot.values(), owned(wanted));
+    let states: BTreeMap<&str, &str> = told["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|check| (check["check"].as_str().unwrap(), check["state"].as_str().unwrap()))
+        .collect();
+    for check in ["box", "settings", "image", "card", "clock", "messages"] {
+        assert_eq!(states.get(check), Some(&"ok"), "{check}: {told}");
+    }
+    assert_eq!(
+        (&told["ready"], set.code),
+        (&(states["checks"] == "ok").into(), Some(if states["checks"] == "ok" { 0 } else { 4 })),
+        "{told}"
+    );
+
+    on(&address, &["setup", "--restore", &undo]).expect_code(&[0]);
+    assert_eq!(autopilot.values(), owned(before));
+    let report = file("report.json");
+    on(&address, &["report", "-o", &report]).expect_code(&[0]);
+    let report = json(&fs::read_to_string(&report).unwrap());
+    // The parameters that are not as delivered.
+    assert!(records(&report, "HUMS_BOOT") >= 1 && records(&report, "HUMS_PARAM") == 2, "{report}");
+    drop(board);
+}
+
+fn records(report: &Value, table: &str) -> usize {
+    let records = report["logs"][0]["records"].as_array().unwrap();
+    records.iter().filter(|record| record["record"] == table).count()
+}
+
+#[test]
+fn a_report_of_a_card_has_the_box_and_neither_place_nor_vehicle() {
+    let dir = tempfile::tempdir().unwrap();
+    let card = dir.path().join("card.img").display().to_string();
+    let flight = own("ap_quad_faults.tlog").display().to_string();
+    hums(["sim", &flight, "--sd", &card]).expect_code(&[0]);
+    let path = dir.path().join("report.json").display().to_string();
+    hums(["box", "report", &card, "-o", &path]).expect_code(&[0]);
+    let text = fs::read_to_string(&path).unwrap();
+    let report = json(&text);
+    assert!(records(&report, "HUMS_BOOT") >= 1 && records(&report, "HUMS_STATS") == 1, "{text}");
+    for told in ["HUMS_VEHICLE", "HUMS_CLOCK", "HUMS_FINDING", "latitude", "ap_quad_faults"] {
+        assert!(!text.contains(told), "{told}");
+    }
+    hums(["box", "report", &card, "-o", &path]).expect_code(&[1]);
+    hums(["box", "report", &card, "-o", &path, "--force"]).expect_code(&[0]);
+    assert!(Path::new(&card).exists());
+}
+
+#[test]
+fn without_a_box_the_setup_still_shows_the_wiring_and_says_where_to_look() {
+    let port = free_port();
+    let address = format!("udpin:127.0.0.1:{port}");
+    let silent = on(&address, &["setup", "--board", "speedybee-f405-v4"]).expect_code(&[1]);
+    let (told, error) = (silent.text(), silent.stderr.clone());
+    assert!(told.contains("R1 (PA10)") && told.contains("T1 (PA9)") && told.contains("PC13"), "{told}");
+    assert!(error.contains("check its LED") && error.contains("no HUMS box is heard"), "{error}");
+    let unknown = on(&address, &["setup", "--board", "no-such"]).expect_code(&[2]);
+    assert!(unknown.stderr.contains("speedybee-f405-v4"), "{}", unknown.stderr);
+}
