@@ -154,8 +154,7 @@ impl Companion {
     pub(crate) fn uplink(
         &mut self,
         now: Instant,
-        port: Port,
-        frame: &Frame<'_>,
+        (port, frame): (Port, &Frame<'_>),
         book: &mut Logbook<'_>,
         summary: &mut Summary,
         sectors: &mut SectorsIn,

@@ -228,7 +228,7 @@ impl<'a> Monitoring<'a> {
             }
             let Self { book, summary, companion, identity, .. } = self;
             if let Some(frame) = Frame::from_queue(bytes, message) {
-                companion.uplink(now, port, &frame, book, summary, sectors, gs);
+                companion.uplink(now, (port, &frame), book, summary, sectors, gs);
             }
             companion.answer(now, book.monitor, identity, summary, gs);
         })
