@@ -73,12 +73,25 @@ pub fn open(endpoint: &Endpoint, silence: Duration) -> Result<Duplex> {
             Duplex { reader: Box::new(Stream(stream)), writer: Box::new(writer) }
         }
         Endpoint::Serial { device, baud } => {
-            let reader = serialport::new(device, *baud).timeout(silence).open().with_context(context)?;
+            let mut reader = serial2::SerialPort::open(device, *baud).with_context(context)?;
+            #[cfg(unix)]
+            take_alone(&reader).with_context(|| {
+                format!("{endpoint}: another program, perhaps a ground station, has this port: close it")
+            })?;
+            reader.set_read_timeout(silence).with_context(context)?;
+            reader.set_write_timeout(WRITE).with_context(context)?;
             let writer = reader.try_clone().with_context(context)?;
             Duplex { reader: Box::new(Stream(reader)), writer: Box::new(writer) }
         }
         Endpoint::File(_) | Endpoint::Standard => bail!("{endpoint} is not live: nobody there answers"),
     })
+}
+
+/// Two programs would each get a part of the bytes. A lock for those that ask for it, and no later opening by the others.
+#[cfg(unix)]
+fn take_alone(port: &serial2::SerialPort) -> rustix::io::Result<()> {
+    rustix::fs::flock(port, rustix::fs::FlockOperation::NonBlockingLockExclusive)?;
+    rustix::termios::ioctl_tiocexcl(port)
 }
 
 fn why_not_bound(error: &io::Error) -> String {
@@ -266,5 +279,31 @@ mod tests {
         assert!(is_silence(&silence), "{silence}");
         peer.send_to(b"later", to).expect("sent");
         assert_eq!(line.reader.read(&mut buffer).expect("it came"), 5);
+    }
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_serial_port_passes_every_byte_both_ways_and_has_one_user() {
+        use rustix::pty::{OpenptFlags, openpt, ptsname, unlockpt};
+        let vehicle = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo terminal");
+        unlockpt(&vehicle).expect("unlocked");
+        let device = ptsname(&vehicle, Vec::new()).expect("its name").into_string().expect("text");
+        let endpoint = Endpoint::Serial { device, baud: 57_600 };
+        let mut line = open(&endpoint, Duration::from_millis(50)).expect("a port");
+        let mut vehicle = std::fs::File::from(vehicle);
+        let mut got = [0; 16];
+        assert!(is_silence(&line.reader.read(&mut got).expect_err("nothing yet")));
+        // A terminal would act on most of these.
+        let bytes = [0x11, 0x13, b'\r', b'\n', 3, 4, 0x7F, 0xFF];
+        vehicle.write_all(&bytes).expect("sent");
+        assert_eq!(line.reader.read(&mut got).expect("they come"), bytes.len());
+        assert_eq!(got[..8], bytes);
+        line.writer.write_all(&bytes).expect("sent");
+        vehicle.read_exact(&mut got[8..]).expect("they come");
+        assert_eq!(got[8..], bytes);
+        let second = open(&endpoint, Duration::ZERO).err().expect("it has a user");
+        assert!(format!("{second:#}").contains("another program"), "{second:#}");
+        drop(vehicle);
+        // Unplugged: no silence.
+        assert!(line.reader.read(&mut got).is_ok_and(|got| got == 0));
     }
 }
