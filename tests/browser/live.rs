@@ -328,6 +328,12 @@ fn a_page_that_has_lost_hums_says_at_once_that_the_vehicles_state_is_not_known()
     page.wait("return document.getElementById('source').textContent === 'no connection'", 10);
     page.wait(&format!("return {overall}.textContent === 'not known'"), 1);
     assert_eq!(page.run(&format!("return {overall}.classList.contains('stale')")), true);
+    // It comes back with the program, by itself.
+    let mut again = command(["live", "--listen", live.host()]);
+    let again = again.arg(&recording).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let _again = Running(again);
+    page.wait("return document.getElementById('source').textContent === 'playing'", 20);
+    page.wait(&format!("return {overall}.textContent !== 'not known'"), 5);
 }
 
 #[test]
@@ -370,13 +376,14 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
     assert_sound(&mut page);
 }
 
-fn ask(address: &str, path: &str, headers: &[(&str, &str)]) -> String {
+/// The status line of the answer.
+fn ask(address: &str, line: &str, headers: &[(&str, &str)]) -> String {
     let host = address.trim_start_matches("http://").trim_end_matches('/');
     let mut stream = TcpStream::connect(host).unwrap();
     let own = [("Host", host)].into_iter().filter(|_| headers.iter().all(|(name, _)| *name != "Host"));
     let lines: Vec<String> =
         own.chain(headers.iter().copied()).map(|(name, value)| format!("{name}: {value}\r\n")).collect();
-    let request = format!("GET {path} HTTP/1.1\r\n{}", lines.concat());
+    let request = format!("{line} HTTP/1.1\r\n{}", lines.concat());
     stream.write_all(format!("{request}\r\n").as_bytes()).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
     let mut line = String::new();
@@ -384,35 +391,39 @@ fn ask(address: &str, path: &str, headers: &[(&str, &str)]) -> String {
     line.trim().to_owned()
 }
 
-const UPGRADE: [(&str, &str); 4] = [
-    ("Connection", "Upgrade"),
-    ("Upgrade", "websocket"),
-    ("Sec-WebSocket-Version", "13"),
-    ("Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="),
-];
-
 #[test]
 fn a_foreign_page_a_foreign_name_and_a_stranger_are_refused() {
     let recording = own("ap_quad_guided.tlog");
     let input = [recording.to_str().unwrap()];
     let open = Live::start(&input);
-    assert!(ask(&open.address, "/", &[]).ends_with("200 OK"));
-    let with = |more: &[(&'static str, &'static str)]| [&UPGRADE[..], more].concat();
-    assert!(ask(&open.address, "/ws", &with(&[])).contains("101"), "a program that is no browser");
-    let evil = with(&[("Origin", "http://evil.example")]);
-    assert!(ask(&open.address, "/ws", &evil).contains("403"), "a foreign page");
-    assert!(
-        ask(&open.address, "/", &[("Host", "evil.example")]).contains("403"),
-        "a name that was bent to here"
-    );
-    assert!(ask(&open.address, "/ws", &with(&[("Host", "evil.example:80")])).contains("403"));
+    for (line, headers, code) in [
+        ("GET /", vec![], "200"),
+        ("GET /events", vec![], "200"),
+        ("GET /nothing", vec![], "404"),
+        ("PUT /", vec![], "501"),
+        ("POST /command", vec![], "400"),
+        // A foreign page, which also may not command.
+        ("GET /events", vec![("Origin", "http://evil.example")], "403"),
+        ("POST /command", vec![("Origin", "http://evil.example")], "403"),
+        // A name that was bent to here.
+        ("GET /", vec![("Host", "evil.example")], "403"),
+        ("GET /events", vec![("Host", "evil.example:80")], "403"),
+    ] {
+        let answer = ask(&open.address, line, &headers);
+        assert!(answer.contains(code), "{line} {headers:?}: {answer}");
+    }
 
     let closed = Live::start(&[&input[..], &["--listen-token", "correct-horse"]].concat());
     let (address, token) = closed.address.split_once("#token=").expect("the address has the token");
     assert_eq!(token, "correct-horse");
-    for (path, code) in [("/ws", "401"), ("/ws?token=wrong-horse", "401"), ("/ws?token=correct-horse", "101")]
-    {
-        assert!(ask(address, path, &with(&[])).contains(code), "{path}");
+    for (line, code) in [
+        ("GET /events", "401"),
+        ("GET /events?token=wrong-horse", "401"),
+        ("GET /events?token=correct-horse", "200"),
+        ("POST /command", "401"),
+        ("POST /command?token=correct-horse", "400"),
+    ] {
+        assert!(ask(address, line, &[]).contains(code), "{line}");
     }
 }
 

@@ -186,7 +186,7 @@ fn decode(known: &Known) {
 fn live(known: &Known) {
     let (path, checked) = (known.path(), known.checked());
     let live = Live::start(&[path.to_str().unwrap()]);
-    let mut page = live.page();
+    let mut page = live.page().unwrap();
     let next = |page: &mut hums_tests::live::Page, kind: &str| loop {
         let message: Value = serde_json::from_str(&page.message()).unwrap();
         if message["t"] == kind {

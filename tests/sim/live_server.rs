@@ -6,37 +6,59 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use hums_tests::flights::own;
-use hums_tests::live::{Live, Running, free_port, handshake};
+use hums_tests::live::{Live, Page, Running, ask_for_events, free_port};
 use hums_tests::program::{self, command};
 use rustix::net::sockopt::set_socket_linger;
 
-fn answer(stream: TcpStream) -> String {
-    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-    let mut line = String::new();
-    BufReader::new(stream.take(4_096)).read_line(&mut line).unwrap();
-    line.trim().to_owned()
+/// Waits until a page opens.
+fn open_page(live: &Live) -> Page {
+    let end = Instant::now() + Duration::from_secs(5);
+    loop {
+        match live.page() {
+            Ok(page) => return page,
+            Err(answer) => assert!(Instant::now() < end, "no page opens any longer: {answer}"),
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
 }
 
 #[test]
-fn two_hundred_broken_off_handshakes_take_no_pages_place() {
+fn two_hundred_broken_off_connections_take_no_pages_place() {
     let recording = own("px4_hil_quad_low.tlog");
     let live = Live::start(&[recording.to_str().unwrap()]);
-    let host = live.address.trim_start_matches("http://").trim_end_matches('/');
     for number in 0..200_u64 {
-        let stream = handshake(host);
+        let stream = ask_for_events(live.host());
         // Like a tablet on a bad radio: reset at once or a moment later.
         set_socket_linger(&stream, Some(Duration::ZERO)).unwrap();
         std::thread::sleep(Duration::from_micros(number % 5 * 250));
     }
-    let end = Instant::now() + Duration::from_secs(5);
-    loop {
-        let line = answer(handshake(host));
-        if line.contains("101") {
-            break;
-        }
-        assert!(Instant::now() < end, "no page opens any longer: {line}");
-        std::thread::sleep(Duration::from_millis(50));
+    open_page(&live);
+}
+
+/// On a link without a frame, where pages get little.
+#[test]
+fn a_page_too_many_is_refused_and_a_later_one_gets_the_place_of_one_that_went() {
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{}", free_port())]);
+    let mut pages: Vec<Page> = (0..16).map(|_| open_page(&live)).collect();
+    assert_eq!(live.page().err().as_deref(), Some("HTTP/1.1 503 Service Unavailable"));
+    pages.pop();
+    pages.push(open_page(&live));
+    for page in &mut pages {
+        let message = page.message();
+        assert!(message.starts_with("{\"t\":\"head\""), "{message}");
     }
+}
+
+#[test]
+fn a_request_that_does_not_come_is_ended_and_keeps_no_page_waiting() {
+    let live = Live::start(&[&format!("udpin:127.0.0.1:{}", free_port())]);
+    let mut slow = TcpStream::connect(live.host()).unwrap();
+    slow.write_all(b"GET / HT").unwrap();
+    open_page(&live);
+    slow.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    let mut answer = String::new();
+    slow.read_to_string(&mut answer).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 408 "), "{answer}");
 }
 
 /// The connection ends, and later ones get no answer.
@@ -52,8 +74,7 @@ fn a_link_that_is_gone_keeps_neither_the_page_nor_the_end_waiting() {
     let queued: Vec<_> = (0..16).map_while(|_| fill().ok()).collect();
     assert!(queued.len() < 16, "connections are still taken");
     std::thread::sleep(Duration::from_millis(1_500));
-    let host = live.address.trim_start_matches("http://").trim_end_matches('/');
-    assert!(answer(handshake(host)).contains("101"), "no page opens");
+    open_page(&live);
     live.program.signal("INT");
     assert_eq!(live.program.end(Duration::from_secs(2)), Some(0));
 }

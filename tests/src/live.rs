@@ -1,6 +1,6 @@
 //! A running `hums live`, and a vehicle for it.
 
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::net::{TcpStream, UdpSocket};
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
@@ -116,16 +116,23 @@ impl Live {
         self.end_by("TERM", limit)
     }
 
-    /// Opens its page.
-    #[track_caller]
-    pub fn page(&self) -> Page {
-        let stream = handshake(self.address.trim_start_matches("http://").trim_end_matches('/'));
+    /// Where it listens.
+    pub fn host(&self) -> &str {
+        self.address.trim_start_matches("http://").trim_end_matches('/')
+    }
+
+    /// Opens its page, or gives the status line of the answer.
+    pub fn page(&self) -> Result<Page, String> {
+        let stream = ask_for_events(self.host());
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-        let mut stream = BufReader::new(stream);
+        let mut lines = BufReader::new(stream).lines();
         let head: Vec<String> =
-            (&mut stream).lines().map_while(Result::ok).take_while(|line| !line.is_empty()).collect();
-        assert!(head.first().is_some_and(|line| line.contains("101")), "no page opens: {head:?}");
-        Page(stream)
+            lines.by_ref().map_while(Result::ok).take_while(|line| !line.is_empty()).collect();
+        if head.iter().any(|line| line == "Content-Type: text/event-stream") {
+            Ok(Page(lines))
+        } else {
+            Err(head.into_iter().next().unwrap_or_default())
+        }
     }
 
     #[track_caller]
@@ -139,41 +146,26 @@ impl Live {
     }
 }
 
-/// Asks for the page's WebSocket.
-pub fn handshake(host: &str) -> TcpStream {
+/// Asks for the page's events.
+pub fn ask_for_events(host: &str) -> TcpStream {
     let mut stream = TcpStream::connect(host).unwrap();
-    let request = format!(
-        "GET /ws HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    );
-    stream.write_all(request.as_bytes()).unwrap();
+    write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
     stream
 }
 
-/// The messages of a page of `hums live`.
+/// The events of a page of `hums live`: lines of an answer without a length.
 #[derive(Debug)]
-pub struct Page(BufReader<TcpStream>);
+pub struct Page(Lines<BufReader<TcpStream>>);
 
 impl Page {
-    /// An unmasked server's frame (RFC 6455, 5.2).
+    /// The data of the next event; comments are passed over.
     #[track_caller]
     pub fn message(&mut self) -> String {
-        let mut head = [0; 2];
-        self.0.read_exact(&mut head).unwrap();
-        assert_eq!((head[0], head[1] & 0x80), (0x81, 0), "a text, whole, not masked");
-        let mut more = |bytes: usize| {
-            let mut length = [0; 8];
-            self.0.read_exact(&mut length[8 - bytes..]).unwrap();
-            u64::from_be_bytes(length)
-        };
-        let length = match head[1] {
-            126 => more(2),
-            127 => more(8),
-            length => length.into(),
-        };
-        let mut text = vec![0; usize::try_from(length).unwrap()];
-        self.0.read_exact(&mut text).unwrap();
-        String::from_utf8(text).unwrap()
+        let lines = self.0.by_ref().map(Result::unwrap);
+        let mut lines = lines.skip_while(|line| line.is_empty() || line.starts_with(':'));
+        let line = lines.next().expect("the connection is open");
+        assert_eq!(lines.next().as_deref(), Some(""), "an event has one line");
+        line.strip_prefix("data: ").expect("only data").to_owned()
     }
 }
 

@@ -2,10 +2,10 @@
 //! a slow page skips states, and gets more history the next time.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use hums_core::clock::Instant;
-use tokio::sync::watch;
 
 use super::world::Histories;
 use crate::page::history::{Cursor, Part};
@@ -44,7 +44,9 @@ pub enum PageCommand {
 /// The meeting place.
 #[derive(Debug)]
 pub struct Hub {
-    state: watch::Sender<Arc<Published>>,
+    /// With the number of the newest one.
+    state: Mutex<(u64, Arc<Published>)>,
+    changed: Condvar,
     histories: Mutex<Histories>,
     commands: SyncSender<PageCommand>,
 }
@@ -53,24 +55,29 @@ impl Hub {
     /// With the end that takes commands.
     pub fn new() -> (Arc<Self>, Receiver<PageCommand>) {
         let (commands, taken) = sync_channel(COMMANDS_MAX);
-        let (state, _) = watch::channel(Arc::default());
-        (Arc::new(Self { state, histories: Mutex::default(), commands }), taken)
+        let hub =
+            Self { state: Mutex::default(), changed: Condvar::new(), histories: Mutex::default(), commands };
+        (Arc::new(hub), taken)
     }
 
     /// Replaces the state before.
     pub fn publish(&self, published: Published) {
-        self.state.send_replace(Arc::new(published));
+        let mut state = lock(&self.state);
+        *state = (state.0 + 1, Arc::new(published));
+        drop(state);
+        self.changed.notify_all();
     }
 
-    /// The state, and when it changes.
-    pub fn follow(&self) -> watch::Receiver<Arc<Published>> {
-        self.state.subscribe()
+    /// The newest state with its number. Waits for it as long as `seen` (0 for none) is the newest one; `None` if the wait is over.
+    pub fn after(&self, seen: u64, wait: Duration) -> Option<(u64, Arc<Published>)> {
+        let newest = self.changed.wait_timeout_while(lock(&self.state), wait, |state| state.0 == seen);
+        let (state, timeout) = newest.unwrap_or_else(PoisonError::into_inner);
+        (!timeout.timed_out()).then(|| state.clone())
     }
 
     /// The histories.
     pub fn histories(&self) -> MutexGuard<'_, Histories> {
-        // Usable after a thread's panic.
-        self.histories.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.histories)
     }
 
     /// The part of a vehicle's history that a page lacks.
@@ -82,4 +89,9 @@ impl Hub {
     pub fn command(&self, command: PageCommand) -> bool {
         self.commands.try_send(command).is_ok()
     }
+}
+
+/// Usable after a thread's panic.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -5,9 +5,8 @@
 //!                                       \-> points -> InfluxDB
 //! ```
 //!
-//! One thread follows the vehicle (`feed`, `playback`) and never waits for the others; the first one serves pages,
-//! one writes to a database. Pages take the newest state and the missing history (`hub`); points wait in memory
-//! (`influx`).
+//! One thread follows the vehicle (`feed`, `playback`) and never waits for the others; each page has one, and one writes
+//! to a database. Pages take the newest state and the missing history (`hub`); points wait in memory (`influx`).
 
 pub mod assets;
 pub mod board;
@@ -15,6 +14,7 @@ pub mod companion;
 pub mod craft;
 pub mod feed;
 pub mod guard;
+pub mod http;
 pub mod hub;
 pub mod influx;
 pub mod latest;
@@ -30,7 +30,6 @@ pub mod told;
 pub mod values;
 pub mod world;
 
-use std::convert::Infallible;
 use std::io::IsTerminal as _;
 use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::process::{Command, Stdio};
@@ -41,7 +40,6 @@ use std::time::SystemTime;
 
 use anyhow::{Context as _, Result, anyhow};
 use serde::Serialize;
-use tokio::sync::oneshot;
 
 use self::feed::Feed;
 use self::guard::Guard;
@@ -69,14 +67,14 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
     let host = args.listen.rsplit_once(':').map_or("", |(host, _)| host);
     let (guard, token) = Guard::new(address, host, args.listen_token.as_deref())?;
     let (hub, commands) = Hub::new();
-    let (follower, followed) = follow(args, &limits, &hub, commands, influx)?;
+    let follower = follow(args, &limits, &hub, commands, influx)?;
+    server::start(listener, hub, guard)?;
     let pages = page_addresses(address, token.as_deref(), others());
     tell(args, &pages)?;
     if let Some(page) = pages.first().filter(|_| args.open) {
         open(page);
     }
-    // Whichever fails ends the program; on Ctrl-C and SIGTERM the follower ends first.
-    server::serve(listener, hub, guard, followed)?;
+    // Ctrl-C and SIGTERM end the follower; the server and its pages end with the program.
     let influx = follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
     Ok(influx.map_or(Outcome::Done, finish))
 }
@@ -107,17 +105,14 @@ fn is_here_only(page: &str) -> bool {
     ["http://localhost:", "http://127.", "http://[::1]:"].iter().any(|here| page.starts_with(here))
 }
 
-type Follower = JoinHandle<Result<Option<Influx>>>;
-
-/// Errors of the source are reported at once. The receiver never gets a value, and closes with the thread.
+/// Errors of the source are reported at once.
 fn follow(
     args: &cli::Live,
     limits: &Limits,
     hub: &Arc<Hub>,
     commands: Receiver<hub::PageCommand>,
     influx: Option<Influx>,
-) -> Result<(Follower, oneshot::Receiver<Infallible>)> {
-    let (follows, followed) = oneshot::channel();
+) -> Result<JoinHandle<Result<Option<Influx>>>> {
     let thread = std::thread::Builder::new().name("vehicle".to_owned());
     let hub = Arc::clone(hub);
     let started = if args.input.is_live() {
@@ -125,20 +120,14 @@ fn follow(
             return Err(usage("--session is for what was recorded: a log, a card or a folder"));
         }
         let feed = Feed::open(&args.input, limits.clone(), hub, influx)?;
-        thread.spawn(move || {
-            let _follows = follows;
-            Ok(feed.run())
-        })
+        thread.spawn(move || Ok(feed.run()))
     } else {
         let opened = recording::open(&args.input, args.session.as_deref())?;
         let name = opened.name.clone();
         let player = Player::new(&name, limits.clone(), hub, commands, influx);
-        thread.spawn(move || {
-            let _follows = follows;
-            player.run(opened)
-        })
+        thread.spawn(move || player.run(opened))
     };
-    Ok((started.context("no thread")?, followed))
+    started.context("no thread")
 }
 
 fn database(args: &cli::Live) -> Result<Option<Influx>> {

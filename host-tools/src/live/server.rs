@@ -1,59 +1,50 @@
-//! The page, and its data connection: a WebSocket.
+//! The page, its data as server-sent events (HTML standard, 9.2), and its commands.
 //!
-//! Each page's task takes the newest state when it can send. A page that takes nothing for `PATIENCE` is
-//! dropped.
+//! Each connection has a thread and one request. A page's thread takes the newest state when it can send. A page that
+//! takes nothing for `PATIENCE` is dropped.
 
-use std::convert::Infallible;
+use std::io::{self, Write as _};
+use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::{self, Builder};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
-use axum::Router;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Path, RawQuery, Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
-use axum::routing::get;
-use futures_util::SinkExt as _;
 use serde::Deserialize;
-use tokio::net::TcpListener;
-use tokio::sync::oneshot;
 
 use super::assets;
 use super::guard::Guard;
+use super::http::{self, Request};
 use super::hub::{Hub, PageCommand, Published};
 use crate::page::history::Cursor;
 use crate::page::json;
 
 /// Pages at once.
 const PAGES_MAX: usize = 16;
-/// Of a page's commands, and of the buffer cleared before each look for one.
-const COMMAND_BYTES_MAX: usize = 1_024;
-/// Then a page is gone.
+/// Connections at once: all pages, and the six of a browser for each of eight others that load it.
+const CONNECTIONS_MAX: usize = 64;
+/// Then a page is gone, or a request does not come any more.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// A page without news gets a comment: that shows a broken connection, and frees its place.
+const COMMENT_EVERY: Duration = Duration::from_secs(1);
+/// After a failed accept, for instance without a free file descriptor.
+const AGAIN: Duration = Duration::from_millis(100);
 
-/// Our scripts and styles, no inline code, no frame around the page.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; \
-                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-
-#[derive(Clone)]
-struct Shared {
+struct Server {
     hub: Arc<Hub>,
     guard: Guard,
     pages: Arc<AtomicUsize>,
 }
 
-/// One page's place. Freed when dropped, also if the connection breaks before it is a WebSocket: the closure
-/// is then dropped without a call.
+/// One of a limited number. Freed when dropped.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {
-    /// `None` if [`PAGES_MAX`] pages are open.
-    fn take(pages: &Arc<AtomicUsize>) -> Option<Self> {
-        let place = Self(Arc::clone(pages));
-        (pages.fetch_add(1, Ordering::SeqCst) < PAGES_MAX).then_some(place)
+    /// `None` if `max` are taken.
+    fn take(taken: &Arc<AtomicUsize>, max: usize) -> Option<Self> {
+        let place = Self(Arc::clone(taken));
+        (taken.fetch_add(1, Ordering::SeqCst) < max).then_some(place)
     }
 }
 
@@ -63,112 +54,113 @@ impl Drop for Place {
     }
 }
 
-/// Serves until the following thread ends: `followed` is then closed.
-pub fn serve(
-    listener: std::net::TcpListener,
-    hub: Arc<Hub>,
-    guard: Guard,
-    followed: oneshot::Receiver<Infallible>,
-) -> Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().context("no runtime")?;
-    runtime.block_on(async move {
-        listener.set_nonblocking(true)?;
-        let listener = TcpListener::from_std(listener)?;
-        let shared = Shared { hub, guard, pages: Arc::default() };
-        let router = Router::new()
-            .route("/", get(index))
-            .route("/ws", get(connect))
-            .route("/{name}", get(asset))
-            .layer(middleware::from_fn_with_state(shared.clone(), check))
-            .with_state(shared);
-        tokio::select! {
-            served = async { axum::serve(listener, router).await } => served.context("the server has ended"),
-            _ = followed => Ok(()),
+/// Serves until the program ends.
+pub fn start(listener: TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
+    let server = Arc::new(Server { hub, guard, pages: Arc::default() });
+    let connections = Arc::default();
+    let accept = move || {
+        for stream in listener.incoming() {
+            let Ok(mut stream) = stream else {
+                thread::sleep(AGAIN);
+                continue;
+            };
+            let Some(place) = Place::take(&connections, CONNECTIONS_MAX) else { continue };
+            let server = Arc::clone(&server);
+            // Without a thread the connection is closed; so it is after an error.
+            let _ = Builder::new().name("page".to_owned()).spawn(move || {
+                let _place = place;
+                server.answer(&mut stream)
+            });
         }
-    })
-}
-
-/// Rules for every request and every answer.
-async fn check(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let headers = request.headers();
-    let mut response = if !shared.guard.knows_host(headers) {
-        (StatusCode::FORBIDDEN, "This server is asked by its address only.\n").into_response()
-    } else if !shared.guard.knows_origin(headers) {
-        (StatusCode::FORBIDDEN, "Other pages may not ask this server.\n").into_response()
-    } else {
-        next.run(request).await
     };
-    let fixed = [
-        (header::CONTENT_SECURITY_POLICY, POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-        (header::CACHE_CONTROL, "no-store"),
-        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
-        (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
-    ];
-    for (name, value) in fixed {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
-    }
-    response
-}
-
-async fn index() -> Response {
-    found("index.html")
-}
-
-async fn asset(Path(name): Path<String>) -> Response {
-    found(&name)
-}
-
-fn found(name: &str) -> Response {
-    match assets::find(name) {
-        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
-        None => (StatusCode::NOT_FOUND, "There is no such thing here.\n").into_response(),
-    }
-}
-
-async fn connect(
-    State(shared): State<Shared>,
-    RawQuery(query): RawQuery,
-    _: HeaderMap,
-    upgrade: WebSocketUpgrade,
-) -> Response {
-    if !shared.guard.knows_token(query.as_deref()) {
-        return (StatusCode::UNAUTHORIZED, "The token is missing or wrong.\n").into_response();
-    }
-    let Some(place) = Place::take(&shared.pages) else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();
-    };
-    let upgrade = upgrade
-        .read_buffer_size(COMMAND_BYTES_MAX)
-        .max_message_size(COMMAND_BYTES_MAX)
-        .max_frame_size(COMMAND_BYTES_MAX);
-    upgrade.on_upgrade(async move |socket| {
-        let _place = place;
-        Page::new(&shared.hub).run(socket, &shared.hub).await;
-    })
-}
-
-/// One write: several would wake page and network.
-async fn send(socket: &mut WebSocket, messages: Vec<String>) -> Result<(), axum::Error> {
-    for text in messages {
-        socket.feed(Message::Text(text.into())).await?;
-    }
-    socket.flush().await
+    Builder::new().name("server".to_owned()).spawn(accept).context("no thread for the page")?;
+    Ok(())
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(tag = "cmd", rename_all = "lowercase")]
 enum Asked {
-    Vehicle { system: u8 },
     Pause,
     Play,
     Seek { to: f64 },
     Speed { to: f64 },
 }
 
+impl Server {
+    fn answer(&self, stream: &mut TcpStream) -> io::Result<()> {
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(PATIENCE))?;
+        stream.set_write_timeout(Some(PATIENCE))?;
+        let request = match Request::read(stream, PATIENCE) {
+            Ok(request) => request,
+            Err(status) => return say(stream, status, "This is no request of a page.\n"),
+        };
+        let (host, origin) = (request.field("host"), request.field("origin"));
+        if !self.guard.knows_host(host.as_deref()) {
+            return say(stream, "403 Forbidden", "This server is asked by its address only.\n");
+        }
+        if !self.guard.knows_origin(host.as_deref(), origin.as_deref()) {
+            return say(stream, "403 Forbidden", "Other pages may not ask this server.\n");
+        }
+        match (request.method.as_str(), request.path.as_str()) {
+            ("GET", "/events") | ("POST", "/command") if !self.guard.knows_token(request.query("token")) => {
+                say(stream, "401 Unauthorized", "The token is missing or wrong.\n")
+            }
+            ("GET", "/events") => self.follow(stream, request.query("vehicle")),
+            ("POST", "/command") => self.obey(stream, &request.body),
+            ("GET", path) => {
+                match assets::find(if path == "/" { "index.html" } else { path.trim_start_matches('/') }) {
+                    Some((kind, text)) => http::answer(stream, "200 OK", kind, text.as_bytes()),
+                    None => say(stream, "404 Not Found", "There is no such thing here.\n"),
+                }
+            }
+            _ => say(stream, "501 Not Implemented", "The page does not ask so.\n"),
+        }
+    }
+
+    fn obey(&self, stream: &mut TcpStream, command: &[u8]) -> io::Result<()> {
+        let command = match serde_json::from_slice(command) {
+            Ok(Asked::Pause) => PageCommand::Pause,
+            Ok(Asked::Play) => PageCommand::Play,
+            Ok(Asked::Seek { to }) => PageCommand::Seek(to),
+            Ok(Asked::Speed { to }) => PageCommand::Speed(to),
+            Err(_) => return say(stream, "400 Bad Request", "This is no command.\n"),
+        };
+        if self.hub.command(command) {
+            say(stream, "200 OK", "")
+        } else {
+            say(stream, "503 Service Unavailable", "Too many commands wait.\n")
+        }
+    }
+
+    /// Ends with the connection, or with a page that takes nothing.
+    fn follow(&self, stream: &mut TcpStream, vehicle: Option<&str>) -> io::Result<()> {
+        let Some(_place) = Place::take(&self.pages, PAGES_MAX) else {
+            return say(stream, "503 Service Unavailable", "Too many pages are open.\n");
+        };
+        http::begin(stream, "text/event-stream")?;
+        let vehicle = vehicle.and_then(|system| system.parse().ok());
+        let mut page = Page { vehicle, cursor: Cursor::default(), epoch: 0, timeline: Arc::default() };
+        let mut seen = 0;
+        loop {
+            let events = match self.hub.after(seen, COMMENT_EVERY) {
+                Some((number, published)) => {
+                    seen = number;
+                    page.news(&published, &self.hub)
+                }
+                None => ":\n\n".to_owned(),
+            };
+            // One write: several would wake page and network.
+            stream.write_all(events.as_bytes())?;
+        }
+    }
+}
+
+fn say(stream: &mut TcpStream, status: &str, words: &str) -> io::Result<()> {
+    http::answer(stream, status, "text/plain; charset=utf-8", words.as_bytes())
+}
+
 struct Page {
-    follow: tokio::sync::watch::Receiver<Arc<Published>>,
     vehicle: Option<u8>,
     cursor: Cursor,
     epoch: u64,
@@ -176,66 +168,22 @@ struct Page {
 }
 
 impl Page {
-    fn new(hub: &Hub) -> Self {
-        Self {
-            follow: hub.follow(),
-            vehicle: None,
-            cursor: Cursor::default(),
-            epoch: 0,
-            timeline: Arc::default(),
-        }
-    }
-
-    async fn run(mut self, mut socket: WebSocket, hub: &Hub) {
-        self.follow.mark_changed();
-        loop {
-            let messages = tokio::select! {
-                received = socket.recv() => match received {
-                    Some(Ok(Message::Text(text))) => {
-                        self.obey(text.as_str(), hub);
-                        Vec::new()
-                    }
-                    Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => Vec::new(),
-                    Some(Ok(Message::Close(_)) | Err(_)) | None => return,
-                },
-                changed = self.follow.changed() => match changed {
-                    Ok(()) => self.news(hub),
-                    Err(_) => return,
-                },
-            };
-            if !matches!(tokio::time::timeout(PATIENCE, send(&mut socket, messages)).await, Ok(Ok(()))) {
-                return;
-            }
-        }
-    }
-
-    fn obey(&mut self, text: &str, hub: &Hub) {
-        let command = match serde_json::from_str(text) {
-            Ok(Asked::Vehicle { system }) => {
-                self.vehicle = Some(system);
-                self.cursor = Cursor::default();
-                self.follow.mark_changed();
-                return;
-            }
-            Ok(Asked::Pause) => PageCommand::Pause,
-            Ok(Asked::Play) => PageCommand::Play,
-            Ok(Asked::Seek { to }) => PageCommand::Seek(to),
-            Ok(Asked::Speed { to }) => PageCommand::Speed(to),
-            Err(_) => return,
-        };
-        hub.command(command);
-    }
-
-    fn news(&mut self, hub: &Hub) -> Vec<String> {
-        let published = Arc::clone(&self.follow.borrow_and_update());
+    /// Each message is an event with one line of data: JSON as we write it has no line breaks.
+    fn news(&mut self, published: &Published, hub: &Hub) -> String {
         if published.epoch != self.epoch {
             self.epoch = published.epoch;
             self.cursor = Cursor::default();
         }
-        let mut messages = vec![published.head.clone()];
+        let mut events = String::new();
+        let mut add = |message: &str| {
+            if !message.is_empty() {
+                events.extend(["data: ", message, "\n\n"]);
+            }
+        };
+        add(&published.head);
         if !Arc::ptr_eq(&self.timeline, &published.timeline) && !published.timeline.is_empty() {
             self.timeline = Arc::clone(&published.timeline);
-            messages.push(self.timeline.to_string());
+            add(&self.timeline);
         }
         let wanted =
             self.vehicle.and_then(|wanted| published.crafts.iter().find(|(system, _)| *system == wanted));
@@ -244,11 +192,11 @@ impl Page {
                 self.vehicle = Some(*system);
                 self.cursor = Cursor::default();
             }
-            let part = hub.since(*system, &mut self.cursor, published.now);
-            messages.extend(part.map(|part| json::json(&part)));
-            messages.push(state.clone());
+            if let Some(part) = hub.since(*system, &mut self.cursor, published.now) {
+                add(&json::json(&part));
+            }
+            add(state);
         }
-        messages.retain(|message| !message.is_empty());
-        messages
+        events
     }
 }

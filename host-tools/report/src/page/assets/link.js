@@ -1,36 +1,49 @@
-// The connection to hums: states and parts of the history come, commands go. It comes back by itself.
+// The connection to hums: states and parts of the history come as server-sent events, commands go by POST. It comes back by
+// itself.
 
 const AGAIN_MS = 1000;
 
 export const connect = (take, changed) => {
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
-  const address = `ws://${location.host}/ws${token ? `?token=${encodeURIComponent(token)}` : ""}`;
-  let socket = null,
+  let events = null,
+    again = 0,
     vehicle = null,
-    failures = 0;
+    failures = 0,
+    waiting = [],
+    sending = false;
+  const address = (path, query) => `${path}?${new URLSearchParams(token ? { ...query, token } : query)}`;
   const open = () => {
-    socket = new WebSocket(address);
-    socket.onopen = () => {
+    clearTimeout(again);
+    events?.close();
+    events = new EventSource(address("events", vehicle == null ? {} : { vehicle }));
+    events.onopen = () => {
       failures = 0;
       changed(true, failures);
-      if (vehicle != null) send({ cmd: "vehicle", system: vehicle });
     };
-    socket.onmessage = (event) => take(JSON.parse(event.data), event.data);
-    socket.onclose = () => {
+    events.onmessage = ({ data }) => take(JSON.parse(data), data);
+    // A browser by itself gives up after an answer such as 503.
+    events.onerror = () => {
+      events.close();
       failures++;
       changed(false, failures, token != null);
-      setTimeout(open, AGAIN_MS);
+      again = setTimeout(open, AGAIN_MS);
     };
-  };
-  const send = (command) => {
-    if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
   };
   open();
   return {
-    send,
+    // One after the other, so that they arrive in this order. Of those that wait, the newest of a kind counts.
+    send: async (command) => {
+      waiting = [...waiting.filter(({ cmd }) => cmd !== command.cmd), command];
+      if (sending) return;
+      sending = true;
+      while (waiting.length) {
+        await fetch(address("command", {}), { method: "POST", body: JSON.stringify(waiting.shift()) }).catch(() => {});
+      }
+      sending = false;
+    },
     follow: (system) => {
       vehicle = system;
-      send({ cmd: "vehicle", system });
+      open();
     },
   };
 };
