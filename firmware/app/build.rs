@@ -23,7 +23,7 @@ fn main() -> Result<(), String> {
         return Ok(());
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    copy("../../memory.x", &out.join("memory.x"));
+    copy("memory.x", &out.join("memory.x"));
     let name = env::var("HUMS_BOARD").unwrap_or_else(|_| hums_boards::DEFAULT.to_owned());
     let board = hums_boards::find(&name).map_err(|why| format!("HUMS_BOARD: {why}"))?;
     fs::write(out.join("board.rs"), code(board)).expect("OUT_DIR can be written");

@@ -9,6 +9,8 @@ use stm32f405_model::machine::{Board, Machine};
 use stm32f405_model::memory::FLASH;
 use stm32f405_model::time::SECOND;
 
+/// The application's, behind its header.
+const VECTORS: u32 = 0x0802_0200;
 /// `movs r0, #3; lsls r0, r0, #28; adds r0, #1; bx r0`: a jump to an address without memory.
 const TO_NOWHERE: [u16; 4] = [0x2003, 0x0700, 0x3001, 0x4700];
 /// `movw r0, #0xED0C; movt r0, #0xE000; movs r1, #4; movt r1, #0x05FA; str r1, [r0]; b .`: AIRCR.SYSRESETREQ.
@@ -90,7 +92,7 @@ fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
     assert!(said.ends_with(&format!("  {:08x} main+0x6\n", main + 6)), "{said}");
     // If that handler also has no memory, the processor is locked up.
     let mut image = Image::parse(&elf).unwrap();
-    let (_, vectors) = image.pieces.iter_mut().find(|(address, _)| *address == FLASH.0).unwrap();
+    let (_, vectors) = image.pieces.iter_mut().find(|(address, _)| *address == VECTORS).unwrap();
     vectors[12..16].copy_from_slice(&0x3000_0001_u32.to_le_bytes());
     let report = Machine::new(image, Board::default()).run_until(SECOND).unwrap_err();
     assert!(report.reason.contains("locked up"), "{report}");

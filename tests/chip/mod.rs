@@ -24,6 +24,8 @@ mod program;
 #[cfg(feature = "chip")]
 mod recompute;
 #[cfg(feature = "chip")]
+mod update;
+#[cfg(feature = "chip")]
 mod usb;
 
 /// In the list of ignored tests: an untested part is not a success.

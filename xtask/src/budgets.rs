@@ -15,9 +15,11 @@ use serde::Deserialize;
 use crate::firmware::{self, Board};
 use crate::repo;
 
-/// Name, first address, one past the last, bytes for the program (`memory.x`): half of the flash, CCM without the stack.
-const MEMORIES: [(&str, u64, u64, u64); 3] = [
-    ("flash", 0x0800_0000, 0x0810_0000, 448 * 1024),
+/// Name, first address, one past the last, bytes for the program (`memory.x`): the application's flash, the resident program's
+/// (sectors 0 and 4), RAM, CCM without the stack.
+const MEMORIES: [(&str, u64, u64, u64); 4] = [
+    ("flash", 0x0802_0000, 0x0810_0000, 896 * 1024),
+    ("resident", 0x0800_0000, 0x0802_0000, 80 * 1024),
     ("ram", 0x2000_0000, 0x2002_0000, 128 * 1024),
     ("ccm", 0x1000_0000, 0x1001_0000, 48 * 1024),
 ];
@@ -127,7 +129,7 @@ pub(crate) fn check(boards: &[&Board], write: bool) -> Result<()> {
         }
     }
     println!(
-        "{:<20} {:<6} {:>9} {:>9} {:>9}  reason of the limit",
+        "{:<20} {:<8} {:>9} {:>9} {:>9}  reason of the limit",
         "board", "memory", "bytes", "limit", "free"
     );
     for row in &rows {
@@ -185,7 +187,7 @@ fn compare(board: &str, used: &BTreeMap<&str, u64>, limits: &BTreeMap<String, Li
             let bytes = used.get(memory).copied().unwrap_or(0);
             let over = bytes > budget.bytes_max;
             let text = format!(
-                "{board:<20} {memory:<6} {bytes:>9} {:>9} {:>9}  {}{}",
+                "{board:<20} {memory:<8} {bytes:>9} {:>9} {:>9}  {}{}",
                 budget.bytes_max,
                 all.saturating_sub(bytes),
                 if over { "OVER: " } else { "" },
@@ -208,7 +210,7 @@ fn sizes(elf: &[u8]) -> Result<BTreeMap<&'static str, u64>> {
             continue;
         }
         match memory_at(u64::from(segment.p_paddr(endian))) {
-            Some(("flash", ..)) => *sizes.entry("flash").or_default() += stored,
+            Some((name @ ("flash" | "resident"), ..)) => *sizes.entry(name).or_default() += stored,
             _ => bail!("a segment is loaded at {:#x}, which is not flash", segment.p_paddr(endian)),
         }
     }

@@ -7,6 +7,7 @@
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::{env, fs};
 
 use anyhow::{Context as _, Result, bail};
@@ -18,10 +19,27 @@ use crate::firmware;
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, MAC_TARGET, Need, STATIC_TARGET, WINDOWS_TARGET};
 use crate::shell::Shell;
+use crate::update::{self, SecretKey};
 use crate::wine::{self, Wine};
 
-/// The checked-out commit, in `target/dist`; `check`: a second one elsewhere, compared.
-pub(crate) fn run(check: bool) -> Result<()> {
+/// Arguments of `dist`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Build them twice and compare, and run what is for Windows under Wine
+    #[arg(long)]
+    check: bool,
+    /// File of the secret key that signs the update files: 64 hexadecimal digits. Without it there are none
+    #[arg(long)]
+    key: Option<PathBuf>,
+}
+
+/// The checked-out commit, in `target/dist`; with `--check` a second one elsewhere, compared.
+pub(crate) fn run(options: &Options) -> Result<()> {
+    let check = options.check;
+    let key = options.key.as_deref().map(update::release_key).transpose()?.map(Rc::new);
+    if key.is_none() {
+        eprintln!("note: no update files (HUMS.UPD) without --key FILE; the others are for a cable");
+    }
     let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
     needs.push(Need::BrowserTarget);
     needs.extend([Need::WindowsTarget, Need::Mingw, Need::MacTarget]);
@@ -44,7 +62,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
         eprintln!("note: what is not committed is not in the release, which is of {commit}");
     }
     let folder = repo::target().join("dist");
-    let files = Release::new(&commit, &repo::target().join("dist-build"))?.make()?;
+    let files = Release::new(&commit, &repo::target().join("dist-build"), key.clone())?.make()?;
     write_all(&folder, &files)?;
     print!("{}", sums(&files));
     println!("{}", repo::shown(&folder));
@@ -57,7 +75,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
     check_findings(|flight| wine.run(&windows).args(["check", "--json"]).arg(flight), repo::root())?;
     wine::try_out(&wine, &windows, &repo::root().join(FAULTY))?;
     let elsewhere = env::temp_dir().join(format!("hums-built-again-{}", std::process::id()));
-    let again = Release::new(&commit, &elsewhere).and_then(|release| release.make());
+    let again = Release::new(&commit, &elsewhere, key).and_then(|release| release.make());
     // Gigabytes of no use.
     fs::remove_dir_all(&elsewhere).with_context(|| format!("cannot remove {}", elsewhere.display()))?;
     let again = again?;
@@ -77,10 +95,11 @@ struct Release {
     tree: PathBuf,
     commit: String,
     flags: OsString,
+    key: Option<Rc<SecretKey>>,
 }
 
 impl Release {
-    fn new(commit: &str, tree: &Path) -> Result<Self> {
+    fn new(commit: &str, tree: &Path, key: Option<Rc<SecretKey>>) -> Result<Self> {
         if tree.exists() {
             fs::remove_dir_all(tree)?;
         }
@@ -88,18 +107,21 @@ impl Release {
         Shell::new("git").within(tree).args(["checkout", "--quiet", "--detach", commit]).run()?;
         let tree = tree.canonicalize()?;
         let flags = firmware::flags(&tree)?;
-        Ok(Self { tree, commit: commit.to_owned(), flags })
+        Ok(Self { tree, commit: commit.to_owned(), flags, key })
     }
 
     fn make(&self) -> Result<Vec<File>> {
         let mut files = Vec::new();
         for board in hums_boards::all() {
             let arguments = [&firmware::cargo_arguments()[..], &firmware::LAST.map(Into::into)].concat();
+            self.cargo("build", &firmware::resident_arguments(), &board.name)?;
             self.cargo("rustc", &arguments, &board.name)?;
-            let (_, elf) = read("", &self.target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))?;
-            files.extend(firmware::files(board, elf)?);
+            let programs = firmware::Programs::read(&self.target())?;
+            let commit = self.commit.get(..12).unwrap_or(&self.commit);
+            files.extend(firmware::files(board, &programs, commit, self.key.as_deref())?);
         }
         files.push(self.sbom("hums-firmware", "firmware/app", &[firmware::target()])?);
+        files.push(self.sbom("hums-resident", "firmware/resident", &[firmware::target()])?);
         self.build(&["--release", "--package=hums", "--target", STATIC_TARGET])?;
         let program = self.target().join(STATIC_TARGET).join("release/hums");
         // The released program, not the tests' build.
@@ -148,6 +170,8 @@ impl Release {
             .env("CARGO_TARGET_DIR", self.target())
             .env("CARGO_ENCODED_RUSTFLAGS", &self.flags)
             .env(firmware::BOARD, board)
+            // Without the test key.
+            .env("HUMS_RELEASE", "1")
             // In place of the time of day.
             .env("SOURCE_DATE_EPOCH", self.stamp()?)
             .args([command, "--locked"])

@@ -6,15 +6,21 @@ use std::{env, fs, io};
 
 use anyhow::{Context as _, Result, bail};
 pub(crate) use hums_boards::Board;
+use hums_update::{header, map};
 
 use crate::dfu;
-use crate::image;
+use crate::image::{self, Piece};
 use crate::repo::{self, FIRMWARE_TARGET};
 use crate::shell::Shell;
+use crate::update::{self, SecretKey};
 
 /// Of `cargo rustc` for the last crate: inlines only functions below half of the compiler's limit. 4.7 KB of flash less, 0.2 %
 /// more load.
 pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
+
+/// Packages that only cross-compile.
+pub(crate) const APPLICATION: &str = "hums-app";
+pub(crate) const RESIDENT: &str = "hums-resident";
 
 /// Every change is tried for it.
 pub(crate) fn default_board() -> &'static Board {
@@ -26,7 +32,12 @@ pub(crate) fn target() -> String {
 }
 
 pub(crate) fn cargo_arguments() -> [String; 3] {
-    ["--package=hums-app".into(), "--profile=firmware".into(), target()]
+    [format!("--package={APPLICATION}"), "--profile=firmware".into(), target()]
+}
+
+/// Arguments of the build of the resident program, for `cargo build`.
+pub(crate) fn resident_arguments() -> [String; 3] {
+    [format!("--package={RESIDENT}"), "--profile=firmware".into(), target()]
 }
 
 pub(crate) fn image_of(board: &Board) -> PathBuf {
@@ -60,26 +71,51 @@ pub(crate) fn cargo(board: &Board) -> Result<Shell> {
     Ok(Shell::cargo().env("CARGO_ENCODED_RUSTFLAGS", flags(repo::root())?).env(BOARD, &board.name))
 }
 
-/// Returns the compiler's ELF file.
-fn compile(board: &Board, further: &[&str]) -> Result<PathBuf> {
+/// Returns the compiler's ELF files.
+fn compile(board: &Board, further: &[&str]) -> Result<Programs> {
+    cargo(board)?.arg("build").args(resident_arguments()).run()?;
     cargo(board)?.arg("rustc").args(cargo_arguments()).args(further).args(LAST).run()?;
-    Ok(repo::target().join(FIRMWARE_TARGET).join("firmware/hums-firmware"))
+    Programs::read(&repo::target())
 }
 
+/// With a log for a debugger: the flashable file and the one with the names.
 pub(crate) fn build_with_log(board: &Board) -> Result<PathBuf> {
-    compile(board, &["--features=log"])
+    let programs = compile(board, &["--features=log"])?;
+    write(board, &programs, "-log")
 }
 
-/// An image as a release; the other files are beside the ELF file.
+/// An image as a release, signed by the test key; the other files are beside the ELF file.
 pub(crate) fn build(board: &Board) -> Result<PathBuf> {
-    let built = compile(board, &[])?;
-    let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
+    let programs = compile(board, &[])?;
+    write(board, &programs, "")
+}
+
+fn write(board: &Board, programs: &Programs, suffix: &str) -> Result<PathBuf> {
     let image = image_of(board);
-    for (name, data) in files(board, elf)? {
+    let commit = Shell::new("git").args(["rev-parse", "--short=12", "HEAD"]).ask().unwrap_or_default();
+    for (name, data) in files(board, programs, commit.trim(), Some(&update::test_key()?))? {
+        let name = name.replace('.', &format!("{suffix}."));
         let path = image.with_file_name(name);
         write_if_different(&path, &data).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    Ok(image)
+    Ok(image.with_file_name(format!("hums-{}{suffix}.elf", board.name)))
+}
+
+/// The ELF files of both programs.
+pub(crate) struct Programs {
+    application: Vec<u8>,
+    resident: Vec<u8>,
+}
+
+impl Programs {
+    /// From the build's folder.
+    pub(crate) fn read(target: &Path) -> Result<Self> {
+        let read = |name: &str| {
+            let path = target.join(FIRMWARE_TARGET).join("firmware").join(name);
+            fs::read(&path).with_context(|| format!("cannot read {}", path.display()))
+        };
+        Ok(Self { application: read("hums-firmware")?, resident: read("hums-resident")? })
+    }
 }
 
 /// One after the other, beside this PC's build; each ends with one core's work.
@@ -94,27 +130,41 @@ pub(crate) fn build_beside(
     })
 }
 
-/// Flashable: name and content, the ELF file last.
-pub(crate) fn files(board: &Board, elf: Vec<u8>) -> Result<[(String, Vec<u8>); 4]> {
+/// Flashable: name and content, the ELF file last. The update file only with a key.
+pub(crate) fn files(
+    board: &Board,
+    programs: &Programs,
+    commit: &str,
+    key: Option<&SecretKey>,
+) -> Result<Vec<(String, Vec<u8>)>> {
     let name = format!("hums-{}", board.name);
-    let pieces = image::pieces(&elf).with_context(|| name.clone())?;
-    Ok([
+    let mut added = image::pieces(&programs.resident).with_context(|| format!("{name}: resident program"))?;
+    let application = image::pieces(&programs.application).with_context(|| name.clone())?;
+    let update = update::file(board, &application, commit, key).with_context(|| name.clone())?;
+    let header = update[..header::BYTES].to_vec();
+    added.push(Piece { address: map::APPLICATION, bytes: header });
+    let elf = image::with_pieces(&programs.application, &added)?;
+    let pieces = image::pieces(&elf)?;
+    let mut files = vec![
         (format!("{name}.dfu"), dfu::file(&name, &pieces)),
         (format!("{name}.hex"), image::hex(&pieces)),
         (format!("{name}.bin"), image::flat(&pieces)),
-        (format!("{name}.elf"), elf),
-    ])
+    ];
+    files.extend(key.map(|_| (format!("{name}.upd"), update)));
+    files.push((format!("{name}.elf"), elf));
+    Ok(files)
 }
 
 pub(crate) fn check_all() -> Result<()> {
-    hums_boards::all()
-        .iter()
-        .try_for_each(|board| cargo(board)?.args(["check", "--quiet"]).args(cargo_arguments()).run())
+    hums_boards::all().iter().try_for_each(|board| {
+        cargo(board)?.args(["check", "--quiet", "--package", RESIDENT]).args(cargo_arguments()).run()
+    })
 }
 
 /// A warning is an error.
 pub(crate) fn lint(board: &Board) -> Result<()> {
-    cargo(board)?.arg("clippy").args(cargo_arguments()).args(["--", "-D", "warnings"]).run()
+    let both = ["clippy", "--package", RESIDENT];
+    cargo(board)?.args(both).args(cargo_arguments()).args(["--", "-D", "warnings"]).run()
 }
 
 /// An unchanged image keeps its time, and nothing is made anew.

@@ -1,6 +1,6 @@
 //! `cargo xtask flash` and `cargo xtask attach`: a firmware onto a board, as released or with a log.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Result, bail};
 
@@ -37,19 +37,21 @@ pub(crate) fn flash(options: &Options) -> Result<()> {
         return load(&path).run();
     }
     require(PROBE_RS)?;
-    // Without --chip-erase only the image's sectors are erased.
-    probe("download", &elf).run()?;
+    load_by_probe(&elf.with_extension("hex")).run()?;
     Shell::new(PROBE_RS.0).args(["reset", "--chip", CHIP]).run()
 }
 
 pub(crate) fn attach(board: &Board) -> Result<()> {
     let elf = firmware::build_with_log(board)?;
     require(PROBE_RS)?;
-    probe("run", &elf).run()
+    load_by_probe(&elf.with_extension("hex")).run()?;
+    Shell::new(PROBE_RS.0).args(["reset", "--chip", CHIP]).run()?;
+    Shell::new(PROBE_RS.0).args(["attach", "--chip", CHIP]).arg(elf).run()
 }
 
-fn probe(command: &str, elf: &PathBuf) -> Shell {
-    Shell::new(PROBE_RS.0).args([command, "--chip", CHIP]).arg(elf)
+/// Not the ELF file: probe-rs takes only its sections. Without --chip-erase only the image's sectors are erased.
+fn load_by_probe(hex: &Path) -> Shell {
+    Shell::new(PROBE_RS.0).args(["download", "--chip", CHIP, "--binary-format", "hex"]).arg(hex)
 }
 
 /// Alternate setting 0 is the flash; then the firmware starts.
@@ -79,9 +81,8 @@ mod tests {
 
     #[test]
     fn nothing_erases_the_whole_chip() {
-        let elf = PathBuf::from("hums.elf");
-        let probe = probe("download", &elf);
-        assert_eq!(probe.shown(), "probe-rs download --chip STM32F405RGTx hums.elf");
+        let probe = load_by_probe(Path::new("hums.hex"));
+        assert_eq!(probe.shown(), "probe-rs download --chip STM32F405RGTx --binary-format hex hums.hex");
         let load = load(Path::new("hums.dfu"));
         assert_eq!(
             load.shown(),

@@ -7,8 +7,8 @@ use object::Endianness;
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader as _, ProgramHeader as _};
 
-/// Sectors never touched by programming (`firmware/app/src/boards/stm32f4/flash.rs`).
-pub(crate) const STORE: std::ops::Range<u32> = 0x0800_4000..0x0800_C000;
+/// Sectors never touched by programming: the store, and the state of an update (ARCHITECTURE.md).
+pub(crate) const KEPT: std::ops::Range<u32> = 0x0800_4000..0x0801_0000;
 
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Piece {
@@ -30,14 +30,43 @@ pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
     joined(pieces)
 }
 
+/// The ELF file with these pieces beside its own. Debuggers and the chip's model load them; symbols stay.
+pub(crate) fn with_pieces(elf: &[u8], pieces: &[Piece]) -> Result<Vec<u8>> {
+    const ENTRY_BYTES: usize = 32;
+    let header = FileHeader32::<Endianness>::parse(elf).context("no ELF file")?;
+    let endian = header.endian()?;
+    let (from, count) = (header.e_phoff(endian) as usize, usize::from(header.e_phnum(endian)));
+    let table = elf.get(from..from + count * ENTRY_BYTES).context("the program headers end early")?;
+    let mut file = elf.to_vec();
+    let mut entries = table.to_vec();
+    for Piece { address, bytes } in pieces {
+        file.resize(file.len().next_multiple_of(4), 0);
+        let length = bytes.len() as u32;
+        // Kind, offset, two addresses, two lengths, flags (readable), alignment.
+        let entry = [PT_LOAD.0, file.len() as u32, *address, *address, length, length, 4, 4];
+        entries.extend(entry.into_iter().flat_map(u32::to_le_bytes));
+        file.extend(bytes);
+    }
+    file.resize(file.len().next_multiple_of(4), 0);
+    let table = file.len() as u32;
+    file.extend(entries);
+    // Offset and number of program headers (ELF-32, header).
+    file[28..32].copy_from_slice(&table.to_le_bytes());
+    file[44..46].copy_from_slice(&((count + pieces.len()) as u16).to_le_bytes());
+    Ok(file)
+}
+
 /// In order of address, with adjacent pieces joined.
 fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
     pieces.sort_by_key(|piece| piece.address);
     let mut joined: Vec<Piece> = Vec::new();
     for piece in pieces {
         let end = u64::from(piece.address) + piece.bytes.len() as u64;
-        if piece.address < STORE.end && end > u64::from(STORE.start) {
-            bail!("the image has bytes at {:#010x}, where the store is: see memory.x", piece.address);
+        if piece.address < KEPT.end && end > u64::from(KEPT.start) {
+            bail!(
+                "the image has bytes at {:#010x}, where the store or the state of an update is: see memory.x",
+                piece.address
+            );
         }
         match joined.last_mut() {
             Some(before) if before.address + before.bytes.len() as u32 > piece.address => {
@@ -119,16 +148,16 @@ mod tests {
 
     #[test]
     fn pieces_are_joined_where_they_touch_and_kept_apart_where_the_store_lies_between() {
-        let pieces = vec![piece(0x0800_C010, 16), piece(0x0800_0000, 392), piece(0x0800_C000, 16)];
-        assert_eq!(joined(pieces).unwrap(), [piece(0x0800_0000, 392), piece(0x0800_C000, 32)]);
+        let pieces = vec![piece(0x0801_0010, 16), piece(0x0800_0000, 392), piece(0x0801_0000, 16)];
+        assert_eq!(joined(pieces).unwrap(), [piece(0x0800_0000, 392), piece(0x0801_0000, 32)]);
     }
 
     #[test]
     fn an_image_that_would_overwrite_the_store_is_refused() {
-        for at in [0x0800_3FFF, 0x0800_4000, 0x0800_BFFF] {
+        for at in [0x0800_3FFF, 0x0800_4000, 0x0800_BFFF, 0x0800_FFFF] {
             assert!(joined(vec![piece(at, 2)]).unwrap_err().to_string().contains("store"), "{at:#x}");
         }
-        assert!(joined(vec![piece(0x0800_3FFE, 2), piece(0x0800_C000, 2)]).is_ok());
+        assert!(joined(vec![piece(0x0800_3FFE, 2), piece(0x0801_0000, 2)]).is_ok());
     }
 
     #[test]
@@ -140,6 +169,17 @@ mod tests {
     fn a_flat_image_has_an_erased_store() {
         let flat = flat(&[piece(0x0800_0000, 2), piece(0x0800_0004, 1)]);
         assert_eq!(flat, [7, 7, 0xFF, 0xFF, 7]);
+    }
+
+    #[test]
+    fn added_pieces_are_loaded_with_those_of_the_file() {
+        // No program header.
+        let mut elf = vec![0; 52];
+        elf[..7].copy_from_slice(b"\x7fELF\x01\x01\x01");
+        let added = [piece(0x0800_0000, 6), piece(0x0802_0000, 3)];
+        let once = with_pieces(&elf, &added[1..]).unwrap();
+        assert_eq!(pieces(&with_pieces(&once, &added[..1]).unwrap()).unwrap(), added);
+        assert!(with_pieces(b"no elf", &added).is_err());
     }
 
     #[test]

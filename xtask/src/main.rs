@@ -25,6 +25,7 @@ mod repo;
 mod setup;
 mod shell;
 mod test;
+mod update;
 mod wine;
 
 use std::fs;
@@ -86,11 +87,10 @@ enum Command {
     },
     /// Make the files of a release in target/dist
     Dist {
-        /// Build them twice and compare, and run what is for Windows under Wine
-        #[arg(long)]
-        check: bool,
+        #[command(flatten)]
+        options: dist::Options,
         /// Make only target/hums-check.html, of the files as they are
-        #[arg(long, conflicts_with = "check")]
+        #[arg(long, conflicts_with_all = ["check", "key"])]
         page: bool,
     },
     /// Build the firmware and program it; what the board has stored stays
@@ -143,7 +143,7 @@ impl Command {
             Self::Bench { what } => bench::run(&what),
             Self::Fuzz { seconds } => fuzz::run(seconds),
             Self::Dist { page: true, .. } => browser::page(),
-            Self::Dist { check, .. } => dist::run(check),
+            Self::Dist { options, .. } => dist::run(&options),
             Self::Flash(options) => flash::flash(&options),
             Self::Attach { board } => flash::attach(board),
             Self::Boards => write_boards(),

@@ -24,6 +24,7 @@ mod registers;
 mod status;
 mod tasks;
 mod trap;
+mod update;
 mod usb;
 mod watch;
 
@@ -68,7 +69,8 @@ fn start() -> board::Idle {
     unsafe { memory::init() };
     let boots = fault::count_start();
     let mut parts = board::take();
-    parts.boot.cause = card_reader::cause(parts.boot.cause);
+    let (cause, message) = update::take(card_reader::cause(parts.boot.cause));
+    parts.boot.cause = cause;
     log::log!(info, "start {=u32}, {=str}, id {=[u8]:02x}", boots, parts.boot.cause.name(), parts.boot.id);
 
     let queues = QUEUES.take().split();
@@ -119,8 +121,9 @@ fn start() -> board::Idle {
         sectors: sectors_in,
         gs: gs_in,
     });
-    on.monitor
-        .spawn(monitor::run(monitoring, ends, handover, parts.boot, parts.watchdog, parts.led).expect(ONCE));
+    on.monitor.spawn(
+        monitor::run(monitoring, ends, handover, parts.boot, message, parts.watchdog, parts.led).expect(ONCE),
+    );
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     let uplink = &*UPLINK_IN.init(queues.uplink_in);

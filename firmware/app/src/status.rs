@@ -2,6 +2,7 @@
 
 use core::sync::atomic::AtomicBool;
 
+use hums_onboard::update::UpdateStatus;
 use hums_onboard::{PortStatus, StoreStatus, Supervisor};
 use hums_recorder::CardStatus;
 
@@ -11,6 +12,8 @@ pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
 /// Counters of storage.
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();
+/// The update file of the card, by storage.
+pub(crate) static UPDATE_STATUS: UpdateStatus = UpdateStatus::new();
 /// Monitor to storage: after the last sector the log ends.
 pub(crate) static LOG_ENDS: AtomicBool = AtomicBool::new(false);
 pub(crate) static LOG_ENDED: AtomicBool = AtomicBool::new(false);

@@ -25,6 +25,7 @@ mod reset;
 pub mod shelf;
 pub mod storage;
 pub mod supervisor;
+pub mod update;
 pub mod uplink;
 pub mod wait;
 

@@ -17,6 +17,8 @@ pub enum ResetCause {
     CardReader,
     /// The firmware itself, after a host ejected the card in card-reader mode.
     Eject,
+    /// The resident program, after work for an update.
+    Update,
 }
 
 impl ResetCause {
@@ -51,6 +53,7 @@ impl ResetCause {
             Self::Watchdog => "watchdog",
             Self::CardReader => "card reader",
             Self::Eject => "eject",
+            Self::Update => "update",
         }
     }
 }

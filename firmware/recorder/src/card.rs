@@ -444,11 +444,12 @@ impl<'a, D: CardDevice> Card<'a, D> {
 
     /// The file of parameters, `PARAMS.TXT`, for reading, and its length.
     pub fn settings(&self) -> Option<(Segment, u32)> {
-        let (first, bytes) = self.directory.settings?;
-        // Its last block is read whole.
-        let blocks = bytes.checked_next_multiple_of(BLOCK_BYTES as u32).unwrap_or(u32::MAX);
-        let (name, chain) = (LogName { session: 0, segment: 0 }, ClusterChain::new(first));
-        Some((Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes))
+        self.directory.settings.map(file_of)
+    }
+
+    /// The file of an update, `HUMS.UPD`, for reading, and its length.
+    pub fn update(&self) -> Option<(Segment, u32)> {
+        self.directory.update.map(file_of)
     }
 
     /// Opens an existing segment for writing in place.
@@ -507,6 +508,14 @@ impl<'a, D: CardDevice> Card<'a, D> {
             total_mib: mib(clusters),
         }))
     }
+}
+
+/// A file that is no log, by its first cluster and its length.
+fn file_of((first, bytes): (u32, u32)) -> (Segment, u32) {
+    // Its last block is read whole.
+    let blocks = bytes.checked_next_multiple_of(BLOCK_BYTES as u32).unwrap_or(u32::MAX);
+    let (name, chain) = (LogName { session: 0, segment: 0 }, ClusterChain::new(first));
+    (Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes)
 }
 
 /// Whether no file has this entry: it was never used, or its file was deleted.

@@ -58,7 +58,8 @@ pub(crate) const DELETED: u8 = 0xE5;
 
 pub(crate) type Entry = [u8; ENTRY_BYTES];
 
-/// The file of parameters, as an entry has its name.
+/// The files of parameters and of an update, as an entry has their names.
+const UPDATE: &[u8; LogName::SHORT_BYTES] = b"HUMS    UPD";
 const SETTINGS: &[u8; LogName::SHORT_BYTES] = b"PARAMS  TXT";
 
 pub(crate) type Newest = Vec<LogEntry, NEWEST_MAX>;
@@ -80,6 +81,7 @@ pub(crate) struct Directory {
     pub(crate) shown: u16,
     pub(crate) names: u32,
     pub(crate) settings: Option<(u32, u32)>,
+    pub(crate) update: Option<(u32, u32)>,
     /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
     verified: Range<u32>,
@@ -103,6 +105,7 @@ impl Directory {
             shown: 0,
             names: 0,
             settings: None,
+            update: None,
             claimed_end: 0,
             verified: 0..0,
             next: 0,
@@ -125,6 +128,8 @@ impl Directory {
                 let _ = self.deleted.push(slot.index);
             } else if slot.is_file(SETTINGS) {
                 self.settings = Some((slot.first(), slot.bytes()));
+            } else if slot.is_file(UPDATE) {
+                self.update = Some((slot.first(), slot.bytes()));
             } else if let Some(row) = self.note(volume, slot) {
                 mend(volume, &row, &verified)?;
             }

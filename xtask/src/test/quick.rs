@@ -10,8 +10,8 @@ use crate::pc;
 use crate::repo;
 use crate::shell::Shell;
 
-/// The package that only cross-compiles.
-const FIRMWARE: &str = "hums-app";
+/// Packages that only cross-compile.
+const FIRMWARE: [&str; 2] = [firmware::APPLICATION, firmware::RESIDENT];
 
 /// Changed packages: since the last commit, or in it.
 pub(super) fn run() -> Result<()> {
@@ -26,11 +26,14 @@ pub(super) fn run() -> Result<()> {
         files.lines().filter_map(|file| package(Path::new(file), &metadata.packages)).collect();
     changed.sort_unstable();
     changed.dedup();
-    if changed.contains(&FIRMWARE) {
+    if FIRMWARE.iter().any(|package| changed.contains(package)) {
         firmware::lint(firmware::default_board())?;
     }
-    let choice: Vec<String> =
-        changed.iter().filter(|name| **name != FIRMWARE).map(|name| format!("--package={name}")).collect();
+    let choice: Vec<String> = changed
+        .iter()
+        .filter(|name| !FIRMWARE.contains(name))
+        .map(|name| format!("--package={name}"))
+        .collect();
     if choice.is_empty() {
         return Ok(());
     }

@@ -134,8 +134,11 @@ fn page() -> Result<()> {
 /// The flashed files, as of `cargo xtask dist`.
 fn chip() -> Result<()> {
     let board = firmware::default_board();
-    let elf = firmware::image_of(board);
-    let files = firmware::files(board, fs::read(&elf).with_context(|| elf.display().to_string())?)?;
+    let read = |ending: &str| {
+        let path = firmware::image_of(board).with_extension(ending);
+        Ok((path.display().to_string(), fs::read(&path).with_context(|| path.display().to_string())?))
+    };
+    let files = ["dfu", "hex", "bin", "upd", "elf"].map(read).into_iter().collect::<Result<Vec<_>>>()?;
     print!("{}", dist::sums(&files));
     pc::end_to_end(&["chip::"])
 }

@@ -17,7 +17,7 @@ use super::stm32f4::{
     random_number, reset_cause, start,
 };
 pub(crate) use super::stm32f4::{
-    Idle, LATE_TURNS, Led, PortRx, PortTx, StoreFlash, Watchdog, begin_with_data0, chip_is_wrong,
+    Idle, LATE_TURNS, Led, PortRx, PortTx, StateFlash, StoreFlash, Watchdog, begin_with_data0, chip_is_wrong,
     crystal_failed, crystal_is_wrong, drop_control_packet, feed_watchdog, frame_number, has_bus_event,
     restart,
 };

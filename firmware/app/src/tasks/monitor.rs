@@ -8,8 +8,10 @@ use embassy_time::{Duration, Ticker, Timer};
 use hums_core::clock::Span;
 use hums_onboard::monitoring::{Machine, Monitoring, Step, TICK};
 use hums_onboard::queues::{FramesOut, GsIn, SectorsIn, UplinkOut};
+use hums_onboard::update::UpdateWatch;
 use hums_onboard::{Handover, ResetCause, Task};
 use hums_recorder::CardState;
+use hums_update::message::Message;
 
 use super::downlink::{AUTOPILOT_STOOD_STILL, BAUD_AUTOPILOT, BAUD_GS, GS_STOOD_STILL};
 use crate::boards::board;
@@ -20,7 +22,7 @@ use crate::fault::{self, Fault};
 use crate::links::{self, now};
 use crate::log::log;
 use crate::memory;
-use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, PORT_STATUS, SUPERVISOR};
+use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, PORT_STATUS, STORE_STATUS, SUPERVISOR, UPDATE_STATUS};
 use crate::watch;
 
 /// Ticks of one half of the LED's blinking while the card records: 0.5 s.
@@ -49,12 +51,14 @@ pub(crate) async fn run(
     ends: &'static mut Ends,
     handover: &'static mut Handover<'static>,
     boot: Boot,
+    message: Option<Message>,
     mut watchdog: board::Watchdog,
     mut led: board::Led,
 ) -> ! {
     body.start(now(), &mut ends.sectors);
     tell_fault(body, ends, boot.cause);
     let mut told = [false; 6];
+    let mut update = UpdateWatch::new(message, boot.cause);
     wake_others();
     let mut ticker = Ticker::every(links::wait(TICK));
     let mut ticks: u32 = 0;
@@ -80,11 +84,14 @@ pub(crate) async fn run(
                 }
                 tick(body, ends, handover);
                 if body.wants_card_reader(now()) {
-                    leave(body, ends, handover, &mut watchdog).await;
+                    leave(body, ends, handover, &mut watchdog, card_reader::restart).await;
+                }
+                if watch_update(body, ends, &mut update) {
+                    leave(body, ends, handover, &mut watchdog, crate::update::restart).await;
                 }
                 tell_board(body, ends, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);
-                led.set(lit(ticks));
+                led.set(lit(ticks, update.is_refused()));
                 fault::tick(now());
                 let silent = SUPERVISOR.silent(now());
                 fault::silent(silent);
@@ -104,13 +111,14 @@ pub(crate) async fn run(
     }
 }
 
-/// Ends the log, saves what the store keeps, and restarts in card-reader mode. A card that does not take the end in time is left
+/// Ends the log, saves what the store keeps, and restarts with `restart`. A card that does not take the end in time is left
 /// as at a power cut.
 async fn leave(
     body: &mut Monitoring<'static>,
     ends: &mut Ends,
     handover: &mut Handover<'static>,
     watchdog: &mut board::Watchdog,
+    restart: fn() -> !,
 ) -> ! {
     finish(body, ends);
     let end = now() + END_MAX;
@@ -124,7 +132,7 @@ async fn leave(
         wake_others();
         Timer::after(links::wait(TICK)).await;
     }
-    card_reader::restart()
+    restart()
 }
 
 #[inline(never)]
@@ -232,6 +240,20 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
     note(body, ends, handover);
 }
 
+/// Tells the result of an update; whether one begins.
+#[inline(never)]
+fn watch_update(body: &mut Monitoring<'static>, ends: &mut Ends, update: &mut UpdateWatch) -> bool {
+    if let Some((severity, text)) = update.news(&UPDATE_STATUS) {
+        body.note(now(), severity, text, &mut ends.sectors);
+    }
+    let (calm, frames) = (STORE_STATUS.calm(), PORT_STATUS.read().frames);
+    let is_due = update.is_due(now(), &UPDATE_STATUS, calm, frames, crate::update::is_on_trial());
+    if is_due {
+        body.note(now(), 5, "HUMS: update begins, nothing is recorded", &mut ends.sectors);
+    }
+    is_due
+}
+
 #[inline(never)]
 fn hand_over(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) {
     handover.step(now(), body.monitor_mut(), PORT_STATUS.read().frames);
@@ -244,11 +266,15 @@ fn wake_others() {
     links::SECTORS.signal(());
 }
 
-/// Slow blinking: recording. Two short flashes a second: recording with a fault of the board. Fast: no usable card.
-fn lit(ticks: u32) -> bool {
+/// Slow blinking: recording. Two short flashes a second: recording with a fault of the board; three: an update is refused. Fast: no
+/// usable card.
+fn lit(ticks: u32, is_refused: bool) -> bool {
     let half = match CARD_STATUS.read().state {
         CardState::Recording if board::crystal_failed() || board::chip_is_wrong() => {
             return matches!(ticks % (2 * BLINK_RECORDING) / BLINK_TROUBLE, 0 | 2);
+        }
+        CardState::Recording if is_refused => {
+            return matches!(ticks % (2 * BLINK_RECORDING) / BLINK_TROUBLE, 0 | 2 | 4);
         }
         CardState::Recording => BLINK_RECORDING,
         _ => BLINK_TROUBLE,

@@ -8,11 +8,13 @@ use hums_core::clock::Instant;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
+use hums_onboard::update::{Running, UpdateSearch};
 use hums_onboard::{Service, Storage, StoreWriter, Task};
 use hums_recorder::Buffers;
 use static_cell::{ConstStaticCell, StaticCell};
 
-use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, SUPERVISOR};
+use crate::status::{CARD_STATUS, LOG_ENDED, LOG_ENDS, SUPERVISOR, UPDATE_STATUS};
+use crate::update;
 
 use crate::boards::board;
 use crate::costs::{Stage, measure};
@@ -31,6 +33,8 @@ pub(crate) struct Body {
     sectors: SectorsOut<'static>,
     shelf: Server<'static>,
     store_writer: Saving,
+    running: Running<'static>,
+    search: UpdateSearch,
 }
 
 // SAFETY: `BUFFERS`, the only part that may not be shared, is lent to the one body. The others are `Send` (below).
@@ -58,7 +62,8 @@ pub(crate) fn body(
 ) -> &'static mut Body {
     BODY.init_with(|| {
         let storage = Storage::new(card, &CARD_STATUS, BUFFERS.take(), entropy);
-        Body { storage, sectors, shelf, store_writer }
+        let (running, search) = (update::running(), UpdateSearch::new());
+        Body { storage, sectors, shelf, store_writer, running, search }
     })
 }
 
@@ -68,6 +73,7 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
         SUPERVISOR.report(Task::Storage, now());
         let service = service(body, now());
         keep(body);
+        look_for_update(body, service);
         // In this order: the monitor preempts this task, and asks for the end after it has queued the last sector.
         if service != Service::Wrote && LOG_ENDS.load(Ordering::Acquire) && end(body) {
             // For items of the store.
@@ -116,4 +122,16 @@ fn serve(body: &mut Body) -> bool {
 #[inline(never)]
 fn keep(body: &mut Body) {
     measure(Stage::Storage, || body.store_writer.service(false));
+}
+
+/// Looks at the update file of a new card, and confirms an image that records.
+#[inline(never)]
+fn look_for_update(body: &mut Body, service: Service) {
+    if service == Service::Wrote {
+        return;
+    }
+    body.search.look(body.storage.recorder(), &body.running, &UPDATE_STATUS);
+    if update::is_on_trial() && body.search.is_proved(now(), &CARD_STATUS) {
+        update::confirm(&body.running);
+    }
 }

@@ -19,8 +19,8 @@ use crate::source::Chunk;
 
 /// Sectors 1 and 2.
 const STORE: std::ops::Range<usize> = 16 * 1024..48 * 1024;
-/// Time until the first byte: a start takes some 20 ms.
-const LEAD: Ps = 30 * MS;
+/// Time until the first byte: a start takes some 25 ms.
+const LEAD: Ps = 40 * MS;
 /// Length of a short power cut.
 const AWAY: Ps = 100 * MS;
 /// Wait at the end: a sector in progress waits 0.15 s (`hums_onboard::monitoring`).

@@ -1,4 +1,4 @@
-//! Two sectors of the processor's own flash for the store, behind the vector table and before the program (`memory.x`).
+//! Sectors of the processor's own flash for the store and the state of an update (ARCHITECTURE.md).
 //!
 //! While a word is written (16 µs) or a sector erased (0.25 s, 0.5 s at the longest) the flash delivers no instructions. The
 //! processor and its interrupts stop; only DMA continues. `hums_onboard::persist` describes the consequences.
@@ -15,19 +15,15 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashEr
 use super::{supply, watchdog};
 
 const FLASH_BEGIN: usize = 0x0800_0000;
-/// Sector 1 begins here (RM0090, table 5).
-const BEGIN: usize = FLASH_BEGIN + 16 * 1024;
-const SECTOR: u8 = 1;
+/// Of each of the first four sectors (RM0090, table 5).
 const SECTOR_BYTES: usize = 16 * 1024;
-/// Sectors 1 and 2.
-const BYTES: usize = 2 * SECTOR_BYTES;
 const WORD: usize = 4;
 /// Unlock keys of the flash control (RM0090, 3.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
-    /// Outside the store, or not whole words or sectors.
+    /// Outside the sectors, or not whole words or sectors.
     Place,
     Supply,
     Refused(u32),
@@ -42,9 +38,16 @@ impl NorFlashError for FlashError {
     }
 }
 
-pub(crate) struct StoreFlash(());
+/// `COUNT` of the first four sectors, from sector `FIRST` on.
+pub(crate) struct Sectors<const FIRST: u8, const COUNT: usize>(());
 
-impl StoreFlash {
+pub(crate) type StoreFlash = Sectors<1, 2>;
+pub(crate) type StateFlash = Sectors<{ hums_update::map::STATE_SECTOR }, 1>;
+
+impl<const FIRST: u8, const COUNT: usize> Sectors<FIRST, COUNT> {
+    const BEGIN: usize = FLASH_BEGIN + FIRST as usize * SECTOR_BYTES;
+    const BYTES: usize = COUNT * SECTOR_BYTES;
+
     /// To be called once.
     pub(crate) const fn new() -> Self {
         Self(())
@@ -52,32 +55,32 @@ impl StoreFlash {
 
     fn place(offset: u32, bytes: usize) -> Result<usize, FlashError> {
         let end = (offset as usize).checked_add(bytes).ok_or(FlashError::Place)?;
-        if end <= BYTES { Ok(BEGIN + offset as usize) } else { Err(FlashError::Place) }
+        if end <= Self::BYTES { Ok(Self::BEGIN + offset as usize) } else { Err(FlashError::Place) }
     }
 }
 
-impl ErrorType for StoreFlash {
+impl<const FIRST: u8, const COUNT: usize> ErrorType for Sectors<FIRST, COUNT> {
     type Error = FlashError;
 }
 
-impl ReadNorFlash for StoreFlash {
+impl<const FIRST: u8, const COUNT: usize> ReadNorFlash for Sectors<FIRST, COUNT> {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         let from = ptr::with_exposed_provenance::<u8>(Self::place(offset, bytes.len())?);
         for (index, byte) in bytes.iter_mut().enumerate() {
-            // SAFETY: within the store's sectors, which are always readable and hold no variable of the program.
+            // SAFETY: within these sectors, which are always readable and hold no variable of the program.
             *byte = unsafe { from.add(index).read_volatile() };
         }
         Ok(())
     }
 
     fn capacity(&self) -> usize {
-        BYTES
+        Self::BYTES
     }
 }
 
-impl NorFlash for StoreFlash {
+impl<const FIRST: u8, const COUNT: usize> NorFlash for Sectors<FIRST, COUNT> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
@@ -94,7 +97,7 @@ impl NorFlash for StoreFlash {
                     w.set_pg(true);
                 });
                 let at = ptr::with_exposed_provenance_mut::<u32>(begin + index * WORD);
-                // SAFETY: an aligned word within the store's sectors, which hold no variable of the program; the
+                // SAFETY: an aligned word within these sectors, which hold no variable of the program; the
                 // flash takes it.
                 unsafe { at.write_volatile(u32::from_le_bytes(*word)) };
                 cortex_m::asm::dsb();
@@ -115,7 +118,7 @@ impl NorFlash for StoreFlash {
                 FLASH.cr().write(|w| {
                     w.set_psize(Psize::PSIZE32);
                     w.set_ser(true);
-                    w.set_snb(SECTOR + sector as u8);
+                    w.set_snb(FIRST + sector as u8);
                 });
                 // The watchdog is not fed during an erase.
                 watchdog::reload();

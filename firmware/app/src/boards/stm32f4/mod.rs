@@ -21,7 +21,7 @@ use embassy_time::{Duration, Instant};
 
 pub(crate) use card::SpiPort;
 pub(crate) use clock::{Crystal, crystal_failed, crystal_is_wrong};
-pub(crate) use flash::StoreFlash;
+pub(crate) use flash::{StateFlash, StoreFlash};
 pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
@@ -64,7 +64,7 @@ const DEVICE: u16 = 0x413;
 /// Address of the flash's size in KiB (RM0090, 39.2).
 const FLASH_KIB: usize = 0x1FFF_7A22;
 /// Flash of the memory map (`memory.x`).
-const FLASH_KIB_MIN: u16 = 512;
+const FLASH_KIB_MIN: u16 = 1_024;
 
 pub(crate) fn chip_is_wrong() -> bool {
     let flash = ptr::with_exposed_provenance::<u16>(FLASH_KIB);

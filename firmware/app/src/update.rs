@@ -1,0 +1,72 @@
+//! The registers and memory of an update; `hums_onboard::update` decides, and the resident program installs.
+
+use core::ptr;
+use core::slice;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use embedded_storage::nor_flash::NorFlash as _;
+use hums_onboard::ResetCause;
+use hums_onboard::update::Running;
+use hums_update::header::Header;
+use hums_update::map;
+use hums_update::message::Message;
+use hums_update::state::{Record, State};
+
+use crate::boards::board;
+
+/// The image is on trial.
+static ON_TRIAL: AtomicBool = AtomicBool::new(false);
+
+fn words() -> *mut [u32; 4] {
+    ptr::with_exposed_provenance_mut(map::MESSAGE as usize)
+}
+
+/// The message of the resident program, and the cause of this start by it. Clears the message: every start calls it once.
+pub(crate) fn take(reset: ResetCause) -> (ResetCause, Option<Message>) {
+    // SAFETY: no variable of either program has these words.
+    let message = Message::of(unsafe { words().read_volatile() });
+    // SAFETY: as above.
+    unsafe { words().write_volatile([0; 4]) };
+    match message.filter(|message| reset == ResetCause::Software && *message != Message::Install) {
+        Some(message) => (ResetCause::Update, Some(message)),
+        None => (reset, None),
+    }
+}
+
+/// Restarts into the resident program, which installs the update.
+pub(crate) fn restart() -> ! {
+    // SAFETY: no variable of either program has these words.
+    unsafe { words().write_volatile(Message::Install.words()) };
+    board::restart()
+}
+
+fn flash(from: u32, bytes: usize) -> &'static [u8] {
+    // SAFETY: flash, always readable. The state changes only in `confirm`, which has no such slice meanwhile.
+    unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(from as usize), bytes) }
+}
+
+/// This image.
+pub(crate) fn running() -> Running<'static> {
+    let running = Running {
+        board: board::NAME,
+        header: Header::read(flash(map::APPLICATION, hums_update::header::BYTES)),
+        state: State::read(flash(map::STATE, map::STATE_BYTES)),
+    };
+    ON_TRIAL.store(running.is_on_trial(), Ordering::Relaxed);
+    running
+}
+
+pub(crate) fn is_on_trial() -> bool {
+    ON_TRIAL.load(Ordering::Relaxed)
+}
+
+/// Ends the trial. Without room or with flash that refuses it goes on.
+pub(crate) fn confirm(running: &Running<'static>) {
+    let Some(header) = &running.header else { return };
+    let bytes = Record::Confirmed(header.floor).bytes(header.id());
+    let at = running.state.free as u32;
+    // The state is read anew at the next start.
+    if board::StateFlash::new().write(at, &bytes).is_ok() {
+        ON_TRIAL.store(false, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,332 @@
+//! The update file on the card: storage looks at its header once for each card, and the monitor asks for the installation.
+//!
+//! The board then ends its log and restarts into the resident program (`hums_update`), which checks the whole file. Conditions:
+//! * the vehicle is disarmed and on the ground for 10 s, or no frame has come in the first minute after power-on;
+//! * the start was not one that may have come in flight, such as a reset by the watchdog;
+//! * this image is confirmed, and the other one was not refused since power-on.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use hums_core::clock::{Instant, Span};
+use hums_recorder::{BLOCK_BYTES, CardDevice, CardState, CardStatus, Recorder};
+use hums_update::header::{self, Header, Refusal};
+use hums_update::message::Message;
+use hums_update::state::{State, Status};
+
+use crate::ResetCause;
+use crate::persist::Calm;
+
+/// Without a frame since power-on.
+const SILENT: Span = Span::from_secs(60);
+/// A new image records for so long before it is confirmed.
+pub const TRIAL: Span = Span::from_secs(60);
+
+const NOTHING: u32 = 0;
+const OFFERED: u32 = 1;
+/// And the number of the refusal.
+const REFUSED: u32 = 0x10;
+
+/// Storage's findings for the monitor.
+#[derive(Debug, Default)]
+pub struct UpdateStatus {
+    found: AtomicU32,
+    id: AtomicU32,
+}
+
+/// An update file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// Its header is good.
+    Offered(u32),
+    /// It is not for this board now.
+    Refused(u32, Refusal),
+}
+
+impl UpdateStatus {
+    /// No file.
+    pub const fn new() -> Self {
+        Self { found: AtomicU32::new(NOTHING), id: AtomicU32::new(0) }
+    }
+
+    fn set(&self, found: Option<Found>) {
+        let (kind, id) = match found {
+            None => (NOTHING, 0),
+            Some(Found::Offered(id)) => (OFFERED, id),
+            Some(Found::Refused(id, why)) => (REFUSED + why as u32, id),
+        };
+        // The monitor interrupts storage, never in between the other way round.
+        self.found.store(NOTHING, Ordering::Relaxed);
+        self.id.store(id, Ordering::Relaxed);
+        self.found.store(kind, Ordering::Release);
+    }
+
+    /// The update file of the card.
+    pub fn read(&self) -> Option<Found> {
+        let (kind, id) = (self.found.load(Ordering::Acquire), self.id.load(Ordering::Relaxed));
+        match kind {
+            NOTHING => None,
+            OFFERED => Some(Found::Offered(id)),
+            _ => Some(Found::Refused(id, *Refusal::ALL.get(kind.wrapping_sub(REFUSED) as usize)?)),
+        }
+    }
+}
+
+/// The running image.
+#[derive(Clone, Debug)]
+pub struct Running<'a> {
+    /// Its board.
+    pub board: &'a str,
+    /// Its header; `None` if the image runs without one.
+    pub header: Option<Header>,
+    /// The trials.
+    pub state: State,
+}
+
+impl Running<'_> {
+    fn id(&self) -> u32 {
+        self.header.as_ref().map_or(0, Header::id)
+    }
+
+    /// Whether it must still show itself.
+    pub fn is_on_trial(&self) -> bool {
+        matches!(self.state.status(self.id()), Status::Trial { .. })
+    }
+}
+
+/// Storage's part.
+#[derive(Debug, Default)]
+pub struct UpdateSearch {
+    has_looked: bool,
+    recording_since: Option<Instant>,
+}
+
+impl UpdateSearch {
+    /// Looked at nothing yet.
+    pub const fn new() -> Self {
+        Self { has_looked: false, recording_since: None }
+    }
+
+    /// While nothing is to be written: looks at a new card's update file, one block.
+    pub fn look<D: CardDevice>(
+        &mut self,
+        recorder: &mut Recorder<'_, D>,
+        running: &Running<'_>,
+        status: &UpdateStatus,
+    ) {
+        let Some(card) = recorder.card() else {
+            self.has_looked = false;
+            status.set(None);
+            return;
+        };
+        if core::mem::replace(&mut self.has_looked, true) {
+            return;
+        }
+        let Some((mut segment, bytes)) = card.update() else { return status.set(None) };
+        let mut block = [0; BLOCK_BYTES];
+        let refused = |why| Some(Found::Refused(0, why));
+        status.set(match card.read(&mut segment, 0, &mut block) {
+            Ok(()) => judge(&block, bytes, running),
+            Err(_) => refused(Refusal::NoFile),
+        });
+    }
+
+    /// Whether the image has recorded for long enough to be confirmed.
+    pub fn is_proved(&mut self, now: Instant, card: &CardStatus) -> bool {
+        if card.read().state != CardState::Recording {
+            self.recording_since = None;
+            return false;
+        }
+        now.since(*self.recording_since.get_or_insert(now)) >= TRIAL
+    }
+}
+
+/// `None` for the running image itself.
+fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<Found> {
+    let Some(header) = Header::read(block) else { return Some(Found::Refused(0, Refusal::Damaged)) };
+    let id = header.id();
+    if id == running.id() {
+        return None;
+    }
+    let floor = running.header.as_ref().map_or(running.state.floor, |own| own.floor.max(running.state.floor));
+    let checked = if running.state.has_failed(id) {
+        Err(Refusal::FailedBefore)
+    } else if bytes != header.image_bytes + header::BYTES as u32 {
+        Err(Refusal::Damaged)
+    } else {
+        header.check(running.board, floor, hums_update::keys::ALL).map(drop)
+    };
+    Some(match checked {
+        Ok(()) => Found::Offered(id),
+        Err(why) => Found::Refused(id, why),
+    })
+}
+
+/// The monitor's part.
+#[derive(Debug)]
+pub struct UpdateWatch {
+    message: Option<Message>,
+    cause: ResetCause,
+    told: Option<Found>,
+    is_refused: bool,
+}
+
+impl UpdateWatch {
+    /// `message`: of the resident program; `cause`: of this start.
+    pub const fn new(message: Option<Message>, cause: ResetCause) -> Self {
+        Self { message, cause, told: None, is_refused: false }
+    }
+
+    /// Whether an image is refused, for the LED.
+    pub const fn is_refused(&self) -> bool {
+        self.is_refused
+    }
+
+    /// The next text with its `MAV_SEVERITY`.
+    pub fn news(&mut self, status: &UpdateStatus) -> Option<(u8, &'static str)> {
+        match self.message {
+            Some(Message::Installed) => {
+                self.message = None;
+                return Some((5, "HUMS: update installed, on trial for a minute"));
+            }
+            Some(Message::FellBack) => {
+                self.message = None;
+                return Some((4, "HUMS: update failed, the version before is back"));
+            }
+            Some(Message::Retried) => {
+                self.message = None;
+                return Some((4, "HUMS: update failed, tried again after power-on"));
+            }
+            // It stays: the image is not asked for again before the next power-on.
+            Some(Message::Refused { why, .. }) if !self.is_refused => {
+                self.is_refused = true;
+                return Some((4, text(why)));
+            }
+            _ => {}
+        }
+        let found = status.read();
+        if found == self.told {
+            return None;
+        }
+        self.told = found;
+        let Some(Found::Refused(_, why)) = found else { return None };
+        self.is_refused = true;
+        Some((4, text(why)))
+    }
+
+    /// Whether the installation begins now. `frames`: received since the start.
+    pub fn is_due(
+        &self,
+        now: Instant,
+        status: &UpdateStatus,
+        calm: Calm,
+        frames: u32,
+        on_trial: bool,
+    ) -> bool {
+        let Some(Found::Offered(id)) = status.read() else { return false };
+        let was_refused = matches!(self.message, Some(Message::Refused { id: refused, .. }) if refused == id || refused == 0);
+        let is_silent =
+            self.cause == ResetCause::PowerOn && frames == 0 && now.since(Instant::ZERO) >= SILENT;
+        !on_trial && !was_refused && !self.cause.may_be_in_flight() && (calm == Calm::Grounded || is_silent)
+    }
+}
+
+const fn text(why: Refusal) -> &'static str {
+    match why {
+        Refusal::NoFile => "HUMS: update refused: card cannot be read",
+        Refusal::Damaged => "HUMS: update refused: damaged, copy it again",
+        Refusal::OtherBoard => "HUMS: update refused: it is for another board",
+        Refusal::TooOld => "HUMS: update refused: older than is allowed",
+        Refusal::ForeignKey => "HUMS: update refused: not signed by a known key",
+        Refusal::BadSignature => "HUMS: update refused: its signature is wrong",
+        Refusal::FailedBefore => "HUMS: update refused: it failed on trial",
+        Refusal::Flash => "HUMS: update refused: flash does not take it",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hums_update::header::Version;
+
+    fn header(board: &str, version: u32) -> Header {
+        Header { key: *b"\0\0\0\0\0\0\0\0", ..Header::new(board, "", Version(version), Version(1), &[0; 8]) }
+    }
+
+    fn running() -> Running<'static> {
+        Running { board: "matek", header: Some(header("matek", 5)), state: State::read(&[0xFF; 64]) }
+    }
+
+    #[test]
+    fn the_header_of_an_update_is_judged_as_the_resident_program_does() {
+        let running = running();
+        let key = |header: Header| Header { key: *hums_update::keys::TEST.first_chunk().unwrap(), ..header };
+        let judged = |header: &Header, bytes: u32| judge(&header.bytes(), bytes, &running);
+        let good = key(header("matek", 6));
+        assert_eq!(judged(&good, 520), Some(Found::Offered(good.id())));
+        assert_eq!(judged(&header("matek", 5), 520), None);
+        for (header, bytes, why) in [
+            (good.clone(), 519, Refusal::Damaged),
+            (key(header("other", 6)), 520, Refusal::OtherBoard),
+            (key(header("matek", 0)), 520, Refusal::TooOld),
+            (Header { key: *b"somebody", ..good.clone() }, 520, Refusal::ForeignKey),
+        ] {
+            assert_eq!(judged(&header, bytes), Some(Found::Refused(header.id(), why)));
+        }
+        assert_eq!(judge(&[0; 512], 520, &running), Some(Found::Refused(0, Refusal::Damaged)));
+    }
+
+    #[test]
+    fn an_update_waits_for_the_ground_and_never_begins_after_a_start_that_may_be_in_flight() {
+        let status = UpdateStatus::new();
+        let due = |message, cause, secs: u64, calm, frames, trial| {
+            UpdateWatch::new(message, cause).is_due(
+                Instant::from_millis(secs * 1_000),
+                &status,
+                calm,
+                frames,
+                trial,
+            )
+        };
+        let power = ResetCause::PowerOn;
+        assert!(!due(None, power, 100, Calm::Grounded, 9, false), "there is no file");
+        status.set(Some(Found::Offered(7)));
+        let refused = |id| Some(Message::Refused { id, why: Refusal::BadSignature });
+        for (message, cause, secs, calm, frames, trial, wanted) in [
+            (None, power, 12, Calm::Grounded, 9, false, true),
+            (None, power, 12, Calm::None, 9, false, false),
+            (None, power, 100, Calm::Silent, 9, false, false),
+            (None, power, 59, Calm::None, 0, false, false),
+            (None, power, 60, Calm::None, 0, false, true),
+            (None, ResetCause::Pin, 60, Calm::None, 0, false, false),
+            (None, ResetCause::Watchdog, 100, Calm::Grounded, 9, false, false),
+            (None, ResetCause::Software, 100, Calm::Grounded, 9, false, false),
+            (None, ResetCause::Update, 100, Calm::Grounded, 9, false, true),
+            (None, ResetCause::Update, 100, Calm::Grounded, 9, true, false),
+            (refused(7), ResetCause::Update, 100, Calm::Grounded, 9, false, false),
+            (refused(0), ResetCause::Update, 100, Calm::Grounded, 9, false, false),
+            (refused(8), ResetCause::Update, 100, Calm::Grounded, 9, false, true),
+        ] {
+            let is_due = due(message, cause, secs, calm, frames, trial);
+            assert_eq!(is_due, wanted, "{message:?} {cause:?} {secs} s {calm:?} {frames} {trial}");
+        }
+    }
+
+    #[test]
+    fn each_result_is_told_once_and_a_text_fits_the_line() {
+        let status = UpdateStatus::new();
+        for why in Refusal::ALL {
+            assert!(text(why).len() <= 50, "{}", text(why));
+            let mut watch = UpdateWatch::new(Some(Message::Refused { id: 1, why }), ResetCause::Update);
+            assert_eq!(watch.news(&status), Some((4, text(why))));
+            assert_eq!((watch.news(&status), watch.is_refused()), (None, true));
+        }
+        let mut watch = UpdateWatch::new(Some(Message::Installed), ResetCause::Update);
+        assert_eq!(watch.news(&status), Some((5, "HUMS: update installed, on trial for a minute")));
+        assert_eq!((watch.news(&status), watch.is_refused()), (None, false));
+        for found in [Found::Refused(3, Refusal::OtherBoard), Found::Refused(4, Refusal::TooOld)] {
+            status.set(Some(found));
+            assert!(watch.news(&status).is_some());
+            assert_eq!((watch.news(&status), watch.is_refused()), (None, true));
+        }
+    }
+}

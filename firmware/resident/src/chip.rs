@@ -1,0 +1,129 @@
+//! Clock, watchdog, supply detector and the words that survive a reset.
+
+use core::ptr;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::peripheral::{DCB, DWT, SCB};
+use hums_core::clock::Instant;
+use hums_update::map;
+use hums_update::message::Message;
+use hums_update::resident::Cause;
+use stm32_metapac::flash::vals::Latency;
+use stm32_metapac::iwdg::vals::{Key, Pr};
+use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
+use stm32_metapac::{DBGMCU, FLASH, IWDG, PWR, RCC};
+
+/// Cycles of a microsecond.
+const MHZ: u64 = 168;
+/// 2.7 V, as in the application: programming 32 bits at once needs it (RM0090, table 7).
+const LEVEL_2V7: u8 = 0b101;
+/// The chip revision with a broken prefetch (ES0182, 2.1.1).
+const REVISION_A: u16 = 0x1000;
+/// Looks until the watchdog's registers are taken over.
+const TRIES_MAX: u32 = 20_000;
+
+/// The watchdog of a trial's start: 4 s of 32 kHz, 2.7 s at the fastest.
+pub(crate) const TRIAL: Pr = Pr::DIVIDE_BY32;
+/// The watchdog of this program: 32 s, 22 s at the fastest. The longest erase takes 4 s, a silent card 8 s.
+pub(crate) const SERVICE: Pr = Pr::DIVIDE_BY256;
+
+/// The flags stay for the application.
+pub(crate) fn cause() -> Cause {
+    let flags = RCC.csr().read();
+    if flags.wdgrstf() || flags.wwdgrstf() || flags.sftrstf() {
+        Cause::Own
+    } else if flags.porrstf() || flags.borrstf() {
+        Cause::Power
+    } else {
+        Cause::Pin
+    }
+}
+
+/// Whether the application asks for its update. Only a reset by the program keeps memory.
+pub(crate) fn take_request(cause: Cause) -> bool {
+    let message: *mut [u32; 4] = ptr::with_exposed_provenance_mut(map::MESSAGE as usize);
+    // SAFETY: no variable of either program has these words.
+    let words = unsafe { message.read_volatile() };
+    let asked = cause == Cause::Own && Message::of(words) == Some(Message::Install);
+    if asked {
+        // SAFETY: as above.
+        unsafe { message.write_volatile([0; 4]) };
+    }
+    asked
+}
+
+pub(crate) fn restart(message: Message) -> ! {
+    let words: *mut [u32; 4] = ptr::with_exposed_provenance_mut(map::MESSAGE as usize);
+    // SAFETY: no variable of either program has these words.
+    unsafe { words.write_volatile(message.words()) };
+    SCB::sys_reset()
+}
+
+/// A debugger that halts the processor halts it as well.
+pub(crate) fn start_watchdog(divider: Pr) {
+    DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
+    IWDG.kr().write(|w| w.set_key(Key::START));
+    IWDG.kr().write(|w| w.set_key(Key::ENABLE));
+    IWDG.pr().write(|w| w.set_pr(divider));
+    IWDG.rlr().write(|w| w.set_rl(0xFFF));
+    let mut tries = 0_u32;
+    while (IWDG.sr().read().pvu() || IWDG.sr().read().rvu()) && tries < TRIES_MAX {
+        tries += 1;
+    }
+    feed();
+}
+
+pub(crate) fn feed() {
+    IWDG.kr().write(|w| w.set_key(Key::RESET));
+}
+
+/// 168 MHz from the chip's own oscillator, peripheral buses at 42 and 84 MHz; counts time from here.
+pub(crate) fn start_clock() {
+    RCC.apb1enr().modify(|w| w.set_pwren(true));
+    PWR.cr1().modify(|w| {
+        w.set_pls(LEVEL_2V7);
+        w.set_pvde(true);
+    });
+    RCC.pllcfgr().modify(|w| {
+        w.set_pllsrc(Pllsrc::HSI);
+        w.set_pllm(Pllm::DIV8);
+        w.set_plln(Plln::MUL168);
+        w.set_pllp(Pllp::DIV2);
+    });
+    RCC.cr().modify(|w| w.set_pllon(true));
+    while !RCC.cr().read().pllrdy() {}
+    // Without the data cache, which would keep erased data.
+    let prefetches = DBGMCU.idcode().read().rev_id() != REVISION_A;
+    FLASH.acr().write(|w| {
+        w.set_latency(Latency::WS5);
+        w.set_prften(prefetches);
+        w.set_icen(true);
+    });
+    RCC.cfgr().modify(|w| {
+        w.set_hpre(Hpre::DIV1);
+        w.set_ppre1(Ppre::DIV4);
+        w.set_ppre2(Ppre::DIV2);
+    });
+    RCC.cfgr().modify(|w| w.set_sw(Sw::PLL1_P));
+    while RCC.cfgr().read().sws() != Sw::PLL1_P {}
+    // SAFETY: the program has one thread and no other user of the counter.
+    unsafe {
+        (*DCB::PTR).demcr.modify(|word| word | 1 << 24);
+        (*DWT::PTR).ctrl.modify(|word| word | 1);
+    }
+}
+
+pub(crate) fn is_supply_low() -> bool {
+    PWR.csr1().read().pvdo()
+}
+
+/// Time since [`start_clock`]. To be asked at least every 25 s, when the counter wraps.
+pub(crate) fn now() -> Instant {
+    static LAST: AtomicU32 = AtomicU32::new(0);
+    static WRAPS: AtomicU32 = AtomicU32::new(0);
+    let count = DWT::cycle_count();
+    let wraps = WRAPS.load(Ordering::Relaxed) + u32::from(count < LAST.load(Ordering::Relaxed));
+    WRAPS.store(wraps, Ordering::Relaxed);
+    LAST.store(count, Ordering::Relaxed);
+    Instant::from_micros((u64::from(wraps) << 32 | u64::from(count)) / MHZ)
+}

@@ -1,0 +1,78 @@
+//! The resident program: the first of a start, never rewritten in the field. It starts the application, or installs one from the
+//! card; `hums_update::resident` decides. This crate has the registers.
+//!
+//! The way to the application takes some 7 ms of the chip's first clock: the header's CRC and the records of the state. Only for
+//! work with the card the processor goes to 168 MHz, by its own oscillator. That way ends with a reset, so the application always
+//! finds the chip as after a reset.
+#![no_std]
+#![no_main]
+
+mod board;
+mod chip;
+mod flash;
+mod port;
+
+use core::panic::PanicInfo;
+
+use cortex_m::peripheral::SCB;
+use hums_core::clock::Span;
+use hums_recorder::SpiCard;
+use hums_update::resident::{Decision, Job, Next, Resident, decide};
+use hums_update::{keys, map};
+
+/// Period of the search for a card.
+const LOOK_EVERY: Span = Span::from_secs(2);
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let cause = chip::cause();
+    let asked = chip::take_request(cause);
+    match decide(&mut flash::Flash::new(), board::NAME, cause, asked) {
+        Decision::Start { on_trial } => start(on_trial),
+        Decision::Work(job) => serve(job),
+    }
+}
+
+fn start(on_trial: bool) -> ! {
+    if on_trial {
+        // A program that hangs before its own watchdog runs.
+        chip::start_watchdog(chip::TRIAL);
+    }
+    // SAFETY: the header is complete, so there is a vector table behind it; all registers are as after a reset.
+    unsafe {
+        (*SCB::PTR).vtor.write(map::VECTORS);
+        cortex_m::asm::bootload(core::ptr::with_exposed_provenance(map::VECTORS as usize));
+    }
+}
+
+#[inline(never)]
+fn serve(mut job: Job) -> ! {
+    chip::start_watchdog(chip::SERVICE);
+    chip::start_clock();
+    board::hold();
+    let card = SpiCard::new(port::Port::new());
+    let mut flash = flash::Flash::new();
+    loop {
+        let mut resident = Resident { flash: &mut flash, card: &card, board: board::NAME, keys: keys::ALL };
+        match resident.work(job) {
+            Next::Restart(message) => chip::restart(message),
+            Next::Wait(next) => job = next,
+        }
+        let end = chip::now() + LOOK_EVERY;
+        while chip::now() < end {
+            board::show_waiting();
+            chip::feed();
+        }
+        hums_recorder::CardDevice::reset(&card);
+    }
+}
+
+#[cortex_m_rt::exception]
+unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    SCB::sys_reset()
+}
