@@ -87,6 +87,7 @@ fn command(command: &Command) -> anyhow::Result<Outcome> {
             BoxAction::Params(args) => talk::params::run(args),
             BoxAction::Replaced(args) => talk::replaced::run(args),
             BoxAction::CardReader(args) => talk::card_reader::run(args),
+            BoxAction::Update(args) => talk::update::run(args),
             BoxAction::FormatCard(args) => talk::format::run(args),
             BoxAction::Setup(args) => talk::setup::run(args),
             BoxAction::Report(args) => talk::report::run(args),

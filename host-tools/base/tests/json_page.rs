@@ -43,6 +43,7 @@ const OBJECTS: &str = "\
 `hums-params-sign` 1; KeyJson; src/talk/params.rs; Of `hums box params sign`.
 `hums-replaced` 1; ReplacedJson; src/talk/replaced.rs; Of `hums box replaced`.
 `hums-card-reader` 1; CardReaderJson; src/talk/card_reader.rs; Of `hums box card-reader`.
+`hums-box-update` 1; UpdateJson; src/talk/update.rs; Of `hums box update`.
 `hums-format` 1; FormattedJson; src/talk/format.rs; Of `hums box format-card`.
 `hums-setup` 1; SetupJson; src/talk/setup.rs; Of `hums box setup`.
 `hums-box-report` 1; ReportJson; src/talk/report.rs; The file of `hums box report`.

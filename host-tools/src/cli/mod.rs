@@ -16,7 +16,7 @@ pub use run::{FaultFlags, Sim, Speed};
 pub use shell::{Completions, Man};
 pub use talk::{
     BoxAction, BoxArgs, BoxReport, CardReader, FormatCard, Link, LogMoment, Params, ParamsAction, Pull,
-    Replaced, Setup,
+    Replaced, Setup, Update,
 };
 
 const ABOUT: &str = "HUMS: an on-board black box and health monitor for drones that speak MAVLink.

@@ -18,6 +18,7 @@ const BOX_EXAMPLES: &str = "Examples:
   hums box setup --board speedybee-f405-v4 --link serial:/dev/ttyUSB0:57600
   hums box report /media/card -o report.json
   hums box card-reader --link serial:/dev/ttyUSB0:57600
+  hums box update hums-matek-f405-std.upd --card /media/card
   hums box format-card --yes --link serial:/dev/ttyUSB0:57600";
 
 /// `hums box`
@@ -40,6 +41,8 @@ pub enum BoxAction {
     Replaced(Replaced),
     /// Show the board's card to a PC as a read-only USB disk
     CardReader(CardReader),
+    /// Check an update of the firmware and copy it to the card
+    Update(Update),
     /// Format the board's card, if the board cannot record on it
     FormatCard(FormatCard),
     /// Lead through wiring and the autopilot's settings, and say what is missing before a flight
@@ -326,6 +329,30 @@ pub struct Setup {
     /// Set the values of a file that --undo wrote, and nothing else
     #[arg(long, value_name = "FILE", conflicts_with_all = ["set", "json"])]
     pub restore: Option<PathBuf>,
+    /// Print the result as one JSON object (docs/json.md)
+    #[arg(long)]
+    pub json: bool,
+}
+
+const UPDATE_EXAMPLES: &str = "Examples:
+  hums box update hums-matek-f405-std.upd --card /media/card
+
+Checks the signature, and board and version by the newest log on the card. The file becomes HUMS.UPD, and an earlier one HUMS.OLD. The
+box installs it on the ground (docs/update.md).";
+
+/// `hums box update`
+#[derive(Args, Clone, Debug)]
+#[command(after_help = UPDATE_EXAMPLES)]
+pub struct Update {
+    /// The update file of a release for this board
+    #[arg(value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// Root folder of the box's card, mounted on this PC
+    #[arg(long, value_name = "DIR")]
+    pub card: PathBuf,
+    /// Also an older version than the one that wrote the newest log
+    #[arg(long)]
+    pub older: bool,
     /// Print the result as one JSON object (docs/json.md)
     #[arg(long)]
     pub json: bool,

@@ -9,6 +9,7 @@ pub mod report;
 pub mod setup;
 #[cfg(test)]
 mod tests;
+pub mod update;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;

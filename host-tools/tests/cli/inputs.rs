@@ -19,7 +19,9 @@ enum Role {
 /// An argument that is not listed fails the test: decide its kind, and the test covers it from then on.
 fn role(arg: &Arg) -> Role {
     match arg.get_id().as_str() {
-        "inputs" | "input" | "gs_input" | "params" | "key" | "firmware" | "past" | "restore" => Role::Input,
+        "inputs" | "input" | "gs_input" | "image" | "params" | "key" | "firmware" | "past" | "restore" => {
+            Role::Input
+        }
         "output" | "sd" | "gs" | "tap" | "store" | "manifest" => Role::Output,
         "around" | "board" | "port" | "bucket" | "number" | "part" | "serial" | "card" | "card_out"
         | "command" | "card_size" | "cut_after_writes" | "cut_store_after" | "folder" | "format" | "from"
@@ -45,7 +47,7 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
 )];
 
 /// Commands without a pair of input and output to try, with the reason.
-const NO_PAIRS: [(&str, &str); 14] = [
+const NO_PAIRS: [(&str, &str); 15] = [
     ("check", "prints"),
     ("live", "shows and sends"),
     ("completions", "prints"),
@@ -55,6 +57,7 @@ const NO_PAIRS: [(&str, &str); 14] = [
     ("box replaced", "talks with a board"),
     ("box setup", "talks with a board"),
     ("box card-reader", "talks with a board"),
+    ("box update", "writes into the card's folder"),
     ("box format-card", "talks with a board"),
     ("box params list", "talks with a board"),
     ("box params get", "talks with a board"),

@@ -1,0 +1,181 @@
+//! `hums box update`: an update file onto a card, for the box to install.
+
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use hums_update::header::{self, Header, Version};
+use hums_update::{keys, map};
+use serde::Serialize;
+
+use crate::check;
+use crate::cli;
+use crate::files::{read_short, settle};
+use crate::outcome::{Outcome, usage};
+use crate::output::{self, Schema};
+use crate::source::find::find;
+
+/// On the card: the update, the one before it, and one that is being written.
+const UPDATE: &str = "HUMS.UPD";
+const PREVIOUS: &str = "HUMS.OLD";
+const PARTIAL: &str = "HUMS.NEW";
+
+const SCHEMA: Schema = Schema::first("hums-box-update");
+
+#[derive(Debug, Serialize)]
+struct UpdateJson {
+    /// Of the file.
+    board: String,
+    version: String,
+    commit: String,
+    /// Signed by the test key, which only development builds take.
+    is_test: bool,
+    /// Of the newest log on the card.
+    box_version: Option<String>,
+    /// On the card.
+    file: PathBuf,
+}
+
+/// Runs `hums box update`.
+pub fn run(args: &cli::Update) -> Result<Outcome> {
+    let name = args.image.display();
+    let bytes = read_short(&args.image, map::APPLICATION_BYTES as u64)?;
+    let header = judge(&bytes).map_err(|why| anyhow::anyhow!("{name}: {why}"))?;
+    let version = header.version.to_string();
+    let newest = newest(&args.card)?;
+    if let Some((board, running)) = &newest {
+        if board != header.board() {
+            bail!("{name} is for the board {}, and the card is of a box with {board}", header.board());
+        }
+        if Version::parse(running).is_some_and(|running| running > header.version) && !args.older {
+            bail!("{name} has version {version}, and the box had {running}. Add --older to go back");
+        }
+    }
+    let file = put(&args.card, &bytes)?;
+    let is_test = keys::TEST.starts_with(&header.key);
+    let update = UpdateJson {
+        board: header.board().to_owned(),
+        version,
+        commit: header.commit().to_owned(),
+        is_test,
+        box_version: newest.map(|(_, version)| version),
+        file,
+    };
+    if args.json {
+        output::json(SCHEMA, &update)?;
+        return Ok(Outcome::Done);
+    }
+    let UpdateJson { board, version, commit, file, .. } = &update;
+    output::line(&format!("{}: version {version} ({commit}) for {board}, signature good", file.display()))?;
+    if is_test {
+        output::line("It is signed by the test key: only a box with a development build takes it.")?;
+    }
+    output::line(
+        "Put the card into the box and switch on. It installs the file on the ground: disarmed for 10 s, or a minute without an autopilot.",
+    )?;
+    Ok(Outcome::Done)
+}
+
+/// The header of a whole file with a good signature.
+fn judge(bytes: &[u8]) -> Result<Header, &'static str> {
+    let header = Header::read(bytes).ok_or("is no update file of HUMS (hums-BOARD.upd of a release)")?;
+    let image = bytes.get(header::BYTES..).unwrap_or_default();
+    if image.len() != header.image_bytes as usize {
+        return Err("is incomplete or too long: download it again");
+    }
+    let all = keys::ALL.iter().chain([&keys::TEST]);
+    let key = all.into_iter().find(|key| key.starts_with(&header.key));
+    let key = key.ok_or("is not signed by a key that a box knows")?;
+    let good = header.verify(key).and_then(|mut check| {
+        check.absorb(image);
+        check.finish()
+    });
+    good.map(|()| header).map_err(|_| "is damaged or forged: its signature does not fit")
+}
+
+/// Board and version by the newest log on the card.
+fn newest(card: &Path) -> Result<Option<(String, String)>> {
+    if !card.is_dir() {
+        return Err(usage(format!(
+            "--card {}: is no folder; mount the card, and name its root",
+            card.display()
+        )));
+    }
+    // A new card has no logs.
+    let Ok(found) = find(&[card.to_owned()], false) else { return Ok(None) };
+    for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
+        if let Some(boot) = check::overview(place)?.contents.boot {
+            return Ok(Some((boot.board, boot.version)));
+        }
+    }
+    Ok(None)
+}
+
+/// Written whole under another name first. Another update that is there becomes the one before.
+fn put(card: &Path, bytes: &[u8]) -> Result<PathBuf> {
+    let [update, previous, partial] = [UPDATE, PREVIOUS, PARTIAL].map(|name| card.join(name));
+    let mut file = settle(File::create(&partial), &partial)?;
+    settle(file.write_all(bytes).and_then(|()| file.sync_all()), &partial)?;
+    drop(file);
+    let is_other = fs::read(&update).is_ok_and(|before| before != bytes && judge(&before).is_ok());
+    if is_other {
+        settle(fs::rename(&update, &previous), &previous)?;
+    }
+    settle(fs::rename(&partial, &update), &update)?;
+    Ok(update)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// RFC 8032's first test vector is no key of a box; `firmware/update/keys/test.key` is.
+    fn signed(number: u8) -> Vec<u8> {
+        let text = include_str!("../../../firmware/update/keys/test.key");
+        let seed: Vec<u8> = (0..64)
+            .step_by(2)
+            .map(|at| u8::from_str_radix(&text[at..at + 2], 16).expect("hexadecimal"))
+            .collect();
+        let pair =
+            ed25519_compact::KeyPair::from_seed(ed25519_compact::Seed::from_slice(&seed).expect("32 bytes"));
+        let image = [number; 64];
+        let mut header = Header::new("matek-f405-std", "abc", Version(1), Version(0), &image);
+        header.sign(&image, &pair.sk);
+        [&header.bytes()[..], &image].concat()
+    }
+
+    #[test]
+    fn a_wrong_file_is_refused_with_its_reason() {
+        let good = signed(1);
+        assert_eq!(judge(&good).expect("good").board(), "matek-f405-std");
+        let mut forged = good.clone();
+        forged[520] ^= 1;
+        for (file, wanted) in [
+            (&good[..100], "no update file"),
+            (&good[..good.len() - 1], "incomplete"),
+            (&forged[..], "signature does not fit"),
+        ] {
+            assert!(judge(file).expect_err("refused").contains(wanted), "{wanted}");
+        }
+        let mut unsigned = Header::read(&good).expect("a header");
+        unsigned.key = *b"somebody";
+        let unsigned = [&unsigned.bytes()[..], &good[512..]].concat();
+        assert!(judge(&unsigned).expect_err("refused").contains("not signed by a key"));
+    }
+
+    #[test]
+    fn the_update_before_stays_on_the_card_and_the_same_one_again_does_not_replace_it() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let read = |name: &str| fs::read(dir.path().join(name)).ok();
+        for (file, previous) in [(1, None), (2, Some(1)), (2, Some(1)), (3, Some(2))] {
+            put(dir.path(), &signed(file)).expect("written");
+            assert_eq!(read(UPDATE), Some(signed(file)));
+            assert_eq!(read(PREVIOUS), previous.map(signed));
+            assert_eq!(read(PARTIAL), None);
+        }
+        fs::write(dir.path().join(UPDATE), b"damaged").expect("written");
+        put(dir.path(), &signed(4)).expect("written");
+        assert_eq!(read(PREVIOUS), Some(signed(2)), "a damaged file is not kept");
+    }
+}
