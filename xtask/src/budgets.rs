@@ -241,8 +241,8 @@ mod tests {
     fn one_byte_over_is_over() {
         let used = BTreeMap::from([("flash", 100), ("ram", 101)]);
         let rows = compare("matek", &used, &limits(100)).unwrap();
-        assert_eq!(rows.iter().map(|row| row.over).collect::<Vec<_>>(), [false, true, false]);
-        assert!(rows[1].text.contains("OVER: because"));
+        assert_eq!(rows.iter().map(|row| row.over).collect::<Vec<_>>(), [false, false, true, false]);
+        assert!(rows[2].text.contains("OVER: because"));
     }
 
     #[test]

@@ -176,6 +176,7 @@ mod tests {
         // No program header.
         let mut elf = vec![0; 52];
         elf[..7].copy_from_slice(b"\x7fELF\x01\x01\x01");
+        elf[42] = 32;
         let added = [piece(0x0800_0000, 6), piece(0x0802_0000, 3)];
         let once = with_pieces(&elf, &added[1..]).unwrap();
         assert_eq!(pieces(&with_pieces(&once, &added[..1]).unwrap()).unwrap(), added);

@@ -66,9 +66,9 @@ fn read_key(path: &Path) -> Result<SecretKey> {
     let digits = text.trim();
     let byte = |at: usize| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
     let seed: Option<Vec<u8>> = (0..digits.len()).step_by(2).map(byte).collect();
-    let seed = seed.and_then(|seed| Seed::from_slice(&seed).ok());
-    let seed = seed.with_context(|| format!("{}: wants 64 hexadecimal digits", path.display()))?;
-    Ok(KeyPair::from_seed(seed).sk)
+    let pair = seed.and_then(|seed| KeyPair::try_from_seed(Seed::from_slice(&seed).ok()?).ok());
+    let pair = pair.with_context(|| format!("{}: wants 64 hexadecimal digits", path.display()))?;
+    Ok(pair.sk)
 }
 
 #[cfg(test)]
@@ -82,7 +82,7 @@ mod tests {
         let why = release_key(&repo::root().join(TEST_KEY)).unwrap_err().to_string();
         assert!(why.contains("this is the test key"), "{why}");
         let path = std::env::temp_dir().join(format!("hums-own-{}.key", std::process::id()));
-        for (text, wanted) in [("00".repeat(32), "no box takes this key"), ("0".repeat(63), "64 hexadecimal")]
+        for (text, wanted) in [("11".repeat(32), "no box takes this key"), ("1".repeat(63), "64 hexadecimal")]
         {
             fs::write(&path, text).unwrap();
             let why = release_key(&path).unwrap_err().to_string();
