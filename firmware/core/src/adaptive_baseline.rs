@@ -12,7 +12,6 @@ const FIGURE_MAX: f32 = 1e6;
 const SPREADS: f32 = 4.0;
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct AdaptiveBaseline {
         smooth: f32,
         mean: f32,

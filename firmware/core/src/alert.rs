@@ -1,17 +1,12 @@
 //! Alerts: problems that the autopilot itself reports, by a text, an event, a flag of health or of the estimator.
 //!
-//! Each way becomes a [`Cause`] in one place: texts in `alert/texts.rs`, PX4's events in `alert/events.rs`, flags of health in
-//! [`crate::cause`], the estimator's here. A new way is one row there. A severe report that is in no table is [`Cause::Other`].
+//! Each way becomes a [`Cause`] in one place: texts and PX4's events in the link crate (`hums_link::alert`), flags of health in
+//! [`crate::cause`], the estimator's here.
 //!
 //! A text or an event is a moment: it holds for [`HOLDS`]. A flag counts from the second message with it on: one
 //! wrong message must not raise an alarm.
 
-mod events;
-mod texts;
-
-pub use events::name as event_name;
-
-use crate::cause::{Alert, Cause, Causes, Meaning, Urgency};
+use crate::cause::{Alert, Cause, Causes, Urgency};
 use crate::observation::{Estimator, EstimatorScale, Sensors};
 use crate::time::{BootMs, Millis, SILENT, Stamp};
 
@@ -24,46 +19,6 @@ const CRITICAL_STATE: u8 = 5;
 
 /// In place of an [`Urgency`]: the alert is no longer reported, and no report says that all is well.
 pub const ENDED: f32 = -1.0;
-
-/// The alert in a text of the autopilot.
-///
-/// `severity` is a `MAV_SEVERITY`; a notice, or less, does not count. It is `None` for a log that stores no severity. Then only
-/// known texts count that are severe by their words.
-///
-/// `MAV_SEVERITY_ALERT` is treated as unknown. `ArduPilot` until 3.2 (2015) counted from 1 for low to 4 for critical,
-/// and sent "Reached Command #1" with it. Later versions use it for a parachute, a fuel cell's states and developers'
-/// messages, PX4 never.
-///
-/// Repeated texts do not count: our own, if a script forwards them to the pilot's radio
-/// (`docs/stations/hums_texts.lua`), and marked texts of others in `ArduPilot`'s log
-/// (`GCS_MAVLINK::handle_statustext`).
-pub fn of_text(severity: Option<u8>, text: &[u8]) -> Option<Alert> {
-    const REPEATED: [&[u8]; 3] = [b"HUMS: ", b"SRC=", b"GCS:"];
-    if REPEATED.iter().any(|mark| text.starts_with(mark)) {
-        return None;
-    }
-    // MAV_SEVERITY: 1 is alert, 4 warning, 5 notice.
-    let severity = match severity {
-        Some(1) => None,
-        Some(5..) => return None,
-        severity => severity,
-    };
-    match texts::meaning(text, severity.is_some()) {
-        Meaning::Wrong(alert) => Some(alert),
-        Meaning::Fine => None,
-        Meaning::Unknown => severity.filter(|severity| *severity < 4).map(|_| Alert::warning(Cause::Other)),
-    }
-}
-
-/// The alert in an event of PX4. `severity` is the low nibble of `log_levels`, its external level.
-pub fn of_event(id: u32, severity: u8, arguments: &[u8]) -> Option<Alert> {
-    const CRITICAL: u8 = 2;
-    match events::meaning(id, arguments) {
-        Meaning::Wrong(alert) => Some(alert),
-        Meaning::Fine => None,
-        Meaning::Unknown => (severity <= CRITICAL).then_some(Alert::warning(Cause::Other)),
-    }
-}
 
 /// The causes of the estimator's flags (`ESTIMATOR_STATUS_FLAGS`, `EKF_STATUS_FLAGS`). A glitch counts if the
 /// estimator had attitude and position before, and a receiver has a fix.
@@ -93,7 +48,6 @@ const fn has_both(flags: u16) -> bool {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     struct Flags {
         now: Causes,
         before: Causes,
@@ -113,7 +67,6 @@ impl Flags {
 
 state! {
     /// The standing alerts of the autopilot. Only those of the armed time count: earlier ones are about arming.
-    #[derive(Clone, Copy, Debug)]
     pub struct Alerts {
         /// For each cause its urgency; until when a single report holds, ms; the time of the last report.
         told: [Option<Urgency>; Cause::COUNT] = [None; Cause::COUNT],

@@ -36,7 +36,6 @@ const LEAPS_M: f32 = 5.0;
 
 state! {
     /// Movement of a height without a climb, within [`RECEIVER_S`].
-    #[derive(Clone, Copy, Debug)]
     struct Leap {
         height_m: f32,
         at: Stamp,
@@ -69,17 +68,13 @@ impl Leap {
 state! {
     /// The last sample of the barometer: height above the first one, m; dynamic pressure of the ground speed as a height,
     /// m; climb, m/s.
-    #[derive(Clone, Copy, Debug)]
     struct Sample {
         at: Stamp,
         height_m: f32,
         wind_m: f32,
         climb_mps: f32,
     }
-}
 
-state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Heights {
         /// The first pressure of the flight, hPa; 0 before it.
         first_hpa: f32,

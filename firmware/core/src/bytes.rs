@@ -205,7 +205,7 @@ macro_rules! fields {
 pub(crate) use fields;
 
 /// FNV-1a (draft-eastlake-fnv, 32 bits): a name in four bytes.
-pub(crate) const fn fnv1a(name: &str) -> u32 {
+pub const fn fnv1a(name: &str) -> u32 {
     let mut hash = 0x811C_9DC5_u32;
     let mut index = 0;
     while index < name.len() {

@@ -70,26 +70,20 @@ pub enum Urgency {
 }
 
 impl Alert {
-    pub(crate) const fn warning(cause: Cause) -> Self {
+    /// A warning of it.
+    pub const fn warning(cause: Cause) -> Self {
         Self { cause, urgency: Urgency::Warning }
     }
 
-    pub(crate) const fn over(cause: Cause) -> Self {
+    /// It is over.
+    pub const fn over(cause: Cause) -> Self {
         Self { cause, urgency: Urgency::Over }
     }
 
-    pub(crate) const fn critical(cause: Cause) -> Self {
+    /// A critical one.
+    pub const fn critical(cause: Cause) -> Self {
         Self { cause, urgency: Urgency::Critical }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Meaning {
-    /// Something is wrong.
-    Wrong(Alert),
-    /// No fault in flight: arming, set-up, a command, or the end of a fault.
-    Fine,
-    Unknown,
 }
 
 /// A set of causes.

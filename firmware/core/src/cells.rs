@@ -95,7 +95,6 @@ pub fn known(name: &str) -> Option<u8> {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     struct Pack {
         highest_v: f32,
         /// The autopilot's id of the battery, by which parameters go. The order of first messages may differ.
@@ -107,11 +106,8 @@ state! {
         doubted: bool,
         count: u8,
     }
-}
 
-state! {
     /// The cells of all batteries.
-    #[derive(Clone, Copy, Debug)]
     pub struct Cells {
         packs: [Pack; BATTERIES_MAX] = [Pack::default(); BATTERIES_MAX],
         /// By the battery's id and [`Setting`]; 0: unknown, or not set.

@@ -16,7 +16,7 @@ const FULL: f32 = 1.15;
 /// The least fall of the state of charge. An error of 10 mV is 5 % of it in the flat part of the curve.
 const FALL_MIN: f32 = 0.3;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Charge {
     state: f32,
     consumed_ah: f32,

@@ -36,7 +36,6 @@ const NOT_COMPARED: [f32; 3] = [f32::NAN; 3];
 const EVERY: Millis = Millis::from_millis(100);
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Crosschecks {
         pub(crate) residuals: Residuals,
         pub(crate) pairs: [Pairs; Kind::COUNT] = [Pairs::default(); Kind::COUNT],

@@ -34,7 +34,6 @@ const LOSS_MEMORY: Millis = Millis::from_secs(10);
 
 state! {
     /// The memory of derived quantities.
-    #[derive(Clone, Copy, Debug)]
     pub struct Derived {
         pub(crate) cells: Cells,
         resistance: [Resistance; BATTERIES_MAX] = [Resistance::default(); BATTERIES_MAX],
@@ -55,11 +54,8 @@ state! {
         pub(crate) frames_lost: Lately,
         pub(crate) write_errors: Lately,
     }
-}
 
-state! {
     /// A count of the last ten seconds, of one that only rises.
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Lately {
         count: u32,
         before: u32,

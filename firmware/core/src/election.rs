@@ -27,7 +27,7 @@ const UNASKED: Millis = Millis::from_secs(5);
 /// A system takes the vehicle's place if it has this many times its observations.
 const FAR_MORE: u16 = 2;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     source: Source,
     autopilot: Autopilot,
@@ -43,7 +43,6 @@ impl Candidate {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Election {
         candidates: [Option<Candidate>; CANDIDATES_MAX] = [None; CANDIDATES_MAX],
         window: BootMs,

@@ -73,7 +73,6 @@ pub(crate) type Tenths = [[u32; BINS]; ExposureQuantity::ALL.len()];
 
 state! {
     /// Time in ranges.
-    #[derive(Clone, Copy, Debug)]
     pub struct Exposure {
         last: Option<BootMs>,
         session: Tenths,

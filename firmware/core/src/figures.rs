@@ -111,7 +111,6 @@ impl Quantity {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     struct Track {
         mean: f32,
         samples: u16,
@@ -133,7 +132,6 @@ impl Track {
 
 state! {
     /// The figures of a flight.
-    #[derive(Clone, Copy, Debug)]
     pub struct Figures {
         tracks: [Track; Quantity::COUNT] = [Track::default(); Quantity::COUNT],
         charged: [Option<Charge>; BATTERIES_MAX] = [None; BATTERIES_MAX],

@@ -138,7 +138,7 @@ impl Stage {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "facts that have nothing to do with each other")]
 struct Arming {
     is_armed: bool,
@@ -153,56 +153,55 @@ struct Arming {
     on_bench: bool,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Beat {
-    at: BootMs,
-    height_m: Option<f32>,
-}
+state! {
+    struct Beat {
+        at: BootMs,
+        height_m: Option<f32>,
+    }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Felt {
-    at: BootMs,
-    load_g: Option<f32>,
-    /// The part of the force that pushes from above, g.
-    from_above_g: f32,
-    rate_radps: f32,
-}
+    struct Felt {
+        at: BootMs,
+        load_g: Option<f32>,
+        /// The part of the force that pushes from above, g.
+        from_above_g: f32,
+        rate_radps: f32,
+    }
 
-/// The phases of a flight.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Flight {
-    stage: Stage,
-    /// Since when it is in the air; kept in a mishap.
-    airborne_since: Option<BootMs>,
-    /// A flight is open, and when the vehicle was in the air last.
-    flew_at: Option<BootMs>,
-    changing_since: Option<BootMs>,
-    /// The vehicle was seen on the ground: a take-off follows.
-    seen_on_ground: bool,
-    arming: Arming,
-    beat: Beat,
-    heard_at: BootMs,
-    pub(crate) pressure: Pressure,
-    pub(crate) thrust: Thrust,
-    pub(crate) motion: Kinematics,
-    felt: Felt,
-    /// Its greatest height with all its thrust, which fades.
-    peak: Peak,
-    watch: Option<DisarmWatch>,
-    signs: Signs,
-    shock: Option<Shock>,
-    still_since: Stamp,
-    flies_since: Stamp,
-    /// Since when it is carried without rotors, and the pressure then, hPa.
-    supported: Option<(BootMs, f32)>,
-    hit_at: BootMs,
-    touchdown: Touchdown,
-    /// The hardest touch of this flight, or of its mishap, m/s.
-    touch_mps: f32,
-    /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
-    tilted_at: Option<BootMs>,
-    /// The position at which a mishap began, or ended.
-    place: Place,
+    /// The phases of a flight.
+    pub struct Flight {
+        stage: Stage,
+        /// Since when it is in the air; kept in a mishap.
+        airborne_since: Option<BootMs>,
+        /// A flight is open, and when the vehicle was in the air last.
+        flew_at: Option<BootMs>,
+        changing_since: Option<BootMs>,
+        /// The vehicle was seen on the ground: a take-off follows.
+        seen_on_ground: bool,
+        arming: Arming,
+        beat: Beat,
+        heard_at: BootMs,
+        pub(crate) pressure: Pressure,
+        pub(crate) thrust: Thrust,
+        pub(crate) motion: Kinematics,
+        felt: Felt,
+        /// Its greatest height with all its thrust, which fades.
+        peak: Peak,
+        watch: Option<DisarmWatch>,
+        signs: Signs,
+        shock: Option<Shock>,
+        still_since: Stamp,
+        flies_since: Stamp,
+        /// Since when it is carried without rotors, and the pressure then, hPa.
+        supported: Option<(BootMs, f32)>,
+        hit_at: BootMs,
+        touchdown: Touchdown,
+        /// The hardest touch of this flight, or of its mishap, m/s.
+        touch_mps: f32,
+        /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
+        tilted_at: Option<BootMs>,
+        /// The position at which a mishap began, or ended.
+        place: Place,
+    }
 }
 
 impl Flight {

@@ -34,7 +34,6 @@ pub(crate) const LEVEL_MPS: f32 = 2.0;
 pub(crate) const LEANS_RAD: f32 = 0.6;
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Gates {
         open: u16,
         inexact_at: Stamp,

@@ -19,7 +19,7 @@ use crate::units::{Metres, Position};
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
 const UNIT_M: f32 = 0.011_132;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Fix {
     /// Latitude and longitude, 1e-7 degrees.
     place: [i32; 2],
@@ -29,7 +29,6 @@ struct Fix {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct GnssVelocity {
         before: Option<Fix>,
         /// Velocity less the movement of the positions, and velocity, both smoothed, m/s; seconds known; time of

@@ -36,7 +36,7 @@ pub enum Happening {
 const WAITING_MAX: usize = 8;
 
 /// Events in order.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Happenings {
     waiting: [Option<Happening>; WAITING_MAX],
     lost: u16,

@@ -39,7 +39,6 @@ const LEAP_MPS2: f32 = 6.0;
 const SHAKE_PART: f32 = 0.5;
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct ImuGnssResidual {
         /// Sum of forces since the last step, their number, their mean, and its time.
         sum: [f32; 3],

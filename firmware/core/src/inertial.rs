@@ -55,7 +55,6 @@ pub(crate) const LIES: Millis = Millis::from_millis(700);
 
 state! {
     /// The state of accelerometer and gyros.
-    #[derive(Clone, Copy, Debug)]
     pub struct Inertial {
         /// Specific force, smoothed, m/s2.
         force: [f32; 3],

@@ -61,4 +61,5 @@ pub mod units;
 pub mod usage;
 pub mod vehicle;
 
+pub use bytes::fnv1a;
 pub use monitor::Monitor;

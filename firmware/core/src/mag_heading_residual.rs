@@ -36,7 +36,6 @@ pub(crate) fn take(residuals: &mut Residuals, at: BootMs, [x, y, z]: [f32; 3], v
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct CompassUse {
         ratios: u8,
         unused: (Stamp, bool),

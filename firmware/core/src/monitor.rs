@@ -61,7 +61,6 @@ pub struct Monitor {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     struct Before {
         armed: bool,
         reboots: u32,

@@ -83,7 +83,7 @@ const RECEIVER_M: f32 = 3.0;
 const STRAYED: Millis = Millis::from_secs(5);
 
 /// The greatest value of the last half to whole second.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct WindowMax {
     now: f32,
     before: f32,
@@ -109,7 +109,7 @@ impl WindowMax {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Kinematics {
     pub(crate) speed: WindowMax,
     pub(crate) sink: WindowMax,

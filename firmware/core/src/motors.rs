@@ -66,7 +66,6 @@ enum Role {
 
 state! {
     /// One motor.
-    #[derive(Clone, Copy, Debug)]
     struct Track {
         errors: Option<Rate>,
         /// Smoothed interval between messages that carry speed or current, s; 0 before there are two.
@@ -104,7 +103,6 @@ impl Track {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Motors {
         tracks: [Track; MOTORS_MAX] = [Track::default(); MOTORS_MAX],
         pub(crate) outputs: MotorOutputs,

@@ -83,30 +83,31 @@ impl Heartbeat {
     pub const TERMINATED: u8 = 8;
 }
 
-/// The autopilot's processor and its idea of the (first) battery: `SYS_STATUS`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SystemStatus {
-    /// Load of the autopilot's processor.
-    pub load: Option<Fraction>,
-    /// Battery voltage.
-    pub voltage: Option<Volts>,
-    /// Battery current; negative charges.
-    pub current: Option<Amperes>,
-    /// Remaining charge of the battery.
-    pub remaining: Option<Fraction>,
-    /// Health of the sensors; `None` if it is not reported (a log of PX4 since v1.14).
-    pub sensors: Option<Sensors>,
-}
+state! {
+    /// The autopilot's processor and its idea of the (first) battery: `SYS_STATUS`.
+    pub struct SystemStatus {
+        /// Load of the autopilot's processor.
+        pub load: Option<Fraction>,
+        /// Battery voltage.
+        pub voltage: Option<Volts>,
+        /// Battery current; negative charges.
+        pub current: Option<Amperes>,
+        /// Remaining charge of the battery.
+        pub remaining: Option<Fraction>,
+        /// Health of the sensors; `None` if it is not reported (a log of PX4 since v1.14).
+        pub sensors: Option<Sensors>,
+    }
 
-/// Sensors by their health, as `MAV_SYS_STATUS_SENSOR` bits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sensors {
-    /// Present, enabled and not healthy.
-    pub unhealthy: u32,
-    /// Enabled, not healthy and not present: PX4 says so of a sensor that it lost, and of one that it never had.
-    pub lost: u32,
-    /// Present and healthy.
-    pub healthy: u32,
+    /// Sensors by their health, as `MAV_SYS_STATUS_SENSOR` bits.
+    #[derive(Eq)]
+    pub struct Sensors {
+        /// Present, enabled and not healthy.
+        pub unhealthy: u32,
+        /// Enabled, not healthy and not present: PX4 says so of a sensor that it lost, and of one that it never had.
+        pub lost: u32,
+        /// Present and healthy.
+        pub healthy: u32,
+    }
 }
 
 impl Sensors {
@@ -117,38 +118,39 @@ impl Sensors {
     }
 }
 
-/// Time: `SYSTEM_TIME`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SystemTime {
-    /// UTC in microseconds since 1970, when the autopilot knows it.
-    pub utc_micros: Option<u64>,
-    /// Milliseconds since the autopilot's boot.
-    pub boot_ms: u32,
-}
+state! {
+    /// Time: `SYSTEM_TIME`.
+    #[derive(Eq)]
+    pub struct SystemTime {
+        /// UTC in microseconds since 1970, when the autopilot knows it.
+        pub utc_micros: Option<u64>,
+        /// Milliseconds since the autopilot's boot.
+        pub boot_ms: u32,
+    }
 
-/// One GNSS receiver.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Gnss {
-    /// Receiver, from 0.
-    pub instance: u8,
-    /// `GPS_FIX_TYPE`: 0 and 1 none, 2 2D, 3 3D, 4 and more better than that.
-    pub fix: u8,
-    /// Satellites in use.
-    pub satellites: Option<u8>,
-    /// Horizontal dilution of precision.
-    pub hdop: Option<f32>,
-    /// Horizontal accuracy (1 sigma).
-    pub accuracy: Option<Metres>,
-    /// The position, with a fix.
-    pub position: Option<Position>,
-    /// Above mean sea level.
-    pub altitude: Option<Metres>,
-    /// Ground speed.
-    pub speed: Option<MetresPerSecond>,
-    /// The direction of that, from north, clockwise.
-    pub course: Option<Radians>,
-    /// When that was measured, by the receiver's clock or when the autopilot took it: milliseconds modulo 2^32, from any beginning.
-    pub measured_ms: Option<NonZeroU32>,
+    /// One GNSS receiver.
+    pub struct Gnss {
+        /// Receiver, from 0.
+        pub instance: u8,
+        /// `GPS_FIX_TYPE`: 0 and 1 none, 2 2D, 3 3D, 4 and more better than that.
+        pub fix: u8,
+        /// Satellites in use.
+        pub satellites: Option<u8>,
+        /// Horizontal dilution of precision.
+        pub hdop: Option<f32>,
+        /// Horizontal accuracy (1 sigma).
+        pub accuracy: Option<Metres>,
+        /// The position, with a fix.
+        pub position: Option<Position>,
+        /// Above mean sea level.
+        pub altitude: Option<Metres>,
+        /// Ground speed.
+        pub speed: Option<MetresPerSecond>,
+        /// The direction of that, from north, clockwise.
+        pub course: Option<Radians>,
+        /// When that was measured, by the receiver's clock or when the autopilot took it: milliseconds modulo 2^32, from any beginning.
+        pub measured_ms: Option<NonZeroU32>,
+    }
 }
 
 impl Gnss {
@@ -161,78 +163,74 @@ impl Gnss {
     }
 }
 
-/// Interference that a GNSS receiver reports.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GnssIntegrity {
-    /// Receiver, from 0.
-    pub instance: u8,
-    /// Jamming: 0 unknown, 1 none, 2 mitigated, 3 detected (`GPS_JAMMING_STATE`).
-    pub jamming: u8,
-    /// Spoofing: 0 unknown, 1 none, 2 mitigated, 3 detected (`GPS_SPOOFING_STATE`).
-    pub spoofing: u8,
-}
+state! {
+    /// Interference that a GNSS receiver reports.
+    pub struct GnssIntegrity {
+        /// Receiver, from 0.
+        pub instance: u8,
+        /// Jamming: 0 unknown, 1 none, 2 mitigated, 3 detected (`GPS_JAMMING_STATE`).
+        pub jamming: u8,
+        /// Spoofing: 0 unknown, 1 none, 2 mitigated, 3 detected (`GPS_SPOOFING_STATE`).
+        pub spoofing: u8,
+    }
 
-/// One inertial sensor, body axes forward, right, down.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Imu {
-    /// Sensor, from 0.
-    pub instance: u8,
-    /// Specific force.
-    pub acceleration: Option<[MetresPerSecond2; 3]>,
-    /// Angular rate.
-    pub rate: Option<[RadiansPerSecond; 3]>,
-    /// Magnetic field, of the compass of the same number.
-    pub field: Option<[Gauss; 3]>,
-    /// The sensor's temperature.
-    pub temperature: Option<Celsius>,
-}
+    /// One inertial sensor, body axes forward, right, down.
+    pub struct Imu {
+        /// Sensor, from 0.
+        pub instance: u8,
+        /// Specific force.
+        pub acceleration: Option<[MetresPerSecond2; 3]>,
+        /// Angular rate.
+        pub rate: Option<[RadiansPerSecond; 3]>,
+        /// Magnetic field, of the compass of the same number.
+        pub field: Option<[Gauss; 3]>,
+        /// The sensor's temperature.
+        pub temperature: Option<Celsius>,
+    }
 
-/// The air outside.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Air {
-    /// Barometer, from 0.
-    pub instance: u8,
-    /// Static pressure.
-    pub pressure: Option<Hectopascals>,
-    /// The barometer's temperature.
-    pub temperature: Option<Celsius>,
-}
+    /// The air outside.
+    pub struct Air {
+        /// Barometer, from 0.
+        pub instance: u8,
+        /// Static pressure.
+        pub pressure: Option<Hectopascals>,
+        /// The barometer's temperature.
+        pub temperature: Option<Celsius>,
+    }
 
-/// Attitude, Tait-Bryan angles.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Attitude {
-    /// Right wing down is positive.
-    pub roll: Radians,
-    /// Nose up is positive.
-    pub pitch: Radians,
-    /// From north, clockwise.
-    pub yaw: Radians,
-    /// Angular rates about the body's axes, if they are reported.
-    pub rates: Option<[RadiansPerSecond; 3]>,
-    /// Milliseconds since the autopilot's boot. Every autopilot sends it here; `SYSTEM_TIME` only some do.
-    pub boot_ms: Option<u32>,
-}
+    /// Attitude, Tait-Bryan angles.
+    pub struct Attitude {
+        /// Right wing down is positive.
+        pub roll: Radians,
+        /// Nose up is positive.
+        pub pitch: Radians,
+        /// From north, clockwise.
+        pub yaw: Radians,
+        /// Angular rates about the body's axes, if they are reported.
+        pub rates: Option<[RadiansPerSecond; 3]>,
+        /// Milliseconds since the autopilot's boot. Every autopilot sends it here; `SYSTEM_TIME` only some do.
+        pub boot_ms: Option<u32>,
+    }
 
-/// What an estimator says that flies beside the one that is used: `ArduPilot`'s DCM where an EKF is used, an EKF where DCM is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SecondEstimate {
-    /// Roll, pitch and yaw, as in [`Attitude`].
-    pub attitude: Option<[Radians; 3]>,
-    /// Where it is.
-    pub position: Option<Position>,
-    /// Above mean sea level.
-    pub altitude: Option<Metres>,
-}
+    /// What an estimator says that flies beside the one that is used: `ArduPilot`'s DCM where an EKF is used, an EKF where DCM is.
+    pub struct SecondEstimate {
+        /// Roll, pitch and yaw, as in [`Attitude`].
+        pub attitude: Option<[Radians; 3]>,
+        /// Where it is.
+        pub position: Option<Position>,
+        /// Above mean sea level.
+        pub altitude: Option<Metres>,
+    }
 
-/// The attitude that the autopilot demands, for its mission, its own loops or the pilot's sticks.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wanted {
-    /// Right wing down is positive.
-    pub roll: Radians,
-    /// Nose up is positive.
-    pub pitch: Radians,
-    /// The demanded rates, if they are reported.
-    pub rates: Option<WantedRates>,
+    /// The attitude that the autopilot demands, for its mission, its own loops or the pilot's sticks.
+    pub struct Wanted {
+        /// Right wing down is positive.
+        pub roll: Radians,
+        /// Nose up is positive.
+        pub pitch: Radians,
+        /// The demanded rates, if they are reported.
+        pub rates: Option<WantedRates>,
+    }
 }
 
 /// The rates that the autopilot wants.
@@ -260,88 +258,81 @@ impl Wanted {
     }
 }
 
-/// Position and velocity from the local origin, north, east, down.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LocalPosition {
-    /// From the origin.
-    pub position: [Metres; 3],
-    /// Over ground.
-    pub velocity: [MetresPerSecond; 3],
-}
-
-/// Outputs to motors and servos: pulses of `SERVO_OUTPUT_RAW`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Outputs {
-    /// Which group: 0 the main outputs, 1 the auxiliary ones.
-    pub port: u8,
-    /// Microseconds, from the first output on; 0 where there is none.
-    pub pulses: [u16; MOTORS_MAX],
-}
-
-/// The fused global position.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GlobalPosition {
-    /// The position, once the autopilot knows it.
-    pub position: Option<Position>,
-    /// Above mean sea level.
-    pub altitude: Metres,
-    /// Above home.
-    pub relative_altitude: Metres,
-    /// North, east, down.
-    pub velocity: [MetresPerSecond; 3],
-}
-
-/// The values of a pilot's display.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Hud {
-    /// Through the air.
-    pub airspeed: Option<MetresPerSecond>,
-    /// Over ground.
-    pub groundspeed: Option<MetresPerSecond>,
-    /// 0 to 360 degrees, 0 is north.
-    pub heading_deg: Option<f32>,
-    /// Throttle.
-    pub throttle: Option<Fraction>,
-    /// Above mean sea level (ArduPilot copters: see its parameters).
-    pub altitude: Option<Metres>,
-    /// Up is positive.
-    pub climb: Option<MetresPerSecond>,
-}
-
-/// The pilot's radio control.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RadioControl {
-    /// Signal strength on the device's scale, 0 to 254.
-    pub rssi: Option<u8>,
-}
-
-/// A telemetry radio's own report, in the device's units.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TelemetryRadio {
-    /// Signal strength here.
-    pub rssi: Option<u8>,
-    /// Signal strength at the other end.
-    pub remote_rssi: Option<u8>,
-    /// Noise here.
-    pub noise: Option<u8>,
-    /// Noise at the other end.
-    pub remote_noise: Option<u8>,
-    /// Errors since its start.
-    pub errors: u16,
-}
-
-/// The autopilot's rails.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Rails {
-    /// The 5 V rail.
-    pub vcc: Option<Volts>,
-    /// The servo rail.
-    pub servo: Option<Volts>,
-}
-
 state! {
+    /// Position and velocity from the local origin, north, east, down.
+    pub struct LocalPosition {
+        /// From the origin.
+        pub position: [Metres; 3],
+        /// Over ground.
+        pub velocity: [MetresPerSecond; 3],
+    }
+
+    /// Outputs to motors and servos: pulses of `SERVO_OUTPUT_RAW`.
+    #[derive(Eq)]
+    pub struct Outputs {
+        /// Which group: 0 the main outputs, 1 the auxiliary ones.
+        pub port: u8,
+        /// Microseconds, from the first output on; 0 where there is none.
+        pub pulses: [u16; MOTORS_MAX],
+    }
+
+    /// The fused global position.
+    pub struct GlobalPosition {
+        /// The position, once the autopilot knows it.
+        pub position: Option<Position>,
+        /// Above mean sea level.
+        pub altitude: Metres,
+        /// Above home.
+        pub relative_altitude: Metres,
+        /// North, east, down.
+        pub velocity: [MetresPerSecond; 3],
+    }
+
+    /// The values of a pilot's display.
+    pub struct Hud {
+        /// Through the air.
+        pub airspeed: Option<MetresPerSecond>,
+        /// Over ground.
+        pub groundspeed: Option<MetresPerSecond>,
+        /// 0 to 360 degrees, 0 is north.
+        pub heading_deg: Option<f32>,
+        /// Throttle.
+        pub throttle: Option<Fraction>,
+        /// Above mean sea level (ArduPilot copters: see its parameters).
+        pub altitude: Option<Metres>,
+        /// Up is positive.
+        pub climb: Option<MetresPerSecond>,
+    }
+
+    /// The pilot's radio control.
+    pub struct RadioControl {
+        /// Signal strength on the device's scale, 0 to 254.
+        pub rssi: Option<u8>,
+    }
+
+    /// A telemetry radio's own report, in the device's units.
+    pub struct TelemetryRadio {
+        /// Signal strength here.
+        pub rssi: Option<u8>,
+        /// Signal strength at the other end.
+        pub remote_rssi: Option<u8>,
+        /// Noise here.
+        pub noise: Option<u8>,
+        /// Noise at the other end.
+        pub remote_noise: Option<u8>,
+        /// Errors since its start.
+        pub errors: u16,
+    }
+
+    /// The autopilot's rails.
+    pub struct Rails {
+        /// The 5 V rail.
+        pub vcc: Option<Volts>,
+        /// The servo rail.
+        pub servo: Option<Volts>,
+    }
+
     /// One battery.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Battery {
         /// Which one.
         pub id: u8,
@@ -475,73 +466,70 @@ impl Vibration {
     }
 }
 
-/// One motor's ESC; each message fills what it carries.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Esc {
-    /// Speed; ArduPilot may send electrical speed where the pole count is not set.
-    pub rpm: Option<Rpm>,
-    /// At the ESC.
-    pub voltage: Option<Volts>,
-    /// Of the motor.
-    pub current: Option<Amperes>,
-    /// Of the ESC.
-    pub temperature: Option<Celsius>,
-    /// `ESC_FAILURE_FLAGS`.
-    pub failures: Option<u16>,
-    /// Errors since the ESC's start; may wrap.
-    pub errors: Option<u32>,
-}
+state! {
+    /// One motor's ESC; each message fills what it carries.
+    pub struct Esc {
+        /// Speed; ArduPilot may send electrical speed where the pole count is not set.
+        pub rpm: Option<Rpm>,
+        /// At the ESC.
+        pub voltage: Option<Volts>,
+        /// Of the motor.
+        pub current: Option<Amperes>,
+        /// Of the ESC.
+        pub temperature: Option<Celsius>,
+        /// `ESC_FAILURE_FLAGS`.
+        pub failures: Option<u16>,
+        /// Errors since the ESC's start; may wrap.
+        pub errors: Option<u32>,
+    }
 
-/// A group of ESCs: motor `first`, `first + 1`, …
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct EscGroup {
-    /// Motor number of the first, from 0.
-    pub first: u8,
-    /// `None` for a motor that does not exist.
-    pub escs: [Option<Esc>; ESC_GROUP],
-}
+    /// A group of ESCs: motor `first`, `first + 1`, …
+    pub struct EscGroup {
+        /// Motor number of the first, from 0.
+        pub first: u8,
+        /// `None` for a motor that does not exist.
+        pub escs: [Option<Esc>; ESC_GROUP],
+    }
 
-/// A combustion engine; `None` where the controller does not measure it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Engine {
-    /// Whether the controller reports itself healthy.
-    pub healthy: bool,
-    /// Crankshaft speed.
-    pub rpm: Option<Rpm>,
-    /// Engine load.
-    pub load: Option<Fraction>,
-    /// Fuel taken, in the controller's unit (g or cm3).
-    pub fuel_consumed: Option<f32>,
-    /// Fuel flow, g/min or cm3/min.
-    pub fuel_flow: Option<f32>,
-    /// Cylinder head.
-    pub cylinder_head: Option<Celsius>,
-    /// Exhaust gas.
-    pub exhaust: Option<Celsius>,
-    /// Intake air.
-    pub intake: Option<Celsius>,
-    /// Fuel pressure.
-    pub fuel_pressure: Option<Hectopascals>,
-    /// Ignition supply.
-    pub ignition: Option<Volts>,
-}
+    /// A combustion engine; `None` where the controller does not measure it.
+    pub struct Engine {
+        /// Whether the controller reports itself healthy.
+        pub healthy: bool,
+        /// Crankshaft speed.
+        pub rpm: Option<Rpm>,
+        /// Engine load.
+        pub load: Option<Fraction>,
+        /// Fuel taken, in the controller's unit (g or cm3).
+        pub fuel_consumed: Option<f32>,
+        /// Fuel flow, g/min or cm3/min.
+        pub fuel_flow: Option<f32>,
+        /// Cylinder head.
+        pub cylinder_head: Option<Celsius>,
+        /// Exhaust gas.
+        pub exhaust: Option<Celsius>,
+        /// Intake air.
+        pub intake: Option<Celsius>,
+        /// Fuel pressure.
+        pub fuel_pressure: Option<Hectopascals>,
+        /// Ignition supply.
+        pub ignition: Option<Volts>,
+    }
 
-/// The generator of a hybrid drone: `GENERATOR_STATUS`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Generator {
-    /// Whether it reports itself switched off.
-    pub is_off: bool,
-    /// Speed of the generator or alternator.
-    pub speed: Option<Rpm>,
-}
+    /// The generator of a hybrid drone: `GENERATOR_STATUS`.
+    pub struct Generator {
+        /// Whether it reports itself switched off.
+        pub is_off: bool,
+        /// Speed of the generator or alternator.
+        pub speed: Option<Rpm>,
+    }
 
-/// A speed sensor: `RPM` or `RAW_RPM`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SpeedSensor {
-    /// Sensor, from 0.
-    pub index: u8,
-    /// What it measures.
-    pub rpm: Rpm,
+    /// A speed sensor: `RPM` or `RAW_RPM`.
+    pub struct SpeedSensor {
+        /// Sensor, from 0.
+        pub index: u8,
+        /// What it measures.
+        pub rpm: Rpm,
+    }
 }
 
 /// Whether the vehicle is on the ground: `EXTENDED_SYS_STATE`.
@@ -574,33 +562,34 @@ pub enum VtolState {
     Forward,
 }
 
-/// The autopilot's processor.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Processor {
-    /// Its temperature.
-    pub temperature: Option<Celsius>,
-    /// Its supply.
-    pub voltage: Option<Volts>,
-}
+state! {
+    /// The autopilot's processor.
+    pub struct Processor {
+        /// Its temperature.
+        pub temperature: Option<Celsius>,
+        /// Its supply.
+        pub voltage: Option<Volts>,
+    }
 
-/// Which autopilot it is: `AUTOPILOT_VERSION`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AutopilotIdentity {
-    /// Flight firmware version, major, minor, patch, type from the top byte down.
-    pub firmware: u32,
-    /// The autopilot's unique id; 0 unknown.
-    pub uid: u64,
-}
+    /// Which autopilot it is: `AUTOPILOT_VERSION`.
+    #[derive(Eq)]
+    pub struct AutopilotIdentity {
+        /// Flight firmware version, major, minor, patch, type from the top byte down.
+        pub firmware: u32,
+        /// The autopilot's unique id; 0 unknown.
+        pub uid: u64,
+    }
 
-/// An answer to a command: `COMMAND_ACK`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CommandAck {
-    /// `MAV_CMD`.
-    pub command: u16,
-    /// `MAV_RESULT`.
-    pub result: u8,
-    /// Whose command it answers; `None` where the sender does not say (MAVLink 1, old firmware).
-    pub target: Option<Source>,
+    /// An answer to a command: `COMMAND_ACK`.
+    #[derive(Eq)]
+    pub struct CommandAck {
+        /// `MAV_CMD`.
+        pub command: u16,
+        /// `MAV_RESULT`.
+        pub result: u8,
+        /// Whose command it answers; `None` where the sender does not say (MAVLink 1, old firmware).
+        pub target: Option<Source>,
+    }
 }
 
 /// One message's worth of knowledge.

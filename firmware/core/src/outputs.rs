@@ -141,7 +141,6 @@ impl Verdict {
 
 state! {
     /// One output.
-    #[derive(Clone, Copy, Debug)]
     struct Output {
         /// Command against the average of all, percent.
         share: AdaptiveBaseline,
@@ -154,10 +153,7 @@ state! {
         first: u16,
         moved: bool,
     }
-}
 
-state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct MotorOutputs {
         port: Option<u8>,
         /// How many motors there are in this flight; 0 before it is known.

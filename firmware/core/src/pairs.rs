@@ -76,15 +76,11 @@ impl Kind {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     struct Sample {
         at: Stamp,
         axes: [f32; 3],
     }
-}
 
-state! {
-    #[derive(Clone, Copy, Debug)]
     struct Pair {
         difference: [f32; 3],
         residual: Residual = Residual::after(SETTLES_S),
@@ -109,7 +105,6 @@ impl Pair {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Pairs {
         samples: [Sample; SENSORS_MAX] = [Sample::default(); SENSORS_MAX],
         pairs: [Pair; SENSORS_MAX] = [Pair::default(); SENSORS_MAX],

@@ -20,7 +20,7 @@ const SHOWN_S: f32 = 0.3;
 pub(crate) const NOISE_M: f32 = 0.8;
 
 /// The estimator of the pressure: the first barometer's values, and that at the arming.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Pressure {
     hpa: f32,
     changed_at: BootMs,

@@ -7,7 +7,7 @@
 /// Turning points kept. A residue grows and then shrinks: 2 N points need N distinct sizes of swing.
 const POINTS: usize = 32;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rainflow<const BINS: usize> {
     edges: [f32; BINS],
     halves: [u32; BINS],

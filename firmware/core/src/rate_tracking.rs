@@ -58,7 +58,6 @@ pub(crate) fn take_attitude(to: &mut Residuals, at: BootMs, attitude: &Attitude,
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Thrust {
         full_since: Option<BootMs>,
         full_at: Option<BootMs>,

@@ -197,7 +197,6 @@ pub(crate) fn smooth<const N: usize>(figure: &mut [f32; N], sample: [f32; N], we
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Residual {
         at: Stamp,
         allowance: f32,
@@ -254,7 +253,6 @@ impl Residual {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Residuals {
         pub(crate) gates: Gates,
         each: [Residual; Comparison::COUNT] = [Residual::default(); Comparison::COUNT],

@@ -97,7 +97,7 @@ pub fn columns(subsystem: Subsystem) -> impl Iterator<Item = &'static str> {
     COLUMNS[subsystem as usize].iter().map(|column| KEPT[*column].0)
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Pending {
     at: BootMs,
     check: &'static str,
@@ -108,7 +108,6 @@ struct Pending {
 
 state! {
     /// The last seconds, and the snapshots that are being taken.
-    #[derive(Clone, Copy, Debug)]
     pub struct Snapshots {
         /// The newest is before `next`.
         ring: [[u16; KEPT.len()]; SAMPLES] = [[0; KEPT.len()]; SAMPLES],

@@ -47,7 +47,6 @@ const TREMBLES_RAD: f32 = 0.01;
 
 state! {
     /// One sensor.
-    #[derive(Clone, Copy, Debug)]
     struct Stuck {
         values: [u16; 2],
         /// When the last one came first: milliseconds modulo 2^32.
@@ -117,7 +116,6 @@ impl Stuck {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     struct Moved {
         climbed_m: f32,
         travelled_m: f32,
@@ -152,7 +150,6 @@ impl Moved {
 }
 
 state! {
-    #[derive(Clone, Copy, Debug)]
     pub(crate) struct Repeats {
         moved: Moved,
         sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT] = [[Stuck::default(); SENSORS_MAX]; Kind::COUNT],

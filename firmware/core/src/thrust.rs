@@ -23,7 +23,7 @@ pub(crate) enum Power {
     Full,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Thrust {
     hover: f32,
     hovered_s: f32,

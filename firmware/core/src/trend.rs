@@ -5,7 +5,6 @@ use crate::units::{Amperes, Volts};
 
 state! {
     /// A battery's internal resistance: the slope of its voltage over its current, from exponential means.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub(crate) struct Resistance {
         current_a: f32,
         voltage_v: f32,

@@ -32,7 +32,6 @@ const OFF: Millis = Millis::from_secs(10);
 state! {
     /// One motor, put together from two kinds of ESC messages: PX4 sends both, ArduPilot's one message is of both kinds. The fields of a kind
     /// are those of its last message.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Motor {
         /// The fields of the last message of each kind.
         pub esc: Esc = Esc { rpm: None, voltage: None, current: None, temperature: None, failures: None, errors: None },
@@ -67,7 +66,6 @@ fn known(places: impl Iterator<Item = bool>) -> u8 {
 
 state! {
     /// The vehicle as it is known now.
-    #[derive(Clone, Copy, Debug)]
     pub struct Vehicle {
         /// The autopilot, once it has sent a heartbeat.
         pub source: Option<Source>,

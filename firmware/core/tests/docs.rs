@@ -12,122 +12,7 @@ use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Millis;
 
 /// The inputs of each check, and the source of its limits unless a parameter is.
-const INPUTS: &str = "\
-batt_remaining: BATTERY_STATUS; SYS_STATUS where no battery reports itself
-cell_voltage: BATTERY_STATUS: the lowest cell, or the pack by its cells, without the sag of its load; SYS_STATUS likewise; armed and lithium
-batt_state: BATTERY_STATUS: charge_state; 1 low or unhealthy, 2 critical, emergency or failed
-cell_deviation: BATTERY_STATUS: highest less lowest cell
-cell_dev_lasting: BATTERY_STATUS: the same for a minute
-batt_resistance: BATTERY_STATUS: slope of voltage over current, above that earlier in the session
-batt_fault: BATTERY_STATUS: fault bits set
-batt_temperature: BATTERY_STATUS
-rail_5v_low: POWER_STATUS
-rail_5v_high: POWER_STATUS
-battery_due: components of kind battery: percent of the limit that trips first
-battery_alert: STATUSTEXT, EVENT; SYS_STATUS: battery; HIGH_LATENCY2
-esc_silent: ESC_STATUS, ESC_INFO, ESC_TELEMETRY: silence beyond three of its own intervals, or five of more than 0.7 s, and as many other messages came as in three usual intervals, or another ESC reports
-esc_temperature: ESC_INFO, ESC_TELEMETRY
-esc_failure: ESC_INFO: failure flags; 1 any, 2 motor stuck or ESC failed
-esc_errors: ESC_INFO: error count, a minute; wraps are no errors
-motor_loss: ESC_STATUS, ESC_TELEMETRY: current in percent of the mean of the others that lift, on rotors, throttle above 20 %; not where half of them stand nearly still and nothing spins: the autopilot stops them to turn; nor a motor that turns at 50 to 90 % of the others' speed, whose command was cut
-motor_imbalance: ESC_STATUS, ESC_TELEMETRY: speed against the middle one and the nearest other one, in steady flight
-motor_output: SERVO_OUTPUT_RAW: one motor's pulse alone above what is usual in this flight, percent of what motors are given; 100 if it alone is at the end of its range; 4, 6 or 8 motors in level flight
-motor_off: SERVO_OUTPUT_RAW: 2 if a motor is given next to nothing while the others carry; the same motors
-thrust_lost: VFR_HUD: how long throttle was full without a climb; on wings, with a sink
-roll_rate: ATTITUDE_TARGET against ATTITUDE: body rate that is wanted and missing, less a part of what is wanted
-pitch_rate: the same messages
-drive_due: components of kind motor, propeller, ESC
-drive_alert: STATUSTEXT, EVENT; SYS_STATUS: motor outputs, propulsion; HIGH_LATENCY2
-cylinder_head: EFI_STATUS
-exhaust_gas: EFI_STATUS
-fuel_pressure: EFI_STATUS
-generator_speed: GENERATOR_STATUS: not while it is off or starts; once it has reached its limits since it was switched on, in this flight
-engine_due: components of kind engine
-vibration: VIBRATION of ArduPilot: the worst axis
-vibration_px4: VIBRATION of PX4: the accelerometer metric
-vibration_rise: VIBRATION: the worst axis, or PX4's accelerometer metric, over what is usual in this flight; on rotors away from the ground; told after 10 s
-clipping: VIBRATION: clipped samples of a flight, since ten seconds without any
-load_factor: SCALED_IMU, RAW_IMU, HIGHRES_IMU: specific force over gravity, while VIBRATION is below 60
-airframe_due: components of kind airframe, other
-vibration_alert: STATUSTEXT, EVENT
-ekf_variance: EKF_STATUS_REPORT: the largest variance but the compass's
-ekf_failsafe: EKF_STATUS_REPORT: the second largest of compass, velocity, position; not of planes
-ekf_compass: EKF_STATUS_REPORT: the compass's variance
-ekf_test_ratio: ESTIMATOR_STATUS: the largest test ratio but the compass's
-ekf_mag_ratio: ESTIMATOR_STATUS: the compass's test ratio
-compass_heading: RAW_IMU, SCALED_IMU, HIGHRES_IMU: heading of the first compass's field, against ATTITUDE's, beyond its usual range in this flight; while it turns little
-compass_unused: ESTIMATOR_STATUS: no test ratio of a compass that had 20 of them in this flight
-accel_mismatch: RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3 of one moment: difference of the forces beyond its usual range in this flight; on rotors, away from the ground, turning little
-imu_gps: RAW_IMU, SCALED_IMU, HIGHRES_IMU: force of the first sensor, turned by ATTITUDE, less the change of GPS_RAW_INT's velocity and of the climb, beyond its own steps and what a late receiver makes of it; of planes without the climb; not of VTOLs, not in fast turns
-gyro_mismatch: the same messages: difference of the rates, likewise; on wings too, and in fast turns where they come within 5 ms; not of VTOLs
-gyro_noise: VIBRATION of PX4: the gyro metric
-compass_mismatch: the same messages: difference of the fields, percent of their length, likewise; not of VTOLs, not in fast turns, not where HIGHRES_IMU comes
-baro_mismatch: SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: difference of the pressures as height, likewise
-baro_height: SCALED_PRESSURE, HIGHRES_IMU: height of the first barometer against GPS_RAW_INT's, beyond its usual range in this flight
-baro_noise: the same messages: steps of that height from sample to sample less the climb of GLOBAL_POSITION_INT, LOCAL_POSITION_NED or VFR_HUD, likewise
-ekf_climb: the same messages: climb by that height against VFR_HUD's, over a second, less the change of the dynamic pressure of the speed; on rotors
-ahrs2_tilt: AHRS2 against ATTITUDE: angle between the two verticals; with an exact receiver
-ahrs2_height: AHRS2 against GLOBAL_POSITION_INT: difference of the altitudes, beyond what is usual in this flight; with an exact receiver
-ahrs2_position: AHRS2 against GLOBAL_POSITION_INT: distance, less half a second of flight; with an exact receiver, where EKF_STATUS_REPORT calls the position absolute
-accel_stuck: RAW_IMU, SCALED_IMU, SCALED_IMU2, SCALED_IMU3, HIGHRES_IMU: how long forces were the same
-gyro_stuck: the same messages: rates
-compass_stuck: the same messages: fields
-baro_stuck: SCALED_PRESSURE, SCALED_PRESSURE2, SCALED_PRESSURE3, HIGHRES_IMU: how long the pressure was the same, while it climbed or sank; or for 10 s where it trembled before
-gps_stuck: GPS_RAW_INT, GPS2_RAW: how long position, height and speed were the same
-gps_speed: GPS_RAW_INT, GPS2_RAW: speed and course less the way between positions, over four seconds
-gps_height: GPS_RAW_INT: what its height moved in four seconds less the climb of GLOBAL_POSITION_INT, LOCAL_POSITION_NED or VFR_HUD, where the barometer (SCALED_PRESSURE, HIGHRES_IMU) did less than half of it
-gps_satellites: GPS_RAW_INT, GPS2_RAW, where the receiver does not tell an accuracy within half of GPS_HACC_WARN
-gps_sats_fall: GPS_RAW_INT, GPS2_RAW: satellites fewer than usual in this flight, in percent of these; with a 3D fix
-gps_hdop: the same messages, likewise
-gps_hdop_rise: GPS_RAW_INT, GPS2_RAW: dilution as a multiple of the usual one of this flight, which is 1 at least
-gps_accuracy: GPS_RAW_INT, GPS2_RAW: horizontal accuracy
-gps_fix: GPS_RAW_INT, GPS2_RAW: fix type, of a receiver that had one
-gps_jamming: GNSS_INTEGRITY
-gps_spoofing: GNSS_INTEGRITY
-gyro_alert: STATUSTEXT, EVENT; SYS_STATUS; HIGH_LATENCY2
-accel_alert: STATUSTEXT, EVENT; SYS_STATUS; ESTIMATOR_STATUS; HIGH_LATENCY2
-compass_alert: STATUSTEXT, EVENT; SYS_STATUS; HIGH_LATENCY2
-baro_alert: STATUSTEXT, EVENT; SYS_STATUS; HIGH_LATENCY2
-airspeed_alert: STATUSTEXT, EVENT; SYS_STATUS; HIGH_LATENCY2
-gnss_alert: STATUSTEXT, EVENT; SYS_STATUS; EKF_STATUS_REPORT, ESTIMATOR_STATUS: glitch; HIGH_LATENCY2; from the first fix on
-ranging_alert: STATUSTEXT, EVENT; SYS_STATUS: optical flow, vision, laser, proximity
-terrain_alert: STATUSTEXT, EVENT; HIGH_LATENCY2
-ekf_alert: STATUSTEXT, EVENT; SYS_STATUS: control of attitude and position, AHRS; EKF_STATUS_REPORT, ESTIMATOR_STATUS: attitude or position lost; HIGH_LATENCY2
-heartbeat: HEARTBEAT of the autopilot: its age
-frames_lost: sequence numbers on the autopilot's port, ten seconds
-position_silent: GLOBAL_POSITION_INT, LOCAL_POSITION_NED: how long before the latest ATTITUDE or HEARTBEAT the last one came
-rc_rssi: RC_CHANNELS; device scale
-radio_rssi: RADIO_STATUS; device scale
-radio_margin: RADIO_STATUS: signal above noise, the worse end; not of a radio that hears no other one
-rc_alert: STATUSTEXT, EVENT; SYS_STATUS: a receiver that was healthy; HIGH_LATENCY2
-gcs_alert: STATUSTEXT, EVENT; HIGH_LATENCY2
-load: SYS_STATUS
-mcu_temperature: MCU_STATUS
-autopilot_reboot: ATTITUDE, SYSTEM_TIME: a boot time that falls while it is armed, for 30 s; not after 10 s of silence
-autopilot_state: HEARTBEAT: MAV_STATE, if it is worse than at the arming
-processor_alert: STATUSTEXT, EVENT
-logging_alert: STATUSTEXT, EVENT; SYS_STATUS
-fence_alert: STATUSTEXT, EVENT; SYS_STATUS; HIGH_LATENCY2
-failsafe_alert: STATUSTEXT, EVENT
-autopilot_alert: STATUSTEXT of severity 0 to 3, EVENT of level 0 to 2, whose meaning is not known
-roll: ATTITUDE, against ATTITUDE_TARGET or NAV_CONTROLLER_OUTPUT
-pitch: ATTITUDE, against ATTITUDE_TARGET or NAV_CONTROLLER_OUTPUT
-attitude_alert: STATUSTEXT, EVENT
-recording: our recorder: 1 not recording, 2 not recording while armed
-record_queue: our recorder: the sector queue
-record_lost: our recorder: frames lost, ten seconds
-card_stall: our recorder: how long the card has kept it waiting
-card_errors: our recorder: block writes that the card refused, ten seconds
-card_room: our recorder: the share of the card that logs can have
-card_due: components of kind card
-free_fall: RAW_IMU, SCALED_IMU, HIGHRES_IMU: specific force below 0.3 g, with the throttle of VFR_HUD; on rotors
-impact: the same: a shock, with the speed of GLOBAL_POSITION_INT breaking off or the vehicle on its side, then stillness
-tumbling: ATTITUDE, or the inertial messages: body rates for 0.5 s, on wings for 1.5 s
-disarmed_in_air: HEARTBEAT: disarmed or terminated out of a flight, and then it falls, sinks or glides
-sinking: GLOBAL_POSITION_INT, LOCAL_POSITION_NED, VFR_HUD: for 0.5 s where the autopilot flies and does not want it (POSITION_TARGET_LOCAL_NED); or a loss of 7 m with full throttle
-overturned: ATTITUDE: the top down by more than 100 degrees; the inertial messages: it lies over, with throttle of late, slower than 12 m/s; for 0.7 s, on rotors
-crash_alert: STATUSTEXT, EVENT
-";
+const INPUTS: &str = include_str!("inputs.txt");
 
 fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../docs").join(name)
@@ -230,7 +115,7 @@ fn seconds(span: Millis) -> String {
 
 fn row(check: &Check) -> String {
     let input = inputs().find(|(name, _)| *name == check.name);
-    let (_, input) = input.unwrap_or_else(|| panic!("{}: say in INPUTS what it reads", check.name));
+    let (_, input) = input.unwrap_or_else(|| panic!("{}: say in inputs.txt what it reads", check.name));
     let side = if check.limits.side == Side::Above { ">" } else { "<" };
     let when = match check.when {
         When::Always => "always",

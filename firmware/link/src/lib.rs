@@ -1,6 +1,7 @@
 //! MAVLink interface: framer, decoder of observations, encoder of our messages.
 #![cfg_attr(not(test), no_std)]
 
+pub mod alert;
 pub mod asking;
 pub mod encode;
 pub mod events;

@@ -1,12 +1,12 @@
 //! `STATUSTEXT` messages of several parts (`id` not 0, `chunk_seq`), put together before their meaning is looked up.
 
-use hums_core::alert;
 use hums_core::cause::Alert;
 use hums_core::clock::Instant;
 use hums_core::observation::Source;
 use hums_core::time::{self, Millis};
 use hums_dialect::ids::STATUSTEXT;
 
+use crate::alert;
 use crate::frame::{Check, Frame};
 use crate::packet::Fields;
 use crate::text::TEXT_BYTES_MAX;

@@ -1,9 +1,9 @@
 //! Components' texts: `STATUSTEXT`, joined from parts.
 
-use hums_core::alert;
 use hums_core::cause::Alert;
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::Source;
+use hums_link::alert;
 
 use crate::mavlink::ids::STATUSTEXT;
 use crate::mavlink::values::{FieldValue, Payload};

@@ -19,7 +19,7 @@ const FALLEN_M: f32 = 2.0;
 /// A terminated one falls so fast some seconds later, by the air pressure alone, m/s.
 const DROPS_MPS: f32 = 10.0;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DisarmWatch {
     since: BootMs,
     pub(super) height_m: Option<f32>,

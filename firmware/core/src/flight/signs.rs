@@ -60,7 +60,7 @@ const FULL_ON_WINGS: f32 = 0.97;
 /// Samples, one after the other, before anything is believed.
 const SAMPLES: u8 = 3;
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Lasting {
     since: BootMs,
     samples: u8,
@@ -86,29 +86,29 @@ impl Lasting {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Signs {
-    /// The worst of each sign, in its own unit; 0 for none.
-    pub(super) worst: [f32; MishapKind::COUNT],
-    /// A sign of this step; the time of the last one.
-    pub(super) seen: Option<MishapKind>,
-    pub(super) seen_at: BootMs,
-    /// Since when an inertial sensor has fallen or turned while the others say that it flies.
-    doubted_since: Stamp,
-    falls: Lasting,
-    unloaded: Lasting,
-    tumbles: Lasting,
-    overturned: Lasting,
-    sinks: Lasting,
+state! {
+    pub(super) struct Signs {
+        /// The worst of each sign, in its own unit; 0 for none.
+        pub(super) worst: [f32; MishapKind::COUNT],
+        /// A sign of this step; the time of the last one.
+        pub(super) seen: Option<MishapKind>,
+        pub(super) seen_at: BootMs,
+        /// Since when an inertial sensor has fallen or turned while the others say that it flies.
+        doubted_since: Stamp,
+        falls: Lasting,
+        unloaded: Lasting,
+        tumbles: Lasting,
+        overturned: Lasting,
+        sinks: Lasting,
+    }
+
+    pub(super) struct Peak {
+        height_m: Option<f32>,
+        at: BootMs,
+    }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Peak {
-    height_m: Option<f32>,
-    at: BootMs,
-}
-
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shock {
     at: BootMs,
     pub(super) load_g: f32,

@@ -11,14 +11,14 @@ use crate::time::BootMs;
 /// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
 const SAME_HEIGHT_M: f32 = 1.5;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Stop {
     at: BootMs,
     height_m: f32,
     sink_mps: f32,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Touchdown(Option<Stop>);
 
 impl Touchdown {

@@ -11,7 +11,7 @@ pub(super) const ALARMS_MAX: usize = 32;
 /// estimator needs some seconds to settle.
 pub(super) const OUTLIVES: Millis = Millis::from_secs(8);
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Standing {
     pub(super) slot: u16,
     pub(super) level: Level,
@@ -23,7 +23,6 @@ pub(super) struct Standing {
 
 state! {
     /// All of them.
-    #[derive(Clone, Copy, Debug)]
     pub(super) struct Alarms {
         standing: [Option<Standing>; ALARMS_MAX] = [None; ALARMS_MAX],
         /// The states that are stale because of a silent link, a bit each.

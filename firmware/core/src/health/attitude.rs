@@ -4,16 +4,9 @@
 //! counts only if it is further than [`FOLLOWS_RAD`] from the setpoint. Without a setpoint it counts, except in modes that let the pilot bank
 //! freely.
 
-use super::check::{Check, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, alert, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
-use crate::cause::Cause;
-use crate::latest::Reading;
+use super::prelude::*;
 use crate::modes::{is_banked_by_hand, is_made_to_turn};
 use crate::observation::{Attitude, VehicleKind};
-use crate::params::Param;
 use crate::time::PAUSE;
 use crate::units::Radians;
 

@@ -311,7 +311,6 @@ pub(super) struct How {
 
 state! {
     /// The memory of one instance of a check.
-    #[derive(Clone, Copy, Debug)]
     pub struct State {
         /// `None` until the value has been seen while the check applied.
         level: Option<Level>,

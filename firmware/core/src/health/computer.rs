@@ -1,15 +1,8 @@
 //! The autopilot's processor.
 
-use super::check::{Check, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, alert, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{FAILSAFES, Group, Role};
-use crate::cause::Cause;
-use crate::latest::Reading;
+use super::prelude::*;
 use crate::motion::{STILL_MPS, climb_mps, ground_speed_mps};
 use crate::observation::Heartbeat;
-use crate::params::Param;
 use crate::time::Millis;
 
 /// A vehicle that was killed at its touchdown is at rest after [`COMES_TO_REST`]: level and still for [`RESTS`], slower than [`STILL_MPS`]. In

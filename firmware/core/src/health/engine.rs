@@ -1,12 +1,7 @@
 //! The combustion engine (EFI) and the generator. Normal values depend on the engine, so the limits are off (at the end of
 //! their range that no value passes) until they are set.
 
-use super::check::{Check, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, due, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use crate::latest::Reading;
-use crate::params::Param;
+use super::prelude::*;
 
 const GENERATOR_HYSTERESIS_RPM: f32 = 100.0;
 

@@ -15,7 +15,6 @@ pub const EXCEEDANCES_MAX: usize = 24;
 
 state! {
     /// Crossings of one check's limits.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Crossings {
         /// How often a warning began.
         pub warnings: u16,
@@ -70,7 +69,7 @@ const fn worse(known: f32, value: f32, side: Side) -> f32 {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
     /// Its place among all checks.
     check: u16,
@@ -98,7 +97,6 @@ impl Entry {
 
 state! {
     /// All exceedances.
-    #[derive(Clone, Copy, Debug)]
     pub struct Exceedances {
         entries: [Option<Entry>; EXCEEDANCES_MAX] = [None; EXCEEDANCES_MAX],
         left_out: u16,

@@ -1,14 +1,7 @@
 //! The autopilot's, the pilot's and the ground station's links.
 
-use super::check::{Check, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, alert, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{Group, RECEIVERS, Role};
-use crate::cause::Cause;
-use crate::latest::Reading;
+use super::prelude::*;
 use crate::observation::TelemetryRadio;
-use crate::params::Param;
 
 const HEARTBEAT: Check = Check {
     name: "heartbeat",

@@ -1,13 +1,7 @@
 //! Mishaps: the signs that [`crate::flight`] saw. No gate holds them back, and they stay critical until the vehicle is armed again or flies
 //! on.
 
-use super::check::{Check, Limits, Read, Unit};
-use super::common::{PLAIN, STALE, alert};
-use super::finding::{Orders, Subsystem};
-use super::inputs::Inputs;
-use super::suppression::Role;
-use crate::cause::Cause;
-use crate::latest::Reading;
+use super::prelude::*;
 use crate::mishap::MishapKind;
 
 pub(super) const CHECKS: &[Check] = &[

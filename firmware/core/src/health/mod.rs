@@ -6,7 +6,6 @@
 mod alarms;
 mod attitude;
 pub mod check;
-mod common;
 mod computer;
 mod engine;
 pub mod exceedance;
@@ -16,6 +15,7 @@ mod link;
 mod mishap;
 mod navigation;
 mod power;
+mod prelude;
 mod propulsion;
 mod recorder;
 mod structure;
@@ -45,7 +45,6 @@ pub const EXPECTED: [Subsystem; 3] = [Subsystem::Power, Subsystem::Link, Subsyst
 
 state! {
     /// The memory of all checks.
-    #[derive(Clone, Copy, Debug)]
     pub struct Health {
         states: [State; STATES] = [State::default(); STATES],
         alarms: Alarms,

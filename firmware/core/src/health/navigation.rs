@@ -1,18 +1,9 @@
 //! Estimator and GNSS.
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, alert, row, said, vibration};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{
-    COMPASS, DISTURBANCES, ESTIMATORS, Group, INERTIAL, RECEIVERS, Role, TURNS, VIBRATION, WRONG_RECEIVERS,
-};
-use crate::cause::Cause;
+use super::prelude::*;
 use crate::gnss_constellation;
-use crate::latest::Reading;
 use crate::observation::{Estimator, EstimatorScale, Gnss, GnssIntegrity, VehicleKind, VibrationScale};
 use crate::pairs::{Kind, SENSORS_MAX};
-use crate::params::Param;
 use crate::residual::Comparison;
 use crate::vehicle::RECEIVERS_MAX;
 

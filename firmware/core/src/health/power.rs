@@ -1,14 +1,7 @@
 //! Batteries and rails.
 
-use super::check::{Check, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE, STALE_SLOW, after, alert, due, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{Group, Role};
-use crate::cause::Cause;
-use crate::latest::{Latest, Reading};
+use super::prelude::*;
 use crate::observation::{Battery, Feeds};
-use crate::params::Param;
 use crate::units::Fraction;
 use crate::vehicle::BATTERIES_MAX;
 

@@ -1,15 +1,8 @@
 //! Motors, ESCs and propellers.
 
-use super::check::{Check, InstanceOf, Limits, Unit, When};
-use super::common::{PLAIN, STALE_SLOW, after, alert, due, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{DRIVE, GYROS, Group, RATES, Role};
-use crate::cause::Cause;
-use crate::latest::Reading;
+use super::prelude::*;
 use crate::observation::{Esc, MOTORS_MAX};
 use crate::outputs::{JUDGED_MAX, Verdict};
-use crate::params::Param;
 use crate::residual::Comparison;
 
 const ESC: Check = Check {

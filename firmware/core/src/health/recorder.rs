@@ -1,12 +1,6 @@
 //! Our own recording: a black box that stopped unnoticed is the failure that pilots report most.
 
-use super::check::{Check, Limits, Unit};
-use super::common::{PLAIN, after, due, row};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::{Group, Role};
-use crate::latest::Reading;
-use crate::params::Param;
+use super::prelude::*;
 use crate::status::Recording;
 
 const STATE: Check = Check {

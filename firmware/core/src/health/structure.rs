@@ -1,12 +1,7 @@
 //! Vibration, clipping and load factor.
 
-use super::check::{Check, Limits, Unit, When};
-use super::common::{PLAIN, STALE, after, alert, due, row, vibration};
-use super::finding::Subsystem;
-use super::suppression::{DRIVE, Group, INERTIAL, Role, SHAKING};
-use crate::cause::Cause;
+use super::prelude::*;
 use crate::observation::VibrationScale;
-use crate::params::Param;
 
 const VIBRATION: Check = Check {
     name: "vibration",

@@ -89,7 +89,7 @@ impl ItemKey {
 
 state! {
     /// Which airframe it is.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Eq)]
     pub struct Airframe {
         /// MAVLink system id; 0 unknown.
         pub system: u8,
@@ -121,7 +121,6 @@ impl Airframe {
 state! {
     /// Totals over an airframe's life. The stored form is as of the beginning of power-on [`Self::boots`]; the stored
     /// [`Session`] of that power-on is added to it.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Lifetime {
         /// Whose life it is.
         pub airframe: Airframe,

@@ -33,7 +33,6 @@ pub enum Room {
 
 state! {
     /// The items that wait to be saved.
-    #[derive(Clone, Copy, Debug)]
     pub struct Saving {
         /// Items that changed since they were saved, one bit each by [`ItemKey::number`].
         changed: u32 = Self::bit(ItemKey::Lifetime) | Self::bit(ItemKey::Exposure),

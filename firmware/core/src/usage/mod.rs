@@ -36,7 +36,6 @@ const LOAD_CYCLES: [UsageCounter; 7] = [
 
 state! {
     /// Usage since power-on.
-    #[derive(Clone, Copy, Debug)]
     pub struct Usage {
         last: Option<BootMs>,
         current_a: Option<f32>,

@@ -5,18 +5,14 @@ use crate::observation::MOTORS_MAX;
 
 state! {
     /// Run time and revolutions of one motor.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MotorTotals {
         /// Seconds that it turned.
         pub seconds: f64,
         /// Revolutions.
         pub revolutions: f64,
     }
-}
 
-state! {
     /// Every counter, added up.
-    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Totals {
         counters: [f64; UsageCounter::ALL.len()] = {
             let mut counters = [0.0; _];

@@ -1,6 +1,5 @@
 //! The autopilot itself, its links, its words.
 
-use hums_core::alert;
 use hums_core::cause::{Alert, Causes};
 use hums_core::cells;
 use hums_core::observation::{
@@ -11,6 +10,7 @@ use hums_core::units::{Celsius, Fraction};
 use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, unix_time, unless, voltage};
+use crate::alert;
 use crate::packet::Fields;
 
 /// A vehicle is a sender whose autopilot is not INVALID. Some ground stations and companions claim one nevertheless,

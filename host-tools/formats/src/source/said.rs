@@ -1,10 +1,10 @@
 //! MAVLink frames as items: observations, parameters, modes, texts.
 
 use anyhow::Result;
-use hums_core::alert::event_name;
 use hums_core::cause::Alert;
 use hums_core::clock::Instant;
 use hums_core::observation::{Autopilot, Observation};
+use hums_link::alert::event_name;
 use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame, LongTexts, observe};

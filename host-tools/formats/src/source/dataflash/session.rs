@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::Result;
-use hums_core::alert;
 use hums_core::clock::Instant;
 use hums_core::observation::Source;
+use hums_link::alert;
 
 use super::ahead::Ahead;
 use super::clock::{Clock, Own};

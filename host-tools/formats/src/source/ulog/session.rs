@@ -5,8 +5,8 @@ use std::io::Read;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use hums_core::alert::{self, event_name};
 use hums_core::clock::{Span, UTC_MICROS};
+use hums_link::alert::{self, event_name};
 
 use super::fields::Fields;
 use super::format::Formats;

@@ -1,6 +1,6 @@
 //! Parameters, texts, modes, events, errors, arming.
 
-use hums_core::alert;
+use hums_link::alert;
 
 use super::handler::{Given, Handler, handler};
 use super::say::{Out, Say};

@@ -5,7 +5,9 @@
 //! the beginning of the text. Most rows are ruled out without a search: all pairs of letters of a pattern must be in
 //! the text ([`PAIRS`]).
 
-use crate::cause::{Alert, Cause, Meaning};
+use hums_core::cause::{Alert, Cause};
+
+use super::Meaning;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Where {

@@ -1,15 +1,18 @@
-//! Parts that several subsystems' tables share.
+//! What each subsystem's table of checks is written with.
 
 use core::num::NonZeroU8;
 
-use super::check::{Check, Debounce, InstanceOf, Limits, Unit, When};
-use super::finding::Subsystem;
-use super::inputs::Inputs;
-use super::suppression::Role;
-use crate::cause::Cause;
-use crate::latest::Reading;
+pub(super) use super::check::{Check, Debounce, InstanceOf, Limits, Read, Unit, When};
+pub(super) use super::finding::{Orders, Subsystem};
+pub(super) use super::inputs::Inputs;
+pub(super) use super::suppression::{
+    COMPASS, DISTURBANCES, DRIVE, ESTIMATORS, FAILSAFES, GYROS, Group, INERTIAL, RATES, RECEIVERS, Role,
+    SHAKING, TURNS, VIBRATION, WRONG_RECEIVERS,
+};
+pub(super) use crate::cause::Cause;
+pub(super) use crate::latest::{Latest, Reading};
 use crate::observation::VibrationScale;
-use crate::params::Param;
+pub(super) use crate::params::Param;
 
 /// Most streams come at 1 Hz or more even over a radio; some batteries at 0.5 Hz.
 pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);

@@ -5,8 +5,10 @@
 //! the three others. So a name gives its number here, while the firmware is built, and stays the same for all
 //! versions that keep the name.
 
-use crate::bytes::fnv1a;
-use crate::cause::{Alert, Cause, Meaning};
+use hums_core::cause::{Alert, Cause};
+use hums_core::fnv1a;
+
+use super::Meaning;
 
 /// The autopilot's component in the number of an event.
 const AUTOPILOT: u32 = 1 << 24;
