@@ -435,7 +435,7 @@ impl Vehicle {
 
     fn take_generator(&mut self, at: BootMs, generator: Generator) {
         let before = self.generator_top.filter(|_| self.armed());
-        self.generator_top = match generator.speed {
+        self.generator_top = match generator.speed.and_then(Rpm::finite) {
             _ if generator.is_off => before.map(|_| Rpm(0.0)),
             Some(speed) if speed.0 > 0.0 => Some(before.map_or(speed, |top| Rpm(top.0.max(speed.0)))),
             _ => before,
