@@ -11,15 +11,13 @@ use crate::motion::ground_speed_mps;
 use crate::observation::SecondEstimate;
 use crate::residual::{AT_ONCE, Comparison, Residuals};
 use crate::time::{BootMs, Millis};
-use crate::units::{Position, norm};
+use crate::units::{DEGREE_M, Position, norm};
 use crate::vehicle::Vehicle;
 
 /// A receiver's place, and a message, are so old, s.
 const LATE_S: f32 = 0.5;
 /// `EKF_POS_HORIZ_ABS`
 const POS_HORIZ_ABS: u16 = 16;
-/// A degree of latitude, m.
-const DEGREE_M: f64 = 111_320.0;
 
 pub(crate) fn take(residuals: &mut Residuals, at: BootMs, second: &SecondEstimate, vehicle: &Vehicle) {
     if !residuals.is_due(Comparison::Ahrs2Tilt, at, Millis::ZERO) {

@@ -14,10 +14,10 @@ use crate::latest::Reading;
 use crate::observation::Gnss;
 use crate::residual::{LATE_S, RECEIVER_S, smooth};
 use crate::time::{BootMs, Millis, PAUSE, Stamp};
-use crate::units::{Metres, Position};
+use crate::units::{DEGREE_M, Metres, Position};
 
 /// Positions are compared in units of 1e-7 degrees of latitude, in metres.
-const UNIT_M: f32 = 0.011_132;
+const UNIT_M: f32 = (DEGREE_M * 1e-7) as f32;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Fix {
@@ -124,8 +124,8 @@ mod tests {
             };
             velocity_residual.take(now, &gnss, true);
             velocity_residual.take(now, &gnss, true);
-            place[0] += f64::from(velocity[0]) * 0.2 / 111_320.0;
-            place[1] += f64::from(velocity[1]) * 0.2 / (111_320.0 * 47.0_f64.to_radians().cos());
+            place[0] += f64::from(velocity[0]) * 0.2 / DEGREE_M;
+            place[1] += f64::from(velocity[1]) * 0.2 / (DEGREE_M * 47.0_f64.to_radians().cos());
         }
         velocity_residual.residual(BootMs::from_millis(20_000)).map(|reading| reading.value)
     }

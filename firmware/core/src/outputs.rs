@@ -88,17 +88,16 @@ enum Range {
 }
 
 impl Range {
-    /// No pulse is as short as this, nor as long, us.
-    const SHORTEST_US: u16 = 500;
-    const LONGEST_US: u16 = 2_500;
+    /// Pulses are as long as this, us.
+    const PULSES_US: RangeInclusive<u16> = 500..=2_500;
 
     /// What these show it to be: it begins at nothing where all that are given next to nothing on the ground say so.
     fn seen(self, outputs: &[u16], on_ground: bool) -> Self {
         let used = || outputs.iter().filter(|output| **output > 0);
-        let begins = || used().count() > 1 && used().all(|output| *output < Self::SHORTEST_US);
+        let begins = || used().count() > 1 && used().all(|output| *output < *Self::PULSES_US.start());
         match self {
             Self::Pulses if on_ground && begins() => Self::DShot,
-            Self::DShot if outputs.iter().any(|output| *output > Self::LONGEST_US) => Self::Can,
+            Self::DShot if outputs.iter().any(|output| *output > *Self::PULSES_US.end()) => Self::Can,
             known => known,
         }
     }

@@ -23,8 +23,6 @@ const PAIRS: [(usize, usize); SENSORS_MAX] = [(0, 1), (0, 2), (1, 2)];
 const SETTLES_S: f32 = 1.5;
 /// Scale difference of gyros; autopilots calibrate only their offsets (MPU-6000: 3 %, data sheet).
 const GYRO_SCALE: f32 = 0.05;
-/// Within this time the turn of a vehicle makes no difference, even a fast one.
-const AT_ONCE_MS: u64 = 5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -52,7 +50,8 @@ impl Kind {
     fn one_moment(self, gates: Gates) -> Millis {
         Millis::from_millis(match self {
             _ if !self.row().is_open(gates) => 0,
-            Self::Gyro if !gates.are(gates::STILL) => AT_ONCE_MS,
+            // The turn of a vehicle makes no difference, even a fast one.
+            Self::Gyro if !gates.are(gates::STILL) => 5,
             Self::Accelerometer | Self::Gyro => 25,
             Self::Compass => 100,
             Self::Barometer => 250,

@@ -3,6 +3,8 @@
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const GRAVITY: f32 = 9.806_65;
+/// A degree of latitude, m.
+pub(crate) const DEGREE_M: f64 = 111_320.0;
 
 macro_rules! units {
     ($($(#[$doc:meta])* $name:ident, $symbol:literal $(, $max:expr)?;)*) => {$(

@@ -3,6 +3,8 @@
 //! [`crate::election`] decides which system on the link is the vehicle. The others (ground stations, other vehicles)
 //! are recorded and not judged. Bounded: [`BATTERIES_MAX`] batteries, [`MOTORS_MAX`] motors; more are recorded only.
 
+use core::ops::Range;
+
 use crate::alert::Alerts;
 use crate::election::Election;
 use crate::inertial::Inertial;
@@ -206,8 +208,7 @@ impl Vehicle {
     /// Whether it hangs on its rotors now (`Some(false)`: it flies on wings); `None` if that is unknown. Of a VTOL
     /// its own word counts, and its speed where it says none: between the two it may be either.
     pub fn hovers(&self, now: BootMs) -> Option<bool> {
-        const WINGS_MPS: f32 = 12.0;
-        const ROTORS_MPS: f32 = 6.0;
+        const TRANSITION_MPS: Range<f32> = 6.0..12.0;
         match self.kind() {
             VehicleKind::Rotorcraft => Some(true),
             VehicleKind::Plane => Some(false),
@@ -219,8 +220,7 @@ impl Vehicle {
                     let hud = self.hud.within(now, SILENT)?;
                     let speed_mps = hud.airspeed.into_iter().chain(hud.groundspeed).map(|speed| speed.0);
                     let speed_mps = speed_mps.reduce(f32::max)?;
-                    let between = (ROTORS_MPS..WINGS_MPS).contains(&speed_mps);
-                    (!between).then_some(speed_mps < ROTORS_MPS)
+                    (!TRANSITION_MPS.contains(&speed_mps)).then_some(speed_mps < TRANSITION_MPS.start)
                 }
             },
             VehicleKind::Surface | VehicleKind::Other => None,

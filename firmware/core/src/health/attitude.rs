@@ -31,7 +31,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Other, DRIVE | GYROS | Group::RollRate.bit()), ..ROLL },
     row!("pitch" ROLL, role: Role::of(Group::Other, DRIVE | GYROS | Group::PitchRate.bit()),
         read: |inputs, _| degrees(inputs, |attitude| attitude.pitch, 1)),
-    alert::<{ Cause::Attitude as usize }>(Subsystem::Attitude, Role::of(Group::Other, DRIVE | GYROS | RATES)),
+    alert!(Attitude Attitude, Role::of(Group::Other, DRIVE | GYROS | RATES)),
 ];
 
 fn degrees(inputs: &Inputs<'_>, angle: fn(&Attitude) -> Radians, axis: usize) -> Option<Reading> {

@@ -30,11 +30,11 @@ pub(super) const CHECKS: &[Check] = &[
     row!("autopilot_state" LOAD, above(_ StateCrit 0.0),
         role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()), unit: Unit::FLAG,
         debounce: after(2_000, 500), when: When::Armed, alarm_only: true, read: state),
-    alert::<{ Cause::Processor as usize }>(Subsystem::Computer, Role::NONE),
-    alert::<{ Cause::Logging as usize }>(Subsystem::Computer, Role::NONE),
-    alert::<{ Cause::Fence as usize }>(Subsystem::Computer, Role::NONE),
-    alert::<{ Cause::Failsafe as usize }>(Subsystem::Computer, Role::of(Group::Failsafe, FAILSAFES)),
-    alert::<{ Cause::Other as usize }>(Subsystem::Computer, Role::NONE),
+    alert!(Processor Computer, Role::NONE),
+    alert!(Logging Computer, Role::NONE),
+    alert!(Fence Computer, Role::NONE),
+    alert!(Failsafe Computer, Role::of(Group::Failsafe, FAILSAFES)),
+    alert!(Other Computer, Role::NONE),
 ];
 
 /// `MAV_STATE`, without a failsafe that stands since before the arming. PX4's kill switch is a termination, and pilots press it after a touchdown. A vehicle that was terminated in the air falls,

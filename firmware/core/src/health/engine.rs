@@ -24,7 +24,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.fuel_pressure?.0))),
     row!("generator_speed" ENGINE, below(GenSpeedWarn GenSpeedCrit GENERATOR_HYSTERESIS_RPM),
         unit: Unit::of("rpm"), when: When::Armed, read: generator_rpm),
-    Check { name: "engine_due", ..due(Subsystem::Engine) },
+    due!("engine_due" Engine),
 ];
 
 /// The speed counts once the generator has reached its limits since it was switched on. Before that, and while it is off, the

@@ -40,11 +40,8 @@ pub(super) const CHECKS: &[Check] = &[
     }),
     row!("radio_margin" RADIO, below(RadioMargWarn _ 2.0),
         read: |inputs, _| inputs.vehicle.radio.read(radio_margin)),
-    alert::<{ Cause::RemoteControl as usize }>(Subsystem::Link, Role::of(Group::FailsafeCause, 0)),
-    alert::<{ Cause::GroundStation as usize }>(
-        Subsystem::Link,
-        Role::of(Group::FailsafeCause, Group::Silence.bit()),
-    ),
+    alert!(RemoteControl Link, Role::of(Group::FailsafeCause, 0)),
+    alert!(GroundStation Link, Role::of(Group::FailsafeCause, Group::Silence.bit())),
 ];
 
 fn position_age_s(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {

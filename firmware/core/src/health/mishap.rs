@@ -14,7 +14,7 @@ pub(super) const CHECKS: &[Check] = &[
     },
     sign(MishapKind::Sinking, "m/s", |inputs, _| reading(inputs, MishapKind::Sinking)),
     sign(MishapKind::Overturned, "deg", |inputs, _| reading(inputs, MishapKind::Overturned)),
-    alert::<{ Cause::Crash as usize }>(Subsystem::Mishap, Role::NONE),
+    alert!(Crash Mishap, Role::NONE),
 ];
 
 const fn sign(kind: MishapKind, unit: &str, read: Read) -> Check {

@@ -197,24 +197,18 @@ pub(super) const CHECKS: &[Check] = &[
     row!("gps_spoofing" GNSS, above(GpsJamWarn GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
         unit: Unit::FLAG, when: When::Always,
         read: |inputs, receiver| integrity(inputs, receiver, |known| known.spoofing)),
-    alert::<{ Cause::Gyro as usize }>(Subsystem::Navigation, Role::of(Group::GyroFault, 0)),
-    alert::<{ Cause::Accelerometer as usize }>(Subsystem::Navigation, Role::of(Group::AccelFault, 0)),
-    alert::<{ Cause::Compass as usize }>(Subsystem::Navigation, Role::of(Group::CompassFault, TURNS)),
-    alert::<{ Cause::Barometer as usize }>(Subsystem::Navigation, Role::of(Group::BaroFault, 0)),
-    alert::<{ Cause::Airspeed as usize }>(Subsystem::Navigation, Role::of(Group::Sensor, 0)),
+    alert!(Gyro Navigation, Role::of(Group::GyroFault, 0)),
+    alert!(Accelerometer Navigation, Role::of(Group::AccelFault, 0)),
+    alert!(Compass Navigation, Role::of(Group::CompassFault, TURNS)),
+    alert!(Barometer Navigation, Role::of(Group::BaroFault, 0)),
+    alert!(Airspeed Navigation, Role::of(Group::Sensor, 0)),
     Check {
         read: |inputs, _| said(inputs, Cause::Gnss).filter(|_| is_gnss_judged(inputs)),
-        ..alert::<{ Cause::Gnss as usize }>(
-            Subsystem::Navigation,
-            Role::of(Group::GnssWord, WRONG_RECEIVERS | INERTIAL | Group::ImuGnss.bit() | VIBRATION),
-        )
+        ..alert!(Gnss Navigation, Role::of(Group::GnssWord, WRONG_RECEIVERS | INERTIAL | Group::ImuGnss.bit() | VIBRATION))
     },
-    alert::<{ Cause::Ranging as usize }>(Subsystem::Navigation, Role::NONE),
-    alert::<{ Cause::Terrain as usize }>(Subsystem::Navigation, Role::NONE),
-    alert::<{ Cause::Estimator as usize }>(
-        Subsystem::Navigation,
-        Role::of(Group::Ekf, Group::Reboot.bit() | DISTURBANCES | Group::EkfClimb.bit()),
-    ),
+    alert!(Ranging Navigation, Role::NONE),
+    alert!(Terrain Navigation, Role::NONE),
+    alert!(Estimator Navigation, Role::of(Group::Ekf, Group::Reboot.bit() | DISTURBANCES | Group::EkfClimb.bit())),
 ];
 
 fn residual(inputs: &Inputs<'_>, of: Comparison) -> Option<Reading> {

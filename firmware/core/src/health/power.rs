@@ -61,11 +61,8 @@ pub(super) const CHECKS: &[Check] = &[
     row!("rail_5v_high" BATTERY, above(RailHighWarn _ 0.05), unit: Unit::of("V"),
         debounce: after(1_000, 2_000), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0))),
-    Check { name: "battery_due", ..due(Subsystem::Power) },
-    alert::<{ Cause::Power as usize }>(
-        Subsystem::Power,
-        Role::of(Group::FailsafeCause, Group::Battery.bit() | Group::BatteryState.bit()),
-    ),
+    due!("battery_due" Power),
+    alert!(Power Power, Role::of(Group::FailsafeCause, Group::Battery.bit() | Group::BatteryState.bit())),
 ];
 
 pub(super) fn feeds(check: &Check, inputs: &Inputs<'_>, instance: u8) -> Feeds {

@@ -57,48 +57,57 @@ macro_rules! row {
 }
 pub(super) use row;
 
-/// The autopilot's own word on `CAUSE`, the number of a [`Cause`].
-pub(super) const fn alert<const CAUSE: usize>(subsystem: Subsystem, role: Role) -> Check {
-    Check {
-        name: Cause::ALL[CAUSE].name(),
-        subsystem,
-        limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
-        // Silence tells nothing about health.
-        alarm_only: true,
-        unit: Unit::FLAG,
-        role,
-        read: |inputs, _| said(inputs, Cause::ALL[CAUSE]),
-        ..PLAIN
-    }
+/// What the autopilot itself reports.
+pub(super) const ALERT: Check = Check {
+    limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
+    // Silence tells nothing about health.
+    alarm_only: true,
+    unit: Unit::FLAG,
+    ..PLAIN
+};
+
+/// The check of a cause that the autopilot reports.
+macro_rules! alert {
+    ($cause:ident $subsystem:ident, $role:expr) => {
+        Check {
+            name: Cause::$cause.name(),
+            subsystem: Subsystem::$subsystem,
+            role: $role,
+            read: |inputs, _| said(inputs, Cause::$cause),
+            ..ALERT
+        }
+    };
 }
+pub(super) use alert;
 
 pub(super) fn said(inputs: &Inputs<'_>, cause: Cause) -> Option<Reading> {
     let level = inputs.vehicle.alerts.level(inputs.now, cause, inputs.flight.in_mishap());
     inputs.reading(level?)
 }
 
-pub(super) const fn due(subsystem: Subsystem) -> Check {
-    Check {
-        name: "",
-        subsystem,
-        unit: Unit::of("%"),
-        limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
-        debounce: after(1_000, 1_000),
-        // A part that is not due does not make its subsystem healthy.
-        alarm_only: true,
-        read: match subsystem {
-            Subsystem::Power => |inputs, _| used(inputs, Subsystem::Power),
-            Subsystem::Propulsion => |inputs, _| used(inputs, Subsystem::Propulsion),
-            Subsystem::Engine => |inputs, _| used(inputs, Subsystem::Engine),
-            Subsystem::Structure => |inputs, _| used(inputs, Subsystem::Structure),
-            Subsystem::Recorder => |inputs, _| used(inputs, Subsystem::Recorder),
-            _ => |_, _| None,
-        },
-        ..PLAIN
-    }
-}
+pub(super) const DUE: Check = Check {
+    unit: Unit::of("%"),
+    limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
+    debounce: after(1_000, 1_000),
+    // A part that is not due does not make its subsystem healthy.
+    alarm_only: true,
+    ..PLAIN
+};
 
-fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
+/// The check of the components of a subsystem.
+macro_rules! due {
+    ($name:literal $subsystem:ident) => {
+        Check {
+            name: $name,
+            subsystem: Subsystem::$subsystem,
+            read: |inputs, _| used(inputs, Subsystem::$subsystem),
+            ..DUE
+        }
+    };
+}
+pub(super) use due;
+
+pub(super) fn used(inputs: &Inputs<'_>, subsystem: Subsystem) -> Option<Reading> {
     let mine = inputs.wear.iter().flatten().filter(|(of, _)| *of == subsystem);
     // A part is replaced on the ground, and a flight counts when it is over: until then it is due soon.
     let most = if inputs.flight.is_open() { inputs.params.get(Param::CompRed) } else { f32::INFINITY };

@@ -67,11 +67,8 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, _| rate_off_deg_s(inputs, 0)),
     row!("pitch_rate" RATE, role: Role::of(Group::PitchRate, DRIVE | GYROS),
         read: |inputs, _| rate_off_deg_s(inputs, 1)),
-    Check { name: "drive_due", ..due(Subsystem::Propulsion) },
-    alert::<{ Cause::Propulsion as usize }>(
-        Subsystem::Propulsion,
-        Role::of(Group::Drive, Group::MotorLoss.bit() | Group::MotorOutput.bit()),
-    ),
+    due!("drive_due" Propulsion),
+    alert!(Propulsion Propulsion, Role::of(Group::Drive, Group::MotorLoss.bit() | Group::MotorOutput.bit())),
 ];
 
 fn verdict(inputs: &Inputs<'_>, motor: u8, value: fn(Verdict) -> f32) -> Option<Reading> {

@@ -27,7 +27,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce: after(0, 1_000), read: |inputs, _| inputs.reading(inputs.derived.write_errors.lately())),
     row!("card_room" STATE, below(RecRoomWarn RecRoomCrit 1.0), unit: Unit::of("%"),
         read: |inputs, _| inputs.reading(inputs.recorder.room? * 100.0)),
-    Check { name: "card_due", ..due(Subsystem::Recorder) },
+    due!("card_due" Recorder),
 ];
 
 /// 0 recording, 1 not recording, 2 not recording while armed.

@@ -36,9 +36,6 @@ pub(super) const CHECKS: &[Check] = &[
     row!("load_factor" VIBRATION, above(LoadFacWarn LoadFacCrit 0.2), role: Role::of(Group::Other, SHAKING),
         unit: Unit::of("g"), debounce: after(500, 500), when: When::InFlight, stale_s: None,
         read: |inputs, _| inputs.derived.load_factor()),
-    Check { name: "airframe_due", ..due(Subsystem::Structure) },
-    alert::<{ Cause::Vibration as usize }>(
-        Subsystem::Structure,
-        Role::of(Group::VibrationWord, Group::Vibration.bit() | INERTIAL | Group::ImuGnss.bit()),
-    ),
+    due!("airframe_due" Structure),
+    alert!(Vibration Structure, Role::of(Group::VibrationWord, Group::Vibration.bit() | INERTIAL | Group::ImuGnss.bit())),
 ];
