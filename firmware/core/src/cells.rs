@@ -242,36 +242,80 @@ impl Cells {
 mod tests {
     use super::*;
 
-    const LOW: u8 = 9;
-    const CRITICAL: u8 = 10;
-    const FULL: u8 = 3;
-    const EMPTY: u8 = 4;
-
-    fn plugged(pack_v: f32) -> Cells {
+    /// The counts of the batteries after a script: `rest` and `fly` with the voltage of a pack, `rest1`
+    /// of the second one, `before` with a stored count, or a parameter with its value.
+    fn counts(script: &str) -> [u8; 2] {
         let mut cells = Cells::default();
-        cells.take_voltage(0, 0, pack_v, true, false);
-        cells
+        for step in script.split(", ").filter(|step| !step.is_empty()) {
+            let (what, value) = step.split_once(' ').expect(step);
+            let number: f32 = value.parse().expect(step);
+            match what {
+                "rest" => cells.take_voltage(0, 0, number, true, false),
+                "rest1" => cells.take_voltage(1, 1, number, true, false),
+                "fly" => cells.take_voltage(0, 0, number, false, true),
+                "before" => cells.remember(0, number as u8),
+                name => cells.take_setting(known(name).expect(name), number),
+            }
+        }
+        [cells.of(0), cells.of(1)]
+    }
+
+    #[test]
+    fn a_count_is_known_if_voltage_parameters_and_earlier_flights_leave_one() {
+        for (what, script, expected) in [
+            ("a full pack of one cell", "rest 4.2", 1),
+            ("half full", "rest 3.8", 1),
+            ("two", "rest 8.4", 2),
+            ("three", "rest 12.6", 3),
+            ("three, half full", "rest 11.4", 3),
+            ("four", "rest 16.8", 4),
+            ("four, half full", "rest 15.2", 4),
+            ("four of high voltage", "rest 17.4", 4),
+            ("it may be of several", "rest 25.2", 0),
+            ("it may be of several", "rest 30.4", 0),
+            ("it may be of several", "rest 50.4", 0),
+            ("it may be of several", "rest 58.8", 0),
+            ("a 4S in place of a 6S", "rest 16.8, MOT_BAT_VOLT_MAX 25.2", 4),
+            ("as delivered it says nothing", "rest 25.2, BATT_LOW_VOLT 10.5", 0),
+            ("a stored count confirms", "rest 25.2, before 6", 6),
+            ("a 4S after a 6S is no dead 6S", "rest 16.8, before 6", 4),
+            ("it does not fit", "rest 30.4, before 6", 0),
+            // A full 5S after a 6S is not taken for an empty 6S. A 6S at 3.7 V is.
+            ("a full 5S", "rest 21.1, before 6", 0),
+            ("a full 5S of high voltage", "rest 21.7, before 6", 0),
+            ("a 6S at 3.7 V", "rest 22.3, before 6", 6),
+            ("of another count", "rest 25.2, before 7", 0),
+            ("of another count", "rest 50.4, before 14", 0),
+            // 0x80 is a doubt: the last flight did not confirm it.
+            ("in the air", "before 6, fly 20.4", 6),
+            ("in the air, doubted", "before 134, fly 20.4", 0),
+            ("in the air, nothing and doubted", "before 128, fly 20.4", 0),
+            ("in the air, garbage", "before 255, fly 20.4", 0),
+            ("rested, doubted", "rest 25.2, before 134", 6),
+            ("rested, nothing and doubted", "rest 25.2, before 128", 0),
+            ("rested, garbage", "rest 25.2, before 255", 0),
+            (
+                "swapped while the autopilot is powered",
+                "rest 25.2, MOT_BAT_VOLT_MAX 25.2, rest 0.3, rest 16.8",
+                4,
+            ),
+            ("in flight the same is an empty pack", "rest 16.8, fly 11.0", 4),
+            ("5 full or 6 half empty", "fly 20.4", 0),
+            ("its last flight says which", "fly 20.4, before 6", 6),
+            ("its parameter says which", "fly 20.4, before 6, before 0, BAT1_N_CELLS 6", 6),
+        ] {
+            assert_eq!(counts(script)[0], expected, "{what}: {script}");
+        }
+        assert_eq!(counts("rest 25.2, rest1 12.6, BAT2_N_CELLS 3, BAT1_N_CELLS 6"), [6, 3]);
     }
 
     #[test]
     fn the_voltage_alone_never_gives_a_wrong_count_from_3_5_v_to_4_4_v_a_cell() {
         for count in 1..=COUNT_MAX {
             for cell_cv in 351..440 {
-                let cells = plugged(count as f32 * cell_cv as f32 / 100.0);
-                assert!(
-                    [0, count as u8].contains(&cells.of(0)),
-                    "{count} cells at {cell_cv}: {}",
-                    cells.of(0)
-                );
+                let [known, _] = counts(&format!("rest {}", count as f32 * cell_cv as f32 / 100.0));
+                assert!([0, count as u8].contains(&known), "{count} cells at {cell_cv}: {known}");
             }
-        }
-        for (pack_v, count) in
-            [(4.2, 1), (3.8, 1), (8.4, 2), (12.6, 3), (11.4, 3), (16.8, 4), (15.2, 4), (17.4, 4)]
-        {
-            assert_eq!(plugged(pack_v).of(0), count, "{pack_v}");
-        }
-        for pack_v in [25.2, 30.4, 50.4, 58.8] {
-            assert_eq!(plugged(pack_v).of(0), 0, "{pack_v} V may be of several");
         }
     }
 
@@ -287,108 +331,48 @@ mod tests {
             let n = count as f32;
             for (levels, [full, empty, low, critical]) in chemistries {
                 for level in levels {
-                    let mut px4 = plugged(n * level);
-                    px4.take_setting(0, n);
-                    assert_eq!(px4.of(0), count as u8, "PX4, {count} cells at {level}");
-                    let mut ardupilot = plugged(n * level);
-                    for (place, value) in [(LOW, low), (CRITICAL, critical), (FULL, full), (EMPTY, empty)] {
-                        ardupilot.take_setting(place, n * value);
-                        let known = ardupilot.of(0);
-                        assert!([0, count as u8].contains(&known), "{count} cells at {level}: {known}");
+                    let mut script = format!("rest {}", n * level);
+                    assert_eq!(counts(&format!("{script}, BAT1_N_CELLS {n}"))[0], count as u8, "{script}");
+                    for (name, value) in [
+                        ("BATT_LOW_VOLT", low),
+                        ("BATT_CRT_VOLT", critical),
+                        ("MOT_BAT_VOLT_MAX", full),
+                        ("MOT_BAT_VOLT_MIN", empty),
+                    ] {
+                        script += &format!(", {name} {}", n * value);
+                        assert!([0, count as u8].contains(&counts(&script)[0]), "{script}");
                     }
-                    assert_eq!(ardupilot.of(0), count as u8, "ArduPilot, {count} cells at {level}");
+                    assert_eq!(counts(&script)[0], count as u8, "{script}");
                 }
             }
         }
     }
 
     #[test]
-    fn a_parameter_that_the_voltage_contradicts_is_not_believed() {
-        let mut cells = plugged(16.8);
-        cells.take_setting(FULL, 25.2);
-        assert_eq!(cells.of(0), 4, "a 4S in place of a 6S");
-        let mut delivered = plugged(25.2);
-        delivered.take_setting(LOW, 10.5);
-        assert_eq!(delivered.of(0), 0, "as delivered it says nothing");
-        let mut none = plugged(15.2);
+    fn parameters_that_are_not_set_say_nothing() {
+        let mut none = Cells::default();
+        none.take_voltage(0, 0, 15.2, true, false);
         for place in 0..KNOWN.len() as u8 {
             none.take_setting(place, 0.0);
             none.take_setting(place, f32::NAN);
         }
-        assert_eq!(none.of(0), 4);
-    }
-
-    #[test]
-    fn a_stored_count_only_confirms() {
-        let mut cells = plugged(25.2);
-        cells.remember(0, 6);
-        assert_eq!(cells.of(0), 6);
-        let mut swapped = plugged(16.8);
-        swapped.remember(0, 6);
-        assert_eq!(swapped.of(0), 4, "a 4S after a 6S is no dead 6S");
-        let mut unfit = plugged(30.4);
-        unfit.remember(0, 6);
-        assert_eq!(unfit.of(0), 0);
-        // A full 5S after a 6S is not taken for an empty 6S. A 6S at 3.7 V is.
-        for (pack_v, before, count) in [(21.1, 6, 0), (21.7, 6, 0), (22.3, 6, 6), (25.2, 7, 0), (50.4, 14, 0)]
-        {
-            let mut cells = plugged(pack_v);
-            cells.remember(0, before);
-            assert_eq!(cells.of(0), count, "{pack_v} V after {before}S");
-        }
-    }
-
-    #[test]
-    fn a_count_that_the_last_flight_did_not_confirm_is_not_believed_in_the_air() {
-        for (stored, count) in [(6, 6), (6 | DOUBTED, 0), (DOUBTED, 0), (0xFF, 0)] {
-            let mut cells = Cells::default();
-            cells.remember(0, stored);
-            cells.take_voltage(0, 0, 20.4, false, true);
-            assert_eq!(cells.of(0), count, "{stored}");
-            let mut cells = plugged(25.2);
-            cells.remember(0, stored);
-            assert_eq!(cells.of(0), if stored & 6 == 6 && stored != 0xFF { 6 } else { 0 }, "{stored}");
-        }
+        assert_eq!((none.of(0), none.of(2), none.of(9)), (4, 0, 0));
     }
 
     #[test]
     fn a_setting_fits_a_pack_by_its_highest_voltage() {
-        let cells = plugged(12.6);
+        let mut cells = Cells::default();
+        cells.take_voltage(0, 0, 12.6, true, false);
         let fitting: Vec<u8> = (0..=24).filter(|count| cells.fits(0, *count)).collect();
         assert_eq!(fitting, [3, 4], "and not 6");
         assert!(!cells.fits(1, 6) && !cells.fits(9, 6), "nothing was heard of it");
     }
 
     #[test]
-    fn a_pack_that_is_swapped_while_the_autopilot_is_powered_is_counted_anew() {
-        let mut cells = plugged(25.2);
-        cells.take_setting(FULL, 25.2);
-        assert_eq!(cells.of(0), 6);
-        cells.take_voltage(0, 0, 0.3, true, false);
-        cells.take_voltage(0, 0, 16.8, true, false);
-        assert_eq!(cells.of(0), 4);
-        // In flight the same is an empty pack.
-        let mut flown = plugged(16.8);
-        flown.take_voltage(0, 0, 11.0, false, true);
-        assert_eq!(flown.of(0), 4);
-    }
-
-    #[test]
-    fn a_box_that_starts_in_the_air_believes_no_voltage_alone() {
-        let mut cells = Cells::default();
-        cells.take_voltage(0, 0, 20.4, false, true);
-        assert_eq!(cells.of(0), 0, "5 full or 6 half empty");
-        cells.remember(0, 6);
-        assert_eq!(cells.of(0), 6);
-        cells.remember(0, 0);
-        cells.take_setting(0, 6.0);
-        assert_eq!(cells.of(0), 6);
-    }
-
-    #[test]
     fn the_capacity_is_known_where_it_is_told_of_each_battery() {
         let set = |cells: &mut Cells, name: &str, mah| cells.take_setting(known(name).unwrap(), mah);
-        let mut cells = plugged(16.8);
+        let mut cells = Cells::default();
+        cells.take_voltage(0, 0, 16.8, true, false);
         assert!(cells.capacity_ah().abs() < f32::EPSILON);
         set(&mut cells, "BATT_CAPACITY", 5_200.0);
         set(&mut cells, "BATT2_CAPACITY", 3_300.0);
@@ -399,14 +383,5 @@ mod tests {
         set(&mut cells, "BAT2_CAPACITY", -1.0);
         assert!(cells.capacity_ah().abs() < f32::EPSILON);
         assert_eq!(cells.of(0), 4, "it says nothing of the cells");
-    }
-
-    #[test]
-    fn two_batteries_are_counted_each_by_itself() {
-        let mut cells = plugged(25.2);
-        cells.take_voltage(1, 1, 12.6, true, false);
-        cells.take_setting(1, 3.0);
-        cells.take_setting(0, 6.0);
-        assert_eq!((cells.of(0), cells.of(1), cells.of(2), cells.of(9)), (6, 3, 0, 0));
     }
 }

@@ -192,61 +192,55 @@ mod tests {
     }
 
     #[test]
-    fn the_first_heartbeat_is_taken_at_once_and_one_that_streams_takes_its_place() {
-        let mut election = Election::default();
-        let vehicle = election.hear(BootMs::ZERO, None, OTHER, Some(Autopilot::Px4));
-        assert_eq!(vehicle, Some(OTHER));
-        // The other one's heartbeats are forwarded; ours streams.
-        let vehicle = hear(&mut election, vehicle, 100..5_000, &[(OTHER, 1_000), (OURS, 100)]);
-        assert_eq!(vehicle, Some(OURS));
-        assert!(!election.is_settled(BootMs::from_millis(5_000)));
-    }
-
-    #[test]
     fn nothing_but_a_heartbeat_makes_a_vehicle() {
         let mut election = Election::default();
         assert_eq!(election.hear(BootMs::ZERO, None, OURS, None), None);
         assert_eq!(election.hear(BootMs::ZERO, None, OURS, Some(Autopilot::Px4)), Some(OURS));
     }
 
-    #[test]
-    fn once_settled_the_choice_stands_whatever_others_say() {
-        let mut election = Election::default();
-        let vehicle = hear(&mut election, None, 0..15_000, &[(OURS, 500)]);
-        let vehicle = hear(&mut election, vehicle, 15_000..120_000, &[(OURS, 1_000), (OTHER, 100)]);
-        assert_eq!(vehicle, Some(OURS));
-    }
+    /// Who is received until when, ms; the vehicle at the end, and whether the choice is settled.
+    type Case = (&'static [(u64, &'static [(Source, u64)])], Source, bool);
 
     #[test]
-    fn after_half_a_minute_of_silence_the_one_that_streams_is_the_vehicle() {
-        let mut election = Election::default();
-        let vehicle = hear(&mut election, None, 0..20_000, &[(OURS, 100)]);
-        let vehicle = hear(&mut election, vehicle, 20_000..49_000, &[(OTHER, 100)]);
-        assert_eq!(vehicle, Some(OURS));
-        let vehicle = hear(&mut election, vehicle, 49_000..51_000, &[(OTHER, 100)]);
-        assert_eq!(vehicle, Some(OTHER), "its system id was changed");
-    }
-
-    #[test]
-    fn a_heartbeat_that_is_only_forwarded_never_takes_the_place_of_a_silent_vehicle() {
-        let mut election = Election::default();
-        let vehicle = hear(&mut election, None, 0..20_000, &[(OURS, 100), (OTHER, 1_000)]);
-        assert_eq!(hear(&mut election, vehicle, 20_000..300_000, &[(OTHER, 1_000)]), Some(OURS));
-    }
-
-    #[test]
-    fn a_stream_takes_the_place_of_a_vehicle_that_never_streamed_at_any_time() {
-        for from_ms in [12_000, 200_000] {
-            let mut election = Election::default();
-            let vehicle = hear(&mut election, None, 0..from_ms, &[(OTHER, 1_000), (OURS, 1_000)]);
-            assert_eq!(vehicle, Some(OTHER), "it was heard first");
-            assert!(!election.is_settled(BootMs::from_millis(from_ms)));
-            let until_ms = from_ms + 3_000;
-            let vehicle = hear(&mut election, vehicle, from_ms..until_ms, &[(OTHER, 1_000), (OURS, 100)]);
-            assert_eq!(vehicle, Some(OURS));
-            let rest = until_ms..until_ms + 60_000;
-            assert_eq!(hear(&mut election, vehicle, rest, &[(OURS, 100), (OTHER, 100)]), Some(OURS));
-            assert!(election.is_settled(BootMs::from_millis(until_ms + 60_000)));
+    fn a_stream_is_the_vehicle_and_once_settled_until_half_a_minute_of_silence() {
+        const FORWARDED: (u64, &[(Source, u64)]) = (12_000, &[(OTHER, 1_000), (OURS, 1_000)]);
+        const LATE: (u64, &[(Source, u64)]) = (200_000, &[(OTHER, 1_000), (OURS, 1_000)]);
+        let cases: [Case; 11] = [
+            // The other one's heartbeats are forwarded and come first; ours streams.
+            (&[(100, &[(OTHER, 1_000)])], OTHER, false),
+            (&[(100, &[(OTHER, 1_000)]), (5_000, &[(OTHER, 1_000), (OURS, 100)])], OURS, false),
+            (&[(15_000, &[(OURS, 500)]), (120_000, &[(OURS, 1_000), (OTHER, 100)])], OURS, true),
+            (&[(20_000, &[(OURS, 100)]), (49_000, &[(OTHER, 100)])], OURS, true),
+            // Its system id was changed.
+            (&[(20_000, &[(OURS, 100)]), (51_000, &[(OTHER, 100)])], OTHER, false),
+            (&[(20_000, &[(OURS, 100), (OTHER, 1_000)]), (300_000, &[(OTHER, 1_000)])], OURS, true),
+            // It was heard first, and never streams.
+            (&[FORWARDED], OTHER, false),
+            (&[LATE], OTHER, false),
+            (&[FORWARDED, (15_000, &[(OTHER, 1_000), (OURS, 100)])], OURS, false),
+            (
+                &[
+                    FORWARDED,
+                    (15_000, &[(OTHER, 1_000), (OURS, 100)]),
+                    (75_000, &[(OURS, 100), (OTHER, 100)]),
+                ],
+                OURS,
+                true,
+            ),
+            (
+                &[LATE, (203_000, &[(OTHER, 1_000), (OURS, 100)]), (263_000, &[(OURS, 100), (OTHER, 100)])],
+                OURS,
+                true,
+            ),
+        ];
+        for (pieces, expected, is_settled) in cases {
+            let (mut election, mut vehicle, mut from_ms) = (Election::default(), None, 0);
+            for (until_ms, who) in pieces {
+                vehicle = hear(&mut election, vehicle, from_ms..*until_ms, who);
+                from_ms = *until_ms;
+            }
+            let end = BootMs::from_millis(from_ms);
+            assert_eq!((vehicle, election.is_settled(end)), (Some(expected), is_settled), "{pieces:?}");
         }
     }
 

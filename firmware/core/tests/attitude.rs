@@ -1,66 +1,47 @@
 //! Roll and pitch against their setpoints.
 
-use crate::common::{Quad, Run};
-use hums_core::observation::{Autopilot, Observation, VehicleKind, Wanted};
+use crate::common::{Quad, Run, Script};
+use hums_core::observation::{Observation, Wanted};
 use hums_core::params::Params;
 use hums_core::units::Radians;
 
-const BANK: f32 = 1.2;
-const NOTHING: [&str; 0] = [];
-
-/// A minute in which it banks from 20 s on; `wanted` is the autopilot's roll setpoint then, if it sends one.
-fn banks(vehicle: &Quad, wanted: Option<f32>) -> Vec<&'static str> {
-    let mut run = Run::new(&Params::defaults());
+/// Whether a bank of 1.2 rad for 5 s is found, of this vehicle; what is wanted meanwhile.
+fn is_found(vehicle: &str, wanted: Option<f32>) -> bool {
+    let (mut run, script) =
+        (Run::new(&Params::defaults()), Script::new(&format!("* {vehicle}; 20-25 roll=1.2")));
     run.says(0..60_000, |now_ms| {
+        let mut quad = Quad::healthy();
+        script.play(now_ms as i64, |said| assert!(quad.take(said), "{}", said.name()));
         let is_banked = (20_000..25_000).contains(&now_ms);
-        let quad = Quad { roll: if is_banked { BANK } else { vehicle.roll }, ..vehicle.clone() };
         let roll = |roll| Wanted { roll: Radians(if is_banked { roll } else { 0.0 }), ..Wanted::default() };
         wanted.map(|wanted| Observation::Wanted(roll(wanted))).into_iter().chain(quad.says(now_ms)).collect()
     });
-    let mut checks = run.checks();
-    checks.retain(|check| matches!(*check, "roll" | "pitch"));
-    checks
+    assert!(run.of_check("pitch").next().is_none(), "{vehicle}");
+    run.of_check("roll").next().is_some()
 }
-
-fn quad(autopilot: Autopilot, mode: u32) -> Quad {
-    Quad { mode, autopilot, ..Quad::healthy() }
-}
-
-const ANGLES: [(Autopilot, u32); 4] = [
-    (Autopilot::ArduPilot, 3),
-    (Autopilot::ArduPilot, 0),
-    (Autopilot::Px4, 0x0404_0000),
-    (Autopilot::Px4, 0x0007_0000),
-];
 
 #[test]
 fn a_bank_that_is_wanted_is_none_and_one_that_nobody_asked_for_is_found() {
-    for (autopilot, mode) in ANGLES {
-        let quad = quad(autopilot, mode);
-        assert_eq!(banks(&quad, Some(BANK - 0.2)), NOTHING, "{autopilot:?} {mode:x}: wanted");
-        assert_eq!(banks(&quad, Some(0.1)), ["roll"], "{autopilot:?} {mode:x}: not wanted");
-        assert_eq!(banks(&quad, Some(-BANK)), ["roll"], "{autopilot:?} {mode:x}: the other way");
-        assert_eq!(banks(&quad, None), ["roll"], "{autopilot:?} {mode:x}: nobody says what is wanted");
+    for mode in ["ap mode=3", "ap mode=0", "px4 mode=mission", "px4 mode=stabilized"] {
+        assert!(!is_found(mode, Some(1.0)), "{mode}: wanted");
+        assert!(is_found(mode, Some(0.1)), "{mode}: not wanted");
+        assert!(is_found(mode, Some(-1.2)), "{mode}: the other way");
+        assert!(is_found(mode, None), "{mode}: nobody says what is wanted");
     }
 }
 
 #[test]
 fn where_the_pilot_asks_for_rates_a_bank_says_nothing_by_itself() {
-    // ArduCopter's DRIFT and SPORT, PX4's RATTITUDE.
-    for (autopilot, mode) in
-        [(Autopilot::ArduPilot, 11), (Autopilot::ArduPilot, 13), (Autopilot::Px4, 0x0008_0000)]
-    {
-        let quad = quad(autopilot, mode);
-        assert_eq!(banks(&quad, None), NOTHING, "{autopilot:?} {mode:x}");
-        assert_eq!(banks(&quad, Some(0.0)), ["roll"], "{autopilot:?} {mode:x}: it does not follow");
-    }
-    // ACRO of both: PX4 still sends the setpoint of the mode before.
-    for (autopilot, mode) in [(Autopilot::ArduPilot, 1), (Autopilot::Px4, 0x0005_0000)] {
-        let quad = quad(autopilot, mode);
-        assert!(
-            banks(&quad, None).is_empty() && banks(&quad, Some(0.0)).is_empty(),
-            "{autopilot:?} {mode:x}"
-        );
+    // ArduCopter's DRIFT and SPORT, PX4's RATTITUDE; ACRO of both: PX4 still sends the setpoint of the mode before.
+    for (mode, is_judged) in [
+        ("ap mode=11", true),
+        ("ap mode=13", true),
+        ("px4 mode=rattitude", true),
+        ("ap mode=1", false),
+        ("px4 mode=acro", false),
+    ] {
+        assert!(!is_found(mode, None), "{mode}");
+        assert_eq!(is_found(mode, Some(0.0)), is_judged, "{mode}: it does not follow");
     }
 }
 
@@ -77,9 +58,6 @@ fn a_quaternion_that_is_none_wants_nothing() {
 
 #[test]
 fn a_plane_with_rotors_is_a_vtol_once_it_says_what_it_flies_on() {
-    use hums_core::observation::{LandedState, VtolState};
-    let plane = Quad { kind: VehicleKind::Plane, type_number: 1, mode: 19, ..Quad::healthy() };
-    assert!(banks(&plane, None).is_empty(), "a plane banks");
-    let hovers = Quad { landed: Some(LandedState::InAir), vtol: VtolState::Hover, ..plane };
-    assert_eq!(banks(&hovers, None), ["roll"]);
+    assert!(!is_found("ap plane mode=19", None), "a plane banks");
+    assert!(is_found("ap plane mode=19 landed=air hover", None));
 }

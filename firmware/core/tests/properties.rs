@@ -7,8 +7,8 @@ use hums_core::Monitor;
 use hums_core::health::{EXPECTED, Level, Subsystem};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CELLS_MAX, CellVoltage, CommandAck, Engine, Esc,
-    EscGroup, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu,
+    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CellVoltage, CommandAck, Engine, Esc, EscGroup,
+    Estimator, EstimatorScale, Feeds, Generator, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu,
     LandedState, LocalPosition, MOTORS_MAX, Observation, Outputs, Processor, RadioControl, Rails,
     SecondEstimate, Sensors, Source, SpeedSensor, SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
     Vibration, VibrationScale, VtolState, Wanted, WantedRates,
@@ -53,265 +53,77 @@ impl Random {
         from[self.below(from.len() as u64) as usize]
     }
 
-    fn f32(&mut self) -> f32 {
-        const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
-        const EXTREME: [f32; 8] = [f32::MAX, f32::MIN, f32::MIN_POSITIVE, -0.0, 0.0, 1e9, -1e9, 65_535.0];
-        match self.below(4) {
-            _ if self.values == Values::Unknown => self.pick(&BAD),
-            0 => self.pick(&BAD),
-            1 => self.pick(&EXTREME),
-            2 => f32::from_bits(self.next() as u32),
-            _ => self.below(2_000) as f32 / 10.0 - 50.0,
-        }
+    fn any<T: Any>(&mut self) -> T {
+        T::any(self)
     }
 
-    fn u32(&mut self) -> u32 {
-        match self.below(3) {
-            0 => self.pick(&[0, 1, u32::MAX, u32::MAX - 1, 1 << 31]),
-            1 => self.below(100) as u32,
-            _ => self.next() as u32,
-        }
-    }
-
-    fn maybe<T>(&mut self, value: impl FnOnce(&mut Self) -> T) -> Option<T> {
-        (self.below(4) != 0).then(|| value(self))
-    }
-
-    fn float<T>(&mut self, unit: fn(f32) -> T) -> Option<T> {
-        self.maybe(|random| unit(random.f32()))
-    }
-
-    /// A whole number, which has no unknown value of its own.
-    fn whole<T>(&mut self, from: fn(u32) -> T) -> Option<T> {
-        if self.values == Values::Unknown {
-            return None;
-        }
-        self.maybe(|random| from(random.u32()))
-    }
-
-    fn vector<T>(&mut self, unit: fn(f32) -> T) -> [T; 3] {
-        [(); 3].map(|()| unit(self.f32()))
-    }
-
-    fn source(&mut self) -> Source {
-        if self.below(8) == 0 {
-            Source { system: self.next() as u8, component: self.next() as u8 }
-        } else {
-            AUTOPILOT
-        }
-    }
-
-    fn heartbeat(&mut self) -> Heartbeat {
-        use VehicleKind::{Other, Plane, Rotorcraft, Surface, Vtol};
-        Heartbeat {
-            autopilot: self.pick(&[Autopilot::ArduPilot, Autopilot::Px4, Autopilot::Other]),
-            kind: self.pick(&[Rotorcraft, Plane, Vtol, Surface, Other]),
-            armed: self.below(2) == 0,
-            state: self.next() as u8,
-            mode: self.u32(),
-            ..Heartbeat::default()
-        }
-    }
-
-    fn battery(&mut self) -> Battery {
-        Battery {
-            id: self.pick(&[0, 0, 1, 2, 255]),
-            cells: [(); CELLS_MAX].map(|()| CellVoltage::from_millivolts(self.u32() as u16)),
-            voltage: self.float(Volts),
-            current: self.float(Amperes),
-            consumed: self.float(AmpereHours),
-            energy: self.float(WattHours),
-            remaining: self.float(Fraction),
-            temperature: self.float(Celsius),
-            faults: self.u32(),
-            lithium: self.below(4) != 0,
-            feeds: hums_core::observation::Feeds::Vehicle,
-            charge: self.pick(&[0, 0, 0, 1, 2, 3, 255]) * u8::from(self.values == Values::Any),
-        }
-    }
-
-    fn escs(&mut self) -> EscGroup {
-        let first = self.pick(&[0, 0, 4, 8, 9, 11, 200, 255]);
-        let escs = [(); 4].map(|()| {
-            self.maybe(|random| Esc {
-                rpm: random.float(Rpm),
-                voltage: random.float(Volts),
-                current: random.float(Amperes),
-                temperature: random.float(Celsius),
-                failures: random.whole(|number| number as u16),
-                errors: random.whole(|number| number),
-            })
-        });
-        EscGroup { first, escs }
-    }
-
-    fn gnss(&mut self) -> Gnss {
-        Gnss {
-            instance: self.pick(&[0, 0, 1, 2, 255]),
-            fix: self.whole(|number| number as u8).unwrap_or(0),
-            satellites: self.whole(|number| number as u8),
-            hdop: self.float(|value| value),
-            accuracy: self.float(Metres),
-            position: self.maybe(|random| Position {
-                latitude_deg: random.u32() as i32 as f64 / 1e7,
-                longitude_deg: f64::NAN,
-            }),
-            altitude: self.float(Metres),
-            speed: self.float(MetresPerSecond),
-            course: self.float(Radians),
-            measured_ms: NonZeroU32::new(self.u32()),
-        }
+    /// Mostly one that there is.
+    fn instance(&mut self) -> u8 {
+        self.pick(&[0, 0, 1, 2, 255])
     }
 
     fn imu(&mut self) -> Imu {
-        Imu {
-            instance: self.pick(&[0, 0, 1, 2, 255]),
-            acceleration: self.maybe(|random| random.vector(MetresPerSecond2)),
-            rate: self.maybe(|random| random.vector(RadiansPerSecond)),
-            field: self.maybe(|random| random.vector(Gauss)),
-            temperature: self.float(Celsius),
-        }
+        Imu { instance: self.instance(), ..self.any() }
     }
 
     fn air(&mut self) -> Air {
-        let instance = self.pick(&[0, 0, 1, 2, 255]);
-        Air { instance, pressure: self.float(Hectopascals), temperature: self.float(Celsius) }
+        Air { instance: self.instance(), ..self.any() }
     }
 
-    fn outputs(&mut self) -> Observation {
-        let pulses = [(); MOTORS_MAX].map(|()| self.pick(&[0, 900, 1_000, 1_100, 1_500, 1_900, 65_535]));
-        Observation::Outputs(Outputs { port: self.pick(&[0, 0, 1, 255]), pulses })
+    fn source(&mut self) -> Source {
+        if self.below(8) == 0 { Source { system: self.any(), component: self.any() } } else { AUTOPILOT }
     }
 
+    /// Two in ten are heartbeats: an armed vehicle makes most of the rest count.
     fn observation(&mut self) -> Observation {
-        let number = self.below(29);
-        match number {
-            0..=2 => Observation::Heartbeat(self.heartbeat()),
-            3 => Observation::SystemStatus(SystemStatus {
-                load: self.float(Fraction),
-                voltage: self.float(Volts),
-                current: self.float(Amperes),
-                remaining: self.float(Fraction),
-                sensors: Some(Sensors::of(self.u32(), self.u32(), self.u32())),
-            }),
-            4 => Observation::SystemTime(SystemTime {
-                utc_micros: self.maybe(Self::next),
-                boot_ms: self.u32(),
-            }),
-            5 => Observation::Gnss(self.gnss()),
-            6 => {
-                let jamming = self.whole(|number| number as u8).unwrap_or(0);
-                let spoofing = self.whole(|number| number as u8).unwrap_or(0);
-                Observation::GnssIntegrity(GnssIntegrity { jamming, spoofing, ..GnssIntegrity::default() })
-            }
+        match self.below(32) {
+            0..=2 => Observation::Heartbeat(self.any()),
+            3 => Observation::SystemStatus(self.any()),
+            4 => Observation::SystemTime(self.any()),
+            5 => Observation::Gnss(Gnss { instance: self.instance(), ..self.any() }),
+            6 => Observation::GnssIntegrity(GnssIntegrity { instance: self.instance(), ..self.any() }),
             7 => Observation::Imu(self.imu()),
             8 => Observation::Air(self.air()),
             9 => Observation::ImuAndAir(self.imu(), self.air()),
-            10 => {
-                let [roll, pitch, yaw] = self.vector(Radians);
-                let rates = self.maybe(|random| random.vector(RadiansPerSecond));
-                Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: self.maybe(Self::u32) })
+            10 => Observation::Attitude(self.any()),
+            11 => Observation::LocalPosition(self.any()),
+            12 | 13 => Observation::GlobalPosition(self.any()),
+            14 => Observation::Hud(self.any()),
+            15 => Observation::RadioControl(self.any()),
+            16 => Observation::TelemetryRadio(self.any()),
+            17 => Observation::Rails(self.any()),
+            18 | 19 => Observation::Battery(Battery { id: self.instance(), ..self.any() }),
+            20 => Observation::Estimator(self.any()),
+            21 => Observation::Vibration(self.any()),
+            22 | 23 => {
+                let first = self.pick(&[0, 0, 4, 8, 9, 11, 200, 255]);
+                Observation::Escs(EscGroup { first, ..self.any() })
             }
-            11 => Observation::LocalPosition(LocalPosition {
-                position: self.vector(Metres),
-                velocity: self.vector(MetresPerSecond),
-            }),
-            12 | 13 => Observation::GlobalPosition(GlobalPosition {
-                relative_altitude: Metres(self.f32()),
-                altitude: Metres(self.f32()),
-                velocity: self.vector(MetresPerSecond),
-                ..GlobalPosition::default()
-            }),
-            14 => Observation::Hud(Hud {
-                airspeed: self.float(MetresPerSecond),
-                groundspeed: self.float(MetresPerSecond),
-                heading_deg: self.float(|value| value),
-                throttle: self.float(Fraction),
-                altitude: self.float(Metres),
-                climb: self.float(MetresPerSecond),
-            }),
-            15 => Observation::RadioControl(RadioControl { rssi: self.whole(|number| number as u8) }),
-            16 => Observation::TelemetryRadio(TelemetryRadio {
-                rssi: self.whole(|number| number as u8),
-                remote_rssi: self.whole(|number| number as u8),
-                noise: self.whole(|number| number as u8),
-                remote_noise: self.whole(|number| number as u8),
-                errors: self.u32() as u16,
-            }),
-            17 => Observation::Rails(Rails { vcc: self.float(Volts), servo: self.float(Volts) }),
-            18 => Observation::Battery(self.battery()),
-            19..=26 => self.machine(number),
-            27 => self.outputs(),
+            24 => Observation::Engine(self.any()),
+            25 if self.any() => Observation::Generator(self.any()),
+            25 => Observation::SpeedSensors(self.any()),
+            26 => Observation::Landed(self.any(), self.any()),
+            27 => Observation::Processor(self.any()),
+            28 => {
+                let pulses =
+                    [(); MOTORS_MAX].map(|()| self.pick(&[0, 900, 1_000, 1_100, 1_500, 1_900, 65_535]));
+                Observation::Outputs(Outputs { port: self.pick(&[0, 0, 1, 255]), pulses })
+            }
             _ => self.rare(),
         }
     }
 
-    /// The part of [`Self::observation`] that is about the machine: its number from 19 to 26.
-    fn machine(&mut self, number: u64) -> Observation {
-        use LandedState::{InAir, Landing, OnGround, TakingOff, Unknown};
-        match number {
-            19 => Observation::Estimator(Estimator {
-                scale: self.pick(&[EstimatorScale::Variance, EstimatorScale::TestRatio]),
-                velocity: self.float(|value| value),
-                position_horizontal: self.float(|value| value),
-                position_vertical: self.float(|value| value),
-                compass: self.float(|value| value),
-                flags: self.u32() as u16,
-            }),
-            20 => Observation::Vibration(Vibration {
-                scale: self.pick(&[VibrationScale::PerAxis, VibrationScale::Px4Metrics]),
-                levels: [(); 3].map(|()| self.float(|value| value)),
-                clips: [(); 3].map(|()| self.u32()),
-            }),
-            21 | 22 => Observation::Escs(self.escs()),
-            23 => Observation::Engine(Engine {
-                healthy: self.below(2) == 0,
-                rpm: self.float(Rpm),
-                cylinder_head: self.float(Celsius),
-                exhaust: self.float(Celsius),
-                fuel_pressure: self.float(Hectopascals),
-                ..Engine::default()
-            }),
-            24 => Observation::SpeedSensors([(); 2].map(|()| {
-                self.maybe(|random| SpeedSensor { index: random.next() as u8, rpm: Rpm(random.f32()) })
-            })),
-            25 => Observation::Landed(
-                self.pick(&[Unknown, OnGround, InAir, TakingOff, Landing]),
-                self.pick(&[VtolState::Unknown, VtolState::Hover, VtolState::Forward, VtolState::Transition]),
-            ),
-            _ => Observation::Processor(Processor {
-                temperature: self.float(Celsius),
-                voltage: self.float(Volts),
-            }),
-        }
-    }
-
     fn rare(&mut self) -> Observation {
-        match self.below(8) {
-            7 => {
-                let of = self.maybe(|random| [(); 4].map(|()| random.f32()));
-                let about = self.vector(RadiansPerSecond);
-                let [roll, pitch, _] = self.vector(Radians);
-                Observation::Wanted(Wanted { roll, pitch, rates: Some(WantedRates { about, of }) })
-            }
-            6 => Observation::SecondEstimate(SecondEstimate {
-                attitude: self.maybe(|random| random.vector(Radians)),
-                position: self.maybe(|random| Position {
-                    latitude_deg: random.f32().into(),
-                    longitude_deg: random.f32().into(),
-                }),
-                altitude: self.float(Metres),
-            }),
-            5 => Observation::ClimbWanted(MetresPerSecond(self.f32())),
-            4 => Observation::Parameter(self.below(20) as u8, self.f32()),
-            0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.u32() }),
-            1 => Observation::CommandAck(CommandAck {
-                target: None,
-                command: self.pick(&[20, 21]),
-                result: self.next() as u8,
-            }),
-            2 => Observation::MissionReached(self.u32() as u16),
-            _ => Observation::FlightInformation { flight: self.next(), takeoff_boot_ms: self.u32() },
+        match self.below(9) {
+            0 => Observation::Identity(AutopilotIdentity { uid: self.below(3), firmware: self.any() }),
+            1 => Observation::CommandAck(CommandAck { command: self.pick(&[20, 21]), ..self.any() }),
+            2 => Observation::MissionReached(self.any()),
+            3 => Observation::Parameter(self.below(20) as u8, self.any()),
+            4 => Observation::ClimbWanted(self.any()),
+            5 => Observation::SecondEstimate(self.any()),
+            6 => Observation::Wanted(self.any()),
+            7 => Observation::Shock(self.any()),
+            _ => Observation::FlightInformation { flight: self.next(), takeoff_boot_ms: self.any() },
         }
     }
 
@@ -327,19 +139,154 @@ impl Random {
     }
 
     fn link(&mut self) -> LinkReading {
-        LinkReading { frames_lost: self.maybe(Self::f32), at: BootMs::from_millis(self.next() >> 30) }
+        LinkReading { frames_lost: self.any(), at: BootMs::from_millis(self.next() >> 30) }
     }
 
     fn recorder(&mut self) -> RecorderStatus {
         RecorderStatus {
             recording: self.pick(&[Recording::Starting, Recording::Running, Recording::Stopped]),
-            queue: self.f32(),
+            queue: self.any(),
             frames_lost: self.next(),
             stall: Millis::from_millis(self.next() >> 16),
             write_errors: self.next(),
-            room: self.maybe(Self::f32),
+            room: self.any(),
         }
     }
+}
+
+/// Any value of a type; what has a value for "unknown" is that and nothing else where values are unknown.
+trait Any: Sized {
+    /// Whether one of its values is "unknown".
+    const HAS_UNKNOWN: bool = true;
+
+    fn any(random: &mut Random) -> Self;
+}
+
+impl Any for f32 {
+    fn any(random: &mut Random) -> Self {
+        const BAD: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+        const EXTREME: [f32; 8] = [f32::MAX, f32::MIN, f32::MIN_POSITIVE, -0.0, 0.0, 1e9, -1e9, 65_535.0];
+        match random.below(4) {
+            _ if random.values == Values::Unknown => random.pick(&BAD),
+            0 => random.pick(&BAD),
+            1 => random.pick(&EXTREME),
+            2 => Self::from_bits(random.next() as u32),
+            _ => random.below(2_000) as Self / 10.0 - 50.0,
+        }
+    }
+}
+
+impl Any for u32 {
+    const HAS_UNKNOWN: bool = false;
+
+    fn any(random: &mut Random) -> Self {
+        match random.below(3) {
+            0 => random.pick(&[0, 1, Self::MAX, Self::MAX - 1, 1 << 31]),
+            1 => random.below(100) as Self,
+            _ => random.next() as Self,
+        }
+    }
+}
+
+/// 0 where values are unknown: that is "unknown" of a fix, a state of jamming and a state of charge.
+impl Any for u8 {
+    const HAS_UNKNOWN: bool = false;
+
+    fn any(random: &mut Random) -> Self {
+        if random.values == Values::Unknown { 0 } else { random.any::<u32>() as Self }
+    }
+}
+
+impl<T: Any> Any for Option<T> {
+    fn any(random: &mut Random) -> Self {
+        let may_be_known = T::HAS_UNKNOWN || random.values == Values::Any;
+        (may_be_known && random.below(4) != 0).then(|| random.any())
+    }
+}
+
+impl<T: Any, const N: usize> Any for [T; N] {
+    fn any(random: &mut Random) -> Self {
+        [(); N].map(|()| random.any())
+    }
+}
+
+/// How a value is made of others.
+macro_rules! any {
+    ($($type:ty $(, $unknown:literal)?: $random:ident $value:expr;)*) => {
+        $(impl Any for $type {
+            $(const HAS_UNKNOWN: bool = $unknown;)?
+
+            fn any($random: &mut Random) -> Self {
+                $value
+            }
+        })*
+    };
+}
+
+any! {
+    bool: random random.below(2) == 0;
+    u16, false: random random.any::<u32>() as Self;
+    u64, false: random random.next();
+    f64: random random.any::<f32>().into();
+    NonZeroU32, false: random Self::MIN | random.any::<u32>();
+    CellVoltage, false: random Self::from_millivolts(random.any::<u16>() | 1).expect("not 0");
+    Autopilot: random random.pick(&[Self::ArduPilot, Self::Px4, Self::Other]);
+    VehicleKind: random random.pick(&[Self::Rotorcraft, Self::Plane, Self::Vtol, Self::Surface, Self::Other]);
+    Feeds: random random.pick(&[Self::Vehicle, Self::Vehicle, Self::Unsaid, Self::Payload]);
+    EstimatorScale: random random.pick(&[Self::Variance, Self::TestRatio]);
+    VibrationScale: random random.pick(&[Self::PerAxis, Self::Px4Metrics]);
+    LandedState: random random.pick(&[Self::Unknown, Self::OnGround, Self::InAir, Self::TakingOff, Self::Landing]);
+    VtolState: random random.pick(&[Self::Unknown, Self::Hover, Self::Forward, Self::Transition]);
+}
+
+macro_rules! any_unit {
+    ($($unit:ident)*) => { any! { $($unit: random Self(random.any());)* } };
+}
+
+any_unit! {
+    AmpereHours Amperes Celsius Fraction Gauss Hectopascals Metres MetresPerSecond MetresPerSecond2 Radians
+    RadiansPerSecond Rpm Volts WattHours
+}
+
+macro_rules! any_of {
+    ($($struct:ident { $($field:ident)* })*) => {
+        any! { $($struct: random Self { $($field: random.any()),* };)* }
+    };
+}
+
+any_of! {
+    Heartbeat { autopilot autopilot_number kind type_number armed state mode }
+    SystemStatus { load voltage current remaining sensors }
+    Sensors { unhealthy lost healthy }
+    SystemTime { utc_micros boot_ms }
+    Gnss { instance fix satellites hdop accuracy position altitude speed course measured_ms }
+    GnssIntegrity { instance jamming spoofing }
+    Imu { instance acceleration rate field temperature }
+    Air { instance pressure temperature }
+    Attitude { roll pitch yaw rates boot_ms }
+    LocalPosition { position velocity }
+    GlobalPosition { position altitude relative_altitude velocity }
+    Position { latitude_deg longitude_deg }
+    Hud { airspeed groundspeed heading_deg throttle altitude climb }
+    RadioControl { rssi }
+    TelemetryRadio { rssi remote_rssi noise remote_noise errors }
+    Rails { vcc servo }
+    Battery { id cells voltage current consumed energy remaining temperature faults lithium feeds charge }
+    Estimator { scale velocity position_horizontal position_vertical compass flags }
+    Vibration { scale levels clips }
+    Esc { rpm voltage current temperature failures errors }
+    EscGroup { first escs }
+    Engine {
+        healthy rpm load fuel_consumed fuel_flow cylinder_head exhaust intake fuel_pressure ignition
+    }
+    Generator { is_off speed }
+    SpeedSensor { index rpm }
+    Processor { temperature voltage }
+    CommandAck { command result target }
+    Source { system component }
+    SecondEstimate { attitude position altitude }
+    Wanted { roll pitch rates }
+    WantedRates { about of }
 }
 
 fn check(monitor: &mut Monitor, now: BootMs) {
@@ -393,7 +340,7 @@ fn run(random: &mut Random) -> (Monitor, BootMs) {
     // At power-on, and where the clock wraps.
     let start_ms = if random.below(2) == 0 { 0 } else { u64::from(u32::MAX) - random.below(40_000_000) };
     let mut now = BootMs::from_millis(start_ms);
-    monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(random.heartbeat()));
+    monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(random.any()));
     for _ in 0..1_000 {
         let step_ms = match random.below(20) {
             0 => random.below(4_000_000),
@@ -467,12 +414,8 @@ fn what_is_said_to_be_unknown_is_never_ok() {
         let mut monitor = Monitor::new(Params::defaults());
         for now_ms in (0..120_000).step_by(50) {
             let now = BootMs::from_millis(now_ms);
-            let heartbeat = Heartbeat {
-                armed: now_ms > 1_000,
-                state: 4,
-                kind: VehicleKind::Rotorcraft,
-                ..random.heartbeat()
-            };
+            let heartbeat =
+                Heartbeat { armed: now_ms > 1_000, state: 4, kind: VehicleKind::Rotorcraft, ..random.any() };
             monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(heartbeat));
             let landed = if now_ms > 2_000 { LandedState::InAir } else { LandedState::OnGround };
             monitor.observe(now, AUTOPILOT, &Observation::Landed(landed, VtolState::Unknown));

@@ -1,42 +1,81 @@
 //! Scripted faults in a simulated flight: silences, restarts, counters, hysteresis, and alarms that explain others.
+#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
-use crate::common::{Quad, Run};
-use hums_core::Monitor;
-use hums_core::cause::{Alert, Cause, Urgency};
+use crate::common::{Run, Script};
+use hums_core::cause::{Alert, Cause};
 use hums_core::health::{Finding, Level, Subsystem};
-use hums_core::observation::{Autopilot, EstimatorScale, Observation, Sensors, SystemTime, VehicleKind};
+use hums_core::observation::{EstimatorScale, Observation, Sensors, SystemTime};
 use hums_core::params::Params;
-use hums_core::units::{Amperes, Celsius, Fraction, Volts};
+use hums_core::units::Celsius;
 use hums_core::usage::UsageCounter;
 
+/// Faults begin and end, ms; the flight lasts for two minutes.
 const FAULT_MS: u64 = 20_000;
 const END_MS: u64 = 100_000;
 
-/// Flies for two minutes; `script` changes the quad between [`FAULT_MS`] and [`END_MS`].
-fn fly(script: impl Fn(u64, &mut Quad)) -> Vec<Finding> {
-    fly_with(&Params::defaults(), script).1
+fn fly(script: &str) -> Run {
+    fly_with(&[], script)
 }
 
-fn fly_with(params: &Params, script: impl Fn(u64, &mut Quad)) -> (Monitor, Vec<Finding>) {
-    let mut run = Run::new(params);
-    run.flies(0..120_000, |now_ms, quad, _| {
-        if (FAULT_MS..END_MS).contains(&now_ms) {
-            script(now_ms, quad);
-        }
+/// Words besides the quad's: `esc3` falls silent; `hot2`, `fail2`, `errors0` of ESCs, and `counts0`, errors that rise; `jam`; `bits` of sensors that are not well;
+/// `ekf` with two figures, of PX4's scale where it is `ratio`; `refused` writes; an `alert` of GNSS.
+fn fly_with(settings: &[(&str, f32)], script: &str) -> Run {
+    let mut params = Params::defaults();
+    for (name, value) in settings {
+        params.set(name, *value).unwrap();
+    }
+    let (mut run, script) = (Run::new(&params), Script::new(script));
+    run.flies(0..120_000, |now_ms, quad, more| {
+        script.play(now_ms as i64, |said| match said.name() {
+            _ if quad.take(said) => {}
+            "esc3" => quad.escs[3] = None,
+            "hot2" => quad.escs[2].as_mut().unwrap().temperature = Some(Celsius(said.number())),
+            "fail2" => quad.escs[2].as_mut().unwrap().failures = Some(said.number() as u16),
+            "errors0" => quad.escs[0].as_mut().unwrap().errors = Some(said.number() as u32),
+            "counts0" => {
+                let errors = &mut quad.escs[0].as_mut().unwrap().errors;
+                *errors = errors.map(|count| count.wrapping_add((said.since_ms / 500) as u32));
+            }
+            "jam" => quad.integrity.jamming = said.number() as u8,
+            "bits" => quad.system.sensors = Some(Sensors::of(u32::MAX, u32::MAX, !(said.number() as u32))),
+            "nodata" => quad.system.load = None,
+            "ekf" => {
+                let [velocity, compass] = said.list().map(Some);
+                (quad.estimator.velocity, quad.estimator.compass) = (velocity, compass);
+            }
+            "drifts" => {
+                let drift = Some(said.number());
+                (quad.estimator.velocity, quad.estimator.position_horizontal) = (drift, drift);
+            }
+            "ratio" => quad.estimator.scale = EstimatorScale::TestRatio,
+            "refused" => quad.recorder.write_errors = said.number() as u64,
+            "falls" => quad.acceleration_down = -0.5 - (now_ms / 100 % 7) as f32 * 0.01,
+            "alert" => more.push(Observation::Alert(Alert::warning(Cause::Gnss))),
+            word => panic!("{word}: no word"),
+        });
     });
-    (run.monitor, run.findings)
+    run
 }
 
-#[test]
-fn a_healthy_flight_has_no_finding() {
-    assert_eq!(fly(|_, _| {}), []);
+fn first(run: &Run, check: &str, level: Level) -> Finding {
+    let found = run.of_check(check).find(|finding| finding.level == level).copied();
+    found.unwrap_or_else(|| panic!("no {level:?} of {check}: {:?}", run.findings))
+}
+
+fn last(run: &Run, check: &str) -> Finding {
+    *run.of_check(check).next_back().unwrap_or_else(|| panic!("no {check}: {:?}", run.findings))
+}
+
+/// Second, level and cause of each finding of a check.
+fn told(run: &Run, check: &str) -> Vec<(u64, Level, &'static str)> {
+    run.of_check(check).map(|one| (one.at.as_millis() / 1_000, one.level, one.because)).collect()
 }
 
 #[test]
 fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
-    let (monitor, _) = fly_with(&Params::defaults(), |_, _| {});
-    let health = monitor.health();
-    assert_eq!(health.overall(), Level::Ok);
+    let run = fly("");
+    let health = run.monitor.health();
+    assert_eq!((&run.findings[..], health.overall()), (&[][..], Level::Ok));
     for subsystem in Subsystem::ALL {
         let level = if subsystem == Subsystem::Engine { Level::Stale } else { Level::Ok };
         assert_eq!(health.subsystem(subsystem), level, "{subsystem:?}");
@@ -44,78 +83,66 @@ fn a_healthy_vehicle_is_ok_as_a_whole_and_in_each_part_that_it_has() {
 }
 
 #[test]
-fn jamming_that_the_receiver_mitigates_is_no_finding() {
-    assert_eq!(fly(|_, quad| quad.integrity.jamming = 2), []);
+fn what_is_no_fault_has_no_finding() {
+    for (what, script) in [
+        ("jamming that the receiver mitigates", "20-100 jam=2"),
+        ("a check before arming, and heights of the ground", "20-100 bits=272629760"),
+        ("an error counter that wraps", "20-100 errors0=2"),
+    ] {
+        assert_eq!(fly(script).findings, [], "{what}");
+    }
 }
 
 #[test]
 fn a_motor_is_lost_by_its_share_of_the_others_current_while_thrust_is_asked_for() {
     // Each ESC's amperes, the throttle, and the share of motor 1 that is too little, percent.
-    let cases = [
-        ([2.0, 0.25, 4.0, 6.0], 0.5, Some(6.25)),
-        ([2.0, 0.41, 4.0, 6.0], 0.5, None),
-        ([5.0, 0.0, 5.0, 5.0], 0.21, Some(0.0)),
-        ([5.0, 0.0, 5.0, 5.0], 0.2, None),
-        ([0.6, 0.0, 0.6, 0.6], 0.5, Some(0.0)),
-        ([0.5, 0.0, 0.5, 0.5], 0.5, None),
-    ];
-    for (currents, throttle, share) in cases {
-        let findings = fly(|_, quad| {
-            quad.throttle = throttle;
-            for (esc, current) in quad.escs.iter_mut().zip(currents) {
-                esc.as_mut().unwrap().current = Some(Amperes(current));
-            }
-        });
-        let lost = findings.iter().filter(|finding| finding.level == Level::Critical);
+    for (currents, throttle, share) in [
+        ("2,0.25,4,6", 0.5, Some(6.25)),
+        ("2,0.41,4,6", 0.5, None),
+        ("5,0,5,5", 0.21, Some(0.0)),
+        ("5,0,5,5", 0.2, None),
+        ("0.6,0,0.6,0.6", 0.5, Some(0.0)),
+        ("0.5,0,0.5,0.5", 0.5, None),
+    ] {
+        let run = fly(&format!("20-100 amps={currents} thr={throttle}"));
+        let lost = run.findings.iter().filter(|finding| finding.level == Level::Critical);
         let lost: Vec<_> = lost.map(|finding| (finding.check, finding.instance, finding.value)).collect();
         let expected: Vec<_> = share.into_iter().map(|share| ("motor_loss", 1, share)).collect();
-        assert_eq!(lost, expected, "{currents:?} at {throttle}");
+        assert_eq!(lost, expected, "{currents} at {throttle}");
     }
 }
 
 #[test]
 fn an_esc_that_fell_silent_says_nothing_of_the_others_current() {
-    let findings = fly(|now_ms, quad| {
-        quad.escs[3].as_mut().unwrap().current = Some(Amperes(30.0));
-        if now_ms >= FAULT_MS + 2_000 {
-            quad.escs[3] = None;
-        }
-        if now_ms >= FAULT_MS + 10_000 {
-            quad.escs[1].as_mut().unwrap().current = Some(Amperes(0.6));
-        }
-    });
-    assert!(findings.iter().all(|finding| finding.instance == 3), "{findings:?}");
+    let run = fly("20-100 amps=5,5,5,30; 30-100 amps=5,0.6,5,30; 22-100 esc3");
+    assert!(run.findings.iter().all(|finding| finding.instance == 3), "{:?}", run.findings);
 }
 
 #[test]
 fn one_esc_that_falls_silent() {
-    let findings = fly(|_, quad| quad.escs[3] = None);
     // Its last message came 100 ms before the fault; 2 s after that it is silent for good.
-    let critical = findings.iter().find(|finding| finding.level == Level::Critical).expect("found");
-    assert_eq!((critical.check, critical.instance), ("esc_silent", 3));
-    assert!((21_900..=22_100).contains(&critical.at.as_millis()), "{critical:?}");
-    let warning = findings.iter().find(|finding| finding.level == Level::Warning).expect("found");
+    let run = fly("20-100 esc3");
+    let (warning, critical) =
+        (first(&run, "esc_silent", Level::Warning), first(&run, "esc_silent", Level::Critical));
+    assert_eq!(critical.instance, 3);
     assert!((20_200..=20_400).contains(&warning.at.as_millis()), "{warning:?}");
-    let last = findings.last().expect("there are some");
-    assert_eq!((last.check, last.level), ("esc_silent", Level::Ok));
-    assert!((END_MS + 2_000..=END_MS + 2_100).contains(&last.at.as_millis()), "{last:?}");
+    assert!((21_900..=22_100).contains(&critical.at.as_millis()), "{critical:?}");
+    let last = last(&run, "esc_silent");
+    let in_time = (END_MS + 2_000..=END_MS + 2_100).contains(&last.at.as_millis());
+    assert!(last.level == Level::Ok && in_time, "{last:?}");
 }
 
 #[test]
 fn an_autopilot_that_falls_silent_makes_everything_else_stale() {
-    let findings = fly(|_, quad| quad.silent = true);
-    let heartbeat =
-        findings.iter().find(|finding| finding.level == Level::Critical && finding.check == "heartbeat");
+    let run = fly("20-100 silent");
     // Its last heartbeat came 500 ms before the silence.
-    let after_ms = heartbeat.expect("found").at.as_millis() - (FAULT_MS - 500);
+    let after_ms = first(&run, "heartbeat", Level::Critical).at.as_millis() - (FAULT_MS - 500);
     assert!((5_000..=5_150).contains(&after_ms), "{after_ms}");
-    for check in ["batt_remaining", "ekf_variance", "vibration", "load", "roll"] {
-        let stale = findings.iter().any(|finding| finding.check == check && finding.level == Level::Stale);
-        assert!(stale, "{check} stayed as it was without any data");
-    }
-    // It is received again with the first heartbeat, and its messages count at once.
     for check in ["heartbeat", "batt_remaining", "ekf_variance", "vibration", "load", "roll"] {
-        let last = findings.iter().rfind(|finding| finding.check == check).expect("there");
+        let is_stale = run.of_check(check).any(|finding| finding.level == Level::Stale);
+        assert!(is_stale || check == "heartbeat", "{check} stayed as it was without any data");
+        // It is received again with the first heartbeat, and its messages count at once.
+        let last = last(&run, check);
         assert_eq!(last.level, Level::Ok, "{last:?}");
         assert!((END_MS..=END_MS + 2_100).contains(&last.at.as_millis()), "{last:?}");
     }
@@ -123,122 +150,73 @@ fn an_autopilot_that_falls_silent_makes_everything_else_stale() {
 
 #[test]
 fn an_autopilot_that_restarts() {
-    let findings = fly(|now_ms, quad| quad.boot_offset_ms = -(FAULT_MS as i64) + i64::from(now_ms == 0));
-    let reboot = findings.iter().find(|finding| finding.check == "autopilot_reboot").expect("found");
-    assert_eq!(reboot.level, Level::Critical);
+    let run = fly("20-100 boot=-20000");
+    let reboot = first(&run, "autopilot_reboot", Level::Critical);
     assert!((FAULT_MS..=FAULT_MS + 100).contains(&reboot.at.as_millis()), "{reboot:?}");
     // The report lasts 30 s, and then two seconds of good values.
-    let cleared = findings.iter().rfind(|finding| finding.check == "autopilot_reboot").expect("there");
-    assert_eq!(cleared.level, Level::Ok);
-    assert!((FAULT_MS + 32_000..=FAULT_MS + 32_200).contains(&cleared.at.as_millis()), "{cleared:?}");
+    let cleared = last(&run, "autopilot_reboot");
+    let in_time = (FAULT_MS + 32_000..=FAULT_MS + 32_200).contains(&cleared.at.as_millis());
+    assert!(cleared.level == Level::Ok && in_time, "{cleared:?}");
 }
 
 #[test]
 fn what_comes_back_by_less_than_the_hysteresis_stays_bad() {
-    type Set = fn(&mut Quad, f32);
-    // A value that is bad for the first half of the fault, and then another one.
-    let cases: [(&str, f32, f32, Set); 8] = [
-        ("cell_voltage", 13.2, 14.1, |quad, v| quad.battery.voltage = Some(Volts(v))),
-        ("batt_remaining", 0.05, 0.075, |quad, part| quad.battery.remaining = Some(Fraction(part))),
-        ("esc_temperature", 120.0, 108.0, |quad, c| {
-            quad.escs[2].as_mut().unwrap().temperature = Some(Celsius(c));
-        }),
-        // Of the others' 5 A.
-        ("motor_loss", 0.0, 0.7, |quad, a| quad.escs[1].as_mut().unwrap().current = Some(Amperes(a))),
-        ("ekf_failsafe", 0.9, 0.77, |quad, velocity| {
-            (quad.estimator.compass, quad.estimator.velocity) = (Some(1.2), Some(velocity));
-        }),
-        ("vibration", 70.0, 58.0, |quad, level| quad.vibration.levels[2] = Some(level)),
-        ("roll", 1.2, 1.0, |quad, roll| quad.roll = roll),
-        ("load", 0.97, 0.94, |quad, load| quad.system.load = Some(Fraction(load))),
-    ];
-    for (check, bad, back, set) in cases {
-        let findings = fly(|now_ms, quad| set(quad, if now_ms < 60_000 { bad } else { back }));
-        let mine = || findings.iter().filter(|finding| finding.check == check);
-        let critical = mine().find(|finding| finding.level == Level::Critical).expect(check);
-        let next = mine().find(|finding| finding.at.is_after(critical.at)).expect(check);
+    // A value that is bad for the first half of the fault, and then another one; the motor's of the others' 5 A.
+    for (check, bad, back) in [
+        ("cell_voltage", "volt=13.2", "volt=14.1"),
+        ("batt_remaining", "rem=0.05", "rem=0.075"),
+        ("esc_temperature", "hot2=120", "hot2=108"),
+        ("motor_loss", "amps=5,0,5,5", "amps=5,0.7,5,5"),
+        ("ekf_failsafe", "ekf=0.9,1.2", "ekf=0.77,1.2"),
+        ("vibration", "vibe=5,5,70", "vibe=5,5,58"),
+        ("roll", "roll=1.2", "roll=1"),
+        ("load", "cpu=0.97", "cpu=0.94"),
+    ] {
+        let run = fly(&format!("20-60 {bad}; 60-100 {back}"));
+        let critical = first(&run, check, Level::Critical);
+        let next = run.of_check(check).find(|finding| finding.at.is_after(critical.at)).expect(check);
         assert!(next.at.as_millis() >= END_MS, "{check} fell to {:?} at {:?}", next.level, next.at);
     }
 }
 
 #[test]
-fn what_is_checked_before_arming_and_heights_of_the_ground_are_no_sensors() {
-    assert_eq!(
-        fly(|_, quad| quad.system.sensors = Some(Sensors::of(u32::MAX, u32::MAX, !(1 << 28 | 1 << 22)))),
-        []
-    );
-}
-
-#[test]
-fn a_warning_falls_with_its_value_or_where_it_is_latched_at_disarming() {
-    let mut latched = Params::defaults();
-    latched.set("HEALTH_LATCH", 1.0).unwrap();
-    let falls = [(42_000, Level::Warning), (52_000, Level::Ok)];
-    for (params, falls) in [(&Params::defaults(), &falls[..]), (&latched, &[(60_000, Level::Ok)])] {
-        let (_, findings) = fly_with(params, |now_ms, quad| {
-            quad.armed = now_ms < 60_000;
-            let load = match now_ms {
-                ..30_000 | 40_000..50_000 => 0.88,
-                30_000..40_000 => 0.97,
-                _ => 0.3,
-            };
-            quad.system.load = Some(Fraction(load));
-        });
-        let load = findings.iter().filter(|finding| finding.check == "load");
-        let load: Vec<_> = load.map(|finding| (finding.at.as_millis(), finding.level)).collect();
-        assert_eq!(load, [&[(22_000, Level::Warning), (32_000, Level::Critical)], falls].concat());
-    }
-}
-
-#[test]
-fn a_latched_warning_whose_message_stops_comes_back_with_it_until_disarming() {
-    let mut latched = Params::defaults();
-    latched.set("HEALTH_LATCH", 1.0).unwrap();
-    let come_back = [Level::Warning, Level::Stale, Level::Warning, Level::Ok];
-    let fall = [Level::Warning, Level::Stale, Level::Ok];
-    for (params, expected) in [(&Params::defaults(), &fall[..]), (&latched, &come_back)] {
-        let (_, findings) = fly_with(params, |now_ms, quad| {
-            quad.armed = now_ms < 60_000;
-            quad.system.load = match now_ms {
-                ..30_000 => Some(Fraction(0.88)),
-                30_000..45_000 => None,
-                _ => Some(Fraction(0.3)),
-            };
-        });
-        let load = findings.iter().filter(|finding| finding.check == "load");
-        let load: Vec<_> = load.map(|finding| finding.level).collect();
-        assert_eq!(load, expected);
+fn a_warning_falls_with_its_value_and_a_latched_one_at_disarming() {
+    use Level::{Critical, Ok, Stale, Warning};
+    let script = "20-100 cpu=0.3; 20-30 cpu=0.88; 30-40 cpu=0.97; 40-50 cpu=0.88; 60-100 off";
+    let stops = "20-100 cpu=0.3; 20-30 cpu=0.88; 30-45 nodata; 60-100 off";
+    for (latch, falls, levels) in [
+        (0.0, &[(42, Warning, ""), (52, Ok, "")][..], &[Warning, Stale, Ok][..]),
+        (1.0, &[(60, Ok, "")], &[Warning, Stale, Warning, Ok]),
+    ] {
+        let run = fly_with(&[("HEALTH_LATCH", latch)], script);
+        assert_eq!(told(&run, "load"), [&[(22, Warning, ""), (32, Critical, "")], falls].concat(), "{latch}");
+        let run = fly_with(&[("HEALTH_LATCH", latch)], stops);
+        assert_eq!(
+            run.of_check("load").map(|one| one.level).collect::<Vec<_>>(),
+            levels,
+            "its message stops"
+        );
     }
 }
 
 #[test]
 fn a_card_that_refuses_writes() {
-    let findings = fly(|_, quad| quad.recorder.write_errors = 3);
-    let errors = findings.iter().find(|finding| finding.check == "card_errors").expect("found");
-    assert_eq!((errors.level, errors.at.as_millis()), (Level::Warning, FAULT_MS + 50), "two ticks");
-    let cleared = findings.iter().rfind(|finding| finding.check == "card_errors").expect("there");
-    assert_eq!(cleared.level, Level::Ok, "ten seconds without one");
-}
-
-#[test]
-fn an_error_counter_that_wraps_is_no_flood_of_errors() {
-    let findings = fly(|_, quad| quad.escs[0].as_mut().unwrap().errors = Some(2));
-    assert_eq!(findings, []);
+    let run = fly("20-100 refused=3");
+    let errors = first(&run, "card_errors", Level::Warning);
+    assert_eq!(errors.at.as_millis(), FAULT_MS + 50, "two ticks");
+    assert_eq!(last(&run, "card_errors").level, Level::Ok, "ten seconds without one");
 }
 
 #[test]
 fn errors_that_rise_are_counted_a_minute_across_the_end_of_their_counter() {
-    let findings = fly(|now_ms, quad| {
-        // Two a second, through the counter's end: more than the limit of ten a minute in the sixth second.
-        quad.escs[0].as_mut().unwrap().errors =
-            Some((u32::MAX - 3).wrapping_add(((now_ms - FAULT_MS) / 500) as u32));
-    });
-    let errors = findings.iter().find(|finding| finding.check == "esc_errors").expect("found");
-    assert_eq!((errors.level, errors.instance), (Level::Warning, 0));
-    let after_ms = errors.at.as_millis() - FAULT_MS;
+    // Two a second, through the counter's end: more than the limit of ten a minute in the sixth second.
+    let run = fly("20-100 counts0");
+    let errors = first(&run, "esc_errors", Level::Warning);
     // Eleven after 5.5 s, and a second of debounce.
-    assert!((6_500..=6_600).contains(&after_ms), "{after_ms}");
-    assert_eq!(findings.iter().filter(|finding| finding.level == Level::Warning).count(), 1, "{findings:?}");
+    let after_ms = errors.at.as_millis() - FAULT_MS;
+    assert!(errors.instance == 0 && (6_500..=6_600).contains(&after_ms), "{errors:?}");
+    let warnings = run.findings.iter().filter(|finding| finding.level == Level::Warning);
+    assert_eq!(warnings.count(), 1, "{:?}", run.findings);
 }
 
 #[test]
@@ -261,101 +239,61 @@ fn a_clock_that_jumps_is_no_fault_and_counts_no_time() {
 
 #[test]
 fn an_alarm_that_outlives_the_one_that_explained_it_is_told_by_itself_once() {
-    let script = |gnss_until_ms: u64| {
-        move |now_ms: u64, quad: &mut Quad| {
-            quad.gnss.fix = if now_ms < gnss_until_ms { 1 } else { 3 };
-            quad.estimator.velocity = Some(if now_ms < 22_000 { 0.1 } else { 1.5 });
-        }
-    };
-    let of_estimator = |gnss_until_ms| {
-        let findings = fly(script(gnss_until_ms));
-        let end = findings.iter().find(|one| one.check == "gps_fix" && one.level == Level::Ok);
-        let end_ms = end.expect("it comes back").at.as_millis();
-        let mine = findings.iter().filter(|one| one.check == "ekf_variance" && one.level != Level::Ok);
+    let of_estimator = |gnss_until_s: f32| {
+        let run = fly(&format!("20-100 vel=0.1; 22-100 vel=1.5; 20-{gnss_until_s} fix=1"));
+        let end_ms = first(&run, "gps_fix", Level::Ok).at.as_millis();
+        let mine = run.of_check("ekf_variance").filter(|one| one.level != Level::Ok);
         (end_ms, mine.map(|one| (one.at.as_millis(), one.because, one.previous)).collect::<Vec<_>>())
     };
     // With the end of its cause at any step.
-    for phase_ms in (0..2_000).step_by(150) {
-        let (end_ms, told) = of_estimator(40_000 + phase_ms);
+    for phase in 0..14_u8 {
+        let (end_ms, told) = of_estimator(40.0 + 0.15 * f32::from(phase));
         let [(_, "gps_fix", Level::Ok), (at_ms, "", Level::Warning)] = told[..] else { panic!("{told:?}") };
-        assert_eq!(at_ms - end_ms, 8_000, "{phase_ms}");
+        assert_eq!(at_ms - end_ms, 8_000, "{phase}");
     }
-    let (_, told) = of_estimator(END_MS);
+    let (_, told) = of_estimator(100.0);
     assert_eq!(told.len(), 1, "{told:?}");
 }
 
 #[test]
 fn an_esc_of_a_plane_that_glides_may_fall_silent() {
-    let told = |throttle: f32| {
-        let findings = fly(|_, quad| {
-            (quad.kind, quad.type_number, quad.throttle) = (VehicleKind::Plane, 1, throttle);
-            quad.escs[3] = None;
-        });
-        findings.iter().any(|finding| finding.check == "esc_silent" && finding.level != Level::Ok)
-    };
-    assert!(told(0.5));
-    assert!(!told(0.0));
-}
-
-fn critical_of(check: &str, findings: &[Finding]) -> Vec<(u64, &'static str)> {
-    let mine = findings.iter().filter(|finding| finding.check == check && finding.level == Level::Critical);
-    mine.map(|finding| (finding.at.as_millis() / 1_000, finding.because)).collect()
+    for (throttle, is_told) in [(0.5, true), (0.0, false)] {
+        let run = fly(&format!("20-100 plane thr={throttle} esc3"));
+        assert_eq!(run.of_check("esc_silent").any(|one| one.level != Level::Ok), is_told, "{throttle}");
+    }
 }
 
 #[test]
 fn a_critical_outlives_a_cause_that_falls_to_a_warning() {
-    let findings = fly(|now_ms, quad| {
-        quad.vibration.levels = [Some(if now_ms < FAULT_MS + 10_000 { 80.0 } else { 45.0 }); 3];
-        if now_ms >= FAULT_MS + 2_000 {
-            (quad.estimator.velocity, quad.estimator.position_horizontal) = (Some(1.2), Some(1.2));
-        }
-    });
-    let fell =
-        findings.iter().rfind(|finding| finding.check == "vibration" && finding.level == Level::Warning);
-    let fell_s = fell.expect("it falls").at.as_millis() / 1_000;
-    assert_eq!(critical_of("ekf_failsafe", &findings), [(23, "vibration"), (fell_s + 8, "")]);
+    let run = fly("20-30 vibe=80; 30-100 vibe=45; 22-100 drifts=1.2");
+    let mut warnings = run.of_check("vibration").filter(|finding| finding.level == Level::Warning);
+    let fell_s = warnings.next_back().expect("it falls").at.as_millis() / 1_000;
+    let mut critical = told(&run, "ekf_failsafe");
+    critical.retain(|(_, level, _)| *level == Level::Critical);
+    let expected = [(23, Level::Critical, "vibration"), (fell_s + 8, Level::Critical, "")];
+    assert_eq!(critical, expected);
 }
 
 #[test]
 fn an_alarm_that_rises_long_after_its_cause_began_is_not_explained_by_it() {
-    let findings = fly(|now_ms, quad| {
-        quad.autopilot = Autopilot::Px4;
-        quad.mode = 3 << 16;
-        quad.estimator.scale = EstimatorScale::TestRatio;
-        quad.vibration.levels = [Some(0.01), Some(0.7), Some(20.0)];
-        let velocity = if now_ms < FAULT_MS + 2_000 {
-            0.1
-        } else if now_ms < 70_000 {
-            0.8
-        } else {
-            5.0
-        };
-        quad.estimator.velocity = Some(velocity);
-    });
-    let warned = findings.iter().find(|finding| finding.check == "ekf_test_ratio").expect("it warns");
+    let run = fly("20-100 px4 mode=posctl ratio vibe=0.01,0.7,20 vel=0.1; 22-70 vel=0.8; 70-100 vel=5");
+    let warned = run.of_check("ekf_test_ratio").next().expect("it warns");
     assert_eq!((warned.level, warned.because), (Level::Warning, "vibration_px4"));
-    let noise = findings.iter().find(|finding| finding.check == "gyro_noise").expect("of the same message");
-    assert_eq!(noise.because, "vibration_px4");
-    let critical = critical_of("ekf_test_ratio", &findings);
-    assert!(critical.iter().all(|(at_s, because)| *at_s >= 70 && because.is_empty()), "{critical:?}");
-    assert!(!critical.is_empty());
+    assert_eq!(
+        run.of_check("gyro_noise").next().map(|one| one.because),
+        Some("vibration_px4"),
+        "one message"
+    );
+    let mut critical = told(&run, "ekf_test_ratio");
+    critical.retain(|(_, level, _)| *level == Level::Critical);
+    assert!(!critical.is_empty() && critical.iter().all(|(at_s, _, cause)| *at_s >= 70 && cause.is_empty()));
 }
 
 #[test]
 fn a_mishap_that_is_over_explains_nothing_where_levels_are_latched() {
-    let mut latched = Params::defaults();
-    latched.set("HEALTH_LATCH", 1.0).unwrap();
-    let (_, findings) = fly_with(&latched, |now_ms, quad| {
-        if now_ms < FAULT_MS + 700 {
-            quad.acceleration_down = -0.5 - (now_ms / 100 % 7) as f32 * 0.01;
-        }
-        if now_ms >= FAULT_MS + 30_000 {
-            quad.escs[2].as_mut().unwrap().failures = Some(0x20);
-        }
-    });
-    assert!(findings.iter().any(|finding| finding.check == "free_fall"), "{findings:?}");
-    let failure = findings.iter().find(|finding| finding.check == "esc_failure").expect("found");
-    assert_eq!(failure.because, "");
+    let run = fly_with(&[("HEALTH_LATCH", 1.0)], "20-20.7 falls; 50-100 fail2=32");
+    assert!(run.of_check("free_fall").next().is_some(), "{:?}", run.findings);
+    assert_eq!(run.of_check("esc_failure").next().map(|one| one.because), Some(""));
 }
 
 #[test]
@@ -368,48 +306,36 @@ fn a_value_of_power_on_is_stale_for_ever() {
             quad.battery.temperature = Some(Celsius(95.0));
         });
     }
-    let last = run.of_check("batt_temperature").next_back().expect("it was hot");
+    let last = last(&run, "batt_temperature");
     assert!(last.level == Level::Stale && last.at.as_millis() < 20_000, "{last:?}");
 }
 
 #[test]
 fn what_has_no_data_when_a_silence_is_over_is_told_then() {
-    let mut run = Run::new(&Params::defaults());
-    run.flies(0..100_000, |now_ms, quad, _| {
-        (quad.silent, quad.battery_silent) = ((20_000..50_000).contains(&now_ms), now_ms >= 19_000);
-    });
-    let is_late = |one: &&Finding| one.check == "batt_remaining" || one.at.as_millis() > 50_000;
-    let stale = run.findings.iter().filter(|one| one.level == Level::Stale).filter(is_late);
-    let stale: Vec<_> = stale.map(|one| (one.check, one.at.as_millis() / 1_000, one.because)).collect();
-    let of_battery: Vec<_> = stale.iter().filter(|(check, ..)| *check == "batt_remaining").collect();
-    let [(_, first_s, "heartbeat"), (_, again_s, "")] = of_battery[..] else { panic!("{stale:?}") };
-    assert!(*first_s < 50 && (58..=62).contains(again_s), "{stale:?}");
+    let run = fly("20-50 silent; 19 mute");
+    let of_battery = told(&run, "batt_remaining");
+    let [(first_s, Level::Stale, "heartbeat"), (again_s, Level::Stale, "")] = of_battery[..] else {
+        panic!("{of_battery:?}")
+    };
+    assert!(first_s < 50 && (58..=62).contains(&again_s), "{of_battery:?}");
+    let late = run.findings.iter().filter(|one| one.level == Level::Stale && one.at.as_millis() > 50_000);
     let of_battery = ["batt_remaining", "cell_voltage", "batt_fault", "batt_temperature"];
-    assert!(stale.iter().all(|(check, ..)| of_battery.contains(check)), "{stale:?}");
+    assert!(late.clone().all(|one| of_battery.contains(&one.check)), "{:?}", late.collect::<Vec<_>>());
 }
 
 #[test]
 fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_received() {
     // The `MAV_STATE` while disarmed, armed, and armed from 30 s on.
-    let critical_ms = |gap_ms: u64, disarmed: Option<u8>, [first, then]: [u8; 2]| {
-        let mut run = Run::new(&Params::defaults());
-        run.flies(0..60_000, |now_ms, quad, _| {
-            quad.silent = (10_000..10_000 + gap_ms).contains(&now_ms);
-            quad.armed = disarmed.is_none() || now_ms >= 10_000;
-            let armed_state = if now_ms < 30_000 { first } else { then };
-            quad.state = disarmed.filter(|_| !quad.armed).unwrap_or(armed_state);
-        });
-        let mut critical = run.of_check("autopilot_state").filter(|one| one.level == Level::Critical);
-        critical.next().map(|one| one.at.as_millis())
-    };
-    for (case, gap_ms, disarmed, states, told_ms) in [
-        ("it stood at the arming", 0, Some(5), [5, 5], None),
-        ("it begins", 0, Some(3), [4, 5], Some(30_000..34_000)),
-        ("it ended between", 0, Some(5), [4, 5], Some(30_000..34_000)),
-        ("first received in the air", 0, None, [5, 5], Some(0..5_000)),
-        ("armed in a gap", 12_000, Some(3), [5, 5], Some(22_000..26_000)),
+    for (case, script, told_ms) in [
+        ("it stood at the arming", "* state=5; 0-10 off", None),
+        ("it begins", "0-10 off state=3; 10-30 state=4; 30 state=5", Some(30_000..34_000)),
+        ("it ended between", "0-10 off state=5; 10-30 state=4; 30 state=5", Some(30_000..34_000)),
+        ("first received in the air", "* state=5", Some(0..5_000)),
+        ("armed in a gap", "0-10 off state=3; 10 state=5; 10-22 silent", Some(22_000..26_000)),
     ] {
-        let critical_ms = critical_ms(gap_ms, disarmed, states);
+        let run = fly(script);
+        let mut critical = run.of_check("autopilot_state").filter(|one| one.level == Level::Critical);
+        let critical_ms = critical.next().map(|one| one.at.as_millis());
         let is_so =
             told_ms.map_or(critical_ms.is_none(), |told| critical_ms.is_some_and(|ms| told.contains(&ms)));
         assert!(is_so, "{case}: {critical_ms:?}");
@@ -418,17 +344,8 @@ fn a_failsafe_counts_if_it_began_after_the_arming_or_if_the_arming_was_not_recei
 
 #[test]
 fn what_the_autopilot_says_of_gnss_counts_from_the_first_fix_on() {
-    let told = |had_fix: bool| {
-        let mut run = Run::new(&Params::defaults());
-        run.flies(0..60_000, |now_ms, quad, more| {
-            quad.gnss.fix = if had_fix && now_ms < FAULT_MS { 3 } else { 1 };
-            let says = now_ms == FAULT_MS + 5_000;
-            more.extend(
-                says.then_some(Observation::Alert(Alert { cause: Cause::Gnss, urgency: Urgency::Warning })),
-            );
-        });
-        run.of_check("gnss_alert").any(|one| one.level == Level::Warning)
-    };
-    assert!(told(true));
-    assert!(!told(false), "it flies indoors");
+    for (script, is_told) in [("20 fix=1; @25 alert", true), ("* fix=1; @25 alert", false)] {
+        let run = fly(script);
+        assert_eq!(run.of_check("gnss_alert").any(|one| one.level == Level::Warning), is_told, "{script}");
+    }
 }

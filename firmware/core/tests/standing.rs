@@ -1,195 +1,119 @@
-//! Standing vehicles that report flight: on the bench, spooling up, landed by hand.
+//! Standing vehicles that report flight: on the bench, spooling up, landed by hand; and vehicles that fly though little says so.
 
-use crate::common::{Quad, Run};
-use hums_core::observation::{Air, Hud, Imu, LandedState, Observation, VehicleKind};
+use crate::common::{Quad, Run, Script};
+use hums_core::observation::{Air, Hud, Imu, Observation};
 use hums_core::params::Params;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 
-fn counts(script: impl Fn(u64) -> Vec<Observation>) -> (u32, u32) {
+/// Flights and landings in two minutes of a vehicle that is armed after 5 s, and that its autopilot calls in the air. Words besides the
+/// vehicle's: `nowhere`, without a position; `alt` and `up`, height and climb on the display; `speed` over ground; `turns`, a body
+/// rate; `shake`, steps of the force, and `hpa`.
+fn counts(script: &str) -> (u32, u32) {
+    let script = Script::new(&format!("* landed=air c=0; 0-5 off; {script}"));
     let mut run = Run::new(&Params::defaults());
-    run.says(0..120_000, script);
+    run.says(0..120_000, |now_ms| {
+        let (mut quad, mut hud, mut imu) = (Quad::healthy(), Hud::default(), Imu::default());
+        let (mut is_nowhere, mut speed_mps, mut air) = (false, None, None);
+        let noise = (now_ms / 100 % 3) as f32;
+        script.play(now_ms as i64, |said| match said.name() {
+            _ if quad.take(said) => {}
+            "nowhere" => is_nowhere = true,
+            "alt" => hud.altitude = Some(Metres(said.number())),
+            "up" => hud.climb = Some(MetresPerSecond(said.number())),
+            "speed" => speed_mps = Some(said.number()),
+            "turns" => imu.rate = Some([said.number(), 0.0, 0.0].map(RadiansPerSecond)),
+            "shake" => {
+                let down = -9.8 + said.number() * noise;
+                imu.acceleration = Some([0.0, 0.0, down].map(MetresPerSecond2));
+                imu.rate = Some([RadiansPerSecond(0.01); 3]);
+            }
+            "hpa" => {
+                let pressure = Some(Hectopascals(said.number() + 0.01 * noise));
+                air = Some(Observation::Air(Air { pressure, ..Air::default() }));
+            }
+            word => panic!("{word}: no word"),
+        });
+        let mut said = quad.says(now_ms);
+        said.retain(|one| !is_nowhere || !matches!(one, Observation::GlobalPosition(_)));
+        for one in &mut said {
+            match one {
+                Observation::GlobalPosition(global) => {
+                    if let Some(speed_mps) = speed_mps {
+                        global.velocity = [speed_mps, 0.0, -quad.climb].map(MetresPerSecond);
+                    }
+                }
+                Observation::Hud(own) => *own = Hud { throttle: Some(Fraction(quad.throttle)), ..hud },
+                Observation::Imu(own) => {
+                    own.acceleration = imu.acceleration.or(own.acceleration);
+                    own.rate = imu.rate;
+                }
+                _ => {}
+            }
+        }
+        said.extend(air);
+        said
+    });
     let [flights, landings, _] =
         run.counts([UsageCounter::Flights, UsageCounter::Landings, UsageCounter::Mishaps]);
     (flights, landings)
 }
 
-/// In the air from its arming on, by its autopilot.
-fn called_in_air(now_ms: u64) -> Quad {
-    Quad { armed: now_ms >= 5_000, landed: Some(LandedState::InAir), climb: 0.0, ..Quad::healthy() }
-}
-
 #[test]
-fn what_idles_on_the_bench_does_not_fly_though_the_autopilot_calls_it_in_the_air() {
-    let bench = |now_ms| Quad { height: 0.2, throttle: 0.12, ..called_in_air(now_ms) }.says(now_ms);
-    assert_eq!(counts(bench), (0, 0));
-    let takes_off = |now_ms| {
-        let throttle = if now_ms < 40_000 { 0.12 } else { 0.45 };
-        let height = if now_ms < 42_000 { 0.2 } else { 10.0 };
-        Quad { height, throttle, ..called_in_air(now_ms) }.says(now_ms)
-    };
-    assert_eq!(counts(takes_off), (1, 0));
-    let restarted =
-        |now_ms| Quad { armed: true, height: 0.3, throttle: 0.4, ..called_in_air(now_ms) }.says(now_ms);
-    assert_eq!(counts(restarted), (1, 0), "heard first in a hover at the height of home");
-}
-
-#[test]
-fn what_a_pilot_landed_and_left_armed_has_landed() {
-    let lands = |now_ms| {
-        let flies = (10_000..50_000).contains(&now_ms) || (80_000..100_000).contains(&now_ms);
-        let (height, throttle) = if flies { (8.0, 0.4) } else { (0.1, 0.0) };
-        let mut said = Quad { height, throttle, ..called_in_air(now_ms) }.says(now_ms);
-        for said in &mut said {
-            if let Observation::GlobalPosition(global) = said {
-                global.velocity = Default::default();
-            }
-        }
-        said
-    };
-    assert_eq!(counts(lands), (2, 2));
-}
-
-#[test]
-fn motors_tried_without_any_position_are_no_flight_where_the_barometer_does_not_rise() {
-    let tried = |height_m: f32| {
-        move |now_ms: u64| {
-            let runs = now_ms >= 20_000;
-            let quad = Quad { armed: now_ms >= 5_000, ..Quad::healthy() };
-            let altitude = 480.0 + if runs { height_m } else { 0.3 };
-            let throttle = Some(Fraction(if runs { 0.6 } else { 0.0 }));
-            let hud = Hud { throttle, altitude: Some(Metres(altitude)), ..Hud::default() };
-            let own =
-                |said: &Observation| !matches!(said, Observation::GlobalPosition(_) | Observation::Hud(_));
-            quad.says(now_ms).into_iter().filter(own).chain([Observation::Hud(hud)]).collect()
-        }
-    };
-    assert_eq!(counts(tried(0.6)), (0, 0));
-    assert_eq!(counts(tried(6.0)), (1, 0));
-}
-
-/// In the air from its arming at 5 s on, by its autopilot, without a position.
-fn without_position(now_ms: u64, throttle: f32, altitude_m: Option<f32>, climb_mps: f32) -> Vec<Observation> {
-    let hud = Hud {
-        throttle: Some(Fraction(throttle)),
-        altitude: altitude_m.map(Metres),
-        climb: Some(MetresPerSecond(climb_mps)),
-        ..Hud::default()
-    };
-    let own = |said: &Observation| !matches!(said, Observation::GlobalPosition(_) | Observation::Hud(_));
-    let said = called_in_air(now_ms).says(now_ms).into_iter().filter(own);
-    said.chain([Observation::Hud(hud)]).collect()
-}
-
-#[test]
-fn what_has_no_throttle_and_does_not_move_does_not_fly_whatever_is_said_of_it() {
-    assert_eq!(counts(|now_ms| without_position(now_ms, 0.0, None, 0.2)), (0, 0), "nothing tells its height");
-    let drifts =
-        |now_ms: u64| Quad { height: now_ms as f32 / 20_000.0, throttle: 0.02, ..called_in_air(now_ms) };
-    assert_eq!(counts(|now_ms| drifts(now_ms).says(now_ms)), (0, 0), "its height drifts by 6 m");
-    let unsaid = |now_ms| Quad { landed: None, ..drifts(now_ms) }.says(now_ms);
-    assert_eq!(counts(unsaid), (0, 0), "nobody says that it flies");
-    let full = |now_ms| {
-        let throttle = if now_ms < 20_000 { 0.0 } else { 1.0 };
-        Quad { height: 0.4, throttle, ..called_in_air(now_ms) }.says(now_ms)
-    };
-    assert_eq!(counts(full), (0, 0), "without propellers, all its throttle");
-    let rolls = |now_ms| {
-        let kind = VehicleKind::Plane;
-        Quad { kind, type_number: 1, height: 0.3, throttle: 0.0, ..called_in_air(now_ms) }.says(now_ms)
-    };
-    assert_eq!(counts(rolls), (0, 0), "a plane that stands");
-}
-
-#[test]
-fn what_hovers_low_what_glides_and_what_falls_without_throttle_flies() {
-    let low = |now_ms| {
-        let throttle = if now_ms < 20_000 { 0.0 } else { 0.3 };
-        let climb = if (20_000..21_000).contains(&now_ms) { 0.5 } else { 0.0 };
-        without_position(now_ms, throttle, Some(if now_ms < 20_000 { 480.0 } else { 480.5 }), climb)
-    };
-    assert_eq!(counts(low), (1, 0), "half a metre up, without a position");
-    let glides = |now_ms| {
-        let kind = VehicleKind::Plane;
-        let mut said =
-            Quad { kind, type_number: 1, height: 60.0, throttle: 0.0, climb: -1.0, ..called_in_air(now_ms) }
-                .says(now_ms);
-        for said in &mut said {
-            if let Observation::GlobalPosition(global) = said {
-                global.velocity[0] = MetresPerSecond(14.0);
-            }
-        }
-        said
-    };
-    assert_eq!(counts(glides), (1, 0), "with its motor off");
-    let sinks = |now_ms| {
-        let (throttle, climb) = if now_ms < 60_000 { (0.5, 0.0) } else { (0.0, -4.0) };
-        without_position(now_ms, throttle, None, climb)
-    };
-    assert_eq!(counts(sinks), (1, 0), "it descends without throttle");
+fn what_stands_does_not_fly_and_what_flies_does_whatever_is_said_of_it() {
+    for (what, script, expected) in [
+        ("it idles on the bench", "* h=0.2 thr=0.12", (0, 0)),
+        ("it takes off from there", "* h=0.2 thr=0.12; 40 thr=0.45; 42 h=10", (1, 0)),
+        ("received first in a hover at the height of home", "* on h=0.3 thr=0.4", (1, 0)),
+        (
+            "a pilot landed it and left it armed",
+            "* h=0.1 thr=0 speed=0; 10-50 h=8 thr=0.4; 80-100 h=8 thr=0.4",
+            (2, 2),
+        ),
+        ("motors tried", "* nowhere landed=- alt=480.3 thr=0; 20 alt=480.6 thr=0.6", (0, 0)),
+        ("the barometer rises", "* nowhere landed=- alt=480.3 thr=0; 20 alt=486 thr=0.6", (1, 0)),
+        ("nothing tells its height", "* nowhere thr=0 up=0.2", (0, 0)),
+        ("its height drifts by 6 m", "* thr=0.02; 0-120 h=0..6", (0, 0)),
+        ("nobody says that it flies", "* landed=- thr=0.02; 0-120 h=0..6", (0, 0)),
+        ("without propellers, all its throttle", "* h=0.4 thr=0; 20 thr=1", (0, 0)),
+        ("a plane that stands", "* plane h=0.3 thr=0", (0, 0)),
+        (
+            "half a metre up, without a position",
+            "* nowhere thr=0 alt=480 up=0; 20 thr=0.3 alt=480.5; 20-21 up=0.5",
+            (1, 0),
+        ),
+        ("with its motor off", "* plane h=60 thr=0 c=-1 speed=14", (1, 0)),
+        ("it descends without throttle", "* nowhere thr=0.5 up=0; 60 thr=0 up=-4", (1, 0)),
+        // Received first in a hover, by a simulator without noise.
+        ("a simulator that hovers", "* on thr=0.5 shake=0.03 hpa=960", (1, 0)),
+    ] {
+        assert_eq!(counts(script), expected, "{what}");
+    }
 }
 
 #[test]
 fn an_estimator_that_drifts_away_while_the_sensors_rest_begins_no_second_flight() {
-    // As an ArduPlane's did: landed, left armed, and called landing again and again.
-    let drifts = |rests: bool| {
-        move |now_ms: u64| {
-            let flies = (10_000..60_000).contains(&now_ms);
-            let says = match now_ms {
-                ..10_000 => LandedState::OnGround,
-                10_000..60_000 => LandedState::InAir,
-                _ if (now_ms / 10_000).is_multiple_of(3) => LandedState::OnGround,
-                _ => LandedState::Landing,
-            };
-            let (height, throttle, climb) = match now_ms {
-                _ if flies => (12.0, 0.5, 0.0),
-                ..60_000 => (0.0, 0.0, 0.0),
-                _ => (-(now_ms as f32 - 60_000.0) / 500.0, 0.03, -2.0),
-            };
-            let quad = Quad { landed: Some(says), height, throttle, climb, ..called_in_air(now_ms) };
-            let mut said = quad.says(now_ms);
-            for said in &mut said {
-                if let Observation::Imu(imu) = said {
-                    let turns = if rests || now_ms < 60_000 { 0.0 } else { 2.0 };
-                    imu.rate = Some([turns, 0.0, 0.0].map(RadiansPerSecond));
-                }
-            }
-            said
-        }
+    let drifts = |turns: f32| {
+        counts(&format!(
+            "0-10 landed=ground h=0 thr=0; 10-60 h=12 thr=0.5; 0 turns=0; 60 landed=landing thr=0.03 c=-2 turns={turns}; \
+             60%30:0-10 landed=ground; 60-120 h=0..-120"
+        ))
     };
-    assert_eq!(counts(drifts(true)), (1, 1));
-    assert_ne!(counts(drifts(false)), (1, 1), "what turns may fall");
+    assert_eq!(drifts(0.0), (1, 1));
+    assert_ne!(drifts(2.0), (1, 1), "what turns may fall");
 }
 
 #[test]
 fn what_rotors_do_not_shake_and_the_barometer_never_saw_rise_does_not_fly_whatever_an_estimator_makes_of_it()
 {
-    // Motors without propellers, half of the throttle, and an estimator that falls by 10 m.
-    let script = |step_mps2: f32, rise_m: f32| {
-        move |now_ms: u64| {
-            let height = if now_ms < 20_000 { 0.0 } else { -((now_ms - 20_000) as f32 / 1_000.0).min(10.0) };
-            let quad =
-                Quad { height, throttle: if now_ms < 10_000 { 0.0 } else { 0.5 }, ..called_in_air(now_ms) };
-            let noise = (now_ms / 100 % 3) as f32;
-            let flies = (20_000..100_000).contains(&now_ms);
-            let pressure = 960.0 + 0.01 * noise - if flies { 0.12 * rise_m } else { 0.0 };
-            let force = [0.0, 0.0, -9.8 + step_mps2 * noise].map(MetresPerSecond2);
-            let imu =
-                Imu { acceleration: Some(force), rate: Some([RadiansPerSecond(0.01); 3]), ..Imu::default() };
-            let air = Air { pressure: Some(Hectopascals(pressure)), ..Air::default() };
-            let own = |said: &Observation| !matches!(said, Observation::Imu(_));
-            let said = quad.says(now_ms).into_iter().filter(own);
-            said.chain([Observation::Imu(imu), Observation::Air(air)]).collect()
-        }
+    let flights = |step_mps2: f32, rise_m: f32| {
+        counts(&format!(
+            "* shake={step_mps2} hpa=960 thr=0; 10 thr=0.5; 0-20 h=0; 20-30 h=0..-10; 30 h=-10; 20-100 hpa={}",
+            960.0 - 0.12 * rise_m
+        ))
+        .0
     };
-    assert_eq!(counts(script(0.03, 0.5)).0, 0);
-    assert_eq!(counts(script(0.03, 8.0)).0, 1, "it rose: a simulator without noise");
-    assert_eq!(counts(script(0.5, 0.5)).0, 1, "it shakes: low over the ground");
-    let heard_in_air = |now_ms: u64| -> Vec<Observation> {
-        let hovers = Quad { armed: true, throttle: 0.5, ..called_in_air(now_ms) }.says(now_ms);
-        let sensor = |said: &Observation| matches!(said, Observation::Imu(_) | Observation::Air(_));
-        let still = script(0.03, 0.0)(now_ms).into_iter().filter(sensor);
-        hovers.into_iter().filter(|said| !sensor(said)).chain(still).collect()
-    };
-    assert_eq!(counts(heard_in_air), (1, 0), "a simulator that hovers when it is heard first");
+    assert_eq!(flights(0.03, 0.5), 0);
+    assert_eq!(flights(0.03, 8.0), 1, "it rose: a simulator without noise");
+    assert_eq!(flights(0.5, 0.5), 1, "it shakes: low over the ground");
 }

@@ -1,6 +1,10 @@
 //! A simulated quad, driven by scripts.
 #![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
 
+mod script;
+
+pub use script::{Said, Script};
+
 use hums_core::Monitor;
 use hums_core::happening::Happening;
 use hums_core::health::Finding;
