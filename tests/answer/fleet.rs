@@ -82,13 +82,6 @@ fn the_documents_queries_answer_what_the_cards_say() {
     let on_board = || logs.iter().filter(|log| log["checked_by"] == "board");
 
     let results = oracle::fleet(&root().join("docs/fleet.md"), dir.path());
-    let hours = rows(&results, "Hours per motor");
-    let sum: f64 =
-        hours.iter().filter(|row| row["motor"] == 1).map(|row| row["hours"].as_f64().unwrap()).sum();
-    let expected: f64 = on_board().map(|log| log["usage"]["motor0_run_time_s"].as_f64().unwrap()).sum();
-    assert!((sum * 3600.0 - expected).abs() < 1.0, "motor 1 ran {sum} h, by info {expected} s");
-    assert!(expected > 600.0, "{expected} s");
-
     let vibration = rows(&results, "Worst vibration by airframe");
     let worst = vibration.iter().map(|row| row["worst"].as_f64().unwrap()).fold(0.0, f64::max);
     assert!(worst > 14.0, "the fault flight shakes: {vibration:?}");
@@ -151,7 +144,7 @@ fn assert_all_are_told(results: &Value, logs: &[Value]) {
     let ran: f64 = logs.iter().filter_map(|log| log["usage"]["motor0_run_time_s"].as_f64()).sum();
     let first_motor = rows(results, "Hours by motor").into_iter().filter(|row| row["motor"] == 1);
     let hours: f64 = first_motor.filter_map(|row| row["hours"].as_f64()).sum();
-    assert!((hours * 3600.0 - ran).abs() < 1.0, "motor 1 ran {hours} h, by info {ran} s");
+    assert!((hours * 3600.0 - ran).abs() < 1.0 && ran > 600.0, "motor 1 ran {hours} h, by info {ran} s");
     let sum = |heading, column: &str| {
         rows(results, heading).iter().filter_map(|row| row[column].as_f64()).sum::<f64>()
     };
