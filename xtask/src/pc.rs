@@ -14,8 +14,9 @@ use crate::oracle;
 use crate::repo;
 use crate::shell::Shell;
 
-/// Without the firmware's binary, which turns on `defmt` in shared crates.
-pub(crate) const CHOICE: [&str; 4] = ["--workspace", "--exclude=hums-app", "--features", FEATURES];
+/// Without the firmware's binaries, which turn on other features in shared crates.
+pub(crate) const CHOICE: [&str; 5] =
+    ["--workspace", "--exclude=hums-app", "--exclude=hums-resident", "--features", FEATURES];
 
 const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases";
 
