@@ -88,7 +88,6 @@ fn the_documents_queries_answer_what_the_cards_say() {
 
     let ageing = rows(&results, "Battery ageing");
     assert_eq!(ageing.len(), 4, "a row for each session's battery: {ageing:?}");
-    // The PX4 flight's battery does not measure its current.
     let unmeasured =
         ageing.iter().filter(|row| row["highest_amperes"].is_null() && row["milliohm"].is_null());
     assert_eq!(unmeasured.count(), 1, "{ageing:?}");
@@ -105,7 +104,6 @@ fn the_documents_queries_answer_what_the_cards_say() {
 
     assert_all_are_told(&results, logs);
 
-    // The Python in the other document reads the same rows.
     let printed = oracle::snippets(&root().join("docs/decode.md"), dir.path());
     let printed: Vec<&str> = printed.as_array().unwrap().iter().filter_map(Value::as_str).collect();
     let attitude = |log: &Value| {
@@ -137,10 +135,8 @@ fn the_documents_queries_answer_what_the_cards_say() {
     assert_eq!(frames, expected);
 }
 
-/// The summary says the same as the tables of records.
 #[track_caller]
 fn assert_all_are_told(results: &Value, logs: &[Value]) {
-    // The summary has the counters of recordings without a box, too.
     let ran: f64 = logs.iter().filter_map(|log| log["usage"]["motor0_run_time_s"].as_f64()).sum();
     let first_motor = rows(results, "Hours by motor").into_iter().filter(|row| row["motor"] == 1);
     let hours: f64 = first_motor.filter_map(|row| row["hours"].as_f64()).sum();

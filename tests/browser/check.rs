@@ -18,7 +18,6 @@ use super::live::shoot;
 /// The page is opened within a second or two; a phone's flash is no faster than this.
 const PAGE_BYTES_MAX: usize = 6_000_000;
 
-/// The page in Chromium, and the folder with what it reads and saves.
 struct Page {
     dir: tempfile::TempDir,
     shown: LivePage,
@@ -90,7 +89,6 @@ impl Page {
         self.shown.run(&script).as_str().unwrap().to_owned()
     }
 
-    /// The shown text, without any words of the command line.
     #[track_caller]
     fn all_text(&mut self) -> String {
         let text = self.text("main, header, footer");
@@ -189,13 +187,11 @@ fn every_recording_of_the_repository_is_judged_to_the_byte_as_on_the_command_lin
     let saved = page.save("Save all findings", 1);
     let expected = hums_in(&folder, &["check", "--json"], &names);
     let (shown, expected) = (fs::read_to_string(&saved[0]).unwrap(), expected.text());
-    // A recording of two vehicles has a line for each.
     let counts = [shown.lines().count(), expected.lines().count()];
     assert!(counts[0] == counts[1] && counts[1] >= names.len(), "{counts:?} of {}", names.len());
     for (shown, expected) in shown.lines().zip(expected.lines()) {
         assert_eq!(shown, expected);
     }
-    // The mark has the word of a folder's lines: an `ok` is of a whole log.
     let lines = hums_in(&folder, &["check"], &names).text();
     let words: Vec<&str> = lines.lines().take_while(|line| !line.is_empty()).map(first_word).collect();
     let marks = page.text("#logs .badge b");
@@ -283,14 +279,12 @@ fn what_is_dropped_is_judged_also_folders_and_two_files_of_one_name() {
     let shown = page.text("#logs h2");
     assert!(shown.contains("flight.tlog") && shown.contains("flight (2).tlog"), "{shown}");
     page.shown.run("document.documentElement.dataset.state = ''; return null");
-    // The browser itself numbers files of one name that are dropped.
     page.shown.drop_files(&[one, two, both.ancestors().nth(2).unwrap().to_owned()]);
     page.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
     let shown = page.text("#logs h2");
     for name in ["flight.tlog", "flight (1).tlog", "card/a/b.bin.gz"] {
         assert!(shown.contains(name), "{name}: {shown}");
     }
-    // A link of a report inside the page scrolls the report.
     page.shown.run("document.querySelector('[data-log=\"flight.tlog\"] button').click(); return null");
     page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
     assert_eq!(page.shown.console(), serde_json::json!([]));
@@ -322,14 +316,12 @@ fn each_vehicle_of_a_recording_of_several_has_its_answer_and_its_report() {
         assert!(fs::read(same).unwrap() == fs::read(&expected).unwrap(), "system {system} differs");
     }
     page.all_text();
-    // A folder of pages has both, and so has its table.
     hums_in(&folder, &["report", "-o", "../both/"], &names).expect_code(&[0, 3]);
     let both: Vec<_> =
         fs::read_dir(page.dir.path().join("both")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(both.len(), 3, "{both:?}");
 }
 
-/// One recording again and again: each is judged by itself.
 fn large(folder: &Path, name: &str, bytes: usize) -> PathBuf {
     let flight = fs::read(own("ap_quad_faults.tlog")).unwrap();
     let path = folder.join(name);
@@ -474,7 +466,6 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
             assert!(shown.contains(error), "{name}: {shown}");
         }
     }
-    // A run is cancelled, and the next one is whole.
     page.shown.files("#files", &[own("ap_quad_faults.tlog")]);
     page.shown.run("[...document.querySelectorAll('button')].find((one) => one.textContent === 'Cancel').click(); return null");
     assert_eq!(page.text("[role=status]"), "Cancelled.");

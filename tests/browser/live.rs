@@ -24,7 +24,6 @@ fn shown(page: &Value, name: &str) -> f64 {
     number(page["values"][name].as_str().unwrap_or_else(|| panic!("the page has no {name}")))
 }
 
-/// The frames with the fields of an independent reader, through a packed log.
 fn frames(recording: &Path) -> Vec<Value> {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("flight.hum"), dir.path().join("flight.jsonl"));
@@ -121,7 +120,6 @@ fn seek(page: &mut LivePage, to_s: f64) -> Value {
 fn assert_sound(page: &mut LivePage) {
     assert_eq!(page.console(), json!([]), "the browser complains");
     let width = &page.read()["width"];
-    // If an element is too wide, a phone shrinks the page and widens the window.
     let window = page.run("return outerWidth || innerWidth").as_f64();
     assert!(width[0].as_f64() <= width[1].as_f64(), "it is wider than the window: {width}");
     assert!(width[1].as_f64() <= window, "something sticks out: {width} in a window of {window:?}");
@@ -136,7 +134,6 @@ pub(crate) fn shoot(page: &mut LivePage, name: &str) {
 
 #[test]
 fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there() {
-    // The page shows the path as it was given.
     let frames = frames(&own("ap_quad_faults.tlog"));
     let live = Live::start(&["flights/ap_quad_faults.tlog"]);
     let mut page = LivePage::start();
@@ -152,7 +149,6 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
     page.press(&["ESCAPE"]);
     page.wait("return !document.querySelector('dialog').open", 10);
 
-    // Each time the whole page shows that moment.
     for to_s in [60.0, 90.0, 45.0, 75.0] {
         assert_shows(&seek(&mut page, to_s), &frames);
     }
@@ -198,7 +194,6 @@ fn each_session_of_a_card_is_played_with_its_parts_as_they_were_then() {
     let dir = tempfile::tempdir().unwrap();
     let (card, store, params) =
         (dir.path().join("card.img"), dir.path().join("store.bin"), dir.path().join("box.param"));
-    // A motor that may turn six minutes: two of these flights are more.
     std::fs::write(&params, "CMP1_KIND 3\nCMP1_NUMBER 2\nCMP1_MOT_HOURS 0.1\n").unwrap();
     for _ in 0..2 {
         let mut sim = command(["sim", "--speed", "max"]);
@@ -251,7 +246,6 @@ fn last_s(frames: &[Value]) -> f64 {
 #[test]
 fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
     let dir = tempfile::tempdir().unwrap();
-    // Ten seconds before the accelerometers begin to shake.
     let recording = cut(&own("ap_quad_faults.tlog"), 75.0, &dir.path().join("late.tlog"));
     let frames = frames(&recording);
     let port = free_port();
@@ -265,10 +259,8 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
     let began = Instant::now();
     let sim = Running(sim.spawn().unwrap());
     page.wait("return document.getElementById('source').textContent === 'live'", 20);
-    // Once the receiver is received, positions are its own.
     page.wait("return document.querySelector('[data-value=satellites]').textContent.length > 1", 30);
 
-    // The shown values were sent in the last seconds.
     let until = Instant::now() + Duration::from_secs(8);
     let mut agreed = 0;
     while Instant::now() < until {
@@ -291,13 +283,11 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
         std::thread::sleep(Duration::from_millis(250));
     }
     assert!(agreed > 10, "only {agreed} looks");
-    // The box on the same link is received, and its own status counts.
     page.wait("return document.querySelector('[data-subsystem=recorder] .badge').textContent === 'ok'", 20);
     let seen = page.read();
     assert_eq!(seen["board"]["recorder"]["by"], "on board", "{}", seen["board"]);
     let loss = seen["values"]["link:loss"].as_str().unwrap();
     assert!(loss == "0.0 %" || loss == "not known yet", "what the box leaves out is no loss: {loss}");
-    // A finding comes while a page is open.
     page.wait("return [...document.querySelectorAll('.notes li .badge')].some((b) => ['warning', 'critical'].includes(b.textContent))", 60);
     assert_sound(&mut page);
 
@@ -328,7 +318,6 @@ fn a_page_that_has_lost_hums_says_at_once_that_the_vehicles_state_is_not_known()
     page.wait("return document.getElementById('source').textContent === 'no connection'", 10);
     page.wait(&format!("return {overall}.textContent === 'not known'"), 1);
     assert_eq!(page.run(&format!("return {overall}.classList.contains('stale')")), true);
-    // It comes back with the program, by itself.
     let mut again = command(["live", "--listen", live.host()]);
     let again = again.arg(&recording).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let _again = Running(again);
@@ -458,7 +447,6 @@ fn a_packet_changes_the_page_within_a_tenth_of_a_second() {
         let mut attitude = vec![0; 28];
         attitude[4..8].copy_from_slice(&roll_deg.to_radians().to_le_bytes());
         sent.push((format!("{roll_deg:.1}"), send(30, &attitude)));
-        // Not a multiple of the page's own step.
         std::thread::sleep(Duration::from_millis(137));
     }
     let seen = page.run("return window.seen");
@@ -485,7 +473,6 @@ fn a_link_is_paused_and_rewound_while_it_goes_on() {
     page.open(&live.address, "light", 1440, 900);
     let flies = AtomicBool::new(true);
     std::thread::scope(|scope| {
-        // A tenth of a degree every fiftieth of a second.
         scope.spawn(|| {
             let seeds = &Manifest::own().seeds;
             let socket = UdpSocket::bind("127.0.0.1:0").unwrap();

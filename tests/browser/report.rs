@@ -36,7 +36,6 @@ fn assert_sound(shown: &Value) {
     let width = shown["width"].as_array().unwrap();
     assert!(width[0].as_f64() <= width[1].as_f64(), "it is wider than a phone: {width:?}");
     for (id, plot) in shown["plots"].as_object().unwrap() {
-        // One line may hide another, but not all of them.
         let pixels = plot["pixels"].as_array().unwrap().iter().filter_map(Value::as_u64);
         assert!(pixels.sum::<u64>() > 50, "{id} has no line: {plot}");
     }
@@ -49,7 +48,6 @@ fn number(text: &str) -> f64 {
     plain[..end].parse().unwrap_or_else(|_| panic!("no number: {text:?}"))
 }
 
-/// Lowest and highest within `around_s`, from the JSON lines.
 fn around(jsonl: &str, message: &str, at_s: f64, around_s: f64, value: impl Fn(&Value) -> f64) -> (f64, f64) {
     let wanted = format!("\"message\":\"{message}\"");
     let values = jsonl.lines().filter(|line| line.contains(&wanted)).map(json).filter_map(|entry| {
@@ -73,7 +71,6 @@ fn a_flights_page_shows_the_flight() {
     assert_eq!(findings.len(), expected.len());
     assert!(!expected.is_empty());
     for (row, finding) in findings.iter().zip(expected) {
-        // A check that no longer applies is not called good.
         let ended = finding["level"] == "ok" && finding["value"].is_null();
         let level = if ended { &serde_json::json!("ended") } else { &finding["level"] };
         assert_eq!((&row[1], &row[2]), (level, &finding["check"]));
@@ -139,7 +136,6 @@ fn assert_modes(jsonl: &str, shown: &Value) {
     assert!(!modes.is_empty());
 }
 
-/// At the mouse, a line has the vehicle's value of that time.
 fn assert_pointed_values(image: &Path, shown: &Value) {
     let mut decode = command(["decode".as_ref(), image.as_os_str()]);
     let jsonl = child::run(decode.args(["-o", "-", "--format", "jsonl"]), LIMIT).expect_code(&[0]).text();
@@ -246,7 +242,6 @@ fn labelled(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("labelled").join(name)
 }
 
-/// Heartbeats and the given messages, each once a second.
 fn standing(seconds: u8, more: impl Fn(u8) -> Vec<(u32, Vec<u8>)>) -> Vec<u8> {
     let seeds = &Manifest::own().seeds;
     let (mut data, mut sequence, start_us) = (Vec::new(), 0_u8, 1_700_000_000_000_000_u64);
@@ -272,7 +267,6 @@ fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
         payload[32..36].copy_from_slice(&[id, 0, 1, 50]);
         payload
     };
-    // SCALED_PRESSURE and HIGHRES_IMU, with different temperatures.
     let pressure = || [&[0; 4][..], &1_000_f32.to_le_bytes(), &[0; 4], &1_180_i16.to_le_bytes()].concat();
     let highres = || {
         [&[0; 8][..], &[0; 36], &1_001_f32.to_le_bytes(), &[0; 8], &15_f32.to_le_bytes(), &[255, 31]].concat()
@@ -313,7 +307,6 @@ fn each_battery_has_its_own_lines_and_two_barometers_are_two() {
 
 #[test]
 fn a_track_across_the_180th_meridian_is_as_wide_as_the_flight() {
-    // GLOBAL_POSITION_INT: 20 m each second at the equator, eastwards from 179.9990 E.
     let place = |second: u8| {
         let degrees = 179.9990 + f64::from(second) * 20.0 / 111_320.0;
         let longitude = (if degrees > 180.0 { degrees - 360.0 } else { degrees } * 1e7) as i32;
@@ -401,7 +394,6 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     page.wait("return document.documentElement.dataset.ready === 'true'", 20);
     let rows = table(&mut page, "#pages");
     assert_eq!(rows.len(), 2);
-    // The headings sort, also from the keyboard.
     let air = |rows: &[Vec<String>]| rows.iter().map(|row| row[7].clone()).collect::<Vec<_>>();
     page.run("document.querySelectorAll('#pages .sort')[7].focus()");
     page.press(&["ENTER"]);
@@ -413,12 +405,10 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
     page.run("const word = document.querySelector('input'); word.value = 'faults'; word.dispatchEvent(new Event('input'))");
     assert_eq!(table(&mut page, "#pages").len(), 1);
     assert_eq!(page.console(), serde_json::json!([]));
-    // Lists the changes since the previous flight.
     page.run("document.querySelector('#pages a').click()");
     page.wait("return document.title.includes('ap_quad_faults') && document.documentElement.dataset.ready === 'true'", 20);
     assert_times(&mut page, &flights[1]);
     let [before, now] = [0, 1].map(|flight: usize| parameters(&flights[flight]));
-    // Values that the autopilot itself counts or measures are not changes.
     let is_own = |name: &str| name.starts_with("STAT_") || name.ends_with("_GND_PRESS");
     let differ: Vec<&String> = now
         .iter()
@@ -503,7 +493,6 @@ fn assert_compared(
     );
     let names = "return [...document.querySelectorAll('#plot-PackVolts-0 .keys button')].map((key) => key.textContent)";
     assert_eq!(page.run(names).as_array().unwrap().len(), 2, "both in one plot, on one scale");
-    // Without the second one only the first is drawn.
     page.run("document.querySelectorAll('#figures input')[1].click()");
     let off = page.run("return [...document.querySelectorAll('.plot')].filter((plot) => plot.querySelectorAll('.keys .off').length !== 1).length");
     let whole = page.run("return [...document.querySelectorAll('.plot')].filter((plot) => plot.querySelectorAll('.keys button').length === 2).length");
@@ -522,11 +511,9 @@ fn assert_compared(
     shoot(page, "compare");
 }
 
-/// All in one scale, and the same distance as on its own page.
 #[track_caller]
 fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
     for (data, far_m) in pages.iter().zip(far_m) {
-        // The last of several flights comes first.
         let last = data["flights"].as_array().unwrap().last().unwrap();
         let within =
             |at: &Value| at.as_f64() >= last["from_s"].as_f64() && at.as_f64() <= last["to_s"].as_f64();
@@ -545,7 +532,6 @@ fn assert_tracks(page: &mut LivePage, pages: &[Value; 2], far_m: [f64; 2]) {
         "return [...document.querySelectorAll('#tracks canvas')].map((map) => Number(map.dataset.scale))";
     let both = page.run(scales);
     assert!(both[0].as_f64() > Some(0.0) && both[0] == both[1] && both[2].is_null(), "{both}");
-    // Without one, the other is never drawn smaller.
     let hide = |number: usize| format!("document.querySelectorAll('#figures input')[{number}].click()");
     for number in 0..2 {
         page.run(&hide(number));

@@ -10,7 +10,6 @@ use stm32f405_model::time::{MS, SECOND, US};
 
 use super::bench_of;
 
-/// A quarter of a second at full rate, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;
 
 fn rig(board: &Board) -> Rig {
@@ -18,7 +17,6 @@ fn rig(board: &Board) -> Rig {
     bench_of(&image).rig(Parts { hse_hz: board.crystal_hz, ..Parts::default() })
 }
 
-/// Each held pin has its level before the first clock to the card, and afterwards.
 #[track_caller]
 fn assert_held(rig: &Rig) {
     let (gpio, hold) = (&rig.machine.chip.gpio, &rig.wired.hold);
@@ -30,7 +28,6 @@ fn assert_held(rig: &Rig) {
     }
 }
 
-/// Records at full rate, loses its card and its power, and records again.
 fn fly(board: &Board) {
     println!("{}", board.name);
     let mut rig = rig(board);
@@ -62,7 +59,6 @@ fn fly(board: &Board) {
     assert!(rig.slot.violations().is_empty(), "{}: {:?}", board.name, rig.slot.violations());
     let compared = rig.compared();
     println!("{compared:?} of {}", rig.sent.len());
-    // The queue held those of the time without a card; what was in memory went with the power.
     assert!(compared.wrong == 0 && compared.missing < IN_MEMORY_MAX, "{}: {compared:?}", board.name);
     assert!(rig.sessions().len() >= 2, "{}", board.name);
 }

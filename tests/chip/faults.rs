@@ -50,7 +50,6 @@ fn the_slowest_erases_leave_the_clock_right_and_the_fastest_watchdog_quiet() {
         assert!(rig.machine.chip.flash.erases.len() == 2 && erased >= 500, "{erased} ms");
         let sent_ms = rig.sent[0].0 / MS;
         let recorded_ms = last(&rig).frames[0].0;
-        // The clock begins when memory is cleared and the clock tree is set.
         assert!(
             (15..25).contains(&(sent_ms - recorded_ms)),
             "{speed:?}: sent {sent_ms}, recorded {recorded_ms}"
@@ -59,7 +58,6 @@ fn the_slowest_erases_leave_the_clock_right_and_the_fastest_watchdog_quiet() {
     }
 }
 
-/// The erase is as slow as possible; in the middle of it the autopilot resumes.
 #[test]
 fn what_comes_in_an_erase_is_told_and_the_watchdog_does_not_bite() {
     let mut rig = bench().settled(Board { lsi_hz: LSI_FASTEST, ..Board::default() }).unwrap();
@@ -152,7 +150,6 @@ fn transmitters_that_stand_still_are_told_and_cost_nothing() {
     assert_no_reset(&rig);
 }
 
-/// 8: the flash refuses a word, and one at the other place too.
 #[test]
 fn flash_that_refuses_a_word_is_told_and_saving_goes_on() {
     const FAILED: &str = "HUMS: saving failed, have the board replaced";
@@ -203,8 +200,6 @@ fn a_change_of_a_ports_rate_cuts_no_byte() {
     assert_no_reset(&rig);
 }
 
-/// A line of frames' beginnings costs the framer most: a reception that looked for the next byte at once would starve other
-/// tasks.
 #[test]
 fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
     let mut rig = bench().settled(Board::default()).unwrap();
@@ -223,7 +218,6 @@ fn beginnings_without_a_frame_at_full_rate_starve_nobody() {
     assert_no_reset(&rig);
 }
 
-/// The flash is made so slow that the smallest frames are too fast.
 #[test]
 fn more_frames_than_the_processor_can_take_are_lost_and_counted() {
     const ESC_STATUS: (u32, u8) = (291, 10);

@@ -21,7 +21,6 @@ use stm32f405_model::time::SECOND;
 
 use super::bench;
 
-/// Percent of 168 MHz in the worst second, at 921,600 baud back to back.
 const BUSY_PERCENT_MAX: f64 = 40.0;
 /// Prefetch, both caches, five wait states.
 const ACR: u32 = 0x705;
@@ -156,7 +155,6 @@ const ODD_PART_MAX: f64 = 0.02;
 
 const STORE_IS_NEW: &str = "HUMS: the store is new, all counters begin";
 
-/// The same kinds in order, at the same times within a step; fields of the machine may differ.
 #[track_caller]
 fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
     assert!(of_chip.len() > 50, "{} records", of_chip.len());
@@ -168,7 +166,6 @@ fn assert_same_records(of_chip: &[Value], of_pc: &[Value], against: Against) {
         let texts: Vec<_> = texts.map(|(name, value)| format!("{name}={value}")).collect();
         format!("{} {}", record["record"], texts.join(" "))
     };
-    // This PC is shut down in order.
     let last_s = quiet_before_the_end_s(of_chip);
     let by_key = |records: &[Value]| {
         let mut rows = BTreeMap::<String, Vec<Value>>::new();
@@ -239,7 +236,6 @@ fn difference(a: &Value, b: &Value) -> Option<String> {
     None
 }
 
-/// The same texts in order, and nearly the same number of each message.
 #[track_caller]
 fn assert_same_stream(of_chip: &[u8], of_pc: &[u8], seeds: &Seeds) {
     const STATUSTEXT: u32 = 253;

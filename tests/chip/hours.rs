@@ -147,7 +147,6 @@ fn fly(machine: &mut Machine, flight: &Flight, until: Ps) -> Vec<Ps> {
     ended
 }
 
-/// All frames in order, each at its time, without a reported loss.
 #[track_caller]
 fn assert_recorded(session: &Session, flight: &Flight, ended: &[Ps]) {
     let Session { frames, losses, gaps, .. } = session;

@@ -83,14 +83,12 @@ fn emulated(elf: &[u8], code: i32) -> String {
 #[test]
 fn a_jump_into_nowhere_stops_with_registers_place_and_the_last_instructions() {
     let (elf, main) = with_main(&TO_NOWHERE);
-    // The image's own handler of faults would reset it again and again.
     let said = emulated(&elf, 1);
     assert!(said.contains("an instruction is wanted from 0x30000000, where none may be"), "{said}");
     assert!(said.contains(" us, in no function, come from main+0x6\n  r0  30000001"), "{said}");
     let registers = said.split_once("  r15 30000000\n").expect("the registers");
     assert_eq!(registers.1.lines().count(), 32, "{said}");
     assert!(said.ends_with(&format!("  {:08x} main+0x6\n", main + 6)), "{said}");
-    // If that handler also has no memory, the processor is locked up.
     let mut image = Image::parse(&elf).unwrap();
     let (_, vectors) = image.pieces.iter_mut().find(|(address, _)| *address == VECTORS).unwrap();
     vectors[12..16].copy_from_slice(&0x3000_0001_u32.to_le_bytes());

@@ -68,11 +68,9 @@ struct Outcome {
     resets: usize,
     /// Number of flips.
     flips: u64,
-    /// The flipped program reached an instruction that is not modelled; no flip came after that.
     stopped: Option<Box<Report>>,
 }
 
-/// One bit at a time, at full line rate.
 fn flipped(part: &str, most: u64, apart: Ps, seed: u64) -> Outcome {
     let mut rig = bench().settled(Board { seed, ..Board::default() }).unwrap();
     let begin = rig.machine.now() + SECOND;

@@ -10,10 +10,8 @@ use stm32f405_model::time::{MS, SECOND, US};
 
 use super::bench;
 
-/// A quarter of a second at full rate, and a sector in progress.
 const IN_MEMORY_MAX: usize = 700;
 
-/// The first second clears memory, mounts the card and makes the log.
 const FIRST_BUSY_PERCENT_MAX: f64 = 47.0;
 
 #[test]
@@ -44,7 +42,6 @@ fn power_that_goes_at_full_rate_costs_what_was_in_memory() {
 
 #[test]
 fn power_that_goes_in_an_erase_of_the_store_leaves_a_board_that_records() {
-    // A first start erases twice, 0.25 s each.
     for part in [5, 245, 400] {
         let mut rig = bench().rig(Board::default());
         rig.run((20 + part) * MS, false).unwrap();
@@ -62,7 +59,6 @@ fn power_that_goes_in_an_erase_of_the_store_leaves_a_board_that_records() {
 
 #[test]
 fn a_card_that_stands_still_for_two_and_a_half_seconds_costs_nothing() {
-    // In nanoseconds; by then the first segment is made.
     let busy = Plan::always(Fault::Busy(2_500_000_000)).from(4_000_000_000).times(1);
     let bench = bench();
     let mut rig = Rig::with(&bench.image, Board::default(), bench.frames, vec![busy]);
@@ -100,7 +96,6 @@ fn a_supply_that_sags_is_survived_recorded_and_told() {
     assert!(compared.wrong == 0 && compared.missing < 1_950 + IN_MEMORY_MAX, "{compared:?}");
 }
 
-/// Each tenth frame has a flaw; noise fills the pauses.
 #[test]
 fn a_noisy_line_costs_the_frames_that_it_damaged() {
     let mut rig = bench().settled(Board::default()).unwrap();

@@ -43,7 +43,6 @@ fn flying() -> Rig {
     rig
 }
 
-/// `since` is the time of the fault.
 #[track_caller]
 fn survives(rig: &mut Rig, since: u64, expected: &Expected<'_>) {
     let (at, cause) = *rig.machine.resets.last().unwrap();
@@ -113,12 +112,10 @@ fn a_full_stack_hurts_nobody_and_is_survived_recorded_and_told() {
     survives(&mut rig, since, &Expected { cause: Cause::Software, fault, told, within_ms: NOTICED_MS });
 }
 
-/// Like code of a file of this name.
 #[test]
 fn a_panic_is_survived_recorded_and_told() {
     const FILE: &[u8] = b"firmware/provoked.rs";
     let mut rig = flying();
-    // At the unused lower end of the stack.
     let place = CCM.0 + 64;
     let words = [place + 16, FILE.len() as u32, 7, 1];
     let bytes = words.iter().flat_map(|word| word.to_le_bytes()).chain(FILE.iter().copied());

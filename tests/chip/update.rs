@@ -74,7 +74,6 @@ fn put(rig: &Rig, all: &[(&files::Name, &[u8])]) {
     }
 }
 
-/// With an autopilot that is disarmed on the ground.
 fn run(rig: &mut Rig, seconds: u8) {
     for second in 0..seconds {
         let now = rig.machine.now();
@@ -110,7 +109,6 @@ fn a_new_version_is_installed_records_for_a_minute_and_is_confirmed() {
     assert_eq!((flash(&rig).0.version, resets(&rig)), (Version(0x0001_0000), 0), "too early");
     run(&mut rig, 20);
     let (header, status) = flash(&rig);
-    // By the application, and by the resident program.
     assert_eq!((header.version, resets(&rig)), (Version(0x0001_0001), 2));
     assert!(matches!(status, Status::Trial { starts: 1, crashes: 0 }), "{status:?}");
     assert_eq!(rig.machine.memory(map::APPLICATION, new.len() as u32), new);
@@ -123,7 +121,6 @@ fn a_new_version_is_installed_records_for_a_minute_and_is_confirmed() {
 #[test]
 fn an_image_that_crashes_at_once_gives_way_to_the_one_before() {
     let mut rig = bench().rig(Board::default());
-    // `b .`: the watchdog of its trial ends it after 4 s.
     let (old, new) = (program_of(&[0xE7FE], 0x0001_0000), program_of(&RESETS, 0x0900_0000));
     put(&rig, &[(UPDATE, &new), (PREVIOUS, &old)]);
     run(&mut rig, 10);
@@ -134,7 +131,6 @@ fn an_image_that_crashes_at_once_gives_way_to_the_one_before() {
     run(&mut rig, 1);
     let (_, status) = flash(&rig);
     assert!(matches!(status, Status::Trial { starts: 1, .. }), "{status:?}");
-    // Into the resident program and out of it, twice, and three of the image's own.
     assert_eq!(resets(&rig), 6, "{:?}", rig.machine.resets);
     assert_told(&rig, &["update begins"]);
 }

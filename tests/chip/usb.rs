@@ -99,7 +99,6 @@ fn the_card_reader_shows_the_card_as_it_is_and_the_board_records_after_the_eject
         ensure!(disk.command(&[0; 6], 0)?.status == 0, "not ready");
         ensure!(disk.command(&[0x1A, 0, 0x3F, 0, 192, 0], 192)?.data == [3, 0, 0x80, 0]);
         let blocks = disk.blocks()?;
-        // Boot record, file system, directory, logs: with single blocks and with long transfers.
         for (first, count) in [(0, 1), (8_192, 1), (blocks - 1, 1), (8_192, 100), (16_000, 128)] {
             let done = disk.read(first, count)?;
             ensure!((done.status, done.residue) == (0, 0), "{first}: status {}", done.status);
@@ -138,7 +137,6 @@ fn the_card_reader_shows_the_card_as_it_is_and_the_board_records_after_the_eject
 
 type Told = (u32, u8, u8, Vec<u8>);
 
-/// Message, sequence, component and payload of each frame.
 fn told(bytes: &[u8]) -> Vec<Told> {
     let mut told = Vec::new();
     let mut framer = Framer::new();
@@ -154,7 +152,6 @@ fn ours(told: &[Told]) -> impl Iterator<Item = &Told> {
     told.iter().filter(|(_, _, component, _)| *component == COMPONENT)
 }
 
-/// Two seconds of a serial port: the vehicle and the box are heard, and no frame is missing.
 fn hears_all(serial: &mut Serial<'_>) -> Result<Vec<Told>> {
     let told = told(&serial.listen(2 * SECOND)?);
     let has = |id: u32, component: u8| told.iter().any(|one| (one.0, one.2) == (id, component));
@@ -167,7 +164,6 @@ fn hears_all(serial: &mut Serial<'_>) -> Result<Vec<Told>> {
     Ok(told)
 }
 
-/// The answers to a request within a second.
 fn answers_to(serial: &mut Serial<'_>, request: &[u8]) -> Result<Vec<Told>> {
     serial.send(request)?;
     Ok(told(&serial.listen(SECOND)?))
@@ -195,10 +191,8 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
         let serial = &mut Serial::attach(bus)?;
         hears_all(serial)?;
         asks(serial, 4_000.0)?;
-        // All parameters: more than the queue holds.
         let answers = answers_to(serial, &frame(21, &[1, COMPONENT], 159, 3))?;
         ensure!(ours(&answers).filter(|one| one.0 == 22).count() > 100, "{} parameters", answers.len());
-        // The program stops reading, then reads on.
         serial.bus.act(Action::Wait(3 * SECOND))?;
         serial.listen(100 * MS)?;
         serial.bus.act(Action::Wait(20 * MS))?;
@@ -210,7 +204,6 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
                 serial.bus.control_in(kind, request, 0xFFFF, 0, 64)?;
             }
         }
-        // Line codings of all lengths, and a transfer that is given up.
         for length in [0, 1, 6, 7, 8, 64, 65] {
             serial.bus.setup(0x21, 0x20, 0, 0, length)?;
         }
@@ -221,7 +214,6 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
         hears_all(serial)?;
         asks(serial, 4_500.0)
     });
-    // Pulled in the middle of the stream, and plugged in again.
     rig.machine.unplug();
     let now = rig.machine.now();
     rig.run(now + 2 * SECOND, true).unwrap();
@@ -237,7 +229,6 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
     assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
     let losses: Vec<_> = rig.sessions().into_iter().flat_map(|session| session.losses).collect();
     assert!(losses.is_empty(), "{losses:?}");
-    // Also with a host, which `cargo xtask costs` does not have.
     for (name, exception, limit) in STACKS {
         let depth = rig.machine.core.stack_depth(exception);
         println!("{name}: {depth} bytes of stack");
@@ -344,7 +335,6 @@ fn a_pulled_card_is_told_and_read_again_when_it_is_back() {
     assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
 }
 
-/// The device's descriptor, which it must give within 100 ms.
 fn answers(bus: &mut Bus) -> Result<()> {
     let begun = bus.now;
     let device = bus.control_in(0, 6, 0x0100, 0, 64)?;
@@ -381,7 +371,6 @@ fn a_control_transfer_that_the_host_gives_up_ends_with_its_next_one_or_a_reset()
             let bus = &mut *Disk::attach(bus)?.bus;
             begin(bus)?;
             answers(bus)?;
-            // The device has waited for it for some time.
             begin(bus)?;
             bus.act(Action::Wait(20 * MS))?;
             answers(bus)?;
@@ -411,7 +400,6 @@ fn a_configuration_begins_anew_without_a_reset() {
         wrapper.resize(31, 0);
         // SET_CONFIGURATION, SET_INTERFACE.
         for (kind, request, value) in [(0, 9, 1), (1, 11, 0)] {
-            // An odd number of packets; endpoints that are halted; a command in work.
             disk.command(&[0; 6], 0)?;
             disk.bus.control(2, 3, 0, to.into())?;
             disk.bus.control(2, 3, 0, u16::from(0x80 | from))?;
@@ -426,7 +414,6 @@ fn a_configuration_begins_anew_without_a_reset() {
             disk.bus.configure(kind, request, value)?;
             ensure!(disk.read(0, 1)?.data == first, "after a part of a command");
         }
-        // Without a configuration the class has no endpoints, and a reset of the class gives it none.
         disk.bus.control(0, 9, 0, 0)?;
         disk.bus.control(0x21, 0xFF, 0, 0)?;
         let packet = Action::Out(disk.bus.address, to, false, vec![0; 31]);
@@ -498,7 +485,6 @@ fn next(state: &mut u64) -> u64 {
     *state >> 33
 }
 
-/// Any actions of a host, without sense.
 fn any_actions(bus: &mut Bus, mut random: impl FnMut(u64) -> u64, count: u32) -> Result<()> {
     for _ in 0..count {
         let address = [0, bus.address][random(2) as usize];

@@ -35,7 +35,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Returns the highest load in a second, after the first two.
 fn fly(
     machine: &mut Machine,
     mut feed: chip::Feed,

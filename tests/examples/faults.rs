@@ -70,7 +70,6 @@ fn told(rig: &Rig) -> Outcome {
     keep(rig)
 }
 
-/// 5: the flash's caches as set and as possible.
 fn caches(bench: &Bench) -> Outcome {
     for what in ["as the image sets it", "prefetch alone", "nothing", "no wait states"] {
         let mut rig = bench.settled(Board::default())?;
@@ -108,7 +107,6 @@ fn caches(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Samples of a second and a half, by exception and by function.
 fn shares(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 4 * SECOND;
@@ -116,7 +114,6 @@ fn shares(bench: &Bench) -> Outcome {
     sample(&mut rig, 1_500)
 }
 
-/// The first second and a half: the card is mounted and the log made.
 fn first(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     for part in 1..=6 {
@@ -164,7 +161,6 @@ fn sample(rig: &mut Rig, ms: u64) -> Outcome {
     Ok(())
 }
 
-/// 8: from the first word on or later.
 fn refused(bench: &Bench) -> Outcome {
     for (refuses, after) in [(0, 1), (3, 1), (3, 20), (30, 1)] {
         let mut rig = bench.settled(Board::default())?;
@@ -181,7 +177,6 @@ fn refused(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// 9: the supply is low for a second.
 fn supply(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 4 * SECOND;
@@ -194,7 +189,6 @@ fn supply(bench: &Bench) -> Outcome {
     told(&rig)
 }
 
-/// Cuts at full rate, and in the erase of a calm time.
 fn cuts(bench: &Bench) -> Outcome {
     let mut rig = bench.settled(Board::default())?;
     let begin = rig.machine.now() + 2 * SECOND;
@@ -228,7 +222,6 @@ fn cuts(bench: &Bench) -> Outcome {
     Ok(())
 }
 
-/// Stalled, silent or out at full rate; times count from power-on.
 fn cards(bench: &Bench) -> Outcome {
     let ms = |ms: u64| ms * 1_000_000;
     let silent = |long: u64| Plan::always(Fault::Silent).from(ms(6_000)).until(ms(6_000 + long));

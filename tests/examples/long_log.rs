@@ -54,7 +54,6 @@ const MADE: [(&str, &[&str]); 9] = [
     ("thesis", &["decode", "-o", "OUT", "--format", "thesis"]),
 ];
 
-/// Groups of one recording over and over, later each time.
 fn long(hums: &Path, mib: &str, recording: &Path, what: &[&str]) -> Result<()> {
     let bytes = mib.parse::<u64>().context("MIB is a number")? << 20;
     if let Some(unknown) = what.iter().find(|word| MADE.iter().all(|(name, _)| name != *word)) {
@@ -90,7 +89,6 @@ fn lengthen(short: &Path, long: &Path, bytes: u64) -> Result<(u64, u64)> {
     let data = fs::read(short)?;
     let sectors: Vec<[u8; SECTOR_BYTES]> =
         data.chunks_exact(SECTOR_BYTES).filter_map(|chunk| chunk.try_into().ok()).collect();
-    // The last group ends early: in the middle of a log no group would follow it.
     let last = sectors.iter().rposition(|sector| Header::read(sector).is_ok_and(|h| h.since_first == 0));
     let whole = sectors.get(..last.unwrap_or(0)).filter(|whole| !whole.is_empty()).context("too short")?;
     let session = Header::read(&whole[0]).map_or(0, |header| header.session);

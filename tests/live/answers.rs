@@ -25,7 +25,6 @@ fn filled(query: &str, [vehicle, session]: [&str; 2], [from_s, to_s]: Span) -> S
     replaced.replace("$vehicle", vehicle).replace("$session", session)
 }
 
-/// Variables come first; each panel has data.
 fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String) -> Vec<Value>) -> usize {
     let mut asked = 0;
     for (name, dashboard) in dashboards(kind) {
@@ -52,7 +51,6 @@ fn ask_all(kind: Kind, span: Span, ask: impl Fn(&Value, &dyn Fn(&str) -> String)
     asked
 }
 
-/// `InfluxDB` 1.x with the points of a recent `ArduPilot` flight answers each query of its dashboards.
 pub(crate) fn assert_answered_by_influx(database: &Database) {
     let asked = ask_all(INFLUXQL, lately(), |query, fill| {
         let series = database.ask(&fill(query["query"].as_str().unwrap()));

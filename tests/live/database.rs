@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use hums_tests::live::{Running, free_port};
 use serde_json::{Value, json};
 
-/// It may read its own files for a while.
 const START: Duration = Duration::from_mins(1);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -248,7 +248,6 @@ impl Points {
     }
 }
 
-/// The texts in quotes after each of these.
 fn quoted<'a>(query: &'a str, before: &str) -> Vec<&'a str> {
     query.match_indices(before).map(|(at, _)| query[at + before.len()..].split('"').next().unwrap()).collect()
 }
@@ -273,7 +272,6 @@ fn whatever_a_panel_asks_for_is_in_the_points_of_the_recorded_flights() {
                     assert!(points.counters.contains(counter), "{place}: no counter {counter}");
                 }
                 for pattern in query.match_indices("=~ /^").map(|(at, _)| &query[at + 5..]) {
-                    // `esc_rpm[0-9]+$`: the text before and after the number.
                     let (before, rest) = pattern.split_once("[0-9]+").unwrap();
                     let after = rest.split('$').next().unwrap();
                     let first = format!("{before}0{after}");

@@ -18,14 +18,12 @@ use super::database::{Database, Kind};
 const RATE: f64 = 2_000.0;
 /// Twelve seconds.
 const FRAMES: usize = 24_000;
-/// Frames until the database goes away, and until it is back.
 const GOES_AT: u64 = 8_000;
 const BACK_AT: u64 = 16_000;
 
 fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
     let data = fs::read(own("ap_quad_faults.tlog")).unwrap();
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
-    // All messages; the battery becomes low after 17,284.
     let frames: Vec<_> = frames.into_iter().skip(40_000).take(FRAMES).collect();
     let mut counts = BTreeMap::new();
     for frame in frames.iter().filter(|frame| frame.verified) {
@@ -34,11 +32,9 @@ fn flight() -> (Vec<Vec<u8>>, BTreeMap<u32, u64>) {
     (frames.into_iter().map(|frame| frame.bytes.to_vec()).collect(), counts)
 }
 
-/// Returns the number of points that hums wrote.
 #[track_caller]
 fn fly(database: &mut Database, flags: &[&str]) -> (u64, BTreeMap<u32, u64>) {
     let (frames, counts) = flight();
-    // TCP: nothing is lost before its arrival.
     let vehicle = TcpListener::bind("127.0.0.1:0").unwrap();
     let (input, url) =
         (format!("tcp:{}", vehicle.local_addr().unwrap()), format!("http://127.0.0.1:{}", database.port));
@@ -79,7 +75,6 @@ fn influxdb_is_killed_in_flight_and_has_every_point_in_the_end() {
     write_as_documented(&database);
 }
 
-/// The commands of docs/decode.md, in smaller pieces.
 fn write_as_documented(database: &Database) {
     let docs = fs::read_to_string(root().join("docs/decode.md")).unwrap();
     let is_command = |line: &&str| {
@@ -125,7 +120,6 @@ fn victoriametrics_is_restarted_in_flight_and_has_every_sample_in_the_end() {
         (241, "VIBRATION_vibration_x"),
     ] {
         let samples = database.samples(field);
-        // A batch whose answer was cut off is written twice.
         assert!(
             (counts[&id]..counts[&id] + 200).contains(&samples),
             "{field}: {samples}, sent {}",
@@ -147,7 +141,6 @@ fn a_bad_point_costs_itself_and_what_the_database_wrote_is_not_counted_as_refuse
     };
     let data = fs::read(own("px4_hil_quad_low.tlog")).unwrap();
     let frames = of_tlog(&data, &Manifest::own().seeds, false);
-    // ATTITUDE's field was text that week: only that message's points are refused.
     let at_us = frames[0].time_us.expect("a tlog's frames have times");
     database.write(&format!("ATTITUDE,vehicle=x,session=x roll=\"text\" {at_us}000"));
     let (code, words) = flight(&database);

@@ -225,7 +225,6 @@ impl Core {
     pub(crate) fn enter<B: Bus>(&mut self, bus: &mut B) {
         let Some(exc_return) = self.entering else { return };
         let Some(number) = self.exceptions.first() else {
-            // Withdrawn during stacking: nothing is left to enter.
             self.entering = None;
             self.depths.resumed();
             self.unstack(bus, exc_return);
@@ -255,7 +254,6 @@ impl Core {
             self.thumb = handler & 1 == 1;
         } else {
             self.control.hfsr |= VECTTBL;
-            // The exception stays pending; the fault is taken.
             self.exceptions.active.put(number, false);
             self.exceptions.pend(number);
             if number == HARD_FAULT || number == NMI || self.priority() < 0 {

@@ -204,7 +204,6 @@ fn sum(a: (bool, u128, i32), b: (bool, u128, i32), status: &mut u32) -> u32 {
         core::mem::swap(&mut a, &mut b);
     }
     let small = jam(b.1, (a.2 - b.2) as u32);
-    // The smaller one leaves a trace in the lowest bit.
     let (negative, mantissa) = if a.0 == b.0 {
         (a.0, a.1 + small)
     } else if a.1 >= small {

@@ -6,7 +6,6 @@ const PLACE: u32 = 0x0800_0000;
 
 #[test]
 fn far_branches_reach_their_targets() {
-    // As LLVM assembles them: halfwords, and the distance from the program counter.
     for (halfwords, distance) in [
         ([0xF07F, 0xAFFF], 0xF_FFFE),
         ([0xF440, 0x8000], -0x10_0000),

@@ -21,7 +21,6 @@ const PROGRAM: u32 = 0x1000;
 const HANDLERS: u32 = 0x2000;
 const STACK: u32 = 0x2000_8000;
 
-/// Exception n's handler is at [`handler`] and returns at once.
 struct Rig {
     core: Core,
     memory: Flat,

@@ -1,7 +1,6 @@
 //! A whole program against QEMU, and the model's speed.
 use crate::common;
 
-/// Interrupts at any moment, nested, with handlers that change all they may.
 #[test]
 fn a_program_does_not_notice_that_it_is_interrupted() {
     let folder = common::folder("interrupted");

@@ -406,7 +406,6 @@ impl Otg {
             return Reply::Nak;
         }
         if number > 0 && data1 != endpoint.data1 {
-            // A packet that it has: its handshake was lost.
             return Reply::Done;
         }
         let index = usize::from(number);

@@ -65,7 +65,6 @@ pub(crate) fn confirm(running: &Running<'static>) {
     let Some(header) = &running.header else { return };
     let bytes = Record::Confirmed(header.floor).bytes(header.id());
     let at = running.state.free as u32;
-    // The state is read anew at the next start.
     if board::StateFlash::new().write(at, &bytes).is_ok() {
         ON_TRIAL.store(false, Ordering::Relaxed);
     }

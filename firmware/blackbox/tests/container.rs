@@ -51,7 +51,6 @@ fn frames(count: usize, seed: u32) -> Vec<Frame> {
         .collect()
 }
 
-/// A frame by chance, whose checksum is not right.
 fn may_be_a_frame(bytes: &[u8]) -> bool {
     matches!(bytes, [0xfd | 0xfe, ..])
 }
@@ -274,7 +273,6 @@ fn records_stand_among_frames_and_restart_begins_a_group() {
     assert_eq!(log.notes.len(), 50);
     assert_eq!(log.notes[49], "note 49");
     assert_eq!(queue.sectors.iter().filter(|sector| sector.starts_group()).count(), 2);
-    // The second group alone, as in a further file of the same session.
     let start = queue.sectors.iter().rposition(Sector::starts_group).expect("a group");
     let log = read(&bytes(&queue.sectors[start..]));
     assert_eq!((log.frames.len(), log.gaps.len()), (25, 0));
@@ -327,10 +325,8 @@ fn sectors_behind_the_first_of_a_ring_are_left_over_and_not_misplaced() {
     let starts: Vec<_> =
         (0..blocks.len()).filter(|at| Sector::from_bytes(blocks[*at]).starts_group()).collect();
     let (first, last) = (starts[2], starts[starts.len() - 1]);
-    // The segment that held the first two groups was written anew with the last one, which is shorter.
     let mut medium = blocks[first..].to_vec();
     medium.extend_from_slice(&blocks[blocks.len() - last..first]);
-    // The oldest file has few sectors of its own, too.
     let mut few = blocks[first..first + 9].to_vec();
     few.extend_from_slice(&blocks[40..60]);
     for medium in [medium, few] {
@@ -444,7 +440,6 @@ fn three_groups(change: impl Fn(usize, &mut Vec<u8>)) -> (Vec<Sector>, Vec<Frame
     (queue.sectors, frames)
 }
 
-/// Frames never sent, and the most that a sector completes.
 fn strangers(log: &Log, frames: &[Frame], sectors: &[Sector]) -> (usize, usize) {
     let most = sectors.iter().map(|sector| usize::from(sector.frames())).max().unwrap_or(0);
     let came: HashSet<&Frame> = frames.iter().collect();

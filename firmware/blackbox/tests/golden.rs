@@ -13,8 +13,6 @@ use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use hums_dialect::crc;
 
-/// Wandering floats, counters, decimals, times, text, two senders, both versions. Also a wrong checksum, an unknown
-/// id, a signed frame and a repeated one.
 fn stream() -> Vec<(u64, Vec<u8>, bool)> {
     let mut frames = Vec::new();
     let mut state = 1_u32;

@@ -84,7 +84,6 @@ fn the_reader_bears_any_file() {
         let len = (random.below(40) * SECTOR_BYTES).min(log.len() - first);
         let mut file = random.damaged(&log[first..first + len]);
         if round % 4 == 0 {
-            // Sectors in another order, as from a broken file system.
             let (a, b) = (random.below(len / SECTOR_BYTES), random.below(len / SECTOR_BYTES));
             for at in 0..SECTOR_BYTES {
                 let (a, b) = (a * SECTOR_BYTES + at, b * SECTOR_BYTES + at);

@@ -116,7 +116,6 @@ impl Causes {
     }
 
     pub(crate) fn of_bits(bits: u32, table: &[(u32, Cause)]) -> Self {
-        // Nearly always: flags come with each status.
         if bits == 0 {
             return Self::NONE;
         }

@@ -95,7 +95,6 @@ impl Crosschecks {
             Observation::Estimator(estimator) => {
                 self.compass_use.take(at, estimator, residuals);
             }
-            // On the scale that the vehicle knows.
             Observation::Vibration(_) => self.take_vibration(at, vehicle),
             _ => {}
         }

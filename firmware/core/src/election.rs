@@ -206,7 +206,6 @@ mod tests {
         const FORWARDED: (u64, &[(Source, u64)]) = (12_000, &[(OTHER, 1_000), (OURS, 1_000)]);
         const LATE: (u64, &[(Source, u64)]) = (200_000, &[(OTHER, 1_000), (OURS, 1_000)]);
         let cases: [Case; 11] = [
-            // The other one's heartbeats are forwarded and come first; ours streams.
             (&[(100, &[(OTHER, 1_000)])], OTHER, false),
             (&[(100, &[(OTHER, 1_000)]), (5_000, &[(OTHER, 1_000), (OURS, 100)])], OURS, false),
             (&[(15_000, &[(OURS, 500)]), (120_000, &[(OURS, 1_000), (OTHER, 100)])], OURS, true),
@@ -214,7 +213,6 @@ mod tests {
             // Its system id was changed.
             (&[(20_000, &[(OURS, 100)]), (51_000, &[(OTHER, 100)])], OTHER, false),
             (&[(20_000, &[(OURS, 100), (OTHER, 1_000)]), (300_000, &[(OTHER, 1_000)])], OURS, true),
-            // It was heard first, and never streams.
             (&[FORWARDED], OTHER, false),
             (&[LATE], OTHER, false),
             (&[FORWARDED, (15_000, &[(OTHER, 1_000), (OURS, 100)])], OURS, false),
@@ -269,7 +267,6 @@ mod tests {
     #[test]
     fn one_that_is_silent_until_it_is_asked_is_asked_though_another_was_heard_first() {
         assert_eq!(asked_in_turns(100, 1_000), (Some(OURS), Some(OURS), true));
-        // The other one streams too when it is asked, but less: over a radio.
         assert_eq!(asked_in_turns(100, 300), (Some(OURS), Some(OURS), true));
         let (_, _, settled) = asked_in_turns(1_000, 1_000);
         assert!(!settled, "nobody streams: they are asked on");

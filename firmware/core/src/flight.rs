@@ -551,7 +551,6 @@ impl Flight {
     /// The part of the flight now.
     pub fn phase(&self, now: BootMs, vehicle: &Vehicle) -> Phase {
         if !self.airborne() {
-            // The step that ends in a landing belongs to it.
             return if self.flew_at == Some(now) { Phase::Landing } else { Phase::Ground };
         }
         let climb_mps = climb_mps(now, vehicle).unwrap_or(0.0);

@@ -163,7 +163,6 @@ mod tests {
     /// The greatest missing force in a flight of 20 s: of a swinging force, a part that no velocity has, and a
     /// receiver with a delay.
     fn most(swings_mps2: f32, untrue_mps2: f32, late_s: f32) -> f32 {
-        // One swing in 5 s, and the velocity that it makes.
         let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;
         let velocity = |time_s: f32| -swings_mps2 * 5.0 / core::f32::consts::TAU * libm::cosf(turns(time_s));
         let mut residual = ImuGnssResidual::default();
@@ -182,7 +181,6 @@ mod tests {
         let mut most = 0.0_f32;
         for step in 0..100 {
             let (time_s, velocity) = (f32::from(step as u8) * STEP_S, 2.5 * STEP_S);
-            // It brakes and turns back at 2.5 m/s2; the force is turned by 40 degrees.
             let told = velocity * f32::from(step as u8);
             residual.delta_v = [velocity * 0.766, velocity * 0.643, 0.0];
             let missing = residual.take_velocity(
@@ -199,7 +197,6 @@ mod tests {
     fn velocities_that_come_in_unequal_steps_show_as_much_as_others() {
         let missing = |untrue_mps2: f32| {
             let mut residual = ImuGnssResidual::default();
-            // Some are lost, or repeat themselves; it speeds up by 5 m/s2 throughout.
             let missing = (0..60_usize).map(|step| {
                 let step_s = [0.2, 0.4, 0.2][step % 3];
                 residual.delta_v = [(5.0 + untrue_mps2) * step_s, 0.0, 0.0];

@@ -460,7 +460,6 @@ mod tests {
         let judged = steps.map(|step| {
             let mut figures = [0.0; JUDGED_MAX];
             if step >= 50 {
-                // The projection of one motor on thrust, roll, pitch and yaw.
                 figures = [0.5, 0.177, 0.25, -0.177, 0.0, -0.177, 0.25, 0.177].map(|part| part * lost);
                 if step.is_multiple_of(7) {
                     figures[3] = 0.6 * lost;

@@ -28,7 +28,6 @@ impl<const BINS: usize> Rainflow<BINS> {
             return;
         }
         let (Some(extreme), true) = (self.extreme, self.used > 0) else {
-            // The history begins with a turning point: its first value.
             if self.used == 0 {
                 self.push(value);
             }
@@ -60,7 +59,6 @@ impl<const BINS: usize> Rainflow<BINS> {
                 break;
             }
             if last == 2 {
-                // Where the history begins: half a cycle.
                 self.count(a, b, 1);
                 self.remove(0, 1);
             } else {
@@ -131,7 +129,6 @@ mod tests {
 
     #[test]
     fn a_residue_longer_than_the_memory_loses_no_half_cycle() {
-        // Ever smaller swings never pair: each is half a cycle.
         let history: Vec<f32> =
             (0..=80_i16).map(|step| f32::from(100 - step) * if step % 2 == 0 { 1.0 } else { -1.0 }).collect();
         assert_eq!(counted(&history).iter().sum::<u32>(), 80);

@@ -66,7 +66,6 @@ mod tests {
 
     #[test]
     fn angles_and_quaternions_are_of_the_same_rotation() {
-        // Nose down by 30 degrees: forward is down by a half.
         is_near(turn(of([0.0, -30_f32.to_radians(), 0.0]), [1.0, 0.0, 0.0]), [0.866_025_4, 0.0, 0.5]);
         // Right wing down: right is down.
         is_near(turn(of([90_f32.to_radians(), 0.0, 0.0]), [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);

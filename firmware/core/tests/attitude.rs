@@ -5,7 +5,6 @@ use hums_core::observation::{Observation, Wanted};
 use hums_core::params::Params;
 use hums_core::units::Radians;
 
-/// Whether a bank of 1.2 rad for 5 s is found, of this vehicle; what is wanted meanwhile.
 fn is_found(vehicle: &str, wanted: Option<f32>) -> bool {
     let (mut run, script) =
         (Run::new(&Params::defaults()), Script::new(&format!("* {vehicle}; 20-25 roll=1.2")));
@@ -32,7 +31,6 @@ fn a_bank_that_is_wanted_is_none_and_one_that_nobody_asked_for_is_found() {
 
 #[test]
 fn where_the_pilot_asks_for_rates_a_bank_says_nothing_by_itself() {
-    // ArduCopter's DRIFT and SPORT, PX4's RATTITUDE; ACRO of both: PX4 still sends the setpoint of the mode before.
     for (mode, is_judged) in [
         ("ap mode=11", true),
         ("ap mode=13", true),

@@ -191,7 +191,6 @@ fn cycles_count_by_the_capacity_that_the_autopilot_knows_and_a_setting_comes_fir
 
 #[test]
 fn a_battery_whose_resistance_rises_is_found() {
-    // 20 mOhm, and 45 from 50 s on, under 10 and 30 A by turns.
     let run = fly(
         &monitor(&[]),
         "* volt=15.8 amp=30; 0%2:0-1 volt=16.2 amp=10; 50 volt=15.05; 50%2:0-1 volt=15.95",

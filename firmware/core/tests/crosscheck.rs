@@ -31,7 +31,6 @@ struct Fitted {
     pressure: [f32; 3],
     pulses: [f32; MOTORS_MAX],
     yaw_rate: f32,
-    /// Body rates about roll and pitch, and their setpoints, rad/s.
     turns: [f32; 2],
     wanted: [f32; 2],
     /// The attitude whose axes these are about.
@@ -43,7 +42,6 @@ struct Fitted {
     hud_climb: Option<f32>,
     gps_until_ms: u64,
     speed: f32,
-    /// The receiver's speed northwards, m/s, if it sends one, and the way north since, m.
     gps_speed: Option<f32>,
     gps_north: f32,
     places: bool,
@@ -179,7 +177,6 @@ fn fly_after(fault: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     })
 }
 
-/// Flies with a period and an offset of each sensor's messages, ms.
 fn fly_with(rhythm: [(u64, u64); 3], script: impl Fn(u64, &mut Fitted)) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     let mut findings = Vec::new();
@@ -218,14 +215,12 @@ fn since_s(now_ms: u64) -> f32 {
 type Found = (&'static str, &'static [usize], Level, u64, Fault);
 
 const FOUND: &[Found] = &[
-    // Of three sensors the one that comes apart. The first barometer leaves the height of GPS too.
     ("accel_mismatch", &[0, 1, 2], Warning, 3_200, |_, it, of| it.force[of][2] += 3.0),
     ("gyro_mismatch", &[0, 1, 2], Warning, 1_000, |_, it, of| it.rate[of][0] += 0.4),
     ("compass_mismatch", &[0, 1, 2], Warning, 1_000, |_, it, of| {
         it.field[of] = [0.5, 0.1 * it.field[of][2], -0.1];
     }),
     ("baro_mismatch", &[1, 2], Warning, 1_300, |_, it, of| it.pressure[of] += 2.5),
-    // A sensor that repeats its value of the moment of the fault; a barometer while the vehicle sinks.
     ("accel_stuck", &[0, 1, 2], Warning, 1_500, |_, it, of| it.force[of] = held().force[of]),
     ("gyro_stuck", &[0, 1, 2], Warning, 1_500, |_, it, of| it.rate[of] = held().rate[of]),
     ("compass_stuck", &[0, 1, 2], Warning, 1_500, |_, it, of| it.field[of] = held().field[of]),
@@ -241,7 +236,6 @@ const FOUND: &[Found] = &[
     ("compass_heading", &[0], Warning, 1_000, |_, it, _| turned(it, -25.0)),
     ("compass_heading", &[0], Warning, 1_000, |_, it, _| turned(it, 25.0)),
     ("compass_heading", &[0], Warning, 1_000, |_, it, _| turned(it, 170.0)),
-    // 10 m, at once and at half a metre a second.
     ("baro_height", &[0], Warning, 3_000, |_, it, _| rises(it, -1.5)),
     ("baro_height", &[0], Warning, 25_000, |ms, it, _| rises(it, 0.06 * since_s(ms))),
     ("baro_noise", &[0], Warning, 2_000, |ms, it, _| it.pressure[0] += 0.6 * noise(ms, 80)),
@@ -253,7 +247,6 @@ const FOUND: &[Found] = &[
     ("roll_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[0] = -2.5),
     ("pitch_rate", &[0], Critical, 2_500, |_, it, _| it.wanted[1] = -2.5),
     ("thrust_lost", &[0], Warning, 2_500, |_, it, _| it.quad.throttle = 1.0),
-    // An estimator that falls while the barometer climbs.
     ("ekf_climb", &[0], Warning, 3_000, |ms, it, _| climbs(it, since_s(ms), 3.0, -7.0)),
     ("ekf_climb", &[0], Critical, 3_000, |ms, it, _| climbs(it, since_s(ms), 3.0, -17.0)),
 ];
@@ -268,16 +261,12 @@ const FOUND_OF: &[(Begins, Found)] = &[
         stands_by_gps,
         ("imu_gps", &[0], Warning, 3_000, |_, it, _| {
             it.quad.roll += 0.4;
-            // A gyro that led the attitude astray, near the equator, where a false lean does not turn the compass's heading.
             it.field.iter_mut().for_each(|field| field[2] -= 0.4);
         }),
     ),
-    // Of two sensors the second stands for both.
     (has_two, ("accel_mismatch", &[1], Warning, 4_000, |_, it, _| it.force[0][0] += 3.0)),
     (has_two, ("accel_mismatch", &[1], Warning, 4_000, |_, it, _| it.force[1][0] += 3.0)),
-    // PX4 has selected the first one and taken an offset off.
     (selects, ("gyro_mismatch", &[2], Warning, 1_500, |_, it, of| it.rate[of][0] += 0.4)),
-    // A quadrotor and a helicopter on a fast leg.
     (|it| it.speed = 10.0, ("accel_mismatch", &[1], Warning, 6_000, |_, it, of| it.force[of][2] += 3.0)),
     (helicopter, ("gyro_mismatch", &[2], Warning, 6_000, |_, it, of| it.rate[of][0] += 0.4)),
     (
@@ -367,7 +356,6 @@ const QUIET: &[Quiet] = &[
         }
     }),
     ("a third sensor that is not fitted", |_, it| has_two(it)),
-    // Their own axes lie otherwise, and the vehicle has turned.
     ("a sensor of PX4's choice, less an offset", |ms, it| {
         selects(it);
         if ms >= FAULT_MS {
@@ -457,7 +445,6 @@ const QUIET: &[Quiet] = &[
         let first = Fitted::healthy(0);
         (it.field, it.force) = (first.field, first.force);
     }),
-    // An estimator's attitude in its last digits, and a climb with an offset.
     ("a simulator without noise that trembles in a hover", |ms, it| {
         if ms >= FAULT_MS {
             (it.force, it.rate, it.field) = (held().force, held().rate, held().field);
@@ -517,12 +504,10 @@ fn rises(it: &mut Fitted, hpa: f32) {
     it.pressure.iter_mut().for_each(|pressure| *pressure -= hpa);
 }
 
-/// The third sensor of each kind is not fitted.
 fn has_two(it: &mut Fitted) {
     (it.force[2], it.rate[2], it.field[2], it.pressure[2]) = ([0.0; 3], [0.0; 3], [0.0; 3], 0.0);
 }
 
-/// A PX4 that sends the sensor of its choice.
 fn selects(it: &mut Fitted) {
     (it.selects, it.quad.autopilot) = (true, Autopilot::Px4);
     it.quad.vibration.levels = [Some(0.0), Some(0.0), Some(1.0)];
@@ -548,7 +533,6 @@ fn turned(it: &mut Fitted, degrees: f32) {
     }
 }
 
-/// A quarter of a turn behind the heading setpoint: to pitch is to roll to the left, a tenth of a second late.
 fn lags(now_ms: u64, it: &mut Fitted) {
     let turning = |now_ms: u64| 3.0 * (now_ms as f32 / 2_000.0).sin();
     let half = core::f32::consts::FRAC_1_SQRT_2;
@@ -563,7 +547,6 @@ fn climbs(it: &mut Fitted, seconds: f32, by_pressure: f32, by_estimator: f32) {
     it.quad.climb = by_pressure;
 }
 
-/// A climb at 3 m/s from the fault on, and the estimator's.
 fn climbs_after(now_ms: u64, it: &mut Fitted, by_estimator: f32) {
     let [by_pressure, by_estimator] = if now_ms < FAULT_MS { [0.0; 2] } else { [3.0, by_estimator] };
     climbs(it, since_s(now_ms), by_pressure, by_estimator);
@@ -723,7 +706,6 @@ fn position_messages_that_stop_are_told() {
     let found = findings.first().expect("something");
     assert_eq!((found.check, found.level), ("position_silent", Warning));
     assert!(found.at.as_millis() < FAULT_MS + 3_500, "{found:?}");
-    // Checks that need a position are stale.
     assert!(findings.iter().skip(1).all(|one| one.level == Level::Stale), "{findings:?}");
 }
 
@@ -780,7 +762,6 @@ fn a_second_estimator_without_an_exact_receiver_is_no_witness() {
         it.quad.gnss.fix = 1;
     }));
     assert_eq!(none, [""; 0], "it never had a fix");
-    // It takes a while to level out.
     let late = fly(|now_ms, it| {
         inexact(30_000)(now_ms, it);
         it.second = it.second.filter(|_| now_ms >= 20_000);
@@ -828,7 +809,6 @@ fn a_weak_a_dead_and_a_shut_off_motor_of_a_hexarotor_are_named() {
     let found = weak.iter().find(|one| one.level == Warning).unwrap();
     assert_eq!((found.check, found.instance), ("motor_output", 0));
     assert!((FAULT_MS..FAULT_MS + 4_000).contains(&found.at.as_millis()), "{found:?}");
-    // A dead one at its end stop while the one opposite idles; one that is given nothing.
     for (shift, check, instance) in [
         ([-350.0, 450.0, 130.0, 130.0, 130.0, 130.0], "motor_output", 1),
         ([125.0, 125.0, -500.0, 125.0, 125.0, -480.0], "motor_off", 2),
@@ -853,10 +833,8 @@ fn a_weak_motor_of_an_octocopter_is_named() {
     // `arms`: its motors are those of four arms one after the other, two each, which turn against each other.
     for arms in [false, true] {
         for place in [0, 1, 7] {
-            // The projection of a motor that lost thrust worth 200 us on thrust, roll, pitch and yaw.
             let mut shift = eight(arms, 200.0, 200.0, 200.0);
             shift.rotate_right(place);
-            // A frame that is put together by parameters may call itself a quadrotor.
             for type_number in [14, 2] {
                 let findings = fly(|now_ms, it| frame(it, now_ms, (type_number, shift)));
                 let found = findings.iter().find(|one| one.level == Warning).unwrap();
@@ -898,10 +876,8 @@ fn px4_that_stops_using_its_compass_is_named() {
             turned(it, if now_ms < FAULT_MS { 0.0 } else { degrees });
         })
     };
-    // It pauses the use of sound ones too.
     let paused = stops(0.0);
     assert!(paused.iter().all(|finding| finding.level == Level::Stale), "{paused:?}");
-    // Its test ratio is not sent any more.
     let told: Vec<_> = stops(11.0).into_iter().filter(|finding| finding.level != Level::Stale).collect();
     assert!(matches!(only(&told), ("compass_unused", 0, 500..900)), "{told:?}");
 }

@@ -54,8 +54,6 @@ fn the_parameters_are_documented_as_they_are() {
     assert_is("parameters.md", &text);
 }
 
-/// The file of parameter descriptions that Mission Planner reads, in its own terms. It takes any component that is
-/// not an autopilot for an `ArduCopter2`.
 #[test]
 fn mission_planner_gets_the_words_of_every_parameter() {
     let mut text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
@@ -172,7 +170,6 @@ fn every_text_of_a_check_is_in_the_runbook() {
     let mut told = Vec::new();
     for (words, check) in VOCABULARY.iter().zip(checks()) {
         let Said { alarm, advice, .. } = words.said;
-        // The same fault on another autopilot's scale, or after another time, has the same text.
         if told.contains(&alarm) {
             continue;
         }

@@ -18,7 +18,6 @@ const END_MS: u64 = 95_000;
 
 type Fault = fn(&mut Quad, &mut Vec<Observation>);
 
-/// Off by default, since they depend on the engine and on the devices.
 const LIMITS: [(&str, f32); 6] = [
     ("ENG_CHT_CRIT", 200.0),
     ("ENG_EGT_CRIT", 800.0),
@@ -190,7 +189,6 @@ const WITH: [(&str, &str); 7] = [
     ("vibration", "vibration_rise"),
 ];
 
-/// Checks of due parts, and the kind of component (`CMP1_KIND`).
 const DUE: [(&str, f32); 8] = [
     ("airframe_due", 1.0),
     ("battery_due", 2.0),
@@ -227,7 +225,6 @@ fn generator(is_off: bool, rpm: f32) -> Observation {
     Observation::Generator(Generator { is_off, speed: Some(Rpm(rpm)) })
 }
 
-/// Levels of the generator's speed, of a vehicle whose generator reports these flags and speeds for 10 s each.
 fn generator_levels(armed: bool, reports: &[(bool, f32)]) -> Vec<Level> {
     let mut run = with(&[("GEN_SPEED_WARN", 5_500.0), ("GEN_SPEED_CRIT", 5_000.0)]);
     run.flies(0..reports.len() as u64 * 10_000, |now_ms, quad, more| {
@@ -249,7 +246,6 @@ fn a_generator_is_judged_once_it_has_run_and_until_it_is_switched_off() {
     assert_eq!(generator_levels(false, &[runs, stands, starts]), [], "disarmed");
 }
 
-/// A fault is found as this level, after the debounce of its check.
 fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad, &mut Vec<Observation>)) {
     let check = health::check_named(name).expect(name);
     let mut run = with(&LIMITS);
@@ -346,7 +342,6 @@ fn each_kind_of_component_is_due_in_its_own_subsystem() {
         let findings = fly(&limits, |quad, _| (quad.armed, quad.height) = (false, 0.0));
         let found: Vec<_> = findings.iter().map(|finding| (finding.check, finding.level)).collect();
         assert_eq!(found, [(name, Level::Warning), (name, Level::Critical)], "kind {kind}: {findings:?}");
-        // In the air after 2.5 s; one component is updated each tick, and the debounce is a second.
         assert!((3_500..=4_000).contains(&findings[0].at.as_millis()), "{findings:?}");
         let due_ms = findings[1].at.as_millis() - FAULT_MS;
         assert!((1_000..=5_000).contains(&due_ms), "critical on the ground only: {findings:?}");

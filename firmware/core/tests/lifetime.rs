@@ -207,7 +207,6 @@ fn a_flight_saves_little_until_it_lands() {
     assert_eq!(session[0], 10, "the boot itself");
     let armed = session.windows(2).filter(|pair| pair[1] <= 1_820);
     assert!(armed.into_iter().all(|pair| pair[1] - pair[0] <= 121), "{session:?}");
-    // Landed (found within 2 s, or at disarming).
     assert!(session.iter().any(|at_s| (1_820..=1_822).contains(at_s)), "{session:?}");
     assert!(session.len() <= 20, "{session:?}");
     assert!(times(ItemKey::Lifetime).len() <= 2, "its owner, and as of this session");

@@ -90,11 +90,8 @@ fn an_esc_whose_messages_come_once_a_second_is_silent_after_five_of_them() {
 
 const HEXA: &str = "* hexa rpm=5000x6; 20 ";
 const QUAD: &str = "* rpm=5000x4; 20 ";
-/// A quadplane in the air from 2 s on.
 const QUADPLANE: &str = "* vtol mode=10 hover; 0-2 landed=ground; 2 landed=air; ";
-/// Pulses on the ground and in the air, and a sink from 20 s on.
 const GIVEN: &str = "* px4 yaw=0.3 servo rpm=5000x4; 0-4 h=0 out=1000x4; 4 h=200 out=1500x4; 20 c=-4 ";
-/// A hexarotor that is first received in the air.
 const AIRBORNE: &str = "* hexa start=20 landed=air fill=0 ";
 
 type Told = &'static [(&'static str, u8)];
@@ -108,9 +105,7 @@ const FLIGHTS: &[(&str, &str, &str, Told)] = &[
     ("it turns fast", QUAD, "rpm=3200,4300,5300,6500 yaw=1.8", &[]),
     ("it turns slowly", QUAD, "rpm=3200,4300,5300,6500 yaw=0.1", &[("motor_imbalance", 3)]),
     ("one stopped", HEXA, "rpm=5900,6000,300,6200,6100,900 yaw=1.8", &[("motor_imbalance", 2)]),
-    // The autopilot goes on to call it in the air.
     ("they idle on the ground", "* thr=0.02 h=12 landed=air rpm=5000x4; 20 ", "rpm=2200,2050,2900,800", &[]),
-    // Hard braking: half a second and more without current, every 20 s.
     (
         "a command that was cut",
         "* amp=5x4 rpm=5000x4; 20%20:0-1.5 ",
@@ -119,7 +114,6 @@ const FLIGHTS: &[(&str, &str, &str, Told)] = &[
     ),
     ("the motor that pushes", QUADPLANE, "* amp=5x4,0", &[]),
     ("it helps for a while", QUADPLANE, "* amp=5x4,0; 10-30 amp=5x4,6", &[]),
-    // Heard first on its wings, and back in hover.
     (
         "it returns",
         QUADPLANE,
@@ -210,13 +204,11 @@ fn a_motor_that_stands_while_it_is_given_all_is_lost_whatever_current_is_told_an
     let stands =
         told(&format!("{AIRBORNE}rpm=5000,5000,0,5000x3 varies=30 out=1500,1480,1950,1510,1530,1600"));
     assert!(stands.contains(&("motor_loss", 2)), "{stands:?}");
-    // It never flies level, so no level is usual.
     let tilted =
         told("* roll=0.7; 0-4 h=0 out=1000x4; 4 h=40 out=1620,1600,1610,1630; 30 out=1620,1600,1610,2000");
     assert!(tilted.contains(&("motor_output", 3)), "{tilted:?}");
 }
 
-/// Findings about PX4's ESCs with two messages: speeds ten times a second, and states by `info` at a time in ms.
 fn px4_escs(info: impl Fn(u64) -> Option<Esc>) -> Vec<Finding> {
     let mut run = Run::new(&Params::defaults());
     run.flies(0..90_000, |now_ms, quad, more| {

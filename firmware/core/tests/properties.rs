@@ -74,7 +74,6 @@ impl Random {
         if self.below(8) == 0 { Source { system: self.any(), component: self.any() } } else { AUTOPILOT }
     }
 
-    /// Two in ten are heartbeats: an armed vehicle makes most of the rest count.
     fn observation(&mut self) -> Observation {
         match self.below(32) {
             0..=2 => Observation::Heartbeat(self.any()),
@@ -156,7 +155,6 @@ impl Random {
 
 /// Any value of a type; what has a value for "unknown" is that and nothing else where values are unknown.
 trait Any: Sized {
-    /// Whether one of its values is "unknown".
     const HAS_UNKNOWN: bool = true;
 
     fn any(random: &mut Random) -> Self;
@@ -210,7 +208,6 @@ impl<T: Any, const N: usize> Any for [T; N] {
     }
 }
 
-/// How a value is made of others.
 macro_rules! any {
     ($($type:ty $(, $unknown:literal)?: $random:ident $value:expr;)*) => {
         $(impl Any for $type {
@@ -323,7 +320,6 @@ fn check(monitor: &mut Monitor, now: BootMs) {
     }
 }
 
-/// A roll-up is as bad as its part; stale hides a warning, and a danger hides all.
 fn not_better(whole: Level, part: Level) -> bool {
     let rank = |level| match level {
         Level::Ok => 0,
@@ -337,7 +333,6 @@ fn not_better(whole: Level, part: Level) -> bool {
 
 fn run(random: &mut Random) -> (Monitor, BootMs) {
     let mut monitor = Monitor::new(random.params());
-    // At power-on, and where the clock wraps.
     let start_ms = if random.below(2) == 0 { 0 } else { u64::from(u32::MAX) - random.below(40_000_000) };
     let mut now = BootMs::from_millis(start_ms);
     monitor.observe(now, AUTOPILOT, &Observation::Heartbeat(random.any()));

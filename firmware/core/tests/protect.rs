@@ -11,14 +11,12 @@ use hums_core::protect::{Action, Request, Stage, Step};
 use hums_core::time::BootMs;
 use hums_core::units::{Fraction, MetresPerSecond2, RadiansPerSecond};
 
-/// The battery is empty from 20 s on, and critical after two seconds; the countdown takes ten.
 const FOUND_MS: u64 = 22_000;
 const ASKED_MS: u64 = FOUND_MS + 10_000;
 /// No answer comes.
 const UNANSWERED: &str = "announced, asked, asked, asked, unanswered";
 /// The landed state is sent.
 const SENT: &str = "0-2 landed=ground; 2 landed=air; ";
-/// Modes that neither return nor land, and in which no failsafe waits.
 const VEHICLES: [&str; 5] = [
     "* ap quad mode=4; ",
     "* ap plane mode=5; ",
@@ -33,7 +31,6 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// The stages in words, without the countdown; a landing after a refused return with its name.
     fn story(&self) -> String {
         let first = self.steps.first().map(|(_, step)| step.action);
         let words = self.steps.iter().filter(|(_, step)| step.stage != Stage::Counting).map(|(_, step)| {
@@ -257,7 +254,6 @@ fn a_refused_return_is_followed_by_a_landing_only_on_rotors() {
 
 #[test]
 fn a_landing_in_a_mission_is_left_alone() {
-    // A pilot's sink is not a mission, and ArduCopter's landed state reports the landing.
     for (vehicle, is_told) in [
         ("ap plane mode=10", true),
         ("ap vtol mode=10", true),
@@ -266,11 +262,9 @@ fn a_landing_in_a_mission_is_left_alone() {
         ("ap plane mode=5", false),
         ("ap quad mode=3", false),
     ] {
-        // From 80 m down at 1.5 m/s from the fourth second on; it flares.
         let outcome = fly(&format!("* {vehicle} h=80 c=0; {SENT}4-55.4 h=80..2.9 c=-1.5; 55.4 h=2 c=-0.2"));
         let story = if is_told { "announced, already_done" } else { UNANSWERED };
         assert_eq!(outcome.story(), story, "{vehicle}");
-        // 2 s after it was at 40 m; no step comes in the flare.
         let at_ms = outcome.steps.last().unwrap().0;
         assert!(!is_told || (32_600..32_900).contains(&at_ms), "{vehicle}: {at_ms}");
     }
@@ -285,7 +279,6 @@ fn a_mission_that_goes_lower_is_announced_once_it_flies_on() {
 
 #[test]
 fn the_end_of_a_mission_is_no_cancel() {
-    // HOLD and BRAKE are not the pilot's choice either: failsafes wait in them.
     for (vehicle, mission, after, is_waiting) in [
         ("px4 quad", "mission", "hold", true),
         ("px4 plane", "mission", "hold", true),
@@ -303,7 +296,6 @@ fn the_end_of_a_mission_is_no_cancel() {
 
 #[test]
 fn one_cancel_holds_for_the_flight_and_not_for_the_next_one() {
-    // Well again and empty again, in the same flight; then down, and up once more.
     let outcome = fly("@25 cancel; 27-30 rem=0.5; 36-42 h=0; 38-40 off");
     let announced = outcome.announced_ms();
     assert!(matches!(announced[..], [FOUND_MS, 42_000..44_000]), "{announced:?}");
@@ -340,7 +332,6 @@ fn a_wrong_landed_state_delays_the_action_by_no_more_than_it_lasts() {
     for height in [3.0, 20.0, 300.0, -15.0] {
         for from_s in [19.0, 21.5, 26.0, 31.5] {
             for lasts_s in [0.5, 2.0, 4.0] {
-                // The vehicle flies again 0.6 s after its autopilot's report, which comes twice a second.
                 let late_ms = (lasts_s * 1_000.0) as u64 + 1_200;
                 let script = format!("* h={height}; {from_s}-{} landed=ground", from_s + lasts_s);
                 all_are_asked(ASKED_MS, late_ms, &script);
@@ -356,8 +347,6 @@ fn a_touch_and_go_pauses_the_countdown() {
 
 #[test]
 fn a_sink_that_ends_in_the_air_is_no_landing() {
-    // Height at its start, and sink rate for four seconds as the battery turns critical. Within 3 m of the take-off
-    // height it may be a landing, for 15 s.
     for (height, sink, late_ms) in [
         (-10.0, 0.6, 100),
         (-30.0, 0.6, 100),
@@ -427,9 +416,7 @@ fn a_mode_in_which_failsafes_wait_is_no_cancel() {
     }
 }
 
-/// Disturbances of a flight, each for a while, one after the other, until 35 s; a number chooses them.
 fn disturbances(seed: u64, from_ms: u64) -> String {
-    // The high bits of a multiplication by the golden ratio are as good as random.
     let random = |of: u64| (seed * 64 + of).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
     let pieces = (6..14_u64).filter_map(|slot| {
         let (begins_ms, ends_ms) = (2_500 * slot, 2_500 * slot + 500 + random(slot) % 1_800);

@@ -9,7 +9,6 @@ use hums_core::params::Params;
 use hums_core::units::Celsius;
 use hums_core::usage::UsageCounter;
 
-/// Faults begin and end, ms; the flight lasts for two minutes.
 const FAULT_MS: u64 = 20_000;
 const END_MS: u64 = 100_000;
 
@@ -66,7 +65,6 @@ fn last(run: &Run, check: &str) -> Finding {
     *run.of_check(check).next_back().unwrap_or_else(|| panic!("no {check}: {:?}", run.findings))
 }
 
-/// Second, level and cause of each finding of a check.
 fn told(run: &Run, check: &str) -> Vec<(u64, Level, &'static str)> {
     run.of_check(check).map(|one| (one.at.as_millis() / 1_000, one.level, one.because)).collect()
 }
@@ -120,7 +118,6 @@ fn an_esc_that_fell_silent_says_nothing_of_the_others_current() {
 
 #[test]
 fn one_esc_that_falls_silent() {
-    // Its last message came 100 ms before the fault; 2 s after that it is silent for good.
     let run = fly("20-100 esc3");
     let (warning, critical) =
         (first(&run, "esc_silent", Level::Warning), first(&run, "esc_silent", Level::Critical));
@@ -135,13 +132,11 @@ fn one_esc_that_falls_silent() {
 #[test]
 fn an_autopilot_that_falls_silent_makes_everything_else_stale() {
     let run = fly("20-100 silent");
-    // Its last heartbeat came 500 ms before the silence.
     let after_ms = first(&run, "heartbeat", Level::Critical).at.as_millis() - (FAULT_MS - 500);
     assert!((5_000..=5_150).contains(&after_ms), "{after_ms}");
     for check in ["heartbeat", "batt_remaining", "ekf_variance", "vibration", "load", "roll"] {
         let is_stale = run.of_check(check).any(|finding| finding.level == Level::Stale);
         assert!(is_stale || check == "heartbeat", "{check} stayed as it was without any data");
-        // It is received again with the first heartbeat, and its messages count at once.
         let last = last(&run, check);
         assert_eq!(last.level, Level::Ok, "{last:?}");
         assert!((END_MS..=END_MS + 2_100).contains(&last.at.as_millis()), "{last:?}");
@@ -153,7 +148,6 @@ fn an_autopilot_that_restarts() {
     let run = fly("20-100 boot=-20000");
     let reboot = first(&run, "autopilot_reboot", Level::Critical);
     assert!((FAULT_MS..=FAULT_MS + 100).contains(&reboot.at.as_millis()), "{reboot:?}");
-    // The report lasts 30 s, and then two seconds of good values.
     let cleared = last(&run, "autopilot_reboot");
     let in_time = (FAULT_MS + 32_000..=FAULT_MS + 32_200).contains(&cleared.at.as_millis());
     assert!(cleared.level == Level::Ok && in_time, "{cleared:?}");
@@ -161,7 +155,6 @@ fn an_autopilot_that_restarts() {
 
 #[test]
 fn what_comes_back_by_less_than_the_hysteresis_stays_bad() {
-    // A value that is bad for the first half of the fault, and then another one; the motor's of the others' 5 A.
     for (check, bad, back) in [
         ("cell_voltage", "volt=13.2", "volt=14.1"),
         ("batt_remaining", "rem=0.05", "rem=0.075"),
@@ -209,10 +202,8 @@ fn a_card_that_refuses_writes() {
 
 #[test]
 fn errors_that_rise_are_counted_a_minute_across_the_end_of_their_counter() {
-    // Two a second, through the counter's end: more than the limit of ten a minute in the sixth second.
     let run = fly("20-100 counts0");
     let errors = first(&run, "esc_errors", Level::Warning);
-    // Eleven after 5.5 s, and a second of debounce.
     let after_ms = errors.at.as_millis() - FAULT_MS;
     assert!(errors.instance == 0 && (6_500..=6_600).contains(&after_ms), "{errors:?}");
     let warnings = run.findings.iter().filter(|finding| finding.level == Level::Warning);
@@ -223,7 +214,6 @@ fn errors_that_rise_are_counted_a_minute_across_the_end_of_their_counter() {
 fn a_clock_that_jumps_is_no_fault_and_counts_no_time() {
     let mut run = Run::new(&Params::defaults());
     run.flies(0..30_000, |now_ms, quad, more| {
-        // The autopilot's own clock jumps as well: forward, which no restart does.
         quad.boot_offset_ms = if now_ms < 20_000 { 100_000 } else { 3_700_000 };
         let utc_micros = Some(if now_ms < 15_000 { 1_700_000_000_000_000 } else { 1_400_000_000_000_000 });
         let boot_ms = (now_ms as i64 + quad.boot_offset_ms) as u32;
@@ -245,7 +235,6 @@ fn an_alarm_that_outlives_the_one_that_explained_it_is_told_by_itself_once() {
         let mine = run.of_check("ekf_variance").filter(|one| one.level != Level::Ok);
         (end_ms, mine.map(|one| (one.at.as_millis(), one.because, one.previous)).collect::<Vec<_>>())
     };
-    // With the end of its cause at any step.
     for phase in 0..14_u8 {
         let (end_ms, told) = of_estimator(40.0 + 0.15 * f32::from(phase));
         let [(_, "gps_fix", Level::Ok), (at_ms, "", Level::Warning)] = told[..] else { panic!("{told:?}") };

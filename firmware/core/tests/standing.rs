@@ -84,7 +84,6 @@ fn what_stands_does_not_fly_and_what_flies_does_whatever_is_said_of_it() {
         ),
         ("with its motor off", "* plane h=60 thr=0 c=-1 speed=14", (1, 0)),
         ("it descends without throttle", "* nowhere thr=0.5 up=0; 60 thr=0 up=-4", (1, 0)),
-        // Received first in a hover, by a simulator without noise.
         ("a simulator that hovers", "* on thr=0.5 shake=0.03 hpa=960", (1, 0)),
     ] {
         assert_eq!(counts(script), expected, "{what}");

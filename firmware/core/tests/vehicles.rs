@@ -107,14 +107,9 @@ fn what_another_system_says_is_judged_by_nobody() {
 
 #[test]
 fn what_is_a_fault_of_a_multicopter_is_none_of_a_plane_a_vtol_or_a_helicopter() {
-    // It banks to 70 degrees, and its first motor turns half as fast.
-    for (kind, expected) in [
-        ("quad", &["motor_imbalance", "roll"][..]),
-        // A helicopter's tail turns at its own speed.
-        ("heli", &["roll"]),
-        ("plane", &[]),
-        ("vtol", &[]),
-    ] {
+    for (kind, expected) in
+        [("quad", &["motor_imbalance", "roll"][..]), ("heli", &["roll"]), ("plane", &[]), ("vtol", &[])]
+    {
         let run = minute(&format!("* {kind} rpm=2500,5000x3; 20-25 roll=1.2"));
         assert_eq!(run.checks(), expected, "{kind}");
     }
@@ -158,7 +153,6 @@ fn a_hexacopter_with_one_dead_motor_has_one_motor_named() {
         run.says(0..60_000, |now_ms| {
             let mut hexa = Quad { type_number: 13, ..Quad::healthy() };
             let esc = hexa.escs[0].unwrap();
-            // The others make up for it; the opposite one least.
             let rpm = |motor: usize| match (motor + 6 - dead) % 6 {
                 _ if now_ms < 20_000 => 5_000.0,
                 0 => 500.0,
@@ -188,15 +182,12 @@ fn a_link_that_is_silent_is_told_as_such_and_not_as_silent_escs() {
 
 #[test]
 fn speeds_that_are_held_and_zeros_of_lost_telemetry_say_nothing_about_a_motor() {
-    // One motor is a little faster than the others, within the usual range.
     for lost in ["escs", "rpm=0"] {
         let run = minute(&format!("* rpm=5000,5600,5000x2; 30 {lost}"));
         assert!(!run.checks().contains(&"motor_imbalance"), "{lost}: {:?}", run.findings);
     }
 }
 
-/// A minute and a half: disarmed for five seconds; armed and away, banked to 70 degrees for five seconds, the pack empty at
-/// the end; disarmed.
 const OUT_AND_BACK: &str = "* c=0 vibe=0.1,0.1,1 volt=15.6; 0-5 off; 70 off; 0-8 h=0 thr=0; 67 h=0 thr=0; \
                             20-25 roll=1.2; 30-70 volt=13.2; ";
 
@@ -204,7 +195,6 @@ const OUT_AND_BACK: &str = "* c=0 vibe=0.1,0.1,1 volt=15.6; 0-5 off; 70 off; 0-8
 fn each_class_of_vehicle_flies_banks_and_is_protected_as_its_class_on_both_autopilots() {
     let mut params = Params::defaults();
     params.set("PROT_ACTION", 2.0).unwrap();
-    // A multicopter reports hover too, a plane nothing. `EXTENDED_SYS_STATE` calls an armed rover of PX4 "in air".
     for kind in ["quad", "hexa", "heli", "plane", "vtol", "rover", "boat", "submarine"] {
         for autopilot in ["ap", "px4"] {
             for landed in ["", "0-8 landed=ground; 8-67 landed=air; 67 landed=ground"] {

@@ -230,7 +230,6 @@ impl Outlet {
             }
             _ => u32::MAX,
         };
-        // Old slots are cleared before they are counted.
         self.window.advance(Window::slot(start));
         let wanted = (bytes + more) as u32;
         bytes as u32 <= share && self.window.sum(start).saturating_add(wanted) <= self.mark(class)
@@ -341,7 +340,6 @@ mod tests {
                 for class in [Class::Bulk, Class::Forward, Class::Event, Class::Own] {
                     while outlet.pass(now, class, &[0; 60], &mut |frame| waiting += frame.len()) {}
                 }
-                // Findings of the tick before may still be there.
                 assert!(waiting <= before.max(300), "{waiting} bytes at {baud} baud");
                 while outlet.pass(now, Class::Finding, &[0; 92], &mut |frame| waiting += frame.len()) {}
                 assert!(waiting <= 300 + FINDINGS as usize, "{waiting} bytes at {baud} baud");

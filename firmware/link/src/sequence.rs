@@ -140,7 +140,6 @@ mod tests {
         heartbeats(&mut sequences, 7_000, (200..255_u8).filter(|number| !(240..250).contains(number)));
         let before = part(&mut sequences, 8_000);
         assert!((before - 10.0 / 255.0).abs() < 0.001, "{before}");
-        // Those of the first seconds leave the window, and few new ones arrive.
         heartbeats(&mut sequences, 14_000, [255]);
         let after = part(&mut sequences, 14_500);
         assert!((after - before).abs() < 0.001, "{after}");

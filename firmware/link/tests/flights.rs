@@ -29,7 +29,6 @@ impl Outcome {
     }
 }
 
-/// A recording at its own times, with a tick every 50 ms.
 fn watch(recording: &Recording) -> Outcome {
     let mut framer = Framer::new();
     let mut sequences = Sequences::new();
@@ -189,7 +188,6 @@ fn the_parts_of_a_flight_add_up_to_it() {
             UsageCounter::Landing,
         ];
         let sum: f64 = parts.into_iter().map(value).sum();
-        // The half second before a take-off is seen counts as flight, and is of no part.
         let unseen_s = 0.55 * expected.flights;
         assert!((value(UsageCounter::Flight) - sum).abs() <= unseen_s + 1.0, "{}: {sum}", expected.name);
     }
@@ -215,7 +213,6 @@ fn healthy_flights_have_no_critical_finding() {
     ] {
         let Some(recording) = flight(name) else { continue };
         let alarms = watch(&recording).alarms();
-        // Its link was silent from 186 s on for a while, as the finding says.
         let silent = |alarm: &&(f64, &str, Level)| name == "eagle_ac740ecf.tlog" && alarm.1 == "heartbeat";
         let critical = alarms.iter().filter(|alarm| alarm.2 == Level::Critical && !silent(alarm));
         let critical: Vec<_> = critical.collect();
@@ -234,7 +231,6 @@ fn the_faults_that_show_in_the_telemetry_of_the_faulty_flight_are_found() {
     let expected = [
         ("vibration_rise", Level::Warning, 86.5, 87.5),
         ("cell_voltage", Level::Critical, 260.7, 260.9),
-        // By its texts, and two heartbeats, one a second.
         ("battery_alert", Level::Warning, 265.7, 266.0),
         ("autopilot_state", Level::Critical, 266.5, 267.5),
         // The autopilot calls the battery low.

@@ -39,7 +39,6 @@ fn heartbeat(armed: bool, autopilot: u8) -> Vec<u8> {
     vec![0, 0, 0, 0, 2, autopilot, if armed { 0x81 } else { 1 }, 4, 3]
 }
 
-/// NaN, infinities, ends of integers, and anything.
 fn payload() -> impl Strategy<Value = Vec<u8>> {
     let repeated =
         |pattern: [u8; 4]| (0..=64_usize).prop_map(move |words| pattern.repeat(words)[..].to_vec());
@@ -74,7 +73,6 @@ fn params(settings: &[(usize, f32)]) -> Params {
 
 fn look(monitor: &mut Monitor, now: BootMs) {
     let sane = |counter: u8, value: f64| {
-        // A figure may be negative: a motor slower than the others.
         let sign = counter >= FIGURE_FIRST || value >= 0.0;
         assert!(value.is_finite() && sign, "counter {counter} is {value}");
     };
@@ -99,7 +97,6 @@ fn look(monitor: &mut Monitor, now: BootMs) {
         let again = Monitor::new(Params::defaults()).restore(key, &item[..length]);
         assert_eq!(again, Ok(()), "{key:?} does not read back");
         monitor.saved(key);
-        // Once: it is to be saved itself.
         if !replaced {
             replaced = true;
             monitor.replace_component(usize::from(key.number() % 8), Label::new("new"));
@@ -163,7 +160,6 @@ proptest! {
         for beat in 0..beats {
             let now = BootMs::from_millis(u64::from(beat) * 500);
             let mut bytes = frame(0, beat, &heartbeat(beat % 2 == 0, 3));
-            // Every integer at its unknown value, every float NaN.
             bytes.extend(frame(unknown, beat, &[0xff; 100]));
             framer.push(&bytes, &mut |frame| {
                 if let Some((source, observation)) = observe(&frame) {

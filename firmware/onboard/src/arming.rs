@@ -93,7 +93,6 @@ mod tests {
         assert!(!after(&armed));
         assert!(!after(&[armed.clone(), disarmed, armed.clone()].concat()));
         assert!(!after(&[damaged.clone(), damaged, armed].concat()));
-        // A ground station, and a camera without an autopilot.
         assert!(!after(&heartbeat(6, 3, ARMED).repeat(3)));
         assert!(!after(&heartbeat(30, 8, ARMED).repeat(3)));
         assert!(!after(&[0xFD; 2_000]));

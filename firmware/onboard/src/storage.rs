@@ -113,7 +113,6 @@ mod tests {
         let mut ends = queues.split();
         let mut storage = Storage::new(Empty, &status, &buffers, 1);
         for second in 0..3 {
-            // Queued after storage looked, and before it asks for the end.
             storage.service(Instant::from_millis(second * 1_000), &mut ends.sectors_out);
             ends.sectors_in.put(&Sector::from_bytes([0; BLOCK_BYTES]));
             assert!(!storage.finish_after(&ends.sectors_out));

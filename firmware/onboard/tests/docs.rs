@@ -31,7 +31,6 @@ fn all_texts() -> Vec<String> {
 
 #[test]
 fn every_text_that_a_pilot_may_read_is_one_message() {
-    // Those with placeholders are tested at their source.
     for text in all_texts().iter().filter(|text| !text.contains('{')) {
         assert!("HUMS: ".len() + text.len() <= TEXT_BYTES_MAX, "{text}");
     }
@@ -41,7 +40,6 @@ fn every_text_that_a_pilot_may_read_is_one_message() {
 fn every_text_that_a_pilot_may_read_is_in_the_runbook() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let read = |name: &str| fs::read_to_string(root.join("docs").join(name)).expect("readable");
-    // The card's have a document of their own.
     let known = read("runbook.md") + &read("cards.md").replace("| ", "card: ");
     for text in all_texts() {
         let pieces = text.split('{').map(|piece| piece.rsplit('}').next().unwrap_or_default().trim());

@@ -58,7 +58,6 @@ impl Outcome {
         self.happenings.iter().filter(|(_, happened)| *happened == happening).count()
     }
 
-    /// One take-off, no landing and no mishap that ended it, in the air at the end.
     fn is_one_flight(&self) -> bool {
         let begun = self.count(Happening::TakeOff) + self.count(Happening::FlightResumed);
         begun == 1 && self.count(Happening::Landing) == 0 && self.monitor.flight().airborne()

@@ -124,7 +124,6 @@ impl Directory {
         let mut root = self.root;
         self.end = walk(volume, &mut root, 0, buffer, &mut |slot| {
             if slot.bytes[0] == DELETED {
-                // Others stay unused until the next walk.
                 let _ = self.deleted.push(slot.index);
             } else if slot.is_file(SETTINGS) {
                 self.settings = Some((slot.first(), slot.bytes()));
@@ -470,7 +469,6 @@ fn chain_block<D: CardDevice>(
     row: &Range<u32>,
 ) -> Result<bool, CardError<D::Error>> {
     let (first, end) = (row.start.max(index * ENTRIES), row.end.min((index + 1) * ENTRIES));
-    // Later entries are chained up to the next free one, and so belong to the row.
     let mut next = if end < row.end { volume.entry(end)? } else { END_OF_CHAIN };
     let mut block = volume.read_fat(index)?;
     let mut changed = false;

@@ -189,7 +189,6 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.segments.look_before(card);
             self.segments.date(card);
         }
-        // The next write handles the same trouble.
         let _ = card.look_ahead();
         if self.room_known {
             return;

@@ -58,7 +58,6 @@ fn a_segment_reads_back_after_a_remount() {
     assert_eq!(card.write(2048, &[block]), Err(CardError::NotOpen));
 }
 
-/// Two segments that grew in turns lie in pieces: a write ends with its piece, and reports that.
 #[test]
 fn a_write_of_many_blocks_takes_one_command_for_each_row_of_clusters() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -394,7 +393,6 @@ fn free_clusters_that_no_log_lost_are_taken() {
     card.create(FIRST, 1 << 20).expect("there is room");
     card.create(SECOND, 1 << 20).expect("there is room");
     drop(card);
-    // Another computer deletes the first log: its clusters, 3 to 2050, are free.
     let free = |from: u32, to: u32| {
         for cluster in from..to {
             let at = cluster as usize % 128 * 4;
@@ -407,7 +405,6 @@ fn free_clusters_that_no_log_lost_are_taken() {
     change(&device, root, |block| block[0] = 0xE5);
     set_hint(&device, 3);
     let mut card = mount(&device, &status);
-    // The third log lies in the first one's place and behind the second one.
     card.create(third, 3 << 19).expect("there is room");
     drop(card);
     free(2051, 4099);
@@ -450,7 +447,6 @@ fn a_row_of_clusters_outside_of_the_card_is_refused() {
             entry[26..28].copy_from_slice(&(first as u16).to_le_bytes());
         }
     }
-    // Nothing else would refuse a block behind the volume.
     device.size += MIB_BLOCKS;
     let mut card = mount(&device, &status);
     card.open(FIRST).expect("it is there");
@@ -464,14 +460,11 @@ fn a_row_of_clusters_outside_of_the_card_is_refused() {
     assert_eq!(written, (behind - row as u32..behind).collect::<Vec<_>>());
 }
 
-/// Free clusters one by one, too few before the FAT's end, and more in blocks from its beginning. A segment takes
-/// each free one, in both copies of the FAT, and no other.
 #[test]
 fn a_segment_is_chained_through_whatever_clusters_are_free() {
     const LAST: u32 = 0x0FFF_FFFF;
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();
-    // As others format: with two copies of the FAT.
     change(&device, 2048, |boot| boot[16] = 2);
     let layout = *mount(&device, &status).layout();
     let entries = |copy: u32| -> Vec<u32> {
@@ -483,7 +476,6 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
         let bytes: Vec<u8> = fat.collect();
         bytes.chunks_exact(4).map(|entry| u32::from_le_bytes(entry.try_into().expect("four"))).collect()
     };
-    // Two of three clusters are used, and the search begins in the last block but three.
     for cluster in (3..layout.clusters + 2).filter(|cluster| cluster % 3 != 0) {
         let at = cluster as usize % 128 * 4;
         for copy in 0..layout.fat_copies {
@@ -519,7 +511,6 @@ fn a_segment_is_chained_through_whatever_clusters_are_free() {
     card.read(&mut segment, last, &mut [0; BLOCK_BYTES]).expect("its chain ends with it");
 }
 
-/// Deleted ones of 21 logs, before the last one's clusters.
 fn with_deleted(is_deleted: impl Fn(u32) -> bool) -> MemCard {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
     let status = CardStatus::new();

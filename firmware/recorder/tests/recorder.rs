@@ -209,7 +209,6 @@ fn a_card_without_room_or_logs_is_told_full() {
     let status = CardStatus::new();
     let mut card =
         Card::mount(device.clone(), &status, held()).map_err(|(_, error)| error).expect("it mounts");
-    // Fill the card with a log, then make it somebody else's file.
     let name = LogName { session: 5, segment: 0 };
     card.create(name, (card.layout().data_bytes() - 1_024) as u32).expect("it fits");
     let root = card.layout().data_start;
@@ -230,7 +229,6 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
         recorder.finish();
         status.read().segments_overwritten
     };
-    // Six segments of 2.5 MiB are 240 blocks of the FAT, more than one call searches.
     for session in 1..=6 {
         assert_eq!(record(session), 0);
     }
@@ -239,7 +237,6 @@ fn no_log_is_overwritten_while_there_is_room_that_nothing_points_to() {
             .copy_from_slice(&hint.to_le_bytes());
         let before = device.reads.get();
         assert_eq!(record(hint), 0, "hint {hint}");
-        // All of the FAT is 640 blocks, and each is read once or twice.
         assert!(device.reads.get() - before < 2_000, "{} blocks read", device.reads.get() - before);
     }
     let mut names: Vec<_> = stored(&device).into_iter().map(|(name, ..)| name.session).collect();
@@ -309,7 +306,6 @@ fn sectors_that_wait_together_are_written_together() {
     assert!(commands * (ROW_BLOCKS as u32 - 1) < blocks, "{blocks} blocks in {commands} commands");
 }
 
-/// A card that fails within a command: blocks that it took before are written again, at the same places.
 #[test]
 fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -324,8 +320,6 @@ fn a_write_that_fails_half_way_is_repeated_from_its_first_sector() {
     assert!(stored(&device).iter().all(|(name, ..)| name.segment == 0), "no new segment was needed");
 }
 
-/// A card that refuses one block write of five keeps its segment, so that it does not fill up and logs of earlier
-/// sessions stay.
 #[test]
 fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -355,8 +349,6 @@ fn a_card_that_refuses_writes_at_random_loses_no_earlier_log() {
     assert!(status.read().write_errors > 500, "{:?}", status.read());
 }
 
-/// All sectors of any two pages of a stretch are rebuilt, also in an unfinished stretch and behind a segment left
-/// after a refused block.
 #[test]
 fn lost_pages_are_made_again_from_parity() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -364,7 +356,6 @@ fn lost_pages_are_made_again_from_parity() {
     let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
     let all = sectors(6_000);
     let (mut left, mut now) = (all.len() - 1, Instant::ZERO);
-    // Power goes before the last sector; the one before came 10 s after the parity was written last.
     for (index, sector) in all[..left].iter().enumerate() {
         if index == 700 {
             device.fail_after.set(Some(0));
@@ -412,7 +403,6 @@ fn lost_pages_are_made_again_from_parity() {
     assert!(stretch >= 2, "{stretch} stretches");
 }
 
-/// After any end of the previous session, the next start finds that end.
 #[test]
 fn the_next_start_finds_where_the_session_before_ended() {
     for count in [0_u32, 1, 7, 100, 2_000, 30_000] {
@@ -420,7 +410,6 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let status = CardStatus::new();
         let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
         let all = sectors(count);
-        // The last one stays open: power fails.
         let written = if count == 0 { &[] } else { &all[..all.len() - 1] };
         assert_eq!(recorder.write(Instant::ZERO, &mut []), Ok(0), "the segment is made");
         for sector in written {
@@ -439,7 +428,6 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let sectors = written.len() as u32;
         let expected = Before { found: Found::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
-        // After a start whose power fails before its first sector, the same is found behind its empty segment.
         assert_eq!(
             Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
             Ok(0)
@@ -481,7 +469,6 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
         let before = found_at_next_start(&device);
         assert_eq!(before.sectors, all.len() as u32 - 1, "page {page}");
     }
-    // Behind the end are sectors of another session.
     device.blocks.replace(whole.clone());
     for at in 0..200 {
         let mut sector = Sector::from_bytes(*all[at].bytes());
@@ -491,8 +478,6 @@ fn the_end_of_the_session_before_is_found_behind_damaged_pages_and_stale_sectors
     assert_eq!(found_at_next_start(&device).sectors, all.len() as u32 - 1);
 }
 
-/// Power fails at each write around the beginning of a file, on an empty card and on one full of older sessions. A
-/// frame both in a copy of a sector and in the next sector counts once.
 #[test]
 fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
     let (mut begun, mut fuller_copies) = (0, 0);
@@ -578,8 +563,6 @@ fn leaked() -> &'static CardStatus {
     Box::leak(Box::default())
 }
 
-/// The search for the previous session takes a while without recording; the session's first sector does not wait for
-/// it.
 #[test]
 fn the_session_before_is_looked_for_once_the_first_sector_is_on_the_card() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);
@@ -671,7 +654,6 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
     for session in 1..=15 {
         record(session, 10);
     }
-    // The first log's second and third block of the FAT end its chain.
     let fat = 2048 + 32;
     let end = [0xFF_u8; 512];
     device.blocks.borrow_mut().extend([(fat + 1, end), (fat + 2, end)]);
@@ -686,7 +668,6 @@ fn a_log_that_lost_its_part_of_the_fat_is_not_written_anew() {
         names
     };
     assert!(names().contains(&1) && names().contains(&16), "what the first one has stays: {:?}", names());
-    // The whole FAT: nothing is overwritten, and the card is reported as damaged.
     let blocks = 600;
     device.blocks.borrow_mut().extend((fat..fat + blocks).map(|at| (at, end)));
     let before = names();
@@ -709,7 +690,6 @@ fn a_card_that_logs_fill_is_not_searched() {
     }
 }
 
-/// The command comes while the slot has a card that cannot be recorded on; before the recorder looks, it has a good one.
 #[test]
 fn a_command_to_format_is_not_for_a_card_that_is_mounted_by_then() {
     let device = MemCard::formatted(64 * MIB_BLOCKS);

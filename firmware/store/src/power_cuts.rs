@@ -17,7 +17,6 @@ impl Random {
 
     fn value(&mut self, length_max: u64) -> Vec<u8> {
         let length = self.below(length_max + 1);
-        // Erased flash is a value like any other.
         let byte = if self.below(3) == 0 { 0xFF } else { self.below(256) as u8 };
         (0..length).map(|at| if byte == 0xFF { byte } else { byte.wrapping_add(at as u8) }).collect()
     }
@@ -44,7 +43,6 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
         let before = flash.erases();
         flash.cut_after(1 + random.below(steps_max), cut);
         let mut writing = None;
-        // The cut may happen during the mount.
         if let Ok((mut store, found)) = Store::mount(&mut flash) {
             assert!(cut == 0 || found == Found::Kept, "{found:?} before cut {cut}");
             loop {
@@ -86,7 +84,6 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
 
 #[test]
 fn after_ten_thousand_cuts_each_item_was_old_or_new_every_time() {
-    // Small sectors fill quickly, so many cuts hit the copy into the other sector.
     let erases = cut_and_look::<2048>(9_000, 1, 200, 400);
     assert!(erases > 1_000, "{erases} erases for the cuts to meet");
     // As on the board.

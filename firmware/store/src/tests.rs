@@ -88,7 +88,6 @@ fn a_save_that_needs_an_erase_waits_until_it_is_allowed_and_changes_nothing() {
     assert_eq!(store.save(Key::item(1), b"new"), Ok(Saved::Written));
     assert_eq!(store.save(Key::item(1), &[number as u8; 200]), Ok(Saved::Written));
     assert!(store.room() > 15_000);
-    // Two at creation, one for the change of sectors.
     assert_eq!(flash.erases(), 3);
 }
 
@@ -305,7 +304,6 @@ fn flash_that_is_no_longer_erased_takes_no_item() {
 fn whatever_is_damaged_no_value_goes_back_without_a_word() {
     type Small = SimFlash<2048>;
     let mut flash = Small::blank();
-    // All values of an item, newest last.
     let mut had = vec![Vec::new(); 4];
     for round in 0..8_u8 {
         let (mut store, _) = Store::mount(&mut flash).expect("it works");
@@ -319,7 +317,6 @@ fn whatever_is_damaged_no_value_goes_back_without_a_word() {
     let whole = flash.bytes().to_vec();
     let newer = |at: usize| u16::from_le_bytes([whole[at + 4], whole[at + 5]]);
     let sector = if newer(2048) > newer(0) { 2048..4096 } else { 0..2048 };
-    // A last item with a damaged last byte looks like one cut short by a power loss.
     let last = whole[sector].iter().rposition(|byte| *byte != 0xFF).expect("items");
     let mut told = 0;
     for at in (0..whole.len() - 8).step_by(4).filter(|at| !(*at..at + 8).contains(&(at / 2048 * 2048 + last)))
@@ -338,7 +335,6 @@ fn whatever_is_damaged_no_value_goes_back_without_a_word() {
                 newest &= now.as_ref() == had.last();
             }
             assert!(newest || found != Found::Kept, "{fill:x} at {at}: {found:?}");
-            // A length that reads as erased hides all later items.
             assert!(fill == 0xFF || found != Found::Unreadable, "{fill:x} at {at}: other items are whole");
             told += u32::from(found == Found::Damaged);
             assert_eq!(Store::mount(&mut flash).map(|(_, found)| found), Ok(Found::Kept), "{fill:x} at {at}");

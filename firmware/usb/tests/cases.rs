@@ -28,7 +28,6 @@ fn the_host_expects_no_data() {
 fn the_host_expects_data() {
     // 4: the command has none.
     assert_eq!(outcome(512, IN, &READY), (PASSED, 0, 0, 512));
-    // 5: less, with and without a full last packet.
     assert_eq!(outcome(100, IN, &[0x12, 0, 0, 0, 36, 0]), (PASSED, 36, 0, 64));
     assert_eq!(outcome(4_096, IN, &read_10(5, 3)), (PASSED, 1_536, 0, 2_560));
     // 6: as much.
@@ -37,7 +36,6 @@ fn the_host_expects_data() {
     for expected in [1, 63, 64, 100, 512, 1_000] {
         assert_eq!(outcome(expected, IN, &read_10(5, 3)), (PHASE_ERROR, expected as usize, 0, 0));
     }
-    // 8: it would take some, and is refused.
     assert_eq!(outcome(1_024, IN, &WRITE), (FAILED, 0, 0, 1_024));
 }
 

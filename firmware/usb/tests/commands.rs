@@ -132,7 +132,6 @@ fn a_read_error_is_a_medium_error_and_no_data() {
     for bad in 10..20 {
         host.card.bad.set(Some(bad));
         let got = host.run(5_120, IN, &read_10(10, 10));
-        // What was read in full before; nothing of the command to the card that failed.
         let good: Vec<u8> = (10..bad).flat_map(content).collect();
         assert_eq!(got.status, 1);
         assert!(good.starts_with(&got.data) && good.len() - got.data.len() < 4 * 512, "block {bad}");

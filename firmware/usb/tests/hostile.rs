@@ -63,7 +63,6 @@ proptest! {
     fn any_packet_is_a_wrapper_or_invalid(packet in prop::collection::vec(any::<u8>(), 0..64)) {
         let mut host = Host::new();
         let mut packet = packet;
-        // Small expectations: the harness holds all data.
         if packet.len() > 11 {
             packet[10] &= 1;
             packet[11] = 0;

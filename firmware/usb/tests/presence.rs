@@ -21,10 +21,8 @@ fn time_without_a_host_counts_from_its_last_frame() {
     // The number has 11 bits at full speed.
     let frames = (0..1_000_u16).map(|look| look.wrapping_mul(97) & 0x7FF);
     assert_eq!(absent(frames.clone().map(|frame| (true, frame))), 0);
-    // A charger, and a host that has not configured the device.
     assert_eq!(absent((0..50).map(|_| (false, 0))), 50 * LOOK);
     assert_eq!(absent(frames.clone().take(50).map(|frame| (false, frame))), 50 * LOOK);
-    // The cable was pulled, or the host sleeps: the device stays configured.
     let pulled = frames.clone().take(20).chain([7; 30]).map(|frame| (true, frame));
     assert_eq!(absent(pulled.clone()), 29 * LOOK);
     // The host is back.

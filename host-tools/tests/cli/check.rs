@@ -79,7 +79,6 @@ fn a_screen_says_what_it_was_what_it_means_and_what_to_do_and_what_was_not_judge
     let place = |words: &str| screen.rfind(words).expect(words);
     assert!(place("cell low") < place("autopilot warns: battery"), "worst first: {screen}");
     assert!(screen.lines().count() < 30, "one screen: {screen}");
-    // What was not judged is a line; -v lists it.
     assert_eq!(screen.matches("not judged: ").count(), 1, "{screen}");
     assert!(!screen.contains("battery temperature") && !screen.contains("failure flags"), "{screen}");
     let verbose = text(&run(dir.path(), "faults.tlog -v", 4));
@@ -240,7 +239,6 @@ fn a_recording_is_decoded_without_a_log_of_ours_between() {
     run(dir.path(), "decode faults.tlog -o out --format csv,jsonl,parquet", 0);
     run(dir.path(), "decode --format hum faults.tlog -o packed.hum", 0);
     run(dir.path(), "decode packed.hum -o packed --format csv", 0);
-    // The tables of the recording are those of its pack, which has further ones of our log.
     let table = |folder: &str| {
         let folders = fs::read_dir(dir.path().join(folder)).expect("a folder");
         let folder = folders
@@ -266,7 +264,6 @@ fn a_recording_of_two_vehicles_is_told_as_that() {
     assert!(json(&attempt(dir.path(), "check --json both.tlog"))["remarks"][0].as_str().is_some());
     let info = text(&attempt(dir.path(), "info both.tlog"));
     assert!(info.contains(words), "{info}");
-    // Two recordings in one command are two logs.
     fs::write(dir.path().join("one.tlog"), &both[0]).expect("written");
     fs::write(dir.path().join("two.tlog"), &both[1]).expect("written");
     let objects = text(&attempt(dir.path(), "check --json one.tlog two.tlog"));
@@ -447,7 +444,6 @@ fn a_log_in_which_there_was_nothing_to_judge_does_not_look_good_to_a_script() {
         assert!(checked["vehicle"].is_null() == (verdict == "unknown"), "{checked}");
         assert!(text(&run(dir.path(), &format!("check {name}"), 0)).contains(words));
     }
-    // It neither hides faults of another log nor counts as good.
     faults(dir.path());
     let table = text(&run(dir.path(), "check little.bin faults.tlog", 4));
     assert!(table.contains("1  not enough in it to judge") && !table.contains("nothing wrong"), "{table}");
@@ -466,7 +462,6 @@ fn ulog_message(log: &mut Vec<u8>, kind: u8, body: &[u8]) {
     log.extend(body);
 }
 
-/// A ULog of a topic that no check reads.
 fn ulog_of_nothing_known() -> Vec<u8> {
     let mut log = ulog_begun();
     let mut message = |kind: u8, body: &[u8]| ulog_message(&mut log, kind, body);
@@ -478,7 +473,6 @@ fn ulog_of_nothing_known() -> Vec<u8> {
     log
 }
 
-/// A ULog with a vehicle for 20 s, whose logger lost a part.
 fn ulog_with_a_dropout() -> Vec<u8> {
     let mut log = ulog_begun();
     let mut message = |kind: u8, body: &[u8]| ulog_message(&mut log, kind, body);
@@ -562,7 +556,6 @@ fn a_failsafe_and_a_crash_are_found_by_their_names() {
     assert!(screen.contains("autopilot in failsafe (vibration failsafe, crash check)"), "{screen}");
 }
 
-/// A tlog with other times: a function of each record's number and time.
 fn with_times(log: &[u8], time: impl Fn(usize, u64) -> u64) -> Vec<u8> {
     let records = records(log).into_iter().enumerate();
     records.flat_map(|(index, (us, frame))| [&time(index, us).to_be_bytes()[..], frame].concat()).collect()
@@ -737,7 +730,6 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
     let words = "trends are not judged: the flights of --past are of another vehicle (system 1, quadrotor";
     assert!(told(ardupilot).contains(words), "{}", told(ardupilot));
     assert!(!told(px4).contains("another vehicle"), "{}", told(px4));
-    // It is read once, as a pipe can be.
     let piped = hums()
         .current_dir(dir.path())
         .args(["check", "--past", ardupilot, "-"])
@@ -754,7 +746,6 @@ fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     let dir = tempfile::tempdir().expect("directory");
     let signed = fs::read(flight("ap_quad_signed.raw")).expect("there");
     fs::write(dir.path().join("signed.raw"), &signed).expect("a copy");
-    // Boot texts of an autopilot are not a loss.
     let checked = text(&run(dir.path(), "check signed.raw", 0));
     assert!(
         !checked.contains("of no frame") && checked.contains("160 bytes at its beginning are words"),
@@ -780,7 +771,6 @@ fn bytes_of_no_frame_are_told_as_that_and_not_as_time_that_is_missing() {
     assert!(table.contains("\"faults\":[\"1 place of loss or noise\"]"));
 }
 
-/// `SYSTEM_TIME` gives the time of day of bytes without recorded times, as the box learns it.
 #[test]
 fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
     let dir = tempfile::tempdir().expect("directory");
@@ -799,7 +789,6 @@ fn raw_bytes_have_the_time_of_day_that_their_autopilot_tells() {
     assert!(!said.contains("time of day"), "{said}");
 }
 
-/// The records of a recording of the repository that `keep` takes, by number and message id, in a file of this folder.
 fn filtered(name: &str, dir: &Path, file: &str, keep: impl Fn(usize, usize, u32) -> bool) {
     let log = fs::read(flight(name)).expect("a recording");
     let records = records(&log);
@@ -832,7 +821,6 @@ fn what_nothing_tells_is_told_neither_as_good_nor_as_zero() {
     run(dir.path(), "report beats.tlog -o pages/", 0);
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
     assert!(table.contains("\"little\":true") && table.contains("\"flight_unknown\":true"));
-    // A box with checks knows no more about a vehicle that sends nothing else.
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let beat = Packet::new(0).u8(4, 2).u8(5, 3).u8(7, 3).u8(8, 3);
     let mut beats = Vec::new();
@@ -862,7 +850,6 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     assert!(table.contains("\"ends_in_air\":true"));
     let end = json(&attempt(dir.path(), "check --json cut.tlog"))["ends_in_air"].clone();
     assert!(end["latitude_deg"].as_f64().is_some_and(|north| north.abs() > 1.0), "{end}");
-    // A record of a box that started in the air says so too.
     let later = |place: usize, all: usize| place > all / 2 && place < all / 3 * 2;
     filtered("ap_quad_faults.tlog", dir.path(), "later.tlog", |place, all, _| later(place, all));
     run(dir.path(), "sim later.tlog --sd later.img", 0);
@@ -870,8 +857,6 @@ fn a_recording_that_ends_in_the_air_says_so_everywhere_and_where_it_was_heard_la
     assert!(listed.contains("; begins in the air; ends in the air"), "{listed}");
 }
 
-/// Each command has the same findings, each with the value of its onset and the worst: of a recording, a card, and a
-/// card whose box lost its power in the air.
 #[test]
 fn a_finding_has_one_onset_and_one_worst_value_in_every_command() {
     let dir = tempfile::tempdir().expect("directory");

@@ -16,7 +16,6 @@ fn one_session_under_two_names_is_told_by_every_command_and_counted_once() {
     assert!(said.contains("\n2 sessions: "), "{said}");
     let said = text(&attempt(dir.path(), "check copied"));
     assert!(said.contains("2 logs checked") && said.contains("1  the same session once more"), "{said}");
-    // In a folder of its own a copy is expected.
     fs::create_dir(dir.path().join("other")).expect("made");
     fs::remove_file(at("00003_00.HUM")).expect("removed");
     fs::copy(at("00001_00.HUM"), dir.path().join("other/00001_00.HUM")).expect("copied");
@@ -48,7 +47,6 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
         let said = text(&attempt(dir.path(), &format!("check {inputs}")));
         assert!(said.contains("1 log checked") && said.contains("the same session once more"), "{said}");
     }
-    // A different one is a log of its own.
     let mut copy = without(&fs::read(&log).expect("there"), usize::MAX, 0);
     copy[20 * BLOCK + 100] ^= 1;
     fs::write(dir.path().join("copied/flight.hum"), copy).expect("written");

@@ -16,7 +16,6 @@ fn a_log_that_is_cut_in_flight_is_told_in_the_same_words_by_every_command() {
         &format!("sim {} --sd card.img --cut-after-writes 1000", flight("ap_quad_guided.tlog").display()),
     );
     all_say(dir.path(), "card.img", 3, &["not proved to its end: armed or in the air since "]);
-    // The next start on the card records the previous end: then all commands know it.
     run(dir.path(), "sim PX4 --sd card.img", 0);
     all_say(
         dir.path(),
@@ -54,7 +53,6 @@ fn a_header_that_counts_what_is_not_there_is_told_by_every_command() {
     }
 }
 
-/// Parity is made of sectors that are on the card. So it shows a lost end, and altered sectors with a valid check.
 #[test]
 fn what_parity_contradicts_is_told_by_every_command() {
     let dir = copied(1);
@@ -64,7 +62,6 @@ fn what_parity_contradicts_is_told_by_every_command() {
     let header = |block: &[u8; BLOCK]| Header::read(block).ok();
     let closed =
         blocks().position(|block| header(block).is_some_and(|header| header.closed)).expect("it is closed");
-    // A page of 16 KiB at the end: four lost sectors of each column.
     let mut erased = whole.clone();
     erased[(closed - 31) * BLOCK..(closed + 1) * BLOCK].fill(0xff);
     fs::write(&path, erased).expect("written");
@@ -88,7 +85,6 @@ fn what_parity_contradicts_is_told_by_every_command() {
     assert_eq!(verified(&altered), (true, false));
     let words = "every eighth sector from 4 to ";
     all_say(dir.path(), "copied", 3, &[words, "00001_00.HUM and the parity of these disagree"]);
-    // A lost sector, and one of the two from which it would be rebuilt.
     let mut parity = blocks().enumerate().filter_map(|(at, block)| Some((at, Parity::read(block)?)));
     let (at, one) = parity.find(|(_, one)| one.sum == Sum::P && one.last % 8 == 4).expect("parity of it");
     let mut lost = whole.clone();
@@ -148,7 +144,6 @@ fn sectors_that_parity_made_again_are_told_by_every_command() {
     assert!(table.contains("repaired from its parity, nothing is lost\n"), "{table}");
     assert!(table.contains("1  repaired from its parity, nothing is lost (counted above too)"), "{table}");
     fs::remove_file(dir.path().join("copied/00002_00.HUM")).expect("ours");
-    // Also for a copy, which shares its original's losses.
     fs::write(dir.path().join("copied/Copy of 00001_00.HUM"), &whole).expect("written");
     let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("not counted") && said.contains("2 sectors had to be made again"), "{said}");
@@ -177,7 +172,6 @@ fn parity_that_is_gone_is_told_by_every_command() {
         let screen = text(&run(dir.path(), "check copied", 3));
         assert!(screen.contains("; the log is whole, without all of its parity"), "{screen}");
     }
-    // After a power cut: parity of each stretch but the last was written.
     let long = flight("ap_quad_guided.tlog");
     run(dir.path(), &format!("sim {} --sd long.img --card-size 64", long.display()), 0);
     let mut long = with_parity(&dir.path().join("long.img"));
@@ -194,7 +188,6 @@ fn parity_that_is_gone_is_told_by_every_command() {
     }
 }
 
-/// Later sectors are then at other blocks, and parity rebuilds them while few are displaced.
 #[test]
 fn a_sector_that_was_put_between_the_last_ones_costs_no_frame() {
     let dir = copied(1);
@@ -224,7 +217,6 @@ fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
     let mut log = fs::read(&path).expect("there");
     let last =
         log.as_chunks::<BLOCK>().0.iter().rposition(|block| Header::read(block).is_ok()).expect("a sector");
-    // Behind its last sector: an earlier copy of it, a sector of another session, a block that is not a sector.
     let mut block = |at: usize, change: &dyn Fn(&mut [u8; BLOCK])| {
         let (from, to) = (last * BLOCK, (last + at) * BLOCK);
         log.copy_within(from..from + BLOCK, to);
@@ -237,7 +229,6 @@ fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
         *block = *sector.bytes();
     });
     block(2, &|block| {
-        // A recycled file has such ones at their old places, or before these.
         block[11..15].copy_from_slice(&(last as u32 + 10).to_le_bytes());
         let mut sector = Sector::from_bytes(*block);
         sector.seal(sector.session() ^ 1);
@@ -271,7 +262,6 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     all_say(dir.path(), "copied", 3, &["1 block that is no sector"]);
     let said = text(&run(dir.path(), "info --verify copied", 3));
     assert!(said.contains("FAILED  end "), "{said}");
-    // A sector's head alone is not enough: with a wrong check it belongs to no session.
     let mut forged = log.clone();
     forged[last * BLOCK..(last + 1) * BLOCK].iter_mut().enumerate().for_each(noise);
     forged[last * BLOCK..][..2].copy_from_slice(&[0x48, 0xb3]);
@@ -281,13 +271,11 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
         said.contains("1 block with the head of a sector") && !said.contains("of another session"),
         "{said}"
     );
-    // Old data of the card, for instance films, continues behind that, and is not a finding.
     let mut film = log.clone();
     film[last * BLOCK..].iter_mut().enumerate().for_each(noise);
     fs::write(&path, film).expect("written");
     let said = text(&run(dir.path(), "info --verify copied", 0));
     assert!(said.contains("blocks that are no sectors") && said.contains("cannot be proved"), "{said}");
-    // An empty block: whether there was a sector is unknown.
     for empty in [0x00, 0xff] {
         let mut log = log.clone();
         log[last * BLOCK..(last + 1) * BLOCK].fill(empty);

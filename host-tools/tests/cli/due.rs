@@ -20,7 +20,6 @@ fn a_manifest_names_each_file_with_its_hash() {
     run(dir.path(), "info --verify card.img --manifest card.img", 2);
 }
 
-/// The texts are those of the box, at the times of `hums check`; without them the frames are those of the recording.
 #[test]
 fn a_tlog_with_findings_has_them_as_texts_of_the_box() {
     let dir = tempfile::tempdir().expect("directory");
@@ -55,7 +54,6 @@ fn a_tlog_with_findings_has_them_as_texts_of_the_box() {
     );
 }
 
-/// Two logs of one session in one call are one set of tables.
 #[test]
 fn a_manifest_names_each_table_of_a_fleet_once() {
     let dir = tempfile::tempdir().expect("directory");
@@ -105,7 +103,6 @@ fn a_card_says_which_part_is_due_and_what_is_left_of_the_others() {
     assert_eq!(motor["rule"], "CMP2_HOURS");
 }
 
-/// The second log's clock is 23 minutes before that of the first.
 #[test]
 fn the_newest_log_of_a_card_is_the_last_one_whatever_its_clock_says() {
     let dir = tempfile::tempdir().expect("directory");

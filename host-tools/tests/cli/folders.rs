@@ -14,7 +14,6 @@ fn a_copied_card_is_whole_and_each_file_that_holds_nothing_of_ours_is_told_by_ev
     let noise: Vec<u8> = (0..SEGMENT as u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 21) as u8).collect();
     let names = ["00001_01.HUM", "00002_01.HUM", "00003_00.HUM"];
     let contents = [vec![0; SEGMENT], noise, Vec::new(), vec![0xff; SEGMENT], b"hello".to_vec()];
-    // Each content under the first name, each name with the first content.
     let pairs = contents.iter().map(|content| (names[0], content));
     for (name, content) in pairs.chain(names[1..].iter().map(|name| (*name, &contents[0]))) {
         let path = dir.path().join("copied").join(name);
@@ -42,7 +41,6 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
         all_say(dir.path(), "copied", 3, &[&format!("{name}: has the name of a recording and holds none")]);
         fs::remove_file(path).expect("removed");
     }
-    // A log in an archive is not read; and `verify` does not judge recordings of other programs.
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     gzip.write_all(&fs::read(dir.path().join("copied/00001_00.HUM")).expect("there")).expect("packed");
     let path = dir.path().join("copied/00003_00.HUM.gz");
@@ -94,7 +92,6 @@ fn files_that_are_named_one_by_one_are_judged_as_their_folder_is() {
     run(dir.path(), &format!("info --verify {named} other/copied/00002_00.HUM"), 3);
 }
 
-/// Power failed before the second session had a sector; the third one found none there.
 #[test]
 fn a_file_that_the_next_start_found_empty_is_no_loss() {
     let dir = copied(2);
@@ -111,7 +108,6 @@ fn a_file_that_the_next_start_found_empty_is_no_loss() {
 #[test]
 fn a_folder_that_cannot_be_read_keeps_nothing_else_from_being_read() {
     let dir = copied(1);
-    // No system accepts a path this long: it is made of two halves.
     let half = |name: &str| {
         let root = dir.path().join(name);
         let deep = (0..8).fold(root.clone(), |path, _| path.join("x".repeat(255)));

@@ -68,7 +68,6 @@ fn named(dir: &Path, stem: &str) -> String {
     names.remove(0)
 }
 
-/// Each number as `N` and its decimals: `-1.13 m/s2; 5s` becomes `N.2 m/sN; Ns`.
 fn shape(line: &str) -> String {
     let mut out = String::new();
     let mut rest = line;
@@ -290,7 +289,6 @@ fn a_gap_is_in_every_format() {
     assert!(read(".lp").lines().any(|line| line.starts_with("HUMS_GAP,")));
     assert_eq!(read(".thesis/gaps.csv").lines().count(), 2);
     assert!(files(&dir.path().join("out"), ".parquet").contains_key("HUMS_GAP"));
-    // The seconds of the gap have no row.
     let values = read(".thesis/flightvalues.csv");
     let seconds: Vec<u64> =
         values.lines().skip(1).filter_map(|row| row.split_once('s')?.0.parse().ok()).collect();
@@ -330,7 +328,6 @@ fn several_logs_side_by_side_are_what_each_is_alone() {
     assert!(!sessions.is_empty());
 }
 
-/// A frame of an id without a definition, with a valid checksum for some definition.
 fn private_frame(id: u32, sequence: u8) -> Vec<u8> {
     let [low, middle, high, _] = id.to_le_bytes();
     let mut frame = vec![0xfd, 4, 0, 0, sequence, 1, 1, low, middle, high, 1, 2, 3, sequence];

@@ -88,7 +88,6 @@ fn serve(dir: &Path, example: &str) {
     assert!(read.is_ok() && first.starts_with("http://127.0.0.1:"), "hums {example}\n{first}");
 }
 
-/// A directory with what examples name: a recording, a card with one session, a folder with such a card, a log file.
 fn furnished() -> TempDir {
     let dir = tempfile::tempdir().expect("directory");
     let path = |name: &str| dir.path().join(name);
@@ -113,7 +112,6 @@ fn copy(from: &Path, to: &Path) {
     assert!(copied.success(), "cp {} {}", from.display(), to.display());
 }
 
-/// Runs an example to its end. Earlier output of the same name is removed before.
 fn works(dir: &Path, example: &str) {
     let named = example.split_whitespace().skip_while(|word| *word != "-o").nth(1);
     let made = dir.join(named.unwrap_or("made"));

@@ -37,7 +37,6 @@ fn a_log_under_another_name_is_read_and_one_that_only_salvage_finds_is_not_calle
     fs::write(&path, &renamed).expect("written");
     all_say(dir.path(), "card.img", 0, &["FLIGHT.BAK begins as a log and has not the name of a segment"]);
     assert!(text(&run(dir.path(), "info --verify card.img", 0)).contains("Session FLIGHT_BAK (FLIGHT.BAK)"));
-    // Another file has taken its entry, and its clusters are free.
     let at = entry(b"00003_00HUM");
     let word = |at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four"));
     let partition = word(446 + 8) as usize * BLOCK;
@@ -80,7 +79,6 @@ fn a_report_of_the_newest_session_tells_that_an_older_one_on_the_card_is_damaged
     let path = dir.path().join("card.img");
     let mut image = fs::read(&path).expect("an image");
     let blocks = image.as_chunks_mut::<BLOCK>().0;
-    // Every eighth: three of them are more than parity can rebuild.
     let sectors = blocks.iter_mut().filter(|block| block.starts_with(&[0x48, 0xb3])).skip(20).step_by(8);
     sectors.take(3).for_each(|block| block[100] ^= 4);
     fs::write(&path, image).expect("written");
@@ -102,7 +100,6 @@ fn a_report_compares_sessions_of_one_card_only() {
         trend.split_once(']').map_or(0, |(sessions, _)| sessions.matches("\"name\"").count())
     };
     assert_eq!((sessions("report card.img"), sessions("report copied")), (2, 2));
-    // Packed logs may be of different vehicles.
     for name in ["one", "two"] {
         run(dir.path(), &format!("decode --format hum PX4 -o {name}.hum"), 0);
     }
@@ -148,7 +145,6 @@ fn a_damaged_image_in_a_folder_is_read_as_where_it_is_named() {
     for (command, code, said) in readers(dir.path(), "cards") {
         assert!(code == 3 && !said.contains("no log"), "{command}: {said}");
     }
-    // The rest of an image is reported; a file that is not an image is skipped and named.
     fs::write(cards.join("card.img"), &image[..300]).expect("written");
     fs::write(cards.join("notes.xyz"), "notes").expect("written");
     fs::copy(px4(), cards.join("flight.tlog")).expect("copied");

@@ -32,7 +32,6 @@ fn two_runs_do_not_use_one_card_or_one_store() {
         assert!(said.contains("another run of hums is using it; wait for its end"), "{said}");
     }
     drop(input);
-    // The half ends in the middle of a record.
     assert_eq!(first.wait().expect("it is ours").code(), Some(3));
     run(dir.path(), "sim PX4 --sd card.img --store store", 0);
     run(dir.path(), "info --verify card.img", 0);
@@ -153,7 +152,6 @@ fn a_store_that_is_read_only_is_refused_as_an_image_is() {
 fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     let dir = tempfile::tempdir().expect("directory");
     let image = dir.path().join("card.img");
-    // No file may be longer than 1 MiB: the image cannot be made.
     let program = env!("CARGO_BIN_EXE_hums");
     let limited = format!("ulimit -f 1024; exec {program} sim {} --sd card.img", px4().display());
     let ended =
@@ -162,11 +160,9 @@ fn an_image_is_whole_or_not_there_and_one_without_a_partition_table_is_told() {
     assert_eq!(ended.status.code(), Some(1), "{said}");
     assert!(said.contains("card.img: cannot have"), "{said}");
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 0, "nothing is left");
-    // Leftovers of a killed run do no harm, and stay.
     fs::write(dir.path().join(".card.img.hums-part"), [0; 512]).expect("written");
     run(dir.path(), "sim PX4 --sd card.img", 0);
     assert_eq!(fs::read_dir(dir.path()).expect("a directory").count(), 2);
-    // A leftover of an earlier version, killed while it made the image.
     fs::File::create(&image).and_then(|file| file.set_len(64 << 20)).expect("made");
     let said = run(dir.path(), "sim PX4 --sd card.img", 3);
     let said = String::from_utf8_lossy(&said.stderr);
@@ -190,7 +186,6 @@ fn a_store_beside_recordings_is_named_and_is_no_loss() {
     }
     let said = run(dir.path(), "check store.bin", 1);
     assert!(String::from_utf8_lossy(&said.stderr).contains("is the memory of a simulated board"));
-    // An empty file with another name of this kind is accepted.
     fs::write(dir.path().join("flight.bin"), vec![7; 32 << 10]).expect("written");
     run(dir.path(), "info .", 3);
 }
@@ -230,7 +225,6 @@ fn a_run_that_is_killed_leaves_a_card_and_a_store_that_the_next_one_goes_on_with
         std::thread::sleep(std::time::Duration::from_millis(after_ms));
         sim.kill().expect("it is ours");
         sim.wait().expect("it is ours");
-        // A log that a kill ended has no proved end, and no other fault.
         let told = text(&attempt(dir.path(), "info --verify card.img"));
         assert!(told.contains("  ok      file system"), "{after_ms} ms: {told}");
     }
@@ -262,7 +256,6 @@ fn what_is_no_card_is_no_card_for_a_run_and_stays_as_it_is() {
         ("damaged.img", &damaged, "volume is damaged"),
         ("exfat.img", &used, "is of type 0x07, not FAT32"),
     ] {
-        // As long as the smallest card, so that it could be formatted.
         fs::write(at(name), bytes).expect("written");
         fs::File::options().write(true).open(at(name)).and_then(|file| file.set_len(40 << 20)).expect("room");
         let before = fs::read(at(name)).expect("there");
@@ -298,7 +291,6 @@ fn a_store_that_is_refused_leaves_no_card_and_a_card_that_is_refused_no_store() 
     }
 }
 
-/// A text log of ArduPilot that begins five minutes after the autopilot's power-on: eleven messages, one a second.
 fn late_log() -> String {
     let formats = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 129, 23, ATT, Qff, TimeUS,Roll,Pitch\n";
     (0..11).fold(formats.to_owned(), |log, second| {

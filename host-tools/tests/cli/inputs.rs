@@ -180,7 +180,6 @@ fn no_command_writes_over_any_of_its_inputs() {
     assert!(contents(dir.path()) == whole, "something was changed");
 }
 
-/// The table of a folder's pages has a fixed name, which may be a link.
 #[test]
 fn a_page_that_would_go_into_an_input_is_refused_before_any_other_is_written() {
     let dir = furnished();
@@ -252,7 +251,6 @@ fn an_output_into_an_input_folder_replaces_nothing_there() {
     for line in ["decode folder -o folder --format csv,parquet,thesis,tlog", "report folder -o folder/"] {
         run(dir.path(), line, 0);
         let made = contents(&dir.path().join("folder"));
-        // And again. A generated tlog is not an input, though it is a recording.
         run(dir.path(), &format!("{line} --force"), 0);
         assert_eq!(contents(&dir.path().join("folder")), made);
     }

@@ -135,13 +135,11 @@ fn tables_of_a_killed_run_are_the_old_ones_or_the_new_ones() {
         std::thread::sleep(Duration::from_millis(after_ms));
         program.kill().expect("it is ours");
         killed += u32::from(!program.wait().expect("it is ours").success());
-        // The next call completes a change that counts.
         run(dir.path(), "decode log.hum -o out --format parquet", 1);
         let now = contents(&out);
         for is_csv in [true, false] {
             let (found, whole) = (of(&now, is_csv), of(&whole, is_csv));
             assert!(
-                // Old CSV files are removed one by one before the new ones take their place.
                 found == whole
                     || found == of(&few, is_csv)
                     || is_csv && found.iter().all(|file| few.contains(file)),
@@ -229,7 +227,6 @@ fn a_signal_while_it_starts_ends_the_writing_of_a_recording_with_words() {
     live.args(["live", "--influx", "http://127.0.0.1:9", "--listen", "127.0.0.1:0"]).arg(px4());
     live.arg("--params").arg(&params);
     let mut live = live.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it runs");
-    // It reads its parameters, and has opened nothing else.
     let mut writer = fs::OpenOptions::new().write(true).open(&params).expect("it is read");
     let end = || Command::new("kill").args(["-TERM", &live.id().to_string()]).status();
     assert!(end().expect("it runs").success());
@@ -254,7 +251,6 @@ fn a_standard_error_on_a_full_disk_ends_nothing() {
         Command::new("bash").args(["-c", &hums]).current_dir(dir.path()).status().expect("a shell").code()
     };
     assert_eq!(shell("hums info --list nosuch 2> /dev/full"), Some(1));
-    // The texts in flight cannot be printed: the card has all of it.
     let line = "hums sim flight.tlog --sd card.img --card-size 34 --tap /dev/full 2> /dev/full";
     assert_eq!(shell(line), Some(3));
     assert_eq!(shell("hums decode card.img -o all.tlog --format tlog"), Some(0));

@@ -109,7 +109,6 @@ fn what_people_wrote_stays_when_the_logbook_is_made_again() {
         flight["exchange"]["message"]["flight_data"]["operation"][0]["contact"] == "A. <Pilot>"
     });
     assert_eq!(of_pilot.count(), 1);
-    // Pages follow the rule of all outputs, and nothing else is taken for a logbook.
     run(dir.path(), "logbook cards/card.img -o book.html", 1);
     fs::write(dir.path().join("mine.csv"), "a,b\n1,2\n").expect("written");
     run(dir.path(), "logbook cards/card.img -o mine.csv", 1);

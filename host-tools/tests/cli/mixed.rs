@@ -19,7 +19,6 @@ fn another_session_under_the_number_of_the_session_before_is_told_by_every_comma
     );
     let said = String::from_utf8_lossy(&run(dir.path(), "info --verify copied", 3).stdout).into_owned();
     assert!(said.contains("FAILED  session before     1 checked, 1 failed"), "{said}");
-    // Without any earlier log none is missed: that is printed, and is not a finding.
     fs::remove_file(at("00002_00.HUM")).expect("removed");
     let said = String::from_utf8_lossy(&run(dir.path(), "info --verify copied", 0).stdout).into_owned();
     let words = "session before     0 checked, 0 failed; session 00002 is not among what was read";
@@ -46,7 +45,6 @@ fn two_logs_in_one_file_are_told_by_every_command_in_both_orders() {
         );
         all_say(dir.path(), "joined.hum", 3, &[&words]);
     }
-    // Segments from a card, with free blocks behind their sectors.
     let dir = copied(2);
     let [one, other] = ["00001_00.HUM", "00002_00.HUM"]
         .map(|name| fs::read(dir.path().join("copied").join(name)).expect("there"));

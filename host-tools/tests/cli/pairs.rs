@@ -70,7 +70,6 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         let place = |gap: &serde_json::Value| gap["place"].as_u64().unwrap_or(0);
         let is_there = |gap: &&serde_json::Value| place(gap).abs_diff(middle as u64) < 1_000;
         let gap = gaps.iter().find(is_there).unwrap_or_else(|| panic!("{name}: {gaps:?}"));
-        // The rest of the message in which it begins may look like one.
         assert!(gap["bytes"].as_u64() >= Some(800), "{name}: {gap}");
         let (from, to) = (checked["from_s"].as_f64(), checked["to_s"].as_f64());
         assert!(to.zip(from).is_some_and(|(to, from)| to - from > 60.0), "{name}: {checked}");

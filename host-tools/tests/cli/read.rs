@@ -67,7 +67,6 @@ fn what_has_no_frame_is_not_packed() {
     let output = run(dir.path(), "decode --format hum text -o out.hum", 1);
     assert!(String::from_utf8_lossy(&output.stderr).contains("no MAVLink frame"));
     assert!(!dir.path().join("out.hum").exists());
-    // An autopilot's log has a frame by chance.
     let frame = &fs::read(px4()).expect("a recording")[8..];
     fs::write(dir.path().join("log.bin"), [&[0xa3, 0x95, 128, 128, 89][..], b"FMT\0BBnNZ", frame].concat())
         .expect("written");
@@ -155,13 +154,11 @@ fn each_line_is_an_object_and_they_are_in_order() {
 
 #[test]
 fn filters_choose_by_time_and_by_message() {
-    // A packed recording has UTC; this vehicle's own frames have none.
     let dir = tempfile::tempdir().expect("directory");
     packed(dir.path());
     let decode = |more: &str| {
         let line = format!("decode flight.hum -o - --format jsonl --message ATTITUDE {more}");
         let lines = text(&run(dir.path(), &line, 0));
-        // The recorder of the checks comes last.
         lines.lines().filter(|line| !line.contains("HUMS_CHECKED")).collect::<Vec<_>>().join("\n")
     };
     let all = decode("");
@@ -306,7 +303,6 @@ fn a_cut_log_gives_what_it_has() {
         for name in ["cut.tlog", "cut.tlog.gaps.csv"] {
             let _ = fs::remove_file(dir.path().join(name));
         }
-        // Nothing in it shows that it ended there.
         run(dir.path(), "decode cut.hum -o cut.tlog --format tlog", 3);
         let back = frames_of(&dir.path().join("cut.tlog"));
         assert!(frames_of(&px4()).starts_with(&back), "{length} bytes");
@@ -319,7 +315,6 @@ fn a_card_without_its_file_system_is_read_block_by_block() {
     let dir = recorded();
     let path = dir.path().join("card.img");
     let mut image = fs::read(&path).expect("an image");
-    // Partition table, boot sector, FAT and the directory's beginning.
     let end = image.windows(3).position(|bytes| bytes == b"HUM").expect("a directory entry") + 512;
     image[..end / 512 * 512].fill(0);
     fs::write(&path, &image).expect("written");
@@ -331,7 +326,6 @@ fn a_card_without_its_file_system_is_read_block_by_block() {
 fn segments_copied_off_a_card_are_a_log() {
     let dir = recorded();
     let image = fs::read(dir.path().join("card.img")).expect("an image");
-    // The first sector of the log, anywhere on the card; segments are allocated in one piece on an empty card.
     let start =
         image.chunks(512).position(|block| block[0] == b'H' && block[1] >> 4 == 0xb).expect("a sector") * 512;
     let folder = dir.path().join("copied/box7");
@@ -340,7 +334,6 @@ fn segments_copied_off_a_card_are_a_log() {
     fs::write(folder.join("notes.txt"), "not a log").expect("written");
     run(dir.path(), "decode copied -o back.tlog --format tlog", 0);
     assert_eq!(frames_of(&dir.path().join("back.tlog")), frames_of(&px4()));
-    // In two files that are named one by one, in any order. Without its parity, which belongs to the original file.
     let (first, second) = image[start..start + (1 << 20)].split_at(100 * 512);
     fs::create_dir(folder.join("two")).expect("made");
     fs::write(folder.join("two/00001_00.hum"), first).expect("written");
@@ -379,14 +372,12 @@ fn what_is_no_log_is_told_apart() {
     ] {
         for command in ["info", "info --verify", "decode -o out --format csv"] {
             if input == "PX4" && command != "info --verify" {
-                // Recordings of every kind have a summary and become tables.
                 run(at, &format!("{command} {input}"), 0);
                 continue;
             }
             let output = run(at, &format!("{command} {input}"), 1);
             let error = String::from_utf8_lossy(&output.stderr).into_owned();
             assert!(error.contains(said), "{command} {input}: {error}");
-            // For a large file of another kind the error lists the readable kinds.
             let lists = command == "info --verify"
                 || input != "zeros"
                 || error.contains("an ArduPilot log (.bin, .log)");

@@ -74,7 +74,6 @@ fn a_tcp_server_is_listened_to_until_it_closes() {
     let frames = json["frames_in"].as_u64().expect("a count");
     assert!((1990..=2000).contains(&frames), "{frames} of 2000 frames");
     let mut datagram = [0; 2048];
-    // The first, empty one only gives the address for answers.
     assert_eq!(ground.recv(&mut datagram).expect("a datagram"), 0);
     assert!(ground.recv(&mut datagram).is_ok_and(|got| got > 8), "nothing reached the ground station");
 }
@@ -104,7 +103,6 @@ fn a_card_whose_file_system_is_damaged_stays_as_it_is() {
     run(dir.path(), &format!("{sim} --card-size 34"), 0);
     let image = dir.path().join("card.img");
     let mut bytes = fs::read(&image).expect("an image");
-    // The first sector of the FAT, with the root directory's entry.
     bytes[(2048 + 32) * 512..][..512].fill(0);
     fs::write(&image, &bytes).expect("written");
     let refused = attempt(dir.path(), sim);
@@ -120,7 +118,6 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     fs::write(dir.path().join("short.raw"), &recording[..20_000]).expect("written");
     let sim = "sim short.raw --sd card.img --json";
     run(dir.path(), &format!("{sim} --card-size 34"), 0);
-    // The smallest card has room for some sixteen sessions.
     let refused = (0..40).map(|_| attempt(dir.path(), sim)).find(|ended| ended.status.code() != Some(0));
     let refused = refused.expect("the card becomes full");
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();
@@ -133,7 +130,6 @@ fn a_full_card_keeps_its_sessions_unless_the_user_says_so_and_then_each_that_goe
     };
     let before = sessions("info card.img --json");
     assert_eq!(before[0], "00001");
-    // A store changes nothing, and each start needs a file of its own.
     let stored = attempt(dir.path(), &format!("{sim} --store store.bin"));
     assert_eq!(stored.status.code(), Some(2), "{}", String::from_utf8_lossy(&stored.stderr));
     assert_eq!(sessions("info card.img --json"), before);

@@ -94,7 +94,6 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
         };
         refused(&line("cut", ""));
         refused(&line("whole", ""));
-        // Each format by itself, so that none hides behind another.
         for format in ["tlog", "jsonl", "influx", "csv", "thesis"] {
             if line("", "").starts_with("decode") {
                 refused(&format!("decode cut/log.hum -o out --format {format}"));
@@ -106,7 +105,6 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
         assert!(contents(&out) == made, "a table of the part is left");
         fs::remove_dir_all(&out).expect("removed");
     }
-    // Parquet tables of two parts of a session never lie side by side: a query reads all files.
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 3);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 1);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet --force", 0);
@@ -161,7 +159,6 @@ fn a_slip_in_the_name_of_an_output_costs_no_recording() {
     run(dir.path(), "sim PX4 --sd card.img --card-size 64", 0);
     let at = |name: &str| dir.path().join(name);
     fs::write(at("thesis.txt"), "months of work").expect("written");
-    // Bytes of a port, and a log from a card: originals of the kinds that the commands make.
     fs::write(at("gs"), frames_of(&px4())[..50].concat()).expect("written");
     let before = stamps(dir.path());
     let names = ["card.img", "thesis.txt", "hums.elf", "flight.tlog", "gs", "log.hum"];
@@ -225,7 +222,6 @@ fn gaps_of_an_earlier_copy_do_not_stay_beside_a_tlog_without_gaps() {
     assert!(!gaps.exists() && dir.path().join("back.tlog").exists());
 }
 
-/// A folder that is decoded again has the exit code and the soundness of the first time.
 #[test]
 fn a_skipped_log_counts_as_the_written_one() {
     let dir = tempfile::tempdir().expect("directory");
@@ -252,7 +248,6 @@ fn a_skipped_log_counts_as_the_written_one() {
     assert_eq!(decode("again.json"), (2, lacks));
 }
 
-/// The log after a log proves its end, also if its own files are there already.
 #[test]
 fn a_skipped_log_proves_the_end_of_the_log_before() {
     let dir = tempfile::tempdir().expect("directory");
@@ -266,7 +261,6 @@ fn a_skipped_log_proves_the_end_of_the_log_before() {
     assert_eq!(said.matches("skipped: ").count(), 1, "{said}");
 }
 
-/// A log is skipped only if all that was asked for is there.
 #[test]
 fn a_log_with_some_of_its_outputs_is_not_skipped() {
     let dir = two_cards();
@@ -317,7 +311,6 @@ fn a_message_that_is_not_there_is_told_and_makes_no_empty_tlog() {
         assert!(String::from_utf8_lossy(&said.stderr).contains(": no AIRSPEED_AUTOCAL of it is within"));
     }
     assert_eq!(contents(dir.path()).len(), 1);
-    // Records exist: they are written, and no tlog.
     let said =
         run(dir.path(), "decode log.hum -o out --format tlog,jsonl,thesis --message AIRSPEED_AUTOCAL", 0);
     assert!(String::from_utf8_lossy(&said.stderr).contains("log: no frame of what was asked for is in it"));
@@ -340,7 +333,6 @@ fn tables_that_would_lie_below_a_file_are_refused_in_every_format() {
         assert!(told.contains("is a file, and a directory is needed there"), "{output} {format}: {told}");
     }
     assert_eq!(fs::read(dir.path().join("notes.txt")).expect("there"), b"mine");
-    // None of the other tables is there either.
     assert!(contents(&dir.path().join("fleet")).iter().all(|(name, _)| !name.ends_with(".parquet")));
 }
 
@@ -392,7 +384,6 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
             let (code, told) = decode(&format!("logs/{path}"), "");
             assert!(code == Some(1) && told.contains("exists, and was not overwritten"), "{path}: {told}");
         }
-        // The session is there under another vehicle.
         let (code, told) = decode("logs", "--vehicle quad-7");
         assert_eq!((code, told.matches("skipped: ").count()), (Some(0), 4), "{told}");
         assert_eq!(decode("logs", "--force").0, Some(0));
@@ -441,7 +432,6 @@ fn pages_that_exist_are_skipped_and_the_others_are_written() {
     let table = fs::read_to_string(dir.path().join("pages/index.html")).expect("a table");
     assert!(table.contains("ap_quad_guided.tlog") && table.contains("px4_hil_quad_low.tlog"));
     assert_eq!(report("--force"), (3, 0, 0));
-    // A run that is interrupted writes pages and no table.
     let whole = contents(&dir.path().join("pages"));
     fs::remove_file(dir.path().join("pages/index.html")).expect("it was there");
     assert_eq!(report(""), (1, 2, 2), "the table alone");

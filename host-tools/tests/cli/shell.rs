@@ -42,7 +42,6 @@ fn the_shell_and_the_manual_know_every_command() {
     assert!(text(&run(dir.path(), "man box pull", 0)).contains("\\-\\-around"));
     run(dir.path(), "man nothing", 2);
     run(dir.path(), "completions tcsh", 2);
-    // Bash reads the script, and completes with it.
     std::fs::write(dir.path().join("hums.bash"), &bash).expect("written");
     let typed =
         "source ./hums.bash; COMP_WORDS=(hums de); COMP_CWORD=1; _hums hums de hums; echo ${COMPREPLY[@]}";

@@ -80,7 +80,6 @@ pub(crate) fn json(output: &Output) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
 
-/// A directory with a card on which the PX4 flight was recorded.
 pub(crate) fn recorded() -> TempDir {
     made_once("recorded", |dir| {
         run(dir, "sim PX4 --sd card.img", 0);
@@ -201,7 +200,6 @@ pub(crate) fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
 /// untouched.
 pub(crate) type Stamp = (u64, u64, i64, i64);
 
-/// Files by name, without reading them: a card's image is large.
 pub(crate) fn stamps(dir: &Path) -> Vec<(String, Stamp)> {
     each_file(dir, |path| {
         let of = fs::metadata(path).expect("a file");

@@ -19,7 +19,6 @@ use hums_core::units::{Amperes, Rpm, Volts};
 type Change = fn(&mut Quad);
 type Expected = (&'static str, u8, Level);
 
-/// Flies for 80 s and lands, with these outputs in flight: the findings, before the flight is learnt.
 fn fly(past: &mut Baselines, change: Change, pulses: Option<[u16; 4]>) -> Vec<Finding> {
     let mut monitor = Monitor::new(Params::defaults());
     for now_ms in (0..100_000).step_by(50) {
@@ -75,7 +74,6 @@ fn each_quantity_that_leaves_what_was_normal_is_found_and_not_learned() {
         quad.throttle = 0.55;
         quad.battery.current = quad.battery.current.map(|current| Amperes(current.0 * 1.154));
     };
-    // Thrust goes with the square of the voltage.
     let emptier: Change = |quad| {
         quad.battery.voltage = Some(Volts(14.4));
         quad.throttle = 0.5 * (15.5_f32 / 14.4).powi(2);
@@ -84,7 +82,6 @@ fn each_quantity_that_leaves_what_was_normal_is_found_and_not_learned() {
         (Some(("power_trend", 0, Level::Warning)), |quad| {
             quad.battery.current = quad.battery.current.map(|current| Amperes(current.0 * 1.1));
         }),
-        // A tenth heavier: power goes with the 1.5th power of the weight.
         (Some(("weight_trend", 0, Level::Warning)), heavier),
         (Some(("vibration_trend", 0, Level::Warning)), |quad| quad.vibration.levels = [Some(9.0); 3]),
         (Some(("vibration_trend", 0, Level::Warning)), |quad| quad.vibration.levels = [Some(2.5); 3]),
@@ -94,7 +91,6 @@ fn each_quantity_that_leaves_what_was_normal_is_found_and_not_learned() {
             quad.escs[2].as_mut().unwrap().rpm = Some(Rpm(5_450.0));
         }),
         (None, emptier),
-        // As much throttle at a higher voltage, and the same power.
         (Some(("throttle_trend", 0, Level::Warning)), |quad| {
             quad.battery.voltage = Some(Volts(16.4));
             quad.battery.current = quad.battery.current.map(|current| Amperes(current.0 * 15.5 / 16.4));

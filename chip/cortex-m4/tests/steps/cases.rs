@@ -5,7 +5,6 @@ use super::{AT, SCRATCH, SLOT, SLOTS, STACK, patterns};
 use cortex_m4_model::decode;
 use cortex_m4_model::op::{Alu, Index, Op, Width};
 
-/// Code in its slot, and initial state.
 #[derive(Clone)]
 pub(crate) struct Case {
     pub(crate) name: &'static str,
@@ -101,7 +100,6 @@ fn on_registers_alone(op: Op) -> bool {
     }
 }
 
-/// A state in a slot otherwise full of SVC.
 fn state(random: &mut Random, name: &'static str, op: Op, start: u32) -> Case {
     let mut case = Case {
         name,
@@ -124,7 +122,6 @@ pub(crate) fn generate(random: &mut Random, number: u32) -> Option<Case> {
         if pattern.len() > 20 { [(bits >> 16) as u16, bits as u16] } else { [bits as u16, 0xDF00] };
     let slot = SLOTS + number * SLOT;
     let in_it = random.one_in(4);
-    // Half of them unaligned, since a base program counter is aligned.
     let at = AT + 2 * random.below(2);
     let (op, _) = decode(slot + at, in_it, halfwords);
     let allowed_in_it = !matches!(op, Op::BranchIf { .. } | Op::BranchZero { .. } | Op::IfThen { .. });
@@ -284,7 +281,6 @@ fn bytes(width: Width) -> u32 {
     }
 }
 
-/// The stack pointer stays if the address is good.
 fn base(case: &mut Case, n: u8, address: u32, offset: i32) -> bool {
     if n == 13 {
         return (0..0x3F0).contains(&offset) || (-0x100..0).contains(&offset) && !to_pc(case.op);
@@ -310,7 +306,6 @@ fn by_register(case: &mut Case, n: u8, m: u8, shift: u8, address: u32) -> bool {
 /// A target in the slot, or empty: QEMU repeats its memories behind them, and has devices at `0x4000_0000`.
 fn good_target(target: u32, slot: u32) -> bool {
     let outside = matches!(target >> 28, 3 | 6..=13);
-    // Not to itself, and not into its own second half.
     let within =
         (slot..slot + AT - 4).contains(&target) || (slot + AT + 6..slot + SLOT - 4).contains(&target);
     within || outside

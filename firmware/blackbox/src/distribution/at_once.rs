@@ -187,7 +187,6 @@ mod tests {
                 _ => (state >> 20) as usize % 16,
             };
             let (start, size) = written.part_of(symbol);
-            // The narrowest and the widest parts, and their first and last places.
             let width = [1, 0x100, u16::MAX, (state >> 8) as u16 | 1][round % 4];
             let (first, last) = (start * u32::from(width), (start + size) * u32::from(width) - 1);
             let offset = [first, last][round / 4 % 2];

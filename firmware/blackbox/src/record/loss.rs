@@ -112,7 +112,6 @@ macro_rules! statistics {
             }
 
             pub(super) fn read(fields: &mut Fields<'_>) -> Self {
-                // Fields are read in the order of writing.
                 Self { $($name: fields.u64(),)+ }
             }
         }

@@ -54,12 +54,10 @@ fn words_and_flags_hold_as_long_as_they_should() {
         // Texts before arming do not count. A text holds for 10 s, the worst one of that time.
         "0 Gnss = -; 0 warning Gnss; 0 Gnss = -; 0 arm; 0 critical Gnss; 5 warning Gnss; 0 Gnss = 2; 14 Gnss = 2; \
          15 Gnss = 2; 16 Gnss = ended; 5 Gyro = -",
-        // It ends by a text; it outlasts disarming, but not the next arming.
         "0 arm; 20 warning Gnss; 21 over Gnss; 22 Gnss = 0; 23 warning Gnss; 24 disarm; 24 Gnss = 1; 25 arm; 25 Gnss = -",
         "0 arm; 1 disarm; 1 warning Gnss; 2 critical Crash; 2 Crash = 2; 2 Gnss = -",
         "0 arm; 1 disarm; 2 critical Accelerometer; 2 Accelerometer = 2",
         "0 arm; 1 disarm; 5 critical Crash; 5 Crash = -",
-        // A flag counts when two messages have it, and while messages come. No flag reports a crash.
         "0 arm; 0 flags; 0 Compass = 0; 1 flags 2; 1 Compass = 0; 2 flags 2; 2 Compass = 1; 3 flags; 3 Compass = 0; \
          4 flags 2; 4 Compass = 0; 5 flags 2; 5 Compass = 1; 10 Compass = 1; 11 Compass = ended; 12 flags; \
          12 Compass = 0; 12 Crash = ended; 13 disarm; 13 Compass = ended",

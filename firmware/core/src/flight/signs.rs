@@ -270,7 +270,6 @@ impl Flight {
             if self.shock.is_none() && self.signs.worst[MishapKind::Impact as usize] == 0.0 {
                 self.hit_at = at;
             }
-            // The greatest of several: what hits something bounces.
             let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));
             self.shock = Some(Shock { load_g: greatest_g, ..shock });
             let pulled_out = !on_rotors(at, vehicle) && load_g <= PULL_OUT_G;

@@ -67,7 +67,6 @@ mod tests {
     #[test]
     fn the_speed_before_the_touch_counts_also_where_the_estimate_goes_on_sinking() {
         assert!((land(10.0, &[(4.0, 2.5), (3.0, 0.1)]) - 2.5).abs() < 1e-6);
-        // As an ArduCopter's estimate did after a touch at 2.49 m/s.
         assert!(
             (land(10.0, &[(4.0, 2.49), (1.0, 0.75), (1.0, 0.5), (1.0, 0.3), (2.0, 0.0)]) - 2.49).abs() < 1e-6
         );

@@ -275,7 +275,6 @@ mod tests {
             ("roll w0", "gyro_mismatch w0, motor_loss c0", "motor_loss"),
             ("roll w0", "roll_rate w0, gyro_stuck w0", "gyro_stuck"),
             ("gnss_alert w0", "imu_gps w0, gps_stuck w0", "gps_stuck"),
-            // A measurement is not explained by a word on it.
             ("gnss_alert w0", "gps_speed w0", "gps_speed"),
             ("gps_speed w0", "gnss_alert w0", ""),
             ("vibration_alert w0", "imu_gps w0", "imu_gps"),
@@ -297,13 +296,11 @@ mod tests {
             ("cell_voltage c0", "heartbeat c0", ""),
             ("card_stall w0", "recording c0", "recording"),
             ("record_lost w0", "recording c0", "recording"),
-            // A motor explains what is of the same one, or of none.
             ("motor_output.2 c0", "motor_loss.2 c0", "motor_loss"),
             ("motor_output.3 c0", "motor_loss.2 c0", ""),
             ("motor_output.0 c0", "motor_loss.1 c0", ""),
             ("roll c0", "motor_loss.3 c0", "motor_loss"),
             ("roll c0", "pitch_rate c0", ""),
-            // A mishap comes before all but the battery and the links, and explains nothing from before it.
             ("ekf_failsafe c0", "gps_fix c0, overturned c0", "overturned"),
             ("load_factor w0", "gps_fix c0, overturned c0", "overturned"),
             ("load_factor w90", "overturned c0", "overturned"),

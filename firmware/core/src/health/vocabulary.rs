@@ -457,7 +457,6 @@ mod tests {
 
     #[test]
     fn an_alarm_names_its_part_and_is_one_checks_alone_and_what_is_critical_has_advice() {
-        // The same fault on another autopilot's scale, and after another time.
         let twins = ["vibration_px4", "cell_dev_lasting"];
         for (index, Words { said, .. }) in VOCABULARY.iter().enumerate() {
             let Said { check, part, alarm, advice, .. } = *said;

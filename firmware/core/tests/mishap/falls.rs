@@ -46,7 +46,6 @@ const DISARMED: &[Case] = &[
         "* start=-10; 0 fall off thr=0; 0-2 h=-10..-30; 2 h=-30",
     ),
     (ROTORS, "on a hill", "", LANDED, "0 thr=0 landed=ground; 1 off"),
-    // Without a landed state the height above home shows flight; no fall, so no disarming in the air.
     (ROTORS, "on a hill, without a landed state", "", LANDED, "* landed=-; 0 thr=0; 1 off"),
     (ROTORS, "in a valley", "", LANDED, "0-8 h=20..-12 c=-4; 8 h=-12 c=0 rates=0 ground=0 thr=0; 10 off"),
     (
@@ -65,7 +64,6 @@ const DISARMED: &[Case] = &[
     ),
     (&[ROTORS[0]], "a dive", "", FLIES, "0-1.5 load=0.05 thr=0"),
     (&[ROTORS[0]], "thrown", "", FLIES, "* mode=18; 0-1 load=0.05 thr=0.5"),
-    // A sample without weight, a gap of three seconds, and two more.
     (ROTORS, "heard too seldom", "", FLIES, "0-0.05 load=0.05; 3-3.1 load=0.05; 0.05-3 unheard"),
     // The bounce of its legs.
     (ROTORS, "killed at the touch-down", "", LANDED, KILLED),
@@ -102,8 +100,6 @@ fn after_a_mishap_the_next_arming_begins_anew() {
 
 #[test]
 fn what_was_wrong_before_a_mishap_ends_when_it_lies_disarmed_and_when_it_is_silent() {
-    // It shakes for 3 s, and then it falls. The time when the vibration check is good again, milliseconds after the
-    // vibration began.
     for (end, good_ms) in [("12 off", Some(12_000..12_600)), ("8 silent", Some(12_400..13_200)), ("", None)] {
         let outcome = fly(ROTORS[0], &format!("0 vibe=45; 3 fall; {end}"));
         let is_down = outcome.changes.iter().any(|(_, change)| *change == MishapChange::Down);

@@ -4,9 +4,7 @@ use super::*;
 
 const CRASH: &str = "0-1 ground=18 c=-3; 1 c=0 ground=0 thr=0 h=0.5 rates=0; 1-1.1 load=8";
 const HARD: &str = "0-9.6 c=-2 h=20..0.8; 9.6 c=0 h=0.8 thr=0; 9.6-9.7 load=4; 10.6 landed=ground; 12.6 off";
-/// It hits the ground with its motors running, and they run on.
 const HITS: &str = "0-5 thr=0.95 c=-12 h=60..0; 5 thr=0.5 c=0 h=0 load=1.4 rates=1.5,0.7,0.4; 5-5.1 load=15";
-/// Armed still, with the throttle of idling rotors; the estimator sinks on.
 const DROPS: &str = "0-0.45 load=0.4 h=0.7 c=-2; 0.45 rates=0 h=0 c=-1.5 thr=0.2";
 
 const CASES: &[Case] = &[
@@ -70,7 +68,6 @@ const CASES: &[Case] = &[
     ),
     (ROTORS, "it turns over", "overturned", FLIES, "1-3 roll=2.5 rates=3,0.5,0"),
     (&[ROTORS[0]], "it drops low", "", ANY, DROPS),
-    // Its estimator falls on; the throttle stick stays.
     (
         &["ap quad mode=1 hover"],
         "it lies on its back, whatever its estimator says",
@@ -108,7 +105,6 @@ fn a_shock_between_two_samples_of_what_fell_is_an_impact_at_its_own_time() {
 #[test]
 fn what_lies_over_with_running_motors_never_flies_on() {
     for of in &ROTORS[..4] {
-        // On its side, and by turns on its back.
         let outcome = fly(of, &format!("{HITS}; 5 roll=1.3 ground=3; 5%6:0-1.5 roll=2.4"));
         assert!(outcome.told().starts_with(&["sinking", "impact"]), "{of}: {:?}", outcome.told());
         assert!(!outcome.flies_on() && outcome.flights() == DOWN, "{of}: {:?}", outcome.changes);
@@ -120,7 +116,6 @@ fn what_lies_over_with_running_motors_never_flies_on() {
 #[test]
 fn what_an_estimate_moves_and_the_receiver_does_not_never_flies_on() {
     for of in &ROTORS[..2] {
-        // After the fall its estimate moves on while the receiver stands, or not.
         let strays = |receiver_mps: f32| {
             let moves =
                 "5 ground=3.5 c=0.2 load=1; 5-5.1 load=15; 5-40 h=4.5..8; 0-5 hpa=955..962.2; 5 hpa=962.2";
@@ -159,12 +154,10 @@ fn a_second_shock_does_not_hide_the_first() {
 fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
     for of in ROTORS {
         let is_multicopter = of.contains("quad") || of.contains("hexa");
-        // Upright on the ground, with a throttle far below hover throttle, while its estimate climbs away.
         let stands = "0-40 h=20..140; 0 c=3 ground=4 rates=0 hpa=955 thr=0.12";
         let outcome = fly(of, stands);
         assert!(outcome.told().is_empty(), "{of}: {:?}", outcome.told());
         assert_eq!(outcome.flights(), (1, u32::from(is_multicopter), 0), "{of}");
-        // It came down at 7 m/s for five seconds.
         let flew_into_it = fly(of, &format!("{stands} load=1.4; 0-5 hpa=955..959.2; 5 hpa=959.2"));
         let told = if is_multicopter { vec!["impact"] } else { Vec::new() };
         assert_eq!(
@@ -180,7 +173,6 @@ fn what_stands_with_little_throttle_flies_no_more_whatever_its_estimate_says() {
 fn what_holds_its_place_in_the_air_after_a_knock_flies_on() {
     for (height, throttle) in [(3.0, 0.45), (20.0, 0.45), (20.0, 0.25), (300.0, 0.7), (-25.0, 0.45)] {
         for knock_g in [3.5, 5.0, 9.0] {
-            // The autopilot is wrong once. Only an autopilot notices that it leaves the ground downwards.
             for word in ["landed=air; 10-10.5 landed=ground", "landed=-"].iter().take(if height > 0.0 {
                 2
             } else {
@@ -208,7 +200,6 @@ fn little_throttle_alone_is_no_landing() {
     for height in [3.0_f32, 7.0, 20.0, 300.0, -25.0] {
         for throttle in [0.04, 0.07, 0.09, 0.12, 0.19] {
             for vehicle in ["ap quad", "px4 hexa"] {
-                // It stands without thrust, climbs at three times its hover throttle, hovers and moves at 3 m/s.
                 let script = format!(
                     "0-8 landed=ground thr=0 h=0 c=0; 8 landed=air shake=0.02; 8-20 thr={} h=0..{height} c={}; \
                      20 thr={throttle} h={height} c=0; 0-30 ground=0.1; 30 ground=3",

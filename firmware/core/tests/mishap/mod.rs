@@ -26,7 +26,6 @@ use hums_core::usage::UsageCounter;
 const AT_MS: u64 = 20_000;
 const RADIO: Source = Source { system: 51, component: 68 };
 
-/// Motion of the vehicle besides the messages of a [`Quad`].
 #[derive(Clone, Copy, Default)]
 struct Motion {
     load_g: f32,
@@ -36,13 +35,11 @@ struct Motion {
     ground_mps: f32,
     pitch: f32,
     pressure_hpa: Option<f32>,
-    /// The greatest specific force since the last sample, for a shock.
     shock_g: Option<f32>,
     /// The climb on the display.
     displayed_mps: Option<f32>,
     roll_wanted: Option<f32>,
     unheard: bool,
-    /// The autopilot sends only heartbeats, and whether it reports a landing.
     beats_only: bool,
     /// Fall of the home height, m.
     home_sank_m: f32,
@@ -89,7 +86,6 @@ impl Motion {
         }
     }
 
-    /// Falls from 20 m for two seconds, hits with 15 g, and lies.
     fn fall(&mut self, ms: u64, quad: &mut Quad) {
         let seconds = ms as f32 / 1_000.0;
         if ms < 2_000 {
@@ -141,7 +137,6 @@ impl Outcome {
     }
 }
 
-/// Whether an observation is independent of the motion that [`fly_between`] adds.
 fn said_besides(said: &Observation, beats_only: bool) -> bool {
     let beats = matches!(said, Observation::Heartbeat(_) | Observation::Landed(..));
     let made =
@@ -164,7 +159,6 @@ fn fly_between(at_ms: u64, end_ms: u64, vehicle: &str, script: &str) -> Outcome 
         if motion.unheard {
             monitor.observe(now, RADIO, &Observation::TelemetryRadio(TelemetryRadio::default()));
         }
-        // No sensor repeats one value for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.002;
         let forces_g = [motion.drag_g, 0.0, -(motion.load_g + noise)];
         let acceleration = Some(forces_g.map(|force_g| MetresPerSecond2(force_g * 9.806_65)));
@@ -211,7 +205,6 @@ type Counts = (u32, u32, u32);
 /// The vehicles that fly it, what it is, the reported mishaps in order (after ".." any others), what is counted, the script.
 type Case = (&'static [&'static str], &'static str, &'static str, Counts, &'static str);
 
-/// It flies on, it landed, it came down in a mishap.
 const FLIES: Counts = (1, 0, 0);
 const LANDED: Counts = (1, 1, 0);
 const DOWN: Counts = (1, 0, 1);

@@ -16,10 +16,8 @@ const CASES: &[Case] = &[
         "0-4 unheard; 4 stands lies state=8 thr=0",
     ),
     (ROTORS, "it was terminated and stands", "", ANY, "0-12 unheard; 12 stands state=8 thr=0 landed=ground"),
-    // It was 20 m above home and 4 m above a hill.
     (ROTORS, "home was set anew", "", LANDED, "0-6.2 unheard; 6.2 rests sank=-16"),
     (ROTORS, "it had the time to land and was laid down", "", LANDED, "0-12 unheard; 12 rests lies roll=1.6"),
-    // It came down, its battery was changed, and for a while only heartbeats come.
     (ROTORS, "a landing", "", LANDED, "0-4 c=-3 h=20..8; 4 rests; 4-24 unheard; 24-27 beats"),
     (ROTORS, "killed after a landing", "", ANY, "0 beats; 0-12 unheard; 12 rests on state=8"),
     (
@@ -29,7 +27,6 @@ const CASES: &[Case] = &[
         LANDED,
         "0 ground=18; 0-6 unheard; 0-8 beats; 20.05 rests",
     ),
-    // Terminated in the air or on its side.
     (ROTORS, "it sank before it was received", "", NONE, "* state=8 thr=0 start=20; 0 c=-4 rates=2,0,0"),
     (ROTORS, "it lay before it was received", "", NONE, "* state=8 thr=0 start=20; 0 stands lies"),
 ];
@@ -37,7 +34,6 @@ const CASES: &[Case] = &[
 #[test]
 fn a_silence_is_judged_by_what_comes_after_it_and_a_vehicle_that_was_off_before_it_was_received_is_not() {
     judge(CASES);
-    // Disarmed, and then it hits the ground or is knocked about on its back.
     judge_from(
         0,
         &[
@@ -50,7 +46,6 @@ fn a_silence_is_judged_by_what_comes_after_it_and_a_vehicle_that_was_off_before_
 #[test]
 fn what_is_terminated_in_the_air_and_neither_stands_nor_falls_at_once_is_a_mishap() {
     for of in ROTORS {
-        // Its motors run on for a while; it reports armed and in the air to the end.
         let drifts = fly(of, "0 state=8 ground=4; 7.05 stands lies");
         assert_eq!((drifts.told().first(), drifts.flights()), (Some(&"disarmed_in_air"), DOWN), "{of}");
         let at_ms = drifts.changes.first().map(|(at_ms, _)| *at_ms);

@@ -8,7 +8,6 @@ const CASES: &[Case] = &[
     (ROTORS, "the autopilot flies", "sinking", FLIES, "0-2 c=-8 h=200..184"),
     (ROTORS, "the pilot", "", FLIES, "* stick; 0-2 c=-8 h=200..184"),
     (WINGS, "on wings", "", FLIES, "0-2 c=-8 h=200..184"),
-    // Modes made for falling: a helicopter's autorotation, and THROW.
     (
         &["ap heli mode=26 hover landed=air", "ap quad mode=18 hover landed=air"],
         "autorotation, THROW",
@@ -16,7 +15,6 @@ const CASES: &[Case] = &[
         FLIES,
         "0-5 c=-10 thr=0",
     ),
-    // It shakes, climbs by the air, and lands hard and safe while the estimator falls.
     (
         ROTORS,
         "an estimator that does not believe itself, against the air",
@@ -43,7 +41,6 @@ const CASES: &[Case] = &[
     ),
     (ROTORS, "slowly, with all its thrust", "sinking", FLIES, "* h=60; 0-6 c=-4.5 h=60..33 thr=0.97"),
     (ROTORS, "it is told to", "", FLIES, "* h=60; 0-6 c=-4.5 h=60..33 thr=0.3"),
-    // The bank of a vehicle that is not carried by rotors alone is not a cause.
     (
         &[ROTORS[0], ROTORS[1], ROTORS[2]],
         "it is told to bank steeply",
@@ -95,7 +92,6 @@ fn only_what_hangs_upright_on_rotors_is_told_to_climb() {
         ),
         ("it has lost a motor", ROTORS[0], Orders::Disarm, "0 amps=5,0,5,5; 2-4 c=-8 h=200..184"),
         ("all the throttle does not do it", ROTORS[0], Orders::Disarm, in_vain),
-        // A plane with all its throttle, and a dead motor: it glides.
         ("it hangs on wings", WINGS[0], Orders::Nothing, in_vain),
     ] {
         assert_eq!(fly(vehicle, script).first("sinking").orders, orders, "{what}");

@@ -6,7 +6,6 @@ const ON_GROUND: &str = "* landed=ground h=0 thr=0; ";
 
 const CASES: &[Case] = &[
     (ROTORS, "tumbles", "tumbling", FLIES, "0-1.5 rates=15,2,0"),
-    // In acro modes the pilot asks for it.
     (
         &[
             "ap quad mode=1 hover landed=air",
@@ -29,7 +28,6 @@ const CASES: &[Case] = &[
         FLIES,
         "* acro; 0-1.5 roll=2.5 rates=3,0.5,0",
     ),
-    // It banks and then flies on under a force from ahead by the air.
     (
         ROTORS,
         "what flies fast is carried by the air too",
@@ -37,7 +35,6 @@ const CASES: &[Case] = &[
         FLIES,
         "0 h=40 thr=0.5 ground=30; 0-0.5 rates=0,2,0; 0.5-4 load=0.4 drag=0.9 pitch=-1.1",
     ),
-    // Armed on the ground with throttle; its motors turn it over by its side in half a second, and it lies there. The estimator disagrees.
     (
         ROTORS,
         "its rotors turn it over",
@@ -66,7 +63,6 @@ const CASES: &[Case] = &[
 fn turning_over_is_told_unless_a_pilot_a_plane_or_a_hand_does_it() {
     judge(CASES);
     for of in ROTORS {
-        // It is stopped under a force from ahead by the ground.
         let stopped = "0 h=40 thr=0.5 ground=1; 0-0.5 rates=0,2,0; 0.5-4 load=0.4 drag=0.9 pitch=-1.1";
         let lies = fly(of, stopped);
         assert!(lies.told().contains(&"overturned"), "{of}: {:?}", lies.changes);
@@ -101,7 +97,6 @@ fn on_the_bench_it_is_an_event_for_each_arming_and_not_told() {
 #[test]
 fn an_attitude_that_the_sensors_contradict_is_none() {
     for of in ROTORS {
-        // It is level and still, and its estimator turns over by 7 degrees a second.
         let outcome = fly(of, "0 rates=0.122,0.02,0; 0-25.75 roll=0..3.1415; 25.75-40 roll=0..1.738");
         let mut attitude = outcome.findings.iter().filter(|of| matches!(of.check, "roll" | "pitch"));
         assert!(outcome.told().is_empty() && attitude.next().is_none(), "{of}: {:?}", outcome.findings);

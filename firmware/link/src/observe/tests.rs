@@ -121,7 +121,6 @@ fn what_the_autopilot_says_is_wrong_is_read_of_texts_events_and_flags() {
     assert_eq!(text(2, "EKF3 lane switch 1", 0), warning(Cause::Estimator));
     assert_eq!((text(6, "EKF3 lane switch 1", 0), text(2, "", 0), text(200, "x", 0)), (None, None, None));
     assert_eq!(by_id(253, &[2, 0xFF, b'!']), warning(Cause::Other), "no UTF-8");
-    // commander_failsafe_enter_hold; level 2 outside, 5 in the log; its cause is a lost remote control.
     let event = Packet::new(410).u32(0, 1 << 24 | FAILSAFE_HOLD).u8(12, 0x52).u8(13 + 7, 1);
     assert_eq!(by_id(410, event.payload()), warning(Cause::RemoteControl));
     let flags = Packet::new(235).u16(22, 8 | 4096);

@@ -39,7 +39,6 @@ fn frame(id: u32, bytes: usize) -> Vec<u8> {
     frame
 }
 
-/// Each of `streams` (id, bytes, interval in ms) comes with jitter.
 fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u32, usize)> {
     let params = params(budget);
     let mut summary = Summary::new(&params);
@@ -58,7 +57,6 @@ fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u3
         for (index, (_, _, every)) in streams.iter().enumerate() {
             if now_ms == next[index] {
                 random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                // Each arrives up to a tenth of its interval early or late.
                 let jitter = (random >> 33) % (every / 5 + 1);
                 next[index] = (now_ms / every + 1) * every + every / 2 + jitter - every / 10;
                 next[index] = next[index].max(now_ms + 1);
@@ -216,10 +214,8 @@ fn nothing_starves_from_the_smallest_budget_up() {
         for (id, ..) in ALL.iter().chain(&[(251, 30, 0), (252, 30, 0)]) {
             let times: Vec<u64> = sent.iter().filter(|(_, sent, _)| sent == id).map(|(at, ..)| *at).collect();
             let longest = times.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(u64::MAX);
-            // At 100 B/s all intervals are about twelve times as long.
             assert!(longest < 90_000, "{id} at {budget} B/s: {longest} ms without one");
         }
-        // The vehicle's heartbeats and ours, of 240 each: link loss is four in a row.
         let beats: Vec<u64> = sent.iter().filter(|(_, id, _)| *id == 0).map(|(at, ..)| *at).collect();
         assert!(beats.len() > 300, "{} heartbeats at {budget} B/s", beats.len());
     }

@@ -173,7 +173,6 @@ impl Commands {
                 // The component's record names the sender.
                 let serial = characters(params);
                 let serial = core::str::from_utf8(&serial).unwrap_or_default();
-                // A station that lost our answer asks again.
                 let (new, known) =
                     (Label::new(serial), book.monitor.components().get(place).map(|part| part.serial));
                 let is_done = new != Label::default() && known == Some(new);

@@ -431,7 +431,6 @@ impl Companion {
             let Some((port, reply)) = replies.first() else { break };
             let packet = commands::packet(now, reply, monitor, identity);
             let sent = ways.send(now, port, Class::Own, &packet);
-            // Nobody is there any more to get it.
             replies.done(sent || !ways.queues.is_open(port));
         }
         for port in Port::ALL {

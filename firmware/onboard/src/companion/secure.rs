@@ -275,14 +275,12 @@ mod tests {
             }
         }
         assert!((1..=u32::from(SIGNED_MAX) + 1).contains(&scarce), "{scarce}");
-        // A landing: its items are stored without an erase.
         let landing = [(ItemKey::Exceedances, 505), (ItemKey::Session, 160), (ItemKey::Session, 160)];
         for (key, length) in landing {
             assert!(handover.put(Item::item(key.number()), &[1; 512][..length]));
             assert_eq!(store_writer.service(false), Saved::Took, "{key:?}");
         }
         assert_eq!(status.read().refused, 0);
-        // Waiting items are stored once there is room again.
         assert!(secure.times_due);
         assert!(store_writer.turn_ahead());
         secure.save(Instant::from_millis(86_400_000), None, &mut handover);

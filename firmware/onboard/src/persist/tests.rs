@@ -35,7 +35,6 @@ fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut
 
 fn end(monitor: &mut Monitor, handover: &mut Handover, store_writer: &mut StoreWriter<&mut Flash>) {
     for _ in 0..TABLE.len() + 100 {
-        // As at a restart: afterwards nothing is written.
         if handover.finish(Instant::from_millis(60_000), monitor) {
             return;
         }
@@ -144,7 +143,6 @@ fn live(second: u64, flies: bool, monitor: &mut Monitor, handover: &mut Handover
     handover.step(now, monitor, frames);
 }
 
-/// A flight from the 20th second on; returns flight seconds in the flash after each.
 fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
     let mut kept = Vec::new();
     let mut copies = Vec::new();
@@ -204,7 +202,6 @@ fn between_two_flights_room_is_made_for_the_next_one() {
                 second += 1;
             }
             assert_eq!(store_writer.status.read().refused, 0, "flight {flight}");
-            // Frames end: the autopilot is switched off.
             for _ in 0..20 {
                 live(second, false, monitor, handover, u32::MAX);
                 while store_writer.service(false) == Saved::Took {}
@@ -222,7 +219,6 @@ fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_c
     let mut erases = 0;
     session(&mut flash, |monitor, handover, store_writer| {
         for second in 0..12 * 3_600_u64 {
-            // A flight of ten minutes in each hour, and a key whose times are stored every two minutes.
             let flies = (600..1_200).contains(&(second % 3_600));
             live(second, flies, monitor, handover, second as u32);
             if second % 120 == 0 {

@@ -246,7 +246,6 @@ mod tests {
             }
             gs_in.put(&[7; FRAME_BYTES_MAX]);
             let sent = gs_out.lend(async |_| {
-                // The queue puts two bytes before each frame.
                 for _ in 0..waiting / (frame.len() + 2) {
                     gs_in.put(&frame);
                 }

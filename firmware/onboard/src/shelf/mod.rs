@@ -197,7 +197,6 @@ impl Server<'_> {
                 .filter(|found| want.which != Which::Settings && found.answer.found.is_ok());
         }
         if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
-            // Its answer comes when it is finished.
             return true;
         }
         *to = answer;

@@ -15,7 +15,6 @@ pub(crate) const BUFFER: usize = 4;
 pub(crate) const IN: u8 = 0x80;
 pub(crate) const OUT: u8 = 0;
 
-/// A card whose blocks have their numbers in each word.
 #[derive(Clone, Default)]
 pub(crate) struct Numbered {
     /// It is not in the slot.
@@ -101,7 +100,6 @@ impl Host {
         Self { disk: Disk::new(card.clone(), SERIAL), card, tag: 0 }
     }
 
-    /// Runs a command to its status, and checks the rules of the bus: full packets, a short end, the residue.
     pub(crate) fn run(&mut self, expected: u32, flags: u8, block: &[u8]) -> Got {
         self.tag += 1;
         self.packet(&wrapper(self.tag, expected, flags, block)).expect("a valid wrapper")

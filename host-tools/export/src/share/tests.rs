@@ -14,7 +14,6 @@ const UTC_US: u64 = 1_795_210_115_657_672;
 const UID: u64 = 0x0031_002a_3035_510a;
 const WORDS: &str = "SN4711Zurich";
 
-/// The facts in each form in which a recording can have them.
 fn secrets() -> Vec<Vec<u8>> {
     let mut all = Vec::new();
     for degrees in [PLACE.0, PLACE.1] {

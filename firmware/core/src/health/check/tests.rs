@@ -65,7 +65,6 @@ fn a_level_is_what_its_values_of_some_time_say() {
             usual,
             1,
             &[
-                // It rises after its debounce, and falls after the time that it must be good.
                 ("0 10, 1000 50, 3000 70, 4000 10, 10000", "1500 warning, 3200 critical, 6000 ok | ok"),
                 ("0 10, 1000 50, 1450 10, 5000", " | ok"),
                 ("0 45, 5000", " | ok"),
@@ -100,7 +99,6 @@ fn a_level_is_what_its_values_of_some_time_say() {
             usual,
             12,
             &[
-                // One wrong message raises no alarm, even if it is held for long or is the last one.
                 ("0 =10, 2500 =170, 5000 =10, 10000", " | ok"),
                 ("0 =10, 2500 =170, 14000", " | ok"),
                 ("0 =10, 2500 =170, 5000 =170, 7500 =10, 12000", "5000 critical, 9500 ok | ok"),
@@ -121,7 +119,6 @@ fn a_level_is_what_its_values_of_some_time_say() {
     for (limits, debounce, stale_s, cases) in groups {
         let check = Check { limits, debounce, stale_s: NonZeroU8::new(stale_s), ..CHECK };
         for (script, expected) in cases {
-            // Also across the end of the counter of milliseconds.
             for start_ms in [0, u64::from(u32::MAX) - 1_050] {
                 assert_eq!(changes(&check, script, start_ms), *expected, "{script}");
             }
@@ -177,14 +174,12 @@ fn a_value_that_goes_up_and_down_is_told_a_few_times_and_not_each_time() {
     };
     let times = falls(again(When::InFlight, 4, 150_000, good));
     assert_eq!(times, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
-    // Landed for a second every 20 s: earlier bad values are forgotten.
     let landed = |from_ms: u64| format!("{} 10, {} off", from_ms + 2_000, from_ms + 19_000);
     assert_eq!(falls(again(When::InFlight, 4, 20_000, landed)), [4_000; 4]);
 }
 
 #[test]
 fn a_bad_value_of_a_slow_stream_is_told_twice_and_then_stays() {
-    // A message each three seconds; it is stale after one.
     let script: Vec<String> = (0..20).map(|message| format!("{} =50", message * 3_000)).collect();
     let script = script.join(", ") + ", 60000";
     let told = changes(&Check { when: When::InFlight, ..CHECK }, &script, 0);

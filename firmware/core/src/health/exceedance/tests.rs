@@ -166,7 +166,6 @@ fn another_airframe_keeps_what_this_session_exceeded_and_nothing_from_before() {
     assert!(left.iter().all(|exceedance| exceedance.lifetime == exceedance.session), "{left:?}");
 }
 
-/// Two warnings and a critical of "roll", as stored since the first version.
 #[rustfmt::skip]
 const ROLL: [u8; 22] = [
     1, // version
@@ -180,7 +179,6 @@ fn place(name: &str) -> u16 {
     checks().position(|check| check.name == name).expect(name) as u16
 }
 
-/// As many entries as there is room for.
 fn full() -> Vec<u8> {
     let mut stored = vec![VERSION];
     let instances = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));

@@ -219,11 +219,9 @@ mod tests {
         places.bind(3, log(42));
         assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
         assert_eq!(places.wanted(3, 0), Some(Which::Same(log(42))), "the first piece was lost");
-        // Another list: the number means another log from its beginning on, but a download in progress goes on.
         places.listed = Some(9);
         assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
         assert_eq!(places.wanted(3, 0), Some(Which::At(2)));
-        // Once it is gone, no bytes are added to its download.
         places.lose(3);
         assert_eq!(places.wanted(3, 90), None);
         assert_eq!(places.wanted(3, 0), Some(Which::At(2)));

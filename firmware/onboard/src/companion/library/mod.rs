@@ -110,7 +110,6 @@ impl Library {
             let ticket = self.next_ticket();
             self.erases = !ways.queues.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
         }
-        // Nobody is there any more to get the rest.
         self.job = self.job.filter(|job| ways.queues.is_open(job.asker.port));
         for _ in 0..LOOKS_MAX {
             let Some(mut job) = self.job else {
@@ -126,7 +125,6 @@ impl Library {
             let goes_on = matches!(step, Step::Wait | Step::Next);
             self.job = goes_on.then_some(job);
             if step == Step::Wait {
-                // The answer stays in the queue until all of it is sent.
                 return None;
             }
             self.asked = false;

@@ -18,12 +18,8 @@ use crate::{Monitoring, PortStatus, ResetCause};
 
 #[derive(Clone, Copy, Debug)]
 enum Comes {
-    Heartbeat {
-        armed: bool,
-    },
-    /// `PARAM_SET` of `AP_BAUD` at the ground station's port.
+    Heartbeat { armed: bool },
     Baud(f32),
-    /// A card is put in; it answers after 0.1 s.
     Card,
     OtherCard,
     NoCard,
@@ -33,7 +29,6 @@ use Comes::{Baud, Card, Heartbeat, NoCard, OtherCard};
 const ARMED: Comes = Heartbeat { armed: true };
 const DISARMED: Comes = Heartbeat { armed: false };
 
-/// `BAT_REM_WARN` 31 in the first piece, `PROT_ACTION` 1 and `AP_BAUD` in the last one.
 fn text() -> String {
     let comment = "# of this airframe\n".repeat(40);
     format!("BAT_REM_WARN 31\n{comment}PROT_ACTION 1\nAP_BAUD 57600\n")
@@ -136,7 +131,6 @@ fn a_box_that_restarts_in_the_air_reads_no_parameters() {
             assert_eq!(run(cause, &comes), NOTHING, "{cause:?}, {heartbeat:?}");
         }
     }
-    // A short power cut: the first heartbeat decides.
     for cause in BY_HAND {
         assert_eq!(run(cause, &[(0, Card), (1, ARMED), (2, ARMED)]), NOTHING, "{cause:?}");
     }
@@ -148,10 +142,8 @@ fn a_box_that_was_armed_before_reads_no_parameters_until_another_card_is_put_in(
     assert_eq!(run(ResetCause::PowerOn, &flown), NOTHING);
     let exchanged = [&flown[..], &[(5, NoCard), (7, DISARMED), (7, OtherCard), (8, DISARMED)]].concat();
     assert_eq!(run(ResetCause::PowerOn, &exchanged), ALL);
-    // The same card, lost for a moment.
     let back = [&flown[..], &[(5, NoCard), (7, DISARMED), (7, Card), (8, DISARMED)]].concat();
     assert_eq!(run(ResetCause::PowerOn, &back), NOTHING);
-    // A card that is lost for a moment in flight, and after it.
     let lost = [&flown[..2], &[(2, NoCard), (3, Card), (4, ARMED)]].concat();
     assert_eq!(run(ResetCause::PowerOn, &lost), NOTHING);
 }
@@ -185,7 +177,6 @@ fn a_line_replaces_the_part_that_it_names_once() {
     }
 }
 
-/// A life of two flights, and five of them flown.
 #[test]
 fn a_part_that_is_due_is_reported_only_if_the_card_does_not_replace_it() {
     let mut params = Params::defaults();
@@ -213,7 +204,6 @@ fn a_part_that_is_due_is_reported_only_if_the_card_does_not_replace_it() {
 #[test]
 fn a_line_whose_end_is_not_read_is_refused() {
     let comes = [(0, Card), (1, DISARMED), (3, DISARMED), (5, DISARMED), (7, DISARMED), (9, DISARMED)];
-    // Of 16 KiB, in pieces of 240 bytes, this is the end.
     let end = 16_384_usize.next_multiple_of(240);
     for (number, set) in [("31", [true, true]), ("31.0", [true, false])] {
         let begin = "PROT_ACTION 1\n# ";

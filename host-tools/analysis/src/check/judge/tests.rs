@@ -14,7 +14,6 @@ use super::*;
 use crate::check::flights::Flight;
 use crate::source::item::hand_said;
 
-/// A record that only a monitor with checks writes.
 const CHECKED: Record<'_> = Record::Usage(Usage::new(Moment::Start, &[]));
 
 const AUTOPILOT: Source = Source { system: 1, component: 1 };
@@ -102,7 +101,6 @@ fn each_check_is_judged_or_says_why_not() {
     assert_eq!(named, VOCABULARY.iter().chain(&WORDS).filter(meant).count());
 }
 
-/// A flight at 30 m, disarmed at 20 s; falls or stays.
 fn disarmed_high(falls: bool) -> Judged {
     disarmed_high_with(falls, None)
 }
@@ -571,7 +569,6 @@ fn a_pause_of_the_recording_is_no_silence_of_an_esc_and_one_that_falls_silent_is
             judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(true)));
         }
         escs(&mut judge, 30_000, 40_000);
-        // A count at the end is no pause.
         let whole = Gap { from: Some(Instant::ZERO), to: Some(Instant::from_millis(39_900)), ..gap };
         judge.item(Instant::from_millis(39_900), Item::Gap(&whole));
         let judged = judge.end();
@@ -625,7 +622,6 @@ fn what_the_board_found_counts_unless_other_limits_are_asked_for() {
     }
 }
 
-/// Armed for twenty seconds; this at the tenth.
 fn armed_and_told(format: Format, item: Item<'_>) -> Judged {
     let mut judge = Judge::new(&Limits::default(), format);
     for tick in 0..200_u64 {

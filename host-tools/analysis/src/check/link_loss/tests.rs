@@ -93,7 +93,6 @@ fn judge(
         if !state.heard {
             continue;
         }
-        // No sensor repeats a value for ever.
         let noise = (now_ms / 50 % 7) as f32 * 0.02;
         let force = if state.lies { [9.8, 0.0, -0.5 - noise] } else { [0.0, 0.0, -9.8 - noise] };
         let rates = Some([state.rate, 0.02, 0.0].map(RadiansPerSecond));

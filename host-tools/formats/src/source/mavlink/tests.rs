@@ -40,13 +40,11 @@ fn one_wrong_time_is_damage_and_changes_no_other_time() {
     for (at, wrong) in [(100, 1_130), (100, 1_400), (100, 9_000), (100, 100), (0, 1_500)] {
         let mut times = usual.clone();
         times[at] = wrong;
-        // Begins the recording, unless it is the wrong one.
         let end = if at == 0 { 198 } else { 199 };
         assert_eq!(told(&times), (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{wrong}");
     }
 }
 
-/// Minutes or hours apart: the last ones are as good as those before.
 #[test]
 fn records_that_are_far_apart_have_right_times_and_a_wrong_one_at_the_end_is_seen() {
     for apart in [610, 30_000, 400_000] {
@@ -77,7 +75,6 @@ fn a_wrong_time_at_either_end_moves_no_other_time() {
             assert_eq!(told, (vec![(Cause::Damaged, Some(at as u64 * 29))], 0, end), "{at} {wrong} {count}");
         }
     }
-    // Silent for some seconds before the last frames.
     let late: Vec<u64> = (80_000..80_200).chain([80_250, 80_251]).collect();
     assert_eq!(told(&late), (vec![], 0, 251));
 }
@@ -98,7 +95,6 @@ fn a_wrong_time_before_a_damaged_stretch_and_before_zeros_moves_no_other_time() 
 
 #[test]
 fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
-    // Every ten seconds the clock falls by 1.1 to 1.4 s.
     let mut times = Vec::new();
     let mut from = 80_000;
     for fall in [11, 14, 12, 13, 0] {
@@ -109,13 +105,11 @@ fn a_clock_that_is_set_back_by_a_second_again_and_again_is_no_damage() {
     assert_eq!((gaps, restarts), (vec![], 4));
 }
 
-/// Attitudes at these seconds of the ground station's and the autopilot's clock.
 fn clock_of(times: &[(u64, u64)]) -> String {
     let tenths: Vec<(u64, u64)> = times.iter().map(|(recorded, boot)| (recorded * 10, boot * 10)).collect();
     clock_of_tenths(&tenths).0
 }
 
-/// A clock in tenths, with the last one's time.
 fn clock_of_tenths(times: &[(u64, u64)]) -> (String, u64) {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let record = |(recorded, boot): &(u64, u64)| {
@@ -175,7 +169,6 @@ fn a_frame_with_a_wrong_checksum_is_damage_and_one_of_an_unknown_message_cannot_
     let mut bytes: Vec<u8> = (1_000..1_040).flat_map(|tenth| record(&tenth)).collect();
     bytes[10 * 29 + 20] ^= 4;
     bytes[12 * 29 + 22] ^= 1;
-    // The second byte of a message's number.
     for at in [20, 21, 22] {
         bytes[at * 29 + 8 + 9] = 200;
     }
@@ -234,7 +227,6 @@ fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_an
     let place_of = |records: &[Vec<u8>], at: usize| records[..at].concat().len() as u64;
     let place = |at: usize| place_of(&records, at);
     assert_eq!(frames_and_gaps(records.concat()), (60, vec![]));
-    // The length of MAVLink 1 and 2, with each other value.
     let (mut swallow, at_length) = (0, TIME_BYTES + 1);
     for at in [20, 21, 22, 57] {
         for length in 0..=u8::MAX {
@@ -254,7 +246,6 @@ fn a_record_whose_length_is_that_of_several_or_whose_end_is_missing_is_damage_an
         }
     }
     assert!(swallow >= 12, "{swallow}");
-    // The cut record's frame ends with the next one.
     let mut cut = records;
     let (keep, start) = (cut[22].len() - record(&23).len(), place_of(&cut, 22));
     cut[22].truncate(keep);
@@ -313,7 +304,6 @@ fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     told
 }
 
-/// Attitudes at these seconds of the autopilot's clock, raw.
 fn attitudes(seconds: std::ops::Range<u32>) -> Vec<u8> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let frame = |second| encoder.frame(&mut buffer, &Packet::new(30).u32(0, second * 1_000)).to_vec();
@@ -341,7 +331,6 @@ fn another_raw_recording_that_was_joined_on_is_told_from_a_restart() {
     assert_eq!(told_raw([attitudes(60..100), attitudes(3..40)].concat()), ["restart"]);
 }
 
-/// Attitudes after 60 to 260 s, ten a second, at times made of the passed seconds.
 fn ten_a_second(recorded: impl Fn(f64) -> u64) -> Vec<u8> {
     let (mut encoder, mut buffer) = (Encoder::of(1, 1), [0; FRAME_BYTES_MAX]);
     let record = |tenth: u64| {
@@ -377,13 +366,10 @@ fn where_the_recorded_times_stand_still_the_autopilots_count_and_it_is_damage() 
     // Half a minute of standing still.
     let stretch = of(&|passed_s| sound(if (50.0..80.0).contains(&passed_s) { 50.0 } else { passed_s }));
     assert!(is_mended(stretch.clone()), "{stretch:?}");
-    // The frames of its start come at once.
     let burst = of(&|passed_s| sound((passed_s - 8.0).max(0.0)));
     assert!(burst.0.is_empty() && (1_960..=2_010).contains(&burst.2), "{burst:?}");
-    // A link that holds back five seconds again and again is sound.
     let held = of(&|passed_s| sound((passed_s / 5.0).ceil() * 5.0));
     assert_eq!((held.0, held.1), (vec![], 0));
-    // A simulator at twenty times the speed is sound too.
     assert_eq!(of(&|passed_s| sound(passed_s / 20.0)), (vec![], 0, 99));
 }
 

@@ -150,7 +150,6 @@ fn a_wrong_time_right_before_a_damaged_place_moves_no_other_time() {
         let log = beginning(|index, time| if index == 200 { time + shift * SECOND } else { time });
         // Each data message has 18 bytes.
         let next = log.len() - (400 - 201) * 18;
-        // A header; three blocks and half of a time; all to the end.
         for (from, bytes) in [(next, 3), (next - 4, 1_536), (next, 6_000)] {
             let mut log = log.clone();
             let to = log.len().min(from + bytes);
@@ -211,7 +210,6 @@ fn data_that_was_appended_to_a_log_that_ends_in_the_middle_of_a_message_is_read(
     assert_eq!(read.of("gap"), ["Cut a message that the end cuts off"]);
 }
 
-/// Near the end of a read chunk, or the longest message.
 #[test]
 fn a_log_that_is_cut_near_any_multiple_of_64_kib_says_so_unless_it_is_cut_between_two_messages() {
     const SEAM: usize = 64 * 1024;
@@ -353,7 +351,6 @@ fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definition
         .format("position:uint64_t timestamp;double x;")
         .subscribe(0, 0, "position")
         .data(0, 2 * SECOND, &1.25_f64.to_le_bytes());
-    // The header is not the rest of a cut message.
     let cut = [&log[..log.len() - 5], &other.bytes].concat();
     let told = read(&cut);
     assert_eq!((told.of("joint").len(), told.of("row position_2")), (1, vec!["0,2000000,1.25"]));
@@ -362,7 +359,6 @@ fn a_log_that_was_joined_to_another_is_another_recording_with_its_own_definition
     let read = read(&log);
     assert_eq!((read.of("joint").len(), read.of("restart").len(), read.gaps.len()), (1, 0, 0));
     assert_eq!(read.of("row position_2"), ["0,2000000,1.25"]);
-    // A second and a bit after the first log.
     assert_eq!(read.items.last().map(|(at, _)| *at), Some(3 * SECOND + 900_001));
 }
 
@@ -426,7 +422,6 @@ fn truncation_at_every_byte_gives_what_came_before() {
 #[test]
 fn no_flipped_bit_costs_more_than_its_neighbours() {
     let log = small().bytes;
-    // From the first message of data on.
     let data = log.len() - 20 * 18 - 3 * 11;
     for bit in data * 8..log.len() * 8 {
         let mut flipped = log.clone();
@@ -438,7 +433,6 @@ fn no_flipped_bit_costs_more_than_its_neighbours() {
 
 #[test]
 fn lies_of_any_kind_take_neither_a_panic_nor_memory() {
-    // Harmful values in each byte of the definitions.
     let log = small().bytes;
     for at in 0..log.len().min(420) {
         for value in [0, 1, 0x20, 0x3a, 0x5b, 0x7f, 0x80, 0xff] {

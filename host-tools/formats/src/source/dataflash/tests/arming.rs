@@ -93,7 +93,6 @@ fn a_log_that_opens_before_arming_begins_disarmed() {
     assert_eq!(changes(&refused), [(1, false)]);
     assert!(is_said(&refused, "does not tell whether it was armed"), "{:?}", refused.said);
 
-    // The message of arming was not kept.
     let mut log = copter(0.0);
     log.attitudes(2..6);
     event(&mut log, 6, 11);
@@ -101,7 +100,6 @@ fn a_log_that_opens_before_arming_begins_disarmed() {
     assert_eq!(changes(&seen(&log.bytes)), [(1, true), (6, false)]);
 }
 
-/// A plane of 2014: 20 m/s from 10 s to 20 s, then gliding against the wind until 40 s.
 #[test]
 fn a_plane_whose_log_has_no_word_about_arming_is_armed_while_it_flies() {
     let mut log = "ArduPlane V3.1.2beta1 (834f90e8)\n\

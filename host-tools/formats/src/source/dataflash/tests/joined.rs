@@ -2,7 +2,6 @@
 
 use super::*;
 
-/// Ten seconds of attitudes, and a type that differs in each log.
 fn flight(firmware: &str, from: u64, letter: &str) -> Writer {
     let mut log = Writer::new();
     log.format(160, "MSG", "QZ", "TimeUS,Message");

@@ -87,7 +87,6 @@ fn wrong_times_of_the_first_messages_move_no_other_time() {
             let first = log.bytes.len();
             tenths(&mut log, 11..100);
             for message in 0..count {
-                // No attitude is among the first nine.
                 set_time(&mut log, first + message * 12, seconds);
             }
             let (gaps, restarts, end) = told(&log.bytes);
@@ -107,7 +106,6 @@ fn a_wrong_time_of_the_last_messages_is_told_and_a_saved_parameter_after_half_a_
         tenths(&mut log, 300 - count..300);
         for message in 0..count {
             let tenth = (300 - count + message) as f64 / 10.0;
-            // Whole seconds would have an attitude each.
             set_time(&mut log, last + message as usize * 12, tenth + shift);
         }
         let (gaps, restarts, end) = told(&log.bytes);
