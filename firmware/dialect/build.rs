@@ -142,7 +142,6 @@ fn only(text: &str, kept: &BTreeSet<&str>) -> Result<String> {
     Ok(out)
 }
 
-/// The folder into which cargo unpacked the `mavlink` crate of `Cargo.lock`.
 fn mavlink_crate_dir() -> Result<PathBuf> {
     let metadata = cargo_metadata::MetadataCommand::new()
         .other_options(vec!["--filter-platform".into(), env::var("TARGET")?])

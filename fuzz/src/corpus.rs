@@ -52,7 +52,6 @@ fn tlog() -> Vec<u8> {
     times.flat_map(|time| [&time.to_be_bytes()[..], &HEARTBEAT].concat()).collect()
 }
 
-/// Entries of a flight of a few seconds, for the target `page`: each kind of message with numbers in it.
 fn entries() -> Vec<u8> {
     let mut out = Vec::new();
     let heartbeat = [0, 0, 0, 0, 2, 3, 81, 4, 3];

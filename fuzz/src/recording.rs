@@ -38,7 +38,6 @@ fn stream(path: &Path, length: usize) {
     source.remark();
 }
 
-/// A compressed file is left to `stream`: its length does not limit its items.
 fn items(path: &Path, length: usize) {
     let Ok(recording) = Place::file(path).open() else { return };
     let mut count = 0;

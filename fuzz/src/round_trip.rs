@@ -18,7 +18,6 @@ impl SectorSink for Card {
     }
 }
 
-/// Pieces of the input: each begins with its length, its time, and its way of becoming a frame.
 fn pieces(mut data: &[u8]) -> Vec<(u64, Vec<u8>)> {
     let (mut pieces, mut at_ms) = (Vec::new(), 0);
     while let [len, step, kind, rest @ ..] = data {

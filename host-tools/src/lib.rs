@@ -48,7 +48,6 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// `check` goes before a file in place of a command.
 fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
     let is_file = |first: &OsString| {
         let is_command = Cli::command().find_subcommand(first).is_some() || first == "help";

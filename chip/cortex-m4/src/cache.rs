@@ -34,7 +34,6 @@ impl Default for Cache {
     }
 }
 
-/// Eight regions of half a gibibyte with a mebibyte each, so that flash and memory differ.
 #[inline]
 fn page(address: u32) -> (usize, u64) {
     let page = (address >> PAGE_BITS & 0xFFF) | address >> 29 << 12;

@@ -321,7 +321,6 @@ impl Core {
         }
     }
 
-    /// Registers from the stack that the return names.
     fn unstack<B: Bus>(&mut self, bus: &mut B, value: u32) {
         let to_thread = value & 8 != 0;
         let to_process = value & 4 != 0 && to_thread;

@@ -36,7 +36,6 @@ impl Mpu {
         }
     }
 
-    /// Aliases are the next regions in its group of four.
     fn region(&self, offset: u32) -> Region {
         self.regions[self.alias(offset)]
     }

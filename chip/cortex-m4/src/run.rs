@@ -65,7 +65,6 @@ impl Core {
         Ok(())
     }
 
-    /// In an IT block: this instruction's condition; the state advances.
     #[inline]
     fn turn(&mut self) -> bool {
         let holds = self.flags.holds(self.it >> 4);
@@ -102,7 +101,6 @@ impl Core {
         bus.fetch(address).map_err(|_| Trap::FetchBus)
     }
 
-    /// `SysTick`, exceptions, sleep and the run's end, between two instructions. Sets the next deadline.
     #[cold]
     #[inline(never)]
     fn attend<B: Bus>(&mut self, bus: &mut B) -> Option<Outcome> {

@@ -32,7 +32,6 @@ impl Rounding {
         [Rounding::Nearest, Rounding::Up, Rounding::Down, Rounding::Zero][(status >> 22 & 3) as usize]
     }
 
-    /// Away from zero; the highest discarded bit is `half`.
     fn goes_up(self, negative: bool, odd: bool, cut: u64, half: u64) -> bool {
         match self {
             Rounding::Nearest => cut > half || cut == half && odd,

@@ -49,7 +49,6 @@ fn place(address: u32) -> Place {
 }
 
 impl Chip {
-    /// How long a busy flash keeps its reader, at this cycle.
     fn stall(&mut self, now: u64) -> u32 {
         let Some((end, (from, bytes))) = self.flash.finish() else { return 0 };
         self.changed.push((FLASH.0 + from, bytes));

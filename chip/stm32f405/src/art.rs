@@ -274,7 +274,6 @@ mod tests {
         }
     }
 
-    /// A loop of three lines, first and third time, and straight code.
     fn waits(prefetch: bool, cache: bool) -> (u32, u32, u32) {
         let mut art = Art::new();
         art.latency = 5;

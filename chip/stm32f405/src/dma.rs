@@ -120,7 +120,6 @@ impl Stream {
         }
     }
 
-    /// Switched off: the flushed FIFO ends the transfer.
     fn end(&mut self, port: &mut impl Port) {
         self.flags |= if self.drain(port, true).is_break() { TEIF } else { 0 };
         self.flags |= TCIF;
@@ -159,7 +158,6 @@ impl Stream {
         ControlFlow::Continue(())
     }
 
-    /// Of the device's size; break: the bus refused.
     fn item(&mut self, port: &mut impl Port) -> ControlFlow<()> {
         let refused = ControlFlow::Break(());
         let psize = Self::size(self.cr >> 11);

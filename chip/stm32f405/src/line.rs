@@ -136,7 +136,6 @@ pub fn chars(bytes: &[u8], start: Ps, baud: f64) -> (Vec<Char>, Ps) {
 mod tests {
     use super::*;
 
-    /// Bytes received right from a sender off by so many per mille.
     fn right(permille: f64) -> usize {
         let bytes: Vec<u8> = (0..=255).collect();
         let (chars, _) = chars(&bytes, 1_000, 921_600.0 * (1.0 + permille / 1_000.0));

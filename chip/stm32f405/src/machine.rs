@@ -185,7 +185,6 @@ impl Machine {
         Ok(())
     }
 
-    /// The processor may have waited beyond it.
     fn reset(&mut self, cause: Cause, at: Now) {
         let now = Now { cycle: self.core.cycles(), ps: at.ps.max(self.now) };
         self.resets.push((now.ps, cause));

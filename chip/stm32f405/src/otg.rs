@@ -336,7 +336,6 @@ impl Otg {
         self.over = now.saturating_add(lasts);
     }
 
-    /// Number of the frame: one each millisecond while the bus is awake, in 11 bits.
     fn frame(&mut self, now: Ps) -> u32 {
         let is_awake = !matches!(self.action, Action::Attach | Action::Reset | Action::Sleep(_));
         if self.host.is_some() && self.enumerated && is_awake {
@@ -368,7 +367,6 @@ impl Otg {
         self.enumerated && self.address == u32::from(address)
     }
 
-    /// Words in the receive FIFO, with a status word for each packet.
     fn taken(&self) -> usize {
         self.received.iter().map(|packet| 1 + packet.words.len()).sum::<usize>() + self.popped.len()
     }
@@ -605,7 +603,6 @@ impl Otg {
         Some(())
     }
 
-    /// `GRSTCTL` without a reset of the core.
     fn flush(&mut self, value: u32) -> Option<()> {
         if value & 1 == 1 {
             return None;

@@ -28,7 +28,6 @@ fn read(chip: &mut Chip, address: u32) -> u32 {
     chip.read(address, Size::Word, now).expect("something is there")
 }
 
-/// 115,942 baud of 16 MHz; DMA: a ring of eight bytes in, four bytes out.
 fn port(chip: &mut Chip) {
     for (address, value) in [
         (RCC + 0x30, 1 | 1 << 22 | 0x0010_0000),

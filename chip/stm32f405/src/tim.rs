@@ -265,7 +265,6 @@ impl Tim {
 mod tests {
     use super::*;
 
-    /// The time driver's TIM2: 1 MHz of 84 MHz, 16 bits, processor at 168 MHz.
     fn driver() -> Tim {
         let mut tim = Tim::new(32, 4);
         tim.set_clock(0, 2);

@@ -229,7 +229,6 @@ impl Assembler {
         }
     }
 
-    /// A jump of the number: the log may continue from it.
     fn jumped(&mut self, mut step: Step) {
         // Before the first output, only a log that begins at number 0 has known places: lower numbers in a ring's
         // oldest file are old.

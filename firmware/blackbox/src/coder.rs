@@ -126,7 +126,6 @@ pub(crate) trait Coder {
     /// A bit that is one with probability `one` of 2^12, 1 to 4095.
     fn bit(&mut self, one: u32, bit: bool) -> bool;
 
-    /// A number of up to 32 bits, each as likely as any.
     #[inline]
     fn bits(&mut self, value: u32, bits: u32) -> u32 {
         if bits <= 16 {
@@ -274,7 +273,6 @@ impl Decoder {
         }
     }
 
-    /// The interval got too small without its top byte being settled: rare.
     #[cold]
     #[inline(never)]
     fn take_cut(&mut self, input: &[u8]) {
@@ -301,7 +299,6 @@ impl Decoder {
     }
 }
 
-/// The next four bytes; zeros after the last one.
 #[inline]
 fn ahead(input: &[u8], at: usize) -> u32 {
     match input.get(at..).and_then(|rest| rest.first_chunk()) {

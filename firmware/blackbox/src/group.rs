@@ -271,7 +271,6 @@ impl GroupDecoder {
     }
 }
 
-/// Whether `next` continues the group of `last`: a partial sector ends it.
 fn follows(last: &Header, next: &Header) -> bool {
     last.session == next.session
         && last.number.wrapping_add(1) == next.number

@@ -220,7 +220,6 @@ impl Column {
         Some((sum, held.last, rest))
     }
 
-    /// The only lost one that a sum covers and that was not found: its place among the lost ones, and its number.
     fn alone(&self, index: usize, lost: &[u32], found: &[Option<Sector>; 2]) -> Option<(usize, u32)> {
         let (_, last, _) = self.held(index)?;
         let is_open = |place: usize| found.get(place).is_none_or(Option::is_none);

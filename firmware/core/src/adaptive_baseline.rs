@@ -89,7 +89,6 @@ impl AdaptiveBaseline {
         self.is_known().then_some((times * self.base(grain)).max(highest))
     }
 
-    /// The base of multiples: a simulator's figure may be exactly 0.
     fn base(&self, grain: f32) -> f32 {
         self.mean.max(grain / 10.0)
     }

@@ -183,7 +183,6 @@ impl Alerts {
         wrong.map(|urgency| f32::from(urgency as u8)).or(was_said.then_some(good))
     }
 
-    /// Whether flags of `SYS_STATUS` cover the cause and call it healthy.
     fn is_cleared(&self, now: BootMs, cause: Cause) -> bool {
         let comes = |flags: &Flags| {
             let has = flags.now.both(flags.before).has(cause);

@@ -163,7 +163,6 @@ impl Cells {
         self.settings.first().is_some_and(|settings| settings[Setting::Full as usize] > 0.0)
     }
 
-    /// The counts that the parameters leave of these. A parameter that contradicts all of them is ignored.
     fn by_settings(&self, id: u8, possible: Counts) -> (Counts, bool) {
         let Some(settings) = self.settings.get(usize::from(id)) else { return (possible, false) };
         let (mut left, mut said) = (possible, false);

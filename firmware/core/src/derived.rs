@@ -81,7 +81,6 @@ impl Lately {
 }
 
 impl Derived {
-    /// Anything heard: after a silence of the link, or as usual.
     fn hear(&mut self, at: BootMs) {
         let pause_s = self.heard.map(|heard| at.since(heard).as_secs_f32());
         if pause_s.is_none_or(|pause_s| pause_s > SILENCE_S.max(SILENCE_PAUSES * self.pause_s)) {

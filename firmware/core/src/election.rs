@@ -173,7 +173,6 @@ mod tests {
     const OURS: Source = Source { system: 1, component: 1 };
     const OTHER: Source = Source { system: 7, component: 1 };
 
-    /// Each system has a period in ms, and a heartbeat every second. Returns the vehicle at the end.
     fn hear(
         election: &mut Election,
         mut vehicle: Option<Source>,

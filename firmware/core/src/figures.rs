@@ -189,7 +189,6 @@ impl Figures {
     }
 }
 
-/// Hovering, or cruising on wings, and not leaning.
 fn is_steady(now: BootMs, vehicle: &Vehicle, flight: &Flight) -> bool {
     let wings = vehicle
         .heartbeat

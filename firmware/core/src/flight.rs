@@ -301,7 +301,6 @@ impl Flight {
         (change, event)
     }
 
-    /// In the air a descent may break off; on the ground the last descent was the touch.
     fn note_touch(&mut self, now: BootMs, vehicle: &Vehicle) {
         let height_m = height_m(now, vehicle);
         if !self.airborne() {
@@ -444,7 +443,6 @@ impl Flight {
         })
     }
 
-    /// It flies on, or is armed again: the mishap is over.
     fn calm(&mut self) {
         self.stage = match (self.airborne_since, self.flew_at) {
             (Some(_), _) => Stage::Airborne,
@@ -515,7 +513,6 @@ impl Flight {
         event
     }
 
-    /// For how long the witnesses must say so until it is in the air; `None` if they do not.
     fn takes_off(&self, now: BootMs, vehicle: &Vehicle, votes: Votes) -> Option<Millis> {
         let has_no_thrust = votes.stands & THRUST != 0
             && !is_on_wings(now, vehicle)
@@ -537,7 +534,6 @@ impl Flight {
         }
     }
 
-    /// For how long the witnesses must say so until it is on the ground; `None` if they do not.
     fn lands(votes: Votes) -> Option<Millis> {
         let (flies, stands) = votes.count();
         if stands >= 2 && stands >= flies + 2 && votes.stands & WORD != 0 {

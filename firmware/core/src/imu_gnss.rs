@@ -160,8 +160,6 @@ mod tests {
 
     const STEP_S: f32 = 0.2;
 
-    /// The greatest missing force in a flight of 20 s: of a swinging force, a part that no velocity has, and a
-    /// receiver with a delay.
     fn most(swings_mps2: f32, untrue_mps2: f32, late_s: f32) -> f32 {
         let turns = |time_s: f32| time_s * core::f32::consts::TAU / 5.0;
         let velocity = |time_s: f32| -swings_mps2 * 5.0 / core::f32::consts::TAU * libm::cosf(turns(time_s));

@@ -208,7 +208,6 @@ impl Inertial {
         }
     }
 
-    /// Whether the force is further than 45 degrees from the direction that this attitude demands.
     fn is_carried_elsewhere(&self, roll: Radians, pitch: Radians) -> bool {
         const FAR: f32 = 0.707;
         let across = libm::cosf(pitch.0);

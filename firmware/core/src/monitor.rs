@@ -79,7 +79,6 @@ const CELLS_COME: Millis = Millis::from_secs(45);
 
 const _: () = assert!(size_of::<Monitor>() <= 16 * 1024 - 64);
 
-/// The first one does if none reports itself.
 fn carries(vehicle: &Vehicle, battery: usize) -> bool {
     let known = vehicle.batteries.get(battery).and_then(Latest::get);
     known.map_or(battery == 0, |known| known.lithium && known.feeds == Feeds::Vehicle)
@@ -246,13 +245,11 @@ impl Monitor {
         }
     }
 
-    /// Whether the stored life has a flight that began and did not end: we were restarted in the air.
     fn has_open_flight(&self) -> bool {
         let count = |counter| self.before.totals.raw(counter);
         count(UsageCounter::Flights) > count(UsageCounter::Landings) + count(UsageCounter::Mishaps)
     }
 
-    /// One component each tick: divisions are expensive, and there is time.
     fn step_wear(&mut self) {
         let place = usize::from(self.wear_next);
         self.describe_component(place);

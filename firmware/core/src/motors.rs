@@ -307,7 +307,6 @@ impl Motors {
         self.furthest = further.0;
     }
 
-    /// The median speed of all fitted motors (the lower of two); `None` while they do not turn.
     fn middle_speed(&self) -> Option<f32> {
         let speeds = || self.speeds().map(|(_, speed)| speed);
         let half = speeds().count() / 2;
@@ -318,7 +317,6 @@ impl Motors {
         speeds().find(is_middle).filter(|speed| *speed >= TURNING_RPM)
     }
 
-    /// Held speeds, or zeros of ESCs that lost their telemetry, do not count.
     fn turn_as_in_flight(&self, now: BootMs, middle_rpm: f32) -> bool {
         let mut fitted = self.tracks.iter().filter(|track| track.is_fitted());
         fitted.all(|track| {

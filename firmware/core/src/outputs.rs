@@ -245,7 +245,6 @@ impl MotorOutputs {
         usize::from(self.count) == count
     }
 
-    /// Without a received take-off only an output alone at an end of its range has a meaning.
     fn judge_unseen(&mut self, at: BootMs, given: &[f32], used: bool, flies_level: bool) -> (u8, Verdict) {
         let (place, verdict) = self.verdict;
         // The one opposite may idle then.
@@ -281,7 +280,6 @@ impl MotorOutputs {
             && matches!(self.verdict.1, Verdict::Saturated | Verdict::ShutOff)
     }
 
-    /// An output above idle while disarmed is a servo's, or a motor's in a test.
     fn note_idle(&mut self, outputs: &[u16; JUDGED_MAX], parts: &[f32; JUDGED_MAX], armed: bool) {
         let used = self.outputs.iter_mut().zip(outputs).zip(parts).filter(|((_, now), _)| **now > 0);
         for ((output, _), given) in used {
@@ -289,7 +287,6 @@ impl MotorOutputs {
         }
     }
 
-    /// Includes outputs beyond the motors of the reported frame.
     fn note_ends(&mut self, parts: &[f32; JUDGED_MAX]) {
         for (output, given) in self.outputs.iter_mut().zip(parts) {
             output.carried |= carries(given);
@@ -423,7 +420,6 @@ fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option
     rest.all(|(_, given)| others(given)).then_some(place as u8)
 }
 
-/// No other motor is near the end of its range, and none idles.
 fn saturated_alone(given: &[f32]) -> Option<u8> {
     only(given, is_full, |given| (IDLE..SHARES).contains(given))
 }
@@ -452,8 +448,6 @@ mod tests {
 
     const STEP_S: f32 = 0.2;
 
-    /// The verdict on a flat octocopter whose first motor lost this share of its thrust, percent, for 60 s. In one
-    /// message of seven another motor gets a higher command.
     fn octocopter(lost: f32) -> Vec<(u8, f32)> {
         let mut outputs = MotorOutputs::default();
         let steps = 0..350_usize;

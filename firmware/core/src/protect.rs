@@ -344,7 +344,6 @@ impl Protect {
         Some(if by_itself { Input::ModeByAutopilot } else { Input::ModeByPilot })
     }
 
-    /// A change, or an autopilot with unknown modes.
     fn has_changed_since(&self, now: BootMs, vehicle: &Vehicle, at: BootMs) -> bool {
         modes(vehicle).is_none() || self.changed_at.age(now).is_some_and(|age| age <= now.since(at))
     }

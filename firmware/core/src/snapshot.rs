@@ -76,7 +76,6 @@ const KEPT: [Quantity; 24] = [
     Quantity("height_m", |it| Some(it.vehicle.global.within(it.now, MOTION_AGE)?.relative_altitude.0)),
 ];
 
-/// A figure of the first battery; of `SYS_STATUS` if none reports itself.
 fn of_battery<T>(
     inputs: &Inputs<'_>,
     battery: fn(&Battery) -> Option<T>,

@@ -92,8 +92,6 @@ impl Stuck {
         self.changes >= KNOWN_SAMPLES
     }
 
-    /// Whether this one took a new value in the second half of the other's repeated time. A change of both comes in
-    /// two messages, one after the other.
     fn changed_during(&self, other: &Self) -> bool {
         self.since_ms.wrapping_sub(other.since_ms) as i32 > i32::from(other.lasts_ms / 2)
     }
@@ -168,7 +166,6 @@ impl Repeats {
         self.moved.step(now, step_s, vehicle);
     }
 
-    /// How far the vehicle has moved so that a kind's values change, and how far it must.
     const fn moved(&self, kind: Kind) -> (f32, f32) {
         match kind {
             Kind::Barometer => (self.moved.climbed_m, CLIMBED_M),

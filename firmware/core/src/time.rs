@@ -177,7 +177,6 @@ impl Add for Millis {
 mod tests {
     use super::*;
 
-    /// Just before the clock wraps, at it, and after a month.
     #[test]
     fn times_are_compared_across_the_wrap() {
         const WRAP_MS: u64 = 1 << 32;

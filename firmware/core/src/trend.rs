@@ -129,7 +129,6 @@ mod tests {
     use super::*;
     use crate::units::{Amperes, Volts};
 
-    /// A battery of `ohm` whose current swings between 10 and 20 A, for `samples`.
     fn load(resistance: &mut Resistance, ohm: f32, samples: u32) {
         for sample in 0..samples {
             let current = if sample / 5 % 2 == 0 { 10.0 } else { 20.0 };

@@ -393,7 +393,6 @@ impl Vehicle {
         (self.boot, self.odd_boot, self.boot_armed) = (Some((boot_ms, at)), None, self.armed());
     }
 
-    /// The first sensor's figures serve; the others measure the same thing.
     fn take_imu(&mut self, at: BootMs, imu: Imu) {
         if imu.instance == 0 {
             self.imu.set(at, imu);
@@ -519,7 +518,6 @@ mod tests {
         assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(BootMs::from_millis(7))));
     }
 
-    /// The boot times of an autopilot that has run for 200 s, every tenth of a second, but for one of them.
     fn reboots_with(odd_ms: u32, restarts: bool) -> (u32, Option<BootMs>) {
         let mut vehicle = known();
         for step in 0..600 {

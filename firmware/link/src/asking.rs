@@ -375,7 +375,6 @@ impl Asking {
         command.or_else(|| self.parameter(known).map(What::Parameter))
     }
 
-    /// The next parameter that this autopilot may have, once the rates were checked.
     fn parameter(&self, known: &Known) -> Option<usize> {
         let px4 = match known.autopilot {
             Autopilot::Px4 => true,
@@ -386,7 +385,6 @@ impl Asking {
         (0..KNOWN.len()).find(due).filter(|_| self.window == ROUND)
     }
 
-    /// The autopilot refused messages that every autopilot has.
     fn knows_no_intervals(&self) -> bool {
         let both = self.messages.iter().zip(&WANTED).filter(|(_, wanted)| wanted.1 == By::Both);
         both.filter(|(message, _)| message.has == Has::No).count() >= 3
@@ -400,7 +398,6 @@ const fn is_sent_by(wanted: &Wanted, autopilot: Autopilot) -> bool {
     )
 }
 
-/// Factor by which all intervals are stretched to fit the line.
 fn stretch(autopilot: Autopilot, baud: u32) -> u32 {
     let sent = WANTED.iter().filter(|wanted| is_sent_by(wanted, autopilot));
     let bytes_per_s: u32 = sent.map(|wanted| u32::from(wanted.2) * u32::from(wanted.3)).sum();

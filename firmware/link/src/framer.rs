@@ -221,7 +221,6 @@ impl Framer {
         self.judge_unknown(&header, known, idle)
     }
 
-    /// Decides a candidate whose definition is not ours, or only looks as if it were.
     fn judge_unknown(&mut self, header: &Header, known: Known, idle: bool) -> Verdict {
         let held = &self.buffer[self.start..self.end];
         let len = header.frame_len();
@@ -307,7 +306,6 @@ impl Known {
     }
 }
 
-/// Whether a whole frame of a known definition begins inside `candidate`, after its first byte.
 fn holds_a_known_frame(candidate: &[u8]) -> bool {
     (1..candidate.len()).any(|at| {
         let bytes = &candidate[at..];

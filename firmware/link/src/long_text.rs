@@ -36,7 +36,6 @@ impl<'a> Part<'a> {
         Some(Self { severity: fields.u8(0), id: fields.u16(51), sequence: fields.u8(53), words })
     }
 
-    /// Its text ends before the field does.
     const fn is_last(&self) -> bool {
         self.id == 0 || self.words.len() < TEXT_BYTES_MAX
     }
@@ -117,7 +116,6 @@ mod tests {
     use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::packet::Packet;
 
-    /// Time in ms, sender, id, part, words.
     fn causes(parts: &[(u64, u8, u16, u8, &str)]) -> Vec<Cause> {
         let (mut long, mut causes) = (LongTexts::new(), Vec::new());
         for (ms, system, id, sequence, words) in parts {

@@ -185,7 +185,6 @@ mod tests {
     use crate::encode::{Encoder, FRAME_BYTES_MAX};
     use crate::frame::{Check, Frame};
 
-    /// The end-to-end tests check the layouts with pymavlink; this test checks their lengths.
     #[test]
     fn every_message_of_ours_is_as_long_as_its_definition_allows() {
         let name = "SIXTEEN_LETTERS_";

@@ -292,7 +292,6 @@ impl Outlet {
 mod tests {
     use super::*;
 
-    /// Budget by each frame's beginning and end.
     fn assert_budget(sent: &[(u64, usize)], budget: u32, baud: u32) {
         let mut free_us = 0;
         let mut spans = Vec::new();

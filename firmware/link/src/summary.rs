@@ -88,7 +88,6 @@ struct Turn {
 }
 
 impl Turn {
-    /// Waiting time in 16ths of the interval, at least 1. `None` before it is due.
     fn score(&self, now_ms: u32, interval_ms: u32) -> Option<u32> {
         // Streams jitter, so a frame may be a quarter of the interval early.
         let early = interval_ms / 4;
@@ -101,7 +100,6 @@ impl Turn {
         self.known && now_ms.wrapping_sub(self.seen_ms) <= (interval_ms * GONE).max(GONE_MS)
     }
 
-    /// The next one is an interval later, in step with those before if possible.
     fn took(&mut self, now_ms: u32, interval_ms: u32) {
         let late = now_ms.wrapping_sub(self.due_ms);
         let in_step = late < interval_ms / 2 || late > u32::MAX - interval_ms / 2;
@@ -396,7 +394,6 @@ pub fn state(monitor: &Monitor) -> i32 {
     levels.enumerate().fold(0, |sum, (index, level)| sum | level << (3 * index))
 }
 
-/// `None` if the pilot does not need it.
 fn severity(finding: &Finding) -> Option<Severity> {
     match (finding.level, finding.previous) {
         (Level::Critical, _) => Some(Severity::Critical),

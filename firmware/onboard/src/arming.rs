@@ -68,7 +68,6 @@ mod tests {
     const ARMED: u8 = 0x81;
     const DISARMED: u8 = 0x01;
 
-    /// A heartbeat of this `MAV_TYPE`, `MAV_AUTOPILOT` and `base_mode`.
     fn heartbeat(kind: u8, autopilot: u8, base_mode: u8) -> Vec<u8> {
         let packet = Packet::new(0).u8(4, kind).u8(5, autopilot).u8(6, base_mode).u8(7, 4).u8(8, 3);
         Encoder::of(1, 1).frame(&mut [0; FRAME_BYTES_MAX], &packet).to_vec()

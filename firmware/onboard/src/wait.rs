@@ -25,7 +25,6 @@ mod tests {
 
     use super::*;
 
-    /// Ready after 5 ms; `away_ms` from each poll to the next.
     fn polled(end_ms: u64, away_ms: u64) -> (Option<u64>, u64) {
         let (now_ms, polls) = (Cell::new(0), Cell::new(0));
         let done = until(

@@ -149,7 +149,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         changed.map(|_| ())
     }
 
-    /// Searches many blocks of the directory for a segment that is needed now; the caller tries again.
     fn look_for_next(&mut self) -> Result<(), CardError<D::Error>> {
         let buffers = self.buffers;
         self.look_on(buffers.parity.borrow_mut().lend())?;
@@ -414,7 +413,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         })
     }
 
-    /// If `change` returns `false` (another entry is there), nothing is written.
     #[inline(never)]
     fn change_entry(
         &self,
@@ -510,7 +508,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
     }
 }
 
-/// A file that is no log, by its first cluster and its length.
 fn file_of((first, bytes): (u32, u32)) -> (Segment, u32) {
     // Its last block is read whole.
     let blocks = bytes.checked_next_multiple_of(BLOCK_BYTES as u32).unwrap_or(u32::MAX);
@@ -518,7 +515,6 @@ fn file_of((first, bytes): (u32, u32)) -> (Segment, u32) {
     (Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes)
 }
 
-/// Whether no file has this entry: it was never used, or its file was deleted.
 fn is_unused(entry: &[u8]) -> bool {
     matches!(entry.first(), Some(&(NEVER_USED | DELETED)))
 }

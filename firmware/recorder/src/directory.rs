@@ -146,7 +146,6 @@ impl Directory {
             || first * ENTRIES < self.claimed_end && first - free < VERIFY_BLOCKS / 2
     }
 
-    /// The first block of the FAT from this one on that was not checked for claims.
     fn unverified(&self, from: u32) -> u32 {
         if self.verified.contains(&from) { self.verified.end } else { from }
     }
@@ -243,7 +242,6 @@ impl Directory {
         let _ = self.newest.insert(place, entry);
     }
 
-    /// Removing it changes the sum of names in the same way.
     fn show(&mut self, name: LogName) {
         self.shown = self.shown.saturating_add(1);
         self.names ^= hash(name);
@@ -410,7 +408,6 @@ pub(crate) const fn clusters_of<D>(volume: &Volume<'_, D>, bytes: u32) -> u32 {
     bytes.div_ceil(volume.layout.cluster_blocks * BLOCK_BYTES as u32)
 }
 
-/// The row of clusters that a log claims by its first one and its length.
 fn claimed<D: CardDevice>(volume: &Volume<'_, D>, entry: &LogEntry) -> Option<Range<u32>> {
     let end = entry.first.checked_add(clusters_of(volume, entry.bytes))?;
     let is_sound = volume.is_cluster(entry.first) && volume.is_cluster(end.saturating_sub(1));
@@ -440,7 +437,6 @@ fn mend<D: CardDevice>(
     Ok(changed)
 }
 
-/// The first free cluster of the row, if the FAT follows the row up to there.
 #[inline(never)]
 fn broken_at<D: CardDevice>(
     volume: &Volume<'_, D>,

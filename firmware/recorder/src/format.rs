@@ -184,7 +184,6 @@ fn info_sector(_: &Plan) -> Block {
     block
 }
 
-/// The FAT's first block: media, "clean" flags, and the root directory of one cluster.
 fn fat_begin(_: &Plan) -> Block {
     let mut block = [0; BLOCK_BYTES];
     for (entry, value) in [0x0FFF_FFF8_u32, 0x0FFF_FFFF, 0x0FFF_FFFF].iter().enumerate() {

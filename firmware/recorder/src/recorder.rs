@@ -430,7 +430,6 @@ fn count_in_row(number: u32, waiting: &[Block]) -> usize {
     waiting.iter().enumerate().take_while(follows).count()
 }
 
-/// Seals sectors for this session. With `partial` they become partial copies, or the sectors themselves again.
 #[inline(never)]
 fn seal(blocks: &mut [Block], partial: Option<bool>, session: u32) {
     for block in blocks {

@@ -103,7 +103,6 @@ impl<const SECTOR: usize> SimFlash<SECTOR> {
         }
     }
 
-    /// Word after a cut write of `new`: the old one, the new one, or any mixture of their bits.
     fn torn(&mut self, old: u32, new: u32) -> u32 {
         match self.random() % 4 {
             0 => old,

@@ -275,7 +275,6 @@ impl<P: driver::ControlPipe> GuardedPipe<P> {
         setup
     }
 
-    /// Polls a stage until it is done. `None`: the host has given the transfer up.
     async fn stage<T>(&mut self, mut poll: impl FnMut(&mut P, &mut Context<'_>) -> Poll<T>) -> Option<T> {
         let end = (self.port.now)() + CONTROL_MAX;
         poll_fn(|context| {

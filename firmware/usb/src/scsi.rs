@@ -204,7 +204,6 @@ impl<D: CardDevice> Disk<D> {
         })
     }
 
-    /// Cuts the reply at the host's allocation length.
     fn answer(&mut self, pieces: &[&[u8]], length: u32) -> Answer {
         let mut bytes = 0;
         for (to, from) in self.reply.iter_mut().zip(pieces.iter().copied().flatten()) {
@@ -238,7 +237,6 @@ impl<D: CardDevice> Disk<D> {
         }
     }
 
-    /// Accesses the card. After an error another card may be in the slot.
     fn access<T>(&mut self, act: impl FnOnce(&D) -> Result<T, D::Error>) -> Result<T, Sense> {
         act(&self.card).map_err(|error| match D::trouble(&error) {
             Trouble::Gone => {

@@ -231,7 +231,6 @@ impl Reference {
         local.or_else(|| self.vehicle.global.within(now, AGE_MAX).map(|global| global.velocity))
     }
 
-    /// The first one, or the autopilot's status.
     fn battery(&self, now: time::BootMs, quantity: Quantity) -> Option<Scalar> {
         let battery = self.vehicle.batteries.first().and_then(|battery| battery.within(now, AGE_MAX));
         let system = || self.vehicle.system.within(now, AGE_MAX);

@@ -62,7 +62,6 @@ fn watched<N: FnMut() + Send + 'static>(
     requested
 }
 
-/// The next signal ends the program at once.
 fn tell_apart(wishes: u32, mut next: impl FnMut(), armed: &AtomicBool) {
     let mut last: Option<Instant> = None;
     for wish in 1..=wishes {
@@ -103,14 +102,12 @@ fn set_by_signals(set: &Arc<AtomicBool>) -> io::Result<()> {
     [SIGINT, SIGTERM].into_iter().try_for_each(|signal| flag::register(signal, Arc::clone(set)).map(|_| ()))
 }
 
-/// Each signal ends the program at once where it finds `armed` set.
 fn end_once(armed: &Arc<AtomicBool>) -> io::Result<()> {
     [SIGINT, SIGTERM].into_iter().try_for_each(|signal| {
         flag::register_conditional_shutdown(signal, EXIT_CODE, Arc::clone(armed)).map(|_| ())
     })
 }
 
-/// Without a handler the signal simply ends the program, as before.
 fn note_failure(result: io::Result<()>) {
     if let Err(error) = result {
         note!("Ctrl-C will end the program without closing the log: {error}");

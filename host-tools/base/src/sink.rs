@@ -83,7 +83,6 @@ impl SideOutput {
 }
 
 impl Inside {
-    /// After an error nothing more is written.
     fn attempt(&mut self, act: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
         let done = match &mut self.to {
             To::Nowhere => Ok(()),

@@ -52,7 +52,6 @@ impl<const N: usize> Table<N> {
 }
 
 impl<const N: usize> Display for Table<N> {
-    /// Two spaces between columns, none at the end of a line.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let mut columns = self.columns;
         for (column, cell) in self.rows.iter().flat_map(|row| (0..N).zip(row)) {

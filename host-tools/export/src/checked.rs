@@ -96,7 +96,6 @@ impl OnBoard {
         self.worst = self.worst.max(next.worst);
     }
 
-    /// The worst level, as in `hums check`: advisories are not problems.
     fn verdict(self) -> &'static str {
         match Level::ALL.get(usize::from(self.worst)) {
             Some(level @ (Level::Warning | Level::Critical)) => level.name(),

@@ -92,7 +92,6 @@ fn length(bytes: &[u8]) -> Option<usize> {
     }
 }
 
-/// How urgent a text about it is; `None` without a text.
 fn severity(finding: &Finding) -> Option<Severity> {
     match (finding.level, finding.previous) {
         (Level::Critical, _) => Some(Severity::Critical),

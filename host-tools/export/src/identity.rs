@@ -167,7 +167,6 @@ impl Sources {
     }
 }
 
-/// A text for every tool, and a name for every file system.
 fn path_name(name: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || matches!(letter, '.' | '_' | '-');
     let plain: String = name.chars().map(|letter| if is_plain(letter) { letter } else { '-' }).collect();

@@ -400,7 +400,6 @@ fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
 }
 
 impl Task<'_> {
-    /// Decodes a log. One of several whose outputs exist is skipped, with a remark.
     fn decode_or_skip(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
         let done = self.decode(work, all);
         if self.logs == 1 {
@@ -465,7 +464,6 @@ impl Task<'_> {
         Ok(Done { outcome, made, remarks, ..read })
     }
 
-    /// The context of a log, needed before its first byte is written.
     fn context(&self, work: &NamedLog<'_>) -> Result<Context> {
         let mut context = Context {
             formats: self.formats.clone(),
@@ -546,7 +544,6 @@ impl Task<'_> {
     }
 }
 
-/// Cuts a log midway between a landing and the next take-off.
 fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
     let flights = check::overview(log)?.contents.flights();
     let middle = |landing: Instant, take_off: Instant| {
@@ -592,7 +589,6 @@ impl PartReceiver<Self> for Gaps {
     }
 }
 
-/// The message for a log without the requested data, with the log's own times.
 fn nothing_of(log: &Place, summary: &RecordingSummary, selection: &Selection) -> String {
     let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
     let names = selection.names().join(", ");

@@ -45,7 +45,6 @@ fn names(table: &Table) -> Option<Names> {
     Some((kept(&table.name)?, columns))
 }
 
-/// A name that lives as long as the program; `None` beyond the limit.
 fn kept(name: &str) -> Option<&'static str> {
     static KEPT: Mutex<(BTreeSet<&'static str>, usize)> = Mutex::new((BTreeSet::new(), 0));
     let mut kept = KEPT.lock().ok()?;

@@ -97,7 +97,6 @@ impl Selection {
     }
 }
 
-/// Order of a time and a limit; `None` if one is UTC and the other cannot be.
 fn compare(at: Instant, limit: When, epochs: &Epochs) -> Option<Ordering> {
     match limit {
         When::Seconds(limit) => Some(at.as_micros().cmp(&limit)),
@@ -105,7 +104,6 @@ fn compare(at: Instant, limit: When, epochs: &Epochs) -> Option<Ordering> {
     }
 }
 
-/// A message's id by its name, `UNKNOWN_12345` and plain numbers included.
 fn id_of(name: &str) -> Result<u32> {
     let upper = name.to_ascii_uppercase();
     if let Some(message) = hums_dialect::messages().iter().find(|message| message.name == upper) {

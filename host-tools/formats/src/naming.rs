@@ -211,7 +211,6 @@ fn file_name(place: &Place) -> String {
     name.map_or_else(|| "recording".to_owned(), |name| cut(name.to_string_lossy().into_owned()))
 }
 
-/// Leaves room for box, session, number, `.tlog.gaps.csv`.
 fn cut(mut name: String) -> String {
     let end = (0..=NAME_BYTES_MAX.min(name.len())).rev().find(|at| name.is_char_boundary(*at));
     name.truncate(end.unwrap_or(0));
@@ -225,7 +224,6 @@ fn fingerprint(path: &Path) -> Result<[u8; 16]> {
     Ok(digest.first_chunk().copied().unwrap_or_default())
 }
 
-/// Number on the card, or file name.
 fn base(log: &Log) -> String {
     let file = log.files.first().map_or(log.name.as_str(), String::as_str);
     let path = Path::new(file);

@@ -38,7 +38,6 @@ pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(without_slash)
 }
 
-/// An offset in seconds, of at most a week.
 fn offset(text: &str) -> Result<f64, String> {
     const WEEK_S: f64 = 604_800.0;
     let offset = text.parse::<f64>().map_err(|error| error.to_string())?;

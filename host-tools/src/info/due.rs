@@ -53,7 +53,6 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
     Ok(outcome.and(if is_due { Outcome::Findings } else { Outcome::Done }))
 }
 
-/// The vehicle by its unique id, else by the user's name, else by folder, kind and autopilot.
 fn vehicle(log: &Overview, found: &FoundRecordings, given: Option<&str>) -> String {
     let known = log.contents.vehicle;
     if let Some(vehicle) = known.filter(|vehicle| vehicle.uid != 0) {

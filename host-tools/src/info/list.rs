@@ -201,12 +201,10 @@ fn start_utc_us(log: &Overview) -> Option<u64> {
     log.ending.summary.first.and_then(|first: Instant| log.utc_us(first))
 }
 
-/// Size of the recording, without the space allocated for it on a card.
 fn bytes(log: &Overview) -> u64 {
     if log.format.is_some() { log.bytes_on_card } else { log.log_bytes() }
 }
 
-/// The largest unit with a value of at least one.
 fn binary(bytes: u64) -> String {
     let (mut size, mut units) = (bytes as f64, ["KiB", "MiB", "GiB", "TiB"].iter());
     let mut unit = "B";
@@ -309,7 +307,6 @@ mod tests {
         assert!(told(None).contains("(hums info --verify says why)"));
     }
 
-    /// The stored count is a lower bound.
     #[test]
     fn a_time_in_the_air_that_was_stored_before_the_records_end_says_so() {
         let mut log = Overview::default();

@@ -208,7 +208,6 @@ fn silence(finding: &Finding) -> Option<&'static str> {
     }
 }
 
-/// A finding with its check, the due part and the cause.
 fn sentence(finding: &Finding, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
     let Finding { subsystem, check, instance, previous, value, worst, limit, unit, .. } = finding;
     let mut sentence = format!("{}: {}", subsystem.name(), check_name(check, *instance));
@@ -299,7 +298,6 @@ fn gaps_text(text: &mut String, log: &Overview) {
     }
 }
 
-/// Gaps in another format: time, place in the file, data found there.
 fn foreign_gaps(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     for (gap, (place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {

@@ -374,7 +374,6 @@ mod tests {
         assert_eq!(part(&board, Subsystem::Power), words);
     }
 
-    /// A link between a radio and a PC.
     #[test]
     fn the_silence_of_a_link_is_no_finding_of_the_wire_and_nothing_is_called_well() {
         let mut craft = craft(&[]);

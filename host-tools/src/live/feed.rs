@@ -228,7 +228,6 @@ fn epoch_us(utc: SystemTime, now: Instant) -> u64 {
     u64::try_from(utc_us).unwrap_or(0).saturating_sub(now.as_micros())
 }
 
-/// Bytes in pieces with times of arrival.
 fn evenly(bytes: &[u8], from: Instant, to: Instant) -> impl Iterator<Item = (Instant, &[u8])> {
     let pieces = bytes.chunks(bytes.len().div_ceil(PIECES).max(1));
     let count = pieces.len() as u64;

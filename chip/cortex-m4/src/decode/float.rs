@@ -26,7 +26,6 @@ pub(super) fn coprocessor(a: u32, b: u32) -> Op {
     }
 }
 
-/// The number of a single register: four bits and one.
 fn single(word: u32, four: u32, other: u32, one: u32) -> u8 {
     (field(word, four, 4) << 1 | field(other, one, 1)) as u8
 }

@@ -28,7 +28,6 @@ fn alu(op: u32, d: u8, n: u8, flags: bool) -> Option<Alu> {
     })
 }
 
-/// The stack pointer only in sums, the program counter never.
 fn allowed(alu: Alu, d: u8, n: u8) -> bool {
     let d_unused = matches!(alu, Alu::Tst | Alu::Teq | Alu::Cmn | Alu::Cmp);
     let n_unused = matches!(alu, Alu::Mov | Alu::Mvn);
@@ -55,7 +54,6 @@ pub(super) fn modified_immediate(a: u32, b: u32) -> Op {
     }
 }
 
-/// A constant of 12 bits, and the carry of its rotation.
 fn expand(constant: u32) -> (u32, Option<bool>) {
     let byte = constant & 0xFF;
     match constant >> 8 {

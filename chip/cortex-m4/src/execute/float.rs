@@ -86,7 +86,6 @@ impl Core {
         }
     }
 
-    /// The lowest address, and the base after.
     fn range(&self, n: u8, count: u8, before: bool) -> (u32, u32) {
         let (base, bytes) = (self.get(n), u32::from(count) * 4);
         if before {

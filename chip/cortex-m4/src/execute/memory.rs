@@ -138,7 +138,6 @@ impl Core {
         Ok(())
     }
 
-    /// Loads and stores with the local monitor.
     fn execute_exclusive<B: Bus>(&mut self, bus: &mut B, op: Op) -> Result<(), Trap> {
         match op {
             Op::LoadExclusive { width, t, n, offset } => {
@@ -166,7 +165,6 @@ impl Core {
         Ok(())
     }
 
-    /// An access with the rights of unprivileged code.
     fn as_user<R>(&mut self, access: impl FnOnce(&mut Self) -> R) -> R {
         let (ipsr, unprivileged) = (self.ipsr, self.unprivileged);
         (self.ipsr, self.unprivileged) = (0, true);

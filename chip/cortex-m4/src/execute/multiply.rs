@@ -9,7 +9,6 @@ fn half(value: u32, top: bool) -> i64 {
     i64::from(if top { (value >> 16) as i16 } else { value as i16 })
 }
 
-/// Products of lower and upper halves; exchanged: of the second's other halves.
 fn products(n: u32, m: u32, exchange: bool) -> (i64, i64) {
     let m = if exchange { m.rotate_right(16) } else { m };
     (half(n, false) * half(m, false), half(n, true) * half(m, true))

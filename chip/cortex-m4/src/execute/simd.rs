@@ -61,7 +61,6 @@ impl Core {
     }
 }
 
-/// The result, and GE if the prefix sets it.
 fn parallel(prefix: Prefix, lanes: Lanes, n: u32, m: u32) -> (u32, Option<u8>) {
     let signed = matches!(prefix, Prefix::S | Prefix::Q | Prefix::Sh);
     let bytes = matches!(lanes, Lanes::Add8 | Lanes::Sub8);

@@ -21,7 +21,6 @@ fn word(machine: &Machine, at: u32) -> u32 {
     machine.memory(at, 4).iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte))
 }
 
-/// RTT's first up-channel: buffer, size, place of writing.
 fn channel(machine: &Machine) -> Option<[u32; 3]> {
     let block = machine.image().find("_SEGGER_RTT")?.address;
     // Behind 24 bytes and the name.

@@ -42,7 +42,6 @@ pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'s
     }
 }
 
-/// A frame is dropped after the timeout.
 async fn send(port: &mut board::PortTx, frame: &[u8], stood_still: &AtomicBool) {
     if with_timeout(SEND_MAX, port.transmit(frame)).await.is_err() {
         port.restart();

@@ -141,7 +141,6 @@ fn finish(body: &mut Monitoring<'static>, ends: &mut Ends) {
     LOG_ENDS.store(true, Ordering::Release);
 }
 
-/// Hands over the store's items; whether all are written.
 #[inline(never)]
 fn save(body: &mut Monitoring<'static>, handover: &mut Handover<'static>) -> bool {
     // The handover last: it looks at the mailbox of both.
@@ -185,7 +184,6 @@ fn tell_board(body: &mut Monitoring<'static>, ends: &mut Ends, told: &mut [bool;
 
 // Own stack frame (ARCHITECTURE.md, Memory). As all that follow.
 
-/// At most [`DRAINED_MAX`] frames; `true` if there may be more.
 #[inline(never)]
 fn drain(body: &mut Monitoring<'static>, ends: &mut Ends) -> bool {
     let Ends { frames, sectors, gs, .. } = ends;
@@ -240,7 +238,6 @@ fn tick(body: &mut Monitoring<'static>, ends: &mut Ends, handover: &mut Handover
     note(body, ends, handover);
 }
 
-/// Tells the result of an update; whether one begins.
 #[inline(never)]
 fn watch_update(body: &mut Monitoring<'static>, ends: &mut Ends, update: &mut UpdateWatch) -> bool {
     if let Some((severity, text)) = update.news(&UPDATE_STATUS) {

@@ -89,7 +89,6 @@ pub(crate) async fn run(body: &'static mut Body) -> ! {
     }
 }
 
-/// Ends the log, once, if no sector waits; whether it has ended.
 #[inline(never)]
 fn end(body: &mut Body) -> bool {
     let has_ended = LOG_ENDED.load(Ordering::Relaxed) || body.storage.finish_after(&body.sectors);
@@ -124,7 +123,6 @@ fn keep(body: &mut Body) {
     measure(Stage::Storage, || body.store_writer.service(false));
 }
 
-/// Looks at the update file of a new card, and confirms an image that records.
 #[inline(never)]
 fn look_for_update(body: &mut Body, service: Service) {
     if service == Service::Wrote {

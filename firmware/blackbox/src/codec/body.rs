@@ -73,7 +73,6 @@ impl Body {
         Some(())
     }
 
-    /// The fields of the layout; returns their end. `calm`: the quiet ones are unchanged.
     #[inline(never)]
     fn fields<C: Coder>(
         &mut self,
@@ -170,7 +169,6 @@ enum Last<'a> {
 }
 
 impl Common {
-    /// The last value with the elements `after` it; `None` unless it was stored.
     #[inline]
     fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
         Some(match element.what() {
@@ -255,7 +253,6 @@ fn elements_in(slot: &Slot) -> Range<usize> {
     first..(first + usize::from(slot.elements_count)).min(ELEMENTS)
 }
 
-/// Bytes of the payload that are coded as fields: a MAVLink 1 payload may be shorter than its layout.
 fn limit(slot: &Slot) -> usize {
     match slot.length {
         Length::Fixed(len) if !slot.key.v2 => usize::from(len.min(slot.described)),

@@ -163,7 +163,6 @@ impl Headers {
     }
 }
 
-/// Flags and length of a frame that is read.
 fn take_flags(slot: &Slot, frame: &mut Frame) {
     (frame.incompat, frame.compat) = (slot.incompat, slot.compat);
     if let Length::Fixed(len) = slot.length {

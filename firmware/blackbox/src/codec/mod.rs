@@ -172,7 +172,6 @@ impl Model {
         self.slots.has_room().then_some((Next::NewSlot, key))
     }
 
-    /// An entry without a slot's frame: a record, or bytes, uncoded (`raw`) or by the text model.
     fn plain<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -202,7 +201,6 @@ impl Model {
         Some(Decoded { kind, at_ms, len })
     }
 
-    /// By the slot's own distribution where there is a slot.
     fn time<C: Coder>(&mut self, coder: &mut C, slot: Option<u8>, at_ms: u64) -> Option<u64> {
         let step = at_ms.saturating_sub(self.last_ms);
         let length = 64 - step.leading_zeros();
@@ -236,7 +234,6 @@ impl Model {
         Some(self.last_ms)
     }
 
-    /// Returns whether it is verified, and its time.
     fn frame<C: End>(
         &mut self,
         coder: &mut C,

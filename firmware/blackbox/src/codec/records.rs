@@ -113,7 +113,6 @@ impl Records {
         *kept
     }
 
-    /// Numbers of 2 bytes that are differences already.
     fn halves<C: Coder>(&mut self, coder: &mut C, halves: &mut [[u8; 2]]) {
         let mut last = 0;
         for half in halves {

@@ -82,7 +82,6 @@ impl<'a> Entries<'a> {
         }
     }
 
-    /// The numbers as runs of those that follow each other.
     fn store_numbers(self, entries_max: usize, sink: &mut Sink<'_>) {
         let mut run: Option<(u8, u8)> = None;
         for (number, _) in self.iter(entries_max) {

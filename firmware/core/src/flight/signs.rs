@@ -248,7 +248,6 @@ impl Flight {
         }
     }
 
-    /// A shock, which may come between two samples.
     fn take_shock(&mut self, at: BootMs, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
             // What broke off a speed goes on while it bounces, or thrashes about.
@@ -366,7 +365,6 @@ impl Flight {
         }
     }
 
-    /// Height below the highest since full thrust, less that of a glide path.
     fn lose_height(&mut self, at: BootMs, thrust: bool, vehicle: &Vehicle) -> f32 {
         let since_s = at.since(core::mem::replace(&mut self.peak.at, at)).as_secs_f32();
         let height_m = height_m(at, vehicle).filter(|_| thrust && self.arming.is_on);
@@ -446,7 +444,6 @@ impl Flight {
     }
 }
 
-/// A mission, a script or an offboard computer asks for such a sink.
 fn is_told_to_sink(at: BootMs, sink_mps: f32, limit_mps: f32, vehicle: &Vehicle) -> bool {
     let wanted_mps = vehicle.climb_wanted.within(at, FRESH).map(|climb| -climb.0);
     wanted_mps.is_some_and(|wanted_mps| wanted_mps > limit_mps && sink_mps < wanted_mps + FOLLOWS_MPS)

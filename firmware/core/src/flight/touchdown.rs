@@ -49,7 +49,6 @@ mod tests {
     use super::*;
     use crate::motion::WindowMax;
 
-    /// (seconds, sink) pieces from a height, at 5 Hz; then the vehicle stands.
     fn land(mut height_m: f32, pieces: &[(f32, f32)]) -> f32 {
         let (mut touchdown, mut sink, mut now_ms) = (Touchdown::default(), WindowMax::default(), 0);
         for (seconds, sink_mps) in pieces {

@@ -562,7 +562,6 @@ impl State {
         self.go(next, value, check.limit(next, params))
     }
 
-    /// Changes the level. A first level that is good counts as no change.
     fn go(&mut self, level: Level, value: f32, limit: f32) -> Option<LevelChange> {
         let before = self.level.replace(level);
         let previous = before.unwrap_or(Level::Ok);

@@ -54,7 +54,6 @@ fn state(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     vehicle.heartbeat.read(|heartbeat| Some(f32::from(counts(heartbeat.state))))
 }
 
-/// 1 for half a minute after a restart while it was armed.
 fn restarted(inputs: &Inputs<'_>, _: u8) -> Option<Reading> {
     let Inputs { now, vehicle, .. } = *inputs;
     let recently = |at| now.since(at) <= Millis::from_secs(30);

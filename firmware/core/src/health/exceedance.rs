@@ -45,7 +45,6 @@ impl Crossings {
         }
     }
 
-    /// The stored form: the hash of the check's name, the instance, and these.
     fn code(&mut self, name: &mut u32, instance: &mut u8, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
         let Self { warnings, criticals, warning_tenths, critical_tenths, peak } = self;
         fields!(fields: name, instance, warnings, criticals, warning_tenths, critical_tenths, peak);

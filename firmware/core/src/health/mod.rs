@@ -171,7 +171,6 @@ impl Health {
         self.alarms.iter().filter_map(|standing| Alarm::at(standing.slot, standing.level, standing.since))
     }
 
-    /// An outlived alarm, or lack of data, as a finding of its own.
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
         let (check, instance) = check_of(slot)?;
         let level = self.states.get(usize::from(slot))?.level()?;
@@ -185,7 +184,6 @@ impl Health {
         Some(self.finding(check, instance, inputs, change, ""))
     }
 
-    /// Whether something that drives the vehicle has a critical alarm.
     fn has_lost_drive(&self) -> bool {
         self.levels().any(|(check, _, level)| level == Level::Critical && suppression::is_of_drive(check))
     }

@@ -214,13 +214,11 @@ impl Alarm {
         Some(Self { since, level, check, instance, slot })
     }
 
-    /// Whether both may be of the same motor, battery or receiver.
     fn may_concern(&self, other: &Self) -> bool {
         let thing = self.check.of.thing();
         thing.is_none() || thing != other.check.of.thing() || self.instance == other.instance
     }
 
-    /// Whether it explains another alarm, or a lack of data.
     fn explains(&self, effect: &Self) -> bool {
         let (before, after) = (effect.since.since(self.since), self.since.since(effect.since));
         match effect.level {

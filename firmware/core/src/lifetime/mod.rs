@@ -234,7 +234,6 @@ mod tests {
         stored.iter().fold(0, |sum, byte| sum.wrapping_mul(31).wrapping_add(u32::from(*byte)))
     }
 
-    /// Reads an item back, also with bytes of a later version appended, but not cut short or without a version.
     fn reads_back<T: Item + Copy + PartialEq + core::fmt::Debug>(item: T) -> Vec<u8> {
         let known = stored(item);
         assert_eq!(T::decode(&known), Ok(item));

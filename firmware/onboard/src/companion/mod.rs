@@ -292,7 +292,6 @@ impl Companion {
         }
     }
 
-    /// Hides earlier logs and marks them as the first to be overwritten; not in flight.
     fn erase(
         &mut self,
         now: Instant,

@@ -168,7 +168,6 @@ impl Settings {
     }
 }
 
-/// The place of a component, from 0, of which a name is that of the serial number: of `CMP1_SERIAL` 0.
 fn place_of_serial(name: &str) -> Option<usize> {
     let place = name.strip_prefix("CMP")?.strip_suffix("_SERIAL")?;
     place.parse::<usize>().ok()?.checked_sub(1).filter(|_| place.len() == 1)

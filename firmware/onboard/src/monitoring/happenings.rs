@@ -73,7 +73,6 @@ pub(super) fn record(
     }
 }
 
-/// Marks the log, reports the place to the ground station, and writes all data to the card at once.
 fn mishap(
     now: Instant,
     change: MishapChange,

@@ -128,7 +128,6 @@ impl<'a> Monitoring<'a> {
         }
     }
 
-    /// The previous session, in a second boot record and in that of each further file.
     #[inline(never)]
     fn tell_before(&mut self, now: Instant, sectors: &mut SectorsIn) {
         let Some(before) = self.book.card.take_before() else { return };

@@ -137,7 +137,6 @@ mod tests {
 
     use super::*;
 
-    /// The first ones are a MAVLink 1 header.
     fn put<const BYTES: usize>(frames: &FramesIn, at_micros: u64, mut bytes: [u8; BYTES]) -> bool {
         bytes[..6].copy_from_slice(&[0xFE, BYTES as u8 - 8, 0, 1, 1, 255]);
         frames.put(at_micros, &Frame::parse(&bytes).expect("a frame"))
@@ -229,7 +228,6 @@ mod tests {
         assert_eq!((written, sectors_out.len()), (Ok(ROW_BLOCKS), sectors));
     }
 
-    /// From any position in the queue, while it holds the frame that is being sent.
     #[test]
     fn the_outlets_frames_fit_behind_a_frame_that_is_being_sent() {
         let waiting = (hums_link::summary::WAITING_BYTES + hums_link::outlet::FINDINGS) as usize;

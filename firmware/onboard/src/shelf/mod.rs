@@ -247,7 +247,6 @@ struct Looked {
     segment: Option<Segment>,
 }
 
-/// The log in the directory unless it is the last one.
 fn find<D: CardDevice>(
     recorder: &mut Recorder<'_, D>,
     want: &Want,
@@ -296,7 +295,6 @@ fn find<D: CardDevice>(
     Looked { answer, segment: Some(segment) }
 }
 
-/// Starts at the previous result if the directory is the same.
 fn at_place<D: CardDevice>(
     card: &Card<'_, D>,
     place: u16,

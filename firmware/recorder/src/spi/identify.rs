@@ -118,7 +118,6 @@ impl<P: Port> Line<P> {
         Ok(Identity { cid, csd, by_bytes })
     }
 
-    /// Whether the card is older than version 2, and does not know the question.
     fn conditions(&mut self) -> Result<bool, SpiError> {
         let answer = self.command(CONDITIONS, VOLTAGE)?;
         if answer & ILLEGAL != 0 {

@@ -69,7 +69,6 @@ impl Clock {
     }
 }
 
-/// At this time or after it. Whatever message a recording begins with.
 fn whole(at: Instant) -> Instant {
     Instant::from_micros(at.as_micros().div_ceil(TICK.as_micros()).saturating_mul(TICK.as_micros()))
 }

@@ -75,7 +75,6 @@ impl Details {
         *self = Self { earlier, others, ..Self::default() };
     }
 
-    /// Each once: the identity may be in one recording only.
     fn all_autopilots(&self) -> Vec<Heard> {
         let mut all = self.others.clone();
         for heard in &self.autopilots {
@@ -165,7 +164,6 @@ impl Details {
         systems.into_iter().collect()
     }
 
-    /// Joined files, or a ground station of several vehicles.
     fn vehicles(&self, judged: Option<u8>) -> Option<String> {
         let first = self.autopilots.first()?;
         let how = match judged.filter(|_| self.autopilots.iter().any(|heard| heard.system != first.system)) {
@@ -216,7 +214,6 @@ impl Details {
         remarks
     }
 
-    /// The alert's cause by recent texts and unhealthy sensors.
     fn tell_alert(&self, check: &str, problems: &mut Problems) {
         let Some(cause) = Cause::ALL.into_iter().find(|cause| cause.name() == check) else { return };
         let of = |bit: &u32| self.sensors & bit != 0 && Causes::of_sensors(*bit).has(cause);

@@ -154,7 +154,6 @@ impl Flights {
         }
     }
 
-    /// A silence counts only if a flight was seen after it.
     fn close(&mut self) {
         if let (Some(flight), Some(silence)) =
             (self.list.last_mut().filter(|_| self.open), self.silence.take())

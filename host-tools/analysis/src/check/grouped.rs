@@ -76,7 +76,6 @@ fn check_of<'a>(alike: &[&'a Problem]) -> &'a str {
     alike.first().map_or("", |problem| &problem.check)
 }
 
-/// Explains all and has no cause; `None` if not listed.
 fn cause<'a>(one: &[&'a Problem], all: &[Vec<&'a Problem>]) -> Option<&'a str> {
     let explains = |one: &[&'a Problem]| {
         let cause = one.first()?.because.as_deref()?;

@@ -327,7 +327,6 @@ impl Judge {
         }
     }
 
-    /// Whether it flew on after a silence; if not, the flight's end is missing: damage.
     fn settle(&mut self) {
         let Some(Silence { airborne, gap, .. }) = self.silence.take() else { return };
         // A disarmed vehicle that may fall, or one on-ground, does not fly.
@@ -421,7 +420,6 @@ impl Judge {
         }
     }
 
-    /// The shock is before the box's finding, which waits until the vehicle lies still.
     fn hit_at(&mut self, finding: &Finding) -> Instant {
         const LIES_STILL: Span = Span::from_secs(5);
         if !is_hit(finding) {
@@ -447,7 +445,6 @@ impl Judge {
         }
     }
 
-    /// Its flight ended at the last reception; the time between belongs to neither, and first values come first.
     fn leave_off(&mut self, at: Instant) {
         if self.first.is_some() {
             self.advance(self.last);
@@ -458,7 +455,6 @@ impl Judge {
         self.clock.skip_to(at + SETTLE);
     }
 
-    /// Another day or vehicle, judged by itself. Earlier findings and counts stay.
     fn joint(&mut self, at: Instant) {
         self.leave_off(at);
         self.here.break_off(self.last, self.clock.behind());
@@ -516,7 +512,6 @@ impl Judge {
         self.list(gap);
     }
 
-    /// Its place in the list, if there is room.
     fn list(&mut self, gap: &Gap) -> Option<usize> {
         self.damages += u64::from(gap.cause.is_damage());
         self.losses += u64::from(gap.cause == Why::Lost);
@@ -596,7 +591,6 @@ impl Judge {
         self.coverage.note(now, steps, &self.monitor, &link, &recorder);
     }
 
-    /// In a radio gap, found only here.
     fn came_down(&mut self, now: Instant, steps: Instant, level: Level, verdict: Verdict) {
         let recording = |at| Clock::recording(now, steps, Instant::of(at, steps));
         let (at, from) = (recording(verdict.at), verdict.from.map(recording));

@@ -207,7 +207,6 @@ impl Judged {
         JudgedChecks { judged, of_box, all: judged + lacking.count() }
     }
 
-    /// Whether it could apply with more data: no box, earlier flights or engine needed, and a limit.
     fn could_apply(&self, check: &str, why: &str) -> bool {
         let is_of_engine =
             |check: &str| check_named(check).is_some_and(|check| check.subsystem == Subsystem::Engine);

@@ -360,7 +360,6 @@ impl LinkLoss {
         self.stands_since = self.stands_since.or(slow.map(|_| now));
     }
 
-    /// Rest for a second, without a fall's rising pressure.
     fn rests(&self, now: BootMs) -> bool {
         self.stands_since.is_some_and(|since| now.since(since) >= SETTLED)
             && self.is_sinking(now, FALLING_MPS) == Some(false)

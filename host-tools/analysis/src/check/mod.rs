@@ -181,7 +181,6 @@ pub fn by_vehicle(place: &Place) -> Vec<Place> {
     if all.is_empty() { vec![place.clone()] } else { all }
 }
 
-/// And the number of inputs without a log; with `--json` these have an object too.
 fn logs(args: &Request<'_>) -> Result<(FoundRecordings, usize)> {
     let error = match find(args.inputs, args.salvage) {
         Ok(found) => return Ok((found, 0)),

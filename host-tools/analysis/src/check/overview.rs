@@ -49,7 +49,6 @@ pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -
     judge_telling(place, limits, heard, shows, &mut |_, _| Ok(()))
 }
 
-/// Judges a recording, and hands on its content in order.
 fn judge_telling(
     place: &Place,
     limits: &Limits,
@@ -278,7 +277,6 @@ fn fill(contents: &mut Contents, judged: Judged) {
     }
 }
 
-/// A mishap ends a flight like a landing.
 fn moves(flights: &[Flight]) -> Vec<(Instant, bool)> {
     let of = |flight: &Flight| {
         let ended = flight.landed || flight.mishap.is_some();

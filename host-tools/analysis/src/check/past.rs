@@ -96,7 +96,6 @@ pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
     learnt(limits, places).map(|(baselines, _)| baselines)
 }
 
-/// The same, with the vehicle if known.
 fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
     let (mut baselines, mut first) = (Baselines::default(), None::<(&str, Vehicle)>);
     for place in places {

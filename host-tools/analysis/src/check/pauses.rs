@@ -10,7 +10,6 @@ use crate::source::item::Want;
 use crate::source::recording::Format;
 use writer::Writer;
 
-/// Tenths of seconds; four ESCs, `silent` ones excepted, ten times a second.
 fn fly(log: &mut Writer, tenths: std::ops::Range<u64>, silent: bool) {
     for tenth in tenths {
         let time = (tenth * 100_000).to_le_bytes();

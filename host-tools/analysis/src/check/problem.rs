@@ -207,7 +207,6 @@ impl Problems {
         }
     }
 
-    /// Causes of open problems, also among later ones: the consequence may come first.
     fn explain(&mut self) {
         let open = || {
             self.open

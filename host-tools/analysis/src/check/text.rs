@@ -287,7 +287,6 @@ fn in_air(checked: &Checked) -> String {
     told.map_or(text.clone(), |told| format!("{text} ({told})"))
 }
 
-/// Time in the air as the box counted it, if it counted to the end of the last flight.
 fn box_counted(checked: &Checked) -> Option<String> {
     let (judged, ending) = (&checked.judged, checked.ending.as_ref()?);
     let landed = judged.flights.last().filter(|flight| flight.landed)?.to;
@@ -296,7 +295,6 @@ fn box_counted(checked: &Checked) -> Option<String> {
     Some(clock(Span::from_micros((seconds * 1e6) as u64)))
 }
 
-/// The unseen parts of flights, and any other end of the last one.
 fn not_seen(flights: &[Flight]) -> String {
     let last = flights.last();
     let ended = match last {
@@ -421,7 +419,6 @@ fn action(problem: &Problem) -> &'static str {
     vocabulary(&problem.check).map_or("", |words| words.action)
 }
 
-/// The first of several, or of unknown ones.
 fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     let is_worse = |one: &Problem, than: &Problem| match side(&one.check) {
         _ if than.value.is_nan() => !one.value.is_nan(),
@@ -454,14 +451,12 @@ fn details(problem: &Problem, max: usize) -> String {
     if details.is_empty() { String::new() } else { format!(" ({})", details.join(", ")) }
 }
 
-/// The values of a quantity, and its limit; `None` for a state.
 fn values(problem: &Problem) -> Option<(Values, Option<String>)> {
     let Problem { check, onset, value, limit, unit, .. } = problem;
     let Shown::Quantity(worst, limit) = shown(check, *value, *limit) else { return None };
     Some((Values::new(*onset, worst, unit), limit.map(|limit| quantity(limit, unit))))
 }
 
-/// The problem: the fault, the parts, the values, the limit, the duration.
 fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
     let mut text = alarm(group);

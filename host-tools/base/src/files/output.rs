@@ -182,7 +182,6 @@ impl Output {
 }
 
 impl Drop for Output {
-    /// Nothing can go on with an empty file.
     fn drop(&mut self) {
         if let Part::Begun { from, .. } = &self.part
             && from.metadata().is_ok_and(|about| about.len() == 0)

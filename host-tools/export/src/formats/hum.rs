@@ -128,7 +128,6 @@ fn input(args: &DecodeRequest) -> Result<Endpoint> {
     }
 }
 
-/// The log's path: in a directory it is named after the recording.
 fn output(args: &DecodeRequest) -> PathBuf {
     let stem = args.inputs.first().and_then(|input| input.file_stem()).unwrap_or_default();
     if says_directory(&args.output) {
@@ -216,7 +215,6 @@ impl<W: Write> Packer<W> {
         self.write_out()
     }
 
-    /// Bytes that came together; a record of a tlog is a frame by itself, with silence around it.
     fn chunk(&mut self, at_us: u64, bytes: &[u8], is_record: bool) -> Result<()> {
         let Self { framer, writer, finished, checksums, .. } = self;
         if is_record {

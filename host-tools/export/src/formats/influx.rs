@@ -122,7 +122,6 @@ impl Lines {
         }
     }
 
-    /// The status untagged, the values by `motor`.
     fn actuators(&mut self, tags: &Tags, at: Instant, payload: &Payload) {
         let Some(active) = payload.number("active") else { return };
         self.reference(tags, at, None, [("Actuator Output Status".to_owned(), Scalar::Double(active))]);

@@ -30,7 +30,6 @@ pub(super) struct Kml {
 }
 
 impl Kml {
-    /// Writes the piece; its last place begins the next one, unless there is a gap.
     fn end_piece(&mut self, context: &Context, goes_on: bool) -> Result<()> {
         let last = self.piece.last().copied();
         if self.piece.len() > 1 {

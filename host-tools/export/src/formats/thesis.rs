@@ -43,7 +43,6 @@ pub(super) struct Thesis {
 }
 
 impl Thesis {
-    /// First come the rows of the seconds that have passed.
     fn observe(&mut self, context: &Context, observed: &Observed) -> Result<()> {
         let at_us = observed.at.as_micros();
         let mut next = *self.next.get_or_insert(at_us.next_multiple_of(SECOND_US));

@@ -208,7 +208,6 @@ fn message(kind: u8, content: &[u8]) -> Vec<u8> {
     [&length.to_le_bytes()[..], &[kind], content].concat()
 }
 
-/// An information or a parameter: its type and name, its value.
 fn keyed(kind: u8, key: &str, value: &[u8]) -> Vec<u8> {
     let key = key.as_bytes().get(..255).unwrap_or(key.as_bytes());
     message(kind, &[&[key.len() as u8][..], key, value].concat())

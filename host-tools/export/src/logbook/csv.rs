@@ -306,7 +306,6 @@ mod tests {
         }
     }
 
-    /// Two recorders of a flight, each in a call of its own.
     #[test]
     fn a_flight_of_an_earlier_call_counts_once() {
         let dir = tempfile::tempdir().expect("a directory");

@@ -147,7 +147,6 @@ fn way(entry: &LogbookEntry, known: &Known, (from, to): (Instant, Instant), star
     Way { features, items, events }
 }
 
-/// A time to the millisecond, as the protocol wants it.
 fn milliseconds(utc_us: u64) -> String {
     let text = iso8601(utc_us / 1000 * 1000);
     let (second, fraction) =

@@ -116,7 +116,6 @@ impl LogbookEntry {
         self.key.rsplit_once('-').map_or(&self.key, |(recording, _)| recording)
     }
 
-    /// Adds cells of people. Different texts of one column both stay.
     fn add_by_hand(&mut self, cells: BTreeMap<String, String>) {
         for (name, cell) in cells {
             let own = self.by_hand.entry(name).or_default();
@@ -377,7 +376,6 @@ fn count_once(entries: &mut Vec<LogbookEntry>) -> Vec<(String, String)> {
     pairs
 }
 
-/// The place at a time: the last known before it, else the first after it.
 fn spot(about: &RecordingContent, at: Instant) -> Option<Spot> {
     let points = about.track.points();
     let after = points.partition_point(|point| point.at <= at);

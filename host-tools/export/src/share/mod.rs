@@ -180,7 +180,6 @@ impl Share {
         Ok(lossy || summary.ending.is_some_and(|ending| !ending.is_sound()))
     }
 
-    /// `None` if no field of the frame stays.
     fn frame<'a>(&mut self, at: Instant, frame: &Frame<'_>, out: &'a mut Vec<u8>) -> Option<&'a [u8]> {
         let name = message_name(frame.id());
         self.see(&name);
@@ -236,7 +235,6 @@ impl Share {
         Some(out)
     }
 
-    /// Systems are counted from 1 in the order of their first frames.
     fn system(&mut self, system: u8) -> u8 {
         let next = (self.systems.len() as u8).wrapping_add(1);
         *self.systems.entry(system).or_insert(next)

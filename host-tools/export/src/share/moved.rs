@@ -42,7 +42,6 @@ impl Moved {
         self.place.map_or(0.0, |(first, _)| (SHARED.0 + degrees - first).clamp(-90.0, 90.0))
     }
 
-    /// A metre to the east stays a metre.
     fn longitude(&self, degrees: f64) -> f64 {
         self.place.map_or(0.0, |(latitude, first)| {
             let scale = latitude.to_radians().cos() / SHARED.0.to_radians().cos();

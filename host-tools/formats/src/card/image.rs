@@ -98,7 +98,6 @@ pub fn is_card(file: &File) -> io::Result<bool> {
     Ok(Layout::read(&ReadOnlyImage::new(file)?).is_ok())
 }
 
-/// Holes of a sparse file are not read.
 fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     let mut bytes = vec![0; 1 << 20];
     loop {
@@ -116,7 +115,6 @@ fn is_zero(mut file: &File, mut at: u64) -> io::Result<bool> {
     }
 }
 
-/// The sparse file's next data; `None` up to its end.
 #[cfg(target_os = "linux")]
 fn data_from(file: &File, at: u64) -> io::Result<Option<u64>> {
     match rustix::fs::seek(file, rustix::fs::SeekFrom::Data(at)) {

@@ -159,7 +159,6 @@ pub(super) fn seconds_after(summary: &LogSummary, at: Instant) -> Option<f64> {
     summary.last.map(|last| last.since(at).as_micros() as f64 / 1e6)
 }
 
-/// UTC if known, otherwise seconds since power-on.
 fn moment(summary: &LogSummary, at: Instant) -> String {
     let utc = summary.epoch_us.map(|epoch| epoch.saturating_add(at.as_micros()));
     utc.map_or_else(|| crate::utc::moment(at), iso8601_ms)

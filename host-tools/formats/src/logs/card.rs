@@ -31,7 +31,6 @@ pub(super) fn whole_file(path: &Path) -> Result<Log> {
     })
 }
 
-/// A card's layout, also of a partition alone (`/dev/sdX1`).
 fn layout(device: &ReadOnlyImage<impl Borrow<File>>) -> Result<Layout, LayoutError<io::Error>> {
     Layout::read(device).or_else(|error| Layout::volume(device).map_err(|_| error))
 }
@@ -124,7 +123,6 @@ fn by_file_system(path: &Path, walk: Walk, about: &mut Image) -> Result<Vec<Card
     Ok(walk.files)
 }
 
-/// The sessions with sectors outside of the logs in the file system.
 fn by_blocks(path: &Path, length: u64, known: &[Log], about: &mut Image) -> Result<Vec<Log>> {
     let knows_none = known.is_empty() && about.damage.is_empty();
     let Scan { logs, left_out } = scan(path, length, &Files::of(known))?;
@@ -174,7 +172,6 @@ fn has_part_of_log(path: &Path, extents: Vec<Extent>) -> Result<bool> {
     Ok(false)
 }
 
-/// Blocks without a file, as a log.
 fn lost(path: &Path, extents: Vec<Extent>) -> Log {
     Log {
         name: String::new(),
@@ -185,7 +182,6 @@ fn lost(path: &Path, extents: Vec<Extent>) -> Log {
     }
 }
 
-/// Each file of another name by itself.
 fn sessions_of(path: &Path, files: &[CardFile]) -> Vec<Log> {
     let mut sessions: BTreeMap<u32, Vec<&CardFile>> = BTreeMap::new();
     for (name, file) in files.iter().filter_map(|file| Some((file.name?, file))) {

@@ -123,7 +123,6 @@ pub fn kind_of(entry: &DirEntry) -> io::Result<FileType> {
     Ok(target.map_or(kind, |target| target.file_type()))
 }
 
-/// One by one: there may be millions of foreign entries.
 fn entries(dir: &Path, found: &mut FoundLogs) -> Result<Entries> {
     let context = || format!("{}: cannot be read", dir.display());
     let mut entries = Entries::default();

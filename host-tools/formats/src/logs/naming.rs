@@ -139,7 +139,6 @@ pub fn ends_with_identity(stem: &str) -> bool {
     is_identity(stem) || numbered.is_some_and(|(stem, _)| is_identity(stem))
 }
 
-/// Whether a name ends with a session, `s1a2b3c4d`, alone or after a box.
 fn is_of_session(of: &str) -> bool {
     let session = match of.rsplit_once('-') {
         Some((recorder, session)) if recorder.starts_with("box") => session,

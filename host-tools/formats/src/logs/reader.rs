@@ -270,7 +270,6 @@ impl<C: EntryCollector> Decoded<C> {
         }
     }
 
-    /// To the group's end, or until a part is full; returns whether it was the end.
     fn go_on(&mut self, rest: &mut Rest, collected: &mut C) -> bool {
         let Rest { decoder, group, at, end } = rest;
         let counts = collected.only_counts();
@@ -338,7 +337,6 @@ impl<C: EntryCollector> Decoded<C> {
     }
 }
 
-/// The next entry; only a frame's outline if that is enough.
 fn next(decoder: &mut GroupDecoder, counts: bool) -> Option<Result<Outline<'_>, GroupError>> {
     if counts { decoder.next_outline() } else { Some(decoder.next_entry()?.map(Outline::Whole)) }
 }
@@ -455,7 +453,6 @@ impl Stitch {
     }
 }
 
-/// First the decoded entries, then the rest part by part.
 fn hand_on<C: EntryCollector>(
     group: &mut Decoded<C>,
     new: &impl Fn() -> C,
@@ -485,7 +482,6 @@ pub fn likely_epoch(log: &Log) -> Result<Option<u64>> {
     last_epoch(log, |epoch| epoch.is_none())
 }
 
-/// Starts of all groups, and the last one's records while `go_on`.
 fn last_epoch(log: &Log, go_on: impl Fn(Option<u64>) -> bool) -> Result<Option<u64>> {
     let mut groups = Groups::new(log);
     let mut decoder = Box::new(GroupDecoder::new());

@@ -191,7 +191,6 @@ impl FileSectors {
         number.filter(|number| *number == base.wrapping_add(at))
     }
 
-    /// Columns with parity and few enough losses, and the lost numbers.
     fn columns(&self, base: u32) -> BTreeMap<(u32, u32), (Column, Vec<u32>)> {
         let mut columns = BTreeMap::new();
         for (one, block) in &self.parity {

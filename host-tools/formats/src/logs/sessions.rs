@@ -75,7 +75,6 @@ struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// Of the log, and of each of several files. Reading an unreadable one reports the error.
     fn fingerprints(&self) -> Vec<Fingerprint> {
         let file = |piece: &Piece| Log { pieces: vec![piece.clone()], ..self.log.clone() };
         let files = self.log.pieces.iter().map(file).filter(|_| self.log.pieces.len() > 1);

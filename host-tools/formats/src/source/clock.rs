@@ -244,7 +244,6 @@ impl Clock {
         self.series.get(series).copied().unwrap_or_default()
     }
 
-    /// A time behind, without a later one of its topic.
     fn is_old(&self, stamp: Stamp) -> bool {
         let Some(now) = self.timeline.recorded_us().filter(|_| self.rules.old_values) else { return false };
         let last_us = self.series(stamp.series).last_us;

@@ -34,7 +34,6 @@ impl Epochs {
         *part = Some(epoch_us);
     }
 
-    /// After too many restarts the time of day is unknown.
     fn restart(&mut self, at: Instant) {
         if self.later.len() < PARTS_MAX {
             self.later.push((at, None));

@@ -65,7 +65,6 @@ impl FoundRecordings {
         }
     }
 
-    /// Those after `before` in files of earlier inputs.
     fn drop_repeats(&mut self, before: usize) {
         // A second path is a second name.
         let mut inside: BTreeMap<FileId, PathBuf> = BTreeMap::new();

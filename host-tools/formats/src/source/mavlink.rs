@@ -23,7 +23,6 @@ use super::tlog::times::{Begins, Times};
 use crate::plural::count;
 use crate::utc::moment;
 
-/// A message with a definition here counts as verified.
 fn summary(counts: Counts) -> RecordingSummary {
     let (mut messages, other_messages) = counts.messages();
     for message in &mut messages {
@@ -235,7 +234,6 @@ const BOOTS: Span = Span::from_secs(2);
 const HELD_BYTES: usize = 512;
 
 impl Strays {
-    /// Bytes with this total outside of frames.
     fn take(&mut self, at: Instant, place: u64, bytes: &[u8], counts: FramerCounts) {
         self.latest.extend(bytes);
         let kept = if self.begun.is_none() { WORDS_BYTES_MAX } else { HELD_BYTES };
@@ -256,7 +254,6 @@ impl Strays {
         }
     }
 
-    /// Reports them, without those that are reported elsewhere.
     fn tell(self, now: Instant, others: u64, take: &mut Take<'_>) -> Result<()> {
         if self.words > 0 {
             let words = format!(

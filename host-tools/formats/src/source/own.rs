@@ -331,7 +331,6 @@ impl Hand<'_, '_> {
     }
 }
 
-/// Damage as a loss: the log itself is whole.
 fn of_packed(loss: &Loss) -> Gap {
     let (words, to) = match loss.what {
         // Over the whole recording.

@@ -116,7 +116,6 @@ mod tests {
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-    /// The vertical speed after this many positions, beside a displayed climb.
     fn down_of(firmware: (Autopilot, u32), positions: u64, down_mps: f32, climb_mps: f32) -> f32 {
         let (mut repairs, mut known) = (Repairs::default(), f32::NAN);
         let (autopilot, firmware) = firmware;

@@ -67,7 +67,6 @@ pub fn sniff_bytes(bytes: &[u8]) -> (InputKind, usize) {
     (kind, good)
 }
 
-/// Frames before a time, less frames before a frame.
 fn count_votes(bytes: &[u8]) -> i32 {
     count(bytes).0
 }

@@ -99,7 +99,6 @@ impl Pages {
     }
 }
 
-/// Faults; of another program's recording also the data that its recorder did not write.
 fn faults(log: &Overview) -> Vec<String> {
     let mut faults = log.faults();
     let losses = log.ending.summary.losses;

@@ -273,8 +273,6 @@ impl Making<'_> {
         Ok(())
     }
 
-    /// The previous recording of the same airframe: by their times if both are known, otherwise in their
-    /// order.
     fn last_flight(&mut self, this: &trend::Session) -> Result<Option<page::Before>> {
         let is_before = |other: &trend::Session| {
             let is_later = this.start_utc().zip(other.start_utc()).is_some_and(|(this, other)| other > this);
@@ -370,7 +368,6 @@ impl Making<'_> {
     }
 }
 
-/// The name of a vehicle's page, if its recording has several.
 fn of_vehicle(name: String, system: Option<u8>) -> String {
     if let Some(system) = system { format!("{name}-system{system}") } else { name }
 }
@@ -464,7 +461,6 @@ fn wanted(args: &Request<'_>, output: &Path, found: &FoundRecordings) -> Result<
 }
 
 impl Wanted {
-    /// A page in a directory has the same name as the session's files by `hums decode`.
     fn path(&self, name: &str) -> PathBuf {
         if self.directory { appended(&self.output.join(name), "html") } else { self.output.clone() }
     }

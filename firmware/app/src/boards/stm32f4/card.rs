@@ -116,7 +116,6 @@ fn by_dma(bytes: &[u8]) -> bool {
     bytes.len() >= DMA_BYTES_MIN && bytes.as_ptr().addr() >= RAM
 }
 
-/// Sleeps until a transfer is done. Stops a transfer after its timeout.
 fn wait(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), PortFailed> {
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());

@@ -83,7 +83,6 @@ impl Distributions {
         value
     }
 
-    /// A float that was a number of hundredths so far: the difference in hundredths. `None` if it is not one now.
     fn decimal<C: Coder>(
         &mut self,
         coder: &mut C,
@@ -104,7 +103,6 @@ impl Distributions {
         (Some((now as f32 * 0.01).to_bits()), Some(now.wrapping_sub(last)))
     }
 
-    /// A float that was computed like the sender's: the difference in order is a few steps at most.
     #[inline(never)]
     fn computed<C: Coder>(&mut self, coder: &mut C, element: &mut Element, guess: i32, value: u32) -> u32 {
         let difference = order(value).wrapping_sub(guess);
@@ -112,7 +110,6 @@ impl Distributions {
         unorder(guess.wrapping_add(integer_rest(coder, symbol, difference)))
     }
 
-    /// The difference from a guess in the order of floats. `cost`: the recent cost of the guess.
     #[inline]
     fn difference<C: Coder>(
         &mut self,
@@ -159,7 +156,6 @@ impl Distributions {
     }
 }
 
-/// Floats in the order of their values, as integers; a bijection.
 #[inline]
 const fn order(bits: u32) -> i32 {
     let bits = bits as i32;

@@ -116,7 +116,6 @@ impl Distributions {
     }
 }
 
-/// An error of 64 bits for costs: beyond 32 bits it is cut to the greatest.
 #[inline]
 fn within_32_bits(error: i64) -> i32 {
     i32::try_from(error).unwrap_or(i32::MAX)
@@ -129,7 +128,6 @@ const fn times_1000(value: u64) -> bool {
     value & 7 == 0 && value.wrapping_mul(INVERSE_OF_125) <= u64::MAX / 125
 }
 
-/// A thousandth, rounded: for spans below an hour.
 #[inline]
 const fn thousandth(value: u32) -> u32 {
     ((value.wrapping_add(500) as u64 * 4_294_968) >> 32) as u32

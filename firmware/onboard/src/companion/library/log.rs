@@ -41,7 +41,6 @@ impl Places {
         self.download = None;
     }
 
-    /// The log with this many bytes read before; `None`: it is gone.
     fn wanted(&self, id: u16, offset: u32) -> Option<Which> {
         let place = Which::At(id.saturating_sub(1));
         match self.download.filter(|download| download.id == id) {
@@ -51,7 +50,6 @@ impl Places {
         }
     }
 
-    /// Whether `offset` belongs to the present list. Without a list only a beginning may be requested.
     fn is_listed(&self, offset: u32, directory: u32) -> bool {
         self.listed.map_or(offset == 0, |listed| listed == directory)
     }
@@ -88,7 +86,6 @@ impl List {
         (Which::At(self.next), What::Length)
     }
 
-    /// The list's end, with a report if a log was left out.
     const fn end(&self) -> Step {
         if self.lacks { Step::End(Reply::LogsUnread) } else { Step::Done }
     }

@@ -138,7 +138,6 @@ impl Library {
         None
     }
 
-    /// A copy: sending needs all queues. Sends the request if still to do.
     fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
         let seen = ways.queues.shelf.answer(self.ticket).cloned();
         if seen.is_none() && !self.asked {

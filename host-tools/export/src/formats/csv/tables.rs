@@ -106,7 +106,6 @@ impl Tables {
     }
 }
 
-/// A column's name as a cell: those of an autopilot's log are words of the world.
 fn cell(name: &str) -> String {
     let mut out = Vec::new();
     push_csv_text(&mut out, name.as_bytes());

@@ -181,7 +181,6 @@ pub(super) struct Mcap {
 }
 
 impl Mcap {
-    /// `None` if the file has no room for another channel.
     fn channel(&mut self, topic: Topic, rows: &BTreeMap<&'static str, Row>) -> Option<u16> {
         if let Some(known) = self.channels.get(&topic) {
             return *known;

@@ -145,7 +145,6 @@ fn foxglove(name: &str, topic: &str) -> Schema {
     Schema { name: format!("foxglove.{name}"), topic: topic.to_owned(), descriptors, about: Vec::new() }
 }
 
-/// A name with letters, digits and `_` only, and no digit at its beginning.
 fn identifier(name: &str) -> String {
     let plain = |character: char| if character.is_ascii_alphanumeric() { character } else { '_' };
     let name: String = name.chars().map(plain).collect();

@@ -29,8 +29,6 @@ const FIELD_BYTES: usize = 4;
 /// Memory of a cell of a row, a short text on the heap included; a long one takes its length in addition.
 const CELL_BYTES: usize = 96;
 
-/// The table of a frame: one for all ids without a definition of ours, and one for frames with another
-/// definition.
 fn table_of(frame: &Frame<'_>, known: bool) -> Table {
     match Table::of(frame, known) {
         Table::Unknown(_) => Table::Hums("UNKNOWN"),

@@ -246,7 +246,6 @@ impl Column {
         }
     }
 
-    /// A cell that is not of the column's type is null.
     fn push_cell(&mut self, cell: Option<&Cell>) {
         let scalar = match (self.kind, cell) {
             (Kind::Text, Some(Cell::Text(text))) => return self.push_text(text),

@@ -351,7 +351,6 @@ impl TableFile {
         open.write(&rows, properties).with_context(|| cannot_write(&open.path))
     }
 
-    /// Later rows go into a further file.
     fn end_file(&mut self) -> Result<()> {
         let Some(Open { path, writer, .. }) = self.open.take() else { return Ok(()) };
         writer.close().map(|_| ()).with_context(|| cannot_write(&path))

@@ -210,7 +210,6 @@ fn look(rest: &[u8], ended: bool, lengths: &mut Lengths) -> Look {
     Look::Message(length)
 }
 
-/// Head or end after this many bytes.
 fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
     match rest.get(length..) {
         Some([a, b, ..]) => [*a, *b] == HEAD,
@@ -220,13 +219,11 @@ fn followed(rest: &[u8], length: usize, ended: bool) -> bool {
     }
 }
 
-/// A message that begins here is completely visible.
 fn searched(rest: &[u8], ended: bool) -> &[u8] {
     let limit = if ended { rest.len() } else { rest.len().saturating_sub(LOOKAHEAD_BYTES / 2).max(1) };
     rest.get(..limit).unwrap_or(rest)
 }
 
-/// Bytes, at least one, of which none begins a message with another after it.
 fn none(within: &[u8], rest: &[u8], ended: bool, lengths: &Lengths) -> usize {
     let mut at = 1;
     while let Some(found) = within.get(at..).and_then(|rest| rest.iter().position(|byte| *byte == HEAD[0])) {

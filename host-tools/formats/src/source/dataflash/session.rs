@@ -115,7 +115,6 @@ impl First {
     }
 }
 
-/// Whether it has a time, also if only the receiver's.
 fn tells_time(format: &Format) -> bool {
     format.time.is_some() || format.name == "GPS"
 }
@@ -125,7 +124,6 @@ fn begins_a_log(formats: &Formats, kind: u8, body: Body<'_>) -> bool {
     fmt.is_some_and(|format| is_of_itself(&Message::new(format, body)))
 }
 
-/// The type, and its name until now.
 fn defined_by(formats: &Formats, kind: u8, body: Body<'_>) -> Option<(u8, String)> {
     let format = formats.get(kind).filter(|format| format.role == Role::Fmt)?;
     let of = u8::try_from(Message::new(format, body).unsigned(0)?).ok()?;
@@ -335,7 +333,6 @@ impl<'w> Session<'w> {
         }
     }
 
-    /// Faults at a type's first message: autopilots define messages wrongly that they never write.
     fn tell_odd(&mut self, kind: u8, place: u64, take: &mut Take<'_>) -> Result<()> {
         match self.formats.take_odd(kind) {
             Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),

@@ -170,7 +170,6 @@ fn record_at(bytes: &[u8], ended: bool) -> Option<(u64, usize)> {
     counts.then_some((time_us, length))
 }
 
-/// A record after the frame's first byte.
 fn has_record_in(frame: &[u8]) -> bool {
     (1..frame.len()).any(|at| {
         let record = frame.get(at..).unwrap_or_default();

@@ -64,7 +64,6 @@ pub(super) fn values<'a>(layout: &Layout, instance: u8, data: &'a [u8]) -> Vec<C
     values
 }
 
-/// Columns of an array; `None` for a single value or a text.
 fn elements(field: &Field) -> Option<u32> {
     field.array.filter(|_| field.number != Number::Char)
 }

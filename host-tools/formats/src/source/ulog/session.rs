@@ -177,7 +177,6 @@ impl<'a, 'b> Session<'a, 'b> {
         rest.get(..bytes).unwrap_or(rest)
     }
 
-    /// `false` without appended data, or at the input's end.
     fn next_part(&mut self, ended: bool) -> bool {
         if ended || self.appended.is_empty() {
             return false;
@@ -615,7 +614,6 @@ impl OwnTables {
     }
 }
 
-/// The module is in front, in brackets.
 fn without_module(words: &str) -> &str {
     words.strip_prefix('[').and_then(|words| words.split_once("] ")).map_or(words, |(_, words)| words)
 }

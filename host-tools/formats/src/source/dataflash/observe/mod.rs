@@ -25,7 +25,6 @@ pub use self::words::mode_name;
 use super::format::Format;
 use super::message::Message;
 
-/// The handler, with the sensor's number in the name.
 fn handler(name: &str) -> Option<(&'static Handler, u8)> {
     let lists = [motion::HANDLERS, power::HANDLERS, system::HANDLERS, said::HANDLERS];
     lists.into_iter().flatten().find_map(|handler| Some((handler, handler.sensor(name)?)))

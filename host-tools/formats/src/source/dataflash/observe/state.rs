@@ -432,7 +432,6 @@ impl State {
         })
     }
 
-    /// The kind with `MAV_TYPE`; `None` for other senders.
     fn kind(&self) -> Option<(VehicleKind, u8)> {
         let Facts { craft, frame_class, motors, quadplane, quadplane_type, .. } = self.facts;
         Some(match craft {

@@ -275,7 +275,6 @@ pub(super) fn place(latitude: Option<f64>, longitude: Option<f64>) -> Option<Pos
     (valid && !nowhere).then_some(Position { latitude_deg, longitude_deg })
 }
 
-/// Home: before the flag existed, any is valid.
 fn home(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let valid = fields.get(2).is_none_or(|flag| flag != 0.0);
@@ -365,7 +364,6 @@ fn vibration(levels: [Option<f32>; 3], clips: [u32; 3]) -> Observation {
     Observation::Vibration(Vibration { scale: VibrationScale::Px4Metrics, levels, clips })
 }
 
-/// `VIBRATION` of the flying accelerometer, and clips of each.
 fn imu_status(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     px4.motion.imu_status = true;

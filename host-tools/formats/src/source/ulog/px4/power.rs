@@ -118,7 +118,6 @@ fn rails(px4: &mut Px4, sample: &Sample<'_>) {
     px4.observe(Observation::Rails(Rails { vcc: vcc.map(Volts), servo: None }));
 }
 
-/// `ESC_STATUS` and `ESC_INFO`, in groups of four.
 fn escs(px4: &mut Px4, sample: &Sample<'_>) {
     let fields = &sample.fields;
     let count = (fields.count(0).unwrap_or(0) as usize).min(MOTORS_MAX);

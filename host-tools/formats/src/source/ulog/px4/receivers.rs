@@ -94,7 +94,6 @@ fn receiver(px4: &mut Px4, sample: &Sample<'_>) {
     utc(px4, sample);
 }
 
-/// UTC, once, of the first receiver with a fix.
 fn utc(px4: &mut Px4, sample: &Sample<'_>) {
     /// 2000 and 2200.
     const UTC_US: std::ops::Range<u64> = 946_684_800_000_000..7_258_118_400_000_000;

@@ -79,7 +79,6 @@ impl System {
         }
     }
 
-    /// Whether another computer flies it, or is meant to.
     fn is_offboard(&self) -> bool {
         const OFFBOARD: u8 = 14;
         self.status.is_some_and(|status| status.nav == OFFBOARD || status.meant == Some(OFFBOARD))
