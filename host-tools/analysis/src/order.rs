@@ -2,11 +2,12 @@
 //!
 //! A clock may be wrong, so UTC decides last:
 //! * logs of one card: by their numbers;
-//! * other logs of one box: by its count of power-ons, and within a power-on by the time since then;
-//! * logs of different boxes, and recordings of other programs: by UTC. A log without UTC stays after the log before it.
+//! * logs of one box: by its count of power-ons, and within a power-on by the time since then, unless the count is no order
+//!   ([`uncounted`]);
+//! * other logs of one box, logs of different boxes, and recordings of other programs: by UTC. A log without UTC stays after
+//!   the log before it.
 
-use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use hums_core::clock::Instant;
 
@@ -14,13 +15,18 @@ use crate::logs::board::{Board, known};
 use crate::logs::sessions::place;
 use crate::summary::Overview;
 
+/// Power-ons of a box's life, and the first moment since power-on.
+type Count = (u32, Option<Instant>);
+
 /// A log's place in time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogTime {
-    /// Its card, if its name is a card's number; its box.
-    chain: (Option<String>, Board),
-    /// Box, power-ons of its life, and first moment since power-on.
-    power_on: Option<(Board, u32, Option<Instant>)>,
+    /// Its card, if its name is a card's number.
+    card: Option<String>,
+    board: Option<Board>,
+    count: Option<Count>,
+    /// Its session, if it begins at power-on.
+    power_on: Option<u32>,
     /// UTC of its start in microseconds since 1970; `None` if unknown, or if the other logs of its card contradict it.
     pub start_us: Option<u64>,
     /// The same, or that of the log before it.
@@ -30,55 +36,83 @@ pub struct LogTime {
 impl LogTime {
     /// By the log's records.
     pub fn of(log: &Overview) -> Self {
-        let first = log.ending.summary.first;
-        let start_us = first.and_then(|first| log.utc_us(first));
+        let summary = &log.ending.summary;
         let boot = log.contents.boot.as_ref().filter(|_| log.format.is_none());
-        let board = boot.map_or([0; 12], |boot| boot.uid);
         let (card, number) = place(&log.ending.name);
-        let card = number.filter(|_| log.format.is_none()).map(|_| card.to_owned());
-        let boots = boot.map(|boot| boot.boots).filter(|boots| *boots > 0);
-        let power_on = known(board).zip(boots).map(|(board, boots)| (board, boots, first));
-        Self { chain: (card, board), power_on, start_us, begun_us: 0 }
-    }
-
-    fn compare(&self, other: &Self) -> Ordering {
-        let by_box = self.power_on.zip(other.power_on).filter(|(one, other)| one.0 == other.0);
-        by_box
-            .map_or(Ordering::Equal, |(one, other)| one.cmp(&other))
-            .then(self.begun_us.cmp(&other.begun_us))
+        Self {
+            card: number.filter(|_| log.format.is_none()).map(|_| card.to_owned()),
+            board: boot.and_then(|boot| known(boot.uid)),
+            count: boot.map(|boot| (boot.boots, summary.first)).filter(|(boots, _)| *boots > 0),
+            power_on: summary.session.filter(|_| summary.first_number == Some(0)),
+            start_us: summary.first.and_then(|first| log.utc_us(first)),
+            begun_us: 0,
+        }
     }
 }
 
 /// Sorts logs, given in the order in which they were found: on a card by number.
-pub fn sort<T>(logs: Vec<(LogTime, T)>) -> Vec<(LogTime, T)> {
-    let count = logs.len();
+pub fn sort<T>(mut logs: Vec<(LogTime, T)>) -> Vec<(LogTime, T)> {
+    let uncounted = uncounted(&logs);
+    let mut sorted = Vec::with_capacity(logs.len());
+    // The counts of each box that are not yet sorted, the lowest one last.
+    let mut left: BTreeMap<Board, Vec<Count>> = BTreeMap::new();
+    for (time, _) in &mut logs {
+        time.count = time.count.filter(|_| time.board.is_some_and(|board| !uncounted.contains(&board)));
+        if let Some((board, count)) = time.board.zip(time.count) {
+            left.entry(board).or_default().push(count);
+        }
+    }
+    left.values_mut().for_each(|counts| counts.sort_unstable_by(|one, other| other.cmp(one)));
     let mut chains: BTreeMap<_, Vec<(LogTime, T)>> = BTreeMap::new();
     for (time, log) in logs {
-        chains.entry(time.chain.clone()).or_default().push((time, log));
+        let board = time.board.filter(|_| time.card.is_none());
+        chains.entry((time.card.clone(), board)).or_default().push((time, log));
     }
-    for ((card, board), logs) in &mut chains {
+    for ((card, _), logs) in &mut chains {
         carry(logs);
         if card.is_none() {
-            logs.sort_by(|(one, _), (other, _)| one.compare(other));
+            logs.sort_by_key(|(time, _)| (time.count, time.begun_us));
         }
-        // Without a box, UTC made the order.
-        if card.is_some() || known(*board).is_some() {
-            forget_contradicted(logs);
-            carry(logs);
-        }
+        forget_contradicted(logs);
+        carry(logs);
     }
     let mut chains: Vec<_> = chains.into_values().map(|logs| logs.into_iter().peekable()).collect();
-    let mut sorted = Vec::with_capacity(count);
     loop {
-        let heads =
-            chains.iter_mut().enumerate().filter_map(|(at, chain)| Some((at, chain.peek()?.0.clone())));
-        let first = heads.min_by(|(_, one), (_, other)| one.compare(other));
-        let next = first.and_then(|(at, _)| chains.get_mut(at)?.next());
-        match next {
-            Some(log) => sorted.push(log),
-            None => return sorted,
+        // A log waits for those of its box with a lower count, unless the orders of cards forbid it.
+        let heads = chains.iter_mut().enumerate().filter_map(|(at, chain)| {
+            let (time, _) = chain.peek()?;
+            let counts = time.board.filter(|_| time.count.is_some()).and_then(|board| left.get(&board));
+            let waits = counts.is_some_and(|counts| counts.last() != time.count.as_ref());
+            Some((waits, time.begun_us, at))
+        });
+        let next = heads.min().and_then(|(.., at)| chains.get_mut(at)?.next());
+        let Some((time, log)) = next else { return sorted };
+        let counts = time.board.and_then(|board| left.get_mut(&board));
+        if let (Some(counts), Some(count)) = (counts, time.count)
+            && let Some(at) = counts.iter().rposition(|left| *left == count)
+        {
+            counts.remove(at);
+        }
+        sorted.push((time, log));
+    }
+}
+
+/// Boxes whose count of power-ons is no order: a log lacks it, two sessions begin with the same power-on, or it falls on a
+/// card. An erase of the chip lets it begin again.
+fn uncounted<T>(logs: &[(LogTime, T)]) -> BTreeSet<Board> {
+    let (mut sessions, mut last, mut uncounted) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+    for (time, _) in logs {
+        let Some(board) = time.board else { continue };
+        let boots = time.count.map_or(0, |(boots, _)| boots);
+        let is_other = time
+            .power_on
+            .is_some_and(|session| *sessions.entry((board, boots)).or_insert(session) != session);
+        let falls = time.card.as_ref().is_some_and(|card| last.insert((board, card), boots) > Some(boots));
+        if boots == 0 || is_other || falls {
+            uncounted.insert(board);
         }
     }
+    uncounted
 }
 
 fn carry<T>(logs: &mut [(LogTime, T)]) {
@@ -121,10 +155,14 @@ mod tests {
     const BOX: Board = [7; 12];
 
     fn log(card: Option<&str>, boots: u32, start_us: u64) -> LogTime {
-        let power_on = (boots > 0).then_some((BOX, boots, None));
-        let board = if boots > 0 { BOX } else { [0; 12] };
-        let start_us = Some(start_us).filter(|start_us| *start_us > 0);
-        LogTime { chain: (card.map(str::to_owned), board), power_on, start_us, begun_us: 0 }
+        let is_counted = boots > 0;
+        LogTime {
+            card: card.map(str::to_owned),
+            board: is_counted.then_some(BOX),
+            count: is_counted.then_some((boots, None)),
+            start_us: Some(start_us).filter(|start_us| *start_us > 0),
+            ..LogTime::default()
+        }
     }
 
     fn sorted(logs: &[LogTime]) -> Vec<(usize, Option<u64>)> {
@@ -154,6 +192,45 @@ mod tests {
         // Downloads of two cards of one box, by name.
         let pulled = [log(None, 1, 10), log(None, 3, 5), log(None, 2, 20)];
         assert_eq!(sorted(&pulled), [(0, Some(10)), (2, Some(20)), (1, None)]);
+    }
+
+    #[test]
+    fn a_card_keeps_its_order_also_where_the_box_is_another_or_unknown() {
+        let card = [(5, 50), (0, 9_000), (6, 60)].map(|(boots, start_us)| log(Some("a"), boots, start_us));
+        assert_eq!(sorted(&card), [(0, Some(50)), (1, None), (2, Some(60))]);
+        let mut card = [(5, 50), (1, 40), (6, 60)].map(|(boots, start_us)| log(Some("a"), boots, start_us));
+        card[1].board = Some([8; 12]);
+        assert_eq!(sorted(&card), [(0, None), (1, Some(40)), (2, Some(60))]);
+    }
+
+    #[test]
+    fn a_count_that_began_again_after_an_erase_is_no_order() {
+        let log =
+            |session, boots, start_us| LogTime { power_on: Some(session), ..log(None, boots, start_us) };
+        let erased = [log(1, 1, 10), log(2, 2, 20), log(3, 1, 30), log(4, 2, 40)];
+        assert_eq!(sorted(&erased), [(0, Some(10)), (1, Some(20)), (2, Some(30)), (3, Some(40))]);
+        // The same log twice, and a later log of the power-on.
+        let whole = [log(1, 1, 10), log(3, 3, 5), log(1, 1, 10), LogTime { power_on: None, ..log(5, 2, 20) }];
+        assert_eq!(sorted(&whole).iter().map(|(at, _)| *at).collect::<Vec<_>>(), [0, 2, 3, 1]);
+        // One log without a count.
+        let unknown = [log(1, 3, 10), LogTime { count: None, ..log(2, 1, 20) }, log(3, 2, 30)];
+        assert_eq!(sorted(&unknown), [(0, Some(10)), (1, Some(20)), (2, Some(30))]);
+    }
+
+    /// By pairs, UTC and count would go in a circle.
+    #[test]
+    fn the_order_does_not_depend_on_the_names_of_cards() {
+        for names in [["a", "b", "c"], ["b", "c", "a"], ["c", "a", "b"], ["c", "b", "a"]] {
+            let [first, second, third] = names.map(Some);
+            let mut other = log(third, 1, 200);
+            other.board = Some([8; 12]);
+            let logs = [log(first, 3, 100), log(second, 2, 300), other];
+            assert_eq!(sorted(&logs).iter().map(|(at, _)| *at).collect::<Vec<_>>(), [2, 1, 0], "{names:?}");
+        }
+        // Counts and cards in a circle: each card keeps its order.
+        let of = |board, card, boots| LogTime { board: Some([board; 12]), ..log(Some(card), boots, 0) };
+        let circle = [of(1, "a", 2), of(2, "a", 1), of(2, "b", 2), of(1, "b", 1)];
+        assert_eq!(sorted(&circle).iter().map(|(at, _)| *at).collect::<Vec<_>>(), [0, 1, 2, 3]);
     }
 
     #[test]
