@@ -32,7 +32,9 @@ pub(super) fn text(text: &mut String, log: &Overview) {
         let _ = writeln!(text, "    ({remark})");
     }
     let mut table = Table::new(4, [left(33), right(14), right(13)]);
-    lines.into_iter().for_each(|line| table.row(line));
+    for line in lines {
+        table.row(line);
+    }
     let _ = write!(text, "{table}");
     for ranges in counters.ranges {
         let bands: Vec<String> =

@@ -28,9 +28,9 @@ fn role(arg: &Arg) -> Role {
         | "influx" | "last" | "line_rate" | "link" | "listen" | "listen_token" | "map" | "message"
         | "name" | "names" | "noise" | "offset" | "org" | "provoke" | "reboot_at_us" | "seed" | "session"
         | "shell" | "span" | "speed" | "split" | "stall" | "system" | "to" | "token" | "value"
-        | "vehicle" | "write_error" => Role::Other,
+        | "vehicle" | "write_error"
         // A file that exists is refused.
-        "undo" => Role::Other,
+        | "undo" => Role::Other,
         unknown => panic!("is --{unknown} an input, an output or none? Say so in `role`"),
     }
 }

@@ -8,6 +8,7 @@ use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::slice;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -131,8 +132,8 @@ fn compare(fleet: &Fleet, stretches: &[Stretch], dir: &Path, text: &mut String) 
     make(stretches, 0..fleet.compared, 0, &files)?;
     let mut paths = fs::read_dir(&files)?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
     paths.sort();
-    let alone: f64 = paths.iter().map(|path| decode(&[path.clone()], &one, "parquet", &[])).sum();
-    let together = decode(&[files.clone()], &all, "parquet", &[]);
+    let alone: f64 = paths.iter().map(|path| decode(slice::from_ref(path), &one, "parquet", &[])).sum();
+    let together = decode(slice::from_ref(&files), &all, "parquet", &[]);
     let (a, b) = (taken(&one)?, taken(&all)?);
     ensure!(a.1 == b.1, "one by one gave {} files, in one call {}", a.1, b.1);
     let ratio = alone / together;
@@ -156,10 +157,10 @@ fn size(dir: &Path, text: &mut String) -> Result<f64> {
     let (logs, tables) = (dir.join("logs"), dir.join("tables"));
     fs::create_dir(&logs)?;
     for (number, recording) in recordings.iter().enumerate() {
-        decode(&[recording.clone()], &logs.join(format!("{number:02}.hum")), "hum", &[]);
+        decode(slice::from_ref(recording), &logs.join(format!("{number:02}.hum")), "hum", &[]);
     }
     let log_bytes = taken(&logs)?.0;
-    decode(&[logs.clone()], &tables, "parquet", &["--vehicle", "one"]);
+    decode(slice::from_ref(&logs), &tables, "parquet", &["--vehicle", "one"]);
     let (bytes, files) = taken(&tables)?;
     compact(&tables);
     let (compact_bytes, compact_files) = taken(&tables)?;
@@ -202,7 +203,7 @@ fn ingest(fleet: &Fleet, stretches: &[Stretch], dir: &Path, text: &mut String) -
         let sessions = fleet.sessions * day / fleet.days..fleet.sessions * (day + 1) / fleet.days;
         frames += make(stretches, sessions, day, &day_folder)?;
         let before = if day == 0 { 0 } else { taken(&tables)?.1 };
-        ingest_s += decode(&[day_folder.clone()], &tables, "parquet", few);
+        ingest_s += decode(slice::from_ref(&day_folder), &tables, "parquet", few);
         fs::remove_dir_all(&day_folder)?;
         let (bytes, now) = taken(&tables)?;
         (most, files) = (most.max(bytes), files + now - before);
