@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use hums_analysis::counters::of_figure;
+use hums_analysis::states::{Shown, shown};
 use hums_core::figures::Quantity;
 use hums_core::usage::{CounterName, counter_name as meaning};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -20,7 +21,7 @@ use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
 
-use super::transaction::{self, OWN};
+use super::transaction;
 use super::{EXTENSION, SESSIONS, folders, names};
 use crate::names::{check_name, counter_name, unit_name};
 
@@ -31,14 +32,15 @@ const SCORE_MAX: f64 = 3.5;
 const QUARTILE: f64 = 0.6745;
 /// Findings of a page at most: vehicles and checks.
 const FINDINGS_MAX: usize = 2_000;
-const COLUMNS: &str =
-    "vehicle session utc autopilot type firmware flights flight_time_s criticals warnings problems parts";
+const COLUMNS: &str = "vehicle session utc end_utc autopilot type firmware flights flight_time_s criticals warnings problems parts";
 
 /// A fleet, for its page.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Overview {
     /// Rows of the table.
     pub sessions: u64,
+    /// Sessions whose flights another recorder of the vehicle has too: they are summed once.
+    pub overlapping: u64,
     /// In the order of their names.
     pub vehicles: Vec<Vehicle>,
     /// Parts that are due or soon due by their vehicle's last session, most used first.
@@ -94,8 +96,11 @@ pub struct Problem {
     level: String,
     check: String,
     instance: u8,
-    value: Option<f64>,
-    limit: Option<f64>,
+    /// The name of a state, which has neither value nor limit for people.
+    #[serde(skip_deserializing)]
+    state: Option<&'static str>,
+    value: Option<f32>,
+    limit: Option<f32>,
     unit: String,
 }
 
@@ -129,6 +134,7 @@ pub struct Outlier {
 #[derive(Default)]
 struct Gathered {
     vehicle: Vehicle,
+    flown: Vec<Flown>,
     /// Time of the last session, and of the last one with parts.
     last: Option<f64>,
     last_parts: Option<f64>,
@@ -136,6 +142,39 @@ struct Gathered {
     findings: BTreeMap<(String, u8), Found>,
     figures: BTreeMap<usize, Vec<f64>>,
 }
+
+/// The flights of a session, with the times of its first and last entry.
+struct Flown {
+    from_us: f64,
+    to_us: f64,
+    flights: f64,
+    flight_s: f64,
+}
+
+impl Flown {
+    /// Whether they share more than half of the shorter one. Clocks differ, so sessions in a row may share a little.
+    fn is_same_time(&self, other: &Self) -> bool {
+        let shared = self.to_us.min(other.to_us) - self.from_us.max(other.from_us);
+        2.0 * shared > (self.to_us - self.from_us).min(other.to_us - other.from_us)
+    }
+}
+
+/// The sessions of a vehicle to sum: of those of the same time the one with more time in the air.
+fn once(mut flown: Vec<Flown>) -> Vec<Flown> {
+    flown.sort_by(|one, other| one.from_us.total_cmp(&other.from_us));
+    let mut kept: Vec<Flown> = Vec::new();
+    for next in flown {
+        match kept.last_mut().filter(|last| last.is_same_time(&next)) {
+            Some(last) if next.flight_s > last.flight_s => *last = next,
+            Some(_) => {}
+            None => kept.push(next),
+        }
+    }
+    kept
+}
+
+/// Of a vehicle, by the number of the figure.
+type Medians = BTreeMap<usize, f64>;
 
 /// Figures that vehicles are compared by: their columns, quantities.
 fn figures() -> Vec<(String, Quantity)> {
@@ -148,9 +187,9 @@ fn figures() -> Vec<(String, Quantity)> {
     (0..=u8::MAX).filter_map(figure).collect()
 }
 
-/// Whether a folder has the tables of a fleet.
+/// Whether a folder has the tables of a fleet. A copy may lack the folder of this program.
 pub fn is_fleet(folder: &Path) -> bool {
-    folder.join(OWN).is_dir() && folder.join(SESSIONS).is_dir()
+    folders(&folder.join(SESSIONS)).is_ok_and(|dates| dates.iter().any(|date| date.starts_with("date=")))
 }
 
 /// Reads the table `sessions` of a folder.
@@ -226,8 +265,6 @@ impl Gathered {
         let at = number(row, "utc");
         let vehicle = &mut self.vehicle;
         vehicle.sessions += 1;
-        vehicle.flights += sum("flights");
-        vehicle.flight_s += sum("flight_time_s");
         vehicle.critical += sum("criticals");
         vehicle.warning += sum("warnings");
         let (first, last) = &mut vehicle.days;
@@ -238,10 +275,20 @@ impl Gathered {
             day.clone_into(last);
         }
         let name = said("vehicle");
+        let (flights, flight_s) = (sum("flights"), sum("flight_time_s"));
+        // Vehicles without an id may share a name.
+        let is_named = !name.starts_with("system-") && name != "unknown";
+        if let Some((from_us, to_us)) = at.zip(number(row, "end_utc")).filter(|_| is_named) {
+            self.flown.push(Flown { from_us, to_us, flights, flight_s });
+        } else {
+            vehicle.flights += flights;
+            vehicle.flight_s += flight_s;
+        }
         if vehicle.vehicle.is_empty() || at >= self.last {
             self.last = at;
             vehicle.vehicle.clone_from(&name);
-            vehicle.kind = format!("{} {}", said("autopilot"), said("type")).trim().to_owned();
+            let kind = format!("{} {}", said("autopilot"), said("type"));
+            kind.trim().clone_into(&mut vehicle.kind);
             vehicle.firmware = said("firmware");
         }
         let parts: Vec<Due> = list(row, "parts");
@@ -250,6 +297,16 @@ impl Gathered {
             let due = parts.into_iter().filter(|part| part.status != "green");
             self.due = due.map(|part| Due { vehicle: name.clone(), ..part }).collect();
         }
+        self.add_problems(row, day, at);
+        for (index, (name, _)) in figures.iter().enumerate() {
+            if let Some(value) = number(row, name) {
+                self.figures.entry(index).or_default().push(value);
+            }
+        }
+    }
+
+    fn add_problems(&mut self, row: &Cells, day: &str, at: Option<f64>) {
+        let said = |name| text(row, name).unwrap_or_default().to_owned();
         let mut counted = BTreeSet::new();
         for problem in list::<Problem>(row, "problems") {
             if !matches!(problem.level.as_str(), "critical" | "warning") {
@@ -258,19 +315,20 @@ impl Gathered {
             let key = (problem.check.clone(), problem.instance);
             let check = check_name(&problem.check, problem.instance);
             let unit = unit_name(&problem.unit).to_owned();
-            let (vehicle, session, day) = (name.clone(), said("session"), day.to_owned());
-            let found =
-                Found { vehicle, sessions: 0, session, day, at, problem: Problem { check, unit, ..problem } };
+            let number = |number: Option<f32>| number.unwrap_or(f32::NAN);
+            let (state, value, limit) =
+                match shown(&problem.check, number(problem.value), number(problem.limit)) {
+                    Shown::State(state) => (state, None, None),
+                    Shown::Quantity(value, limit) => (None, value, limit),
+                };
+            let problem = Problem { check, state, value, limit, unit, ..problem };
+            let (vehicle, session, day) = (said("vehicle"), said("session"), day.to_owned());
+            let found = Found { vehicle, sessions: 0, session, day, at, problem };
             let known = self.findings.entry(key.clone()).or_insert_with(|| found.clone());
             if (found.is_critical(), at) >= (known.is_critical(), known.at) {
                 *known = Found { sessions: known.sessions, ..found };
             }
             known.sessions += u64::from(counted.insert(key));
-        }
-        for (index, (name, _)) in figures.iter().enumerate() {
-            if let Some(value) = number(row, name) {
-                self.figures.entry(index).or_default().push(value);
-            }
         }
     }
 }
@@ -284,9 +342,15 @@ impl Found {
 impl Overview {
     fn of(vehicles: BTreeMap<String, Gathered>, figures: &[(String, Quantity)]) -> Self {
         let mut fleet = Self::default();
-        let mut kinds: BTreeMap<String, Vec<(String, BTreeMap<usize, f64>)>> = BTreeMap::new();
+        let mut kinds: BTreeMap<String, Vec<(String, Medians)>> = BTreeMap::new();
         for (name, gathered) in vehicles {
-            let Gathered { vehicle, due, findings, figures, .. } = gathered;
+            let Gathered { mut vehicle, flown, due, findings, figures, .. } = gathered;
+            fleet.overlapping += flown.len() as u64;
+            for flown in once(flown) {
+                fleet.overlapping -= 1;
+                vehicle.flights += flown.flights;
+                vehicle.flight_s += flown.flight_s;
+            }
             let medians =
                 figures.into_iter().map(|(index, mut values)| (index, median(&mut values))).collect();
             kinds.entry(vehicle.kind.clone()).or_default().push((name, medians));
@@ -374,6 +438,36 @@ mod tests {
         ]
         .map(|(name, field)| (name.to_owned(), field))
         .into()
+    }
+
+    #[test]
+    fn a_flight_of_two_recorders_is_summed_once_and_a_state_has_its_name() {
+        let figures = figures();
+        let sum = |name: &str, sessions: &[(i64, i64, f64)]| {
+            let mut gathered = Gathered::default();
+            for (from, to, flight_s) in sessions {
+                let mut row = row(name, 1, 10.0);
+                row.insert("utc".to_owned(), Field::TimestampMicros(*from));
+                row.insert("end_utc".to_owned(), Field::TimestampMicros(*to));
+                row.insert("flight_time_s".to_owned(), Field::Double(*flight_s));
+                gathered.add(&row, "2026-05-01", &figures);
+            }
+            let fleet = Overview::of([(name.to_owned(), gathered)].into(), &figures);
+            (fleet.vehicles[0].flights, fleet.vehicles[0].flight_s, fleet.overlapping)
+        };
+        // A box at each power-on, a ground station over two of them; the last two share a little, as clocks differ.
+        let sessions = [(0, 100, 60.0), (150, 250, 70.0), (5, 255, 125.0), (252, 400, 80.0)];
+        assert_eq!(sum("uid-1", &sessions), (4.0, 205.0, 2));
+        assert_eq!(sum("system-1-quadrotor-PX4-logs", &sessions), (8.0, 335.0, 0));
+        // Times that cannot be share nothing.
+        assert_eq!(sum("uid-1", &[(0, 0, 1.0), (5, 5, 1.0), (0, i64::MAX, 1.0)]), (6.0, 3.0, 0));
+
+        let mut gathered = Gathered::default();
+        let problems = r#"[{"level":"critical","check":"autopilot_state","instance":0,"value":5.0,"limit":4.5,"unit":"flag"}]"#;
+        let row: Cells = [("problems".to_owned(), Field::Str(problems.to_owned()))].into();
+        gathered.add(&row, "", &figures);
+        let problem = &gathered.findings.values().next().expect("a finding").problem;
+        assert_eq!((problem.state, problem.value, problem.limit), (Some("critical"), None, None));
     }
 
     fn fleet(vibrations: &[f64]) -> Overview {

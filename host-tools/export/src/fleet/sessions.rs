@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use hums_analysis::log_json::{VehicleJson, duration_s, finite, vehicle};
 use hums_core::figures::Quantity;
 use hums_core::health::Level;
-use hums_core::usage::{CounterName, counter_name as meaning};
+use hums_core::usage::{CounterName, UsageCounter, counter_name as meaning};
 use serde::Serialize;
 
 use super::SESSIONS;
@@ -76,8 +76,17 @@ pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
     cells.extend(machines(about));
     cells.extend(record(about));
     cells.extend(health(context, about));
+    let contents = &overview.contents;
     let counter = |name: &'static String| {
-        let value = overview.contents.usage.get(name).copied();
+        let counted = contents.usage.get(name).copied();
+        // The counters count since power-on, and a later log of one power-on begins with them.
+        let value = if *name == UsageCounter::Flight.name() {
+            overview.flight_s()
+        } else if *name == UsageCounter::Flights.name() {
+            counted.map(|_| contents.flights().len() as f64)
+        } else {
+            counted
+        };
         (name.as_str(), known(value, Cell::Double, CellType::Double))
     };
     cells.extend(COUNTERS.iter().map(counter));
@@ -166,4 +175,23 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
         ("parts", text(serde_json::to_string(&parts).unwrap_or_default())),
     ]);
     cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_later_log_of_one_power_on_has_its_own_flights_and_not_those_before_it() {
+        let mut about = RecordingContent::default();
+        let usage = [("flight_time_s", 900.0), ("flights", 3.0), ("charge_ah", 2.0)];
+        about.overview.contents.usage = usage.map(|(name, value)| (name.to_owned(), value)).into();
+        about.overview.contents.flight_before_s = Some(600.0);
+        about.overview.contents.moves = vec![(hums_core::clock::Instant::from_millis(700_000), true)];
+        about.overview.ending.summary.first_number = Some(9);
+        let row = row(&Context::default(), &about);
+        let cell = |name| row.cells.iter().find(|(of, _)| *of == name).map(|(_, cell)| cell.clone());
+        let cells = ["flight_time_s", "flights", "charge_ah"].map(cell);
+        assert_eq!(cells, [300.0, 1.0, 2.0].map(|value| Some(Cell::Double(value))));
+    }
 }

@@ -308,3 +308,18 @@ fn vehicles_share_sixteen_buckets_evenly() {
     // printf uid-0031002a3035510a | sha256sum
     assert_eq!(partition("uid-0031002a3035510a", Some("2026-11-21")), "date=2026-11-21/bucket=15");
 }
+
+#[test]
+fn a_copy_without_the_folder_of_this_program_is_a_fleet() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let root = dir.path();
+    assert!(!overview::is_fleet(root));
+    for number in VEHICLES {
+        add(root, number, (number != 0).then_some("2026-05-01"), 1, false).expect("added");
+    }
+    fs::remove_dir_all(root.join(OWN)).expect("removed");
+    assert!(overview::is_fleet(root) && !overview::is_fleet(&root.join(SESSIONS)));
+    let overview = overview::read(root).expect("a fleet");
+    assert_eq!((overview.sessions, overview.vehicles.len()), (5, 5));
+    assert!(!root.join(OWN).exists(), "reading writes nothing");
+}

@@ -64,7 +64,7 @@ const found = table(
     ["Check", "words", ({ check }) => check, ({ check }) => check],
     ["Sessions", "n", ({ sessions }) => sessions, ({ sessions }) => whole(sessions)],
     ["Last", "t", ({ day }) => day, ({ day }) => day || "not known"],
-    ["Value", "n", ({ value }) => value ?? 0, (one) => (one.value == null ? "" : unit(one.value, null, one.unit))],
+    ["Value", "n", ({ value }) => value ?? 0, (one) => one.state ?? (one.value == null ? "" : unit(one.value, null, one.unit))],
     ["Limit", "n", ({ limit }) => limit ?? 0, (one) => (one.limit == null ? "" : unit(one.limit, null, one.unit))],
     ["Session", "words", ({ session }) => session, ({ session }) => session],
   ],
@@ -98,7 +98,7 @@ differ.append(
     }`,
   ),
 );
-table(
+const all = table(
   "vehicles",
   "Vehicles",
   vehicles,
@@ -117,4 +117,12 @@ table(
   5,
   "The table sessions is empty.",
 );
+if (fleet.overlapping)
+  all.append(
+    el(
+      "p",
+      { class: "dim" },
+      `${plural(fleet.overlapping, "session")} at the time of another session of the same vehicle with more time in the air: flights are summed once.`,
+    ),
+  );
 document.documentElement.dataset.ready = "true";
