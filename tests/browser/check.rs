@@ -201,7 +201,10 @@ fn every_recording_of_the_repository_is_judged_to_the_byte_as_on_the_command_lin
         assert!(words.contains(&word), "no log is {word}");
     }
     page.all_text();
-    assert_eq!(page.text("[role=status]").split_whitespace().last(), Some("checked."));
+    let failed = shown.lines().filter(|line| line.contains("\"error\":")).count();
+    assert!(failed > 0, "each was read");
+    let count = names.len() - failed;
+    assert_eq!(page.text("[role=status]"), format!("{count} logs checked, {failed} not read."));
     assert_eq!(page.shown.console(), serde_json::json!([]));
 }
 
@@ -288,6 +291,76 @@ fn what_is_dropped_is_judged_also_folders_and_two_files_of_one_name() {
     page.shown.run("document.querySelector('[data-log=\"flight.tlog\"] button').click(); return null");
     page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
     assert_eq!(page.shown.console(), serde_json::json!([]));
+}
+
+#[test]
+fn a_log_that_is_not_read_shows_its_reason_alone() {
+    let mut page = Page::open(1280);
+    let (flight, empty) = (own("ap_quad_faults.tlog"), page.file("empty.tlog", b""));
+    page.check("#files", &[flight, empty]);
+    assert_eq!(page.text("[role=status]"), "1 log checked, 1 not read.");
+    let details = page.shown.run(
+        "return [...document.querySelectorAll('.log')].map((log) => log.querySelectorAll('details').length)",
+    );
+    assert_eq!(details, serde_json::json!([1, 0]));
+}
+
+#[test]
+fn what_is_dropped_on_a_report_is_judged_and_what_is_no_log_leaves_the_page_at_rest() {
+    let mut page = Page::sized(1000, 1300);
+    page.check("#files", &[own("ap_quad_faults.tlog")]);
+    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
+    // Words, as a link or a marked text.
+    page.shown.run(
+        "const data = new DataTransfer(); data.setData('text/plain', 'words');
+         dispatchEvent(new DragEvent('drop', { dataTransfer: data, cancelable: true })); return null",
+    );
+    assert_eq!(page.text("[role=status]"), "1 log checked.");
+    // The report is brought to the place of the drop.
+    page.shown.run("document.querySelector('iframe').scrollIntoView(); document.documentElement.dataset.state = ''; return null");
+    page.shown.drop_files(&[own("px4_hil_quad_low.tlog")]);
+    page.shown.wait("return document.documentElement.dataset.state === 'done'", 60);
+    assert!(page.text("#logs h2").contains("px4_hil_quad_low.tlog"), "{}", page.text("#logs h2"));
+    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
+    let folder = page.dir.path().join("folder");
+    fs::create_dir(&folder).unwrap();
+    page.shown.drop_files(&[folder]);
+    page.shown.wait(
+        "return document.querySelector('[role=status]').textContent === 'Nothing to read was given.'",
+        20,
+    );
+    assert_eq!(page.shown.run("return document.documentElement.dataset.state"), "done");
+}
+
+#[test]
+fn each_session_of_a_card_and_of_its_copy_has_its_own_report() {
+    let mut page = Page::open(1280);
+    let folder = page.dir.path().join("logs");
+    fs::create_dir(&folder).unwrap();
+    let card = Recording::make(Machine::Sim, &own("ap_quad_faults.tlog"), &[]);
+    fs::copy(card.image(), folder.join("card.img")).unwrap();
+    let flight = own("ap_quad_guided.tlog").display().to_string();
+    hums_in(&folder, &["sim", "--sd", "card.img"], &[flight]).expect_code(&[0]);
+    fs::copy(folder.join("card.img"), folder.join("copy.img")).unwrap();
+    let names = ["card.img", "copy.img"].map(str::to_owned);
+    hums_in(&folder, &["report", "-o", "../pages/"], &names).expect_code(&[0, 3]);
+    page.check("#files", &names.map(|name| folder.join(name)));
+    for log in ["card.img:00001", "card.img:00002", "copy.img:00001", "copy.img:00002"] {
+        // Of the others the button is renamed, so that one click is one report.
+        page.shown.run(&format!(
+            "for (const button of document.querySelectorAll('.log button'))
+               if (/^(Save report|This one)$/.test(button.textContent))
+                 button.textContent = button.closest('.log').dataset.log === {log:?} ? 'This one' : 'Save report';
+             return null"
+        ));
+        let report = page.save("This one", 1).remove(0);
+        let html = fs::read(&report).unwrap();
+        if log.starts_with("card") {
+            let made = fs::read(page.dir.path().join("pages").join(report.file_name().unwrap())).unwrap();
+            assert!(html == made, "{log} differs");
+        }
+        fs::remove_file(&report).unwrap();
+    }
 }
 
 #[test]
@@ -468,7 +541,7 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
     }
     page.shown.files("#files", &[own("ap_quad_faults.tlog")]);
     page.shown.run("[...document.querySelectorAll('button')].find((one) => one.textContent === 'Cancel').click(); return null");
-    assert_eq!(page.text("[role=status]"), "Cancelled.");
+    assert_eq!(page.text("[role=status]"), "The check ended early: you cancelled it. 0 logs checked.");
     page.check("#files", &[own("ap_quad_faults.tlog")]);
     assert!(page.text("#logs .verdict").contains("2 critical findings"), "{}", page.text("#logs"));
 }

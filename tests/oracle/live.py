@@ -125,8 +125,9 @@ def step(driver, asked):
         return None
     if do == "drop":
         data = {"items": [], "files": asked["paths"], "dragOperationsMask": 1}
-        for kind in ["dragEnter", "dragOver", "drop"]:
-            driver.execute_cdp_cmd("Input.dispatchDragEvent", {"type": kind, "x": 100, "y": 100, "data": data})
+        # Over the page's margin first, as a mouse comes in.
+        for kind, at in [("dragEnter", 1), ("dragOver", 1), ("dragOver", 100), ("drop", 100)]:
+            driver.execute_cdp_cmd("Input.dispatchDragEvent", {"type": kind, "x": at, "y": at, "data": data})
         return None
     if do == "downloads":
         driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": asked["path"]})

@@ -6,8 +6,9 @@
 //! ```text
 //! hums-browser check INPUT...          two lines for each log: {"screen": TEXT, "state": WORD, "reasons": TEXT}, of which
 //!                                      the last is the list of checks without data; then the object of `hums check --json`
-//! hums-browser report SYSTEM INPUT...  a line for each page: {"page": FILE, "log": LOG or null, "html": TEXT}; SYSTEM is the
-//!                                      id of one vehicle of a recording of several, or `-`
+//! hums-browser report SYSTEM SESSION INPUT...
+//!                                      a line for each page: {"page": FILE, "log": LOG or null, "html": TEXT}; SYSTEM is the
+//!                                      id of one vehicle of a recording of several, SESSION one log of a card, or `-`
 //! hums-browser compare INPUT...        the same of the flights side by side
 //! ```
 //!
@@ -35,10 +36,11 @@ fn run(mut arguments: impl Iterator<Item = OsString>) -> Result<Outcome> {
     let inputs: Vec<PathBuf> = arguments.map(PathBuf::from).collect();
     match (command.to_str(), inputs.as_slice()) {
         (Some("check"), _) => check(&inputs),
-        (Some("report"), [system, inputs @ ..]) => {
-            report(inputs, "pages/", system.to_str().and_then(|id| id.parse().ok()))
+        (Some("report"), [system, session, inputs @ ..]) => {
+            let session = session.to_str().filter(|session| *session != "-");
+            report(inputs, "pages/", system.to_str().and_then(|id| id.parse().ok()), session)
         }
-        (Some("compare"), _) => report(&inputs, "flights.html", None),
+        (Some("compare"), _) => report(&inputs, "flights.html", None, None),
         _ => Err(usage("the first argument is check, report or compare")),
     }
 }
@@ -64,11 +66,11 @@ fn check(inputs: &[PathBuf]) -> Result<Outcome> {
 }
 
 /// A folder is for a page of each session, a file for one of all side by side.
-fn report(inputs: &[PathBuf], output: &str, system: Option<u8>) -> Result<Outcome> {
+fn report(inputs: &[PathBuf], output: &str, system: Option<u8>, session: Option<&str>) -> Result<Outcome> {
     let request = report::Request {
         inputs,
         output: Some(output.as_ref()),
-        session: None,
+        session,
         compare: !output.ends_with('/'),
         system,
         map: None,

@@ -134,11 +134,11 @@ impl FoundRecordings {
         Ok(self)
     }
 
-    /// A session by name or number.
+    /// A session by name, number, or the title that `hums check` gives it.
     pub fn session(&self, name: &str) -> Result<usize> {
         let number = |name: &str| name.parse::<u32>().ok();
         let is_it = |place: &Place| {
-            place.name == name || number(name).is_some_and(|wanted| number(&place.name) == Some(wanted))
+            place.name == name || place.title == name || number(name).is_some_and(|wanted| number(&place.name) == Some(wanted))
         };
         self.places.iter().position(is_it).ok_or_else(|| {
             let names: Vec<&str> = self.places.iter().map(|place| place.name.as_str()).collect();

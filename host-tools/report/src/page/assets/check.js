@@ -19,7 +19,7 @@ const workerAddress = URL.createObjectURL(new Blob([textOf("worker")], { type: "
 // ---- The page.
 const status = el("p", { role: "status", class: "dim" });
 const meter = el("progress", { max: 1, hidden: true, "aria-label": "progress" });
-const stop = el("button", { type: "button", hidden: true, onclick: () => cancel("Cancelled.") }, "Cancel");
+const stop = el("button", { type: "button", hidden: true, onclick: () => interrupt({ why: "you cancelled it" }) }, "Cancel");
 const choose = (label, options) => {
   const input = el("input", { type: "file", multiple: true, ...options });
   input.addEventListener("change", () => {
@@ -71,12 +71,15 @@ const show = async (title, { html }) => {
   shown.replaceChildren(el("h2", {}, title), frame);
   shown.hidden = false;
 };
-// Pages are made when they are first asked for. `make` resolves to a page, or to nothing if its run ended early.
+// A page is made when it is first asked for. `make` resolves to it, or to nothing if its run ended early.
 const pageButtons = (host, words, title, make) => {
-  let made = null;
+  let making = null;
   const page = async (use) => {
-    made ??= await make();
+    making ??= make();
+    const made = await making;
     if (made) use(made);
+    // It may be tried again.
+    else making = null;
   };
   const open = () => page((page) => show(title, page).then(() => shown.scrollIntoView({ behavior: "smooth" })));
   host.append(
@@ -111,7 +114,7 @@ const addLog = (line, told, { screen, state, reasons }) => {
 };
 
 // ---- Runs of the program, one at a time, each in a worker of its own: its memory ends with it.
-// A run ends with `why` it ended early, or null, and the program's exit code.
+// A run ends with `why` it ended early, or null; itself it is null if other logs were given meanwhile.
 let endRun = () => {};
 let turn = 0;
 const idle = (words) => {
@@ -119,10 +122,10 @@ const idle = (words) => {
   meter.hidden = stop.hidden = true;
   root.dataset.state = "done";
 };
-const cancel = (words) => {
+// Ends the run, and those that wait.
+const interrupt = (result) => {
   turn++;
-  endRun({ why: null });
-  idle(words);
+  endRun(result);
 };
 // Once each: a report repeats those of the check.
 const remark = (words) => {
@@ -134,7 +137,7 @@ const run = (words, command, files, takeLine) => {
     (module) =>
       new Promise((resolve) => {
         // It may have been cancelled before it began.
-        if (mine !== turn) return resolve({ why: null });
+        if (mine !== turn) return resolve(null);
         const own = new Worker(workerAddress);
         const end = (result) => {
           own.terminate();
@@ -159,25 +162,24 @@ const run = (words, command, files, takeLine) => {
   );
 };
 
-// The pages of a run, by log; nothing if it was cancelled, or ended early. One run after the other; `words` are shown after it.
+// The page of this log; nothing if its run was cancelled, or ended early. One run after the other; `words` are shown after it.
 let lastRun = Promise.resolve();
-const pagesOf = (command, files, words) => {
+const pageOf = (command, files, log, words) => {
   const mine = turn;
   lastRun = lastRun.then(async () => {
     if (mine !== turn) return null;
     root.dataset.state = "busy";
-    const pages = new Map();
-    const { why, code } = await run("Reporting", command, files, (line) => {
+    let made = null;
+    const ended = await run("Reporting", command, files, (line) => {
       if (!line.startsWith("{")) return;
-      const { page, log, html } = JSON.parse(line);
-      // Out of the script's memory: reports are large, and a card may have hundreds.
-      pages.set(log, { file: page, html: new Blob([html]) });
+      const { page, log: of, html } = JSON.parse(line);
+      // Out of the script's memory: reports are large.
+      if (of === log) made = { file: page, html: new Blob([html]) };
     });
-    if (mine !== turn) return null;
-    // Exit codes 1 and 2: an input or a request that the program refused.
-    const early = why ?? ([1, 2].includes(code) ? "see the remarks" : null);
+    if (!ended) return null;
+    const early = ended.why ?? (made ? null : "see the remarks");
     idle(early ? `The report ended early: ${early}.` : words);
-    return early ? null : pages;
+    return early ? null : made;
   });
   return lastRun;
 };
@@ -197,9 +199,9 @@ const named = (items) => {
 // `items`: the files of each chosen or dropped file or folder; `unread`: sentences about others.
 const start = async (items, unread = []) => {
   const given = named(items.filter((files) => files.length));
+  interrupt(null);
+  idle("Nothing to read was given.");
   if (given.length + unread.length === 0) return;
-  cancel("");
-  const mine = turn;
   root.dataset.state = "busy";
   logs = [];
   for (const node of [list, beside, remarks, shown]) node.replaceChildren();
@@ -211,42 +213,42 @@ const start = async (items, unread = []) => {
   const checked = await run("Checking", ["check", ...inputs], given, (line) => {
     const told = JSON.parse(line);
     if (told.screen != null) answer = told;
-    else addLog(line, told, answer);
+    else {
+      addLog(line, told, answer);
+      answer = {};
+    }
   });
-  if (mine !== turn) return;
+  if (!checked) return;
   const read = logs.filter(({ told }) => !told.error);
   if (read.length > 1)
     beside.append(
       button("Save all findings", () => save("findings.jsonl", logs.map(({ line }) => `${line}\n`).join(""), "application/json")),
     );
-  if (checked.why) return idle(`The check ended early: ${checked.why}.`);
-  if (read.length === 0) return idle(`No log could be read${logs.length ? "" : " in what was given"}.`);
-  const end = `${plural(new Set(logs.map(({ told }) => told.log)).size, "log")} checked.`;
-  idle(end);
   const failed = new Set(logs.filter(({ told }) => told.error).map(({ told }) => told.log));
-  const good = inputs.filter((input) => !failed.has(input));
+  const count = new Set(read.map(({ told }) => told.log)).size;
+  const counts = `${plural(count, "log")} checked${failed.size ? `, ${failed.size} not read` : ""}.`;
+  const none = `No log could be read${logs.length ? "" : " in what was given"}.`;
+  const end = checked.why ? `The check ended early: ${checked.why}. ${counts}` : count ? counts : none;
+  idle(end);
+  // Inputs with one of these logs. Segments of one log may be inputs, and only the first has its name.
+  const isOf = (log, input) => log === input || log.startsWith(`${input}/`) || log.startsWith(`${input}:`);
+  const holding = (some) =>
+    inputs.filter((input) => !failed.has(input) && (/\.hum$/i.test(input) || some.some(({ told }) => isOf(told.log, input))));
   const filesOf = (some) => given.filter(({ path }) => !failed.has(path) && some.includes(path.split("/")[0]));
-  const cards = good.filter((input) => !read.some(({ told }) => told.log === input && told.format !== "hums"));
-  // A run each for a file, for all cards together, whose sessions are compared, and for the flights side by side.
-  const runs = new Map();
-  const page = async (log, command, files) => {
-    const key = command.join("\n");
-    if (!runs.has(key)) runs.set(key, pagesOf(command, files, end));
-    const made = await runs.get(key);
-    // It may be tried again.
-    if (!made) runs.delete(key);
-    return made?.get(log);
-  };
+  // All of them for each session, which is compared with others.
+  const good = holding(read),
+    cards = holding(read.filter(({ told }) => told.format === "hums"));
   if (read.reduce((sum, { told }) => sum + told.flights.length, 0) > 1)
-    pageButtons(beside, "Flights side by side", "Flights side by side", () => page(null, ["compare", ...good], filesOf(good)));
+    pageButtons(beside, "Flights side by side", "Flights side by side", () => pageOf(["compare", ...good], filesOf(good), null, end));
   for (const { line, told, buttons, heading } of read) {
     const isOfSeveral = read.filter((other) => other.told.log === told.log).length > 1;
     const system = isOfSeveral ? String(told.vehicle.system) : "-";
     const name = isOfSeveral ? `${told.log}, system ${system}` : told.log;
     heading.lastChild.textContent = ` ${name}`;
     const file = told.format === "hums" ? null : given.find(({ path }) => path === told.log);
-    const [own, of] = file ? [[told.log], [file]] : [cards, filesOf(cards)];
-    const use = pageButtons(buttons, "Report", `Report of ${name}`, () => page(told.log, ["report", system, ...own], of));
+    const [session, own, of] = file ? ["-", [told.log], [file]] : [told.log, cards, filesOf(cards)];
+    const make = () => pageOf(["report", system, session, ...own], of, told.log, end);
+    const use = pageButtons(buttons, "Report", `Report of ${name}`, make);
     const saved = `${name.replace(/[^\w.-]+/g, "_")}.json`;
     buttons.append(button("Save findings", () => save(saved, `${line}\n`, "application/json")));
     if (read.length === 1) use((page) => show(`Report of ${name}`, page));
@@ -284,11 +286,20 @@ const dropped = (item) => {
   const handle = item.getAsFileSystemHandle?.();
   return handle ? handle.then((folder) => ofHandle(folder, folder.name)) : ofEntry(entry, entry.name);
 };
+// A report would take for itself what is dropped on it, and open it.
+const overReport = (takes) => {
+  shown.style.pointerEvents = takes ? "" : "none";
+};
+addEventListener("dragenter", () => overReport(false));
+addEventListener("dragleave", ({ relatedTarget }) => relatedTarget || overReport(true));
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", async (event) => {
   event.preventDefault();
+  overReport(true);
   const items = [...event.dataTransfer.items].filter(({ kind }) => kind === "file").map(dropped);
-  cancel("Listing what was dropped.");
+  if (items.length === 0) return;
+  interrupt(null);
+  idle("Listing what was dropped.");
   root.dataset.state = "busy";
   const mine = turn;
   const ended = await Promise.allSettled(items);

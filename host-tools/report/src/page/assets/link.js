@@ -2,6 +2,8 @@
 // itself.
 
 const AGAIN_MS = 1000;
+// A command that hums does not answer holds up those behind it no longer.
+const COMMAND_MS = 5000;
 
 export const connect = (take, changed) => {
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
@@ -37,7 +39,8 @@ export const connect = (take, changed) => {
       if (sending) return;
       sending = true;
       while (waiting.length) {
-        await fetch(address("command", {}), { method: "POST", body: JSON.stringify(waiting.shift()) }).catch(() => {});
+        const request = { method: "POST", body: JSON.stringify(waiting.shift()), signal: AbortSignal.timeout(COMMAND_MS) };
+        await fetch(address("command", {}), request).catch(() => {});
       }
       sending = false;
     },

@@ -12,39 +12,19 @@ import { plots } from "./plots.js";
 import { recorderSection } from "./recorder.js";
 import { spectrumSection } from "./spectrum.js";
 import { summary } from "./summary.js";
-import { counted, fixed, moment, plural, span, whole } from "./text.js";
+import { fixed, moment, plural, span, whole } from "./text.js";
 import { timeline } from "./timeline.js";
 import { trendSection } from "./trend.js";
 import { usageSection } from "./usage.js";
 import { back, cursorTime, home, lookAt, usually, zoom } from "./view.js";
 
 const root = document.documentElement;
-// From the best to the worst.
-const LEVELS = ["ok", "advisory", "stale", "warning", "critical"];
 
 // ---- Who flew, when, and the verdict.
 const findings = flight.notes.filter(({ kind, found }) => kind === "finding" && found);
-const worst = findings.reduce((worst, { level }) => (LEVELS.indexOf(level) > LEVELS.indexOf(worst) ? level : worst), "ok");
-// A check that warned before it was critical is one finding, as in hums check.
-const count = (level) => data[level] ?? findings.filter((note) => note.level === level).length;
 const unjudged = log.format !== "hums" && !log.vehicle;
-// Nothing found is good news where enough was judged.
-const little = data.little && worst === "ok";
-const verdict =
-  log.checked_by === "nobody" || unjudged
-    ? "Not checked"
-    : little
-      ? `Not enough to judge: ${data.judged[0]} of ${data.judged[1]} checks`
-      : worst === "ok"
-        ? data.judged
-          ? `No findings in ${data.judged[0]} of ${data.judged[1]} checks`
-          : "No findings"
-        : data.critical + data.warning
-          ? data.verdict
-          : ["stale", "advisory"]
-              .filter(count)
-              .map((level) => counted(count(level), level))
-              .join(", ");
+const isChecked = log.checked_by !== "nobody" && !unjudged;
+const worst = data.critical ? "critical" : data.warning ? "warning" : data.judged && !data.little ? "ok" : "stale";
 // Of a recording of frames alone it is the first of them.
 const POWER_ON = "the autopilot's power-on";
 const ZEROS = { hums: "the monitor's power-on", dataflash: POWER_ON, ulog: POWER_ON };
@@ -60,7 +40,7 @@ document
       { class: "dim" },
       [`${session}${log.name}`, when, span(log.duration_s), log.format === "hums" ? log.end.words : ""].filter(Boolean).join(" \u00b7 "),
     ),
-    el("p", { class: `verdict ${little ? "stale" : worst}`, id: "verdict" }, verdict),
+    el("p", { class: `verdict ${isChecked ? worst : "stale"}`, id: "verdict" }, isChecked ? data.verdict : "Not checked"),
     data.judged && data.judged[0] < data.judged[1]
       ? el(
           "p",

@@ -43,7 +43,7 @@ export const sorted = (id, items, columns, { by = 0, placeholder, label }) => {
     });
   };
   const sort = (column) => {
-    down = column === by ? !down : columns[column][1] === "n" || column === 0;
+    down = column === by ? !down : columns[column][1] !== "words";
     by = column;
     draw();
   };
