@@ -147,6 +147,30 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     drop(board);
 }
 
+/// At the autopilot's USB. The settings are the reason for which the box hears nothing, and sends nothing.
+#[test]
+fn the_port_of_a_box_that_hears_nothing_is_set_and_restored() {
+    let files = tempfile::tempdir().unwrap();
+    let undo = files.path().join("before.param").display().to_string();
+    let before = [("BRD_SER2_RTSCTS", 0.0), ("SERIAL2_BAUD", 57.0), ("SERIAL2_PROTOCOL", -1.0)];
+    let owned = |values: [(&str, f32); 3]| values.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    let port = free_port();
+    let autopilot = Autopilot::start(port, &before);
+    let address = format!("udpin:127.0.0.1:{port}");
+    let told = json(&on(&address, &["setup", "--set", "--undo", &undo, "--json"]).expect_code(&[4]).text());
+    let checks: Vec<[&str; 2]> = told["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|check| ["check", "state"].map(|name| check[name].as_str().unwrap()))
+        .collect();
+    assert_eq!(checks, [["box", "missing"], ["settings", "ok"]], "{told}");
+    let wanted = [("BRD_SER2_RTSCTS", 0.0), ("SERIAL2_BAUD", 921.0), ("SERIAL2_PROTOCOL", 2.0)];
+    assert_eq!(autopilot.values(), owned(wanted));
+    on(&address, &["setup", "--restore", &undo]).expect_code(&[0]);
+    assert_eq!(autopilot.values(), owned(before));
+}
+
 fn records(report: &Value, table: &str) -> usize {
     let records = report["logs"][0]["records"].as_array().unwrap();
     records.iter().filter(|record| record["record"] == table).count()
@@ -178,7 +202,10 @@ fn without_a_box_the_setup_still_shows_the_wiring_and_says_where_to_look() {
     let silent = on(&address, &["setup", "--board", "speedybee-f405-v4"]).expect_code(&[1]);
     let (told, error) = (silent.text(), silent.stderr.clone());
     assert!(told.contains("R1 (PA10)") && told.contains("T1 (PA9)") && told.contains("PC13"), "{told}");
-    assert!(error.contains("check its LED") && error.contains("no HUMS box is heard"), "{error}");
+    assert!(
+        error.contains("check its LED") && error.contains("no HUMS box or autopilot is heard"),
+        "{error}"
+    );
     let unknown = on(&address, &["setup", "--board", "no-such"]).expect_code(&[2]);
     assert!(unknown.stderr.contains("speedybee-f405-v4"), "{}", unknown.stderr);
 }

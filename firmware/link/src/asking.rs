@@ -109,7 +109,7 @@ pub fn wanted(autopilot: Autopilot, baud: u32) -> impl Iterator<Item = (u32, f32
 }
 
 /// Groups of `REQUEST_DATA_STREAM` and their rates: raw sensors, extended status, RC, position, extra 1 to 3.
-pub const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
+const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Has {

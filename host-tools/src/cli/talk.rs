@@ -317,7 +317,7 @@ pub struct Setup {
     /// Show the pads of this board, and check that the image is for it (docs/boards.md)
     #[arg(long, value_name = "NAME")]
     pub board: Option<String>,
-    /// The autopilot's telemetry port with the box: TELEM n of PX4, SERIALn of ArduPilot
+    /// The autopilot's telemetry port with the box: `TELEM n` of PX4 (1 to 4), `SERIALn` of ArduPilot
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=9))]
     pub port: u8,
     /// Set the autopilot's parameters that differ, after writing their values to the file of --undo

@@ -76,15 +76,20 @@ impl Client {
     /// No board; several without `--system` (usage error).
     pub fn connect(link: &Link) -> Result<Self> {
         // No wait for other boards.
-        Self::find_on(link, if link.system.is_some() { Duration::ZERO } else { LISTEN })
+        Self::connect_to(link, &[COMPONENT])
+    }
+
+    /// As [`Self::connect`], with the first of these components that is heard.
+    pub fn connect_to(link: &Link, components: &[u8]) -> Result<Self> {
+        Self::find_on(link, components, if link.system.is_some() { Duration::ZERO } else { LISTEN })
     }
 
     /// A connection for a command that cannot be undone: looks for further boards even with `--system`.
     pub fn connect_alone(link: &Link) -> Result<Self> {
-        Self::find_on(link, LISTEN)
+        Self::find_on(link, &[COMPONENT], LISTEN)
     }
 
-    fn find_on(link: &Link, listen: Duration) -> Result<Self> {
+    fn find_on(link: &Link, components: &[u8], listen: Duration) -> Result<Self> {
         let endpoint = &link.link;
         if !endpoint.is_live() {
             return Err(usage(format!("--link {endpoint}: a file does not answer; give udp, tcp or serial")));
@@ -93,8 +98,8 @@ impl Client {
         let duplex = duplex::open(endpoint, READ)?;
         interrupt::watch();
         let mut client = Self::over(duplex, seal);
-        client.find(link.system, listen).with_context(|| endpoint.to_string())?;
-        note!("system {}: its board is heard", client.system);
+        client.find(components, link.system, listen).with_context(|| endpoint.to_string())?;
+        note!("system {}: its {} is heard", client.system, who(client.component));
         Ok(client)
     }
 
@@ -112,9 +117,33 @@ impl Client {
         }
     }
 
-    /// The board of this system, or the only one within `listen` after the first. Two boards of one system differ in unique
-    /// ids, so each is asked.
-    fn find(&mut self, wanted: Option<u8>, listen: Duration) -> Result<()> {
+    /// The component of this system, or the only one within `listen` after the first. Two of one system differ in unique ids,
+    /// so each is asked.
+    fn find(&mut self, components: &[u8], wanted: Option<u8>, listen: Duration) -> Result<()> {
+        let mut heard = BTreeMap::new();
+        for component in components {
+            self.component = *component;
+            heard = self.listen(wanted, listen)?;
+            if wanted.map_or(!heard.is_empty(), |wanted| heard.contains_key(&wanted)) {
+                break;
+            }
+        }
+        let meant = |system: &u8| wanted.map_or(heard.len() == 1, |wanted| wanted == *system);
+        let Some((system, ids)) = heard.iter().find(|(system, _)| meant(system)) else {
+            return Err(not_found(components, wanted, heard.keys()));
+        };
+        if ids.len() > 1 {
+            bail!(
+                "{} boards, by their unique ids, say that they are of system {system}, and which one would answer nobody knows; give \
+                 their vehicles different system ids, or switch all but one off",
+                ids.len()
+            );
+        }
+        self.system = *system;
+        Ok(())
+    }
+
+    fn listen(&mut self, wanted: Option<u8>, listen: Duration) -> Result<BTreeMap<u8, BTreeSet<Board>>> {
         let mut heard: BTreeMap<u8, BTreeSet<Board>> = BTreeMap::new();
         let (mut end, mut is_found) = (Instant::now() + CONNECT, false);
         while let Some((system, id)) = self.next(end, told)? {
@@ -127,22 +156,10 @@ impl Client {
             }
             if !listen.is_zero() {
                 let about = [AUTOPILOT_VERSION as f32];
-                self.send(&messages::command_long(REQUEST_MESSAGE, &about, system, COMPONENT))?;
+                self.send(&messages::command_long(REQUEST_MESSAGE, &about, system, self.component))?;
             }
         }
-        let meant = |system: &u8| wanted.map_or(heard.len() == 1, |wanted| wanted == *system);
-        let Some((system, ids)) = heard.iter().find(|(system, _)| meant(system)) else {
-            return Err(not_found(wanted, heard.keys()));
-        };
-        if ids.len() > 1 {
-            bail!(
-                "{} boards, by their unique ids, say that they are of system {system}, and which one would answer nobody knows; give \
-                 their vehicles different system ids, or switch all but one off",
-                ids.len()
-            );
-        }
-        self.system = *system;
-        Ok(())
+        Ok(heard)
     }
 
     /// The board's system id.
@@ -267,20 +284,29 @@ fn told(frame: &Frame<'_>) -> Option<(u8, Option<Board>)> {
     }
 }
 
+const fn who(component: u8) -> &'static str {
+    if component == COMPONENT { "HUMS box" } else { "autopilot" }
+}
+
 /// `heard`: systems on the link.
-fn not_found<'a>(wanted: Option<u8>, heard: impl Iterator<Item = &'a u8>) -> anyhow::Error {
+fn not_found<'a>(
+    components: &[u8],
+    wanted: Option<u8>,
+    heard: impl Iterator<Item = &'a u8>,
+) -> anyhow::Error {
     let systems = heard.map(u8::to_string).collect::<Vec<_>>().join(", ");
+    let names = components.iter().map(|component| who(*component)).collect::<Vec<_>>().join(" or ");
     match wanted {
         _ if systems.is_empty() => {
             anyhow!(
-                "no HUMS box is heard on this link: is it powered, are address, port or baud rate of --link right, and does the box talk \
-                 on this link (its parameter GS_PATH)?"
+                "no {names} is heard on this link: is it powered, are address, port or baud rate of --link right, and does it talk on this \
+                 link (the box's parameter GS_PATH)?"
             )
         }
-        None => usage(format!("boards of the systems {systems} are heard; say which: --system N")),
-        Some(wanted) => anyhow!(
-            "no board of system {wanted} is heard (component {COMPONENT}), but of {systems}; is --system as it should be?"
-        ),
+        None => usage(format!("several are heard, of the systems {systems}; say which: --system N")),
+        Some(wanted) => {
+            anyhow!("no {names} of system {wanted} is heard, but of {systems}; is --system as it should be?")
+        }
     }
 }
 

@@ -23,6 +23,8 @@ use crate::talk;
 const GAP: Duration = Duration::from_millis(1_500);
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
+/// Answers to earlier requests that may come before that to a `PARAM_SET`.
+const STALE_MAX: usize = 2;
 /// `MAV_PARAM_TYPE_REAL32`
 const REAL32: u8 = 9;
 /// More parameters than a board has.
@@ -198,9 +200,16 @@ pub(super) fn set(client: &mut Client, name: &str, value: f32, kind: u8) -> Resu
     let (system, component) = client.target();
     let packet =
         Packet::new(PARAM_SET).f32(0, value).u8(4, system).u8(5, component).text(6, 16, name).u8(22, kind);
-    let kept =
-        client.ask(&packet, ANSWER, TRIES, |frame| value_of(frame).filter(|value| value.name == name))?;
-    kept.with_context(|| no_answer(system, name))
+    let mut others = Vec::new();
+    let kept = client.ask(&packet, ANSWER, TRIES, |frame| {
+        let param = value_of(frame).filter(|param| param.name == name)?;
+        if param.value.to_bits() == value.to_bits() || others.len() == STALE_MAX {
+            return Some(param);
+        }
+        others.push(param);
+        None
+    })?;
+    kept.or_else(|| others.pop()).with_context(|| no_answer(system, name))
 }
 
 /// And its faults; lost values are requested one by one.
@@ -291,6 +300,19 @@ mod tests {
         let values: Vec<f32> =
             list(&mut client).expect("a list").0.into_iter().map(|param| param.value).collect();
         assert_eq!(values, [2000.0]);
+    }
+
+    #[test]
+    fn an_earlier_answer_is_not_that_to_a_set() {
+        for (stale, refuses, kept) in [(2, false, 7.0), (1, true, 5.0)] {
+            let mut client = fake::found(&[1], move |frame| {
+                let mut said = vec![(1, param_value("A", 5.0, 0, 1)); stale];
+                said.extend((!refuses).then(|| (1, param_value("A", 7.0, 0, 1))));
+                if frame.id() == PARAM_SET { said } else { Vec::new() }
+            });
+            let value = set(&mut client, "A", 7.0, REAL32).expect("an answer").value;
+            assert_eq!(value.to_bits(), f32::to_bits(kept));
+        }
     }
 
     #[test]

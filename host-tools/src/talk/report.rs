@@ -3,7 +3,7 @@
 //! The records of [`KEPT`], from a card, a log or the newest log of a box on a link. Other records have places, vehicles or
 //! persons. Texts pass the rules of `hums share`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::Write as _;
 
 use anyhow::{Context as _, Result, bail};
@@ -26,17 +26,15 @@ use crate::source::item::Item;
 use crate::summary::Overview;
 
 const SCHEMA: Schema = Schema::first("hums-box-report");
-/// Tables of the report; `true`: only the last row counts.
-const KEPT: [(&str, bool); 6] = [
-    ("HUMS_BOOT", false),
-    ("HUMS_FAULT", false),
-    ("HUMS_LOSS", false),
-    ("HUMS_NOTE", false),
-    ("HUMS_PARAM", false),
-    ("HUMS_STATS", true),
+/// Tables of the report, with the newest records of a log that are kept: bounded memory.
+const KEPT: [(&str, usize); 6] = [
+    ("HUMS_BOOT", 100),
+    ("HUMS_FAULT", 100),
+    ("HUMS_LOSS", 500),
+    ("HUMS_NOTE", 500),
+    ("HUMS_PARAM", 800),
+    ("HUMS_STATS", 1),
 ];
-/// Records of a log: bounded memory.
-const RECORDS_MAX: usize = 2_000;
 /// Newest logs of a card.
 const LOGS_MAX: usize = 20;
 
@@ -60,7 +58,7 @@ struct LogJson {
     records: Vec<RecordJson>,
     /// Texts that may name a place or a person.
     texts_removed: u64,
-    /// Records beyond the limit.
+    /// Older records beyond the limit of their table.
     records_left_out: u64,
 }
 
@@ -116,15 +114,16 @@ impl LogJson {
     fn of(log: &Log) -> Result<Self> {
         let name = log.name.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
         let mut this = Self { name, ..Self::default() };
-        let mut last = BTreeMap::new();
+        let mut kept = BTreeMap::new();
         let rules = share::TextRules::new();
         let overview = Overview::told(log, None, &mut |at, item| {
             if let Item::Record(record) = item {
-                this.take(at, record, &rules, &mut last);
+                this.take(at, record, &rules, &mut kept);
             }
             Ok(())
         })?;
-        this.records.extend(last.into_values());
+        this.records = kept.into_values().flatten().collect();
+        this.records.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         this.lacks = overview.soundness().words();
         Ok(this)
     }
@@ -134,10 +133,10 @@ impl LogJson {
         at: Instant,
         record: &Record<'_>,
         rules: &share::TextRules,
-        last: &mut BTreeMap<&'static str, RecordJson>,
+        kept: &mut BTreeMap<&'static str, VecDeque<RecordJson>>,
     ) {
         for row in record::rows(record) {
-            let Some((table, is_last)) = KEPT.iter().find(|(table, _)| *table == row.table) else { continue };
+            let Some((table, max)) = KEPT.iter().find(|(table, _)| *table == row.table) else { continue };
             if matches!(record, Record::Note(note) if !rules.keeps(note.text)) {
                 self.texts_removed += 1;
                 continue;
@@ -145,13 +144,12 @@ impl LogJson {
             let mut fields = Vec::new();
             row.push_json_object(&mut fields);
             let fields = serde_json::from_slice(&fields).unwrap_or_default();
-            let record = RecordJson { time_s: at.as_secs_f64(), record: table, fields };
-            if *is_last {
-                last.insert(table, record);
-            } else if self.records.len() < RECORDS_MAX {
-                self.records.push(record);
-            } else {
-                self.records_left_out += 1;
+            let records = kept.entry(table).or_default();
+            records.push_back(RecordJson { time_s: at.as_secs_f64(), record: table, fields });
+            if records.len() > *max {
+                records.pop_front();
+                // Earlier figures are in the newest ones.
+                self.records_left_out += u64::from(*max > 1);
             }
         }
     }

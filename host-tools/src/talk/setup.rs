@@ -12,7 +12,8 @@ use anyhow::{Context as _, Result, bail};
 use hums_analysis::log_json::duration_s;
 use hums_boards::{Board, Wire};
 use hums_core::observation::Autopilot;
-use hums_link::asking::{GROUPS, wanted};
+use hums_core::params::Param as BoxParam;
+use hums_link::asking::wanted;
 use hums_link::encode::COMPONENT;
 use hums_link::messages;
 use hums_link::packet::Fields;
@@ -58,8 +59,12 @@ const HEAD_SECTORS: u32 = 8;
 const UNDO_BYTES_MAX: u64 = 64 * 1024;
 /// PX4's `MAV_X_RATE` at 921,600 baud, bytes per second.
 const RATE_BYTES: u32 = 80_000;
-/// Names of ArduPilot's groups of `SRn_`, in the order of [`GROUPS`].
-const STREAMS: [&str; 7] = ["RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3"];
+/// PX4 has TELEM 1 to 4.
+const TELEM_MAX: u8 = 4;
+/// `SERIALn_PROTOCOL` of a port for the box: none, MAVLink 1 or 2.
+const FREE: [f64; 3] = [-1.0, 1.0, 2.0];
+/// What to check if the box is not heard.
+const SILENT: &str = "the box sends nothing before it hears the autopilot: check its LED, power, the autopilot's TX wire, and the port's rate";
 /// The checks of every vehicle need them; of the last two one autopilot has one.
 const NEEDED: [u32; 10] = [
     SYS_STATUS,
@@ -73,8 +78,8 @@ const NEEDED: [u32; 10] = [
     ESTIMATOR_STATUS,
     EKF_STATUS_REPORT,
 ];
-/// A message is slow below this part of its rate.
-const SLOW: f64 = 0.5;
+/// A message is slow below this part of its rate. An ArduPilot that only knows `REQUEST_DATA_STREAM` sends 2 Hz of 5.
+const SLOW: f64 = 0.35;
 
 #[derive(Debug, Serialize)]
 struct SetupJson {
@@ -165,11 +170,12 @@ struct Own {
 }
 
 impl Own {
-    fn read(client: &mut Client) -> Result<Self> {
+    /// `value` gives that of a parameter.
+    fn of(mut value: impl FnMut(BoxParam) -> Result<f32>) -> Result<Self> {
         Ok(Self {
-            baud: params::value(client, "AP_BAUD")? as u32,
-            path: params::value(client, "GS_PATH")? as u8,
-            has_streams: params::value(client, "AP_STREAMS")? > 0.0,
+            baud: value(BoxParam::ApBaud)? as u32,
+            path: value(BoxParam::GsPath)? as u8,
+            has_streams: value(BoxParam::ApStreams)? > 0.0,
         })
     }
 }
@@ -187,37 +193,46 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
     if let Some(board) = board.filter(|_| !args.json) {
         output::line(&format!("wiring of {}, all grounds together, 3.3 V signals", board.title))?;
         let mut table = Table::new(2, [left(0), left(0)]);
-        wiring(board).into_iter().for_each(|Wiring { wire, pad }| table.row([wire.to_owned(), pad]));
+        for Wiring { wire, pad } in wiring(board) {
+            table.row([wire.to_owned(), pad]);
+        }
         output::line(&table.text())?;
         board.owner.notes.iter().try_for_each(|note| output::line(&format!("  {note}")))?;
     }
-    let restored = args.restore.as_deref().map(values_of).transpose()?;
-    let mut client = Client::connect(&args.at).context(
-        "the box sends nothing before it hears the autopilot: check its LED, power, the autopilot's TX wire, and the port's rate",
-    )?;
-    let system = client.system();
-    let own = Own::read(&mut client)?;
+    if let Some(file) = &args.restore {
+        let values = values_of(file)?;
+        return restore(&mut Client::connect_to(&args.at, &[AUTOPILOT])?, &values);
+    }
+    let mut client = Client::connect_to(&args.at, &[COMPONENT, AUTOPILOT]).context(SILENT)?;
+    let (system, found) = client.target();
+    let is_silent = found != COMPONENT;
+    let own = Own::of(|param| {
+        let spec = param.spec();
+        if is_silent { Ok(spec.default) } else { params::value(&mut client, spec.name) }
+    })?;
     client.turn_to(AUTOPILOT);
     let heard = autopilot(&mut client)?;
-    if let Some(values) = restored {
-        return restore(&mut client, heard, &values);
-    }
     let mut settings = match heard {
         Some(heard) => settings(&mut client, heard.autopilot, args.port, &own)?,
         None => Vec::new(),
     };
     if args.set {
         let file = args.undo.as_deref().context("--undo FILE is missing")?;
-        change(&mut client, heard, &mut settings, file)?;
+        change(&mut client, &mut settings, file)?;
     }
     if !args.json {
         show_settings(heard, &settings)?;
     }
     client.turn_to(COMPONENT);
     let mut checks = vec![own_line(&own, &args.at.link.to_string()), settings_line(&settings)];
-    let ready = prearm(&mut client)?;
-    checks.extend(bench(client, &own, board, heard)?);
-    checks.push(ready);
+    if is_silent {
+        let detail = format!("{SILENT}; the settings are for {} baud, its AP_BAUD as delivered", own.baud);
+        checks[0] = line("box", false, detail);
+    } else {
+        let ready = prearm(&mut client)?;
+        checks.extend(bench(client, &own, board, heard)?);
+        checks.push(ready);
+    }
     let missing: Vec<&str> =
         checks.iter().filter(|check| check.state == "missing").map(|check| check.check).collect();
     let is_ready = missing.is_empty();
@@ -261,17 +276,20 @@ fn autopilot(client: &mut Client) -> Result<Option<Heard>> {
     })
 }
 
-/// The wanted settings with the present values; empty for another autopilot.
+/// The wanted settings with the present values; empty for another autopilot, and for a PX4 that does not answer.
 fn settings(client: &mut Client, autopilot: u8, port: u8, own: &Own) -> Result<Vec<Setting>> {
     let mut settings = match autopilot {
         ARDUPILOT => ardupilot(port, own),
-        PX4 => px4(port, instance(client, port)?, own),
+        PX4 => instance(client, port)?.map_or_else(Vec::new, |instance| px4(port, instance, own)),
         _ => return Ok(Vec::new()),
     };
     for setting in &mut settings {
         let Some(param) = params::ask(client, &setting.name, TRIES)? else {
             // A link on which nothing is answered is not asked further.
-            if setting.is_optional { continue } else { break }
+            if setting.is_optional {
+                continue;
+            }
+            break;
         };
         (setting.now, setting.kind) = (Some(value(autopilot, &param)), param.kind);
     }
@@ -281,22 +299,14 @@ fn settings(client: &mut Client, autopilot: u8, port: u8, own: &Own) -> Result<V
 /// `SERIALn_BAUD` is in thousands, cut off.
 fn ardupilot(port: u8, own: &Own) -> Vec<Setting> {
     let flow = Setting::new(format!("BRD_SER{port}_RTSCTS"), 0, "CTS and RTS are open");
-    let mut settings = vec![
+    vec![
         Setting::new(format!("SERIAL{port}_PROTOCOL"), 2, "MAVLink 2"),
         Setting::new(format!("SERIAL{port}_BAUD"), own.baud / 1_000, "the box's AP_BAUD"),
         Setting { is_optional: true, ..flow },
-    ];
-    if !own.has_streams {
-        let why = "the box requests no streams (AP_STREAMS 0)";
-        settings.extend(STREAMS.iter().zip(GROUPS).map(|(name, (_, rate_hz))| Setting {
-            at_least: true,
-            ..Setting::new(format!("SR{port}_{name}"), rate_hz, why)
-        }));
-    }
-    settings
+    ]
 }
 
-/// TELEM 1 to 3 are 101 to 103 in `MAV_n_CONFIG`.
+/// TELEM 1 to 4 are 101 to 104 in `MAV_n_CONFIG`.
 fn px4(port: u8, instance: u8, own: &Own) -> Vec<Setting> {
     let rate = RATE_BYTES.min(own.baud / 12);
     let mut settings = vec![
@@ -313,18 +323,28 @@ fn px4(port: u8, instance: u8, own: &Own) -> Vec<Setting> {
     settings
 }
 
-/// The MAVLink instance of this port, else the one that is free, else the second.
-fn instance(client: &mut Client, port: u8) -> Result<u8> {
+/// The MAVLink instance of this port, else a free one; `None` if the autopilot does not answer for each.
+fn instance(client: &mut Client, port: u8) -> Result<Option<u8>> {
+    if port > TELEM_MAX {
+        return Err(usage(format!("--port {port}: PX4 has TELEM 1 to {TELEM_MAX}; give the box's")));
+    }
     let mut free = None;
     for instance in 0..3 {
-        let Some(param) = params::ask(client, &format!("MAV_{instance}_CONFIG"), TRIES)? else { break };
+        let Some(param) = params::ask(client, &format!("MAV_{instance}_CONFIG"), TRIES)? else {
+            return Ok(None);
+        };
         let config = value(PX4, &param);
         if (config - f64::from(100 + port)).abs() < 0.5 {
-            return Ok(instance);
+            return Ok(Some(instance));
         }
         free = free.or((config.abs() < 0.5).then_some(instance));
     }
-    Ok(free.unwrap_or(1))
+    free.map(Some).with_context(|| {
+        format!(
+            "TELEM {port} has no MAVLink, and MAV_0_CONFIG to MAV_2_CONFIG have other ports: give the box's port with --port, or set one of \
+             them to 0"
+        )
+    })
 }
 
 fn value(autopilot: u8, param: &Param) -> f64 {
@@ -345,11 +365,19 @@ fn sent(autopilot: u8, kind: u8, value: f64) -> f32 {
 }
 
 /// Sets what differs, after the present values are in a file.
-fn change(client: &mut Client, heard: Option<Heard>, settings: &mut [Setting], file: &Path) -> Result<()> {
-    let heard = settable(heard)?;
+fn change(client: &mut Client, settings: &mut [Setting], file: &Path) -> Result<()> {
+    settable(client)?;
     if settings.iter().all(|setting| setting.now.is_none()) {
         bail!(
             "the autopilot does not answer: nothing is set; connect to its USB or radio, or set the box's GS_PASS to 1"
+        );
+    }
+    let other = |setting: &&Setting| {
+        setting.name.ends_with("_PROTOCOL") && setting.now.is_some_and(|now| !FREE.contains(&now))
+    };
+    if let Some(Setting { name, now: Some(now), .. }) = settings.iter().find(other) {
+        bail!(
+            "{name} is {now}, so the port has another use and nothing is set: give the box's port with --port, or set it to -1 (none)"
         );
     }
     let different: Vec<&mut Setting> = settings.iter_mut().filter(|setting| setting.differs()).collect();
@@ -364,7 +392,7 @@ fn change(client: &mut Client, heard: Option<Heard>, settings: &mut [Setting], f
     }
     undo.finish()?;
     for setting in different {
-        set(client, heard.autopilot, &setting.name, setting.kind, setting.wanted).with_context(|| {
+        set(client, &setting.name, setting.kind, setting.wanted).with_context(|| {
             format!("{}; --restore {} sets the former values", setting.name, file.display())
         })?;
         setting.now = Some(setting.wanted);
@@ -373,8 +401,9 @@ fn change(client: &mut Client, heard: Option<Heard>, settings: &mut [Setting], f
     Ok(())
 }
 
-fn settable(heard: Option<Heard>) -> Result<Heard> {
-    let heard = heard.context(
+/// The autopilot, if its next heartbeat says that it is disarmed.
+fn settable(client: &mut Client) -> Result<Heard> {
+    let heard = autopilot(client)?.context(
         "the autopilot is not heard on this link: connect to the autopilot's USB or radio, or set the box's GS_PASS to 1",
     )?;
     if heard.is_armed {
@@ -383,7 +412,8 @@ fn settable(heard: Option<Heard>) -> Result<Heard> {
     Ok(heard)
 }
 
-fn set(client: &mut Client, autopilot: u8, name: &str, kind: u8, wanted: f64) -> Result<()> {
+fn set(client: &mut Client, name: &str, kind: u8, wanted: f64) -> Result<()> {
+    let Heard { autopilot, .. } = settable(client)?;
     let kept = params::set(client, name, sent(autopilot, kind, wanted), kind)?;
     let kept = value(autopilot, &kept);
     if (kept - wanted).abs() > wanted.abs() * 1e-6 {
@@ -411,13 +441,21 @@ fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
     Ok(values)
 }
 
-fn restore(client: &mut Client, heard: Option<Heard>, values: &[(String, f64)]) -> Result<Outcome> {
-    let heard = settable(heard)?;
+/// Sets all that it can.
+fn restore(client: &mut Client, values: &[(String, f64)]) -> Result<Outcome> {
+    let mut failed = Vec::new();
     for (name, wanted) in values {
-        let param = params::ask(client, name, TRIES)?;
-        let param = param.with_context(|| format!("{name}: the autopilot does not answer; call again"))?;
-        set(client, heard.autopilot, name, param.kind, *wanted).with_context(|| name.clone())?;
-        output::line(&format!("{} {wanted}", word(name)))?;
+        let done = params::ask(client, name, TRIES).and_then(|param| {
+            let param = param.context("the autopilot does not answer")?;
+            set(client, name, param.kind, *wanted)
+        });
+        match done {
+            Ok(()) => output::line(&format!("{} {wanted}", word(name)))?,
+            Err(error) => failed.push(format!("{}: {error:#}", word(name))),
+        }
+    }
+    if !failed.is_empty() {
+        bail!("{} of {} not restored; call again\n{}", failed.len(), values.len(), failed.join("\n"));
     }
     output::line("restored; restart the autopilot")?;
     Ok(Outcome::Done)
@@ -590,7 +628,7 @@ mod tests {
     const OWN: Own = Own { baud: 57_600, path: 2, has_streams: false };
 
     /// An autopilot with these parameters, each with its type; values are as on the line.
-    fn vehicle(autopilot: u8, mode: u8, values: &[(&str, f32, u8)]) -> Client {
+    fn vehicle(autopilot: u8, mut mode: u8, values: &[(&str, f32, u8)]) -> Client {
         let mut values: BTreeMap<String, (f32, u8)> =
             values.iter().map(|(name, value, kind)| ((*name).to_owned(), (*value, *kind))).collect();
         let mut client = found(&[1], move |frame| {
@@ -605,9 +643,9 @@ mod tests {
             };
             let name = fields.text(at, 16).unwrap_or_default();
             let Some((value, kind)) = values.get_mut(name) else { return Vec::new() };
-            // It refuses one.
-            if frame.id() == PARAM_SET && name != "SR2_EXTRA3" {
+            if frame.id() == PARAM_SET && name != "REFUSED" {
                 *value = fields.f32(0);
+                mode |= if name == "ARMING" { ARMED } else { 0 };
             }
             vec![(1, messages::param_value(name, *value, 0, 9).u8(24, *kind))]
         });
@@ -623,16 +661,11 @@ mod tests {
     fn an_ardupilot_is_compared_set_and_restored() {
         let dir = tempfile::tempdir().expect("a folder");
         let (first, second) = (dir.path().join("undo.param"), dir.path().join("again.param"));
-        let streams = STREAMS.map(|name| format!("SR2_{name}"));
-        let mut values =
-            vec![("SERIAL2_PROTOCOL", 1.0, 2), ("SERIAL2_BAUD", 57.0, 4), ("BRD_SER2_RTSCTS", 0.0, 2)];
-        values.extend(
-            streams
-                .iter()
-                .map(|name| (name.as_str(), if name.ends_with("_POSITION") { 2.0 } else { 50.0 }, 4)),
+        let mut client = vehicle(
+            ARDUPILOT,
+            0,
+            &[("SERIAL2_PROTOCOL", 1.0, 2), ("SERIAL2_BAUD", 115.0, 4), ("BRD_SER2_RTSCTS", 0.0, 2)],
         );
-        let mut client = vehicle(ARDUPILOT, 0, &values);
-        let heard = autopilot(&mut client).expect("a link");
         let differ = |client: &mut Client| {
             let all = settings(client, ARDUPILOT, 2, &OWN).expect("a link");
             let names: Vec<String> =
@@ -640,17 +673,47 @@ mod tests {
             (all, names)
         };
         let (mut all, names) = differ(&mut client);
-        assert_eq!((names, all.len()), (vec!["SERIAL2_PROTOCOL".to_owned(), "SR2_POSITION".to_owned()], 10));
+        assert_eq!((names, all.len()), (vec!["SERIAL2_PROTOCOL".to_owned(), "SERIAL2_BAUD".to_owned()], 3));
         assert_eq!(settings_line(&all).state, "missing");
-        change(&mut client, heard, &mut all, &first).expect("set");
-        assert_eq!(std::fs::read_to_string(&first).expect("a file"), "SERIAL2_PROTOCOL,1\nSR2_POSITION,2\n");
+        change(&mut client, &mut all, &first).expect("set");
+        assert_eq!(
+            std::fs::read_to_string(&first).expect("a file"),
+            "SERIAL2_PROTOCOL,1\nSERIAL2_BAUD,115\n"
+        );
         let (mut all, names) = differ(&mut client);
         assert!(names.is_empty() && settings_line(&all).state == "ok", "{names:?}");
-        change(&mut client, heard, &mut all, &second).expect("nothing to do");
+        change(&mut client, &mut all, &second).expect("nothing to do");
         assert!(!second.exists(), "nothing was changed");
-        assert!(change(&mut client, heard, &mut [], &second).is_err(), "nothing was answered");
-        restore(&mut client, heard, &values_of(&first).expect("values")).expect("restored");
-        assert_eq!(differ(&mut client).1, ["SERIAL2_PROTOCOL", "SR2_POSITION"]);
+        assert!(change(&mut client, &mut [], &second).is_err(), "nothing was answered");
+        // The others are restored too.
+        let mut values = vec![("GONE".to_owned(), 1.0)];
+        values.extend(values_of(&first).expect("values"));
+        let error = restore(&mut client, &values).expect_err("not all").to_string();
+        assert!(error.starts_with("1 of 3 not restored") && error.contains("GONE"), "{error}");
+        assert_eq!(differ(&mut client).1, ["SERIAL2_PROTOCOL", "SERIAL2_BAUD"]);
+    }
+
+    #[test]
+    fn a_port_that_has_another_use_is_left_to_it() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let file = dir.path().join("undo");
+        let mut client = vehicle(ARDUPILOT, 0, &[("SERIAL2_PROTOCOL", 23.0, 2), ("SERIAL2_BAUD", 115.0, 4)]);
+        let mut all = settings(&mut client, ARDUPILOT, 2, &OWN).expect("a link");
+        let error = change(&mut client, &mut all, &file).expect_err("a receiver's").to_string();
+        assert!(error.starts_with("SERIAL2_PROTOCOL is 23") && !file.exists(), "{error}");
+        let configs = [101, 103, 1_000].map(bits);
+        let all = [
+            ("MAV_0_CONFIG", configs[0], 6),
+            ("MAV_1_CONFIG", configs[1], 6),
+            ("MAV_2_CONFIG", configs[2], 6),
+        ];
+        let error = instance(&mut vehicle(PX4, 0, &all), 2).expect_err("none is free").to_string();
+        assert!(error.contains("MAV_2_CONFIG"), "{error}");
+        // Nobody knows the instance without an answer.
+        assert_eq!(instance(&mut vehicle(PX4, 0, &all[..2]), 2).expect("a link"), None);
+        assert!(
+            instance(&mut vehicle(PX4, 0, &all), 5).expect_err("no such port").is::<crate::outcome::Usage>()
+        );
     }
 
     #[test]
@@ -670,7 +733,6 @@ mod tests {
                 ("MAV_1_FORWARD", bits(1), 6),
             ],
         );
-        let heard = autopilot(&mut client).expect("a link");
         let mut all = settings(&mut client, PX4, 2, &OWN).expect("a link");
         let now: Vec<(&str, Option<f64>, bool)> =
             all.iter().map(|setting| (setting.name.as_str(), setting.now, setting.differs())).collect();
@@ -685,29 +747,32 @@ mod tests {
                 ("MAV_1_FORWARD", Some(1.0), false),
             ]
         );
-        change(&mut client, heard, &mut all, &dir.path().join("undo")).expect("set");
+        change(&mut client, &mut all, &dir.path().join("undo")).expect("set");
         let kept = params::ask(&mut client, "SER_TEL2_BAUD", 1).expect("a link").expect("an answer");
-        assert_eq!((kept.value.to_bits(), instance(&mut client, 2).expect("a link")), (57_600, 1));
-        assert_eq!(instance(&mut client, 1).expect("a link"), 0);
+        assert_eq!((kept.value.to_bits(), instance(&mut client, 2).expect("a link")), (57_600, Some(1)));
+        assert_eq!(instance(&mut client, 1).expect("a link"), Some(0));
     }
 
     #[test]
     fn nothing_is_set_while_armed_nor_on_an_autopilot_that_is_not_heard() {
         let dir = tempfile::tempdir().expect("a folder");
         let file = dir.path().join("undo");
-        let mut client = vehicle(ARDUPILOT, ARMED, &[("SERIAL2_BAUD", 57.0, 4)]);
-        let heard = autopilot(&mut client).expect("a link");
-        let mut all = vec![Setting { now: Some(57.0), ..Setting::new("SERIAL2_BAUD".to_owned(), 921, "") }];
-        for (heard, words) in [(heard, "armed"), (None, "not heard")] {
-            let error = change(&mut client, heard, &mut all, &file).expect_err("refused").to_string();
+        let one = |name: &str| Setting { now: Some(0.0), ..Setting::new(name.to_owned(), 2, "") };
+        let armed = vehicle(ARDUPILOT, ARMED, &[("OTHER", 0.0, 4)]);
+        for (mut client, words) in [(armed, "armed"), (found(&[1], |_| Vec::new()), "not heard")] {
+            client.turn_to(AUTOPILOT);
+            let error = change(&mut client, &mut [one("OTHER")], &file).expect_err("refused").to_string();
             assert!(error.contains(words) && !file.exists(), "{error}");
         }
-        // A refused value is an error that names the file.
-        let mut client = vehicle(ARDUPILOT, 0, &[("SR2_EXTRA3", 0.0, 4)]);
-        let heard = autopilot(&mut client).expect("a link");
-        let mut all = vec![Setting { now: Some(0.0), ..Setting::new("SR2_EXTRA3".to_owned(), 2, "") }];
-        let error = format!("{:#}", change(&mut client, heard, &mut all, &file).expect_err("refused"));
+        // A refused value is an error that names the file. A vehicle that arms meanwhile gets no more.
+        let mut client = vehicle(ARDUPILOT, 0, &["REFUSED", "ARMING", "OTHER"].map(|name| (name, 0.0, 4)));
+        let error = change(&mut client, &mut [one("REFUSED")], &file).expect_err("refused");
+        let error = format!("{error:#}");
         assert!(error.contains("refused 2 and keeps 0") && error.contains("--restore"), "{error}");
+        let file = dir.path().join("second");
+        let error = change(&mut client, &mut [one("ARMING"), one("OTHER")], &file).expect_err("armed");
+        let other = params::ask(&mut client, "OTHER", 1).expect("a link").expect("an answer");
+        assert!(format!("{error:#}").contains("armed") && other.value.to_bits() == 0, "{error:#}");
     }
 
     #[test]
@@ -735,7 +800,7 @@ mod tests {
             .map(|id| MessageCount {
                 id: Some((id, true)),
                 name: String::new(),
-                amount: Amount { count: if id == ATTITUDE { 30 } else { 60 }, bytes: 0 },
+                amount: Amount { count: if id == ATTITUDE { 30 } else { 19 }, bytes: 0 },
             })
             .collect();
         let told = received(&end, &own);

@@ -10,7 +10,7 @@ fn of_two_boards_neither_is_taken_unless_it_is_said_which() {
     let listen = Duration::from_millis(20);
     let find = |systems, wanted| {
         let mut client = fake::client(systems, |_| Vec::new());
-        client.find(wanted, listen).map(|()| client.target()).context("udpin:0.0.0.0:14550")
+        client.find(&[COMPONENT], wanted, listen).map(|()| client.target()).context("udpin:0.0.0.0:14550")
     };
     let refused = find(&[2, 1], None).expect_err("which one?");
     let words = format!("{refused:#}");
@@ -30,7 +30,7 @@ fn two_boards_of_one_system_are_told_by_their_unique_ids() {
             let asks = frame.id() == 76 && Fields(frame.payload()).u16(28) == REQUEST_MESSAGE;
             if asks { ids.map(version).to_vec() } else { Vec::new() }
         });
-        client.find(wanted, Duration::from_millis(listen_ms)).map(|()| client.target())
+        client.find(&[COMPONENT], wanted, Duration::from_millis(listen_ms)).map(|()| client.target())
     };
     for wanted in [None, Some(7)] {
         let refused = find([1, 2], wanted, 50).expect_err("which one?").to_string();

@@ -42,7 +42,7 @@ pub(in crate::talk) fn found(
     answer: impl FnMut(&Frame<'_>) -> Answers + Send + 'static,
 ) -> Client {
     let mut client = client(systems, answer);
-    client.find(Some(1), Duration::ZERO).expect("it is heard");
+    client.find(&[COMPONENT], Some(1), Duration::ZERO).expect("it is heard");
     client
 }
 
