@@ -17,6 +17,7 @@ use embassy_futures::select::{Either3, select3};
 use hums_core::clock::{Instant, Span};
 use hums_onboard::{ArmingWatch, ResetCause};
 use hums_recorder::Block;
+use hums_update::message::Message;
 use hums_usb::Builder;
 use hums_usb::class::{Control, MassStorage};
 use hums_usb::guard::Link;
@@ -26,7 +27,7 @@ use hums_usb::scsi::Disk;
 use crate::boards::board;
 use crate::links::now;
 use crate::usb::{self, Identity, Packets};
-use crate::{fault, watch};
+use crate::{fault, update, watch};
 
 const HOST_MAX: Span = Span::from_secs(600);
 /// After an eject the host still fetches its status.
@@ -50,7 +51,7 @@ pub(crate) fn restart() -> ! {
 
 fn restart_with(mark: u32) -> ! {
     MARK.store(mark, Ordering::Relaxed);
-    board::restart()
+    update::restart(Message::Planned)
 }
 
 /// The cause of this start, by its reset and the mark. Clears the mark: every start calls it once.

@@ -33,10 +33,10 @@ pub(crate) fn take(reset: ResetCause) -> (ResetCause, Option<Message>) {
     }
 }
 
-/// Restarts into the resident program, which installs the update.
-pub(crate) fn restart() -> ! {
+/// Restarts into the resident program with a message for it.
+pub(crate) fn restart(message: Message) -> ! {
     // SAFETY: no variable of either program has these words.
-    unsafe { words().write_volatile(Message::Install.words()) };
+    unsafe { words().write_volatile(message.words()) };
     board::restart()
 }
 

@@ -3,13 +3,13 @@
 //! The board then ends its log and restarts into the resident program (`hums_update`), which checks the whole file. Conditions:
 //! * the vehicle is disarmed and on the ground for 10 s, or no frame has come in the first minute after power-on;
 //! * the start was not one that may have come in flight, such as a reset by the watchdog;
-//! * this image is confirmed, and the other one was not refused since power-on.
+//! * this image is confirmed, and the resident program has refused nothing since power-on, or since the card before.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use hums_core::clock::{Instant, Span};
 use hums_recorder::{BLOCK_BYTES, CardDevice, CardState, CardStatus, Recorder};
-use hums_update::header::{self, Header, Refusal};
+use hums_update::header::{self, Header, NO_WISH, Refusal};
 use hums_update::message::Message;
 use hums_update::state::{State, Status};
 
@@ -30,43 +30,38 @@ const REFUSED: u32 = 0x10;
 #[derive(Debug, Default)]
 pub struct UpdateStatus {
     found: AtomicU32,
-    id: AtomicU32,
 }
 
 /// An update file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// Its header is good.
-    Offered(u32),
+    Offered,
     /// It is not for this board now.
-    Refused(u32, Refusal),
+    Refused(Refusal),
 }
 
 impl UpdateStatus {
     /// No file.
     pub const fn new() -> Self {
-        Self { found: AtomicU32::new(NOTHING), id: AtomicU32::new(0) }
+        Self { found: AtomicU32::new(NOTHING) }
     }
 
     fn set(&self, found: Option<Found>) {
-        let (kind, id) = match found {
-            None => (NOTHING, 0),
-            Some(Found::Offered(id)) => (OFFERED, id),
-            Some(Found::Refused(id, why)) => (REFUSED + why as u32, id),
+        let kind = match found {
+            None => NOTHING,
+            Some(Found::Offered) => OFFERED,
+            Some(Found::Refused(why)) => REFUSED + why as u32,
         };
-        // The monitor interrupts storage, never in between the other way round.
-        self.found.store(NOTHING, Ordering::Relaxed);
-        self.id.store(id, Ordering::Relaxed);
-        self.found.store(kind, Ordering::Release);
+        self.found.store(kind, Ordering::Relaxed);
     }
 
     /// The update file of the card.
     pub fn read(&self) -> Option<Found> {
-        let (kind, id) = (self.found.load(Ordering::Acquire), self.id.load(Ordering::Relaxed));
-        match kind {
+        match self.found.load(Ordering::Relaxed) {
             NOTHING => None,
-            OFFERED => Some(Found::Offered(id)),
-            _ => Some(Found::Refused(id, *Refusal::ALL.get(kind.wrapping_sub(REFUSED) as usize)?)),
+            OFFERED => Some(Found::Offered),
+            kind => Some(Found::Refused(*Refusal::ALL.get(kind.wrapping_sub(REFUSED) as usize)?)),
         }
     }
 }
@@ -123,10 +118,9 @@ impl UpdateSearch {
         }
         let Some((mut segment, bytes)) = card.update() else { return status.set(None) };
         let mut block = [0; BLOCK_BYTES];
-        let refused = |why| Some(Found::Refused(0, why));
         status.set(match card.read(&mut segment, 0, &mut block) {
             Ok(()) => judge(&block, bytes, running),
-            Err(_) => refused(Refusal::NoFile),
+            Err(_) => Some(Found::Refused(Refusal::NoFile)),
         });
     }
 
@@ -142,22 +136,28 @@ impl UpdateSearch {
 
 /// `None` for the running image itself.
 fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<Found> {
-    let Some(header) = Header::read(block) else { return Some(Found::Refused(0, Refusal::Damaged)) };
+    let Some(header) = Header::read(block) else { return Some(Found::Refused(Refusal::Damaged)) };
     let id = header.id();
-    if id == running.id() {
+    let own = running.header.as_ref();
+    if own.is_some_and(|own| own.has_image_of(&header)) {
         return None;
     }
-    let floor = running.header.as_ref().map_or(running.state.floor, |own| own.floor.max(running.state.floor));
+    let mut floor = own.map_or(running.state.floor, |own| own.floor.max(running.state.floor));
+    if header.wish == NO_WISH {
+        floor = own.map_or(floor, |own| own.version.max(floor));
+    }
     let checked = if running.state.has_failed(id) {
         Err(Refusal::FailedBefore)
+    } else if running.state.was_confirmed(id) {
+        Err(Refusal::Replaced)
     } else if bytes != header.image_bytes + header::BYTES as u32 {
         Err(Refusal::Damaged)
     } else {
         header.check(running.board, floor, hums_update::keys::ALL).map(drop)
     };
     Some(match checked {
-        Ok(()) => Found::Offered(id),
-        Err(why) => Found::Refused(id, why),
+        Ok(()) => Found::Offered,
+        Err(why) => Found::Refused(why),
     })
 }
 
@@ -167,49 +167,38 @@ pub struct UpdateWatch {
     message: Option<Message>,
     cause: ResetCause,
     told: Option<Found>,
-    is_refused: bool,
+    /// The resident program refused this card's update: it is not asked for again.
+    was_refused: bool,
 }
 
 impl UpdateWatch {
     /// `message`: of the resident program; `cause`: of this start.
     pub const fn new(message: Option<Message>, cause: ResetCause) -> Self {
-        Self { message, cause, told: None, is_refused: false }
+        Self { message, cause, told: None, was_refused: matches!(message, Some(Message::Refused(_))) }
     }
 
     /// Whether an image is refused, for the LED.
     pub const fn is_refused(&self) -> bool {
-        self.is_refused
+        self.was_refused || matches!(self.told, Some(Found::Refused(_)))
     }
 
     /// The next text with its `MAV_SEVERITY`.
     pub fn news(&mut self, status: &UpdateStatus) -> Option<(u8, &'static str)> {
-        match self.message {
-            Some(Message::Installed) => {
-                self.message = None;
-                return Some((5, "HUMS: update installed, on trial for a minute"));
-            }
-            Some(Message::FellBack) => {
-                self.message = None;
-                return Some((4, "HUMS: update failed, the version before is back"));
-            }
-            Some(Message::Retried) => {
-                self.message = None;
-                return Some((4, "HUMS: update failed, tried again after power-on"));
-            }
-            // It stays: the image is not asked for again before the next power-on.
-            Some(Message::Refused { why, .. }) if !self.is_refused => {
-                self.is_refused = true;
-                return Some((4, text(why)));
-            }
+        match self.message.take() {
+            Some(Message::Installed) => return Some((5, "HUMS: update installed, on trial for a minute")),
+            Some(Message::FellBack) => return Some((4, "HUMS: update failed, the version before is back")),
+            Some(Message::Retried) => return Some((4, "HUMS: update failed, and has another trial")),
+            Some(Message::Refused(why)) => return Some((4, text(why))),
             _ => {}
         }
         let found = status.read();
         if found == self.told {
             return None;
         }
+        // Without a card nothing is found.
+        self.was_refused &= found.is_some();
         self.told = found;
-        let Some(Found::Refused(_, why)) = found else { return None };
-        self.is_refused = true;
+        let Some(Found::Refused(why)) = found else { return None };
         Some((4, text(why)))
     }
 
@@ -222,11 +211,10 @@ impl UpdateWatch {
         frames: u32,
         on_trial: bool,
     ) -> bool {
-        let Some(Found::Offered(id)) = status.read() else { return false };
-        let was_refused = matches!(self.message, Some(Message::Refused { id: refused, .. }) if refused == id || refused == 0);
         let is_silent =
             self.cause == ResetCause::PowerOn && frames == 0 && now.since(Instant::ZERO) >= SILENT;
-        !on_trial && !was_refused && !self.cause.may_be_in_flight() && (calm == Calm::Grounded || is_silent)
+        let is_offered = status.read() == Some(Found::Offered) && !self.was_refused;
+        is_offered && !on_trial && !self.cause.may_be_in_flight() && (calm == Calm::Grounded || is_silent)
     }
 }
 
@@ -235,10 +223,11 @@ const fn text(why: Refusal) -> &'static str {
         Refusal::NoFile => "HUMS: update refused: card cannot be read",
         Refusal::Damaged => "HUMS: update refused: damaged, copy it again",
         Refusal::OtherBoard => "HUMS: update refused: it is for another board",
-        Refusal::TooOld => "HUMS: update refused: older than is allowed",
+        Refusal::TooOld => "HUMS: update refused: an older version",
         Refusal::ForeignKey => "HUMS: update refused: not signed by a known key",
         Refusal::BadSignature => "HUMS: update refused: its signature is wrong",
         Refusal::FailedBefore => "HUMS: update refused: it failed on trial",
+        Refusal::Replaced => "HUMS: update refused: it was replaced before",
         Refusal::Flash => "HUMS: update refused: flash does not take it",
     }
 }
@@ -247,6 +236,7 @@ const fn text(why: Refusal) -> &'static str {
 mod tests {
     use super::*;
     use hums_update::header::Version;
+    use hums_update::state::Record;
 
     fn header(board: &str, version: u32) -> Header {
         Header { key: *b"\0\0\0\0\0\0\0\0", ..Header::new(board, "", Version(version), Version(1), &[0; 8]) }
@@ -262,7 +252,7 @@ mod tests {
         let key = |header: Header| Header { key: *hums_update::keys::TEST.first_chunk().unwrap(), ..header };
         let judged = |header: &Header, bytes: u32| judge(&header.bytes(), bytes, &running);
         let good = key(header("matek", 6));
-        assert_eq!(judged(&good, 520), Some(Found::Offered(good.id())));
+        assert_eq!(judged(&good, 520), Some(Found::Offered));
         assert_eq!(judged(&header("matek", 5), 520), None);
         for (header, bytes, why) in [
             (good.clone(), 519, Refusal::Damaged),
@@ -270,9 +260,34 @@ mod tests {
             (key(header("matek", 0)), 520, Refusal::TooOld),
             (Header { key: *b"somebody", ..good.clone() }, 520, Refusal::ForeignKey),
         ] {
-            assert_eq!(judged(&header, bytes), Some(Found::Refused(header.id(), why)));
+            assert_eq!(judged(&header, bytes), Some(Found::Refused(why)));
         }
-        assert_eq!(judge(&[0; 512], 520, &running), Some(Found::Refused(0, Refusal::Damaged)));
+        assert_eq!(judge(&[0; 512], 520, &running), Some(Found::Refused(Refusal::Damaged)));
+    }
+
+    #[test]
+    fn an_older_or_a_replaced_image_is_offered_only_by_a_wish() {
+        let key = |version, wish| Header {
+            key: *hums_update::keys::TEST.first_chunk().unwrap(),
+            wish,
+            ..header("matek", version)
+        };
+        let (older, newer) = (key(4, NO_WISH), key(6, NO_WISH));
+        let mut sector = vec![0xFF; 512];
+        sector[..16].copy_from_slice(&Record::Confirmed(Version(0)).bytes(newer.id()));
+        let running = Running { state: State::read(&sector), ..running() };
+        for (header, wanted) in [
+            (older, Found::Refused(Refusal::TooOld)),
+            (key(4, 1), Found::Offered),
+            (key(0, 1), Found::Refused(Refusal::TooOld)),
+            (newer, Found::Refused(Refusal::Replaced)),
+            (key(6, 1), Found::Offered),
+            (key(7, NO_WISH), Found::Offered),
+        ] {
+            assert_eq!(judge(&header.bytes(), 520, &running), Some(wanted), "{}", header.version.0);
+        }
+        // The same image, by another header: a cable loaded it.
+        assert_eq!(judge(&key(5, 1).bytes(), 520, &running), None);
     }
 
     #[test]
@@ -289,8 +304,8 @@ mod tests {
         };
         let power = ResetCause::PowerOn;
         assert!(!due(None, power, 100, Calm::Grounded, 9, false), "there is no file");
-        status.set(Some(Found::Offered(7)));
-        let refused = |id| Some(Message::Refused { id, why: Refusal::BadSignature });
+        status.set(Some(Found::Offered));
+        let refused = Some(Message::Refused(Refusal::BadSignature));
         for (message, cause, secs, calm, frames, trial, wanted) in [
             (None, power, 12, Calm::Grounded, 9, false, true),
             (None, power, 12, Calm::None, 9, false, false),
@@ -302,9 +317,7 @@ mod tests {
             (None, ResetCause::Software, 100, Calm::Grounded, 9, false, false),
             (None, ResetCause::Update, 100, Calm::Grounded, 9, false, true),
             (None, ResetCause::Update, 100, Calm::Grounded, 9, true, false),
-            (refused(7), ResetCause::Update, 100, Calm::Grounded, 9, false, false),
-            (refused(0), ResetCause::Update, 100, Calm::Grounded, 9, false, false),
-            (refused(8), ResetCause::Update, 100, Calm::Grounded, 9, false, true),
+            (refused, ResetCause::Update, 100, Calm::Grounded, 9, false, false),
         ] {
             let is_due = due(message, cause, secs, calm, frames, trial);
             assert_eq!(is_due, wanted, "{message:?} {cause:?} {secs} s {calm:?} {frames} {trial}");
@@ -316,17 +329,39 @@ mod tests {
         let status = UpdateStatus::new();
         for why in Refusal::ALL {
             assert!(text(why).len() <= 50, "{}", text(why));
-            let mut watch = UpdateWatch::new(Some(Message::Refused { id: 1, why }), ResetCause::Update);
+            let mut watch = UpdateWatch::new(Some(Message::Refused(why)), ResetCause::Update);
             assert_eq!(watch.news(&status), Some((4, text(why))));
             assert_eq!((watch.news(&status), watch.is_refused()), (None, true));
         }
         let mut watch = UpdateWatch::new(Some(Message::Installed), ResetCause::Update);
         assert_eq!(watch.news(&status), Some((5, "HUMS: update installed, on trial for a minute")));
         assert_eq!((watch.news(&status), watch.is_refused()), (None, false));
-        for found in [Found::Refused(3, Refusal::OtherBoard), Found::Refused(4, Refusal::TooOld)] {
+        for found in [Found::Refused(Refusal::OtherBoard), Found::Refused(Refusal::TooOld)] {
             status.set(Some(found));
             assert!(watch.news(&status).is_some());
             assert_eq!((watch.news(&status), watch.is_refused()), (None, true));
+        }
+    }
+
+    #[test]
+    fn another_card_ends_a_refusal() {
+        let status = UpdateStatus::new();
+        let refused = Some(Message::Refused(Refusal::BadSignature));
+        let mut watch = UpdateWatch::new(refused, ResetCause::Update);
+        let later = Instant::from_millis(100_000);
+        let mut due = |found| {
+            status.set(found);
+            while watch.news(&status).is_some() {}
+            (watch.is_due(later, &status, Calm::Grounded, 9, false), watch.is_refused())
+        };
+        for (found, wanted) in [
+            (None, (false, true)),
+            (Some(Found::Offered), (false, true)),
+            (None, (false, false)),
+            (Some(Found::Refused(Refusal::TooOld)), (false, true)),
+            (Some(Found::Offered), (true, false)),
+        ] {
+            assert_eq!(due(found), wanted, "{found:?}");
         }
     }
 }

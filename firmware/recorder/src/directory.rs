@@ -128,7 +128,8 @@ impl Directory {
             } else if slot.is_file(SETTINGS) {
                 self.settings = Some((slot.first(), slot.bytes()));
             } else if slot.is_file(UPDATE) {
-                self.update = Some((slot.first(), slot.bytes()));
+                // The first one, as the resident program takes it.
+                self.update.get_or_insert((slot.first(), slot.bytes()));
             } else if let Some(row) = self.note(volume, slot) {
                 mend(volume, &row, &verified)?;
             }

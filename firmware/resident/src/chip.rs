@@ -27,29 +27,23 @@ pub(crate) const TRIAL: Pr = Pr::DIVIDE_BY32;
 /// The watchdog of this program: 32 s, 22 s at the fastest. The longest erase takes 4 s, a silent card 8 s.
 pub(crate) const SERVICE: Pr = Pr::DIVIDE_BY256;
 
-/// The flags stay for the application.
+/// By the reset's flags, which stay for the application, and by its message, which is taken.
 pub(crate) fn cause() -> Cause {
     let flags = RCC.csr().read();
-    if flags.wdgrstf() || flags.wwdgrstf() || flags.sftrstf() {
-        Cause::Own
-    } else if flags.porrstf() || flags.borrstf() {
-        Cause::Power
-    } else {
-        Cause::Pin
+    if !(flags.wdgrstf() || flags.wwdgrstf() || flags.sftrstf()) {
+        return Cause::Usual;
     }
-}
-
-/// Whether the application asks for its update. Only a reset by the program keeps memory.
-pub(crate) fn take_request(cause: Cause) -> bool {
     let message: *mut [u32; 4] = ptr::with_exposed_provenance_mut(map::MESSAGE as usize);
     // SAFETY: no variable of either program has these words.
-    let words = unsafe { message.read_volatile() };
-    let asked = cause == Cause::Own && Message::of(words) == Some(Message::Install);
-    if asked {
-        // SAFETY: as above.
-        unsafe { message.write_volatile([0; 4]) };
-    }
-    asked
+    let cause = match Message::of(unsafe { message.read_volatile() }) {
+        Some(Message::Install) => Cause::Asked,
+        Some(Message::Planned) => Cause::Usual,
+        // One of this program is for the application.
+        _ => return Cause::Crash,
+    };
+    // SAFETY: as above.
+    unsafe { message.write_volatile([0; 4]) };
+    cause
 }
 
 pub(crate) fn restart(message: Message) -> ! {
@@ -77,13 +71,17 @@ pub(crate) fn feed() {
     IWDG.kr().write(|w| w.set_key(Key::RESET));
 }
 
-/// 168 MHz from the chip's own oscillator, peripheral buses at 42 and 84 MHz; counts time from here.
-pub(crate) fn start_clock() {
+/// Without it the flash would be written with a supply that is too low. The application sets the same.
+pub(crate) fn watch_supply() {
     RCC.apb1enr().modify(|w| w.set_pwren(true));
     PWR.cr1().modify(|w| {
         w.set_pls(LEVEL_2V7);
         w.set_pvde(true);
     });
+}
+
+/// 168 MHz from the chip's own oscillator, peripheral buses at 42 and 84 MHz; counts time from here.
+pub(crate) fn start_clock() {
     RCC.pllcfgr().modify(|w| {
         w.set_pllsrc(Pllsrc::HSI);
         w.set_pllm(Pllm::DIV8);

@@ -25,9 +25,8 @@ const LOOK_EVERY: Span = Span::from_secs(2);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let cause = chip::cause();
-    let asked = chip::take_request(cause);
-    match decide(&mut flash::Flash::new(), board::NAME, cause, asked) {
+    chip::watch_supply();
+    match decide(&mut flash::Flash::new(), board::NAME, chip::cause()) {
         Decision::Start { on_trial } => start(on_trial),
         Decision::Work(job) => serve(job),
     }
@@ -38,7 +37,8 @@ fn start(on_trial: bool) -> ! {
         // A program that hangs before its own watchdog runs.
         chip::start_watchdog(chip::TRIAL);
     }
-    // SAFETY: the header is complete, so there is a vector table behind it; all registers are as after a reset.
+    // SAFETY: the header is complete, so there is a vector table behind it; all registers but the supply detector's are as
+    // after a reset.
     unsafe {
         (*SCB::PTR).vtor.write(map::VECTORS);
         cortex_m::asm::bootload(core::ptr::with_exposed_provenance(map::VECTORS as usize));

@@ -18,6 +18,8 @@ const BOARD: &str = "matek";
 const SECTOR_BYTES: usize = 512;
 const SECTORS: usize = 4;
 const STATE_BYTES: usize = 1_024;
+/// Of the driver of a card (`hums_recorder::SpiCard`); an erase takes as long.
+const SERVICE_SECS: u32 = 8;
 /// Two sectors behind the header's, the last one in part.
 const IMAGE_BYTES: usize = 700;
 
@@ -28,6 +30,8 @@ thread_local! {
     /// Operations until power goes.
     static LEFT: Cell<u32> = const { Cell::new(u32::MAX) };
     static USED: Cell<u32> = const { Cell::new(0) };
+    /// Seconds.
+    static NOW: Cell<u32> = const { Cell::new(0) };
 }
 
 /// Whether power goes in this operation.
@@ -105,6 +109,7 @@ impl Flash for Nor {
     }
 
     fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailed> {
+        NOW.set(NOW.get() + SERVICE_SECS);
         let cut = is_cut();
         let bytes = if region == Region::State { STATE_BYTES } else { SECTOR_BYTES };
         for at in sector * bytes..(sector + 1) * bytes {
@@ -125,6 +130,8 @@ impl Flash for Nor {
 struct Disk {
     files: Vec<(crate::files::Name, Vec<u8>)>,
     reads: Cell<u32>,
+    /// All answers are late from this second on.
+    deadline: Cell<Option<u32>>,
     gone_after: Cell<Option<u32>>,
     /// From this read on the file of this number stands in the place of the first one.
     changes: RefCell<Option<(u32, usize)>>,
@@ -139,6 +146,12 @@ impl Disk {
     fn of(files: &[(&crate::files::Name, &[u8])]) -> Self {
         let files = files.iter().map(|(name, file)| (**name, file.to_vec())).collect();
         Self { files, ..Self::default() }
+    }
+
+    fn is_there(&self) -> Result<(), ()> {
+        let is_gone = self.gone_after.get().is_some_and(|after| self.reads.get() > after);
+        let is_late = self.deadline.get().is_some_and(|deadline| NOW.get() >= deadline);
+        if is_gone || is_late { Err(()) } else { Ok(()) }
     }
 
     /// The first cluster of a file; each cluster is a block.
@@ -211,9 +224,7 @@ impl CardDevice for Disk {
             std::panic::panic_any(PowerCut);
         }
         self.reads.set(self.reads.get() + 1);
-        if self.gone_after.get().is_some_and(|after| self.reads.get() > after) {
-            return Err(());
-        }
+        self.is_there()?;
         for (block, at) in blocks.iter_mut().zip(start..) {
             *block = self.block(at);
         }
@@ -224,10 +235,12 @@ impl CardDevice for Disk {
         panic!("the resident program never writes to a card");
     }
 
+    fn begin_service(&self) {
+        self.deadline.set(Some(NOW.get() + SERVICE_SECS));
+    }
+
     fn num_blocks(&self) -> Result<u32, ()> {
-        if self.gone_after.get().is_some_and(|after| self.reads.get() > after) {
-            return Err(());
-        }
+        self.is_there()?;
         Ok(START + RESERVED + FAT_BLOCKS + CLUSTERS)
     }
 }
@@ -262,10 +275,10 @@ enum Runs {
 
 /// One power-on, with the resets that the resident program makes itself, up to the application or a wait. Each message goes to
 /// `told`.
-fn start(nor: &mut Nor, disk: &Disk, mut cause: Cause, mut asked: bool, told: &mut Vec<Message>) -> Runs {
+fn start(nor: &mut Nor, disk: &Disk, mut cause: Cause, told: &mut Vec<Message>) -> Runs {
     let key = *key(1).pk;
     for _ in 0..10 {
-        match decide(nor, BOARD, cause, asked) {
+        match decide(nor, BOARD, cause) {
             Decision::Start { on_trial } => {
                 let file = Header::read(&nor.application).unwrap();
                 let end = BYTES + file.image_bytes as usize;
@@ -284,14 +297,15 @@ fn start(nor: &mut Nor, disk: &Disk, mut cause: Cause, mut asked: bool, told: &m
                 }
             }
         }
-        (cause, asked) = (Cause::Own, false);
+        cause = Cause::Crash;
     }
     panic!("it restarts again and again");
 }
 
-fn begin(nor: &mut Nor, disk: &Disk, cause: Cause, asked: bool) -> (Runs, Vec<Message>) {
+fn begin(nor: &mut Nor, disk: &Disk, cause: Cause) -> (Runs, Vec<Message>) {
+    NOW.set(NOW.get() + 2 * SERVICE_SECS);
     let mut told = Vec::new();
-    let runs = start(nor, disk, cause, asked, &mut told);
+    let runs = start(nor, disk, cause, &mut told);
     (runs, told)
 }
 
@@ -299,18 +313,18 @@ fn begin(nor: &mut Nor, disk: &Disk, cause: Cause, asked: bool) -> (Runs, Vec<Me
 fn an_update_is_installed_put_on_trial_and_confirmed() {
     let (old, new) = (signed(1, 1, 0), signed(2, 2, 1));
     let (mut nor, disk) = (Nor::holding(1, &old), Disk::of(&[(UPDATE, &new)]));
-    assert_eq!(begin(&mut nor, &disk, Cause::Power, false), (Runs::Application(id(&old), false), vec![]));
-    let (runs, told) = begin(&mut nor, &disk, Cause::Own, true);
+    assert_eq!(begin(&mut nor, &disk, Cause::Usual), (Runs::Application(id(&old), false), vec![]));
+    let (runs, told) = begin(&mut nor, &disk, Cause::Asked);
     assert_eq!((runs, told), (Runs::Application(id(&new), true), vec![Message::Installed]));
     append(&mut nor, Record::Confirmed(Version(1)), id(&new)).unwrap();
-    let (runs, told) = begin(&mut nor, &disk, Cause::Power, false);
+    let (runs, told) = begin(&mut nor, &disk, Cause::Usual);
     assert_eq!((runs, told), (Runs::Application(id(&new), false), vec![]));
     assert_eq!(nor.application[..new.len()], new);
     // Its floor holds from now on.
     let older = Disk::of(&[(UPDATE, &signed(3, 0, 0))]);
-    let (runs, told) = begin(&mut nor, &older, Cause::Own, true);
+    let (runs, told) = begin(&mut nor, &older, Cause::Asked);
     assert_eq!(runs, Runs::Application(id(&new), false));
-    assert!(matches!(told[..], [Message::Refused { why: Refusal::TooOld, .. }]), "{told:?}");
+    assert!(matches!(told[..], [Message::Refused(Refusal::TooOld)]), "{told:?}");
 }
 
 /// Cuts each operation of an update. Then power comes back with the same card, or first without one.
@@ -320,15 +334,15 @@ fn power_that_goes_in_any_operation_leaves_an_application_or_a_wait_for_the_card
     let disk = Disk::of(&[(PREVIOUS, &old), (UPDATE, &new)]);
     let empty = Disk::of(&[]);
     USED.set(0);
-    begin(&mut Nor::holding(1, &old), &disk, Cause::Own, true);
+    begin(&mut Nor::holding(1, &old), &disk, Cause::Asked);
     let operations = USED.get();
     assert!(operations > 300, "{operations}");
     let (mut waits, mut olds) = (0, 0);
     for cut in 0..operations {
         let mut nor = Nor::holding(u64::from(cut) << 8, &old);
-        assert_eq!(powered(cut, || begin(&mut nor, &disk, Cause::Own, true)), None, "{cut}");
+        assert_eq!(powered(cut, || begin(&mut nor, &disk, Cause::Asked)), None, "{cut}");
         let mut without = nor.clone();
-        match begin(&mut without, &empty, Cause::Power, false).0 {
+        match begin(&mut without, &empty, Cause::Usual).0 {
             Runs::Application(which, trial) => {
                 assert!(which == id(&old) && !trial || which == id(&new) && trial, "{cut}");
             }
@@ -336,8 +350,8 @@ fn power_that_goes_in_any_operation_leaves_an_application_or_a_wait_for_the_card
         }
         let mut nor = if cut % 2 == 0 { nor } else { without };
         // A second cut while it goes on.
-        let again = powered(cut.wrapping_mul(7) % operations, || begin(&mut nor, &disk, Cause::Power, false));
-        let runs = again.unwrap_or_else(|| begin(&mut nor, &disk, Cause::Power, false)).0;
+        let again = powered(cut.wrapping_mul(7) % operations, || begin(&mut nor, &disk, Cause::Usual));
+        let runs = again.unwrap_or_else(|| begin(&mut nor, &disk, Cause::Usual)).0;
         assert!(matches!(runs, Runs::Application(..)), "{cut}: {runs:?}");
         olds += u32::from(runs == Runs::Application(id(&old), false));
     }
@@ -348,20 +362,20 @@ fn power_that_goes_in_any_operation_leaves_an_application_or_a_wait_for_the_card
 fn a_card_that_is_pulled_at_any_block_changes_nothing_or_is_waited_for() {
     let (old, new) = (signed(1, 1, 0), signed(2, 2, 0));
     let disk = Disk::of(&[(UPDATE, &new)]);
-    begin(&mut Nor::holding(1, &old), &disk, Cause::Own, true);
+    begin(&mut Nor::holding(1, &old), &disk, Cause::Asked);
     for after in 0..disk.reads.get() {
         let disk = Disk::of(&[(UPDATE, &new)]);
         let mut nor = Nor::holding(1, &old);
         disk.gone_after.set(Some(after));
-        match begin(&mut nor, &disk, Cause::Own, true) {
+        match begin(&mut nor, &disk, Cause::Asked) {
             (Runs::Application(which, false), told) => {
                 assert_eq!(which, id(&old));
-                assert!(matches!(told[..], [Message::Refused { why: Refusal::NoFile, .. }]), "{told:?}");
+                assert!(matches!(told[..], [Message::Refused(Refusal::NoFile)]), "{told:?}");
             }
             (runs, _) => assert_eq!(runs, Runs::Waits),
         }
         disk.gone_after.set(None);
-        let runs = begin(&mut nor, &disk, Cause::Own, true).0;
+        let runs = begin(&mut nor, &disk, Cause::Asked).0;
         assert_eq!(runs, Runs::Application(id(&new), true), "after {after} blocks");
     }
 }
@@ -370,15 +384,15 @@ fn a_card_that_is_pulled_at_any_block_changes_nothing_or_is_waited_for() {
 fn a_card_that_gives_another_image_at_the_second_reading_never_starts_it() {
     let (old, good, other) = (signed(1, 1, 0), signed(2, 2, 0), vec![0x5A; 512 + IMAGE_BYTES]);
     let disk = Disk::of(&[(UPDATE, &good), (b"OTHER   BIN", &other)]);
-    begin(&mut Nor::holding(1, &old), &disk, Cause::Own, true);
+    begin(&mut Nor::holding(1, &old), &disk, Cause::Asked);
     for from in 0..disk.reads.get() {
         let disk = Disk::of(&[(UPDATE, &good), (b"OTHER   BIN", &other)]);
         *disk.changes.borrow_mut() = Some((from, 1));
         let mut nor = Nor::holding(1, &old);
         // `start` compares each started image with its checksum.
-        begin(&mut nor, &disk, Cause::Own, true);
+        begin(&mut nor, &disk, Cause::Asked);
         *disk.changes.borrow_mut() = None;
-        assert!(matches!(begin(&mut nor, &disk, Cause::Power, false).0, Runs::Application(..)));
+        assert!(matches!(begin(&mut nor, &disk, Cause::Usual).0, Runs::Application(..)));
     }
 }
 
@@ -422,9 +436,9 @@ fn each_wrong_image_is_refused_with_its_reason_before_anything_is_erased() {
     for (index, (file, wanted)) in cases.iter().enumerate() {
         let mut nor = Nor::holding(1, &old);
         let before = nor.clone();
-        let (runs, told) = begin(&mut nor, &Disk::of(&[(UPDATE, file)]), Cause::Own, true);
+        let (runs, told) = begin(&mut nor, &Disk::of(&[(UPDATE, file)]), Cause::Asked);
         assert_eq!(runs, Runs::Application(id(&old), false));
-        assert!(matches!(&told[..], [Message::Refused { why, .. }] if why == wanted), "{index}: {told:?}");
+        assert!(matches!(&told[..], [Message::Refused(why)] if why == wanted), "{index}: {told:?}");
         assert!(nor.application == before.application && nor.state == before.state, "{index}");
     }
 }
@@ -434,12 +448,12 @@ fn an_image_that_crashes_gives_way_to_the_one_before_and_is_not_taken_again() {
     let (old, bad) = (signed(1, 1, 0), signed(2, 2, 0));
     let disk = Disk::of(&[(UPDATE, &bad), (PREVIOUS, &old)]);
     let mut nor = Nor::holding(1, &old);
-    let (mut runs, _) = begin(&mut nor, &disk, Cause::Own, true);
+    let (mut runs, _) = begin(&mut nor, &disk, Cause::Asked);
     let mut starts = 0;
     let mut told = Vec::new();
     while runs == Runs::Application(id(&bad), true) {
         starts += 1;
-        (runs, told) = begin(&mut nor, &disk, Cause::Own, false);
+        (runs, told) = begin(&mut nor, &disk, Cause::Crash);
     }
     assert_eq!(
         (starts, runs, told),
@@ -447,37 +461,32 @@ fn an_image_that_crashes_gives_way_to_the_one_before_and_is_not_taken_again() {
     );
     append(&mut nor, Record::Confirmed(Version(0)), id(&old)).unwrap();
     assert!(State::read(&nor.state).has_failed(id(&bad)));
-    let (runs, told) = begin(&mut nor, &disk, Cause::Own, true);
+    let (runs, told) = begin(&mut nor, &disk, Cause::Asked);
     let why = Refusal::FailedBefore;
-    assert_eq!(
-        (runs, told),
-        (Runs::Application(id(&old), false), vec![Message::Refused { id: id(&bad), why }])
-    );
+    assert_eq!((runs, told), (Runs::Application(id(&old), false), vec![Message::Refused(why)]));
 }
 
 #[test]
-fn an_image_that_crashes_without_another_one_waits_and_gets_a_trial_at_each_power_on() {
+fn an_image_that_crashes_without_another_one_gets_a_trial_again_and_again() {
     let bad = signed(2, 2, 0);
     let disk = Disk::of(&[(UPDATE, &bad)]);
     let mut nor = Nor::new(1);
     let trial = Runs::Application(id(&bad), true);
-    assert_eq!(begin(&mut nor, &disk, Cause::Power, false).0, trial);
-    for _ in 0..3 {
+    assert_eq!(begin(&mut nor, &disk, Cause::Usual).0, trial);
+    for _ in 0..100 {
         for _ in 1..CRASHES_MAX {
-            assert_eq!(begin(&mut nor, &disk, Cause::Own, false).0, trial);
+            assert_eq!(begin(&mut nor, &disk, Cause::Crash).0, trial);
         }
-        assert_eq!(begin(&mut nor, &disk, Cause::Own, false).0, Runs::Waits);
-        assert_eq!(begin(&mut nor, &disk, Cause::Pin, false).0, Runs::Waits);
-        let (runs, told) = begin(&mut nor, &disk, Cause::Power, false);
+        let (runs, told) = begin(&mut nor, &disk, Cause::Crash);
         assert_eq!((runs, told), (trial, vec![Message::Retried]));
     }
     // A better image on the card ends that.
     let good = signed(3, 3, 0);
     let disk = Disk::of(&[(UPDATE, &good)]);
     for _ in 1..CRASHES_MAX {
-        begin(&mut nor, &disk, Cause::Own, false);
+        begin(&mut nor, &disk, Cause::Crash);
     }
-    assert_eq!(begin(&mut nor, &disk, Cause::Own, false).0, Runs::Application(id(&good), true));
+    assert_eq!(begin(&mut nor, &disk, Cause::Crash).0, Runs::Application(id(&good), true));
 }
 
 #[test]
@@ -485,11 +494,11 @@ fn a_person_may_switch_off_within_the_first_minute_but_not_for_ever() {
     let (old, new) = (signed(1, 1, 0), signed(2, 2, 0));
     let disk = Disk::of(&[(UPDATE, &new), (PREVIOUS, &old)]);
     let mut nor = Nor::holding(1, &old);
-    let (mut runs, _) = begin(&mut nor, &disk, Cause::Own, true);
+    let (mut runs, _) = begin(&mut nor, &disk, Cause::Asked);
     let mut starts = 0;
     while runs == Runs::Application(id(&new), true) {
         starts += 1;
-        runs = begin(&mut nor, &disk, Cause::Power, false).0;
+        runs = begin(&mut nor, &disk, Cause::Usual).0;
     }
     assert_eq!((starts, runs), (STARTS_MAX, Runs::Application(id(&old), true)));
 }
@@ -499,8 +508,37 @@ fn a_box_without_an_application_takes_the_one_before_if_the_update_is_none() {
     let old = signed(1, 1, 0);
     let disk = Disk::of(&[(UPDATE, &[1; 600]), (PREVIOUS, &old)]);
     let mut nor = Nor::new(1);
-    assert_eq!(decide(&mut nor, BOARD, Cause::Power, false), Decision::Work(Job::Restore));
-    assert_eq!(begin(&mut nor, &disk, Cause::Power, false).0, Runs::Application(id(&old), true));
+    assert_eq!(decide(&mut nor, BOARD, Cause::Usual), Decision::Work(Job::Restore));
+    assert_eq!(begin(&mut nor, &disk, Cause::Usual).0, Runs::Application(id(&old), true));
+}
+
+#[test]
+fn a_trial_ends_wherever_the_state_is_full() {
+    let (old, bad) = (signed(1, 1, 0), signed(2, 2, 0));
+    let disk = Disk::of(&[(UPDATE, &bad), (PREVIOUS, &old)]);
+    for records in 0..STATE_BYTES / 16 {
+        let mut nor = Nor::holding(1, &bad);
+        for _ in 0..records {
+            append(&mut nor, Record::Start { crashed: false }, 7).unwrap();
+        }
+        append(&mut nor, Record::Trial, id(&bad)).unwrap();
+        let starts = (0..20)
+            .take_while(|_| begin(&mut nor, &disk, Cause::Crash).0 == Runs::Application(id(&bad), true));
+        assert!(starts.count() <= CRASHES_MAX as usize, "{records}");
+        assert_eq!(begin(&mut nor, &disk, Cause::Usual).0, Runs::Application(id(&old), true), "{records}");
+    }
+}
+
+#[test]
+fn the_floor_of_an_image_that_a_cable_loaded_holds_after_a_cut() {
+    let (cable, new, older) = (signed(1, 5, 4), signed(2, 6, 0), signed(3, 3, 0));
+    let disk = Disk::of(&[(UPDATE, &new)]);
+    USED.set(0);
+    begin(&mut Nor::holding(1, &cable), &disk, Cause::Asked);
+    let mut nor = Nor::holding(1, &cable);
+    powered(USED.get() / 2, || begin(&mut nor, &disk, Cause::Asked));
+    assert_eq!(application(&nor, BOARD), None);
+    assert_eq!(begin(&mut nor, &Disk::of(&[(UPDATE, &older)]), Cause::Usual).0, Runs::Waits);
 }
 
 #[test]
@@ -509,7 +547,7 @@ fn an_application_that_a_cable_loaded_needs_no_trial_whatever_the_state_has() {
     let mut nor = Nor::holding(1, &new);
     for record in [Record::Trial, Record::Start { crashed: true }, Record::Failed] {
         append(&mut nor, record, id(&old)).unwrap();
-        let runs = begin(&mut nor, &Disk::of(&[]), Cause::Own, false).0;
+        let runs = begin(&mut nor, &Disk::of(&[]), Cause::Crash).0;
         assert_eq!(runs, Runs::Application(id(&new), false));
     }
 }
@@ -523,11 +561,11 @@ fn a_full_state_makes_room_and_keeps_the_floor() {
     for number in 2..40 {
         let new = signed(number, 5, 0);
         let disk = Disk::of(&[(UPDATE, &new)]);
-        assert_eq!(begin(&mut nor, &disk, Cause::Own, true).0, Runs::Application(id(&new), true), "{number}");
+        assert_eq!(begin(&mut nor, &disk, Cause::Asked).0, Runs::Application(id(&new), true), "{number}");
         append(&mut nor, Record::Confirmed(Version(0)), id(&new)).unwrap();
         full += u32::from(State::read(&nor.state).free < 100);
-        let (_, told) = begin(&mut nor, &Disk::of(&[(UPDATE, &signed(99, 3, 0))]), Cause::Own, true);
-        assert!(matches!(told[..], [Message::Refused { why: Refusal::TooOld, .. }]), "{number}: {told:?}");
+        let (_, told) = begin(&mut nor, &Disk::of(&[(UPDATE, &signed(99, 3, 0))]), Cause::Asked);
+        assert!(matches!(told[..], [Message::Refused(Refusal::TooOld)]), "{number}: {told:?}");
     }
     assert!(full > 1, "{full}");
 }
@@ -538,9 +576,9 @@ fn flash_that_refuses_ends_with_the_application_or_a_wait() {
     let disk = Disk::of(&[(UPDATE, &new)]);
     let mut nor = Nor::holding(1, &old);
     nor.refuses = true;
-    let (runs, told) = begin(&mut nor, &disk, Cause::Own, true);
+    let (runs, told) = begin(&mut nor, &disk, Cause::Asked);
     assert_eq!(runs, Runs::Application(id(&old), false));
-    assert!(matches!(told[..], [Message::Refused { why: Refusal::Flash, .. }]), "{told:?}");
+    assert!(matches!(told[..], [Message::Refused(Refusal::Flash)]), "{told:?}");
     assert!(application(&nor, BOARD).is_some() && application(&nor, "other").is_none());
     assert_eq!(State::read(&nor.state).status(id(&new)), Status::Confirmed);
 }

@@ -35,6 +35,7 @@ pub struct File<'a, D> {
 impl<'a, D: CardDevice> File<'a, D> {
     /// Finds a file of this name. The card must have a FAT32 volume in its first partition.
     pub fn open(device: &'a D, name: &Name) -> Result<Self, Refusal> {
+        device.begin_service();
         let layout = Layout::read(device).map_err(|_| Refusal::NoFile)?;
         let mut directory = Self { device, layout, cluster: layout.root, block: 0, bytes: 0 };
         for _ in 0..DIRECTORY_BLOCKS_MAX {

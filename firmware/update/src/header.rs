@@ -11,7 +11,8 @@
 //! | 56 | 16 | commit, filled with zeros |
 //! | 72 | 8 | first bytes of the public key; zeros: not signed |
 //! | 80 | 64 | Ed25519 signature over bytes 0 to 79 and the image |
-//! | 144 | 364 | `0xFF` |
+//! | 144 | 4 | not signed: `0xFFFFFFFF`, or the number of a wish for an image that others replaced (`hums box update --older`) |
+//! | 148 | 360 | `0xFF` |
 //! | 508 | 4 | CRC-32 of all before |
 //!
 //! Numbers are little-endian. An image without a signature is for a cable only.
@@ -32,8 +33,12 @@ pub const COMMIT_BYTES: usize = 16;
 /// Bytes of a key's name.
 pub const KEY_BYTES: usize = 8;
 
+/// A header as it was released.
+pub const NO_WISH: u32 = u32::MAX;
+
 const SIGNED: usize = 80;
 const SIGNATURE: core::ops::Range<usize> = SIGNED..SIGNED + 64;
+const WISH: usize = SIGNATURE.end;
 const CHECKED: usize = BYTES - 4;
 
 /// A version as one number: a newer one is greater.
@@ -75,6 +80,8 @@ pub struct Header {
     pub key: [u8; KEY_BYTES],
     /// Over the fields above and the image.
     pub signature: [u8; 64],
+    /// Number of a wish for this image; [`NO_WISH`]: an older or a replaced one is not installed.
+    pub wish: u32,
 }
 
 /// A fault of an image.
@@ -94,13 +101,15 @@ pub enum Refusal {
     BadSignature,
     /// It failed on trial.
     FailedBefore,
+    /// It was confirmed, and another one took its place.
+    Replaced,
     /// The flash did not take it.
     Flash,
 }
 
 impl Refusal {
     /// All, in the order of their numbers.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::NoFile,
         Self::Damaged,
         Self::OtherBoard,
@@ -108,6 +117,7 @@ impl Refusal {
         Self::ForeignKey,
         Self::BadSignature,
         Self::FailedBefore,
+        Self::Replaced,
         Self::Flash,
     ];
 }
@@ -124,6 +134,7 @@ impl Header {
             commit: padded(commit),
             key: [0; KEY_BYTES],
             signature: [0; 64],
+            wish: NO_WISH,
         }
     }
 
@@ -153,6 +164,7 @@ impl Header {
         put(&self.commit);
         put(&self.key);
         put(&self.signature);
+        put(&self.wish.to_le_bytes());
         let crc = crc32(0, &block[..CHECKED]);
         block[CHECKED..].copy_from_slice(&crc.to_le_bytes());
         block
@@ -174,6 +186,7 @@ impl Header {
             commit: *block[56..].first_chunk()?,
             key: *block[72..].first_chunk()?,
             signature: *block[SIGNATURE].first_chunk()?,
+            wish: word(WISH),
         };
         let fits = (8..=APPLICATION_BYTES - BYTES).contains(&(header.image_bytes as usize));
         (fits && header.image_bytes.is_multiple_of(4)).then_some(header)
@@ -187,6 +200,12 @@ impl Header {
     /// The name of the board; empty if it is no text.
     pub fn board(&self) -> &str {
         text(&self.board)
+    }
+
+    /// Whether both have the same image, whoever signed it.
+    pub fn has_image_of(&self, other: &Self) -> bool {
+        let image = |header: &Self| (header.image_bytes, header.image_crc, header.version, header.commit);
+        image(self) == image(other)
     }
 
     /// The commit; empty if it is no text.

@@ -8,18 +8,15 @@ use crate::header::Refusal;
 pub enum Message {
     /// Install the update file.
     Install,
+    /// A restart that is no fault of the application: low voltage, the card reader, an end of the log.
+    Planned,
     /// It is installed and on trial.
     Installed,
     /// It was not installed.
-    Refused {
-        /// Of the image, or 0.
-        id: u32,
-        /// The reason.
-        why: Refusal,
-    },
+    Refused(Refusal),
     /// The application failed on trial, and the one before it is back.
     FellBack,
-    /// The application failed on trial, and gets another one because a person switched power on.
+    /// The application failed on trial, and gets another one: the card has nothing else.
     Retried,
 }
 
@@ -29,20 +26,21 @@ const MARK: u32 = 0x5550_4454;
 impl Message {
     /// Its words.
     pub fn words(self) -> [u32; 4] {
-        let (kind, id) = match self {
-            Self::Install => (1, 0),
-            Self::Installed => (2, 0),
-            Self::FellBack => (3, 0),
-            Self::Retried => (4, 0),
-            Self::Refused { id, why } => (0x10 + why as u32, id),
+        let kind = match self {
+            Self::Install => 1,
+            Self::Installed => 2,
+            Self::FellBack => 3,
+            Self::Retried => 4,
+            Self::Planned => 5,
+            Self::Refused(why) => 0x10 + why as u32,
         };
-        [MARK, kind, id, sum(kind, id)]
+        [MARK, kind, 0, sum(kind)]
     }
 
     /// Of these words; `None` for any others.
     pub fn of(words: [u32; 4]) -> Option<Self> {
-        let [mark, kind, id, check] = words;
-        if mark != MARK || check != sum(kind, id) {
+        let [mark, kind, none, check] = words;
+        if mark != MARK || none != 0 || check != sum(kind) {
             return None;
         }
         match kind {
@@ -50,16 +48,14 @@ impl Message {
             2 => Some(Self::Installed),
             3 => Some(Self::FellBack),
             4 => Some(Self::Retried),
-            _ => {
-                let why = *Refusal::ALL.get(kind.checked_sub(0x10)? as usize)?;
-                Some(Self::Refused { id, why })
-            }
+            5 => Some(Self::Planned),
+            _ => Refusal::ALL.get(kind.checked_sub(0x10)? as usize).copied().map(Self::Refused),
         }
     }
 }
 
-fn sum(kind: u32, id: u32) -> u32 {
-    !(MARK.rotate_left(7) ^ kind.wrapping_mul(0x9E37_79B9) ^ id.rotate_left(13))
+fn sum(kind: u32) -> u32 {
+    !(MARK.rotate_left(7) ^ kind.wrapping_mul(0x9E37_79B9))
 }
 
 #[cfg(test)]
@@ -68,8 +64,9 @@ mod tests {
 
     #[test]
     fn a_message_comes_as_it_went_and_a_changed_bit_makes_it_none() {
-        let refusals = Refusal::ALL.map(|why| Message::Refused { id: 0x1234_5678, why });
-        let others = [Message::Install, Message::Installed, Message::FellBack, Message::Retried];
+        let refusals = Refusal::ALL.map(Message::Refused);
+        let others =
+            [Message::Install, Message::Installed, Message::FellBack, Message::Retried, Message::Planned];
         for message in others.into_iter().chain(refusals) {
             assert_eq!(Message::of(message.words()), Some(message));
             for bit in 0..128 {

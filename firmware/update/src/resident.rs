@@ -57,12 +57,12 @@ pub trait Flash {
 /// The cause of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Power came.
-    Power,
-    /// Watchdog, or a reset by the program.
-    Own,
-    /// The reset pin.
-    Pin,
+    /// Power, the reset pin, or a restart that the application announced by [`Message::Planned`].
+    Usual,
+    /// Watchdog, or a reset by the program without a word.
+    Crash,
+    /// The application left [`Message::Install`].
+    Asked,
 }
 
 /// The result of [`decide`].
@@ -86,8 +86,6 @@ pub enum Job {
     Replace {
         /// Its id.
         failed: u32,
-        /// A person switched power on: without another image it gets a new trial.
-        may_retry: bool,
     },
     /// No application is complete.
     Restore,
@@ -107,22 +105,27 @@ pub fn application(flash: &impl Flash, board: &str) -> Option<Header> {
     Header::read(flash.read(Region::Application)).filter(|header| header.board() == board)
 }
 
-/// The way of a start, without the card. `asked`: the application left [`Message::Install`].
-pub fn decide(flash: &mut impl Flash, board: &str, cause: Cause, asked: bool) -> Decision {
+/// The way of a start, without the card.
+pub fn decide(flash: &mut impl Flash, board: &str, cause: Cause) -> Decision {
     let Some(header) = application(flash, board) else { return Decision::Work(Job::Restore) };
     let id = header.id();
-    let failed = Decision::Work(Job::Replace { failed: id, may_retry: cause == Cause::Power });
-    match State::read(flash.read(Region::State)).status(id) {
-        Status::Confirmed if asked => Decision::Work(Job::Asked),
+    let failed = Decision::Work(Job::Replace { failed: id });
+    let state = State::read(flash.read(Region::State));
+    match state.status(id) {
+        Status::Confirmed if cause == Cause::Asked => Decision::Work(Job::Asked),
         Status::Confirmed => Decision::Start { on_trial: false },
         Status::Failed => failed,
         Status::Trial { starts, crashes } => {
-            let crashed = starts > 0 && cause == Cause::Own;
-            // A record that the flash refuses is missing later. The image is started all the same: it may be good.
+            let crashed = starts > 0 && cause == Cause::Crash;
             if starts >= STARTS_MAX || crashes + u32::from(crashed) >= CRASHES_MAX {
                 let _ = append(flash, Record::Failed, id);
                 return failed;
             }
+            // It would never end its trial.
+            if state.free + RECORD_BYTES > flash.read(Region::State).len() {
+                return failed;
+            }
+            // A record that the flash refuses is missing later. The image is started all the same: it may be good.
             let _ = append(flash, Record::Start { crashed }, id);
             Decision::Start { on_trial: true }
         }
@@ -159,50 +162,46 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
     pub fn work(&mut self, job: Job) -> Next {
         let state = State::read(self.flash.read(Region::State));
         let done = match job {
-            Job::Asked => self.install(UPDATE, &|id| !state.has_failed(id)).map(|_| Message::Installed),
-            Job::Replace { failed, .. } => {
-                self.install_any(&|id| id != failed && !state.has_failed(id)).map(|_| Message::FellBack)
+            Job::Asked => self.install(UPDATE, &|id| !state.has_failed(id)).map(|()| Message::Installed),
+            Job::Replace { failed } => {
+                self.install_any(&|id| id != failed && !state.has_failed(id)).map(|()| Message::FellBack)
             }
             // A failed image is better than none: it gets a new trial.
             Job::Restore => self
                 .install_any(&|id| !state.has_failed(id))
                 .or_else(|_| self.install_any(&|_| true))
-                .map(|_| Message::Installed),
+                .map(|()| Message::Installed),
         };
         match (done, job) {
             (Ok(message), _) => Next::Restart(message),
             (Err(_), _) if application(self.flash, self.board).is_none() => Next::Wait(Job::Restore),
-            (Err((id, why)), Job::Asked) => Next::Restart(Message::Refused { id, why }),
-            (Err(_), Job::Replace { failed, may_retry: true }) => {
-                match append(self.flash, Record::Trial, failed) {
+            (Err(why), Job::Asked) => Next::Restart(Message::Refused(why)),
+            // A crashing recorder is better than none.
+            (Err(_), Job::Replace { failed }) => {
+                match self.make_room().and_then(|()| append(self.flash, Record::Trial, failed)) {
                     Ok(()) => Next::Restart(Message::Retried),
-                    Err(FlashFailed) => Next::Wait(Job::Replace { failed, may_retry: false }),
+                    Err(FlashFailed) => Next::Wait(job),
                 }
             }
-            (Err(_), job) => Next::Wait(job),
+            (Err(_), Job::Restore) => Next::Wait(job),
         }
     }
 
     /// The update, or else the image before it.
-    fn install_any(&mut self, wanted: &dyn Fn(u32) -> bool) -> Result<u32, (u32, Refusal)> {
+    fn install_any(&mut self, wanted: &dyn Fn(u32) -> bool) -> Result<(), Refusal> {
         self.install(UPDATE, wanted).or_else(|_| self.install(PREVIOUS, wanted))
     }
 
-    /// Installs a file; returns its id. The error has the id of a file with a header, else 0.
-    fn install(&mut self, name: &Name, wanted: &dyn Fn(u32) -> bool) -> Result<u32, (u32, Refusal)> {
-        let mut file = File::open(self.card, name).map_err(|why| (0, why))?;
-        let block = file.next().map_err(|why| (0, why))?;
-        let header = Header::read(&block).ok_or((0, Refusal::Damaged))?;
-        let id = header.id();
-        let write = || {
-            if !wanted(id) {
-                return Err(Refusal::FailedBefore);
-            }
-            let key = header.check(self.board, self.floor(), self.keys)?;
-            self.verify_file(&header, &key, file)?;
-            self.program(&header, &key, name)
-        };
-        write().map_err(|why| (id, why)).map(|()| id)
+    /// Installs a file.
+    fn install(&mut self, name: &Name, wanted: &dyn Fn(u32) -> bool) -> Result<(), Refusal> {
+        let mut file = File::open(self.card, name)?;
+        let header = Header::read(&file.next()?).ok_or(Refusal::Damaged)?;
+        if !wanted(header.id()) {
+            return Err(Refusal::FailedBefore);
+        }
+        let key = header.check(self.board, self.floor(), self.keys)?;
+        self.verify_file(&header, &key, file)?;
+        self.program(&header, &key, name)
     }
 
     /// The oldest version that may be installed.
@@ -239,8 +238,13 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
         if before.is_some_and(|before| state.status(before) != Status::Confirmed) {
             self.clear().map_err(flash)?;
         }
+        let floor = self.floor();
         self.make_room().map_err(flash)?;
         let state = State::read(self.flash.read(Region::State));
+        // Of an image that a cable loaded: it is asked for after a cut.
+        if floor > state.floor {
+            append(self.flash, Record::Confirmed(floor), 0).map_err(flash)?;
+        }
         if state.status(id) != (Status::Trial { starts: 0, crashes: 0 }) {
             append(self.flash, Record::Trial, id).map_err(flash)?;
         }

@@ -11,9 +11,10 @@ pub const RECORD_BYTES: usize = 16;
 /// A record.
 pub type Bytes = [u8; RECORD_BYTES];
 
+const NONE: (u32, Status) = (0, Status::Confirmed);
 const BLANK: Bytes = [0xFF; RECORD_BYTES];
-/// Failed images that are remembered.
-const FAILED_MAX: usize = 4;
+/// Images whose end of trial is remembered.
+const ENDED_MAX: usize = 8;
 
 /// An event in the life of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +87,8 @@ pub enum Status {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct State {
     last: (u32, Status),
-    failed: [u32; FAILED_MAX],
+    /// The newest one first; the id 0 is none.
+    ended: [(u32, Status); ENDED_MAX],
     /// Older versions are refused.
     pub floor: Version,
     /// Offset of the first record behind all others.
@@ -96,8 +98,7 @@ pub struct State {
 impl State {
     /// Of the sector's bytes.
     pub fn read(sector: &[u8]) -> Self {
-        let mut state =
-            Self { last: (0, Status::Confirmed), failed: [0; FAILED_MAX], floor: Version(0), free: 0 };
+        let mut state = Self { last: NONE, ended: [NONE; ENDED_MAX], floor: Version(0), free: 0 };
         for (index, bytes) in sector.as_chunks::<RECORD_BYTES>().0.iter().enumerate() {
             // As a number: this is most of the time of a start.
             if u128::from_le_bytes(*bytes) == u128::MAX {
@@ -121,18 +122,18 @@ impl State {
             (Record::Start { .. }, before) => before,
             (Record::Confirmed(floor), _) => {
                 self.floor = self.floor.max(floor);
-                for failed in self.failed.iter_mut().filter(|failed| **failed == id) {
-                    *failed = 0;
-                }
-                Status::Confirmed
+                self.end(id, Status::Confirmed)
             }
-            (Record::Failed, _) => {
-                self.failed.rotate_right(1);
-                self.failed[0] = id;
-                Status::Failed
-            }
+            (Record::Failed, _) => self.end(id, Status::Failed),
         };
         self.last = (id, status);
+    }
+
+    fn end(&mut self, id: u32, status: Status) -> Status {
+        let place = self.ended.iter().position(|(ended, _)| *ended == id).unwrap_or(ENDED_MAX - 1);
+        self.ended[..=place].rotate_right(1);
+        self.ended[0] = (id, status);
+        status
     }
 
     /// The status of an image.
@@ -147,6 +148,11 @@ impl State {
 
     /// Whether an image failed on trial, and was not confirmed afterwards.
     pub fn has_failed(&self, id: u32) -> bool {
-        id != 0 && self.failed.contains(&id)
+        id != 0 && self.ended.contains(&(id, Status::Failed))
+    }
+
+    /// Whether an image was confirmed.
+    pub fn was_confirmed(&self, id: u32) -> bool {
+        id != 0 && self.ended.contains(&(id, Status::Confirmed))
     }
 }

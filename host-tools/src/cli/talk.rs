@@ -337,8 +337,8 @@ pub struct Setup {
 const UPDATE_EXAMPLES: &str = "Examples:
   hums box update hums-matek-f405-std.upd --card /media/card
 
-Checks the signature, and board and version by the newest log on the card. The file becomes HUMS.UPD, and an earlier one HUMS.OLD. The
-box installs it on the ground (docs/update.md).";
+Checks the signature, and board and version by the newest log on the card. The file becomes HUMS.UPD, and an earlier one that
+wrote the newest log HUMS.OLD. The box installs it on the ground (docs/update.md).";
 
 /// `hums box update`
 #[derive(Args, Clone, Debug)]
@@ -350,7 +350,7 @@ pub struct Update {
     /// Root folder of the box's card, mounted on this PC
     #[arg(long, value_name = "DIR")]
     pub card: PathBuf,
-    /// Also an older version than the one that wrote the newest log
+    /// Also an older version than the one that wrote the newest log, or one that was replaced
     #[arg(long)]
     pub older: bool,
     /// Print the result as one JSON object (docs/json.md)

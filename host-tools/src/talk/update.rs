@@ -3,6 +3,7 @@
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use anyhow::{Result, bail};
 use hums_update::header::{self, Header, Version};
@@ -33,6 +34,8 @@ struct UpdateJson {
     is_test: bool,
     /// Of the newest log on the card.
     box_version: Option<String>,
+    /// Whether an image to fall back to is on the card.
+    has_previous: bool,
     /// On the card.
     file: PathBuf,
 }
@@ -40,11 +43,11 @@ struct UpdateJson {
 /// Runs `hums box update`.
 pub fn run(args: &cli::Update) -> Result<Outcome> {
     let name = args.image.display();
-    let bytes = read_short(&args.image, map::APPLICATION_BYTES as u64)?;
-    let header = judge(&bytes).map_err(|why| anyhow::anyhow!("{name}: {why}"))?;
+    let mut bytes = read_short(&args.image, map::APPLICATION_BYTES as u64)?;
+    let mut header = judge(&bytes).map_err(|why| anyhow::anyhow!("{name}: {why}"))?;
     let version = header.version.to_string();
     let newest = newest(&args.card)?;
-    if let Some((board, running)) = &newest {
+    if let Some(Newest { board, version: running, .. }) = &newest {
         if board != header.board() {
             bail!("{name} is for the board {}, and the card is of a box with {board}", header.board());
         }
@@ -52,14 +55,20 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
             bail!("{name} has version {version}, and the box had {running}. Add --older to go back");
         }
     }
-    let file = put(&args.card, &bytes)?;
+    if args.older {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        header.wish = now.as_secs() as u32;
+        bytes[..header::BYTES].copy_from_slice(&header.bytes());
+    }
+    let file = put(&args.card, &bytes, newest.as_ref())?;
     let is_test = keys::TEST.starts_with(&header.key);
     let update = UpdateJson {
         board: header.board().to_owned(),
         version,
         commit: header.commit().to_owned(),
         is_test,
-        box_version: newest.map(|(_, version)| version),
+        box_version: newest.map(|newest| newest.version),
+        has_previous: args.card.join(PREVIOUS).exists(),
         file,
     };
     if args.json {
@@ -70,6 +79,11 @@ pub fn run(args: &cli::Update) -> Result<Outcome> {
     output::line(&format!("{}: version {version} ({commit}) for {board}, signature good", file.display()))?;
     if is_test {
         output::line("It is signed by the test key: only a box with a development build takes it.")?;
+    }
+    if !update.has_previous {
+        output::line(
+            "The card has no HUMS.OLD: if the update fails, the box has no other version to go back to.",
+        )?;
     }
     output::line(
         "Put the card into the box and switch on. It installs the file on the ground: disarmed for 10 s, or a minute without an autopilot.",
@@ -94,8 +108,22 @@ fn judge(bytes: &[u8]) -> Result<Header, &'static str> {
     good.map(|()| header).map_err(|_| "is damaged or forged: its signature does not fit")
 }
 
-/// Board and version by the newest log on the card.
-fn newest(card: &Path) -> Result<Option<(String, String)>> {
+/// By the newest log on the card.
+struct Newest {
+    board: String,
+    version: String,
+    commit: String,
+}
+
+impl Newest {
+    /// Whether this image wrote it. A release's header has more of the commit's digits.
+    fn is_of(&self, header: &Header) -> bool {
+        let is_commit = !self.commit.is_empty() && header.commit().starts_with(&self.commit);
+        is_commit && Version::parse(&self.version) == Some(header.version)
+    }
+}
+
+fn newest(card: &Path) -> Result<Option<Newest>> {
     if !card.is_dir() {
         return Err(usage(format!(
             "--card {}: is no folder; mount the card, and name its root",
@@ -106,20 +134,22 @@ fn newest(card: &Path) -> Result<Option<(String, String)>> {
     let Ok(found) = find(&[card.to_owned()], false) else { return Ok(None) };
     for place in found.places.iter().rev().filter(|place| place.own().is_some()) {
         if let Some(boot) = check::overview(place)?.contents.boot {
-            return Ok(Some((boot.board, boot.version)));
+            return Ok(Some(Newest { board: boot.board, version: boot.version, commit: boot.git }));
         }
     }
     Ok(None)
 }
 
-/// Written whole under another name first. Another update that is there becomes the one before.
-fn put(card: &Path, bytes: &[u8]) -> Result<PathBuf> {
+/// Written whole under another name first. The update that is there becomes the one before, if it wrote the newest log.
+fn put(card: &Path, bytes: &[u8], newest: Option<&Newest>) -> Result<PathBuf> {
     let [update, previous, partial] = [UPDATE, PREVIOUS, PARTIAL].map(|name| card.join(name));
     let mut file = settle(File::create(&partial), &partial)?;
     settle(file.write_all(bytes).and_then(|()| file.sync_all()), &partial)?;
     drop(file);
-    let is_other = fs::read(&update).is_ok_and(|before| before != bytes && judge(&before).is_ok());
-    if is_other {
+    let before = fs::read(&update).ok().and_then(|before| judge(&before).ok());
+    let ran = |before: &Header| newest.is_some_and(|newest| newest.is_of(before));
+    let is_same = |before: &Header| Header::read(bytes).is_some_and(|new| new.has_image_of(before));
+    if before.is_some_and(|before| ran(&before) && !is_same(&before)) {
         settle(fs::rename(&update, &previous), &previous)?;
     }
     settle(fs::rename(&partial, &update), &update)?;
@@ -132,6 +162,7 @@ mod tests {
 
     /// RFC 8032's first test vector is no key of a box; `firmware/update/keys/test.key` is.
     fn signed(number: u8) -> Vec<u8> {
+        let commit = format!("{number:02}{:014}", 0);
         let text = include_str!("../../../firmware/update/keys/test.key");
         let seed: Vec<u8> = (0..64)
             .step_by(2)
@@ -140,7 +171,7 @@ mod tests {
         let pair =
             ed25519_compact::KeyPair::from_seed(ed25519_compact::Seed::from_slice(&seed).expect("32 bytes"));
         let image = [number; 64];
-        let mut header = Header::new("matek-f405-std", "abc", Version(1), Version(0), &image);
+        let mut header = Header::new("matek-f405-std", &commit, Version(0x0001_0000), Version(0), &image);
         header.sign(&image, &pair.sk);
         [&header.bytes()[..], &image].concat()
     }
@@ -165,17 +196,32 @@ mod tests {
     }
 
     #[test]
-    fn the_update_before_stays_on_the_card_and_the_same_one_again_does_not_replace_it() {
+    fn the_update_that_ran_stays_on_the_card_and_one_that_failed_does_not_take_its_place() {
         let dir = tempfile::tempdir().expect("a folder");
         let read = |name: &str| fs::read(dir.path().join(name)).ok();
-        for (file, previous) in [(1, None), (2, Some(1)), (2, Some(1)), (3, Some(2))] {
-            put(dir.path(), &signed(file)).expect("written");
+        let ran = |file: u8| Newest {
+            board: String::new(),
+            version: "0.1.0".into(),
+            commit: format!("{file:02}{:010}", 0),
+        };
+        let other = Newest { commit: "abc".into(), ..ran(1) };
+        for (file, newest, previous) in [
+            (1, None, None),
+            (2, Some(ran(1)), Some(1)),
+            (2, Some(ran(2)), Some(1)),
+            // It failed: the box runs the first one.
+            (3, Some(other), Some(1)),
+            (4, None, Some(1)),
+            (5, Some(Newest { version: "0.2.0".into(), ..ran(4) }), Some(1)),
+            (6, Some(ran(5)), Some(5)),
+        ] {
+            put(dir.path(), &signed(file), newest.as_ref()).expect("written");
             assert_eq!(read(UPDATE), Some(signed(file)));
             assert_eq!(read(PREVIOUS), previous.map(signed));
             assert_eq!(read(PARTIAL), None);
         }
         fs::write(dir.path().join(UPDATE), b"damaged").expect("written");
-        put(dir.path(), &signed(4)).expect("written");
-        assert_eq!(read(PREVIOUS), Some(signed(2)), "a damaged file is not kept");
+        put(dir.path(), &signed(7), Some(&ran(7))).expect("written");
+        assert_eq!(read(PREVIOUS), Some(signed(5)), "a damaged file is not kept");
     }
 }

@@ -87,7 +87,8 @@ pub(crate) async fn run(
                     leave(body, ends, handover, &mut watchdog, card_reader::restart).await;
                 }
                 if watch_update(body, ends, &mut update) {
-                    leave(body, ends, handover, &mut watchdog, crate::update::restart).await;
+                    leave(body, ends, handover, &mut watchdog, || crate::update::restart(Message::Install))
+                        .await;
                 }
                 tell_board(body, ends, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);

@@ -9,9 +9,10 @@ use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac;
 
-use super::reset::restart;
+use hums_update::message::Message;
+
 use super::watchdog;
-use crate::fault;
+use crate::{fault, update};
 
 /// The PVD's line into the interrupt controller (RM0090, 12.2.5).
 const LINE: usize = 16;
@@ -46,5 +47,5 @@ fn PVD() {
         // A reset would not restore the supply. The note explains why no other code feeds the watchdog.
         watchdog::reload();
     }
-    restart();
+    update::restart(Message::Planned);
 }
