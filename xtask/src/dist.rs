@@ -11,6 +11,7 @@ use std::rc::Rc;
 use std::{env, fs};
 
 use anyhow::{Context as _, Result, bail};
+use hums_update::keys;
 use sha2::{Digest as _, Sha256};
 
 use crate::browser;
@@ -39,6 +40,11 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     let key = options.key.as_deref().map(update::release_key).transpose()?.map(Rc::new);
     if key.is_none() {
         eprintln!("note: no update files (HUMS.UPD) without --key FILE; the others are for a cable");
+    }
+    if keys::ALL == [keys::TEST] {
+        eprintln!(
+            "WARNING: firmware/update/keys has no key but the test key: no card can ever update these boxes"
+        );
     }
     let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
     needs.push(Need::BrowserTarget);

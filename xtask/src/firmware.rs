@@ -141,8 +141,9 @@ pub(crate) fn files(
     let mut added = image::pieces(&programs.resident).with_context(|| format!("{name}: resident program"))?;
     let application = image::pieces(&programs.application).with_context(|| name.clone())?;
     let update = update::file(board, &application, commit, key).with_context(|| name.clone())?;
-    let header = update[..header::BYTES].to_vec();
-    added.push(Piece { address: map::APPLICATION, bytes: header });
+    // Not signed: another id, so an image that a cable loads has no trial behind it.
+    let bytes = update::file(board, &application, commit, None)?[..header::BYTES].to_vec();
+    added.push(Piece { address: map::APPLICATION, bytes });
     let elf = image::with_pieces(&programs.application, &added)?;
     let pieces = image::pieces(&elf)?;
     let mut files = vec![
