@@ -1,6 +1,6 @@
 //! Waits for an armed vehicle on the autopilot's line, without a monitor: in card-reader mode nothing is recorded.
 
-use hums_core::observation::Observation;
+use hums_core::observation::{Observation, Source};
 use hums_link::frame::{Check, Frame};
 use hums_link::framer::Framer;
 
@@ -11,7 +11,14 @@ const HEARTBEATS: u8 = 2;
 #[derive(Debug)]
 pub struct ArmingWatch {
     framer: Framer,
-    armed: u8,
+    armed: Armed,
+}
+
+/// Armed heartbeats, and whose was the last. Another vehicle's that say disarmed do not count.
+#[derive(Debug)]
+struct Armed {
+    count: u8,
+    by: Option<Source>,
 }
 
 impl Default for ArmingWatch {
@@ -23,7 +30,7 @@ impl Default for ArmingWatch {
 impl ArmingWatch {
     /// Before the first byte.
     pub const fn new() -> Self {
-        Self { framer: Framer::new(), armed: 0 }
+        Self { framer: Framer::new(), armed: Armed { count: 0, by: None } }
     }
 
     /// Room for the next bytes; see [`Framer::room`].
@@ -43,18 +50,22 @@ impl ArmingWatch {
         framer.idle(&mut |frame| heard(armed, &frame));
     }
 
-    /// The last heartbeats of a vehicle, two in a row, were armed.
+    /// Two heartbeats were armed, and the vehicle of the first did not disarm between them.
     pub const fn is_armed(&self) -> bool {
-        self.armed >= HEARTBEATS
+        self.armed.count >= HEARTBEATS
     }
 }
 
-fn heard(armed: &mut u8, frame: &Frame<'_>) {
-    if *armed >= HEARTBEATS || frame.check() != Check::Verified {
+fn heard(armed: &mut Armed, frame: &Frame<'_>) {
+    if armed.count >= HEARTBEATS || frame.check() != Check::Verified {
         return;
     }
-    if let Some((_, Observation::Heartbeat(heartbeat))) = hums_link::observe(frame) {
-        *armed = if heartbeat.armed { *armed + 1 } else { 0 };
+    if let Some((source, Observation::Heartbeat(heartbeat))) = hums_link::observe(frame) {
+        if heartbeat.armed {
+            *armed = Armed { count: armed.count + 1, by: Some(source) };
+        } else if armed.by == Some(source) {
+            armed.count = 0;
+        }
     }
 }
 
@@ -69,8 +80,12 @@ mod tests {
     const DISARMED: u8 = 0x01;
 
     fn heartbeat(kind: u8, autopilot: u8, base_mode: u8) -> Vec<u8> {
+        heartbeat_of(1, kind, autopilot, base_mode)
+    }
+
+    fn heartbeat_of(system: u8, kind: u8, autopilot: u8, base_mode: u8) -> Vec<u8> {
         let packet = Packet::new(0).u8(4, kind).u8(5, autopilot).u8(6, base_mode).u8(7, 4).u8(8, 3);
-        Encoder::of(1, 1).frame(&mut [0; FRAME_BYTES_MAX], &packet).to_vec()
+        Encoder::of(system, 1).frame(&mut [0; FRAME_BYTES_MAX], &packet).to_vec()
     }
 
     fn after(bytes: &[u8]) -> bool {
@@ -95,6 +110,16 @@ mod tests {
         assert!(!after(&heartbeat(6, 3, ARMED).repeat(3)));
         assert!(!after(&heartbeat(30, 8, ARMED).repeat(3)));
         assert!(!after(&[0xFD; 2_000]));
+    }
+
+    #[test]
+    fn another_vehicle_that_is_disarmed_does_not_hide_an_armed_one() {
+        let (armed, disarmed) = (heartbeat(2, 3, ARMED), heartbeat(2, 3, DISARMED));
+        let other = |base_mode| heartbeat_of(2, 2, 3, base_mode);
+        assert!(after(&[armed.clone(), other(DISARMED), armed.clone()].concat()));
+        assert!(after(&[other(DISARMED), armed.clone(), other(ARMED)].concat()));
+        assert!(!after(&[armed.clone(), disarmed.clone(), other(ARMED)].concat()));
+        assert!(!after(&[armed, other(DISARMED), disarmed].concat().repeat(3)));
     }
 
     #[test]
