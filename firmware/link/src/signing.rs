@@ -24,7 +24,7 @@
 use core::fmt;
 
 use hums_core::clock::{Instant, Span};
-use hums_dialect::wire::SIGNATURE_BYTES;
+pub use hums_dialect::wire::SIGNATURE_BYTES;
 use sha2::{Digest as _, Sha256};
 
 use crate::frame::Frame;

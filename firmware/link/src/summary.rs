@@ -131,13 +131,24 @@ pub struct OwnFigures {
     pub computer: ComputerStatus,
 }
 
+/// Forwarding of the vehicle's frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Forwards {
+    /// They are not forwarded.
+    Nothing,
+    /// Within the stream's budget.
+    Budgeted,
+    /// Each when it is due, to another port than ours, which has a budget of its own.
+    Apart,
+}
+
 /// The summary stream.
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// Shared by answers and stream.
     pub outlet: Outlet,
-    /// Forwards the vehicle's frames; not if the autopilot carries the stream.
-    pub forwards: bool,
+    /// What becomes of the vehicle's frames.
+    pub forwards: Forwards,
     /// The box's own status.
     pub own: OwnFigures,
     vehicle: Option<Source>,
@@ -159,7 +170,7 @@ impl Summary {
                 params.get(Param::GsBaud) as u32,
                 WAITING_BYTES,
             ),
-            forwards: true,
+            forwards: Forwards::Budgeted,
             own: OwnFigures::default(),
             vehicle: None,
             turns: [Turn { due_ms: 0, seen_ms: 0, bytes: 0, known: false }; TURNS],
@@ -178,18 +189,28 @@ impl Summary {
             vehicle.system == frame.system()
                 && (frame.id() != ids::HEARTBEAT || vehicle.component == frame.component())
         };
-        if !self.forwards || !self.vehicle.is_some_and(ours) {
+        if self.forwards == Forwards::Nothing || !self.vehicle.is_some_and(ours) {
             return;
         }
         let Ok(index) = FORWARDED.binary_search_by_key(&frame.id(), |(id, _)| *id) else { return };
         let bytes = frame.bytes();
+        let is_apart = self.forwards == Forwards::Apart;
         if interval_ms(index) == 0 {
-            self.outlet.pass(at, Class::Event, bytes, out);
+            if is_apart {
+                out(bytes);
+            } else {
+                self.outlet.pass(at, Class::Event, bytes, out);
+            }
             return;
         }
         let now_ms = at.as_millis() as u32;
         self.announce(index, now_ms, bytes.len());
-        if self.has_turn(index, at, bytes.len()) {
+        if is_apart {
+            if self.turns[index].score(now_ms, interval_ms(index)).is_some() {
+                self.turns[index].took(now_ms, interval_ms(index));
+                out(bytes);
+            }
+        } else if self.has_turn(index, at, bytes.len()) {
             let class = if self.is_urgent(index, now_ms) { Class::Own } else { Class::Forward };
             if self.outlet.pass(at, class, bytes, out) {
                 self.turns[index].took(now_ms, interval_ms(index));
@@ -217,7 +238,9 @@ impl Summary {
             return true;
         }
         let mut first = (score, 0);
-        for (other, turn) in self.turns.iter().enumerate().filter(|(other, _)| *other != index) {
+        let shares = |other: usize| self.forwards != Forwards::Apart || other >= VALUES;
+        let others = self.turns.iter().enumerate().filter(|(other, _)| *other != index && shares(*other));
+        for (other, turn) in others {
             let interval = interval_ms(other);
             if let Some(other_score) = turn.score(now_ms, interval)
                 && other_score > first.0

@@ -26,7 +26,7 @@ pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> !
     loop {
         SUPERVISOR.report(Task::Downlink, now());
         set_baud(&mut port, &BAUD_GS).await;
-        if !queue.lend(async |frame| send(&mut port, frame, &GS_STOOD_STILL).await).await {
+        if queue.lend(async |frame| send(&mut port, frame, &GS_STOOD_STILL).await).await.is_none() {
             let _ = with_timeout(REPORT, links::GS.wait()).await;
         }
     }
@@ -36,17 +36,20 @@ pub(crate) async fn run(mut port: board::PortTx, mut queue: GsOut<'static>) -> !
 pub(crate) async fn requests(mut port: board::PortTx, mut queue: AutopilotOut<'static>) -> ! {
     loop {
         set_baud(&mut port, &BAUD_AUTOPILOT).await;
-        if !queue.lend(async |frame| send(&mut port, frame, &AUTOPILOT_STOOD_STILL).await).await {
+        if queue.lend(async |frame| send(&mut port, frame, &AUTOPILOT_STOOD_STILL).await).await.is_none() {
             links::AUTOPILOT.wait().await;
         }
     }
 }
 
-async fn send(port: &mut board::PortTx, frame: &[u8], stood_still: &AtomicBool) {
-    if with_timeout(SEND_MAX, port.transmit(frame)).await.is_err() {
+/// Whether the frame was sent in time.
+async fn send(port: &mut board::PortTx, frame: &[u8], stood_still: &AtomicBool) -> bool {
+    let is_sent = with_timeout(SEND_MAX, port.transmit(frame)).await.is_ok();
+    if !is_sent {
         port.restart();
         stood_still.store(true, Ordering::Relaxed);
     }
+    is_sent
 }
 
 async fn set_baud(port: &mut board::PortTx, wanted: &AtomicU32) {

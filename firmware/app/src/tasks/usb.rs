@@ -86,11 +86,11 @@ async fn send(sender: &mut Sender<'static, Bus>, mut queue: UsbOut<'static>) -> 
         let mut is_taken = true;
         while is_taken {
             let send = async |frame: &[u8]| {
-                let sent = with_timeout(SEND_MAX, serial::send(sender, frame)).await;
-                is_taken = matches!(sent, Ok(Ok(())));
+                matches!(with_timeout(SEND_MAX, serial::send(sender, frame)).await, Ok(Ok(())))
             };
-            if !queue.lend(send).await {
-                Timer::after(EMPTY).await;
+            match queue.lend(send).await {
+                Some(is_sent) => is_taken = is_sent,
+                None => Timer::after(EMPTY).await,
             }
         }
         queue.close();

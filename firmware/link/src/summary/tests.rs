@@ -40,10 +40,20 @@ fn frame(id: u32, bytes: usize) -> Vec<u8> {
 }
 
 fn run(budget: f32, seconds: u64, streams: &[(u32, usize, u64)]) -> Vec<(u64, u32, usize)> {
+    run_with(Forwards::Budgeted, budget, seconds, streams)
+}
+
+fn run_with(
+    forwards: Forwards,
+    budget: f32,
+    seconds: u64,
+    streams: &[(u32, usize, u64)],
+) -> Vec<(u64, u32, usize)> {
     let params = params(budget);
     let mut summary = Summary::new(&params);
     let monitor = Monitor::new(params);
     summary.vehicle = Some(VEHICLE);
+    summary.forwards = forwards;
     let frames: Vec<Vec<u8>> = streams.iter().map(|(id, bytes, _)| frame(*id, *bytes)).collect();
     let mut sent = Vec::new();
     let mut random = 12_345_u64;
@@ -512,4 +522,20 @@ fn what_is_less_urgent_takes_no_place_of_what_waits() {
     let after: Vec<_> = summary.waiting.iter().map(|finding| finding.instance).collect();
     assert_eq!((after.len(), summary.dropped()), (WAITING_MAX, 5));
     assert_eq!(before, after);
+}
+
+#[test]
+fn frames_for_a_port_with_a_budget_of_its_own_take_nothing_from_ours() {
+    let streams = [ALL, &[(253, 62, 100)]].concat();
+    let apart = run_with(Forwards::Apart, 200.0, 60, &streams);
+    let alone = run_with(Forwards::Nothing, 200.0, 60, &streams);
+    let count = |sent: &[(u64, u32, usize)], id| sent.iter().filter(|one| one.1 == id).count();
+    let is_ours = |id: u32| [251, 252, 390].contains(&id);
+    let ours: Vec<_> = apart.iter().filter(|one| is_ours(one.1)).collect();
+    assert_eq!(ours, alone.iter().filter(|one| is_ours(one.1)).collect::<Vec<_>>());
+    assert!(ours.len() > 100, "{}", ours.len());
+    // Each at its interval, and all texts.
+    for (id, wanted) in [(30, 240), (33, 120), (74, 120), (1, 30), (253, 590)] {
+        assert!(count(&apart, id) * 20 >= wanted * 19, "{id}: {} of {wanted}", count(&apart, id));
+    }
 }

@@ -27,10 +27,10 @@ use hums_link::frame::Frame;
 use hums_link::ids;
 use hums_link::messages;
 use hums_link::outlet::{self, Class, Outlet};
-use hums_link::packet::{Fields, Packet};
+use hums_link::packet::Fields;
 use hums_link::request::{self, AddressedRequest, Port, Reply, Request};
-use hums_link::signing::{Key, Seal};
-use hums_link::summary::{self, Summary};
+use hums_link::signing::{Key, SIGNATURE_BYTES, Seal};
+use hums_link::summary::{self, Forwards, Summary};
 
 use crate::journal::{Journal, Logbook};
 use crate::notices::Notices;
@@ -121,30 +121,33 @@ impl Companion {
         self.secure.save(now, seals.into_iter().flatten().map(Seal::last).max(), handover)
     }
 
-    /// The summary stream: to its carrier, and to the USB port while that is open.
+    /// Our frames of the summary stream: to its carrier, and to the USB port while that is open.
     pub(crate) fn tell(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
-        if !gs.is_open(Port::Usb) {
+        gs.tell(frame);
+        self.tell_usb(now, frame, gs);
+    }
+
+    /// The vehicle's, likewise. The autopilot does not carry its own frames.
+    pub(crate) fn forward(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
+        if gs.route() == SummaryRoute::Port {
             gs.tell(frame);
-            return;
         }
-        let message = self.usb.encoder.message_of(frame);
-        // The autopilot does not carry its own frames: those are for USB only.
-        if message.is_some() || gs.route() != SummaryRoute::Autopilot {
-            gs.tell(frame);
-        }
-        self.tell_usb(now, frame, message.as_ref(), gs);
+        self.tell_usb(now, frame, gs);
     }
 
     // Own stack frame (ARCHITECTURE.md, Memory).
     #[inline(never)]
-    fn tell_usb(&mut self, now: Instant, frame: &[u8], message: Option<&Packet>, gs: &mut GsIn) {
-        let has_room = gs.has_room(Port::Usb);
+    fn tell_usb(&mut self, now: Instant, frame: &[u8], gs: &mut GsIn) {
+        if !gs.is_open(Port::Usb) {
+            return;
+        }
+        let has_room = gs.has_room(Port::Usb, frame.len() + SIGNATURE_BYTES);
         let mut out = |bytes: &[u8]| gs.send(Port::Usb, bytes);
-        // The stream has been selected: here it has no class.
+        // Ours have been selected: here they are all alike.
         let is_sent = has_room
-            && match message {
-                Some(packet) => self.usb.send(now, Class::Critical, packet, &mut out),
-                None => self.usb.pass(now, Class::Critical, frame, &mut out),
+            && match self.usb.encoder.message_of(frame) {
+                Some(packet) => self.usb.send(now, Class::Critical, &packet, &mut out),
+                None => self.usb.pass(now, Class::Event, frame, &mut out),
             };
         if !is_sent {
             gs.lose(Port::Usb);
@@ -367,7 +370,11 @@ impl Companion {
             2 => SummaryRoute::Autopilot,
             _ => SummaryRoute::Port,
         });
-        summary.forwards = gs.route() == SummaryRoute::Port || gs.is_open(Port::Usb);
+        summary.forwards = match gs.route() {
+            SummaryRoute::Port => Forwards::Budgeted,
+            _ if gs.is_open(Port::Usb) => Forwards::Apart,
+            _ => Forwards::Nothing,
+        };
         if self.commands.stopped() && book.monitor.vehicle().armed() {
             self.commands.stop_or_record(now, false, NOBODY, &mut book.journal, sectors);
         }
@@ -464,4 +471,62 @@ fn known(now: Instant, monitor: &Monitor) -> Option<Known> {
         identified: vehicle.identity.get().is_some() || vehicle.source != Some(source),
         baud: monitor.params().get(Param::ApBaud) as u32,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use hums_link::encode::Encoder;
+    use hums_link::packet::Packet;
+    use hums_link::text::Severity;
+
+    use super::*;
+    use crate::queues::{Ends, Queues};
+
+    const NOW: Instant = Instant::from_millis(5_000);
+
+    #[test]
+    fn critical_texts_have_room_behind_all_the_bulk_that_a_usb_port_takes() {
+        let text = messages::status_text(Severity::Critical, &"x".repeat(50));
+        for bytes in [20, 40, 109, 263] {
+            let mut queues = Box::new(Queues::new());
+            let Ends { mut gs_in, usb_out, .. } = queues.split();
+            usb_out.open();
+            let params = Params::defaults();
+            let (mut companion, mut summary) = (Companion::new(&params), Summary::new(&params));
+            let bulk = Packet::new(ids::LOG_DATA).bytes(0, &vec![1; bytes - 12][..]);
+            let outlets = [&mut summary.outlet, &mut companion.outlet, &mut companion.usb];
+            let mut ways = Ways { outlets, queues: &mut gs_in };
+            let taken = (0..99).take_while(|_| ways.send(NOW, Port::Usb, Class::Bulk, &bulk)).count();
+            assert!(taken >= 2, "{taken} of {bytes} bytes");
+            let mut out = [0; FRAME_BYTES_MAX];
+            for _ in 0..3 {
+                companion.tell(NOW, Encoder::new().frame(&mut out, &text), &mut gs_in);
+            }
+            assert_eq!(gs_in.lost(), 0, "behind {bytes} bytes");
+        }
+    }
+
+    #[test]
+    fn the_autopilot_never_gets_its_own_frames_whether_usb_is_open_or_not() {
+        let mut queues = Box::new(Queues::new());
+        let Ends { mut gs_in, mut usb_out, .. } = queues.split();
+        let mut companion = Companion::new(&Params::defaults());
+        gs_in.set_route(SummaryRoute::Autopilot);
+        let (mut out, mut usb_frames) = ([0; FRAME_BYTES_MAX], 0);
+        let text = messages::status_text(Severity::Notice, "x");
+        for is_open in [true, false] {
+            if is_open {
+                usb_out.open();
+            } else {
+                usb_out.close();
+            }
+            let mut frame = [0; FRAME_BYTES_MAX];
+            companion.forward(NOW, Encoder::of(1, 1).frame(&mut frame, &text), &mut gs_in);
+            companion.tell(NOW, Encoder::new().frame(&mut frame, &text), &mut gs_in);
+            while usb_out.take(&mut out).is_some() {
+                usb_frames += 1;
+            }
+        }
+        assert_eq!((gs_in.autopilot.frames(), usb_frames, gs_in.lost()), (2, 2, 0));
+    }
 }

@@ -196,7 +196,7 @@ impl<'a> Monitoring<'a> {
         let Self { book, summary, companion, .. } = self;
         companion.heard(at, &frame, book, summary, sectors, gs);
         begin(Step::Summary);
-        summary.frame(at, &frame, &mut |bytes| companion.tell(at, bytes, gs));
+        summary.frame(at, &frame, &mut |bytes| companion.forward(at, bytes, gs));
     }
 
     #[inline(never)]

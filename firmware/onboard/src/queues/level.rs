@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Bytes of the length that the queue puts before each frame.
-const HEAD_BYTES: usize = 2;
+pub(super) const HEAD_BYTES: usize = 2;
 
 /// It includes the queue's own bytes, but not the gap before it wraps to its start, which is shorter than a
 /// frame.

@@ -142,6 +142,14 @@ mod tests {
         frames.put(at_micros, &Frame::parse(&bytes).expect("a frame"))
     }
 
+    fn block_on<T>(future: impl Future<Output = T>) -> T {
+        let mut context = core::task::Context::from_waker(core::task::Waker::noop());
+        match core::pin::pin!(future).poll(&mut context) {
+            core::task::Poll::Ready(value) => value,
+            core::task::Poll::Pending => panic!("it waits"),
+        }
+    }
+
     #[test]
     fn a_frame_comes_out_with_the_message_that_it_was_found_to_be() {
         let mut queues = Box::new(Queues::new());
@@ -247,9 +255,9 @@ mod tests {
                 for _ in 0..waiting / (frame.len() + 2) {
                     gs_in.put(&frame);
                 }
+                true
             });
-            let mut context = core::task::Context::from_waker(core::task::Waker::noop());
-            assert!(core::pin::pin!(sent).poll(&mut context).is_ready());
+            assert_eq!(block_on(sent), Some(true));
             assert_eq!(gs_in.lost(), 0, "from byte {shift} on");
         }
     }
@@ -259,21 +267,24 @@ mod tests {
         let mut queues = Box::new(Queues::new());
         let Ends { mut gs_in, mut usb_out, .. } = queues.split();
         let mut out = [0; FRAME_BYTES_MAX];
-        assert!(gs_in.is_open(Port::Gs) && !gs_in.is_open(Port::Usb) && !gs_in.has_room(Port::Usb));
+        assert!(gs_in.is_open(Port::Gs) && !gs_in.is_open(Port::Usb) && !gs_in.has_room(Port::Usb, 0));
         for _ in 0..200 {
             usb_out.open();
             let mut frames = 0;
-            while gs_in.has_room(Port::Usb) {
+            while gs_in.has_room(Port::Usb, FRAME_BYTES_MAX - 13) {
                 gs_in.send(Port::Usb, &[7; FRAME_BYTES_MAX - 13]);
                 frames += 1;
             }
             assert_eq!((frames, gs_in.lost()), (3, 0), "from any place in the queue");
             while usb_out.take(&mut out).is_some() {}
         }
-        gs_in.send(Port::Usb, &[7; 60]);
-        gs_in.send(Port::Usb, &[7; 60]);
+        for _ in 0..4 {
+            gs_in.send(Port::Usb, &[7; 60]);
+        }
+        let mut lend = |is_sent| block_on(usb_out.lend(async |_| is_sent));
+        assert_eq!((lend(true), lend(false)), (Some(true), Some(false)));
         usb_out.close();
-        assert!(gs_in.lost() == 2 && !gs_in.has_room(Port::Usb) && usb_out.take(&mut out).is_none());
+        assert!(gs_in.lost() == 3 && !gs_in.has_room(Port::Usb, 0) && usb_out.take(&mut out).is_none());
     }
 
     #[test]

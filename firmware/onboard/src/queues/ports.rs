@@ -9,7 +9,7 @@ use hums_link::encode::FRAME_BYTES_MAX;
 use hums_link::request::Port;
 
 use super::capacities::{AUTOPILOT_QUEUE_BYTES, GS_QUEUE_BYTES, USB_QUEUE_BYTES};
-use super::level::Level;
+use super::level::{HEAD_BYTES, Level};
 use crate::shelf::Reader;
 
 /// All ports, and the logs on the card.
@@ -63,9 +63,12 @@ impl GsIn<'_> {
         port != Port::Usb || self.usb.level.is_open()
     }
 
-    /// Whether the longest frame has room. The outlets of the other ports know their queues by a model of the line.
-    pub fn has_room(&self, port: Port) -> bool {
-        port != Port::Usb || (self.usb.level.is_open() && self.usb.level.bytes() <= 2 * FRAME_BYTES_MAX)
+    /// Whether a frame of `bytes` has room. The outlets of the other ports know their queues by a model of the line.
+    pub fn has_room(&self, port: Port, bytes: usize) -> bool {
+        // The end of the queue may be too short for a frame.
+        const USABLE: usize = USB_QUEUE_BYTES - (HEAD_BYTES + FRAME_BYTES_MAX);
+        let level = self.usb.level;
+        port != Port::Usb || (level.is_open() && level.bytes() + HEAD_BYTES + bytes <= USABLE)
     }
 
     /// Queues a frame of the summary stream.
@@ -99,7 +102,7 @@ impl GsIn<'_> {
 
     /// Lost frames to ground stations, at both ports.
     pub fn lost(&self) -> u64 {
-        self.gs.lost + self.usb.lost + u64::from(self.usb.level.dropped())
+        self.gs.lost() + self.usb.lost()
     }
 
     /// Most waiting bytes.
@@ -141,9 +144,9 @@ impl<'a, const BYTES: usize> PortIn<'a, BYTES> {
         self.frames
     }
 
-    /// Lost frames.
-    pub const fn lost(&self) -> u64 {
-        self.lost
+    /// Frames that were not queued, or not sent.
+    pub fn lost(&self) -> u64 {
+        self.lost + u64::from(self.level.dropped())
     }
 }
 
@@ -185,12 +188,16 @@ impl<const BYTES: usize> PortOut<'_, BYTES> {
         }
     }
 
-    /// Lends the oldest frame in place; then removes it; `false` if there is none.
-    pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8])) -> bool {
-        let Ok(grant) = self.0.read() else { return false };
-        send(&grant).await;
+    /// Lends the oldest frame in place, then removes it, and counts it as lost if `send` says `false`. Returns what that
+    /// says, `None` if there is no frame.
+    pub async fn lend(&mut self, send: impl AsyncFnOnce(&[u8]) -> bool) -> Option<bool> {
+        let grant = self.0.read().ok()?;
+        let is_sent = send(&grant).await;
+        if !is_sent {
+            self.1.drop_one();
+        }
         self.1.fall(grant.len());
         grant.release();
-        true
+        Some(is_sent)
     }
 }
