@@ -326,6 +326,27 @@ fn a_page_that_has_lost_hums_says_at_once_that_the_vehicles_state_is_not_known()
 }
 
 #[test]
+fn a_hidden_page_gives_its_connection_up_unless_its_sound_is_on() {
+    let live = Live::start(&[own("px4_hil_quad_low.tlog").to_str().unwrap()]);
+    let mut page = LivePage::start();
+    page.open(&live.address, "light", 1440, 900);
+    page.wait("return document.documentElement.dataset.ready === 'true'", 60);
+    page.run(
+        "let away = false;
+         Object.defineProperty(document, 'hidden', { get: () => away });
+         window.EventSource = class extends EventSource { constructor(url) { super(url); window.events = this; } };
+         window.turn = (hidden) => { away = hidden; document.dispatchEvent(new Event('visibilitychange')); };
+         turn(false);",
+    );
+    page.wait("return events.readyState === EventSource.OPEN", 10);
+    assert_eq!(page.run("turn(true); return events.readyState"), 2, "closed");
+    page.run("turn(false)");
+    page.wait("return events.readyState === EventSource.OPEN", 10);
+    page.press(&["m"]);
+    assert_eq!(page.run("turn(true); return events.readyState"), 1, "open");
+}
+
+#[test]
 fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
     const HOSTILE: [&str; 4] = [
         "<img src=x onerror=\"document.title='owned'\">",

@@ -154,3 +154,24 @@ impl LogJson {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use hums_blackbox::record::{Loss, Lost, Stats};
+
+    use super::*;
+
+    #[test]
+    fn each_table_keeps_its_newest_records() {
+        let (mut log, mut kept, rules) = (LogJson::default(), BTreeMap::new(), share::TextRules::new());
+        let at = Instant::from_millis;
+        log.take(at(0), &Record::Stats(Stats::default()), &rules, &mut kept);
+        for ms in 1..=502 {
+            let loss = Loss { what: Lost::QueueFull, count: 1, from: at(ms), to: at(ms) };
+            log.take(at(ms), &Record::Loss(loss), &rules, &mut kept);
+        }
+        let losses = &kept["HUMS_LOSS"];
+        assert_eq!((losses.len(), losses[0].time_s, losses[499].time_s), (500, 0.003, 0.502));
+        assert_eq!((kept["HUMS_STATS"].len(), log.records_left_out), (1, 2));
+    }
+}

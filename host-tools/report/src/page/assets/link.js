@@ -5,7 +5,8 @@ const AGAIN_MS = 1000;
 // A command that hums does not answer holds up those behind it no longer.
 const COMMAND_MS = 5000;
 
-export const connect = (take, changed) => {
+// A browser has six connections to a host for all its tabs: a page that is neither seen nor `isHeard` gives up its own.
+export const connect = (take, changed, isHeard) => {
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
   let events = null,
     again = 0,
@@ -17,6 +18,7 @@ export const connect = (take, changed) => {
   const open = () => {
     clearTimeout(again);
     events?.close();
+    if (document.hidden && !isHeard()) return;
     events = new EventSource(address("events", vehicle == null ? {} : { vehicle }));
     events.onopen = () => {
       failures = 0;
@@ -32,6 +34,7 @@ export const connect = (take, changed) => {
     };
   };
   open();
+  document.addEventListener("visibilitychange", () => isHeard() || open());
   return {
     // One after the other, so that they arrive in this order. Of those that wait, the newest of a kind counts.
     send: async (command) => {

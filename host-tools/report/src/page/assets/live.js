@@ -78,13 +78,14 @@ picture.node.id = "source";
 const rows = [general(), movement(), esc(), condition()],
   sides = [board(), usage(), link()],
   body = el("div", { class: "rows" });
-const wire = connect(take, (now, count, token) => {
+const linked = (now, count, token) => {
   connected = now;
   failures = count;
   tokenGiven = token;
   lostAt = now ? null : (lostAt ?? performance.now());
   stir();
-});
+};
+const wire = connect(take, linked, () => speaker.on);
 const time = player((command) => wire.send(command), stir);
 const go = (at) => {
   if (!time.recording) lookAt(at);
