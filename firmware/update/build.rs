@@ -13,19 +13,20 @@ fn main() {
         .filter(|path| path.extension().is_some_and(|ending| ending == "pub"))
         .collect();
     files.sort_unstable();
-    let (mut all, mut test) = (String::new(), None);
+    let (mut all, mut test) = (Vec::new(), None);
     for path in files {
-        let key = bytes(&fs::read_to_string(&path).expect("it can be read"))
-            .unwrap_or_else(|| panic!("{}: wants 64 hexadecimal digits", path.display()));
+        let text = fs::read_to_string(&path).expect("it can be read");
+        let key = bytes(&text).ok_or(path.display()).expect("wants 64 hexadecimal digits");
         let is_test = path.file_stem().is_some_and(|name| name == "test");
         if is_test {
             test = Some(format!("{key:?}"));
         }
         if !(is_test && is_release) {
-            all += &format!("    {key:?},\n");
+            all.push(format!("    {key:?},\n"));
         }
     }
     let test = test.expect("keys/test.pub");
+    let all = all.concat();
     let code = format!(
         "/// Of each key.\npub const ALL: &[[u8; 32]] = &[\n{all}];\nconst TEST_KEY: [u8; 32] = {test};\n"
     );

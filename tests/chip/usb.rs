@@ -462,7 +462,7 @@ fn a_fault_of_the_card_reader_is_recorded_as_one_of_it() {
     /// `udf #0`
     const UNDEFINED: [u8; 2] = [0x00, 0xDE];
     let (mut rig, resets) = reading();
-    let (host, thread) = host(|bus| bus.enumerate());
+    let (host, thread) = host(Bus::enumerate);
     rig.machine.plug(host);
     let address = rig.replace("OTG_FS", &UNDEFINED, false).unwrap();
     drop(thread);

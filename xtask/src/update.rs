@@ -54,7 +54,7 @@ pub(crate) fn release_key(path: &Path) -> Result<SecretKey> {
         bail!("{}: this is the test key, which everybody has. A release wants another one", path.display());
     }
     if !keys::ALL.contains(&public) {
-        let digits: String = public.iter().map(|byte| format!("{byte:02x}")).collect();
+        let digits = public.map(|byte| format!("{byte:02x}")).concat();
         bail!("{}: no box takes this key. Put {digits} into firmware/update/keys/NAME.pub", path.display());
     }
     Ok(key)

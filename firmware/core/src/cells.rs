@@ -338,7 +338,7 @@ mod tests {
                         ("MOT_BAT_VOLT_MAX", full),
                         ("MOT_BAT_VOLT_MIN", empty),
                     ] {
-                        script += &format!(", {name} {}", n * value);
+                        script = format!("{script}, {name} {}", n * value);
                         assert!([0, count as u8].contains(&counts(&script)[0]), "{script}");
                     }
                     assert_eq!(counts(&script)[0], count as u8, "{script}");

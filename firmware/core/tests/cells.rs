@@ -86,14 +86,15 @@ fn what_the_autopilot_the_setting_or_an_earlier_flight_tells_makes_it_known() {
     let mut stored = [0; Lifetime::BYTES];
     Lifetime { cells: [6, 0, 0, 0], ..Lifetime::default() }.encode(&mut stored);
     flown.restore(ItemKey::Lifetime, &stored).unwrap();
-    for (monitor, parameters) in [
-        (monitor(&[]), "BAT1_N_CELLS=6"),
-        (monitor(&[]), "MOT_BAT_VOLT_MAX=25.2"),
-        (monitor(&[]), "BATT_LOW_VOLT=21.6 BATT_CRT_VOLT=20.4"),
-        (monitor(&[]), "MOT_BAT_VOLT_MIN=19.8 BATT_LOW_VOLT=21.6"),
-        (monitor(&[("BAT_CELLS", 6.0)]), ""),
-        (flown, ""),
-    ] {
+    let cases = [
+        (Box::new(monitor(&[])), "BAT1_N_CELLS=6"),
+        (Box::new(monitor(&[])), "MOT_BAT_VOLT_MAX=25.2"),
+        (Box::new(monitor(&[])), "BATT_LOW_VOLT=21.6 BATT_CRT_VOLT=20.4"),
+        (Box::new(monitor(&[])), "MOT_BAT_VOLT_MIN=19.8 BATT_LOW_VOLT=21.6"),
+        (Box::new(monitor(&[("BAT_CELLS", 6.0)])), ""),
+        (Box::new(flown), ""),
+    ];
+    for (monitor, parameters) in cases {
         let run = fly(&monitor, &format!("{empties} {parameters}"));
         assert_eq!(levels(&run), [Critical], "{parameters}");
         assert!(told_ms(&run).is_empty() && !run.requests.is_empty(), "{parameters}");

@@ -1,4 +1,5 @@
 //! Standing vehicles that report flight: on the bench, spooling up, landed by hand; and vehicles that fly though little says so.
+#![expect(clippy::panic, reason = "that is how a test fails")]
 
 use crate::common::{Quad, Run, Script};
 use hums_core::observation::{Air, Hud, Imu, Observation};

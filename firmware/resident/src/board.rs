@@ -68,9 +68,15 @@ pub(crate) fn hold() {
         w.set_gpiocen(true);
         w.set_gpioden(true);
     });
-    HIGH.iter().for_each(|pin| pin.output(true, vals::Ospeedr::LOW_SPEED));
-    LOW.iter().for_each(|pin| pin.output(false, vals::Ospeedr::LOW_SPEED));
-    PULLED.iter().for_each(|pin| pin.pull_up());
+    for pin in HIGH {
+        pin.output(true, vals::Ospeedr::LOW_SPEED);
+    }
+    for pin in LOW {
+        pin.output(false, vals::Ospeedr::LOW_SPEED);
+    }
+    for pin in PULLED {
+        pin.pull_up();
+    }
 }
 
 /// While it works, the LED flickers.

@@ -165,7 +165,7 @@ impl Disk {
     fn block(&self, at: u32) -> Block {
         let mut block = [0; BLOCK_BYTES];
         let put = |block: &mut Block, at: usize, value: u32| {
-            block[at..at + 4].copy_from_slice(&value.to_le_bytes())
+            block[at..at + 4].copy_from_slice(&value.to_le_bytes());
         };
         let data = START + RESERVED + FAT_BLOCKS;
         if at == 0 {

@@ -39,7 +39,7 @@ impl<'a, D: CardDevice> File<'a, D> {
         let layout = Layout::read(device).map_err(|_| Refusal::NoFile)?;
         let mut directory = Self { device, layout, cluster: layout.root, block: 0, bytes: 0 };
         for _ in 0..DIRECTORY_BLOCKS_MAX {
-            let block = directory.next()?;
+            let block = directory.next_block()?;
             for entry in block.as_chunks::<ENTRY_BYTES>().0 {
                 if entry[0] == 0 {
                     return Err(Refusal::NoFile);
@@ -56,7 +56,7 @@ impl<'a, D: CardDevice> File<'a, D> {
     }
 
     /// The next block; behind the end of the chain an error.
-    pub fn next(&mut self) -> Result<Block, Refusal> {
+    pub fn next_block(&mut self) -> Result<Block, Refusal> {
         let Layout { cluster_blocks, data_start, clusters, fat_start, .. } = self.layout;
         if self.block == cluster_blocks {
             let links = self.read(fat_start + self.cluster / LINKS)?;

@@ -195,7 +195,7 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
     /// Installs a file.
     fn install(&mut self, name: &Name, wanted: &dyn Fn(u32) -> bool) -> Result<(), Refusal> {
         let mut file = File::open(self.card, name)?;
-        let header = Header::read(&file.next()?).ok_or(Refusal::Damaged)?;
+        let header = Header::read(&file.next_block()?).ok_or(Refusal::Damaged)?;
         if !wanted(header.id()) {
             return Err(Refusal::FailedBefore);
         }
@@ -219,7 +219,7 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
         let mut check = header.verify(key)?;
         let mut left = header.image_bytes as usize;
         while left > 0 {
-            let block = file.next()?;
+            let block = file.next_block()?;
             let part = left.min(BLOCK_BYTES);
             check.absorb(&block[..part]);
             left -= part;
@@ -255,10 +255,10 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
             self.flash.erase(Region::Application, sector).map_err(flash)?;
         }
         let mut file = File::open(self.card, name)?;
-        file.next()?;
+        file.next_block()?;
         let mut at = header::BYTES;
         while at < end {
-            let block = file.next()?;
+            let block = file.next_block()?;
             for word in block[..BLOCK_BYTES.min(end - at)].as_chunks::<4>().0 {
                 self.flash.program(Region::Application, at, u32::from_le_bytes(*word)).map_err(flash)?;
                 at += 4;

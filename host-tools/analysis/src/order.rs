@@ -62,7 +62,9 @@ pub fn sort<T>(mut logs: Vec<(LogTime, T)>) -> Vec<(LogTime, T)> {
             left.entry(board).or_default().push(count);
         }
     }
-    left.values_mut().for_each(|counts| counts.sort_unstable_by(|one, other| other.cmp(one)));
+    for counts in left.values_mut() {
+        counts.sort_unstable_by(|one, other| other.cmp(one));
+    }
     let mut chains: BTreeMap<_, Vec<(LogTime, T)>> = BTreeMap::new();
     for (time, log) in logs {
         let board = time.board.filter(|_| time.card.is_none());

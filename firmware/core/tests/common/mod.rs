@@ -1,5 +1,11 @@
 //! A simulated quad, driven by scripts.
-#![allow(dead_code, missing_docs, unreachable_pub, reason = "each test file uses its own part of this")]
+#![allow(
+    dead_code,
+    unused_imports,
+    missing_docs,
+    unreachable_pub,
+    reason = "each test file uses its own part of this"
+)]
 
 mod script;
 

@@ -6,6 +6,7 @@
 //! `@32.3` at that moment, `*` always, also before the script begins; `4-10%2:0-0.1` is the first 0.1 s of every 2 s.
 //! A word is a flag or has a value: a number, one that changes steadily during its piece (`20..80`), a list (`2,0.25,5x3`) or a name.
 //! A later word counts.
+#![allow(clippy::panic, reason = "that is how a test fails")]
 
 use core::ops::Range;
 

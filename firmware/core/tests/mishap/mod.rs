@@ -1,5 +1,5 @@
 //! Mishaps, scripted for each class of vehicle: signs, false signs, and the end of the flight.
-#![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
+#![expect(clippy::panic, reason = "that is how a test fails")]
 
 mod falls;
 mod impacts;
@@ -231,7 +231,7 @@ fn judge_from(at_ms: u64, cases: &[Case]) {
     }
 }
 
-/// In modes in which the autopilot flies: ArduCopter's AUTO, ArduPlane's and PX4's missions.
+/// In modes in which the autopilot flies: AUTO of ArduPilot, missions of PX4.
 const ROTORS: &[&str] = &[
     "ap quad mode=3 hover landed=air",
     "px4 quad mode=mission hover landed=air",

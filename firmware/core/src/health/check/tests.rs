@@ -50,6 +50,11 @@ fn changes(check: &Check, script: &str, start_ms: u64) -> String {
     format!("{} | {}", told.join(", "), state.level().map_or("none", Level::name))
 }
 
+/// Scripts, and the changes of level that each has.
+type Cases = &'static [(&'static str, &'static str)];
+
+const BATTERY: Cases = &[("0 15, 5000", " | ok"), ("0 14.9, 1000 16, 4000", "500 warning, 3000 ok | ok")];
+
 #[test]
 fn a_level_is_what_its_values_of_some_time_say() {
     let above = Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0);
@@ -58,7 +63,6 @@ fn a_level_is_what_its_values_of_some_time_say() {
     let cell = Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05);
     let minute = Debounce::millis(60_000);
     let [usual, none, long] = [CHECK.debounce, [Debounce::millis(0); 2], [minute; 2]];
-    type Cases = &'static [(&'static str, &'static str)];
     let groups: [(Limits, [Debounce; 2], u8, Cases); 8] = [
         (
             above,
@@ -86,12 +90,7 @@ fn a_level_is_what_its_values_of_some_time_say() {
             1,
             &[("0 3.8, 1000 3.55, 3000 3.4, 4000 3.9, 10000", "1500 warning, 3200 critical, 6000 ok | ok")],
         ),
-        (
-            battery,
-            usual,
-            1,
-            &[("0 15, 5000", " | ok"), ("0 14.9, 1000 16, 4000", "500 warning, 3000 ok | ok")],
-        ),
+        (battery, usual, 1, BATTERY),
         (alone, long, 1, &[("0 10, 1000 70, 62000", "61000 critical | critical")]),
         (alone, usual, 1, &[("0 70, 50", " | none")]),
         (

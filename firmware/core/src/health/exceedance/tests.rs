@@ -116,7 +116,7 @@ fn only_a_warning_or_worse_that_is_there_now_lasts() {
     assert!(!Exceedances::default().lasting());
     let mut script = "1 ok 0".to_owned();
     for level in ["warning", "critical", "stale", "warning", "ok", "advisory"] {
-        script += &format!(", 1 {level} 50");
+        script = format!("{script}, 1 {level} 50");
         assert_eq!(played(&script).lasting(), matches!(level, "warning" | "critical"), "{script}");
     }
 }

@@ -47,7 +47,7 @@ fn run_slowly(cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -
 fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, Comes)]) -> ([bool; 2], f32) {
     let is = |params: &Params, param, value: f32| params.get(param).to_bits() == value.to_bits();
     let monitor = Monitor::new(Params::defaults());
-    after(monitor, text, cause, ticks_an_answer, comes, |monitor| {
+    after(&monitor, text, cause, ticks_an_answer, comes, |monitor| {
         let params = monitor.params();
         let set = [is(params, Param::BatRemWarn, 31.0), is(params, Param::ProtAction, 1.0)];
         (set, params.get(Param::ApBaud))
@@ -55,7 +55,7 @@ fn run_with(text: &str, cause: ResetCause, ticks_an_answer: u64, comes: &[(u64, 
 }
 
 fn after<T>(
-    monitor: Monitor,
+    monitor: &Monitor,
     text: &str,
     cause: ResetCause,
     ticks_an_answer: u64,
@@ -63,7 +63,7 @@ fn after<T>(
     known: impl FnOnce(&Monitor) -> T,
 ) -> T {
     let (card, port) = (CardStatus::new(), PortStatus::new());
-    let (mut monitor, mut writer) = (Box::new(monitor), Box::new(Writer::new()));
+    let (mut monitor, mut writer) = (Box::new(*monitor), Box::new(Writer::new()));
     let mut queues = Box::new(Queues::new());
     let mut ends = queues.split();
     let mut body = Monitoring::new(&mut monitor, &mut writer, Boot::default(), cause, &card, &port);
@@ -172,7 +172,7 @@ fn a_line_replaces_the_part_that_it_names_once() {
     let twice = [&once[..], &[(4, NoCard), (6, OtherCard), (7, DISARMED), (8, DISARMED)]].concat();
     for comes in [&once[..], &twice[..]] {
         let monitor = Monitor::new(Params::defaults());
-        let part = after(monitor, text, ResetCause::PowerOn, 1, comes, |monitor| monitor.components()[1]);
+        let part = after(&monitor, text, ResetCause::PowerOn, 1, comes, |monitor| monitor.components()[1]);
         assert_eq!((part.serial.as_str(), part.replaced), ("A-4711", 1));
     }
 }
@@ -188,7 +188,7 @@ fn a_part_that_is_due_is_reported_only_if_the_card_does_not_replace_it() {
     let flown = ComponentFigures { flights: 5.0, ..ComponentFigures::default() };
     monitor.learn_component(0, part.having_run(flown));
     let is_due = |text, comes: &[(u64, Comes)]| {
-        after(monitor, text, ResetCause::PowerOn, 1, comes, |monitor| {
+        after(&monitor, text, ResetCause::PowerOn, 1, comes, |monitor| {
             let mut exceeded = monitor.exceedances().changed(Instant::ZERO.into(), Instant::ZERO.into());
             exceeded.any(|exceedance| exceedance.check.name == "airframe_due")
         })
