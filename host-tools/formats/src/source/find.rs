@@ -138,7 +138,9 @@ impl FoundRecordings {
     pub fn session(&self, name: &str) -> Result<usize> {
         let number = |name: &str| name.parse::<u32>().ok();
         let is_it = |place: &Place| {
-            place.name == name || place.title == name || number(name).is_some_and(|wanted| number(&place.name) == Some(wanted))
+            place.name == name
+                || place.title == name
+                || number(name).is_some_and(|wanted| number(&place.name) == Some(wanted))
         };
         self.places.iter().position(is_it).ok_or_else(|| {
             let names: Vec<&str> = self.places.iter().map(|place| place.name.as_str()).collect();
