@@ -413,7 +413,7 @@ fn the_command_line_lists_reads_and_sets_parameters_over_a_bad_link() {
     let link = Lossy::to(board.port);
     let address = format!("udpout:127.0.0.1:{}", link.port);
     let listed = hums(["box", "params", "list", "--link", &address]).expect_code(&[0]);
-    assert!(listed.stderr.contains("system 1: its board is heard"), "{}", listed.stderr);
+    assert!(listed.stderr.contains("system 1: its HUMS box is heard"), "{}", listed.stderr);
     let list = listed.text();
     assert!(list.contains("GS_BUDGET 2000\n") && list.contains("BAT_REM_WARN 15\n"), "{list}");
     let set = hums(["box", "params", "set", "BAT_REM_WARN", "21.5", "--system", "1", "--link", &address])

@@ -3,7 +3,7 @@
 //! A clock may be wrong, so UTC decides last:
 //! * logs of one card: by their numbers;
 //! * logs of one box: by its count of power-ons, and within a power-on by the time since then, unless the count is no order
-//!   ([`uncounted`]);
+//!   (`uncounted`);
 //! * other logs of one box, logs of different boxes, and recordings of other programs: by UTC. A log without UTC stays after
 //!   the log before it.
 

@@ -1,6 +1,6 @@
 //! `hums box report`: what a maintainer needs about a box, without where and who.
 //!
-//! The records of [`KEPT`], from a card, a log or the newest log of a box on a link. Other records have places, vehicles or
+//! The records of `KEPT`, from a card, a log or the newest log of a box on a link. Other records have places, vehicles or
 //! persons. Texts pass the rules of `hums share`.
 
 use std::collections::{BTreeMap, VecDeque};
