@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use clap::{Arg, ArgAction, CommandFactory as _};
+use clap::{Arg, ArgAction, ArgGroup, CommandFactory as _};
 use hums::cli::Cli;
 
 use crate::support::{Stamp, attempt, contents, furnished, recorded, run, stamps, text};
@@ -96,11 +96,15 @@ pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, Stri
         }
         words.push(value);
     };
+    let has_one =
+        |group: &ArgGroup| group.get_args().any(|id| given.iter().any(|(arg, _)| arg.get_id() == id));
+    let groups = command.get_groups().filter(|group| group.is_required_set() && !has_one(group));
+    let firsts: Vec<_> = groups.filter_map(|group| group.get_args().next()).collect();
     for arg in command.get_arguments() {
         let id = arg.get_id();
         if let Some((_, value)) = given.iter().find(|(given, _)| given.get_id() == id) {
             push(arg, value.clone());
-        } else if arg.is_required_set() {
+        } else if arg.is_required_set() || firsts.contains(&id) {
             push(arg, value(path[0], id.as_str()).to_owned());
         }
     }
