@@ -150,7 +150,7 @@ fn every_command_with_the_flag_makes_the_same_again_with_it() {
         assert!(contents(&out) == made, "{line}");
         tried.push(path[0]);
     }
-    assert_eq!(tried, ["report", "decode", "share", "logbook"]);
+    assert_eq!(tried, ["report", "decode", "share", "logbook", "box"]);
 }
 
 #[test]
