@@ -527,7 +527,7 @@ state! {
     pub struct SpeedSensor {
         /// Sensor, from 0.
         pub index: u8,
-        /// What it measures.
+        /// Measured speed of rotation.
         pub rpm: Rpm,
     }
 }

@@ -95,7 +95,7 @@ const GIVEN: &str = "* px4 yaw=0.3 servo rpm=5000x4; 0-4 h=0 out=1000x4; 4 h=200
 const AIRBORNE: &str = "* hexa start=20 landed=air fill=0 ";
 
 type Told = &'static [(&'static str, u8)];
-/// What it is, how it begins and goes on, and what is told of its motors.
+/// A name, the script of the beginning, that of the rest, and the findings of the motors.
 const FLIGHTS: &[(&str, &str, &str, Told)] = &[
     ("a Y6's upper and lower motors", HEXA, "rpm=5100,3550,5050,3500,3520,5080 yaw=0.4", &[]),
     ("a yawing quad", QUAD, "rpm=4200,4150,5900,5950 yaw=0.5", &[]),

@@ -52,7 +52,7 @@ struct ReportJson {
 struct LogJson {
     /// Number on the card.
     name: String,
-    /// What the log lacks; empty for a whole one.
+    /// The missing part of the log; empty for a whole one.
     lacks: &'static str,
     /// In order of time.
     records: Vec<RecordJson>,

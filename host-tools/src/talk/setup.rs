@@ -46,7 +46,7 @@ const ARDUPILOT: u8 = 3;
 const PX4: u8 = 12;
 /// `MAV_MODE_FLAG_SAFETY_ARMED`
 const ARMED: u8 = 0x80;
-/// `MAV_PARAM_TYPE`: integers up to 32 bits, of which PX4 sends the bits in the place of a float.
+/// `MAV_PARAM_TYPE`: integers up to 32 bits. PX4 sends their bits in the place of a float.
 const INTEGERS: std::ops::RangeInclusive<u8> = 1..=6;
 /// `MAV_CMD_RUN_PREARM_CHECKS`
 const PREARM: u16 = 401;

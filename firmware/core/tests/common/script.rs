@@ -1,4 +1,4 @@
-//! Flights in words: what a vehicle does, and when.
+//! Flights in words: the actions of a vehicle, and their times.
 //!
 //! `"* px4 plane mode=mission; 0-2 landed=ground; 4-10 h=20..80 c=10; 30 off; @32.3 ack=20,0"`
 //!

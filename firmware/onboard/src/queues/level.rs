@@ -11,7 +11,7 @@ pub(super) const HEAD_BYTES: usize = 2;
 pub(super) struct Level {
     bytes: AtomicU32,
     bytes_max: AtomicU32,
-    /// Somebody takes the bytes. Only of a port that may have nobody.
+    /// A reader takes the bytes. The USB port may have none.
     is_open: AtomicBool,
     /// Frames that the reader dropped.
     dropped: AtomicU32,
