@@ -5,8 +5,8 @@ use hums_link::encode::FRAME_BYTES_MAX;
 use hums_link::{outlet, summary};
 use hums_recorder::recorder::ROW_BLOCKS;
 
-/// 16 ms of a line at 921,600 baud, stamps included: the monitor's longest step, a tick that records everything there
-/// is, takes 4 (`ARCHITECTURE.md` has the figures).
+/// 16 ms of a line at 921,600 baud, stamps included. The monitor's longest step, a tick that records everything there
+/// is, takes 4 ms.
 pub const FRAME_QUEUE_BYTES: usize = 2 * 1024;
 
 /// The waiting frames of the port's outlet, with findings; the frame being sent; and an end of the queue too short
