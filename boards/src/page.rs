@@ -7,25 +7,26 @@ use crate::{Board, Port, all};
 const HEAD: &str = "\
 # Boards
 
-For the builder of a box. Afterwards you know which pads of your board to connect. [wiring.md](wiring.md) has the autopilot's side and its
-settings. The wiring tables here are made from the files in [`boards/`](../boards) by `cargo xtask boards`.
+For the buyer and the builder of a box. Afterwards you can choose a board, and know its pads, its supply and its boot loader.
+[wiring.md](wiring.md) has the autopilot's side and its settings. `cargo xtask boards` makes this page from the files in [`boards/`](../boards).
 
-**No board of this page was tried on hardware.** `cargo xtask test` runs the image of one board for each SPI on the [model of the chip](chip.md),
-`cargo xtask prove boards` that of every board. Pins, crystals and levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If
-you have tried a board, please report it, with the file of `hums box report`.
+**No board of this page was tried on hardware.** `cargo xtask prove boards` runs the image of each on the [model of the chip](chip.md). Pins,
+crystals and levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If you try a board, please report it with the file of
+`hums box report`.
 
 * A flight controller is used here as a recorder only. Its own sensors, OSD and motor outputs stay unused. Do not connect motors.
-* The USB plug loads the firmware, and shows the card as a [read-only disk](runbook.md#read-the-card-over-usb).
-* 5 V: *documented* means that the maker names a pad as an input for 5 V. On the others the 5 V pad is the output of the board's own
-  regulator; ask the maker before you feed it.
+* The USB plug loads the firmware, is a [serial port](companion.md#the-usb-port), and can show the card as a [disk](runbook.md#read-the-card-over-usb).
+* **Supply:** *documented* means that the maker names a pad as an input for 5 V. On other flight controllers the 5 V pad is an output: feed their
+  battery pads within the range of the row *power*, and leave the 5 V of the telemetry port open.
+* Rows *held* and *pulled up*: the firmware keeps these pins at a level, so that other chips of the board stay silent. Connect nothing there.
 ";
 
 const TAIL: &str = "
 ## Add a board
 For a board with an STM32F405RG and a crystal of 4 to 26 MHz (an even number). No code changes.
 
-1. Copy the file of the most similar board to `boards/NAME.toml`, and change it. DMA streams: RM0090, tables 42 and 43. Without `bus` the processor moves
-   the card's pins itself.
+1. Copy the file of the most similar board to `boards/NAME.toml`, and change it. The chip's manual (RM0090) has the DMA streams in tables 42 and 43.
+   Without `bus` the processor moves the card's pins itself.
 2. Add a line to `boards/facts.csv` for each pin, with its source and the commit of the source.
 3. `cargo test -p hums-boards` compares both, after `cargo xtask boards` has made this page.
 4. `cargo xtask firmware --board NAME` builds it. A pin without the wanted function, or a DMA stream that does not serve a port, does not compile.
