@@ -12,11 +12,11 @@ const HEAD: &str = "\
 For people who write scripts around `hums`. After this page you know the names in the JSON of each command. The tables are made from
 the code's structs by `host-tools/base/tests/json_page.rs`.
 
-* With `--json` a command prints one object on standard output. `schema` and `version` name it. `version` rises when a name goes or changes
-  its meaning. New names may come at any time.
+* With `--json` a command prints one object on standard output, `hums check` one object a line for each log. `schema` and `version` name it:
+  each section below has its schema as the title. `version` rises when a name goes or changes its meaning. New names may come at any time.
 * Names carry units: `_s` seconds, `_us` microseconds, `_utc` ISO 8601. Other times count from the monitor's power-on, in other recordings
   from their own zero. `null` means \"not known\" or \"none\". A name with `[]` is an element of a list.
-* Standard error is for people. [cli.md](cli.md) has the exit codes. `hums completions` and `hums man` have no `--json`.
+* Messages, progress and errors go to standard error, as text. [cli.md](cli.md) has the exit codes. `hums completions` and `hums man` have no `--json`.
 
 Example: the logs of a folder with a critical finding, and the parts of each vehicle that are due:
 ```
@@ -29,13 +29,13 @@ hums due --json logs/ | jq -r '.vehicles[] | .vehicle as $v | .parts[] | select(
 const OBJECTS: &str = "\
 `hums-check` 1; LogJson; analysis/src/check/json.rs; One object a line for each log. \
     A log that cannot be read has `schema`, `version`, `log` and `error` only.
-`hums-info-list` 1; images: Vec<ImageJson>, /// The oldest first. logs: Vec<LogJson>,; src/info/list.rs;
-`hums-info` 1; images: Vec<ImageJson>, logs: Vec<LogJson>,; analysis/src/log_json.rs analysis/src/summary.rs;
-`hums-info-verify` 1; images: Vec<ImageJson>, logs: Vec<LogJson>, /// Of all logs and images. ok: bool,; src/verify.rs;
+`hums-info-list` 1; images: Vec<ImageJson>, /// The oldest first. logs: Vec<LogJson>,; src/info/list.rs; Of `hums info --list`.
+`hums-info` 1; images: Vec<ImageJson>, logs: Vec<LogJson>,; analysis/src/log_json.rs analysis/src/summary.rs; Of `hums info`.
+`hums-info-verify` 1; images: Vec<ImageJson>, logs: Vec<LogJson>, /// Of all logs and images. ok: bool,; src/verify.rs; Of `hums info --verify`.
 `hums-manifest` 1; Manifest; analysis/src/manifest.rs; The file of `--manifest FILE` of `hums info --verify` and `hums decode`.
-`hums-due` 1; DueJson; src/info/due.rs;
-`hums-decode` 1; MadeJson; export/src/made.rs;
-`hums-report` 1; PagesJson; report/src/report/mod.rs;
+`hums-due` 1; DueJson; src/info/due.rs; Of `hums due`.
+`hums-decode` 1; MadeJson; export/src/made.rs; Of `hums decode`.
+`hums-report` 1; PagesJson; report/src/report/mod.rs; Of `hums report`.
 `hums-run` 1; RunReport; src/run/report.rs; Of `hums sim`.
 `hums-pull` 1; PulledJson; src/talk/pull/mod.rs src/talk/pull/judge.rs; Of `hums box pull`.
 `hums-params` 1; /// MAVLink system id of the box's vehicle. system: u8,;; Of `hums box params list`, `get` and `set`. \
