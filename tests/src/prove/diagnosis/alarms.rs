@@ -11,7 +11,7 @@ use super::table::Form;
 
 pub(super) const BY_CHECK: Form = Form {
     title: "False alarms by check",
-    about: "Of all sets with labels. In the air counts until three seconds after a landing.",
+    about: "Of all sets with labels. An alarm counts as in the air until three seconds after a landing.",
     columns: &["check", "warnings", "criticals", "on the ground", "recordings with one"],
 };
 

@@ -7,33 +7,34 @@ use super::real::{self, RATES, Results};
 use super::summary;
 
 pub(super) const HEAD: &str = "\
-# Diagnosis: what the box finds, how fast, and how often it is wrong
+# Diagnosis: found faults, delays and false alarms
 
-`cargo xtask prove diagnosis` judges recorded flights whose faults are known, with the monitor of the board and default limits. It
-prints these tables, and each fault; `--write` writes this page. `cargo xtask test` judges the flights of the repository. It fails if
-fewer faults are found or more false alarms come than before.
+For fleet owners, safety engineers and maintainers. Afterwards you know how many known faults the box reports, how soon, and how often an
+alarm is false. The monitor of the board judged these recordings with default limits, on a PC. No box was in the vehicles.
 
-* `prove diagnosis FOLDER` also judges the flights of a folder: real flights of `labels*.csv`
-  (`tests/src/prove/diagnosis/real.rs` has the columns), those of each `labels.json`, or all recordings. `--unseen FOLDER` is for flights that nobody who chose the limits has seen. `HUMS_FLIGHTS` names a folder of further recordings.
-* [labels.json](../tests/labelled/README.md) says what was done to a flight, and when. No check knows a label or a flight.
-* Figures of known flights show that nothing got worse. Only flights that are not known, and real recordings, measure the box.
-* A fault is told if a check rises to a warning or to critical while the fault lasts. Its cause is named if one of these checks is of
-  the part that failed (`tests/src/prove/diagnosis/causes.rs`). Faults that no message shows are not counted.
-* An alarm is false if nothing was wrong: without a fault, before it, or in weather that the autopilot holds against. Each rise counts.
-* Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air.
-* [real-flights.csv](real-flights.csv) lists the real ArduPilot flights, [real-flights-px4.csv](real-flights-px4.csv) those of PX4.
+* A fault is **reported** if a check rises to warning or critical while the fault lasts. Its **cause is named** if one of these checks is
+  of the failed part (`tests/src/prove/diagnosis/causes.rs`). Faults that no message shows are not counted.
+* An alarm is **false** if nothing was wrong: without a fault, before it, or in weather that the autopilot resists. Each rise counts.
+* **Known** flights were there when the limits were chosen: their figures show only that nothing got worse. All others were judged once, and measure the box.
+* **Real flights** are public logs of [ArduPilot](real-flights.csv) and [PX4](real-flights-px4.csv). The limits were chosen with their tuning half.
+* **Simulator flights** are the repository's [labelled flights](../tests/labelled/README.md) and the sets SITL A to M. No check knows a label.
+* Bounds (\"at least\", \"at most\") are exact, 95 %. Delays are seconds after the fault. Hours are in the air. [health.md](health.md) explains the checks.
+
+`cargo xtask prove diagnosis` prints these tables and each fault; `--write` writes this page. With `FOLDER` it also judges the folder's flights: those of
+`labels*.csv` (`tests/src/prove/diagnosis/real.rs` has the columns), those of each `labels.json`, or all. `--unseen FOLDER` counts them as not known.
+`HUMS_FLIGHTS` names a folder of recordings without labels. `cargo xtask test` fails if fewer faults of the repository's flights are found, or more alarms are false.
 ";
 
 /// No table shows these.
 const LIMITS: &str = "\
 ## Known limits
 
-| limit | why, and how much |
+| fault | not reported, or late, because |
 |---|---|
 | faults of real vehicles | a simulator has no loose screws, worn bearings, water or wrong propellers; its faults begin at once, one at a time |
 | faults without a message | the box reads messages only: PX4 sends STATUSTEXT only to a ground station; logs of ground stations have low rates |
 | wear | judged only against three earlier flights; 30 real flights with cut propellers: [usage.md](usage.md#baselines) |
-| a fall that nobody heard | a radio gap in the air is judged by `hums check`, not on board |
+| a fall in a radio gap | it is judged by `hums check`, not on board |
 | short twists | 28 to 39 rad/s2 for 0.6 s lean a vehicle by 4 to 13 degrees, as gusts do |
 | GPS velocity | noise or an offset of 1.6 to 3 m/s; a receiver 0.5 to 0.9 s late; a position that drifts by 1 m/s |
 | gyros | noise of one of several, 43 to 59 deg/s: messages have it filtered; biases that are alike in all |
@@ -49,10 +50,10 @@ const LIMITS: &str = "\
 
 ## Sets that were held out
 
-Each was flown after the limits were chosen, and judged once by the checks of then. All sets are known since. Most are not in the
-repository. Together, of simulated flights: 624 of 680 faults told (92 %), and no critical false by the data in 44.6 hours since `K`.
+Each set was flown after the limits were chosen, and judged once by the checks of that commit. Now all are known. Most are not in the repository. Of the
+simulated faults 624 of 680 were reported (92 %). \"By the data\": so many are false after a comparison with the data. Since `K` no critical is, in 44.6 hours.
 
-| flights | flown by | faults | told | cause named | median s | hours | false warnings | false criticals |
+| flights | flown by | faults | reported | cause named | median s | hours | false warnings | false criticals |
 |---|---|---|---|---|---|---|---|---|
 | frozen-3, at 24a2872 | ArduPilot, PX4 | - | - | - | - | 41.06 | 24 | 6 |
 | frozen-4, at 30f3dc3 | ArduPilot, PX4 | - | - | - | - | 19.98 | 22 | 5 |

@@ -11,14 +11,14 @@ use super::table::Form;
 
 pub(super) const SETS: Form = Form {
     title: "Sets of flights",
-    about: "Simulator flights have simulated hours.",
+    about: "Flights in simulators; the hours are simulated.",
     columns: &[
         "flights",
         "known",
         "recordings",
         "hours",
         "faults",
-        "told",
+        "reported",
         "at least",
         "cause named",
         "at least",
@@ -35,15 +35,15 @@ pub(super) const SETS: Form = Form {
 
 pub(super) const BY_CLASS: Form = Form {
     title: "Faults by class",
-    about: "Of all sets with labels. The autopilot's own first text of severity warning or worse, for comparison.",
+    about: "Of all sets with labels. For comparison: the autopilot's own first text of severity warning or worse.",
     columns: &[
         "class",
         "parts",
         "faults",
-        "told",
+        "reported",
         "cause named",
         "median s",
-        "autopilot told",
+        "autopilot reported",
         "HUMS first",
         "autopilot first",
     ],
@@ -53,7 +53,7 @@ pub(super) const EACH: Form = Form {
     title: "Each fault",
     about: "Seconds after the fault: the first alarm, the first one that names the cause, and the autopilot's own first text of \
             severity warning or worse.",
-    columns: &["flight", "vehicle", "class", "fault", "told", "cause named", "autopilot's own text"],
+    columns: &["flight", "vehicle", "class", "fault", "reported", "cause named", "autopilot's own text"],
 };
 
 fn shown(judged: &Judged) -> impl Iterator<Item = (&Outcome, &Fault)> {

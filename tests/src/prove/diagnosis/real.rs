@@ -42,9 +42,9 @@ const COLUMNS: [&str; 6] = ["file", "check", "instance", "onset", "label", "caus
 
 pub(super) const RATES: Form = Form {
     title: "Real flights",
-    about: "Findings that a pilot is told: rises of a level without a cause among the other findings. Rates are by the armed hour, \
-            without unlabelled findings. A needless finding is true, and no pilot, mechanic or owner would act on it. Of known faults: how often the first \
-            finding was of the part that failed. Hours of simulators are in the air without a fault; each alarm is false.",
+    about: "Findings that the pilot receives: rises of a level without a cause among the other findings. Rates are per armed hour, \
+            without unlabelled findings. A needless finding is true, but no pilot, mechanic or owner would act on it. Fault first: of so many known \
+            faults the first finding was of the failed part. Hours of simulators are in the air without a fault; each alarm in them is false.",
     columns: &[
         "flights",
         "judged",
@@ -133,7 +133,7 @@ pub(super) struct Set {
     flights: Vec<Flight>,
 }
 
-/// A told finding.
+/// A finding that the pilot receives.
 #[derive(Debug)]
 struct Told {
     check: String,

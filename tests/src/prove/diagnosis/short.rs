@@ -59,7 +59,7 @@ impl Sums {
     fn text(&self) -> String {
         let Self { faults, told, named, warnings, critical, ground, counted, miscounted } = self;
         format!(
-            "* faults, told, cause named: {faults}, {told} (at least {TOLD_MIN}), {named} (at least {NAMED_MIN})\n\
+            "* faults, reported, cause named: {faults}, {told} (at least {TOLD_MIN}), {named} (at least {NAMED_MIN})\n\
              * false warnings and criticals in the air: {warnings} (at most {WARNINGS_MAX}), {critical} (at most {CRITICAL_MAX})\n\
              * false alarms on the ground: {ground} (at most {GROUND_MAX})\n\
              * flights, landings and mishaps counted: in {counted} flights, wrong in {miscounted} (at most {MISCOUNTED_MAX})\n"

@@ -30,7 +30,7 @@ pub(super) fn section(sets: &[Judged]) -> String {
     let _ = write!(text, "* Simulator flights, {whose}, while nothing was wrong: {}", alarms(&quiet));
     if !further.is_empty() {
         let words =
-            "Recordings without labels (simulators of other people among them), where an alarm may be true";
+            "Recordings without labels (some from simulators of other people), where an alarm may be true";
         let _ = write!(text, "* {words}: {}", alarms(&further));
     }
     text
@@ -38,8 +38,8 @@ pub(super) fn section(sets: &[Judged]) -> String {
 
 const fn words(known: Known) -> &'static str {
     match known {
-        Known::No => "seen by nobody who chose the limits",
-        Known::Yes | Known::Seen => "known to whoever chose the limits",
+        Known::No => "not known",
+        Known::Yes | Known::Seen => "known",
     }
 }
 
@@ -53,8 +53,8 @@ fn found(flights: &[&Outcome]) -> String {
     let [told_share, told_least] = share(told, all);
     let [named_share, named_least] = share(named, all);
     format!(
-        "of {all} faults {told} were told ({told_share}, at least {told_least}), half of these within {} s and nine in ten \
-         within {} s; the cause of {named} was named ({named_share}, at least {named_least}).\n",
+        "{told} of {all} faults were reported ({told_share}, at least {told_least}), half of these within {} s and nine in ten \
+         within {} s. The cause of {named} was named ({named_share}, at least {named_least}).\n",
         quantile_s(&delays_s, 0.5),
         quantile_s(&delays_s, 0.9),
     )
@@ -62,15 +62,15 @@ fn found(flights: &[&Outcome]) -> String {
 
 fn alarms(flights: &[&Outcome]) -> String {
     let air_s = flights.iter().fold(0.0, |sum, one| sum + one.air_s);
-    let words = |level| {
+    let words = |level, name: &str| {
         let events = count(flights.iter().flat_map(|one| &one.alarms), level, true);
         let [rate, most] = an_hour(events, air_s);
-        format!("{events} ({rate} an hour, at most {most})")
+        format!("{events} {name} ({rate} an hour, at most {most})")
     };
     format!(
-        "in {} hours in the air, warnings {}, criticals {}.\n",
+        "in {} hours in the air {} and {}.\n",
         hours(air_s),
-        words(Level::Warning),
-        words(Level::Critical)
+        words(Level::Warning, "warnings"),
+        words(Level::Critical, "criticals")
     )
 }
