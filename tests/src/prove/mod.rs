@@ -53,8 +53,8 @@ pub const CAMPAIGNS: &[Campaign] = &[
     },
     Campaign {
         name: "careless-cards",
-        about: "power fails at a simulated card with one of three faults: it loses some of its last blocks, it loses \
-                one acknowledged block, or it spoils the page around the last block. Promise: earlier sessions lose \
+        about: "power fails at a simulated card with one of three faults. The card loses some of its last blocks, \
+                loses one acknowledged block, or spoils the page around the last block. Promise: earlier sessions lose \
                 only spoiled groups, and each loss is reported. Sectors that the next power-on overwrites are counted",
         labels: power_cuts::careless::LABELS,
         run: power_cuts::careless::run,
@@ -84,8 +84,8 @@ pub const CAMPAIGNS: &[Campaign] = &[
         name: "hostile-gs",
         about: "for 24 simulated hours a ground station sends noise, floods, forged and malformed frames at full rate. \
                 Promise: no panic, no lost frame of the vehicle, no second above the budget of a port, and readable \
-                earlier logs. With a key also: no parameter changes, no log is marked as erased, the record has no gap, \
-                and the autopilot receives only the box's own messages",
+                earlier logs. With a key also: no parameter changes, no log is marked as erased, the record has no gap. \
+                The autopilot then receives only the box's own messages",
         labels: hostile_gs::LABELS,
         run: hostile_gs::run,
     },
