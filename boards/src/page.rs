@@ -16,8 +16,8 @@ crystals and levels come from the sources in [`boards/facts.csv`](../boards/fact
 
 * A flight controller is used here as a recorder only. Its own sensors, OSD and motor outputs stay unused. Do not connect motors.
 * The USB plug loads the firmware, is a [serial port](companion.md#the-usb-port), and can show the card as a [disk](runbook.md#read-the-card-over-usb).
-* **Supply:** *documented* means that the maker names a pad as an input for 5 V. On other flight controllers the 5 V pad is an output: feed their
-  battery pads within the range of the row *power*, and leave the 5 V of the telemetry port open.
+* **Supply:** *documented* means that the maker names a pad as an input for 5 V. On other flight controllers the 5 V pad is an output. Feed their
+  battery pads within the range of the row *power*. Leave the 5 V of the telemetry port open.
 * Rows *held* and *pulled up*: the firmware keeps these pins at a level, so that other chips of the board stay silent. Connect nothing there.
 ";
 

@@ -34,9 +34,9 @@ fn number(value: f32) -> String {
 #[test]
 fn the_parameters_are_documented_as_they_are() {
     let mut text = "# Parameters\n\n\
-        Made from the table in `firmware/core/src/params.rs` by `firmware/core/tests/docs.rs`. Set by `hums sim --params FILE`, by a\n\
-        ground station over MAVLink, and kept over power-off. A change is recorded with who made it and applies at once. Ground stations get\n\
-        these words from the box, or from a file: [companion.md](companion.md#settings-in-words).\n\n\
+        For everyone who changes a setting of the box. Afterwards you know its unit, default, range and the source of the default. Example:\n\
+        `hums box params set BAT_REM_WARN 20 --link serial:/dev/ttyUSB0:57600`. [companion.md](companion.md#parameters) has the other ways, [health.md](health.md#change-a-check) how to\n\
+        switch a check off. The box stores the values, and refuses one outside its range. `firmware/core/tests/docs.rs` makes this table from the code.\n\n\
         | name | unit | default | range | what it is | more, and where the default comes from |\n|---|---|---|---|---|---|\n"
         .to_owned();
     for param in Param::ALL {
