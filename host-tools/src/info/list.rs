@@ -84,13 +84,13 @@ struct LogJson {
     findings_count: u64,
     /// First finding of `hums check`; `null` without a warning or critical finding.
     worst: Option<WorstJson>,
-    /// Checks with data, or `null` for most logs that a board checked. Below a tenth of all: too little to judge.
+    /// Checks with data, or `null` for most logs that a box checked. Below a tenth of all: too little to judge.
     checks_judged: Option<usize>,
     /// All checks.
     checks_all: Option<usize>,
     /// The log begins in the air.
     begins_in_air: bool,
-    /// The log ends in the air; false for a log that a board checked.
+    /// The log ends in the air; false for a log that a box checked.
     ends_in_air: bool,
     /// Part of the time was not recorded (recordings of other programs).
     lossy: bool,

@@ -33,7 +33,7 @@ const HEAD: &str = "\
 # Proof
 
 For investigators and safety engineers. Afterwards you know the promises about the record, how often each was tested, and the result. Each
-section is a campaign. All ran on a PC, with simulated cards and links: no board and no real card. Other pages have the
+section is a campaign. All ran on a PC, with simulated cards and links: no box and no real card. Other pages have the
 [limits of the proof](safety.md#what-the-record-proves), the [firmware on the model of its chip](chip.md#results), and the [found faults](diagnosis.md).
 
 `cargo xtask prove` runs all campaigns on the recordings of the repository (an hour) and writes this page. `cargo xtask prove NAME`

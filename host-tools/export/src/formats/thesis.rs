@@ -99,7 +99,7 @@ impl Writer for Thesis {
     const ABOUT: FormatDetails = FormatDetails {
         has_records: false,
         has_observations: true,
-        omits: "messages besides flight, ESC and speed values, the board's records, findings",
+        omits: "messages besides flight, ESC and speed values, the box's records, findings",
         ..FormatDetails::new(
             "thesis",
             "Four tables with a row a second, as the thesis has them on which HUMS is built: flight, ESC status, ESC errors, speeds",

@@ -49,7 +49,7 @@ impl Writer for Tlog {
     const ABOUT: FormatDetails = FormatDetails {
         has_records: false,
         is_of_frames: true,
-        omits: "the board's records, findings (with `--findings` as texts)",
+        omits: "the box's records, findings (with `--findings` as texts)",
         ..FormatDetails::new(
             "tlog",
             "A ground station's log: opens in Mission Planner, QGroundControl, MAVProxy, pymavlink",

@@ -389,7 +389,7 @@ impl Writer for Ulog {
     const ABOUT: FormatDetails = FormatDetails {
         has_observations: true,
         has_words: true,
-        omits: "messages beyond some twenty quantities, the board's records",
+        omits: "messages beyond some twenty quantities, the box's records",
         ..FormatDetails::new(
             "ulog",
             "PX4's log with the main quantities, for Flight Review and PlotJuggler",

@@ -10,7 +10,7 @@ pub(super) const HEAD: &str = "\
 # Diagnosis: found faults, delays and false alarms
 
 For fleet owners, safety engineers and maintainers. Afterwards you know how many known faults the box reports, how soon, and how often an
-alarm is false. The monitor of the board judged these recordings with default limits, on a PC. No box was in the vehicles.
+alarm is false. The box's monitor judged these recordings with default limits, on a PC. No box was in the vehicles.
 
 * A fault is **reported** if a check rises to warning or critical while the fault lasts. Its **cause is named** if one of these checks is
   of the failed part (`tests/src/prove/diagnosis/causes.rs`). Faults that no message shows are not counted.
@@ -34,7 +34,7 @@ const LIMITS: &str = "\
 | faults of real vehicles | a simulator has no loose screws, worn bearings, water or wrong propellers; its faults begin at once, one at a time |
 | faults without a message | the box reads messages only: PX4 sends STATUSTEXT only to a ground station; logs of ground stations have low rates |
 | wear | judged only against three earlier flights; 30 real flights with cut propellers: [usage.md](usage.md#baselines) |
-| a fall in a radio gap | it is judged by `hums check`, not on board |
+| a fall in a radio gap | it is judged by `hums check`, not by the box |
 | short twists | 28 to 39 rad/s2 for 0.6 s lean a vehicle by 4 to 13 degrees, as gusts do |
 | GPS velocity | noise or an offset of 1.6 to 3 m/s; a receiver 0.5 to 0.9 s late; a position that drifts by 1 m/s |
 | gyros | noise of one of several, 43 to 59 deg/s: messages have it filtered; biases that are alike in all |
