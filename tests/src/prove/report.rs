@@ -34,7 +34,7 @@ const HEAD: &str = "\
 
 For investigators and safety engineers. Afterwards you know the promises about the record, how often each was tested, and the result. Each
 section is a campaign. All ran on a PC, with simulated cards and links: no box and no real card. Other pages have the
-[limits of the proof](safety.md#what-the-record-proves), the [firmware on the model of its chip](chip.md#results), and the [found faults](diagnosis.md).
+[limits of the proof](safety.md#evidence), the [firmware on the model of its chip](chip.md#results), and the [found faults](diagnosis.md).
 
 `cargo xtask prove` runs all campaigns on the recordings of the repository (an hour) and writes this page. `cargo xtask prove NAME`
 prints one. `cargo xtask test` runs a short form of each. The same commit and seed give the same figures, apart from the seconds.
