@@ -65,7 +65,7 @@ fn what_parity_contradicts_is_told_by_every_command() {
     let mut erased = whole.clone();
     erased[(closed - 31) * BLOCK..(closed + 1) * BLOCK].fill(0xff);
     fs::write(&path, erased).expect("written");
-    all_say(dir.path(), "copied", 3, &["32 sectors missing at its end: its parity tells of them"]);
+    all_say(dir.path(), "copied", 3, &["32 sectors missing at its end: its parity covers them"]);
     let verified = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("written");
         let said = text(&attempt(dir.path(), "info --verify copied"));

@@ -110,8 +110,8 @@ impl Proof {
             }
             Self::NextStart(None) => "whole to its end, as the next start found it".to_owned(),
             Self::NextStart(Some(moved)) => format!(
-                "whole to its end, as the next start found it; armed or in the air since {} when power went: what was \
-                 not written then is not known",
+                "whole to its end, as the next start found it; armed or in the air since {} when power went: later \
+                 data may be missing",
                 moment(moved)
             ),
             Self::Mark(at, why) => match seconds_after(summary, at).unwrap_or(0.0) {
@@ -135,15 +135,15 @@ impl Proof {
                     None => "not proved to its end: power went or the card was pulled while it recorded".to_owned(),
                 }
             }
-            Self::Differs => "what came after it on the card went on from other entries than these: it is another log, or a \
-                              part of one"
+            Self::Differs => "the next log on the card continues other entries than these: this is another log, or a part of \
+                              one"
                 .to_owned(),
             Self::Short { sectors, frames, by } => {
                 let sectors = Some(sectors).filter(|sectors| *sectors > 0).map(|some| count(some, "sector"));
                 let frames = frames.map(|some| count(some, "frame"));
                 let by = match by {
                     Teller::NextStart => "the next start found them",
-                    Teller::Parity => "its parity tells of them",
+                    Teller::Parity => "its parity covers them",
                 };
                 match (sectors, frames) {
                     (Some(sectors), Some(frames)) => format!("{sectors} missing at its end, {frames}: {by}"),
