@@ -64,7 +64,8 @@ const TELEM_MAX: u8 = 4;
 /// `SERIALn_PROTOCOL` of a port for the box: none, MAVLink 1 or 2.
 const FREE: [f64; 3] = [-1.0, 1.0, 2.0];
 /// What to check if the box is not heard.
-const SILENT: &str = "no message of the box: check its LED, its supply, the wires to the autopilot, and the port's rate";
+const SILENT: &str =
+    "no message of the box: check its LED, its supply, the wires to the autopilot, and the port's rate";
 /// The checks of every vehicle need them; of the last two one autopilot has one.
 const NEEDED: [u32; 10] = [
     SYS_STATUS,
