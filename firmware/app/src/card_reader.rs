@@ -5,15 +5,16 @@
 //! watchdog, an eject or ten minutes without a host end the mode by a reset. Only the start after an eject counts
 //! as one by hand. A plugged cable never starts the mode: a charger in the field must not stop a recording.
 //!
-//! One loop without an executor polls the USB stack and the disk. The card's driver blocks it for 8 s at
-//! most; [`watch`] feeds the watchdog meanwhile.
+//! There is no executor. The disk's server polls the USB stack while it waits, also for a block of the card. The
+//! identification of a card blocks it for 8 s at most; [`watch`] feeds the watchdog meanwhile.
 
-use core::future::poll_fn;
+use core::future::{Future as _, poll_fn};
+use core::pin::pin;
 use core::sync::atomic::{AtomicU32, Ordering};
-use core::task::Poll;
+use core::task::{Context, Poll, Waker};
 
 use embassy_futures::block_on;
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::select3;
 use hums_core::clock::{Instant, Span};
 use hums_onboard::{ArmingWatch, ResetCause};
 use hums_recorder::Block;
@@ -23,6 +24,7 @@ use hums_usb::class::{Control, MassStorage};
 use hums_usb::guard::Link;
 use hums_usb::presence::Presence;
 use hums_usb::scsi::Disk;
+use hums_usb::server::{Chunk, Chunks, Lane, Server};
 
 use crate::boards::board;
 use crate::links::now;
@@ -34,7 +36,7 @@ const HOST_MAX: Span = Span::from_secs(600);
 const PARTING: Span = Span::from_secs(1);
 /// `SysTick` feeds the watchdog for this many turns without the loop: 10 s, of which the card's driver has 8.
 const LOOP_TURNS_MAX: u32 = 100;
-/// How often the autopilot's port is looked at: its ring holds 22 ms. After a longer call of the card's driver its bytes are lost.
+/// How often the autopilot's port is looked at: its ring holds 22 ms. After a longer identification of a card its bytes are lost.
 const LISTEN_EVERY: Span = Span::from_millis(1);
 /// How often the bus is looked at and the LED's pin is set: a pin of the debug port is not the LED's at first.
 const LOOK_EVERY: Span = Span::from_millis(100);
@@ -94,14 +96,24 @@ pub(crate) fn run(
     let mut builder = Builder::new(driver, config, &mut descriptor, &mut bos, &mut [], &mut control_data);
     let mut class = MassStorage::new(&mut builder, &mut control);
     let mut device = builder.build();
-    let serve = async {
-        class.run(&mut disk, buffer).await;
-        let end = now() + PARTING;
-        poll_fn(|_| if now() < end { Poll::Pending } else { Poll::Ready(()) }).await;
+    let (lane, mut chunks) = (Lane::default(), Chunk::of(buffer));
+    let mut chunks = Chunks::new(&mut chunks);
+    let (to_bus, chunks) = chunks.split();
+    let mut bus = pin!(select3(device.run(), class.run(&lane, chunks), supervise(led, autopilot, &link)));
+    let mut context = Context::from_waker(Waker::noop());
+    let mut meanwhile = || {
+        if bus.as_mut().poll(&mut context).is_ready() {
+            // Only an eject proves a cable. A vehicle without one may have been armed since the mode began.
+            restart_with(0);
+        }
+        false
     };
-    let end = block_on(select3(device.run(), serve, supervise(led, autopilot, &link)));
-    // Only an eject proves a cable. A vehicle without one may have been armed since the mode began.
-    restart_with(if matches!(end, Either3::Second(())) { ResetCause::MARK_EJECT } else { 0 })
+    Server::new(to_bus, &lane, &link).run(&mut disk, &mut meanwhile);
+    let end = now() + PARTING;
+    while now() < end {
+        meanwhile();
+    }
+    restart_with(ResetCause::MARK_EJECT)
 }
 
 /// Until the mode ends by itself: the vehicle is armed, or no host is there.

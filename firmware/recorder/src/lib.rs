@@ -59,6 +59,9 @@ pub const BLOCK_BYTES: usize = 512;
 /// A block, in which cards are read and written.
 pub type Block = [u8; BLOCK_BYTES];
 
+/// Work while a card's driver waits. It returns whether the processor may sleep until the next interrupt.
+pub type Meanwhile<'a> = &'a mut dyn FnMut() -> bool;
+
 /// A card: a device of blocks that can start over, as after it was pulled and put back.
 pub trait CardDevice {
     /// Why an access failed.
@@ -66,6 +69,16 @@ pub trait CardDevice {
 
     /// Blocks in a row, from this one on.
     fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), Self::Error>;
+
+    /// The same, with work for the processor while the card has none for it. That work must not use the card.
+    fn read_while(
+        &self,
+        blocks: &mut [Block],
+        start: u32,
+        _meanwhile: Meanwhile<'_>,
+    ) -> Result<(), Self::Error> {
+        self.read(blocks, start)
+    }
 
     /// Blocks in a row, from this one on.
     fn write(&self, blocks: &[Block], start: u32) -> Result<(), Self::Error>;

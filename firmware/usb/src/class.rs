@@ -1,17 +1,19 @@
-//! The mass storage class on a USB driver: bytes between endpoints and [`Transport`].
+//! The mass storage class on a USB driver: packets between endpoints and [`crate::server`].
 
-use embassy_futures::select::{Either, select};
-use embassy_futures::{poll_once, yield_now};
+use core::future::pending;
+use core::iter;
+
+use embassy_futures::join::join;
+use embassy_futures::poll_once;
+use embassy_futures::select::select;
 use embassy_usb::control::{InResponse, OutResponse, Recipient, Request, RequestType};
-use embassy_usb::driver::{Driver, Endpoint as _, EndpointError, EndpointIn as _, EndpointOut as _};
+use embassy_usb::driver::{Driver, Endpoint as _, EndpointIn, EndpointOut};
 use embassy_usb::types::InterfaceNumber;
 use embassy_usb::{Builder, Handler};
-use hums_recorder::{Block, CardDevice};
 
 use crate::PACKET_BYTES;
 use crate::guard::Link;
-use crate::scsi::Disk;
-use crate::transport::{Step, Transport};
+use crate::server::{Lane, Outgoing};
 
 /// Mass storage, SCSI commands, Bulk-Only Transport (BOT, 4.3).
 const CLASS: u8 = 0x08;
@@ -80,20 +82,6 @@ pub struct MassStorage<'d, D: Driver<'d>> {
     link: &'d Link,
 }
 
-/// The packet on the bus was not followed by the next one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum End {
-    /// The host has ejected the disk, and has the status of that command.
-    Ejected,
-    Disabled,
-}
-
-impl From<EndpointError> for End {
-    fn from(_: EndpointError) -> Self {
-        Self::Disabled
-    }
-}
-
 impl<'d, D: Driver<'d>> MassStorage<'d, D> {
     /// Adds the class to a device. The state of `control` and the driver's guard must be the same.
     pub fn new(builder: &mut Builder<'d, D>, control: &'d mut Control<'d>) -> Self {
@@ -109,57 +97,42 @@ impl<'d, D: Driver<'d>> MassStorage<'d, D> {
         Self { from_host, to_host, link }
     }
 
-    /// Serves the disk until the host ejects it. `buffer` is for blocks on their way: at least one.
-    pub async fn run<C: CardDevice>(&mut self, disk: &mut Disk<C>, buffer: &mut [Block]) {
+    /// Moves packets between bus and card, for ever.
+    pub async fn run(&mut self, lane: &Lane, mut chunks: Outgoing<'_, '_>) -> ! {
+        let Self { from_host, to_host, link } = self;
         loop {
-            self.from_host.wait_enabled().await;
-            self.link.abort.reset();
-            let link = self.link;
+            from_host.wait_enabled().await;
+            link.abort.reset();
+            lane.abort(&mut chunks);
             // The host sends none before the status of its request.
             let mut packet = [0; PACKET_BYTES];
-            let _ = poll_once(self.from_host.read(&mut packet));
+            let _ = poll_once(from_host.read(&mut packet));
             // The abort first: the rest of an aborted command must not reach an endpoint that was emptied.
-            if let Either::Second(End::Ejected) = select(link.abort.wait(), self.serve(disk, buffer)).await {
-                return;
-            }
+            let serve = join(take(from_host, lane), send(to_host, &mut chunks));
+            select(link.abort.wait(), serve).await;
         }
     }
+}
 
-    async fn serve<C: CardDevice>(&mut self, disk: &mut Disk<C>, buffer: &mut [Block]) -> End {
-        loop {
-            match self.command(disk, buffer).await {
-                Ok(()) if disk.is_ejected() => return End::Ejected,
-                Ok(()) => {}
-                // The abort ends this wait.
-                Err(End::Disabled) => core::future::pending::<()>().await,
-                Err(end) => return end,
-            }
-        }
+/// Until the endpoint is disabled, after which the abort comes.
+async fn take(from_host: &mut impl EndpointOut, lane: &Lane) {
+    let mut packet = [0; PACKET_BYTES];
+    while let Ok(bytes) = from_host.read(&mut packet).await {
+        lane.packets.send((packet, bytes)).await;
     }
+    pending::<()>().await;
+}
 
-    async fn command<C: CardDevice>(&mut self, disk: &mut Disk<C>, buffer: &mut [Block]) -> Result<(), End> {
-        let mut packet = [0; PACKET_BYTES];
-        let bytes = self.from_host.read(&mut packet).await?;
-        // The card may block each step for its whole service. The watchdog is fed between two of them.
-        yield_now().await;
-        let Some(scratch) = buffer.first_mut() else { return Err(End::Disabled) };
-        let Ok(mut transport) = Transport::begin(packet.get(..bytes).unwrap_or_default(), disk, scratch)
-        else {
-            self.link.halt();
-            return Err(End::Disabled);
-        };
-        yield_now().await;
-        loop {
-            match transport.step(disk, buffer) {
-                Step::Send([]) => self.to_host.write(&[]).await?,
-                Step::Send(data) => {
-                    for packet in data.chunks(PACKET_BYTES) {
-                        self.to_host.write(packet).await?;
-                    }
-                }
-                Step::Take => transport.taken(self.from_host.read(&mut packet).await?),
-                Step::Status(status) => return Ok(self.to_host.write(&status).await?),
+/// As [`take`].
+async fn send(to_host: &mut impl EndpointIn, chunks: &mut Outgoing<'_, '_>) {
+    loop {
+        let mut packets = chunks.receive().await.data().chunks(PACKET_BYTES);
+        let first = packets.next().unwrap_or_default();
+        for packet in iter::once(first).chain(packets) {
+            if to_host.write(packet).await.is_err() {
+                return pending().await;
             }
         }
+        chunks.receive_done();
     }
 }

@@ -1,11 +1,11 @@
 //! The USB plug: the card as a read-only disk (*card-reader mode*), and a serial port while the box records ([`serial`]).
 //!
 //! ```text
-//! host -> bulk OUT -> Transport (wrappers, lengths) -> Disk (SCSI commands) -> CardDevice
+//! host -> bulk OUT -> Server (reads ahead) -> Transport (wrappers, lengths) -> Disk (SCSI commands) -> CardDevice
 //! host <- bulk IN  <-
 //! ```
-//! [`transport`] and [`scsi`] have no I/O. [`class`] moves their bytes through any driver of `embassy_usb`, which [`guard`]
-//! protects from a hostile host.
+//! [`server`], [`transport`] and [`scsi`] have no I/O but the card. [`class`] moves their bytes through any driver of
+//! `embassy_usb`, which [`guard`] protects from a hostile host.
 //!
 //! Rules:
 //! * The disk cannot be written. Writes are refused as protected, and hosts are told so by MODE SENSE.
@@ -20,6 +20,7 @@ pub mod guard;
 pub mod presence;
 pub mod scsi;
 pub mod serial;
+pub mod server;
 pub mod transport;
 
 pub use embassy_usb::driver;

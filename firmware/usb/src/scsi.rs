@@ -15,7 +15,13 @@
 //!
 //! A card that comes back after it was gone is reported once as a unit attention, so that the host reads its file system anew.
 
-use hums_recorder::{BLOCK_BYTES, Block, CardDevice, Trouble};
+use hums_core::clock::Span;
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice, Meanwhile, Trouble};
+
+use crate::server::{Ahead, Chunk};
+
+/// Blocks read ahead count for this long: nobody changes a card in this time.
+const FRESH: Span = Span::from_millis(100);
 
 /// Reason of a refusal: sense key, additional code and its qualifier (SPC-4, 4.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,6 +97,8 @@ pub struct Disk<D> {
     serial: [u8; SERIAL_BYTES],
     sense: Sense,
     slot: Slot,
+    /// The block behind the last ones that were read for the command in work, or the one before.
+    next: Option<u32>,
     reply: [u8; REPLY_BYTES],
 }
 
@@ -102,6 +110,7 @@ impl<D: CardDevice> Disk<D> {
             serial,
             sense: Sense { key: 0, code: 0, qualifier: 0 },
             slot: Slot::Unknown,
+            next: None,
             reply: [0; REPLY_BYTES],
         }
     }
@@ -116,29 +125,69 @@ impl<D: CardDevice> Disk<D> {
         &self.reply
     }
 
-    /// Executes a command block. `false`: it is refused, and REQUEST SENSE has the reason. `scratch` is overwritten.
-    pub fn command(&mut self, block: &[u8], scratch: &mut Block) -> Option<Answer> {
+    /// Executes a command block. `false`: it is refused, and REQUEST SENSE has the reason.
+    pub fn command(&mut self, block: &[u8]) -> Option<Answer> {
         if block.first() != Some(&REQUEST_SENSE) {
             self.sense = Sense::default();
         }
+        self.next = None;
         self.card.begin_service();
-        let answer = self.execute(block, scratch);
+        let answer = self.execute(block);
         answer.map_err(|sense| self.sense = sense).ok()
     }
 
-    /// Reads blocks of an accepted command. After `false` the host must not get `blocks`.
-    pub fn read(&mut self, first: u32, blocks: &mut [Block]) -> bool {
-        self.card.begin_service();
-        let read = self.access(|card| card.read(blocks, first));
-        read.map_err(|sense| self.sense = sense).is_ok()
+    /// Reads blocks of an accepted command into the chunk: up to `count`, up to the chunk's end, up to the first unreadable one.
+    /// Returns their number. 0: the first one is unreadable.
+    pub fn read(&mut self, first: u32, count: u32, chunk: &mut Chunk<'_>, meanwhile: Meanwhile<'_>) -> u32 {
+        let count = chunk.blocks.len().min(count as usize);
+        let blocks = chunk.blocks.get_mut(..count).unwrap_or_default();
+        let ahead = chunk.ahead.take().filter(|ahead| ahead.first == first);
+        let read = match ahead.filter(|ahead| self.card.now().since(ahead.read) <= FRESH) {
+            Some(ahead) => Ok(ahead.count.min(count)),
+            None => self.readable(first, blocks, meanwhile),
+        };
+        let count = read.map_err(|sense| self.sense = sense).unwrap_or(0) as u32;
+        self.next = first.checked_add(count).filter(|_| count > 0);
+        count
     }
 
-    fn execute(&mut self, block: &[u8], scratch: &mut Block) -> Result<Answer, Sense> {
+    /// Reads the blocks behind the last ones, once. If the card does not give them, the next command for them tries it again.
+    pub fn read_ahead(&mut self, chunk: &mut Chunk<'_>, meanwhile: Meanwhile<'_>) {
+        let (Some(first), Slot::Card(blocks)) = (self.next.take(), self.slot) else { return };
+        let count = chunk.blocks.len().min(blocks.saturating_sub(first) as usize);
+        let blocks = chunk.blocks.get_mut(..count).unwrap_or_default();
+        chunk.ahead = None;
+        self.card.begin_service();
+        if !blocks.is_empty() && self.access(|card| card.read_while(blocks, first, meanwhile)).is_ok() {
+            chunk.ahead = Some(Ahead { first, count, read: self.card.now() });
+        }
+    }
+
+    fn readable(
+        &mut self,
+        first: u32,
+        blocks: &mut [Block],
+        meanwhile: Meanwhile<'_>,
+    ) -> Result<usize, Sense> {
+        self.card.begin_service();
+        let all = self.access(|card| card.read_while(blocks, first, meanwhile));
+        let Err(Sense::UNREADABLE) = all else { return all.map(|()| blocks.len()) };
+        let mut count = 0;
+        for (block, at) in blocks.chunks_mut(1).zip(first..) {
+            if self.access(|card| card.read_while(block, at, meanwhile)).is_err() {
+                break;
+            }
+            count += 1;
+        }
+        if count > 0 { Ok(count) } else { Err(Sense::UNREADABLE) }
+    }
+
+    fn execute(&mut self, block: &[u8]) -> Result<Answer, Sense> {
         let command = Command::of(block)?;
         match command.code {
             TEST_UNIT_READY => {
                 self.blocks()?;
-                self.access(|card| card.read(core::slice::from_mut(scratch), 0))?;
+                self.access(|card| card.read(&mut [[0; BLOCK_BYTES]], 0))?;
                 Ok(Answer::Done)
             }
             REQUEST_SENSE => {

@@ -15,10 +15,11 @@
 //! A write is refused: case 3, 8, 9 or 11 to 13, with the status of a refused command. A refused command has no data. In place of
 //! a short packet BOT wants padding or a halted endpoint; Linux's gadget sends a short packet too if its controller cannot halt.
 
-use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
+use hums_recorder::{BLOCK_BYTES, CardDevice, Meanwhile};
 
 use crate::PACKET_BYTES;
 use crate::scsi::{Answer, Disk};
+use crate::server::Chunk;
 
 /// Bytes of a command wrapper (BOT, 5.1).
 pub const WRAPPER_BYTES: usize = 31;
@@ -36,14 +37,14 @@ const TO_HOST: u8 = 0x80;
 pub struct Invalid;
 
 /// The next action on the bus.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Step<'a> {
-    /// Send these bytes in packets of [`PACKET_BYTES`]; none is one empty packet.
-    Send(&'a [u8]),
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Send the chunk's bytes in packets of [`PACKET_BYTES`]; none is one empty packet.
+    Send,
     /// Take a packet and report its length to [`Transport::taken`].
     Take,
-    /// Send this status wrapper. The command is over.
-    Status([u8; STATUS_BYTES]),
+    /// Send the chunk's bytes, which are the status wrapper. The command is over.
+    End,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,12 +77,8 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// Begins the command of a packet. `scratch` is overwritten.
-    pub fn begin<D: CardDevice>(
-        packet: &[u8],
-        disk: &mut Disk<D>,
-        scratch: &mut Block,
-    ) -> Result<Self, Invalid> {
+    /// Begins the command of a packet.
+    pub fn begin<D: CardDevice>(packet: &[u8], disk: &mut Disk<D>) -> Result<Self, Invalid> {
         let wrapper: &[u8; WRAPPER_BYTES] = packet.try_into().map_err(|_| Invalid)?;
         let [s0, s1, s2, s3, t0, t1, t2, t3, e0, e1, e2, e3, flags, unit, length, block @ ..] = *wrapper;
         let block = block.get(..usize::from(length)).filter(|block| !block.is_empty()).ok_or(Invalid)?;
@@ -90,7 +87,7 @@ impl Transport {
         }
         const { assert!(WRAPPER_BYTES == 15 + BLOCK_MAX) };
         let expected = u32::from_le_bytes([e0, e1, e2, e3]);
-        let answer = disk.command(block, scratch);
+        let answer = disk.command(block);
         let wants_data = expected > 0 && flags == TO_HOST;
         let has = match answer {
             Some(Answer::Reply(bytes)) => bytes as u64,
@@ -113,33 +110,43 @@ impl Transport {
         Ok(Self { tag: [t0, t1, t2, t3], expected, sent: 0, status, stage })
     }
 
-    /// The next action. `buffer` is for blocks of the card: at least one.
-    pub fn step<'a, D: CardDevice>(&mut self, disk: &'a mut Disk<D>, buffer: &'a mut [Block]) -> Step<'a> {
+    /// The next action. It fills the chunk.
+    pub fn step<D: CardDevice>(
+        &mut self,
+        disk: &mut Disk<D>,
+        chunk: &mut Chunk<'_>,
+        meanwhile: Meanwhile<'_>,
+    ) -> Step {
         match self.stage {
             Stage::Reply(bytes) if bytes > 0 => {
                 (self.stage, self.sent) = (Stage::End, bytes);
-                return Step::Send(disk.reply().get(..bytes as usize).unwrap_or_default());
+                chunk.put(disk.reply().get(..bytes as usize).unwrap_or_default());
+                return Step::Send;
             }
             Stage::Blocks(first, left) if left > 0 => {
-                let count = left.div_ceil(BLOCK_BYTES as u32).min(buffer.len() as u32);
-                let blocks = buffer.get_mut(..count as usize).unwrap_or_default();
-                if !blocks.is_empty() && disk.read(first, blocks) {
+                let count = disk.read(first, left.div_ceil(BLOCK_BYTES as u32), chunk, meanwhile);
+                if count > 0 {
                     let bytes = left.min(count * BLOCK_BYTES as u32);
                     self.stage = Stage::Blocks(first + count, left - bytes);
                     self.sent += bytes;
-                    return Step::Send(blocks.as_flattened().get(..bytes as usize).unwrap_or_default());
+                    chunk.has(bytes);
+                    return Step::Send;
                 }
                 self.status = Status::Failed;
             }
             Stage::Take(left) if left > 0 => return Step::Take,
-            Stage::Reply(_) | Stage::Blocks(..) | Stage::End | Stage::Take(_) => {}
-            Stage::Status => return Step::Status(self.wrapper()),
+            Stage::Reply(_) | Stage::Blocks(..) | Stage::End | Stage::Take(_) | Stage::Status => {}
         }
-        let is_open = !matches!(self.stage, Stage::Take(_))
+        let is_open = !matches!(self.stage, Stage::Take(_) | Stage::Status)
             && self.sent < self.expected
             && self.sent.is_multiple_of(PACKET_BYTES as u32);
         self.stage = Stage::Status;
-        if is_open { Step::Send(&[]) } else { Step::Status(self.wrapper()) }
+        if is_open {
+            chunk.put(&[]);
+            return Step::Send;
+        }
+        chunk.put(&self.wrapper());
+        Step::End
     }
 
     /// A packet of the host was taken. A short one ends the data.

@@ -141,7 +141,7 @@ impl<P: Port> Line<P> {
     fn register(&mut self, command: u8) -> Result<[u8; 16], SpiError> {
         self.must(command, 0)?;
         let mut register = [0; 16];
-        self.receive(&mut register)?;
+        self.receive(&mut register, &mut || true)?;
         Ok(register)
     }
 }

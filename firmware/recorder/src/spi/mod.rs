@@ -20,7 +20,7 @@ mod registers;
 
 use core::cell::RefCell;
 
-use crate::{BLOCK_BYTES, Block, CardDevice};
+use crate::{BLOCK_BYTES, Block, CardDevice, Meanwhile};
 use hums_core::clock::{Instant, Span};
 
 pub use error::SpiError;
@@ -109,13 +109,18 @@ fn address(card: &Identity, block: u32, count: usize) -> Result<u32, SpiError> {
     address.ok_or(SpiError::OutOfRange)
 }
 
-fn read<P: Port>(line: &mut Line<P>, address: u32, blocks: &mut [Block]) -> Result<(), SpiError> {
+fn read<P: Port>(
+    line: &mut Line<P>,
+    address: u32,
+    blocks: &mut [Block],
+    meanwhile: Meanwhile<'_>,
+) -> Result<(), SpiError> {
     if let [block] = blocks {
         line.must(READ, address)?;
-        return line.receive(block);
+        return line.receive(block, meanwhile);
     }
     line.must(READ_MANY, address)?;
-    let received = blocks.iter_mut().try_for_each(|block| line.receive(block));
+    let received = blocks.iter_mut().try_for_each(|block| line.receive(block, meanwhile));
     let stopped = line.stop_reading();
     received.and(stopped)
 }
@@ -155,10 +160,15 @@ impl<P: Port> CardDevice for SpiCard<P> {
     type Error = SpiError;
 
     fn read(&self, blocks: &mut [Block], start: u32) -> Result<(), SpiError> {
+        self.read_while(blocks, start, &mut || true)
+    }
+
+    fn read_while(&self, blocks: &mut [Block], start: u32, meanwhile: Meanwhile<'_>) -> Result<(), SpiError> {
         if blocks.is_empty() {
             return Ok(());
         }
-        self.inner.borrow_mut().access(|line, card| read(line, address(card, start, blocks.len())?, blocks))
+        let mut inner = self.inner.borrow_mut();
+        inner.access(|line, card| read(line, address(card, start, blocks.len())?, blocks, meanwhile))
     }
 
     fn write(&self, blocks: &[Block], start: u32) -> Result<(), SpiError> {

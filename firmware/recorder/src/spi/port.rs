@@ -2,6 +2,11 @@
 
 use hums_core::clock::Instant;
 
+use crate::Meanwhile;
+
+/// Bytes between two calls of other work: 30 µs of a port that the processor moves.
+const PART_BYTES: usize = 32;
+
 /// The speed of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
@@ -22,6 +27,15 @@ pub trait Port {
 
     /// Replaces bytes by the received ones.
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed>;
+
+    /// Receives bytes. `meanwhile` is called often.
+    fn receive(&mut self, bytes: &mut [u8], meanwhile: Meanwhile<'_>) -> Result<(), PortFailed> {
+        bytes.fill(0xFF);
+        bytes.chunks_mut(PART_BYTES).try_for_each(|part| {
+            meanwhile();
+            self.exchange(part)
+        })
+    }
 
     /// Drops received bytes.
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed>;

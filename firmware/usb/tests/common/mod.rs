@@ -3,14 +3,17 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use hums_core::clock::{Instant, Span};
 use hums_recorder::{BLOCK_BYTES, Block, CardDevice, Trouble};
 use hums_usb::PACKET_BYTES;
 use hums_usb::scsi::{Disk, Sense};
-use hums_usb::transport::{Invalid, Step, Transport};
+use hums_usb::server::Chunk;
+use hums_usb::transport::{Invalid, STATUS_BYTES, Step, Transport};
 
 pub(crate) const BLOCKS: u32 = 1_000;
 pub(crate) const SERIAL: [u8; 24] = *b"0123456789ABCDEF01234567";
-pub(crate) const BUFFER: usize = 4;
+/// Blocks of a chunk.
+pub(crate) const CHUNK: usize = 4;
 /// `bCBWFlags` of a command whose data goes to the host.
 pub(crate) const IN: u8 = 0x80;
 pub(crate) const OUT: u8 = 0;
@@ -25,6 +28,11 @@ pub(crate) struct Numbered {
     pub(crate) resets: Rc<Cell<u32>>,
     /// The highest block that was read, plus 1.
     pub(crate) end: Rc<Cell<u32>>,
+    /// How many were read.
+    pub(crate) reads: Rc<Cell<u32>>,
+    pub(crate) now: Rc<Cell<Instant>>,
+    /// Its content is another one.
+    pub(crate) edition: Rc<Cell<u32>>,
 }
 
 pub(crate) fn content(number: u32) -> Block {
@@ -47,7 +55,8 @@ impl CardDevice for Numbered {
                 return Err(Trouble::Refusing);
             }
             self.end.set(self.end.get().max(number + 1));
-            *block = content(number);
+            self.reads.set(self.reads.get() + 1);
+            *block = content(number + (self.edition.get() << 16));
         }
         Ok(())
     }
@@ -58,6 +67,10 @@ impl CardDevice for Numbered {
 
     fn num_blocks(&self) -> Result<u32, Trouble> {
         if self.gone.get() { Err(Trouble::Gone) } else { Ok(BLOCKS) }
+    }
+
+    fn now(&self) -> Instant {
+        self.now.get()
     }
 
     fn reset(&self) {
@@ -80,6 +93,7 @@ pub(crate) struct Got {
 pub(crate) struct Host {
     pub(crate) disk: Disk<Numbered>,
     pub(crate) card: Numbered,
+    chunks: [Chunk<'static>; 3],
     tag: u32,
 }
 
@@ -97,7 +111,14 @@ pub(crate) fn wrapper(tag: u32, expected: u32, flags: u8, block: &[u8]) -> Vec<u
 impl Host {
     pub(crate) fn new() -> Self {
         let card = Numbered::default();
-        Self { disk: Disk::new(card.clone(), SERIAL), card, tag: 0 }
+        let memory = Vec::leak(vec![[0xAA; BLOCK_BYTES]; 3 * CHUNK]);
+        Self { disk: Disk::new(card.clone(), SERIAL), card, chunks: Chunk::of(memory), tag: 0 }
+    }
+
+    /// In the least time that a person needs.
+    pub(crate) fn change_card(&mut self) {
+        self.card.now.set(self.card.now.get() + Span::from_millis(101));
+        self.card.edition.set(self.card.edition.get() + 1);
     }
 
     pub(crate) fn run(&mut self, expected: u32, flags: u8, block: &[u8]) -> Got {
@@ -106,18 +127,19 @@ impl Host {
     }
 
     pub(crate) fn packet(&mut self, packet: &[u8]) -> Result<Got, Invalid> {
-        let mut buffer = [[0xAA; BLOCK_BYTES]; BUFFER];
-        let mut transport = Transport::begin(packet, &mut self.disk, &mut buffer[0])?;
+        let mut transport = Transport::begin(packet, &mut self.disk)?;
         let expected = u32::from_le_bytes(packet[8..12].try_into().unwrap());
         let (mut data, mut taken, mut is_open) = (Vec::new(), 0, true);
         loop {
-            match transport.step(&mut self.disk, &mut buffer) {
-                Step::Send(bytes) => {
+            let step = transport.step(&mut self.disk, &mut self.chunks[0], &mut || true);
+            let bytes = self.chunks[0].data();
+            match step {
+                Step::Send => {
                     assert!(is_open && packet[12] == IN, "data after the end, or to a host that sends");
                     is_open = bytes.len().is_multiple_of(PACKET_BYTES) && !bytes.is_empty();
                     data.extend_from_slice(bytes);
                     assert!(data.len() <= expected as usize, "more than the host expects");
-                    buffer = [[0xAA; BLOCK_BYTES]; BUFFER];
+                    self.chunks.rotate_left(1);
                 }
                 Step::Take => {
                     assert!(packet[12] == OUT);
@@ -126,7 +148,8 @@ impl Host {
                     transport.taken(bytes);
                     taken += bytes;
                 }
-                Step::Status(status) => {
+                Step::End => {
+                    let status: [u8; STATUS_BYTES] = bytes.try_into().unwrap();
                     assert_eq!((&status[..4], &status[4..8]), (&b"USBS"[..], &packet[4..8]));
                     let residue = u32::from_le_bytes(status[8..12].try_into().unwrap());
                     assert_eq!(residue as usize, expected as usize - data.len());
@@ -136,6 +159,8 @@ impl Host {
                     if packet[12] == OUT {
                         assert_eq!(taken, expected as usize, "bytes of the host are left");
                     }
+                    self.chunks.rotate_left(1);
+                    self.disk.read_ahead(&mut self.chunks[0], &mut || true);
                     return Ok(Got { data, taken, status: status[12], residue });
                 }
             }

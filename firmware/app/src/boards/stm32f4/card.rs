@@ -13,6 +13,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
 use hums_core::clock::{Instant, Span};
+use hums_recorder::Meanwhile;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
 use super::time;
@@ -81,7 +82,7 @@ impl Port for SpiPort {
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
         self.pause.before();
         if by_dma(bytes) {
-            wait(self.bus.transfer_in_place(bytes))?;
+            wait(self.bus.transfer_in_place(bytes), &mut || true)?;
         } else {
             self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
         }
@@ -89,9 +90,14 @@ impl Port for SpiPort {
         Ok(())
     }
 
+    fn receive(&mut self, bytes: &mut [u8], meanwhile: Meanwhile<'_>) -> Result<(), PortFailed> {
+        bytes.fill(0xFF);
+        if by_dma(bytes) { wait(self.bus.transfer_in_place(bytes), meanwhile) } else { self.exchange(bytes) }
+    }
+
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
         if by_dma(bytes) {
-            wait(self.bus.write(bytes))
+            wait(self.bus.write(bytes), &mut || true)
         } else {
             self.bus.blocking_write(bytes).map_err(|_| PortFailed)
         }
@@ -116,11 +122,15 @@ fn by_dma(bytes: &[u8]) -> bool {
     bytes.len() >= DMA_BYTES_MIN && bytes.as_ptr().addr() >= RAM
 }
 
-fn wait(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), PortFailed> {
+fn wait(
+    transfer: impl Future<Output = Result<(), Error>>,
+    meanwhile: Meanwhile<'_>,
+) -> Result<(), PortFailed> {
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());
     let done =
         hums_onboard::wait::until(crate::links::now() + TRANSFER_MAX, crate::links::now, |may_sleep| {
+            let may_sleep = meanwhile() && may_sleep;
             // Masked: an interrupt between the two still ends the sleep and is served right after it.
             cortex_m::interrupt::free(|_| {
                 let polled = transfer.as_mut().poll(&mut context);
