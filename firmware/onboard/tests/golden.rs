@@ -1,7 +1,7 @@
 //! The golden list: every finding and event of every recorded flight in the repository, as the box judges it.
 //!
 //! Each `tests/FOLDER/*.tlog` (or `.tlog.gz`) is parsed and monitored by the code that the box runs. The list in
-//! `tests/golden` has one line for each finding: time, check, instance, new level, cause, and whether the ground is told.
+//! `tests/golden` has one line for each finding: time, check, instance, new level, cause. A line with `>` is a text to the ground.
 //! A commit that only moves code leaves the list as it is. A commit that changes behaviour contains the difference.
 //! `HUMS_GOLDEN=write cargo test -p hums-onboard golden::` writes the list anew.
 
@@ -17,13 +17,15 @@ use hums_core::observation::Observation;
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_link::LongTexts;
-use hums_link::frame::Check;
+use hums_link::frame::{Check, Frame};
 use hums_link::framer::Framer;
 use hums_link::sequence::Sequences;
+use hums_link::summary::Summary;
 use hums_onboard::monitoring::TICK;
 
 /// Microseconds since 1970, big-endian.
 const TIME_BYTES: usize = 8;
+const STATUSTEXT: u32 = 253;
 /// A longer step of the recorder's clock does not count as time of the flight, milliseconds.
 const STEP_MAX_MS: u64 = 60_000;
 
@@ -136,6 +138,7 @@ struct BoxUnderTest {
     sequences: Sequences,
     long_texts: LongTexts,
     monitor: Monitor,
+    summary: Summary,
     ticked: Instant,
     list: String,
 }
@@ -146,7 +149,8 @@ impl BoxUnderTest {
         params.set("PROT_ACTION", 1.0).expect("a return is a protective action");
         let (framer, sequences) = (Framer::new(), Sequences::new());
         let (long_texts, monitor) = (LongTexts::new(), Monitor::new(params));
-        Self { framer, sequences, long_texts, monitor, ticked: Instant::ZERO, list: String::new() }
+        let summary = Summary::new(&params);
+        Self { framer, sequences, long_texts, monitor, summary, ticked: Instant::ZERO, list: String::new() }
     }
 
     fn take(&mut self, at_us: u64, bytes: &[u8]) {
@@ -172,7 +176,9 @@ impl BoxUnderTest {
     }
 
     fn tick(&mut self) {
-        let Self { sequences, monitor, ticked, list, .. } = self;
+        let Self { sequences, monitor, summary, ticked, list, .. } = self;
+        let mut texts = Vec::new();
+        let mut sent = |frame: &[u8]| texts.extend(text_of(frame));
         let link = sequences.reading(*ticked, monitor.vehicle().source);
         let recorder = RecorderStatus { recording: Recording::Running, ..RecorderStatus::default() };
         let seconds = ticked.as_secs_f64();
@@ -180,9 +186,21 @@ impl BoxUnderTest {
             let (check, instance, level) = (finding.check, finding.instance, finding.level.name());
             let cause = if finding.because.is_empty() { "told" } else { finding.because };
             writeln!(list, "{seconds:9.3} {check} {instance} {level} {cause}").expect("a string takes text");
+            summary.finding(*ticked, finding, &mut sent);
         });
+        summary.tick(*ticked, monitor, &mut sent);
+        for text in texts {
+            writeln!(list, "{seconds:9.3} > {text}").expect("a string takes text");
+        }
         while let Some(happening) = monitor.take_happening() {
             writeln!(list, "{seconds:9.3} {happening:?}").expect("a string takes text");
         }
     }
+}
+
+/// The text of a frame that has one.
+fn text_of(frame: &[u8]) -> Option<String> {
+    let frame = Frame::again(frame, Check::Verified).filter(|frame| frame.id() == STATUSTEXT)?;
+    let text = frame.payload().get(1..)?;
+    Some(String::from_utf8_lossy(text).trim_end_matches('\0').trim_start_matches("HUMS: ").to_owned())
 }
