@@ -245,6 +245,16 @@ fn an_alarm_that_outlives_the_one_that_explained_it_is_told_by_itself_once() {
 }
 
 #[test]
+fn a_cause_that_is_found_later_explains_its_effect_from_then_on() {
+    let run = fly("20-100 vel=1.5; 22-40 fix=1");
+    let end_ms = first(&run, "gps_fix", Level::Ok).at.as_millis();
+    let mine = run.of_check("ekf_variance").filter(|one| one.level != Level::Ok);
+    let told: Vec<_> = mine.map(|one| (one.at.as_millis(), one.because, one.previous)).collect();
+    let [(first_ms, "", Level::Ok), (last_ms, "", Level::Warning)] = told[..] else { panic!("{told:?}") };
+    assert!(first_ms < 22_000 && last_ms - end_ms == 8_000, "it outlives its cause: {told:?}");
+}
+
+#[test]
 fn an_esc_of_a_plane_that_glides_may_fall_silent() {
     for (throttle, is_told) in [(0.5, true), (0.0, false)] {
         let run = fly(&format!("20-100 plane thr={throttle} esc3"));

@@ -23,7 +23,7 @@ use crate::frame::Frame;
 use crate::messages::{self, ComputerStatus};
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
-use crate::telling::{Fate, Telling, order};
+use crate::telling::{self, Fate, Telling, order};
 use crate::text::{Severity, TEXT_BYTES_MAX, Text};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
@@ -278,14 +278,23 @@ impl Summary {
         let mut place = 0;
         while let Some(finding) = self.waiting.get(place) {
             let is_critical = finding.level == Level::Critical;
+            let check = health::check_named(finding.check);
+            let revises =
+                !is_critical && health.is_some_and(|health| self.telling.has_effect(finding, health));
+            // A value of several sensors may recover while it waits for its cause.
             let is_so = |health: &Health| {
-                let check = health::check_named(finding.check);
-                check.is_none_or(|check| health.lasts(check, finding.instance, now.into()))
+                check.is_none_or(|check| {
+                    check.role.is_derived() || health.lasts(check, finding.instance, now.into())
+                })
             };
-            let fate = if is_critical || health.is_some_and(is_so) {
-                self.telling.fate(now, finding)
-            } else {
-                Fate::Later
+            let is_explained = |health: &Health| {
+                health.alarm(finding.check, finding.instance).is_some_and(|(_, is_explained)| is_explained)
+            };
+            let fate = match health {
+                _ if is_critical => self.telling.fate(now, finding, false),
+                Some(health) if is_explained(health) => Fate::Never,
+                Some(health) if is_so(health) => self.telling.fate(now, finding, revises),
+                _ => Fate::Later,
             };
             match fate {
                 Fate::Now => {}
@@ -300,12 +309,18 @@ impl Summary {
             }
             let class = if is_critical { Class::Critical } else { Class::Finding };
             let severity = severity(finding).unwrap_or(Severity::Notice);
-            let packet = messages::status_text(severity, text(finding).as_str());
+            let cause = telling::cause(finding, &self.waiting).filter(|_| is_critical);
+            let text = words(cause.as_ref().unwrap_or(finding), finding, revises);
+            let packet = messages::status_text(severity, text.as_str());
             if !self.outlet.send(now, class, &packet, out) {
                 return;
             }
             let told = self.waiting.remove(place);
             self.telling.told(now, &told);
+            if let Some(cause) = cause {
+                self.telling.names(&cause);
+                self.waiting.retain(|waits| (waits.check, waits.instance) != (cause.check, cause.instance));
+            }
             self.waiting.retain(|waits| !Telling::is_consequence(&told, waits));
             place = 0;
         }
@@ -439,8 +454,13 @@ fn urgency(finding: &Finding) -> u8 {
 
 /// Text of a finding for the pilot: part, fault, value and, if critical, the action: `HUMS: battery 1 low: 6.8 %, LAND NOW`. The
 /// end of a finding repeats its name: `HUMS: over: battery 1 low`.
-#[inline(never)]
 pub fn text(finding: &Finding) -> Text {
+    words(finding, finding, false)
+}
+
+/// The text of a finding with the order of another one; of the cause of what was sent before if it revises that.
+#[inline(never)]
+fn words(finding: &Finding, orders: &Finding, revises: bool) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;
     let Some(said) = health::said(check) else { return Text::new(format_args!("HUMS: {check}")) };
     match level {
@@ -451,11 +471,12 @@ pub fn text(finding: &Finding) -> Text {
     let mut text = if check == "esc_silent" && finding.orders != Orders::Own {
         Text::new(format_args!("HUMS: ESC {} and all others silent", u16::from(instance) + 1))
     } else {
-        Text::new(format_args!("HUMS: {}", said.alarm_of(instance, feeds)))
+        let cause = if revises { "cause: " } else { "" };
+        Text::new(format_args!("HUMS: {cause}{}", said.alarm_of(instance, feeds)))
     };
     // Nobody lands because of a camera's battery.
-    let is_told = level == Level::Critical && feeds != Feeds::Payload;
-    let order = if is_told { order(finding) } else { "" };
+    let is_told = orders.level == Level::Critical && orders.feeds != Feeds::Payload;
+    let order = if is_told { order(orders) } else { "" };
     let advice = if order.is_empty() { Text::default() } else { Text::new(format_args!(", {order}")) };
     if let Some((before, after)) = said.around_value(finding.unit)
         && value.is_finite()

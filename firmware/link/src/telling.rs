@@ -6,10 +6,13 @@
 //! * A finding explained by another one ([`Finding::because`]) is recorded only.
 //! * A critical finding is never delayed. It is sent if its order differs from those of the event's earlier texts. So
 //!   a fourth lost motor, or the pitch beside the roll, does not repeat LAND NOW.
-//! * A warning waits for [`HOLD`]. If it becomes critical meanwhile, only the critical finding is sent. Otherwise it
+//! * A warning waits for [`HOLD`], that of an estimator for [`DERIVED_HOLD`]. If it becomes critical meanwhile, only the
+//!   critical finding is sent. If its cause is found, only the cause is sent. Otherwise it
 //!   is the first text of an event, or waits for the event's end, and is sent if it still holds. The same goes for
 //!   missing data, and for the end of a finding. A check that no longer applies, as after landing, is not reported:
 //!   its state is unknown.
+//! * A critical finding whose cause waits as a warning is sent in the words of the cause, with its own order.
+//! * A cause whose effect was sent before it is sent as `cause: ...`, and waits for no event.
 //! * Of a mishap the first kind is sent. Another one is sent if its order differs and nothing led to it. The text
 //!   that it is down, with the place, comes by itself. A kind whose order does not fit the vehicle is sent with the
 //!   one that fits ([`order`]); if none fits, its cause does not count. A waiting mild finding that began with the
@@ -21,12 +24,17 @@
 //! * Findings that are not critical wait during an event with a critical text. At most [`MILD_MAX`] of them are sent
 //!   in any [`SPAN`], the worst first.
 
+use core::iter;
+
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{self, Finding, Level, Subsystem};
+use hums_core::health::{self, Alarm, Check, Finding, Health, Level, Subsystem, root_cause};
 
 const EVENT: Span = Span::from_secs(10);
 /// Time that a warning waits in case it becomes critical.
 const HOLD: Span = Span::from_secs(1);
+/// The same of a value that is made of several sensors: its cause may be found. An estimator doubts at the first wrong sample; the check of a
+/// sensor takes 2.5 s to smooth and to debounce.
+const DERIVED_HOLD: Span = Span::from_secs(3);
 /// Most texts that are not critical in any [`SPAN`].
 const MILD_MAX: usize = 3;
 /// See [`MILD_MAX`].
@@ -101,6 +109,8 @@ impl Telling {
                 false
             }
             Level::Ok => self.open.contains(&key) && !self.is_explained(finding),
+            // It outlives its cause, and was sent before that was found.
+            level if level == finding.previous && self.open.contains(&key) => false,
             Level::Stale => finding.because.is_empty() && self.open.is_empty(),
             _ => finding.because.is_empty(),
         }
@@ -108,11 +118,12 @@ impl Telling {
 
     fn is_explained(&self, finding: &Finding) -> bool {
         let Some(check) = health::check_named(finding.check) else { return false };
-        let mut open = self.open.iter().filter_map(|(number, _)| health::checks().nth(usize::from(*number)));
+        let mut open = self.open.iter().filter_map(|(number, _)| check_of(*number));
         open.any(|cause| health::explains(cause, check))
     }
 
-    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding) -> Fate {
+    /// `revises`: it explains what was sent.
+    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding, revises: bool) -> Fate {
         let event = &self.events[family(finding.subsystem) as usize];
         let is_mishap = finding.subsystem == Subsystem::Mishap;
         if finding.level == Level::Critical {
@@ -125,9 +136,10 @@ impl Telling {
         if is_mishap {
             return Fate::Never;
         }
-        let is_held = finding.level == Level::Warning && now.since(Instant::of(finding.at, now)) < HOLD;
-        let is_busy = event.is_running(now)
-            || self.events.iter().any(|event| event.critical[0].is_some() && event.is_running(now));
+        let is_held =
+            finding.level == Level::Warning && now.since(Instant::of(finding.at, now)) < hold(finding.check);
+        let mut others = self.events.iter().filter(|event| event.critical[0].is_some());
+        let is_busy = !revises && (event.is_running(now) || others.any(|event| event.is_running(now)));
         while self.mild.front().is_some_and(|at_ms| since(now, *at_ms) >= SPAN.as_millis()) {
             self.mild.pop_front();
         }
@@ -161,17 +173,56 @@ impl Telling {
         } else if let Some(free) = event.critical.iter_mut().find(|number| number.is_none()) {
             *free = ordering;
         }
-        let Some(key) = key(finding) else { return };
-        self.open.retain(|open| *open != key);
+        self.names(finding);
         if is_mishap {
             self.open.retain(|(number, _)| !part(*number).is_some_and(health::is_of_mishap));
-        } else if matches!(finding.level, Level::Warning | Level::Critical) {
+        }
+    }
+
+    /// A text that went named it.
+    pub(crate) fn names(&mut self, finding: &Finding) {
+        let Some(key) = key(finding) else { return };
+        self.open.retain(|open| *open != key);
+        if is_alarm(finding) && finding.subsystem != Subsystem::Mishap {
             if self.open.is_full() {
                 self.open.remove(0);
             }
             let _ = self.open.push(key);
         }
     }
+
+    /// Whether an effect of a finding was sent before it.
+    pub(crate) fn has_effect(&self, cause: &Finding, health: &Health) -> bool {
+        let Some((cause, _)) = health.alarm(cause.check, cause.instance) else { return false };
+        let known = |(number, instance): &(u8, u8)| health.alarm(check_of(*number)?.name, *instance);
+        let open = self.open.iter().filter_map(known);
+        open.map(|(alarm, _)| mild(alarm)).any(|effect| root_cause(&effect, iter::once(cause)).is_some())
+    }
+}
+
+/// As a warning, which a milder one may explain.
+const fn mild(mut alarm: Alarm) -> Alarm {
+    alarm.level = Level::Warning;
+    alarm
+}
+
+/// How long a check's warning waits before it is sent.
+pub fn hold(check: &str) -> Span {
+    let is_derived = health::check_named(check).is_some_and(|check| check.role.is_derived());
+    if is_derived { DERIVED_HOLD } else { HOLD }
+}
+
+/// The waiting warning that explains a critical finding.
+pub(crate) fn cause(finding: &Finding, waiting: &[Finding]) -> Option<Finding> {
+    let alarm = |of: &Finding| Alarm::of(of.check, of.instance, Level::Warning, of.at);
+    let alarms = waiting.iter().filter(|waits| is_alarm(waits)).filter_map(alarm);
+    let cause = root_cause(&alarm(finding)?, alarms)?;
+    let is_it = |waits: &&Finding| (waits.check, waits.instance) == (cause.check.name, cause.instance);
+    waiting.iter().find(is_it).copied()
+}
+
+const fn is_alarm(finding: &Finding) -> bool {
+    matches!(finding.level, Level::Warning | Level::Critical)
 }
 
 /// `at_ms`: modulo 2^32.
@@ -192,11 +243,14 @@ pub(crate) fn order(finding: &Finding) -> &'static str {
     health::said(finding.ordering()).map_or("", |said| said.advice)
 }
 
+fn check_of(number: u8) -> Option<&'static Check> {
+    health::checks().nth(usize::from(number))
+}
+
 fn part(number: u8) -> Option<Subsystem> {
-    Some(health::checks().nth(usize::from(number))?.subsystem)
+    Some(check_of(number)?.subsystem)
 }
 
 fn advice(number: u8) -> &'static str {
-    let check = health::checks().nth(usize::from(number));
-    check.and_then(|check| health::said(check.name)).map_or("", |said| said.advice)
+    check_of(number).and_then(|check| health::said(check.name)).map_or("", |said| said.advice)
 }

@@ -21,6 +21,13 @@ pub(super) struct Standing {
     cause_ended: Option<BootMs>,
 }
 
+impl Standing {
+    /// By another one, which may have ended of late.
+    pub(super) const fn is_explained(&self) -> bool {
+        self.cause.is_some()
+    }
+}
+
 state! {
     /// All of them.
     pub(super) struct Alarms {
@@ -66,9 +73,17 @@ impl Alarms {
         Some(place.as_ref()?.since)
     }
 
+    pub(super) fn of(&self, slot: u16) -> Option<&Standing> {
+        self.iter().find(|known| known.slot == slot)
+    }
+
     pub(super) fn cause(&self, slot: u16) -> Option<u16> {
-        let known = self.iter().find(|known| known.slot == slot)?;
+        let known = self.of(slot)?;
         known.cause.filter(|_| known.cause_ended.is_none())
+    }
+
+    pub(super) fn unexplained(&self, place: usize) -> Option<Standing> {
+        (*self.standing.get(place)?).filter(|known| known.cause.is_none() || known.cause_ended.is_some())
     }
 
     pub(super) fn explain(&mut self, slot: u16, cause: Option<u16>) {

@@ -36,7 +36,7 @@ pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::{BootMs, Millis, SILENT};
-use alarms::{ALARMS_MAX, Alarms};
+use alarms::{ALARMS_MAX, Alarms, Standing};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
 
@@ -149,22 +149,28 @@ impl Health {
     }
 
     /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as
-    /// bad, until it rises itself.
+    /// bad, until it rises itself. An earlier alarm without a cause has one from now on if this one explains it.
     fn explain(&mut self, slot: u16, level: Level, now: BootMs) -> &'static str {
-        let since = match self.alarms.change(slot, level, now) {
-            Some(since) => since,
-            None if level == Level::Stale => now,
-            None => return "",
+        let cause = if level == Level::Stale {
+            let since = self.alarms.change(slot, level, now).unwrap_or(now);
+            let cause = self.cause(Alarm::at(slot, level, since));
+            cause.inspect(|cause| self.alarms.silence(slot, *cause))
+        } else {
+            self.alarms.change(slot, level, now);
+            for place in 0..ALARMS_MAX {
+                if let Some(Standing { slot, level, since, .. }) = self.alarms.unexplained(place)
+                    && let Some(cause) = self.cause(Alarm::at(slot, level, since))
+                {
+                    self.alarms.explain(slot, Some(cause));
+                }
+            }
+            self.alarms.cause(slot)
         };
-        let cause = self
-            .alarms
-            .cause(slot)
-            .or_else(|| Some(root_cause(&Alarm::at(slot, level, since)?, self.standing())?.slot));
-        match cause {
-            Some(cause) if level == Level::Stale => self.alarms.silence(slot, cause),
-            _ => self.alarms.explain(slot, cause),
-        }
         cause.and_then(check_of).map_or("", |(cause, _)| cause.name)
+    }
+
+    fn cause(&self, effect: Option<Alarm>) -> Option<u16> {
+        Some(root_cause(&effect?, self.standing())?.slot)
     }
 
     fn standing(&self) -> impl Iterator<Item = Alarm> {
@@ -173,7 +179,9 @@ impl Health {
 
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
         let (check, instance) = check_of(slot)?;
-        let level = self.states.get(usize::from(slot))?.level()?;
+        let state =
+            self.states.get(usize::from(slot)).filter(|state| state.lasts(inputs.now, Millis::ZERO))?;
+        let level = state.level()?;
         let (value, limit) = if level == Level::Stale {
             (f32::NAN, f32::NAN)
         } else {
@@ -204,6 +212,12 @@ impl Health {
     pub fn lasts(&self, check: &Check, instance: u8, now: BootMs) -> bool {
         let state = slot_of(check.name, instance).and_then(|slot| self.states.get(usize::from(slot)));
         state.is_none_or(|state| state.lasts(now, Millis::from_secs(check.told_after_s.into())))
+    }
+
+    /// The alarm of a check that stands, and whether another one explains it by now.
+    pub fn alarm(&self, check: &str, instance: u8) -> Option<(Alarm, bool)> {
+        let known = self.alarms.of(slot_of(check, instance)?)?;
+        Some((Alarm::at(known.slot, known.level, known.since)?, known.is_explained()))
     }
 
     /// Of each check, in the order of [`checks`], the levels of its instances.

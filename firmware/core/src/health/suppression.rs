@@ -120,6 +120,13 @@ pub(super) const SENSORS: u64 =
 /// Whatever disturbs an estimator.
 pub(super) const DISTURBANCES: u64 = RECEIVERS | SENSORS | SHAKING;
 pub(super) const ESTIMATORS: u64 = Group::EkfClimb.bit() | Group::Ekf.bit();
+/// Made of several sensors.
+const DERIVED: u64 = ESTIMATORS
+    | Group::ImuGnss.bit()
+    | Group::GnssWord.bit()
+    | Group::VibrationWord.bit()
+    | Group::CompassUse.bit()
+    | Group::Failsafe.bit();
 /// An autopilot has a failsafe for these.
 pub(super) const FAILSAFES: u64 = Group::Silence.bit()
     | Group::Battery.bit()
@@ -146,6 +153,11 @@ impl Role {
 
     const fn explained_by(self) -> u64 {
         self.0 & ((1 << Self::SETS) - 1)
+    }
+
+    /// Whether its value is made of several sensors: the check of the one that is wrong may come later.
+    pub const fn is_derived(self) -> bool {
+        self.is_of(DERIVED)
     }
 
     const fn number(self) -> u8 {

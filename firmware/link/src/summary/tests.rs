@@ -367,6 +367,21 @@ fn warnings_wait_for_their_events_end_and_three_are_told_in_half_a_minute() {
 }
 
 #[test]
+fn an_estimator_waits_for_its_cause_and_gives_its_order_in_the_words_of_one_that_waits() {
+    let doubts = [comes(0, "ekf_test_ratio", 0, WARNING)];
+    assert_eq!(texts(&told(&doubts)), [(30, "EKF rejects position or speed")]);
+    let fails = [
+        doubts[0],
+        comes(5, "gps_stuck", 0, WARNING),
+        comes(8, "ekf_test_ratio", 0, CRITICAL),
+        comes(200, "ekf_test_ratio", 0, (Level::Ok, Level::Critical)),
+        comes(300, "gps_stuck", 0, (Level::Ok, Level::Warning)),
+    ];
+    let expected = [(8, "GPS 1 frozen, LAND, MANUAL"), (300, "over: GPS 1 frozen")];
+    assert_eq!(texts(&told(&fails)), expected);
+}
+
+#[test]
 fn what_is_not_critical_waits_for_the_end_of_what_is() {
     let told = told(&[comes(0, "gps_fix", 0, CRITICAL), comes(5, "vibration_rise", 0, WARNING)]);
     assert_eq!(texts(&told), [(0, "GPS 1 position lost, FLY MANUALLY"), (100, "vibration up")]);
@@ -375,7 +390,7 @@ fn what_is_not_critical_waits_for_the_end_of_what_is() {
 #[test]
 fn a_mishap_is_told_once_and_what_waits_is_its_consequence() {
     let mishap = [
-        comes(0, "compass_unused", 0, WARNING),
+        comes(0, "compass_stuck", 0, WARNING),
         comes(15, "roll_rate", 0, CRITICAL),
         comes(19, "baro_noise", 0, WARNING),
         comes(20, "sinking", 0, CRITICAL),
@@ -385,7 +400,7 @@ fn a_mishap_is_told_once_and_what_waits_is_its_consequence() {
         comes(400, "roll_rate", 0, (Level::Ok, Level::Critical)),
     ];
     let led_to = [
-        (10, "EKF dropped compass"),
+        (10, "compass 1 frozen"),
         (15, "roll does not follow, LAND NOW"),
         (20, "sinking fast, FLY FORWARD, CLIMB"),
     ];

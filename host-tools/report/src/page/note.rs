@@ -88,11 +88,12 @@ impl Cause {
 /// A box sends three texts in half a minute at most, and a warning at the end of its event.
 const AGAIN_S: f64 = 45.0;
 const OVER: &str = "over: ";
+const CAUSE: &str = "cause: ";
 
 /// Check, part, and the rest of the text.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
     let silent = words.strip_prefix("no data: ");
-    let words = words.strip_prefix(OVER).unwrap_or(words);
+    let words = words.strip_prefix(OVER).or_else(|| words.strip_prefix(CAUSE)).unwrap_or(words);
     let parts = |said: &Said| match instances(said.check) {
         // A trend that a box judged itself.
         0 if said.part.is_empty() => 1,
