@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
+use hums::check::causes::causes as causes_of;
 use hums::check::flights::Flight;
 use hums::check::judge::{Heard, Limits};
 use hums::check::judged::Judged;
@@ -10,7 +11,9 @@ use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::Place;
 use hums::source::told::Finding;
+use hums_core::clock::Span;
 use hums_core::health::Level;
+use hums_link::hold;
 
 use super::causes;
 use super::labels::Label;
@@ -41,6 +44,8 @@ pub(super) struct Fault {
     pub(super) told: Option<Alarm>,
     /// The first that names its cause.
     pub(super) named: Option<Alarm>,
+    /// Whether the first that a pilot hears names it.
+    pub(super) right_first: bool,
     /// The autopilot's first report: seconds after the fault.
     pub(super) autopilot: Option<(f64, String)>,
 }
@@ -90,6 +95,7 @@ fn learn(past: &[PathBuf]) -> Result<Baselines> {
 fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
     let recorded_s = judged.span.map_or(0.0, |(_, last)| last.as_secs_f64());
     let alarms = alarms(judged);
+    let heard = heard(&judged.findings);
     let quiet_s = label.and_then(|label| label.fault_s).unwrap_or(recorded_s);
     let air = match label.and_then(|label| label.flights.clone()) {
         Some(flights) => flights,
@@ -115,7 +121,7 @@ fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
         alarms: false_ones
             .map(|alarm| False { alarm: alarm.clone(), in_air: is_in_air(alarm.at_s) })
             .collect(),
-        fault: label.and_then(|label| fault(&alarms, label)),
+        fault: label.and_then(|label| fault(&alarms, &heard, label)),
         counts: label.and_then(|label| Some((truth(label)?, counted(judged)))),
     }
 }
@@ -148,15 +154,56 @@ fn alarms(judged: &Judged) -> Vec<Alarm> {
         .collect()
 }
 
-fn fault(alarms: &[Alarm], label: &Label) -> Option<Fault> {
+/// What a pilot hears, in order: a critical finding at once, a warning after its [`hold`] if it still stands. Not what another one explains by
+/// then. A critical finding that a milder one explains is told in that one's words.
+pub(super) fn heard(findings: &[Finding]) -> Vec<Alarm> {
+    let mut heard = Vec::new();
+    for (place, finding) in findings.iter().enumerate() {
+        let is_critical = finding.level == Level::Critical;
+        let wait = if is_critical { Span::ZERO } else { hold(&finding.check) };
+        let by_then = findings.partition_point(|other| other.at <= finding.at + wait);
+        let by_then = &findings[..by_then.max(place + 1)];
+        let is_same = |other: &&Finding| (&other.check, other.instance) == (&finding.check, finding.instance);
+        let is_so = by_then.iter().rfind(is_same).is_some_and(|last| last.level == finding.level);
+        if rank(finding.level) <= rank(finding.previous) || !is_so || cause(by_then, place).is_some() {
+            continue;
+        }
+        let milder: Vec<Finding> = by_then.iter().map(as_warning).collect();
+        let cause = cause(&milder, place).filter(|_| is_critical);
+        let at_s = (finding.at + wait).as_secs_f64();
+        heard.push(Alarm {
+            check: cause.unwrap_or_else(|| finding.check.clone()),
+            level: finding.level,
+            at_s,
+        });
+    }
+    heard.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
+    heard
+}
+
+fn cause(findings: &[Finding], place: usize) -> Option<String> {
+    causes_of(findings).swap_remove(place)
+}
+
+fn as_warning(finding: &Finding) -> Finding {
+    let level = if finding.level == Level::Critical { Level::Warning } else { finding.level };
+    Finding { level, ..finding.clone() }
+}
+
+fn fault(alarms: &[Alarm], heard: &[Alarm], label: &Label) -> Option<Fault> {
     let fault_s = label.fault_s?;
     let names = causes::of(&label.class).map_or(&[][..], |class| class.checks);
-    let mut after = alarms.iter().filter(|alarm| (fault_s..=label.end_s).contains(&alarm.at_s));
+    let is_of_fault = |alarm: &&Alarm| (fault_s..=label.end_s).contains(&alarm.at_s);
+    let mut after = alarms.iter().filter(is_of_fault);
     let since = |alarm: &Alarm| Alarm { at_s: alarm.at_s - fault_s, ..alarm.clone() };
     Some(Fault {
         visible: label.visible,
         told: after.clone().next().map(since),
         named: after.find(|alarm| names.contains(&alarm.check.as_str())).map(since),
+        right_first: heard
+            .iter()
+            .find(is_of_fault)
+            .is_some_and(|first| names.contains(&first.check.as_str())),
         autopilot: label.autopilot_said().map(|(delay_s, text)| (delay_s, text.to_owned())),
     })
 }
@@ -180,6 +227,9 @@ fn counted(judged: &Judged) -> Counts {
 
 #[cfg(test)]
 mod tests {
+    use hums_core::clock::Instant;
+    use hums_core::health::Subsystem;
+
     use super::*;
 
     fn alarm(check: &str, level: Level, at_s: f64) -> Alarm {
@@ -201,17 +251,52 @@ mod tests {
             alarm("gps_fix", Level::Critical, 64.0),
             alarm("batt_remaining", Level::Critical, 91.0),
         ];
-        let gnss = fault(&alarms, &label("gnss")).unwrap();
+        let gnss = fault(&alarms, &alarms, &label("gnss")).unwrap();
         assert_eq!(gnss.told, Some(alarm("ekf_alert", Level::Warning, 2.5)));
         assert_eq!(gnss.named, Some(alarm("gps_fix", Level::Critical, 4.0)));
-        let power = fault(&alarms, &label("power")).unwrap();
+        let power = fault(&alarms, &alarms, &label("power")).unwrap();
         assert_eq!(
             (power.told.is_some(), power.named),
             (true, None),
             "what comes after the end is of nothing"
         );
-        let missed = fault(&alarms[..1], &label("gnss")).unwrap();
+        assert!(!gnss.right_first && fault(&alarms, &alarms[2..], &label("gnss")).unwrap().right_first);
+        let missed = fault(&alarms[..1], &[], &label("gnss")).unwrap();
         assert_eq!((missed.told, missed.named), (None, None), "what was there before is no news");
+    }
+
+    fn finding(at_ms: u64, check: &str, level: Level) -> Finding {
+        Finding {
+            at: Instant::from_millis(at_ms),
+            subsystem: Subsystem::Navigation,
+            check: check.to_owned(),
+            instance: 0,
+            level,
+            previous: Level::Ok,
+            value: 1.0,
+            worst: None,
+            limit: 1.0,
+            unit: String::new(),
+        }
+    }
+
+    #[test]
+    fn a_pilot_hears_a_warning_after_its_hold_if_nothing_explains_it_and_a_critical_finding_at_once() {
+        let (warning, critical) = (Level::Warning, Level::Critical);
+        let heard = |findings: &[(u64, &str, Level)]| {
+            let findings: Vec<Finding> =
+                findings.iter().map(|(at, check, level)| finding(*at, check, *level)).collect();
+            let words = |alarm: &Alarm| format!("{:.1} {} {}", alarm.at_s, alarm.check, alarm.level.name());
+            heard(&findings).iter().map(words).collect::<Vec<_>>()
+        };
+        let found_late = [(0, "ekf_variance", warning), (2_000, "gps_stuck", warning)];
+        assert_eq!(heard(&found_late), ["3.0 gps_stuck warning"]);
+        let found_too_late = [(0, "ekf_variance", warning), (3_500, "gps_stuck", warning)];
+        assert_eq!(heard(&found_too_late), ["3.0 ekf_variance warning", "4.5 gps_stuck warning"]);
+        let worse = [found_late[0], (500, "gps_stuck", warning), (700, "ekf_failsafe", critical)];
+        assert_eq!(heard(&worse), ["0.7 gps_stuck critical", "1.5 gps_stuck warning"]);
+        assert_eq!(heard(&[found_late[0], (900, "ekf_variance", Level::Ok)]), [""; 0], "it is over");
+        assert_eq!(heard(&[(0, "gps_fix", critical), found_late[0]]), ["0.0 gps_fix critical"]);
     }
 
     #[test]

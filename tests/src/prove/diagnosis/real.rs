@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use super::causes::{self, Class};
 use super::judged::{Judged, with_label};
 use super::options::Known;
-use super::outcome::{count, rises};
+use super::outcome::{Alarm, count, heard, rises};
 use super::rates::{an_hour, hours, share};
 use super::table::{Form, records};
 
@@ -44,7 +44,7 @@ pub(super) const RATES: Form = Form {
     title: "Real flights",
     about: "Findings that the pilot receives: rises of a level without a cause among the other findings. Rates are per armed hour, \
             without unlabelled findings. A needless finding is true, but no pilot, mechanic or owner would act on it. Fault first: of so many known \
-            faults the first finding was of the failed part. Hours of simulators are in the air without a fault; each alarm in them is false.",
+            faults the first text to the pilot was of the failed part. Hours of simulators are in the air without a fault; each alarm in them is false.",
     columns: &[
         "flights",
         "judged",
@@ -148,7 +148,8 @@ struct Told {
 struct Outcome {
     name: String,
     armed_s: f64,
-    fault: Option<Fault>,
+    /// Of a known fault, whether the first that a pilot hears is of the part that failed.
+    right_first: Option<bool>,
     told: Vec<Told>,
 }
 
@@ -256,7 +257,7 @@ fn of(flight: &Flight, judged: &Judgement) -> Outcome {
     Outcome {
         name: flight.name.clone(),
         armed_s: judged.armed.as_millis() as f64 / 1e3,
-        fault: flight.fault,
+        right_first: flight.fault.map(|fault| is_right_first(&heard(&judged.findings), fault)),
         told: told.collect(),
     }
 }
@@ -274,8 +275,7 @@ pub(super) fn rates(real: &[Results], sets: &[Judged]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     for set in real {
         let armed_s = set.outcomes.iter().map(|one| one.armed_s).sum::<f64>();
-        let faulty = set.outcomes.iter().filter_map(|one| Some(is_right_first(&one.told, one.fault?)));
-        let right = right_first(faulty);
+        let right = right_first(set.outcomes.iter().filter_map(|one| one.right_first));
         for (level, name) in levels {
             let of = |wanted| {
                 let told = set.outcomes.iter().flat_map(|one| &one.told);
@@ -297,7 +297,7 @@ pub(super) fn rates(real: &[Results], sets: &[Judged]) -> Vec<Vec<String>> {
         }
         let air_s = flown.iter().map(|one| one.air_s).sum::<f64>();
         let faults = flown.iter().filter_map(|one| one.fault.as_ref()).filter(|fault| fault.visible);
-        let right = right_first(faults.map(|fault| fault.told.is_some() && fault.told == fault.named));
+        let right = right_first(faults.map(|fault| fault.right_first));
         for (level, level_name) in levels {
             let alarms = count(flown.iter().flat_map(|one| &one.alarms), level, true);
             let mut row = head("simulators", name, flown.len(), air_s, level_name);
@@ -321,8 +321,8 @@ fn right_first(faults: impl Iterator<Item = bool>) -> String {
     format!("{right} of {all} ({part}, at least {least})")
 }
 
-fn is_right_first(told: &[Told], fault: Fault) -> bool {
-    let first = told.iter().find(|one| fault.onset_s - EARLIER_S <= one.at_s);
+fn is_right_first(heard: &[Alarm], fault: Fault) -> bool {
+    let first = heard.iter().find(|one| fault.onset_s - EARLIER_S <= one.at_s);
     first.is_some_and(|first| fault.class.checks.contains(&first.check.as_str()))
 }
 
