@@ -170,35 +170,15 @@ impl Setting {
     }
 }
 
-/// Whether a component may go on. The numbers are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Status {
-    /// Well within its limits, or without any.
-    Green = 0,
-    /// Soon due.
-    Yellow = 1,
-    /// Due.
-    Red = 2,
-}
-
-impl Status {
-    /// The status of a stored number.
-    pub const fn from_number(number: u8) -> Self {
-        match number {
-            0 => Self::Green,
-            1 => Self::Yellow,
-            _ => Self::Red,
-        }
-    }
-
-    /// The name that reports use.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Green => "green",
-            Self::Yellow => "yellow",
-            Self::Red => "red",
-        }
+numbered! {
+    /// Whether a component may go on. The numbers are stored.
+    pub enum Status {
+        /// Well within its limits, or without any.
+        Green "green",
+        /// Soon due.
+        Yellow "yellow",
+        /// Due.
+        Red "red",
     }
 }
 

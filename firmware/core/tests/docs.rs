@@ -120,6 +120,7 @@ fn row(check: &Check) -> String {
         When::Armed => "armed",
         When::InFlight => "in flight",
     };
+    let [warning_debounce, critical_debounce] = check.debounce_ms.map(|ms| Millis::from_millis(ms.into()));
     let source = check.limits.critical.or(check.limits.warn).map_or("", |param| param.words().source);
     format!(
         "| {} | {} | {input} | {when} | {side} | {} | {} | {} | {}, {} | {} | {} | {source} |",
@@ -128,8 +129,8 @@ fn row(check: &Check) -> String {
         check.unit.name(),
         limit(check.limits.warn),
         limit(check.limits.critical),
-        seconds(check.debounce[0].span()),
-        seconds(check.debounce[1].span()),
+        seconds(warning_debounce),
+        seconds(critical_debounce),
         check.limits.hysteresis,
         check.stale_after().map_or_else(|| "–".to_owned(), seconds),
     )

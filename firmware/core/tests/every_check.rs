@@ -257,7 +257,7 @@ fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad
     let mut mine = run.of_check(name).filter(|finding| finding.instance == instance);
     let found = mine.clone().find(|finding| finding.level == level);
     let found = found.unwrap_or_else(|| panic!("{name} {instance} never {level:?}: {:?}", run.findings));
-    let debounce_ms = check.debounce[usize::from(level == Level::Critical)].span().as_millis();
+    let debounce_ms = check.debounce_ms[usize::from(level == Level::Critical)].into();
     let after_ms = found.at.as_millis().saturating_sub(FAULT_MS);
     // Speeds that are compared are smoothed: half again above the others is 30 % above after 0.9 s.
     let smoothing_ms = if name == "motor_imbalance" { 900 } else { 0 };

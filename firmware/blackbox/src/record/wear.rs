@@ -143,7 +143,7 @@ impl<'a> Component<'a> {
             place: fields.u8(),
             kind: ComponentKind::from_number(fields.u8()).unwrap_or_default(),
             number: fields.u8(),
-            status: Status::from_number(fields.u8()),
+            status: Status::from_number(fields.u8()).unwrap_or(Status::Red),
             replaced: fields.u32(),
             name: fields.text(),
             serial: fields.text(),

@@ -19,7 +19,7 @@ const ROLL: Check = Check {
     subsystem: Subsystem::Attitude,
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
-    debounce: after(500, 300),
+    debounce_ms: [500, 300],
     // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
     when: When::InFlight,
     stale_s: STALE,

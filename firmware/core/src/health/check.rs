@@ -19,11 +19,11 @@
 
 use core::num::NonZeroU8;
 
-use super::finding::{Finding, Level, Orders, Subsystem};
+use super::finding::{Level, Subsystem};
 use super::inputs::Inputs;
 use super::suppression::Role;
+use crate::bytes::fnv1a;
 use crate::latest::Reading;
-use crate::observation::Feeds;
 use crate::params::{Param, Params};
 use crate::time::{BootMs, Millis, Stamp};
 
@@ -124,7 +124,7 @@ impl Unit {
     /// A unit as it is written; empty for a plain number. A new one goes into `NAMES`.
     pub const fn of(name: &str) -> Self {
         let mut place = Self::FLAG.0 as usize + 1;
-        while !is_same(Self::NAMES[place], name) {
+        while fnv1a(Self::NAMES[place]) != fnv1a(name) {
             place += 1;
         }
         Self(place as u8)
@@ -141,31 +141,6 @@ impl Unit {
     /// As it is written.
     pub const fn name(self) -> &'static str {
         Self::NAMES[self.0 as usize]
-    }
-}
-
-const fn is_same(one: &str, other: &str) -> bool {
-    let (one, other) = (one.as_bytes(), other.as_bytes());
-    let mut at = 0;
-    while at < one.len() && at < other.len() && one[at] == other[at] {
-        at += 1;
-    }
-    at == one.len() && at == other.len()
-}
-
-/// A time of at most a minute, in two bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Debounce(u16);
-
-impl Debounce {
-    /// In milliseconds.
-    pub(super) const fn millis(millis: u16) -> Self {
-        Self(millis)
-    }
-
-    /// As a span.
-    pub const fn span(self) -> Millis {
-        Millis::from_millis(self.0 as u64)
     }
 }
 
@@ -218,8 +193,8 @@ pub struct Check {
     pub unit: Unit,
     /// Its limits.
     pub limits: Limits,
-    /// How long it must be bad before it is a warning, and before it is critical.
-    pub debounce: [Debounce; 2],
+    /// How long it must be bad before it is a warning, and before it is critical, milliseconds: a minute at most.
+    pub debounce_ms: [u16; 2],
     /// How long it must be bad before its warning is told, if that is longer, seconds.
     pub told_after_s: u8,
     /// When the check applies.
@@ -354,36 +329,6 @@ impl Check {
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
         let [warn, critical] = self.limits.values(params);
         if level == Level::Critical || warn.is_nan() { critical } else { warn }
-    }
-
-    pub(super) const fn finding(
-        &self,
-        instance: u8,
-        at: BootMs,
-        change: LevelChange,
-        feeds: Feeds,
-    ) -> Finding {
-        Finding {
-            at,
-            subsystem: self.subsystem,
-            check: self.name,
-            instance,
-            level: change.level,
-            previous: change.previous,
-            // NaN if a flag is no longer reported, or if a mishap ended: neither is known to be good.
-            value: if (self.unit.is_flag() && change.value < 0.0)
-                || (matches!(self.subsystem, Subsystem::Mishap) && matches!(change.level, Level::Ok))
-            {
-                f32::NAN
-            } else {
-                change.value
-            },
-            limit: change.limit,
-            unit: self.unit.name(),
-            feeds,
-            because: "",
-            orders: Orders::Own,
-        }
     }
 }
 
@@ -532,7 +477,7 @@ impl State {
         let level = self.level.unwrap_or(Level::Ok);
         let [warn, critical] = check.limits.values(params);
         let beyond = |limit: f32, margin: f32| check.limits.is_beyond(value, limit, margin);
-        let [debounce_warn, debounce_critical] = check.debounce.map(Debounce::span);
+        let [debounce_warn, debounce_critical] = check.debounce_ms.map(|ms| Millis::from_millis(ms.into()));
         let very_bad = self.samples.count(Samples::VERY_BAD, beyond(critical, 0.0), measured)
             & self.very_bad.run(beyond(critical, 0.0), now, debounce_critical);
         // Without a warning limit no warning precedes critical.

@@ -10,7 +10,7 @@ const ENGINE: Check = Check {
     subsystem: Subsystem::Engine,
     unit: Unit::of("degC"),
     limits: Limits::above(Some(Param::EngChtWarn), Some(Param::EngChtCrit), 5.0),
-    debounce: after(2_000, 1_000),
+    debounce_ms: [2_000, 1_000],
     stale_s: STALE,
     read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.cylinder_head?.0)),
     ..PLAIN

@@ -16,7 +16,7 @@ const RADIO: Check = Check {
     name: "rc_rssi",
     unit: Unit::of(""),
     limits: Limits::below(Some(Param::RcRssiWarn), Some(Param::RcRssiCrit), 2.0),
-    debounce: after(2_000, 1_000),
+    debounce_ms: [2_000, 1_000],
     when: When::Armed,
     stale_s: STALE,
     read: |inputs, _| inputs.vehicle.rc.read(|rc| rc.rssi.map(f32::from)),
@@ -27,7 +27,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Silence, 0), ..HEARTBEAT },
     row!("frames_lost" HEARTBEAT, above(LinkLossWarn LinkLossCrit 0.2),
         role: Role::of(Group::FramesLost, Group::Silence.bit()), unit: Unit::of("%"),
-        debounce: after(2_000, 2_000),
+        debounce_ms: [2_000, 2_000],
         read: |inputs, _| Some(Reading { at: inputs.link.at, value: inputs.link.frames_lost? * 100.0 })),
     // Positions that come tell nothing about their quality.
     row!("position_silent" HEARTBEAT, above(PosAgeWarn _ 0.0),

@@ -23,9 +23,7 @@ mod suppression;
 mod tables;
 mod vocabulary;
 
-pub use check::{
-    CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, Debounce, InstanceOf, Limits, Side, State, Unit, When,
-};
+pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, InstanceOf, Limits, Side, State, Unit, When};
 use check::{How, LevelChange, Reported};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
@@ -143,9 +141,24 @@ impl Health {
         change: LevelChange,
         because: &'static str,
     ) -> Finding {
-        let feeds = power::feeds(check, inputs, instance);
-        let orders = mishap::orders(check, inputs, || self.has_lost_drive());
-        Finding { because, orders, ..check.finding(instance, inputs.now, change, feeds) }
+        let LevelChange { level, previous, value, limit } = change;
+        // Neither a flag that is no longer reported nor a mishap that ended is known to be good.
+        let is_unknown = (check.unit.is_flag() && value < 0.0)
+            || (check.subsystem == Subsystem::Mishap && level == Level::Ok);
+        Finding {
+            at: inputs.now,
+            subsystem: check.subsystem,
+            check: check.name,
+            instance,
+            level,
+            previous,
+            value: if is_unknown { f32::NAN } else { value },
+            limit,
+            unit: check.unit.name(),
+            feeds: power::feeds(check, inputs, instance),
+            because,
+            orders: mishap::orders(check, inputs, || self.has_lost_drive()),
+        }
     }
 
     /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as

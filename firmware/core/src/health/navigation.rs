@@ -8,9 +8,9 @@ use crate::residual::Comparison;
 use crate::vehicle::RECEIVERS_MAX;
 
 /// Of values that are smoothed and beyond their usual range: three comparisons.
-const SMOOTHED: [Debounce; 2] = after(200, 1_000);
+const SMOOTHED: [u16; 2] = [200, 1_000];
 /// Four messages of a receiver at 5 Hz, two at 2 Hz. Dilutions of precision leap as satellites come and go, and wait longer.
-const RECEIVER_SAYS: [Debounce; 2] = after(600, 1_000);
+const RECEIVER_SAYS: [u16; 2] = [600, 1_000];
 const MARGIN: f32 = 0.5;
 
 const ESTIMATOR: Check = Check {
@@ -18,7 +18,7 @@ const ESTIMATOR: Check = Check {
     subsystem: Subsystem::Navigation,
     limits: Limits::above(Some(Param::EkfVarWarn), None, 0.05),
     // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
-    debounce: after(500, 1_000),
+    debounce_ms: [500, 1_000],
     when: When::InFlight,
     stale_s: STALE,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
@@ -28,7 +28,7 @@ const ESTIMATOR: Check = Check {
 const GNSS: Check = Check {
     name: "gps_satellites",
     limits: Limits::below(Some(Param::GpsSatsWarn), None, 0.0),
-    debounce: after(2_000, 1_000),
+    debounce_ms: [2_000, 1_000],
     instances: RECEIVERS_MAX as u8,
     of: InstanceOf::Receiver,
     read: |inputs, receiver| {
@@ -58,7 +58,7 @@ const STUCK: Check = Check {
     name: "accel_stuck",
     unit: Unit::of("s"),
     limits: Limits::above(Some(Param::StuckWarn), None, 0.0),
-    debounce: after(0, 1_000),
+    debounce_ms: [0, 1_000],
     alarm_only: true,
     of: InstanceOf::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
@@ -71,7 +71,7 @@ const SECOND: Check = Check {
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::Ahrs2TiltWarn), None, 2.0),
     // A check that names the faulty sensor comes first.
-    debounce: after(1_000, 1_000),
+    debounce_ms: [1_000, 1_000],
     instances: 1,
     of: InstanceOf::Vehicle,
     read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
@@ -103,10 +103,10 @@ pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::AccelMismatch, Group::AccelFault.bit() | VIBRATION), ..MISMATCH },
     row!("gyro_mismatch" MISMATCH, above(GyroMismWarn _ 0.02),
         role: Role::of(Group::GyroMismatch, Group::GyroFault.bit() | VIBRATION), unit: Unit::of("rad/s"),
-        debounce: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
+        debounce_ms: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
     // What shakes the accelerometer shakes the gyro.
     row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, VIBRATION),
-        unit: Unit::of("rad/s"), debounce: after(2_000, 0), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        unit: Unit::of("rad/s"), debounce_ms: [2_000, 0], stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate)),
     // It goes by the attitude and a receiver too.
     row!("imu_gps" MISMATCH, above(ImuGpsWarn _ 0.3),
@@ -114,25 +114,25 @@ pub(super) const CHECKS: &[Check] = &[
         of: InstanceOf::Vehicle, read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now)),
     row!("compass_mismatch" MISMATCH, above(MagMismWarn _ 5.0),
         role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()), unit: Unit::of("%"),
-        debounce: SMOOTHED,
+        debounce_ms: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor)),
     row!("compass_heading" MISMATCH, above(MagHeadWarn _ 3.0),
         role: Role::of(Group::CompassUse, COMPASS | TURNS), unit: Unit::of("deg"),
-        debounce: SMOOTHED, instances: 1, of: InstanceOf::Vehicle,
+        debounce_ms: SMOOTHED, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| residual(inputs, Comparison::MagHeading)),
     row!("baro_mismatch" MISMATCH, above(BaroMismWarn _ 1.0),
         role: Role::of(Group::Sensor, Group::BaroFault.bit()), unit: Unit::of("m"),
-        debounce: SMOOTHED,
+        debounce_ms: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor)),
     row!("baro_height" MISMATCH, above(BaroGpsWarn _ 1.0),
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS), unit: Unit::of("m"),
-        debounce: after(1_000, 1_000), instances: 1, of: InstanceOf::Sensor,
+        debounce_ms: [1_000, 1_000], instances: 1, of: InstanceOf::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroGnss)),
     row!("baro_noise" MISMATCH, above(BaroNoiseWarn _ 0.5),
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()), unit: Unit::of("m"),
         instances: 1, of: InstanceOf::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroNoise)),
     row!("ekf_climb" MISMATCH, above(EkfClimbWarn EkfClimbCrit 1.0),
-        role: Role::of(Group::EkfClimb, DISTURBANCES), unit: Unit::of("m/s"), debounce: after(500, 500),
+        role: Role::of(Group::EkfClimb, DISTURBANCES), unit: Unit::of("m/s"), debounce_ms: [500, 500],
         instances: 1, of: InstanceOf::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroClimb)),
     SECOND,
     row!("ahrs2_height" SECOND, above(Ahrs2HgtWarn Ahrs2HgtCrit 1.0), unit: Unit::of("m"),
@@ -143,7 +143,7 @@ pub(super) const CHECKS: &[Check] = &[
     row!("gyro_stuck" STUCK, role: Role::of(Group::GyroFault, 0),
         read: |inputs, sensor| stuck(inputs, Kind::Gyro, sensor)),
     // What changed all compasses is in one message up to 0.2 s before another.
-    row!("compass_stuck" STUCK, role: Role::of(Group::CompassFault, 0), debounce: after(300, 1_000),
+    row!("compass_stuck" STUCK, role: Role::of(Group::CompassFault, 0), debounce_ms: [300, 1_000],
         read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor)),
     row!("baro_stuck" STUCK, role: Role::of(Group::BaroFault, 0),
         read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor)),
@@ -151,10 +151,10 @@ pub(super) const CHECKS: &[Check] = &[
     row!("gps_stuck" STUCK, role: Role::of(Group::GnssFrozen, 0), instances: RECEIVERS_MAX as u8,
         of: InstanceOf::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver)),
-    Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce: RECEIVER_SAYS, ..GNSS },
+    Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce_ms: RECEIVER_SAYS, ..GNSS },
     row!("gps_sats_fall" GNSS, above(GpsSatsFall _ 5.0),
     role: Role::of(Group::SatellitesLost, Group::GnssLost.bit() | Group::GnssQuality.bit()),
-    unit: Unit::of("%"), debounce: after(1_000, 1_000), stale_s: None, read: |inputs, receiver| {
+    unit: Unit::of("%"), debounce_ms: [1_000, 1_000], stale_s: None, read: |inputs, receiver| {
         let residuals = &inputs.derived.crosschecks.residuals;
         gnss_constellation::satellites_lost(residuals, inputs.now, receiver)
     }),
@@ -168,7 +168,7 @@ pub(super) const CHECKS: &[Check] = &[
     // It goes by the barometer too.
     row!("gps_height" GNSS, above(GpsHeightWarn _ 1.0),
         role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()), unit: Unit::of("m"),
-        debounce: after(200, 1_000), stale_s: None, instances: 1, of: InstanceOf::Vehicle,
+        debounce_ms: [200, 1_000], stale_s: None, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks.heights.receiver_leapt(inputs.now)),
     row!("gps_hdop" GNSS, above(GpsHdopWarn _ 0.1), role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
     read: |inputs, receiver| {
@@ -179,16 +179,16 @@ pub(super) const CHECKS: &[Check] = &[
     }),
     row!("gps_hdop_rise" GNSS, above(GpsHdopRise _ 0.1),
     role: Role::of(Group::GnssWord, Group::GnssLost.bit() | Group::GnssQuality.bit() | Group::SatellitesLost.bit()),
-    unit: Unit::of("times"), debounce: after(1_000, 1_000), stale_s: None, read: |inputs, receiver| {
+    unit: Unit::of("times"), debounce_ms: [1_000, 1_000], stale_s: None, read: |inputs, receiver| {
         gnss_constellation::hdop_rise(&inputs.derived.crosschecks.residuals, inputs.now, receiver)
     }),
     row!("gps_accuracy" GNSS, above(GpsHaccWarn _ 0.1),
         role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), unit: Unit::of("m"),
-        debounce: RECEIVER_SAYS,
+        debounce_ms: RECEIVER_SAYS,
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| gnss.accuracy.map(|accuracy| accuracy.0))),
     // Two messages without one.
     row!("gps_fix" GNSS, below(_ GpsFixCrit 0.0), role: Role::of(Group::GnssLost, 0), unit: Unit::FLAG,
-        debounce: after(2_000, 200),
+        debounce_ms: [2_000, 200],
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix)))),
     // A receiver that mitigates jamming has a good fix.
     row!("gps_jamming" GNSS, above(_ GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),

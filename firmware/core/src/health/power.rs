@@ -12,7 +12,7 @@ const BATTERY: Check = Check {
     subsystem: Subsystem::Power,
     unit: Unit::of("%"),
     limits: Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0),
-    debounce: after(2_000, 2_000),
+    debounce_ms: [2_000, 2_000],
     stale_s: STALE_SLOW,
     instances: BATTERIES,
     of: InstanceOf::Supply,
@@ -24,17 +24,17 @@ pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::Battery, 0), ..BATTERY },
     // ArduPilot's low voltage timer is 10 s: a sag under full throttle is not an empty battery.
     row!("cell_voltage" BATTERY, below(CellVoltWarn CellVoltCrit 0.05), role: Role::of(Group::Battery, 0),
-        unit: Unit::of("V"), debounce: after(10_000, 5_000), when: When::Armed,
+        unit: Unit::of("V"), debounce_ms: [10_000, 5_000], when: When::Armed,
         read: |inputs, battery| inputs.derived.cell_voltage(inputs.vehicle, inputs.params, battery)),
     row!("cell_deviation" BATTERY, above(CellDevWarn CellDevCrit 0.01),
-        role: Role::of(Group::FailsafeCause, 0), unit: Unit::of("V"), debounce: after(10_000, 10_000),
+        role: Role::of(Group::FailsafeCause, 0), unit: Unit::of("V"), debounce_ms: [10_000, 10_000],
         when: When::Armed, of: InstanceOf::Battery, read: |inputs, battery| of(inputs, battery, spread_v)),
     // AirData: above the warning's limit for a minute is as bad as far above it.
     row!("cell_dev_lasting" BATTERY, above(_ CellDevWarn 0.01), unit: Unit::of("V"),
-        debounce: after(2_000, 60_000), when: When::Armed, of: InstanceOf::Battery,
+        debounce_ms: [2_000, 60_000], when: When::Armed, of: InstanceOf::Battery,
         read: |inputs, battery| of(inputs, battery, spread_v)),
     // A trend holds until the next figure.
-    row!("batt_resistance" BATTERY, above(BatResWarn BatResCrit 5.0), debounce: after(10_000, 10_000),
+    row!("batt_resistance" BATTERY, above(BatResWarn BatResCrit 5.0), debounce_ms: [10_000, 10_000],
     when: When::InFlight, stale_s: None, of: InstanceOf::Battery, read: |inputs, battery| {
         let resistance = inputs.derived.resistance(usize::from(battery))?;
         of(inputs, battery, |_| resistance.rise_percent())
@@ -56,10 +56,10 @@ pub(super) const CHECKS: &[Check] = &[
         })
     }),
     row!("rail_5v_low" BATTERY, below(RailLowWarn RailLowCrit 0.05), unit: Unit::of("V"),
-        debounce: after(1_000, 500), when: When::Armed, stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        debounce_ms: [1_000, 500], when: When::Armed, stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0))),
     row!("rail_5v_high" BATTERY, above(RailHighWarn _ 0.05), unit: Unit::of("V"),
-        debounce: after(1_000, 2_000), stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        debounce_ms: [1_000, 2_000], stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
         read: |inputs, _| inputs.vehicle.rails.read(|rails| Some(rails.vcc?.0))),
     due!("battery_due" Power),
     alert!(Power Power, Role::of(Group::FailsafeCause, Group::Battery.bit() | Group::BatteryState.bit())),

@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU8;
 
-pub(super) use super::check::{Check, Debounce, InstanceOf, Limits, Read, Unit, When};
+pub(super) use super::check::{Check, InstanceOf, Limits, Read, Unit, When};
 pub(super) use super::finding::{Orders, Subsystem};
 pub(super) use super::inputs::Inputs;
 pub(super) use super::suppression::{
@@ -24,7 +24,7 @@ pub(super) const PLAIN: Check = Check {
     subsystem: Subsystem::Power,
     unit: Unit::of(""),
     limits: Limits::above(None, None, 0.0),
-    debounce: after(0, 0),
+    debounce_ms: [0, 0],
     told_after_s: 0,
     when: When::Always,
     stale_s: None,
@@ -34,11 +34,6 @@ pub(super) const PLAIN: Check = Check {
     of: InstanceOf::Vehicle,
     read: |_, _| None,
 };
-
-/// Debounces in ms.
-pub(super) const fn after(warning_ms: u16, critical_ms: u16) -> [Debounce; 2] {
-    [Debounce::millis(warning_ms), Debounce::millis(critical_ms)]
-}
 
 /// A row of a table of checks: its name, the row that it is like, its limits, and the fields in which it differs. The limits:
 /// of a warning, of a critical level (`_`: none), and the hysteresis.
@@ -88,7 +83,7 @@ pub(super) fn said(inputs: &Inputs<'_>, cause: Cause) -> Option<Reading> {
 pub(super) const DUE: Check = Check {
     unit: Unit::of("%"),
     limits: Limits::above(Some(Param::CompYellow), Some(Param::CompRed), 0.0),
-    debounce: after(1_000, 1_000),
+    debounce_ms: [1_000, 1_000],
     // A part that is not due does not make its subsystem healthy.
     alarm_only: true,
     ..PLAIN

@@ -8,7 +8,7 @@ const CHECK: Check = Check {
     subsystem: Subsystem::Attitude,
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
-    debounce: [Debounce::millis(500), Debounce::millis(200)],
+    debounce_ms: [500, 200],
     when: When::Always,
     stale_s: NonZeroU8::new(1),
     instances: 1,
@@ -61,9 +61,8 @@ fn a_level_is_what_its_values_of_some_time_say() {
     let alone = Limits { warn: None, ..above };
     let battery = Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0);
     let cell = Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05);
-    let minute = Debounce::millis(60_000);
-    let [usual, none, long] = [CHECK.debounce, [Debounce::millis(0); 2], [minute; 2]];
-    let groups: [(Limits, [Debounce; 2], u8, Cases); 8] = [
+    let [usual, none, long] = [CHECK.debounce_ms, [0; 2], [60_000; 2]];
+    let groups: [(Limits, [u16; 2], u8, Cases); 8] = [
         (
             above,
             usual,
@@ -115,8 +114,8 @@ fn a_level_is_what_its_values_of_some_time_say() {
             &[("0 =10, 20000 =170, 40000 =170, 42000", "5050 stale, 40200 critical | critical")],
         ),
     ];
-    for (limits, debounce, stale_s, cases) in groups {
-        let check = Check { limits, debounce, stale_s: NonZeroU8::new(stale_s), ..CHECK };
+    for (limits, debounce_ms, stale_s, cases) in groups {
+        let check = Check { limits, debounce_ms, stale_s: NonZeroU8::new(stale_s), ..CHECK };
         for (script, expected) in cases {
             for start_ms in [0, u64::from(u32::MAX) - 1_050] {
                 assert_eq!(changes(&check, script, start_ms), *expected, "{script}");
