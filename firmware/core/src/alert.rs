@@ -68,10 +68,8 @@ impl Flags {
 state! {
     /// The standing alerts of the autopilot. Only those of the armed time count: earlier ones are about arming.
     pub struct Alerts {
-        /// For each cause its urgency; until when a single report holds, ms; the time of the last report.
-        told: [Option<Urgency>; Cause::COUNT] = [None; Cause::COUNT],
-        until_ms: [u32; Cause::COUNT] = [0; Cause::COUNT],
-        told_at: Stamp,
+        /// For each cause its urgency, and until when a single report holds.
+        told: [Option<(Urgency, BootMs)>; Cause::COUNT] = [None; Cause::COUNT],
         /// Last time of a cause that was not reported just before, or of an emergency state.
         began_at: Stamp,
         emergency: bool,
@@ -117,21 +115,15 @@ impl Alerts {
     pub(crate) fn tell(&mut self, at: BootMs, alert: Alert) {
         let is_last_word = (alert.cause == Cause::Crash || alert.urgency == Urgency::Critical)
             && self.armed_at.age(at).is_some_and(|age| age <= DISARMED);
-        let place = alert.cause as usize;
-        let (Some(told), Some(until_ms)) = (self.told.get_mut(place), self.until_ms.get_mut(place)) else {
-            return;
-        };
-        if !self.armed && !is_last_word {
-            return;
-        }
-        self.told_at = Stamp::at(at);
-        let held = told.filter(|_| !is_past(at, *until_ms));
+        let counts = self.armed || is_last_word;
+        let Some(told) = self.told.get_mut(alert.cause as usize).filter(|_| counts) else { return };
+        let held = told.filter(|(_, until)| !at.is_after(*until)).map(|(urgency, _)| urgency);
         if held.is_none() && alert.urgency != Urgency::Over {
             self.began_at = Stamp::at(at);
         }
-        (*told, *until_ms) = match alert.urgency {
-            Urgency::Over => (told.map(|_| Urgency::Over), at.as_millis() as u32),
-            urgency => (Some(held.unwrap_or(urgency).max(urgency)), (at + HOLDS).as_millis() as u32),
+        *told = match alert.urgency {
+            Urgency::Over => told.map(|_| (Urgency::Over, at)),
+            urgency => Some((held.unwrap_or(urgency).max(urgency), at + HOLDS)),
         };
     }
 
@@ -155,11 +147,6 @@ impl Alerts {
         self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix, in_air));
     }
 
-    /// Whether flags were ever received: then each cause has a level.
-    pub(crate) fn has_flags(&self) -> bool {
-        self.flags().iter().any(|flags| flags.at.is_set())
-    }
-
     const fn flags(&self) -> [&Flags; 3] {
         [&self.sensors, &self.failures, &self.estimator]
     }
@@ -170,16 +157,19 @@ impl Alerts {
     /// - [`ENDED`]: it is no longer reported.
     /// - `None`: it was never reported.
     pub fn level(&self, now: BootMs, cause: Cause, in_mishap: bool) -> Option<f32> {
-        let (told, until_ms) = (self.told.get(cause as usize)?, self.until_ms.get(cause as usize)?);
+        let told = self.told.get(cause as usize)?;
+        let urgency = told.map(|(urgency, _)| urgency);
         let is_judged = self.armed && !in_mishap;
         let is_flagged = is_judged
             && self.flags().iter().any(|flags| flags.has(now, cause))
             && (cause != Cause::RemoteControl || self.had.has(cause));
-        let held = told.filter(|urgency| *urgency != Urgency::Over && !is_past(now, *until_ms));
+        let holds = told.is_some_and(|(_, until)| !now.is_after(until));
+        let held = urgency.filter(|urgency| *urgency != Urgency::Over && holds);
         let wrong = held.max(is_flagged.then_some(Urgency::Warning));
-        let is_over = *told == Some(Urgency::Over) || is_judged && self.is_cleared(now, cause);
+        let is_over = urgency == Some(Urgency::Over) || is_judged && self.is_cleared(now, cause);
         let good = if is_over { f32::from(Urgency::Over as u8) } else { ENDED };
-        let was_said = self.has_flags() || told.is_some();
+        // Once flags were received each cause has a level.
+        let was_said = told.is_some() || self.flags().iter().any(|flags| flags.at.is_set());
         wrong.map(|urgency| f32::from(urgency as u8)).or(was_said.then_some(good))
     }
 
@@ -193,11 +183,6 @@ impl Alerts {
             || (Causes::of_failure_flags(u16::MAX).has(cause) && comes(&self.failures))
             || (by_estimator && comes(&self.estimator))
     }
-}
-
-/// Times are in milliseconds modulo 2^32.
-const fn is_past(now: BootMs, until_ms: u32) -> bool {
-    (now.as_millis() as u32).wrapping_sub(until_ms).cast_signed() > 0
 }
 
 #[cfg(test)]

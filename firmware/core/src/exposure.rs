@@ -75,7 +75,7 @@ state! {
     /// Time in ranges.
     pub struct Exposure {
         last: Option<BootMs>,
-        session: Tenths,
+        pub(crate) session: Tenths,
         before: Tenths,
         /// The power-on before which `before` counts.
         as_of: u32,
@@ -112,21 +112,13 @@ impl Exposure {
 
     /// Every range that the airframe was in, this session included.
     pub fn for_each_of_life(&self, each: impl FnMut(ExposureQuantity, usize, f64)) {
-        visit(&self.lifetime(), each);
-    }
-
-    fn lifetime(&self) -> Tenths {
         let mut both = self.before;
         add(&mut both, &self.session);
-        both
+        visit(&both, each);
     }
 
     pub(crate) fn forget_life(&mut self) {
         self.before = Tenths::default();
-    }
-
-    pub(crate) const fn session(&self) -> &Tenths {
-        &self.session
     }
 
     /// Adds the session of power-on `boots`, unless it is counted already.
@@ -203,7 +195,7 @@ mod tests {
         heat(&mut exposure, 21_050, 22_050, 1e9);
         heat(&mut exposure, 90_000, 90_500, 200.0);
         assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
-        let session = *exposure.session();
+        let session = exposure.session;
         let mut stored = [0; Exposure::BYTES];
         exposure.as_of(8).encode(&mut stored);
         let mut exposure = Exposure::decode(&stored).expect("readable");

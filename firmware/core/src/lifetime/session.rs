@@ -23,7 +23,7 @@
 use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
 use crate::bytes::{Fields, fields};
 use crate::exposure::{BINS, Exposure, ExposureQuantity, Tenths};
-use crate::usage::{Form, Totals, UsageCounter, Wear};
+use crate::usage::{Form, Totals, Usage, UsageCounter, Wear};
 use crate::vehicle::BATTERIES_MAX;
 
 const RANGE_BYTES: usize = (BINS * ExposureQuantity::ALL.len()).div_ceil(8);
@@ -37,44 +37,21 @@ pub struct Session {
     pub heard: bool,
     /// Its counters.
     pub totals: Totals,
-    battery_cycles: [f64; BATTERIES_MAX],
-    exposure: Tenths,
+    pub(super) battery_cycles: [f64; BATTERIES_MAX],
+    pub(crate) exposure: Tenths,
 }
 
 impl Session {
     /// Bytes that a quad with four ESCs needs after half an hour, generously.
     pub const BYTES_TYPICAL: usize = 160;
 
-    #[cfg(test)]
-    pub(super) const fn of(
-        boots: u32,
-        totals: &Totals,
-        battery_cycles: [f64; BATTERIES_MAX],
-        exposure: Tenths,
-    ) -> Self {
-        Self { boots, heard: true, totals: *totals, battery_cycles, exposure }
-    }
-
-    pub(crate) fn now(
-        boots: u32,
-        heard: bool,
-        totals: &Totals,
-        wear: &Wear<'_>,
-        exposure: &Exposure,
-    ) -> Self {
-        let mut battery_cycles = [0.0; BATTERIES_MAX];
-        for (to, cycles) in battery_cycles.iter_mut().zip(wear.battery_cycles) {
-            *to = *cycles;
-        }
-        Self { boots, heard, totals: *totals, battery_cycles, exposure: *exposure.session() }
+    pub(crate) fn now(boots: u32, heard: bool, usage: &Usage, exposure: &Exposure) -> Self {
+        let (totals, battery_cycles) = (usage.totals(), *usage.wear().battery_cycles);
+        Self { boots, heard, totals, battery_cycles, exposure: exposure.session }
     }
 
     pub(crate) const fn wear(&self) -> Wear<'_> {
         Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
-    }
-
-    pub(crate) const fn exposure(&self) -> &Tenths {
-        &self.exposure
     }
 }
 

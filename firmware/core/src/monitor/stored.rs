@@ -65,7 +65,7 @@ impl Monitor {
             ItemKey::Session => {
                 let session = Session::decode(stored)?;
                 self.before.add(&session);
-                self.exposure.add(session.boots, session.exposure());
+                self.exposure.add(session.boots, &session.exposure);
                 self.components
                     .iter_mut()
                     .for_each(|component| component.add(session.boots, &session.wear()));
@@ -96,10 +96,7 @@ impl Monitor {
                 let component = self.components.get(usize::from(place)).copied().unwrap_or_default();
                 component.as_of(boots).encode(out)
             }
-            ItemKey::Session => {
-                let (totals, wear) = (self.usage.totals(), self.usage.wear());
-                Session::now(boots, self.heard(), &totals, &wear, &self.exposure).encode(out)
-            }
+            ItemKey::Session => Session::now(boots, self.heard(), &self.usage, &self.exposure).encode(out),
         }
     }
 

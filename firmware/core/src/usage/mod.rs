@@ -24,15 +24,6 @@ use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Greater accelerations, m/s2 or g, are garbage: no vehicle here reaches them.
 const ACCELERATION_MAX: f32 = 10_000.0;
-const LOAD_CYCLES: [UsageCounter; 7] = [
-    UsageCounter::LoadCycles0,
-    UsageCounter::LoadCycles1,
-    UsageCounter::LoadCycles2,
-    UsageCounter::LoadCycles3,
-    UsageCounter::LoadCycles4,
-    UsageCounter::LoadCycles5,
-    UsageCounter::LoadCycles6,
-];
 
 state! {
     /// Usage since power-on.
@@ -55,6 +46,8 @@ state! {
 const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// A load factor that turns back by less is vibration and noise.
 const LOAD_TURN_G: f32 = 0.1;
+const _: () =
+    assert!(UsageCounter::Landing.place() - UsageCounter::Ground.place() == Phase::Landing as usize);
 
 impl Usage {
     /// Takes an observation's extremes, which a step could miss.
@@ -155,7 +148,9 @@ impl Usage {
         }
         if is_known {
             let landing_s = core::mem::take(&mut self.landing_s);
-            self.totals.add(regime(flight.phase(now, vehicle)), step_s + landing_s);
+            // The regimes follow each other as the phases do.
+            let regime = UsageCounter::Ground.place() + flight.phase(now, vehicle) as usize;
+            self.totals.add(UsageCounter::ALL[regime], step_s + landing_s);
         } else if reports {
             self.landing_s += step_s;
         }
@@ -210,8 +205,9 @@ impl Usage {
     /// Every counter as it stands now.
     pub fn totals(&self) -> Totals {
         let mut totals = self.totals;
-        for (bin, counter) in LOAD_CYCLES.into_iter().enumerate() {
-            totals.set(counter, self.load_cycles.cycles(bin));
+        let cycles = UsageCounter::ALL.iter().skip(UsageCounter::LoadCycles0.place());
+        for (bin, counter) in cycles.take(LOAD_RANGES_G.len()).enumerate() {
+            totals.set(*counter, self.load_cycles.cycles(bin));
         }
         totals
     }
@@ -219,10 +215,7 @@ impl Usage {
     /// A counter's value; `None` for a minimum that was never measured, and for battery cycles without a known
     /// capacity.
     pub fn value(&self, counter: UsageCounter) -> Option<f64> {
-        match LOAD_CYCLES.into_iter().position(|cycles| cycles == counter) {
-            Some(bin) => Some(self.load_cycles.cycles(bin)),
-            None => self.totals.value(counter),
-        }
+        self.totals().value(counter)
     }
 
     pub(crate) fn until(&self) -> BootMs {
@@ -236,17 +229,5 @@ impl Usage {
     /// The wear of components.
     pub const fn wear(&self) -> Wear<'_> {
         Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
-    }
-}
-
-const fn regime(phase: Phase) -> UsageCounter {
-    match phase {
-        Phase::Ground => UsageCounter::Ground,
-        Phase::TakeOff => UsageCounter::TakeOff,
-        Phase::Hover => UsageCounter::Hover,
-        Phase::Climb => UsageCounter::Climb,
-        Phase::Cruise => UsageCounter::Cruise,
-        Phase::Descent => UsageCounter::Descent,
-        Phase::Landing => UsageCounter::Landing,
     }
 }

@@ -2,6 +2,7 @@
 
 use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter};
 use crate::observation::MOTORS_MAX;
+use crate::vehicle::BATTERIES_MAX;
 
 state! {
     /// Run time and revolutions of one motor.
@@ -100,7 +101,7 @@ pub struct Wear<'a> {
     /// The session's counters.
     pub totals: &'a Totals,
     /// Full discharges of each battery.
-    pub battery_cycles: &'a [f64],
+    pub battery_cycles: &'a [f64; BATTERIES_MAX],
 }
 
 #[cfg(test)]
