@@ -171,7 +171,7 @@ mod tests {
         vehicle.observe(BootMs::ZERO, AUTOPILOT, &Observation::Heartbeat(Heartbeat::default()));
         for now_ms in (from_ms..to_ms).step_by(50) {
             let now = BootMs::from_millis(now_ms);
-            let processor = Processor { temperature: Some(Celsius(celsius)), voltage: None };
+            let processor = Processor { temperature: Some(Celsius(celsius)) };
             vehicle.observe(now, AUTOPILOT, &Observation::Processor(processor));
             exposure.step(now, &vehicle, None);
         }

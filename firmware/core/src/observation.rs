@@ -9,7 +9,7 @@ use core::num::{NonZeroU16, NonZeroU32};
 use crate::cause::{Alert, Causes};
 use crate::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
-    Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
+    Position, Radians, RadiansPerSecond, Rpm, Volts,
 };
 
 /// Motors of one vehicle at most: a dodecacopter.
@@ -344,8 +344,6 @@ state! {
         pub current: Option<Amperes>,
         /// Charge taken since the start.
         pub consumed: Option<AmpereHours>,
-        /// Energy taken since the start.
-        pub energy: Option<WattHours>,
         /// What is left.
         pub remaining: Option<Fraction>,
         /// Of the battery.
@@ -507,12 +505,8 @@ state! {
         pub cylinder_head: Option<Celsius>,
         /// Exhaust gas.
         pub exhaust: Option<Celsius>,
-        /// Intake air.
-        pub intake: Option<Celsius>,
         /// Fuel pressure.
         pub fuel_pressure: Option<Hectopascals>,
-        /// Ignition supply.
-        pub ignition: Option<Volts>,
     }
 
     /// The generator of a hybrid drone: `GENERATOR_STATUS`.
@@ -567,8 +561,6 @@ state! {
     pub struct Processor {
         /// Its temperature.
         pub temperature: Option<Celsius>,
-        /// Its supply.
-        pub voltage: Option<Volts>,
     }
 
     /// Which autopilot it is: `AUTOPILOT_VERSION`.

@@ -41,8 +41,6 @@ units! {
     Amperes, "A", 10_000.0;
     /// Electric charge.
     AmpereHours, "Ah";
-    /// Energy.
-    WattHours, "Wh";
     /// Temperature.
     Celsius, "degC", 1_000.0;
     /// Length.

@@ -145,7 +145,7 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("radio_margin", 0, Level::Warning, |_, more| radio(more, [90, 90], [30, 85])),
     ("load", 0, Level::Critical, |quad, _| quad.system.load = Some(Fraction(0.97))),
     ("mcu_temperature", 0, Level::Critical, |_, more| {
-        more.push(Observation::Processor(Processor { temperature: Some(Celsius(105.0)), voltage: None }));
+        more.push(Observation::Processor(Processor { temperature: Some(Celsius(105.0)) }));
     }),
     ("autopilot_state", 0, Level::Critical, |_, more| {
         let kind = VehicleKind::Rotorcraft;
@@ -316,7 +316,7 @@ fn what_else_is_fitted_and_well_has_no_finding() {
         }));
         more.push(Observation::RadioControl(RadioControl { rssi: Some(200) }));
         radio(more, [90, 90], [30, 30]);
-        more.push(Observation::Processor(Processor { temperature: Some(Celsius(50.0)), voltage: None }));
+        more.push(Observation::Processor(Processor { temperature: Some(Celsius(50.0)) }));
     });
     assert_eq!(findings, []);
 }

@@ -18,7 +18,7 @@ use hums_core::status::{LinkReading, RecorderStatus, Recording};
 use hums_core::time::{BootMs, Millis};
 use hums_core::units::{
     AmpereHours, Amperes, Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2,
-    Position, Radians, RadiansPerSecond, Rpm, Volts, WattHours,
+    Position, Radians, RadiansPerSecond, Rpm, Volts,
 };
 use hums_core::usage::FIGURE_FIRST;
 
@@ -242,7 +242,7 @@ macro_rules! any_unit {
 
 any_unit! {
     AmpereHours Amperes Celsius Fraction Gauss Hectopascals Metres MetresPerSecond MetresPerSecond2 Radians
-    RadiansPerSecond Rpm Volts WattHours
+    RadiansPerSecond Rpm Volts
 }
 
 macro_rules! any_of {
@@ -268,17 +268,15 @@ any_of! {
     RadioControl { rssi }
     TelemetryRadio { rssi remote_rssi noise remote_noise errors }
     Rails { vcc servo }
-    Battery { id cells voltage current consumed energy remaining temperature faults lithium feeds charge }
+    Battery { id cells voltage current consumed remaining temperature faults lithium feeds charge }
     Estimator { scale velocity position_horizontal position_vertical compass flags }
     Vibration { scale levels clips }
     Esc { rpm voltage current temperature failures errors }
     EscGroup { first escs }
-    Engine {
-        healthy rpm load fuel_consumed fuel_flow cylinder_head exhaust intake fuel_pressure ignition
-    }
+    Engine { healthy rpm load fuel_consumed fuel_flow cylinder_head exhaust fuel_pressure }
     Generator { is_off speed }
     SpeedSensor { index rpm }
-    Processor { temperature voltage }
+    Processor { temperature }
     CommandAck { command result target }
     Source { system component }
     SecondEstimate { attitude position altitude }

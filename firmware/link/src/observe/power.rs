@@ -1,7 +1,7 @@
 //! Batteries and rails.
 
 use hums_core::observation::{Battery, CELLS_MAX, CellVoltage, Feeds, Rails};
-use hums_core::units::{AmpereHours, Celsius, Volts, WattHours};
+use hums_core::units::{AmpereHours, Celsius, Volts};
 use hums_dialect::ardupilotmega as ap;
 
 use super::fields::{current, percent, read, voltage};
@@ -30,7 +30,6 @@ pub(super) fn battery(payload: &[u8]) -> Option<Battery> {
         current: current(battery.current_battery),
         // -1 is unknown; PX4 scales its own -1 and then sends other negative numbers.
         consumed: (battery.current_consumed >= 0).then(|| AmpereHours(battery.current_consumed as f32 / 1e3)),
-        energy: (battery.energy_consumed >= 0).then(|| WattHours(battery.energy_consumed as f32 / 36.0)),
         remaining: percent(battery.battery_remaining),
         temperature: (battery.temperature != i16::MAX)
             .then(|| Celsius(f32::from(battery.temperature) / 100.0)),

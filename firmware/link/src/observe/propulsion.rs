@@ -73,12 +73,12 @@ fn group(first: u8) -> EscGroup {
     EscGroup { first, escs: [None; ESC_GROUP] }
 }
 
-/// Extension fields (ignition voltage, fuel pressure) are unknown at 0; a temperature of absolute zero is a sensor
-/// that is not there.
+/// The fuel pressure, an extension field, is unknown at 0; a temperature of absolute zero is a sensor that is not
+/// there.
 pub(super) fn engine(payload: &[u8]) -> Option<Engine> {
     let efi = read::<ap::EFI_STATUS_DATA>(payload, &[])?;
     let temperature = |degrees: f32| Celsius(degrees).finite().filter(|celsius| celsius.0 > -100.0);
-    let extension = |value: f32| (value.is_finite() && value != 0.0).then_some(value);
+    let pressure_kpa = Some(efi.fuel_pressure).filter(|value| value.is_finite() && *value != 0.0);
     Some(Engine {
         healthy: efi.health != 0,
         rpm: Rpm(efi.rpm).finite(),
@@ -87,9 +87,7 @@ pub(super) fn engine(payload: &[u8]) -> Option<Engine> {
         load: Fraction(efi.engine_load / 100.0).finite(),
         cylinder_head: temperature(efi.cylinder_head_temperature),
         exhaust: temperature(efi.exhaust_gas_temperature),
-        intake: temperature(efi.intake_manifold_temperature),
-        fuel_pressure: extension(efi.fuel_pressure).map(|kilopascals| Hectopascals(kilopascals * 10.0)),
-        ignition: extension(efi.ignition_voltage).map(Volts),
+        fuel_pressure: pressure_kpa.map(|kilopascals| Hectopascals(kilopascals * 10.0)),
     })
 }
 

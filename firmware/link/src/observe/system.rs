@@ -85,7 +85,7 @@ pub(super) fn processor(payload: &[u8]) -> Option<Processor> {
     let mcu = read::<ap::MCU_STATUS_DATA>(payload, &[])?;
     let temperature = (mcu.MCU_temperature != i16::MAX && mcu.MCU_temperature != 0)
         .then(|| Celsius(f32::from(mcu.MCU_temperature) / 100.0));
-    Some(Processor { temperature, voltage: voltage(mcu.MCU_voltage) })
+    Some(Processor { temperature })
 }
 
 pub(super) fn identity(payload: &[u8]) -> Option<AutopilotIdentity> {

@@ -175,7 +175,6 @@ fn battery_figures_have_their_own_scales_and_unknowns() {
     let message = ap::BATTERY_STATUS_DATA {
         current_battery: 2_734,
         current_consumed: 454,
-        energy_consumed: 360,
         temperature: i16::MAX,
         battery_remaining: 86,
         ..Default::default()
@@ -185,10 +184,9 @@ fn battery_figures_have_their_own_scales_and_unknowns() {
         (known.current, known.remaining, known.temperature),
         (Some(Amperes(27.34)), Some(Fraction(0.86)), None)
     );
-    assert!((known.energy.expect("known").0 - 10.0).abs() < 1e-5, "360 hJ are 10 Wh");
-    let unknown = ap::BATTERY_STATUS_DATA { current_consumed: -29, energy_consumed: -1, ..message };
+    let unknown = ap::BATTERY_STATUS_DATA { current_consumed: -29, ..message };
     let Some(Observation::Battery(unknown)) = said(&unknown) else { panic!() };
-    assert_eq!((unknown.consumed, unknown.energy), (None, None));
+    assert_eq!(unknown.consumed, None);
 }
 
 #[test]
@@ -282,14 +280,14 @@ fn an_estimator_that_has_not_started_has_no_variances() {
 }
 
 #[test]
-fn an_exhaust_at_absolute_zero_and_extensions_at_zero_are_unknown() {
+fn an_exhaust_at_absolute_zero_and_a_fuel_pressure_of_zero_are_unknown() {
     let message = ap::EFI_STATUS_DATA {
         exhaust_gas_temperature: -273.15,
         cylinder_head_temperature: 201.0,
         ..Default::default()
     };
     let Some(Observation::Engine(engine)) = said(&message) else { panic!() };
-    assert_eq!((engine.exhaust, engine.fuel_pressure, engine.ignition), (None, None, None));
+    assert_eq!((engine.exhaust, engine.fuel_pressure), (None, None));
     assert_eq!(engine.cylinder_head, Some(Celsius(201.0)));
 }
 

@@ -3,7 +3,7 @@
 use hums_core::observation::{
     Battery, CELLS_MAX, CellVoltage, ESC_GROUP, Esc, EscGroup, Observation, Processor, Rails, SpeedSensor,
 };
-use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts, WattHours};
+use hums_core::units::{AmpereHours, Amperes, Celsius, Fraction, Rpm, Volts};
 
 use super::handler::{Given, Handler, handler};
 use super::say::Out;
@@ -55,7 +55,6 @@ fn battery(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
         voltage: Some(Volts(volts)),
         current: current.map(Amperes),
         consumed: consumed_mah.map(|mah| AmpereHours(mah / 1e3)),
-        energy: given.single(4).map(WattHours),
         remaining: remaining.map(Fraction),
         // A battery without a thermometer has 0.
         temperature: given.single(5).filter(|celsius| *celsius != 0.0).map(Celsius),
@@ -111,9 +110,8 @@ fn processor(_: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
 
 fn observe_processor(given: &Given<'_>, first: usize, out: &mut Out<'_>) {
     let temperature = given.single(first).filter(|celsius| *celsius != 0.0).map(Celsius);
-    let voltage = volts(given, first + 1);
-    if temperature.is_some() || voltage.is_some() {
-        out.observe(&Observation::Processor(Processor { temperature, voltage }));
+    if temperature.is_some() {
+        out.observe(&Observation::Processor(Processor { temperature }));
     }
 }
 

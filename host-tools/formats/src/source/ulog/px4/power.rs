@@ -49,7 +49,6 @@ fn battery(px4: &mut Px4, sample: &Sample<'_>) {
         voltage: voltage.map(Volts),
         current: current.map(Amperes),
         consumed: when(fields.finite(6)).filter(|mah| *mah >= 0.0).map(|mah| AmpereHours(mah / 1e3)),
-        energy: None,
         remaining: remaining.map(|part| Fraction((part * 100.0).round() / 100.0)),
         temperature: when(fields.finite(7)).map(Celsius),
         faults: fields.count(8).unwrap_or(0) as u32,
