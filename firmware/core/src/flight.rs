@@ -217,9 +217,7 @@ impl Flight {
 
     pub(crate) fn is_steady(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         self.is_settled(now)
-            && vehicle.attitude.get().is_none_or(|attitude| {
-                attitude.roll.0.abs() < STEADY_TILT_RAD && attitude.pitch.0.abs() < STEADY_TILT_RAD
-            })
+            && vehicle.attitude.get().is_none_or(|attitude| attitude.lean_rad() < STEADY_TILT_RAD)
     }
 
     /// When it left the ground last, while it is in the air.

@@ -2,7 +2,7 @@
 
 use crate::flight::Flight;
 use crate::motion::{CLEAR_M, climb_mps};
-use crate::observation::{Attitude, Gnss, LandedState, VehicleKind};
+use crate::observation::{Gnss, LandedState, VehicleKind};
 use crate::time::{BootMs, FRESH, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::Vehicle;
 
@@ -81,8 +81,7 @@ impl Gates {
 
 fn is_level(now: BootMs, vehicle: &Vehicle) -> bool {
     let climbs = climb_mps(now, vehicle).is_some_and(|climb| climb.abs() > LEVEL_MPS);
-    let leans = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > LEANS_RAD;
-    !climbs && !vehicle.attitude.get().is_some_and(leans)
+    !climbs && !vehicle.attitude.get().is_some_and(|attitude| attitude.lean_rad() > LEANS_RAD)
 }
 
 fn is_clear(now: BootMs, vehicle: &Vehicle) -> bool {

@@ -16,9 +16,9 @@
 //! nothing is judged.
 
 use crate::motion::TILTED_RAD;
-use crate::observation::Imu;
+use crate::observation::{Attitude, Imu};
 use crate::time::{BootMs, FRESH, Millis, PAUSE, Stamp};
-use crate::units::{GRAVITY, MetresPerSecond2, Radians, RadiansPerSecond, norm};
+use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};
 
 /// Time constant of the force, of 0.53 Hz: a shock counts for little, a lasting turn fully.
 const SMOOTHING_S: f32 = 0.3;
@@ -197,18 +197,18 @@ impl Inertial {
     }
 
     /// The estimator's attitude.
-    pub(crate) fn take_attitude(&mut self, at: BootMs, roll: Radians, pitch: Radians) {
-        let tilt = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
+    pub(crate) fn take_attitude(&mut self, at: BootMs, attitude: &Attitude) {
+        let tilt = attitude.lean_rad();
         let tilted = self.tilted_since.run(tilt > TILTED_RAD, at, TILTED);
         let rests = self.is_fresh(at) && self.rests_since.age(at).is_some_and(|age| age >= LASTS);
-        if rests && tilted && (self.is_level(at) || self.is_carried_elsewhere(roll, pitch)) {
+        if rests && tilted && (self.is_level(at) || self.is_carried_elsewhere(attitude)) {
             self.contradicts = true;
         } else if rests && tilt < AGREES_RAD {
             self.contradicts = false;
         }
     }
 
-    fn is_carried_elsewhere(&self, roll: Radians, pitch: Radians) -> bool {
+    fn is_carried_elsewhere(&self, Attitude { roll, pitch, .. }: &Attitude) -> bool {
         const FAR: f32 = 0.707;
         let across = libm::cosf(pitch.0);
         let weight = [libm::sinf(pitch.0), -libm::sinf(roll.0) * across, -libm::cosf(roll.0) * across];
@@ -237,6 +237,7 @@ fn weight(step: Option<Millis>, constant_s: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Radians;
 
     /// Whether a still vehicle, carried with this force for three seconds, contradicts an attitude rolled by
     /// `roll_deg`, and then a level one.
@@ -253,7 +254,8 @@ mod tests {
                     ..Imu::default()
                 };
                 inertial.take(now, &imu);
-                inertial.take_attitude(now, Radians(roll_deg.to_radians()), Radians(0.05));
+                let (roll, pitch) = (Radians(roll_deg.to_radians()), Radians(0.05));
+                inertial.take_attitude(now, &Attitude { roll, pitch, ..Attitude::default() });
             }
             *said = inertial.contradicts(now);
         }

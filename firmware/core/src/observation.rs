@@ -211,7 +211,16 @@ state! {
         /// Milliseconds since the autopilot's boot. Every autopilot sends it here; `SYSTEM_TIME` only some do.
         pub boot_ms: Option<u32>,
     }
+}
 
+impl Attitude {
+    /// The greater one of roll and pitch, without its sign.
+    pub(crate) fn lean_rad(&self) -> f32 {
+        libm::fabsf(self.roll.0).max(libm::fabsf(self.pitch.0))
+    }
+}
+
+state! {
     /// What an estimator says that flies beside the one that is used: `ArduPilot`'s DCM where an EKF is used, an EKF where DCM is.
     pub struct SecondEstimate {
         /// Roll, pitch and yaw, as in [`Attitude`].

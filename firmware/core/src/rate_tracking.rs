@@ -67,10 +67,7 @@ state! {
 impl Thrust {
     pub(crate) fn take(&mut self, at: BootMs, hud: &Hud, vehicle: &Vehicle, is_settled: bool) {
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
-        let level = vehicle
-            .attitude
-            .get()
-            .is_none_or(|attitude| attitude.roll.0.abs() < LEANS_RAD && attitude.pitch.0.abs() < LEANS_RAD);
+        let level = vehicle.attitude.get().is_none_or(|attitude| attitude.lean_rad() < LEANS_RAD);
         if self.full_at.is_none_or(|before| at.since(before) > PAUSE) {
             self.full_since = None;
         }

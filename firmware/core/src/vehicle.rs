@@ -295,7 +295,7 @@ impl Vehicle {
                     self.take_boot_time(at, boot_ms);
                 }
                 self.inertial.take_rates(at, attitude.rates);
-                self.inertial.take_attitude(at, attitude.roll, attitude.pitch);
+                self.inertial.take_attitude(at, &attitude);
                 self.attitude.set(at, attitude);
             }
             Observation::Wanted(Wanted { roll, pitch, .. }) => {

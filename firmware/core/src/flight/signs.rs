@@ -295,7 +295,7 @@ impl Flight {
     /// No autopilot or pilot asks for rotors that pull downwards, except in modes for it.
     fn take_attitude(&mut self, at: BootMs, attitude: &Attitude, vehicle: &Vehicle, params: &Params) {
         let Attitude { roll, pitch, .. } = attitude;
-        let most = libm::fabsf(roll.0).max(libm::fabsf(pitch.0));
+        let most = attitude.lean_rad();
         if (most > TILTED_RAD || self.felt.rate_radps > TURNS_RADPS) && self.arming.is_on {
             self.tilted_at = Some(at);
         }

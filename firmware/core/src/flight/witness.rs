@@ -322,10 +322,7 @@ pub(super) fn is_on_wings(now: BootMs, vehicle: &Vehicle) -> bool {
 
 fn is_tilted(now: BootMs, vehicle: &Vehicle) -> bool {
     !vehicle.inertial.contradicts(now)
-        && vehicle
-            .attitude
-            .within(now, PAUSE)
-            .is_some_and(|attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD)
+        && vehicle.attitude.within(now, PAUSE).is_some_and(|attitude| attitude.lean_rad() > TILTED_RAD)
 }
 
 pub(super) fn is_fast(now: BootMs, vehicle: &Vehicle) -> bool {
