@@ -215,7 +215,6 @@ impl Derived {
         if slot.get().is_some_and(|known| !known.lithium) {
             return None;
         }
-        let at = if slot.get().is_some() { slot.at() } else { vehicle.system.at() };
         let lowest = slot
             .get()
             .filter(|known| known.cells_reported() > 1)
@@ -224,14 +223,13 @@ impl Derived {
             let cells = self.cell_count(vehicle, index, params);
             pack_v(vehicle, index).filter(|_| cells > 0).map(|pack_v| pack_v / f32::from(cells))
         };
-        Reading::new(at, lowest.or_else(share).map(|cell_v| cell_v + self.sag_v(vehicle, index, params)))
+        let value = lowest.or_else(share)? + self.sag_v(vehicle, index, params);
+        Some(Reading { at: vehicle.supply(index)?.at, value })
     }
 
     /// How far the load makes a cell's voltage sag; [`SAG_MAX_V`] at most.
     fn sag_v(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> f32 {
-        let known = vehicle.batteries.get(battery).and_then(Latest::get);
-        let system = || vehicle.system.get().and_then(|system| system.current);
-        let current = known.map_or_else(system, |known| known.current);
+        let current = vehicle.supply(battery).and_then(|supply| supply.current);
         let cells = f32::from(self.cell_count(vehicle, battery, params).max(1));
         let sag_v = self.resistance.get(battery).zip(current).map_or(0.0, |(of, current)| of.sag_v(current));
         (sag_v / cells).min(SAG_MAX_V)
@@ -272,9 +270,7 @@ pub(crate) fn load_factor_g(force: [MetresPerSecond2; 3]) -> Option<f32> {
 }
 
 pub(crate) fn pack_v(vehicle: &Vehicle, battery: usize) -> Option<f32> {
-    let known = vehicle.batteries.get(battery)?.get();
-    let system = || vehicle.system.get().filter(|_| battery == 0).and_then(|system| system.voltage);
-    known.map_or_else(system, |known| known.voltage).map(|voltage| voltage.0)
+    Some(vehicle.supply(battery)?.voltage?.0)
 }
 
 fn clips(vehicle: &Vehicle) -> Option<u32> {

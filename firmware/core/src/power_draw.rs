@@ -2,7 +2,7 @@
 
 use crate::time::{BootMs, PAUSE, SILENT};
 use crate::units::{Amperes, Volts};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{BATTERIES_MAX, Supply, Vehicle};
 
 /// Voltage of the first battery (or the autopilot's figure if none reports itself), and discharge current and power
 /// of all batteries. Without a battery current: the sum of all ESCs (PX4 in simulation).
@@ -15,13 +15,8 @@ pub(crate) struct Drawn {
 
 pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> Drawn {
     let mut drawn = Drawn::default();
-    let batteries = vehicle.batteries.iter();
-    for battery in batteries.clone().filter_map(|slot| slot.within(now, SILENT)) {
-        drawn.add(battery.voltage, battery.current);
-    }
-    let none_reported = batteries.clone().all(|slot| slot.get().is_none());
-    if let Some(system) = vehicle.system.within(now, SILENT).filter(|_| none_reported) {
-        drawn.add(system.voltage, system.current);
+    for supply in (0..BATTERIES_MAX).filter_map(|battery| supply(now, vehicle, battery)) {
+        drawn.add(supply.voltage, supply.current);
     }
     if drawn.current_a.is_none() {
         let fresh = |at: Option<BootMs>| at.is_some_and(|at| now.since(at) <= PAUSE);
@@ -33,14 +28,17 @@ pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> Drawn {
 }
 
 pub(crate) fn discharge_a(now: BootMs, vehicle: &Vehicle, battery: usize) -> f64 {
-    let Some(slot) = vehicle.batteries.get(battery) else { return 0.0 };
     let mut drawn = Drawn::default();
-    if let Some(reported) = slot.within(now, SILENT) {
-        drawn.add(reported.voltage, reported.current);
-    } else if battery == 0 && vehicle.batteries.iter().all(|slot| slot.get().is_none()) {
+    if battery == 0 && vehicle.batteries_known() == 0 {
         drawn = self::drawn(now, vehicle);
+    } else if let Some(supply) = supply(now, vehicle, battery) {
+        drawn.add(supply.voltage, supply.current);
     }
     f64::from(drawn.current_a.unwrap_or(0.0))
+}
+
+fn supply(now: BootMs, vehicle: &Vehicle, battery: usize) -> Option<Supply> {
+    vehicle.supply(battery).filter(|supply| now.since(supply.at) <= SILENT)
 }
 
 impl Drawn {

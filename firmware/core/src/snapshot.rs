@@ -7,9 +7,8 @@
 use crate::half;
 use crate::health::{Finding, Inputs, Level, Subsystem};
 use crate::motion::MOTION_AGE;
-use crate::observation::{Battery, Estimator, SystemStatus};
+use crate::observation::Estimator;
 use crate::time::{BootMs, Millis};
-use crate::vehicle::Vehicle;
 
 /// Between two samples.
 pub const INTERVAL: Millis = Millis::from_millis(200);
@@ -40,12 +39,12 @@ const COLUMNS: [&[usize]; Subsystem::ALL.len()] = [
 ];
 
 const KEPT: [Quantity; 24] = [
-    Quantity("voltage_v", |it| Some(of_battery(it, |it| it.voltage, |it| it.voltage)?.0)),
-    Quantity("current_a", |it| Some(of_battery(it, |it| it.current, |it| it.current)?.0)),
+    Quantity("voltage_v", |it| Some(it.vehicle.supply(0)?.voltage?.0)),
+    Quantity("current_a", |it| Some(it.vehicle.supply(0)?.current?.0)),
     Quantity("cell_lowest_v", |it| {
         it.derived.cell_voltage(it.vehicle, it.params, 0).map(|reading| reading.value)
     }),
-    Quantity("remaining_percent", |it| Some(of_battery(it, |it| it.remaining, |it| it.remaining)?.0 * 100.0)),
+    Quantity("remaining_percent", |it| Some(it.vehicle.supply(0)?.remaining?.0 * 100.0)),
     Quantity("throttle_percent", |it| Some(it.vehicle.hud.within(it.now, MOTION_AGE)?.throttle?.0 * 100.0)),
     Quantity("rpm_lowest", |it| speeds(it).reduce(f32::min)),
     Quantity("rpm_highest", |it| speeds(it).reduce(f32::max)),
@@ -75,15 +74,6 @@ const KEPT: [Quantity; 24] = [
     Quantity("climb_m_s", |it| crate::motion::climb_mps(it.now, it.vehicle)),
     Quantity("height_m", |it| Some(it.vehicle.global.within(it.now, MOTION_AGE)?.relative_altitude.0)),
 ];
-
-fn of_battery<T>(
-    inputs: &Inputs<'_>,
-    battery: fn(&Battery) -> Option<T>,
-    system: fn(&SystemStatus) -> Option<T>,
-) -> Option<T> {
-    let Vehicle { batteries, system: status, .. } = inputs.vehicle;
-    batteries[0].get().map_or_else(|| status.get().and_then(system), battery)
-}
 
 fn speeds(inputs: &Inputs<'_>) -> impl Iterator<Item = f32> {
     let (now, motors) = (inputs.now, inputs.vehicle.motors.iter());

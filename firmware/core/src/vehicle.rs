@@ -16,7 +16,7 @@ use crate::observation::{
     TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
 };
 use crate::time::{BootMs, Millis, SILENT};
-use crate::units::{MetresPerSecond, Radians, Rpm};
+use crate::units::{Amperes, Fraction, MetresPerSecond, Radians, Rpm, Volts};
 
 /// Batteries that are monitored.
 pub const BATTERIES_MAX: usize = 4;
@@ -60,6 +60,14 @@ impl Motor {
     const fn is_known(&self) -> bool {
         self.moved_at.is_some() || self.state_at.is_some()
     }
+}
+
+/// The figures of a battery's load and charge.
+pub(crate) struct Supply {
+    pub(crate) at: BootMs,
+    pub(crate) voltage: Option<Volts>,
+    pub(crate) current: Option<Amperes>,
+    pub(crate) remaining: Option<Fraction>,
 }
 
 fn known(places: impl Iterator<Item = bool>) -> u8 {
@@ -168,6 +176,17 @@ impl Vehicle {
     pub(crate) fn receivers_known(&self) -> u8 {
         let of_both = self.gnss.iter().zip(&self.gnss_integrity);
         known(of_both.map(|(gnss, integrity)| gnss.get().is_some() || integrity.get().is_some()))
+    }
+
+    /// A battery's own figures. Those of the autopilot are the first battery's while none reports itself: with several they are
+    /// ambiguous.
+    pub(crate) fn supply(&self, battery: usize) -> Option<Supply> {
+        let slot = self.batteries.get(battery)?;
+        if let (Some(at), Some(&Battery { voltage, current, remaining, .. })) = (slot.at(), slot.get()) {
+            return Some(Supply { at, voltage, current, remaining });
+        }
+        let &SystemStatus { voltage, current, remaining, .. } = self.system.get().filter(|_| battery == 0)?;
+        Some(Supply { at: self.system.at()?, voltage, current, remaining })
     }
 
     /// Whether motors may turn, by the last heartbeat.
@@ -460,7 +479,6 @@ fn set_instance<T, const N: usize>(slots: &mut [Latest<T>; N], instance: u8, at:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Volts;
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 

@@ -2,7 +2,6 @@
 
 use super::prelude::*;
 use crate::observation::{Battery, Feeds};
-use crate::units::Fraction;
 use crate::vehicle::BATTERIES_MAX;
 
 const BATTERIES: u8 = BATTERIES_MAX as u8;
@@ -16,7 +15,10 @@ const BATTERY: Check = Check {
     stale_s: STALE_SLOW,
     instances: BATTERIES,
     of: InstanceOf::Supply,
-    read: remaining_percent,
+    read: |inputs, battery| {
+        let supply = inputs.vehicle.supply(battery.into())?;
+        Some(Reading { at: supply.at, value: supply.remaining?.0 * 100.0 })
+    },
     ..PLAIN
 };
 
@@ -78,14 +80,4 @@ fn of(inputs: &Inputs<'_>, battery: u8, value: impl FnOnce(&Battery) -> Option<f
 fn spread_v(battery: &Battery) -> Option<f32> {
     let cells = battery.cells.iter().flatten().map(|cell| cell.volts().0);
     Some(cells.clone().reduce(f32::max)? - cells.reduce(f32::min)?)
-}
-
-/// A battery's own figure; the autopilot's only where no battery reports itself (it is ambiguous with several).
-fn remaining_percent(inputs: &Inputs<'_>, battery: u8) -> Option<Reading> {
-    let vehicle = inputs.vehicle;
-    let percent = |remaining: Option<Fraction>| Some(remaining?.0 * 100.0);
-    if vehicle.batteries_known() > 0 || battery > 0 {
-        return of(inputs, battery, |battery| percent(battery.remaining));
-    }
-    vehicle.system.read(|system| percent(system.remaining))
 }
