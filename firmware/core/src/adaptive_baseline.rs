@@ -13,9 +13,10 @@ const SPREADS: f32 = 4.0;
 
 state! {
     pub(crate) struct AdaptiveBaseline {
-        smooth: f32,
+        pub(crate) smooth: f32,
         mean: f32,
-        spread: f32,
+        /// The mean distance of the smoothed figure from its mean.
+        pub(crate) spread: f32,
         learnt_s: f32,
     }
 }
@@ -66,15 +67,6 @@ impl AdaptiveBaseline {
 
     pub(crate) fn range(&self) -> f32 {
         SPREADS * self.spread
-    }
-
-    pub(crate) fn spread(&self) -> f32 {
-        self.spread
-    }
-
-    /// The smoothed figure.
-    pub(crate) fn figure(&self) -> f32 {
-        self.smooth
     }
 
     /// The figure as a multiple of its baseline if it is out of its range by more than `grain`; 1 otherwise.

@@ -55,8 +55,8 @@ enum Way<'a> {
 /// The stored form of an item that is being written or read, field by field.
 pub struct Fields<'a> {
     way: Way<'a>,
-    at: usize,
-    short: bool,
+    pub(crate) at: usize,
+    pub(crate) short: bool,
     /// An earlier version wrote it: fields are missing at its end.
     lacks: bool,
 }
@@ -74,16 +74,8 @@ impl<'a> Fields<'a> {
         Ok(Self { way: Way::Read(stored), at: 1, short: false, lacks: version < newest })
     }
 
-    pub(crate) const fn len(&self) -> usize {
-        self.at
-    }
-
     pub(crate) const fn is_read(&self) -> bool {
         matches!(self.way, Way::Read(stored) if stored.len() <= self.at)
-    }
-
-    pub(crate) const fn is_short(&self) -> bool {
-        self.short
     }
 
     fn bytes<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Unreadable> {

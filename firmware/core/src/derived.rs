@@ -141,7 +141,7 @@ impl Derived {
             && !vehicle.vibration.within(at, MOTION_AGE).is_some_and(shakes)
             && let Some(sample_g) = imu.acceleration.and_then(load_factor_g)
         {
-            self.load_factor.set(at, [sample_g, norm(vehicle.inertial.force()) / GRAVITY]);
+            self.load_factor.set(at, [sample_g, norm(vehicle.inertial.force) / GRAVITY]);
         }
     }
 

@@ -196,7 +196,7 @@ state! {
         hit_at: BootMs,
         touchdown: Touchdown,
         /// The hardest touch of this flight, or of its mishap, m/s.
-        touch_mps: f32,
+        pub(crate) touch_mps: f32,
         /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
         tilted_at: Option<BootMs>,
         /// The position at which a mishap began, or ended.
@@ -608,10 +608,6 @@ impl Flight {
     /// The height above home of the last place that was told, metres.
     pub const fn height_m(&self) -> i16 {
         self.place.height_m
-    }
-
-    pub(crate) const fn touch_mps(&self) -> f32 {
-        self.touch_mps
     }
 }
 

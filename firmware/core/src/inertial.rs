@@ -57,7 +57,7 @@ state! {
     /// The state of accelerometer and gyros.
     pub struct Inertial {
         /// Specific force, smoothed, m/s2.
-        force: [f32; 3],
+        pub(crate) force: [f32; 3],
         /// The last sample along the body's downward axis, and its smoothed step from sample to sample; m/s2.
         down: f32,
         step: f32,
@@ -168,10 +168,6 @@ impl Inertial {
     /// Whether it shakes less than on carrying rotors. Simulators have no noise: they are calm too.
     pub(crate) fn is_calm(&self, now: BootMs) -> bool {
         self.has_steps(now) && self.step < CALM_MPS2
-    }
-
-    pub(crate) const fn force(&self) -> [f32; 3] {
-        self.force
     }
 
     pub(crate) const fn shakes_mps2(&self) -> f32 {

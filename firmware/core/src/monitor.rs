@@ -203,7 +203,7 @@ impl Monitor {
         if crossed || self.exceedances.lasting() {
             self.saving.change(ItemKey::Exceedances);
         }
-        self.exposure.step(now, &self.vehicle, self.usage.current_a());
+        self.exposure.step(now, &self.vehicle, self.usage.current_a);
         self.step_protect(now);
         self.step_cells(now);
         self.step_life(now, event);

@@ -324,7 +324,7 @@ impl MotorOutputs {
 
     fn find_shut_off(&self, count: usize) -> Option<u8> {
         let mut outputs = (0_u8..).zip(&self.outputs).take(count);
-        outputs.find(|(_, output)| output.share.figure() < SHUT_OFF_SHARE).map(|(place, _)| place)
+        outputs.find(|(_, output)| output.share.smooth < SHUT_OFF_SHARE).map(|(place, _)| place)
     }
 
     fn find_weak(&mut self, count: usize, step_s: f32) -> (u8, f32) {
@@ -341,7 +341,7 @@ impl MotorOutputs {
             6 => (changes[4], 0.5),
             _ => (lowest, 1.0),
         };
-        let spreads = self.outputs.iter().take(count).map(|output| output.share.spread());
+        let spreads = self.outputs.iter().take(count).map(|output| output.share.spread);
         let spread = spreads.sum::<f32>() / count as f32;
         let excess = ((first.0 - second.0) - (second.0 - lowest.0)) / part;
         let (now, (summed, sum)) = (excess - SPREADS * spread / part, self.sum(excess, first.1, step_s));
@@ -379,7 +379,7 @@ impl MotorOutputs {
     pub(crate) fn share(&self, now: BootMs, vehicle: &Vehicle, motor: u8) -> Option<f32> {
         self.at.age(now).filter(|age| *age <= PAUSE)?;
         let judged = Some(self.judged(vehicle)).filter(|count| *count <= OUTPUTS_MAX)?;
-        Some(self.outputs.get(..judged)?.get(usize::from(motor))?.share.figure())
+        Some(self.outputs.get(..judged)?.get(usize::from(motor))?.share.smooth)
     }
 
     /// The verdict on a motor, and when it was made; good for those that are not judged now.

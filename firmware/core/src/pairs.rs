@@ -92,13 +92,13 @@ impl Pair {
             return;
         }
         let row = kind.row();
-        let weight = self.residual.at().age(at).map_or(1.0, |step| row.weight(step));
-        smooth(&mut self.difference, difference, weight, row.hold());
+        let weight = self.residual.at.age(at).map_or(1.0, |step| row.weight(step));
+        smooth(&mut self.difference, difference, weight, row.hold);
         self.residual.take(row, at, norm(self.difference), 0.0);
     }
 
     fn excess(&self, now: BootMs, kind: Kind) -> Option<Reading> {
-        let at = self.residual.at().instant(now).filter(|at| now.since(*at) <= PAUSE);
+        let at = self.residual.at.instant(now).filter(|at| now.since(*at) <= PAUSE);
         Reading::new(at, self.residual.excess(kind.row()))
     }
 }
@@ -125,7 +125,7 @@ impl Pairs {
                 _ => continue,
             };
             // Newer than when it was compared last.
-            let is_new = |age: Millis| pair.residual.at().age(at).is_none_or(|before| age < before);
+            let is_new = |age: Millis| pair.residual.at.age(at).is_none_or(|before| age < before);
             if samples[partner].at.age(at).is_some_and(|age| age <= moment && is_new(age)) {
                 pair.take(at, kind, kind.difference(samples[one].axes, samples[other].axes));
             }
@@ -146,7 +146,7 @@ impl Pairs {
     }
 
     pub(crate) fn are_compared(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.residual.at().is_set())
+        self.pairs.iter().any(|pair| pair.residual.at.is_set())
     }
 
     /// How far a sensor is apart from all others, beyond what is usual; of two, for the second one. Measured when the first of its pairs

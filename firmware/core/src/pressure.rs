@@ -28,7 +28,7 @@ pub(crate) struct Pressure {
     began_hpa: f32,
     before_hpa: f32,
     window: BootMs,
-    sank_at: BootMs,
+    pub(crate) sank_at: BootMs,
     /// Pressure at the arming, hPa; 0 for none.
     armed_hpa: f32,
 }
@@ -77,10 +77,6 @@ impl Pressure {
 
     pub(crate) fn is_within(&self, of_hpa: f32, limit_m: f32) -> bool {
         libm::fabsf(self.rise_m(of_hpa)) < limit_m
-    }
-
-    pub(crate) const fn sank_at(&self) -> BootMs {
-        self.sank_at
     }
 
     /// Time since it last sank as fast as under a parachute; `None` without a barometer that measures.

@@ -66,7 +66,7 @@ pub(crate) struct Row {
     side: Side,
     learn: Learn,
     /// Half of the check's default limit.
-    hold: f32,
+    pub(crate) hold: f32,
 }
 
 const ROW: Row = Row {
@@ -175,10 +175,6 @@ pub(crate) const PAIRS: [Row; 4] = {
 };
 
 impl Row {
-    pub(crate) const fn hold(&self) -> f32 {
-        self.hold
-    }
-
     pub(crate) const fn is_open(&self, gates: Gates) -> bool {
         gates.are(self.gates)
     }
@@ -198,7 +194,7 @@ pub(crate) fn smooth<const N: usize>(figure: &mut [f32; N], sample: [f32; N], we
 
 state! {
     pub(crate) struct Residual {
-        at: Stamp,
+        pub(crate) at: Stamp,
         allowance: f32,
         figure: AdaptiveBaseline,
     }
@@ -208,10 +204,6 @@ impl Residual {
     /// A residual of many samples: it settles for this time, s, before it is learnt.
     pub(crate) fn after(settles_s: f32) -> Self {
         Self { figure: AdaptiveBaseline::after(settles_s), ..Self::default() }
-    }
-
-    pub(crate) const fn at(&self) -> Stamp {
-        self.at
     }
 
     /// Takes a sample; returns the learnt part, s.
@@ -228,7 +220,7 @@ impl Residual {
         let weight = row.weight(step);
         self.at = Stamp::at(at);
         self.allowance += weight * (allowance - self.allowance);
-        let before = self.figure.figure();
+        let before = self.figure.smooth;
         let off = sample - before;
         let turns = if row.period > 0.0 { libm::roundf(off / row.period) } else { 0.0 };
         self.figure.follow(before + (off - row.period * turns).clamp(-clamp, clamp), weight);

@@ -31,7 +31,7 @@ pub(crate) struct Thrust {
     /// Last time armed with more than idle throttle; zero for never.
     driven_at: BootMs,
     /// Whether the throttle reached its level of flight since arming: only then its values have a meaning.
-    has_flown: bool,
+    pub(crate) has_flown: bool,
 }
 
 impl Thrust {
@@ -68,10 +68,6 @@ impl Thrust {
             part if part >= self.idle() => Power::Little,
             _ => Power::Idle,
         }
-    }
-
-    pub(crate) const fn has_flown(&self) -> bool {
-        self.has_flown
     }
 
     pub(crate) fn was_driven(&self, now: BootMs, within: Millis) -> bool {

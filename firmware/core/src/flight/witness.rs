@@ -153,7 +153,7 @@ impl Flight {
     pub(super) fn power(&self, now: BootMs, vehicle: &Vehicle) -> Option<Power> {
         let power = throttle(now, vehicle).map(|part| self.thrust.power(part));
         power.filter(|power| {
-            *power != Power::Idle || self.thrust.has_flown() || vehicle.inertial.shakes(now) != Some(true)
+            *power != Power::Idle || self.thrust.has_flown || vehicle.inertial.shakes(now) != Some(true)
         })
     }
 
@@ -288,7 +288,7 @@ impl Flight {
             && self.thrust.is_learnt()
             && self.power(now, vehicle) == Some(Power::Idle)
             && now.since(self.felt.at) <= PAUSE
-            && WEIGHT_G.contains(&(norm(vehicle.inertial.force()) / GRAVITY))
+            && WEIGHT_G.contains(&(norm(vehicle.inertial.force) / GRAVITY))
             && self.is_slow_to_turn();
         self.supported = match (self.pressure.now(now).filter(|_| rests), self.supported) {
             (None, _) => None,
@@ -299,7 +299,7 @@ impl Flight {
             && self.stage == Stage::Airborne
             && self.is_supported(now)
             && self.is_lost(now, vehicle)
-            && (self.pressure.sank_at() + TURNED).is_after(since)
+            && (self.pressure.sank_at + TURNED).is_after(since)
         {
             self.hit_at = since;
             self.see(now, MishapKind::Impact, 0.0, params);

@@ -149,7 +149,7 @@ fn counters(totals: &mut Totals, places: Range<usize>, fields: &mut Fields<'_>) 
 }
 
 fn motors(totals: &mut Totals, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-    let revolutions = if fields.is_short() { Form::Count } else { Form::Amount };
+    let revolutions = if fields.short { Form::Count } else { Form::Amount };
     fields.list(
         &mut totals.motors,
         |motor| motor.seconds > 0.0,

@@ -29,7 +29,7 @@ state! {
     /// Usage since power-on.
     pub struct Usage {
         last: Option<BootMs>,
-        current_a: Option<f32>,
+        pub(crate) current_a: Option<f32>,
         /// All counters but the cycles of the load factor, which are computed when asked for.
         totals: Totals,
         capacity_ah: f32,
@@ -175,8 +175,8 @@ impl Usage {
     fn land(&mut self, flight: &Flight, params: &Params) {
         let ended = if flight.is_down() { UsageCounter::Mishaps } else { UsageCounter::Landings };
         self.totals.add(ended, 1.0);
-        self.totals.extend(UsageCounter::TouchdownMax, f64::from(flight.touch_mps()));
-        if flight.touch_mps() >= params.get(Param::HardLanding) {
+        self.totals.extend(UsageCounter::TouchdownMax, f64::from(flight.touch_mps));
+        if flight.touch_mps >= params.get(Param::HardLanding) {
             self.totals.add(UsageCounter::HardLandings, 1.0);
         }
     }
@@ -220,10 +220,6 @@ impl Usage {
 
     pub(crate) fn until(&self) -> BootMs {
         self.last.unwrap_or_default()
-    }
-
-    pub(crate) const fn current_a(&self) -> Option<f32> {
-        self.current_a
     }
 
     /// The wear of components.
