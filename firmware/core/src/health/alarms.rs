@@ -48,7 +48,7 @@ impl Alarms {
     /// A state's level changes. Gives since when it has an alarm; `None` where it has none, or no place is left for it. A rise is
     /// an onset of its own, with no cause yet. From now on an effect outlives this alarm if that no longer explains it at its new level.
     pub(super) fn change(&mut self, slot: u16, level: Level, now: BootMs) -> Option<BootMs> {
-        let is_alarm = matches!(level, Level::Warning | Level::Critical);
+        let is_alarm = level.alarm() > 0;
         for known in self.standing.iter_mut().flatten() {
             let explains = is_alarm && level as u8 >= known.level as u8;
             if known.cause == Some(slot) && known.cause_ended.is_none() && !explains {

@@ -263,12 +263,8 @@ impl Repeats {
     }
 
     fn note(&mut self, previous: Level, level: Level) {
-        let rank = |level| match level {
-            Level::Warning => 1,
-            Level::Critical => 2,
-            _ => 0,
-        };
-        let (rank, worst) = (if rank(level) > rank(previous) { rank(level) } else { 0 }, self.0 >> 2 & 3);
+        let rank = if level.alarm() > previous.alarm() { level.alarm() } else { 0 };
+        let worst = self.0 >> 2 & 3;
         let again = u32::from(rank > 0 && rank <= worst);
         self.0 = (self.count() + again).min(Self::MOST) as u8 | worst.max(rank) << 2;
     }
@@ -338,16 +334,13 @@ impl State {
         self.level
     }
 
-    pub(super) const fn alarm(&self) -> Option<Level> {
-        match self.level {
-            Some(level @ (Level::Warning | Level::Critical)) => Some(level),
-            _ => None,
-        }
+    pub(super) fn has_alarm(&self) -> bool {
+        self.level.is_some_and(|level| level.alarm() > 0)
     }
 
     /// Whether it has no alarm, or its value was bad for so long and is not good just now.
     pub(super) fn lasts(&self, now: BootMs, span: Millis) -> bool {
-        self.alarm().is_none() || (!self.better.is_set() && self.bad.age(now).unwrap_or(Millis::ZERO) >= span)
+        !self.has_alarm() || (!self.better.is_set() && self.bad.age(now).unwrap_or(Millis::ZERO) >= span)
     }
 
     /// Whether it never had a value since it began to apply, nor a level: then a step without a value changes nothing.
@@ -456,13 +449,9 @@ impl State {
 
     /// How old the value may be. An alarm that came back after a pause of its stream has more time.
     fn stale_after(&self, check: &Check) -> Option<Millis> {
-        match self.level {
-            // Also of a value that is never stale: without its input it has none.
-            Some(Level::Warning | Level::Critical) => {
-                Some(self.repeats.grown(check.stale_after().unwrap_or(UNSEEN)))
-            }
-            _ => check.stale_after(),
-        }
+        // Also of a value that is never stale: without its input it has none.
+        let grown = || self.repeats.grown(check.stale_after().unwrap_or(UNSEEN));
+        if self.has_alarm() { Some(grown()) } else { check.stale_after() }
     }
 
     /// `measured`: the value was measured since the last step, and not only held.

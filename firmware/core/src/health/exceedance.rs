@@ -81,6 +81,11 @@ struct Entry {
 }
 
 impl Entry {
+    fn of(check: u16, instance: u8, since: BootMs) -> Self {
+        let (session, before) = (Crossings::default(), Crossings::default());
+        Self { check, instance, level: Level::Ok, since, session, before }
+    }
+
     fn extend(&mut self, now: BootMs) {
         self.session.extend(self.level, (now.since(self.since).as_millis() / 100) as u32);
         self.since = now;
@@ -134,54 +139,36 @@ impl Exceedances {
             Level::Critical => entry.session.criticals = entry.session.criticals.saturating_add(1),
             _ => {}
         }
-        if rank(finding.level) > 0 {
+        if finding.level.alarm() > 0 {
             entry.session.peak = worse(entry.session.peak, finding.value, side);
         }
         entry.level = finding.level;
     }
 
     pub(crate) fn note(&mut self, check: u16, instance: u8, side: Side, value: f32) {
-        let entries = self.entries.iter_mut().flatten();
-        if let Some(entry) =
-            entries.into_iter().find(|entry| (entry.check, entry.instance) == (check, instance))
-        {
+        if let Some(entry) = self.place(check, instance).and_then(|place| self.entries[place].as_mut()) {
             entry.session.peak = worse(entry.session.peak, value, side);
         }
     }
 
+    fn place(&self, check: u16, instance: u8) -> Option<usize> {
+        let is_same = |entry: &Entry| (entry.check, entry.instance) == (check, instance);
+        self.entries.iter().position(|entry| entry.as_ref().is_some_and(is_same))
+    }
+
     fn entry(&mut self, check: u16, finding: &Finding) -> Option<&mut Entry> {
-        let same = |entry: &Option<Entry>| {
-            entry.is_some_and(|entry| (entry.check, entry.instance) == (check, finding.instance))
-        };
-        let free = |entry: &Option<Entry>| entry.is_none();
-        let lesser = |entry: &Option<Entry>| {
-            finding.level == Level::Critical
-                && entry.is_some_and(|entry| entry.session.criticals == 0 && entry.before.criticals == 0)
-        };
-        let known = self.entries.iter().position(same);
-        if known.is_none() && rank(finding.level) == 0 {
-            return None;
+        let known = self.place(check, finding.instance);
+        if known.is_some() || finding.level.alarm() == 0 {
+            return self.entries.get_mut(known?)?.as_mut();
         }
-        let place = known
-            .or_else(|| self.entries.iter().position(free))
-            .or_else(|| self.entries.iter().position(lesser));
-        let Some(place) = place else {
+        let never_critical = |entry: &Entry| entry.session.criticals == 0 && entry.before.criticals == 0;
+        let is_lesser = |entry: &Entry| finding.level == Level::Critical && never_critical(entry);
+        let free = self.entries.iter().position(Option::is_none);
+        let place = free.or_else(|| {
             self.left_out = self.left_out.saturating_add(1);
-            return None;
-        };
-        let entry = &mut self.entries[place];
-        if known.is_none() {
-            self.left_out = self.left_out.saturating_add(u16::from(entry.is_some()));
-            *entry = None;
-        }
-        Some(entry.get_or_insert(Entry {
-            check,
-            instance: finding.instance,
-            level: Level::Ok,
-            since: finding.at,
-            session: Crossings::default(),
-            before: Crossings::default(),
-        }))
+            self.entries.iter().position(|entry| entry.as_ref().is_some_and(is_lesser))
+        });
+        Some(self.entries.get_mut(place?)?.insert(Entry::of(check, finding.instance, finding.at)))
     }
 
     /// Every exceedance, counted up to now.
@@ -191,7 +178,7 @@ impl Exceedances {
 
     /// Every exceedance that began, ended or lasted at a time or after it, counted up to now.
     pub fn changed(&self, now: BootMs, since: BootMs) -> impl Iterator<Item = Exceedance> {
-        let changed = move |entry: &&Entry| rank(entry.level) > 0 || !since.is_after(entry.since);
+        let changed = move |entry: &&Entry| entry.level.alarm() > 0 || !since.is_after(entry.since);
         self.entries.iter().flatten().filter(changed).filter_map(move |entry| entry.now(now))
     }
 
@@ -203,7 +190,7 @@ impl Exceedances {
     }
 
     pub(crate) fn lasting(&self) -> bool {
-        self.entries.iter().flatten().any(|entry| rank(entry.level) > 0)
+        self.entries.iter().flatten().any(|entry| entry.level.alarm() > 0)
     }
 
     /// Checks that found no room.
@@ -228,7 +215,7 @@ impl Exceedances {
             // Writing has no errors.
             let _ = lifetime.code(&mut fnv1a(check.name), &mut instance, &mut fields);
         }
-        fields.len()
+        fields.at
     }
 
     /// Reads the stored form, of this version or a later one. Checks that no longer exist are left out.
@@ -245,24 +232,9 @@ impl Exceedances {
             let (mut name, mut instance, mut before) = (0, 0, Crossings::default());
             before.code(&mut name, &mut instance, &mut fields)?;
             let check = checks().position(|check| fnv1a(check.name) == name && instance < check.instances);
-            *place = check.map(|check| Entry {
-                check: check as u16,
-                instance,
-                level: Level::Ok,
-                since: BootMs::ZERO,
-                session: Crossings::default(),
-                before,
-            });
+            *place = check.map(|check| Entry { before, ..Entry::of(check as u16, instance, BootMs::ZERO) });
         }
         Ok(exceedances)
-    }
-}
-
-const fn rank(level: Level) -> u8 {
-    match level {
-        Level::Warning => 1,
-        Level::Critical => 2,
-        Level::Ok | Level::Advisory | Level::Stale => 0,
     }
 }
 

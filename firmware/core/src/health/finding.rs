@@ -45,6 +45,17 @@ numbered! {
     }
 }
 
+impl Level {
+    /// 1 of a warning, 2 of a critical level; 0 of one that is no alarm.
+    pub(super) const fn alarm(self) -> u8 {
+        match self {
+            Self::Warning => 1,
+            Self::Critical => 2,
+            Self::Ok | Self::Advisory | Self::Stale => 0,
+        }
+    }
+}
+
 /// One check changed its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finding {

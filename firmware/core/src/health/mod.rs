@@ -121,9 +121,7 @@ impl Health {
         let before = *state;
         let change = state.step(check, inputs.now, reading, applies, inputs.params);
         let change = if latched { state.hold(&before, change) } else { change };
-        if let (None, Some(Level::Warning | Level::Critical), Some(reading)) =
-            (change, state.level(), reading)
-        {
+        if let (None, true, Some(reading)) = (change, state.has_alarm(), reading) {
             exceedances.note(place, instance, check.limits.side, reading.value);
         }
         let change = change?;

@@ -195,8 +195,8 @@ fn a_text_waits_until_the_value_was_bad_for_so_long_and_a_shorter_rise_has_none(
             let value = if (1_000..good_again_ms).contains(now_ms) { 50.0 } else { 10.0 };
             let now = BootMs::from_millis(*now_ms);
             state.step(&check, now, Some(Reading { at: now, value }), true, &Params::defaults());
-            alarmed |= state.alarm().is_some();
-            state.alarm().is_some() && state.lasts(now, Millis::from_millis(10_000))
+            alarmed |= state.has_alarm();
+            state.has_alarm() && state.lasts(now, Millis::from_millis(10_000))
         });
         assert!(alarmed);
         assert_eq!(told, told_ms, "good again at {good_again_ms} ms");
