@@ -222,14 +222,10 @@ impl Cells {
     /// Capacity of all batteries together, by the autopilot's parameters, Ah; 0 unless each is known.
     pub(crate) fn capacity_ah(&self) -> f32 {
         let heard = self.packs.iter().filter(|pack| pack.highest_v > 0.0);
-        let each = heard.map(|pack| {
-            self.settings.get(usize::from(pack.id)).map_or(0.0, |of| of[Setting::Capacity as usize] / 1_000.0)
-        });
-        each.fold(None, |sum: Option<f32>, ah| {
-            Some(if ah > 0.0 { sum.unwrap_or(0.0) + ah } else { f32::NAN })
-        })
-        .filter(|sum| sum.is_finite())
-        .unwrap_or(0.0)
+        let set_mah =
+            |pack: &Pack| Some(self.settings.get(usize::from(pack.id))?[Setting::Capacity as usize]);
+        let each_ah = heard.map(|pack| set_mah(pack).filter(|mah| *mah > 0.0).map(|mah| mah / 1_000.0));
+        each_ah.sum::<Option<f32>>().unwrap_or(0.0)
     }
 
     pub(crate) fn has_voltage(&self, battery: usize) -> bool {

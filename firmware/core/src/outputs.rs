@@ -50,6 +50,7 @@ const IDLE: f32 = 0.15;
 /// Parts of the mean command of the others. An output that idled on the ground and has such a command in level flight is a
 /// motor too.
 const LIKE_OTHERS: RangeInclusive<f32> = 0.5..=1.5;
+/// Numbers for `DShot` that were not seen on the ground look like pulses: a motor among such is given less of both.
 const SURELY_CARRIES: f32 = 0.3;
 /// Further above the others a change teaches nothing, percent.
 const HOLD_PERCENT: f32 = 4.0;
@@ -252,7 +253,7 @@ impl MotorOutputs {
             return self.verdict;
         }
         // An output of nothing is not used.
-        let shut_off = only(given, is_off, surely_carries).filter(|_| used);
+        let shut_off = only(given, is_off, |given| *given > SURELY_CARRIES).filter(|_| used);
         let at_end = shut_off.map(|place| (place, Verdict::ShutOff));
         let at_end = at_end.or_else(|| Some((saturated_alone(given)?, Verdict::Saturated)));
         let others_moved = |place: u8| {
@@ -289,7 +290,7 @@ impl MotorOutputs {
 
     fn note_ends(&mut self, parts: &[f32; JUDGED_MAX]) {
         for (output, given) in self.outputs.iter_mut().zip(parts) {
-            output.carried |= carries(given);
+            output.carried |= *given > IDLE_THROTTLE;
             output.off = output.carried && is_off(given);
             output.full = is_full(given);
         }
@@ -403,15 +404,6 @@ fn is_off(given: &f32) -> bool {
 
 fn is_full(given: &f32) -> bool {
     *given >= FULL
-}
-
-fn carries(given: &f32) -> bool {
-    *given > IDLE_THROTTLE
-}
-
-/// Numbers for `DShot` that were not seen on the ground look like pulses: a motor among such is given less of both.
-fn surely_carries(given: &f32) -> bool {
-    *given > SURELY_CARRIES
 }
 
 fn only(given: &[f32], is: fn(&f32) -> bool, others: fn(&f32) -> bool) -> Option<u8> {
