@@ -60,7 +60,7 @@ pub enum Setting {
     Capacity = 5,
 }
 
-const SETTINGS: usize = 6;
+const SETTINGS: usize = Setting::Capacity as usize + 1;
 
 /// Range of a cell's voltage at these settings, V.
 const CELL_V: [(f32, f32); SETTINGS - 1] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75), (3.25, 3.8), (2.9, 3.7)];

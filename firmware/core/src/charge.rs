@@ -35,7 +35,7 @@ impl Charge {
     /// The whole capacity, Ah, from the state `now` in flight; `None` if too little was taken, or if the sag under
     /// load is not known.
     pub(crate) fn capacity_ah(&self, now: &Self, derived: &Derived, battery: u8) -> Option<f32> {
-        let sags = derived.resistance(usize::from(battery))?.sag_v(Amperes(1.0)) > 0.0;
+        let sags = derived.resistance.get(usize::from(battery))?.sag_v(Amperes(1.0)) > 0.0;
         let fall = self.state - now.state;
         (sags && fall >= FALL_MIN).then(|| (now.consumed_ah - self.consumed_ah) / fall)
     }

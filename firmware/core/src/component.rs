@@ -79,14 +79,6 @@ impl ComponentKind {
             Self::Card => Some(Subsystem::Recorder),
         }
     }
-
-    const fn is_one_of_the_motors(self) -> bool {
-        matches!(self, Self::Motor | Self::Propeller | Self::Esc)
-    }
-
-    const fn wears_while_powered(self) -> bool {
-        matches!(self, Self::Card | Self::Other)
-    }
 }
 
 /// Wear figures of a component.
@@ -122,16 +114,15 @@ impl ComponentFigures {
         }
         let total = |counter| wear.totals.value(counter).unwrap_or(0.0);
         let motors = &wear.totals.motors;
-        let motor_s = match usize::from(number) {
-            number if kind.is_one_of_the_motors() && number > 0 => {
-                motors.get(number - 1).map_or(0.0, |motor| motor.seconds)
+        let place = usize::from(number).checked_sub(1);
+        let motor_s = match (kind, place) {
+            (ComponentKind::Motor | ComponentKind::Propeller | ComponentKind::Esc, Some(place)) => {
+                motors.get(place).map_or(0.0, |motor| motor.seconds)
             }
             _ => motors.iter().fold(0.0, |longest: f64, motor| longest.max(motor.seconds)),
         };
-        let cycles = match usize::from(number) {
-            number if kind == ComponentKind::Battery && number > 0 => {
-                wear.battery_cycles.get(number - 1).copied().unwrap_or(0.0)
-            }
+        let cycles = match (kind, place) {
+            (ComponentKind::Battery, Some(place)) => wear.battery_cycles.get(place).copied().unwrap_or(0.0),
             _ => total(UsageCounter::BatteryCycles),
         };
         Self {
@@ -213,7 +204,8 @@ impl Component {
             return None;
         }
         let figures = self.figures(wear);
-        let hours = if self.kind.wears_while_powered() { figures.powered_s } else { figures.flight_s };
+        let is_powered = matches!(self.kind, ComponentKind::Card | ComponentKind::Other);
+        let hours = if is_powered { figures.powered_s } else { figures.flight_s };
         let used = [
             (hours / 3_600.0, Setting::Hours),
             (figures.flights, Setting::Flights),

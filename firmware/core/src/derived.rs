@@ -36,7 +36,7 @@ state! {
     /// The memory of derived quantities.
     pub struct Derived {
         pub(crate) cells: Cells,
-        resistance: [Resistance; BATTERIES_MAX] = [Resistance::default(); BATTERIES_MAX],
+        pub(crate) resistance: [Resistance; BATTERIES_MAX] = [Resistance::default(); BATTERIES_MAX],
         pub(crate) motors: Motors,
         pub(crate) crosschecks: Crosschecks,
         /// Of the last sample, and smoothed.
@@ -179,16 +179,6 @@ impl Derived {
         self.motors.step();
         self.frames_lost.take(now, recorder.frames_lost);
         self.write_errors.take(now, recorder.write_errors);
-    }
-
-    pub(crate) fn forget_resistance(&mut self, battery: usize) {
-        if let Some(resistance) = self.resistance.get_mut(battery) {
-            *resistance = Resistance::default();
-        }
-    }
-
-    pub(crate) fn resistance(&self, battery: usize) -> Option<&Resistance> {
-        self.resistance.get(battery)
     }
 
     /// Cells of a battery: set, reported, or found ([`crate::cells`]). 0 where that is not known.

@@ -14,17 +14,16 @@ use crate::charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::health::Inputs;
-use crate::observation::{MOTORS_MAX, VehicleKind};
+use crate::observation::MOTORS_MAX;
 use crate::params::Params;
 use crate::power_draw::drawn;
+use crate::residual::KNOWN_SAMPLES;
 use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::trend::Resistance;
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// Between samples.
 const EVERY: Millis = Millis::from_secs(1);
-/// Samples from which on a mean is a figure.
-const SAMPLES_MIN: u16 = 20;
 const SAMPLES: u16 = 60;
 /// Part of the distance by which a sample moves the mean at most (and [`Quantity::grain`]).
 const BELIEVED: f32 = 0.5;
@@ -164,7 +163,7 @@ impl Figures {
             let value = match quantity {
                 // The resistance shows under a load that changes, and has a mean of its own; the charge sinks in any flight.
                 Quantity::Resistance(battery) => {
-                    derived.resistance(usize::from(battery)).and_then(Resistance::ohm)
+                    derived.resistance.get(usize::from(battery)).and_then(Resistance::ohm)
                 }
                 Quantity::Capacity(battery) => self.capacity_ah(vehicle, derived, params, battery),
                 _ if !steady => continue,
@@ -185,18 +184,17 @@ impl Figures {
 
     /// The mean of the last minute of steady flight; `None` before there were enough samples.
     pub fn get(&self, quantity: Quantity) -> Option<f32> {
-        self.tracks.get(quantity.index()).filter(|track| track.samples >= SAMPLES_MIN).map(|track| track.mean)
+        self.tracks
+            .get(quantity.index())
+            .filter(|track| track.samples >= KNOWN_SAMPLES.into())
+            .map(|track| track.mean)
     }
 }
 
 fn is_steady(now: BootMs, vehicle: &Vehicle, flight: &Flight) -> bool {
-    let wings = vehicle
-        .heartbeat
-        .get()
-        .is_some_and(|heartbeat| matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol));
     let phase = flight.phase(now, vehicle);
     let level = flight.is_steady(now, vehicle);
-    level && (phase == Phase::Hover || (wings && phase == Phase::Cruise))
+    level && (phase == Phase::Hover || (vehicle.has_wings() && phase == Phase::Cruise))
 }
 
 fn sample(quantity: Quantity, inputs: &Inputs<'_>) -> Option<f32> {

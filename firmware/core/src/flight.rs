@@ -35,7 +35,7 @@ mod signs;
 mod touchdown;
 mod witness;
 
-use crate::latest::{Latest, Reading};
+use crate::latest::Reading;
 use crate::mishap::{MishapChange, MishapKind, Place, Report};
 use crate::motion::{Kinematics, MOVES_MPS, OFF, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
@@ -572,22 +572,19 @@ impl Flight {
             return Some(Reading { at: now, value });
         }
         let Vehicle { imu, attitude, heartbeat, .. } = vehicle;
-        let forces = || {
-            measured(imu, |imu| {
-                imu.acceleration.is_some_and(|axes| norm(axes.map(|axis| axis.0)).is_finite())
-            })
-        };
-        let at = match kind {
+        let measured = match kind {
             MishapKind::FreeFall | MishapKind::Overturned if vehicle.kind() == VehicleKind::Plane => None,
-            MishapKind::FreeFall | MishapKind::Impact => forces(),
-            MishapKind::Overturned => measured(attitude, |it| (it.roll.0 + it.pitch.0).is_finite()),
-            MishapKind::Tumbling => measured(attitude, |it| {
-                it.rates.is_some_and(|axes| norm(axes.map(|axis| axis.0)).is_finite())
-            }),
-            MishapKind::Disarmed => heartbeat.at(),
-            MishapKind::Sinking => climb_mps(now, vehicle).map(|_| now),
+            MishapKind::FreeFall | MishapKind::Impact => {
+                imu.read(|imu| Some(norm(imu.acceleration?.map(|axis| axis.0))))
+            }
+            MishapKind::Overturned => attitude.read(|attitude| Some(attitude.roll.0 + attitude.pitch.0)),
+            MishapKind::Tumbling => attitude.read(|attitude| Some(norm(attitude.rates?.map(|axis| axis.0)))),
+            MishapKind::Disarmed => heartbeat.read(|_| Some(0.0)),
+            MishapKind::Sinking => climb_mps(now, vehicle).map(|value| Reading { at: now, value }),
         };
-        Reading::new(at.filter(|_| vehicle.kind() != VehicleKind::Surface), Some(0.0))
+        let is_known =
+            |reading: &Reading| reading.value.is_finite() && vehicle.kind() != VehicleKind::Surface;
+        measured.filter(is_known).map(|Reading { at, .. }| Reading { at, value: 0.0 })
     }
 
     /// The report of a change to the ground, at the tick of the change.
@@ -609,10 +606,6 @@ impl Flight {
     pub const fn height_m(&self) -> i16 {
         self.place.height_m
     }
-}
-
-fn measured<T>(latest: &Latest<T>, has_values: impl Fn(&T) -> bool) -> Option<BootMs> {
-    latest.at().filter(|_| latest.get().is_some_and(has_values))
 }
 
 #[cfg(test)]

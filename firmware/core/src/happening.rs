@@ -39,7 +39,7 @@ const WAITING_MAX: usize = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Happenings {
     waiting: [Option<Happening>; WAITING_MAX],
-    lost: u16,
+    pub(crate) lost: u16,
 }
 
 impl Happenings {
@@ -53,9 +53,5 @@ impl Happenings {
     pub(crate) fn take(&mut self) -> Option<Happening> {
         self.waiting.rotate_left(1);
         self.waiting[WAITING_MAX - 1].take()
-    }
-
-    pub(crate) const fn take_lost(&mut self) -> u16 {
-        core::mem::replace(&mut self.lost, 0)
     }
 }

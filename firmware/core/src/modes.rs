@@ -1,16 +1,12 @@
 //! Flight modes, by who flies: the numbers are `HEARTBEAT.custom_mode` of `ArduPilot` and PX4.
 
-use crate::observation::{Autopilot, Heartbeat, VehicleKind};
+use crate::observation::Autopilot;
 use crate::vehicle::Vehicle;
-
-fn has_wings(heartbeat: &Heartbeat) -> bool {
-    matches!(heartbeat.kind, VehicleKind::Plane | VehicleKind::Vtol)
-}
 
 /// Thrown or dropped into the air to start: `ArduCopter`'s THROW.
 pub(crate) fn is_thrown(vehicle: &Vehicle) -> bool {
     vehicle.heartbeat.get().is_some_and(|heartbeat| {
-        heartbeat.autopilot == Autopilot::ArduPilot && !has_wings(heartbeat) && heartbeat.mode == 18
+        heartbeat.autopilot == Autopilot::ArduPilot && !vehicle.has_wings() && heartbeat.mode == 18
     })
 }
 
@@ -20,7 +16,7 @@ pub(crate) fn is_thrown(vehicle: &Vehicle) -> bool {
 pub fn has_pilots_throttle(vehicle: &Vehicle) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
     match heartbeat.autopilot {
-        Autopilot::ArduPilot if has_wings(heartbeat) => {
+        Autopilot::ArduPilot if vehicle.has_wings() => {
             matches!(heartbeat.mode, 0 | 2 | 3 | 4 | 5 | 8 | 17 | 23 | 24)
         }
         Autopilot::ArduPilot => matches!(heartbeat.mode, 0 | 1 | 11 | 14 | 18 | 26),
@@ -33,7 +29,7 @@ pub fn has_pilots_throttle(vehicle: &Vehicle) -> bool {
 /// MANUAL and ACRO.
 pub(crate) fn is_made_to_turn(vehicle: &Vehicle) -> bool {
     let Some(heartbeat) = vehicle.heartbeat.get() else { return true };
-    let wings = has_wings(heartbeat);
+    let wings = vehicle.has_wings();
     match heartbeat.autopilot {
         Autopilot::ArduPilot if wings => matches!(heartbeat.mode, 0 | 3 | 4 | 23),
         Autopilot::ArduPilot => matches!(heartbeat.mode, 1 | 14 | 28),
@@ -49,7 +45,7 @@ pub(crate) fn is_made_to_turn(vehicle: &Vehicle) -> bool {
 pub(crate) fn is_banked_by_hand(vehicle: &Vehicle) -> bool {
     is_made_to_turn(vehicle)
         || vehicle.heartbeat.get().is_some_and(|heartbeat| match heartbeat.autopilot {
-            Autopilot::ArduPilot => !has_wings(heartbeat) && matches!(heartbeat.mode, 11 | 13),
+            Autopilot::ArduPilot => !vehicle.has_wings() && matches!(heartbeat.mode, 11 | 13),
             Autopilot::Px4 => heartbeat.mode >> 16 & 0xFF == 8,
             Autopilot::Other => false,
         })

@@ -457,7 +457,7 @@ impl Monitor {
 
     /// Events without a place since the last call.
     pub const fn take_happenings_lost(&mut self) -> u16 {
-        self.happenings.take_lost()
+        core::mem::replace(&mut self.happenings.lost, 0)
     }
 
     /// Half of a snapshot around a critical finding, each once.

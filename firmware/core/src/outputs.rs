@@ -132,11 +132,6 @@ impl Verdict {
             Self::Saturated => SATURATED_PERCENT,
         }
     }
-
-    /// 2, critical, of a motor that is shut off.
-    pub(crate) fn off_rank(self) -> f32 {
-        if self == Self::ShutOff { 2.0 } else { 0.0 }
-    }
 }
 
 state! {
@@ -160,7 +155,7 @@ state! {
         count: u8,
         range: Range = Range::Pulses,
         outputs: [Output; JUDGED_MAX] = [Output::default(); JUDGED_MAX],
-        at: Stamp,
+        pub(crate) at: Stamp,
         /// The motor that has stood out over time, and by how much, percent for [`SUMMED_S`].
         summed: (u8, f32),
         /// The judged motor and its verdict; all others are good.
@@ -316,16 +311,12 @@ impl MotorOutputs {
             self.outputs.iter_mut().for_each(|output| output.share.learn(step_s));
         }
         // Opposite to a motor that alone drives, an idle motor is the balance, and no fault.
-        let shut_off = self.find_shut_off(count).filter(|_| !self.is_known() || stands_out < HOLD_PERCENT);
+        let mut outputs = (0_u8..).zip(&self.outputs).take(count).filter(|_| is_quiet);
+        let shut_off = outputs.find(|(_, output)| output.share.smooth < SHUT_OFF_SHARE);
         self.verdict = match shut_off {
-            Some(place) => (place, Verdict::ShutOff),
+            Some((place, _)) => (place, Verdict::ShutOff),
             None => (place, if self.is_known() { Verdict::Weak(stands_out) } else { Verdict::Ok }),
         };
-    }
-
-    fn find_shut_off(&self, count: usize) -> Option<u8> {
-        let mut outputs = (0_u8..).zip(&self.outputs).take(count);
-        outputs.find(|(_, output)| output.share.smooth < SHUT_OFF_SHARE).map(|(place, _)| place)
     }
 
     fn find_weak(&mut self, count: usize, step_s: f32) -> (u8, f32) {
@@ -370,10 +361,6 @@ impl MotorOutputs {
 
     fn judged(&self, vehicle: &Vehicle) -> usize {
         motors(vehicle).max(self.count.into()) * usize::from(motors(vehicle) > 0)
-    }
-
-    pub(crate) fn are_told(&self) -> bool {
-        self.at.is_set()
     }
 
     /// A motor's command against the average of all, percent, smoothed; of frames whose outputs have a past.

@@ -56,10 +56,6 @@ impl Motor {
             self.state_at = Some(at);
         }
     }
-
-    const fn is_known(&self) -> bool {
-        self.moved_at.is_some() || self.state_at.is_some()
-    }
 }
 
 /// The figures of a battery's load and charge.
@@ -70,7 +66,8 @@ pub(crate) struct Supply {
     pub(crate) remaining: Option<Fraction>,
 }
 
-fn known(places: impl Iterator<Item = bool>) -> u8 {
+/// How many places there are up to the last known one.
+pub(crate) fn known(places: impl Iterator<Item = bool>) -> u8 {
     (1..).zip(places).fold(0, |count, (place, is_known)| if is_known { place } else { count })
 }
 
@@ -165,17 +162,8 @@ state! {
 }
 
 impl Vehicle {
-    pub(crate) fn motors_known(&self) -> u8 {
-        known(self.motors.iter().map(Motor::is_known))
-    }
-
     pub(crate) fn batteries_known(&self) -> u8 {
         known(self.batteries.iter().map(|slot| slot.get().is_some()))
-    }
-
-    pub(crate) fn receivers_known(&self) -> u8 {
-        let of_both = self.gnss.iter().zip(&self.gnss_integrity);
-        known(of_both.map(|(gnss, integrity)| gnss.get().is_some() || integrity.get().is_some()))
     }
 
     /// A battery's own figures. Those of the autopilot are the first battery's while none reports itself: with several they are
@@ -208,6 +196,10 @@ impl Vehicle {
             VehicleKind::Plane if self.vtol != VtolState::Unknown => VehicleKind::Vtol,
             kind => kind,
         }
+    }
+
+    pub(crate) fn has_wings(&self) -> bool {
+        matches!(self.kind(), VehicleKind::Plane | VehicleKind::Vtol)
     }
 
     /// Whether its autopilot is an `ArduPilot`.
@@ -298,7 +290,10 @@ impl Vehicle {
                 }
                 self.system.set(at, system);
             }
-            Observation::SystemTime(time) => self.take_time(at, time),
+            Observation::SystemTime(time) => {
+                self.take_boot_time(at, time.boot_ms);
+                self.time.set(at, time);
+            }
             Observation::Gnss(gnss) => set_instance(&mut self.gnss, gnss.instance, at, gnss),
             Observation::GnssIntegrity(integrity) => {
                 set_instance(&mut self.gnss_integrity, integrity.instance, at, integrity);
@@ -317,10 +312,8 @@ impl Vehicle {
                 self.inertial.take_attitude(at, &attitude);
                 self.attitude.set(at, attitude);
             }
-            Observation::Wanted(Wanted { roll, pitch, .. }) => {
-                if roll.0.is_finite() && pitch.0.is_finite() {
-                    self.wanted.set(at, [roll, pitch]);
-                }
+            Observation::Wanted(Wanted { roll, pitch, .. }) if (roll.0 + pitch.0).is_finite() => {
+                self.wanted.set(at, [roll, pitch]);
             }
             Observation::ClimbWanted(climb) => self.climb_wanted.set(at, climb),
             Observation::LocalPosition(local) => self.local.set(at, local),
@@ -350,7 +343,8 @@ impl Vehicle {
             Observation::Alert(alert) => self.alerts.tell(at, alert),
             Observation::Failing(causes) => self.alerts.take_failures(at, causes),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
-            Observation::SpeedSensors(_)
+            Observation::Wanted(_)
+            | Observation::SpeedSensors(_)
             | Observation::SecondEstimate(_)
             | Observation::Outputs(_)
             | Observation::MissionCurrent(_)
@@ -370,11 +364,6 @@ impl Vehicle {
         let terminated = heartbeat.state == Heartbeat::TERMINATED;
         self.terminated_since = terminated.then(|| self.terminated_since.unwrap_or(at));
         self.heartbeat.set(at, heartbeat);
-    }
-
-    fn take_time(&mut self, at: BootMs, time: SystemTime) {
-        self.take_boot_time(at, time.boot_ms);
-        self.time.set(at, time);
     }
 
     /// A boot time that falls, and which the next one agrees with, is a reboot. One wrong time is none, nor are messages that

@@ -18,7 +18,7 @@ use crate::motion::{
     CLEAR_M, LOW_M, MOVES_MPS, STILL_MPS, TILTED_RAD, WINGS_MPS, airspeed_mps, climb_mps, ground_speed_mps,
     throttle,
 };
-use crate::observation::{LandedState, VehicleKind};
+use crate::observation::LandedState;
 use crate::params::Params;
 use crate::pressure::NOISE_M;
 use crate::thrust::Power;
@@ -316,8 +316,7 @@ pub(super) fn on_rotors(now: BootMs, vehicle: &Vehicle) -> bool {
 }
 
 pub(super) fn is_on_wings(now: BootMs, vehicle: &Vehicle) -> bool {
-    let has_wings = matches!(vehicle.kind(), VehicleKind::Plane | VehicleKind::Vtol);
-    !vehicle.hovers(now).unwrap_or(!has_wings)
+    !vehicle.hovers(now).unwrap_or(!vehicle.has_wings())
 }
 
 fn is_tilted(now: BootMs, vehicle: &Vehicle) -> bool {

@@ -26,6 +26,7 @@ use crate::bytes::fnv1a;
 use crate::latest::Reading;
 use crate::params::{Param, Params};
 use crate::time::{BootMs, Millis, Stamp};
+use crate::vehicle::known;
 
 /// Which side of its limits is the bad one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,14 +91,17 @@ impl Reported {
     pub(super) fn of(inputs: &Inputs<'_>) -> Self {
         let Inputs { vehicle, derived, .. } = inputs;
         let batteries = vehicle.batteries_known();
+        let motors = vehicle.motors.iter().map(|motor| motor.moved_at.or(motor.state_at).is_some());
+        let both = vehicle.gnss.iter().zip(&vehicle.gnss_integrity);
+        let receivers = both.map(|(gnss, integrity)| gnss.at().or(integrity.at()).is_some());
         let sensors = derived.crosschecks.sensors_known();
         let mut counts = [u8::MAX; _];
         for (kind, count) in [
-            (InstanceOf::Motor, vehicle.motors_known()),
-            (InstanceOf::Output, if derived.motors.outputs.are_told() { u8::MAX } else { 0 }),
+            (InstanceOf::Motor, known(motors)),
+            (InstanceOf::Output, if derived.motors.outputs.at.is_set() { u8::MAX } else { 0 }),
             (InstanceOf::Supply, batteries.max(1)),
             (InstanceOf::Battery, batteries),
-            (InstanceOf::Receiver, vehicle.receivers_known()),
+            (InstanceOf::Receiver, known(receivers)),
             (InstanceOf::Sensor, sensors),
             (InstanceOf::Pair, if derived.crosschecks.are_compared() { sensors } else { 0 }),
         ] {
@@ -286,7 +290,7 @@ state! {
         /// `None` until the value has been seen while the check applied.
         level: Option<Level>,
         /// The lowest level while levels are held: a warning or critical.
-        held: Option<Level>,
+        pub(super) held: Option<Level>,
         samples: Samples = Samples(0),
         repeats: Repeats = Repeats(0),
         bad: Stamp,
@@ -315,11 +319,8 @@ pub struct LevelChange {
 
 impl Check {
     /// How old the value may be; `None` for values that are ages themselves.
-    pub const fn stale_after(&self) -> Option<Millis> {
-        match self.stale_s {
-            Some(seconds) => Some(Millis::from_secs(seconds.get() as u64)),
-            None => None,
-        }
+    pub fn stale_after(&self) -> Option<Millis> {
+        self.stale_s.map(|seconds| Millis::from_secs(seconds.get().into()))
     }
 
     pub(super) fn limit(&self, level: Level, params: &Params) -> f32 {
@@ -380,10 +381,6 @@ impl State {
         if let Some(reading) = reading.filter(|reading| reading.value.is_finite()) {
             self.seen = Stamp::at(reading.at.earlier(now));
         }
-    }
-
-    pub(super) const fn release(&mut self) {
-        self.held = None;
     }
 
     /// One step: at least every 50 ms.

@@ -121,12 +121,11 @@ pub struct Exceedance {
 }
 
 const VERSION: u8 = 1;
-const ENTRY_BYTES: usize = 4 + 1 + 2 + 2 + 4 + 4 + 4;
 
 impl Exceedances {
     /// The longest stored form: version, then the entries. Each has the FNV-1a hash of the check's name (u32),
     /// instance, warnings and criticals (u16), tenths of a second of both (u32), peak (f32).
-    pub const BYTES: usize = 1 + EXCEEDANCES_MAX * ENTRY_BYTES;
+    pub const BYTES: usize = 1 + EXCEEDANCES_MAX * (4 + 1 + 2 + 2 + 4 + 4 + 4);
 
     /// `check`: its place among all checks.
     pub(crate) fn change(&mut self, check: u16, side: Side, finding: &Finding) {

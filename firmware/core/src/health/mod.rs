@@ -79,7 +79,7 @@ impl Health {
                 }
                 let reading = if is_read { (check.read)(inputs, instance) } else { None };
                 if !how.quiet && !how.latched {
-                    state.release();
+                    state.held = None;
                 }
                 if how.quiet {
                     state.see(inputs.now, reading);

@@ -38,7 +38,7 @@ pub(super) const CHECKS: &[Check] = &[
     // A trend holds until the next figure.
     row!("batt_resistance" BATTERY, above(BatResWarn BatResCrit 5.0), debounce_ms: [10_000, 10_000],
     when: When::InFlight, stale_s: None, of: InstanceOf::Battery, read: |inputs, battery| {
-        let resistance = inputs.derived.resistance(usize::from(battery))?;
+        let resistance = inputs.derived.resistance.get(usize::from(battery))?;
         of(inputs, battery, |_| resistance.rise_percent())
     }),
     row!("batt_fault" BATTERY, above(BatFaultWarn _ 0.0), role: Role::of(Group::FailsafeCause, 0),

@@ -58,7 +58,7 @@ pub(super) const CHECKS: &[Check] = &[
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::FLAG,
         debounce_ms: [500, 1_000], when: When::InFlight, instances: JUDGED_MAX as u8,
         of: InstanceOf::Output, alarm_only: true,
-        read: |inputs, motor| verdict(inputs, motor, Verdict::off_rank)),
+        read: |inputs, motor| verdict(inputs, motor, |verdict| if verdict == Verdict::ShutOff { 2.0 } else { 0.0 })),
     row!("thrust_lost" ESC, above(ThrustWarn _ 0.0),
         role: Role::of(Group::Other, DRIVE | Group::EscTelemetry.bit() | RATES | Group::EkfClimb.bit()),
         when: When::InFlight, instances: 1, of: InstanceOf::Vehicle,

@@ -3,7 +3,7 @@
 use super::Monitor;
 use crate::component::{Component, ComponentFigures, ComponentKind, Label, Status};
 use crate::lifetime::ItemKey;
-use crate::vehicle::BATTERIES_MAX;
+use crate::trend::Resistance;
 
 impl Monitor {
     /// Figures and status of a component.
@@ -41,9 +41,11 @@ impl Monitor {
         let old = component.replace(serial, &usage.wear());
         saving.hurry(ItemKey::Component(place as u8));
         if old.kind == ComponentKind::Battery {
-            (0..BATTERIES_MAX)
-                .filter(|battery| old.number == 0 || usize::from(old.number) == battery + 1)
-                .for_each(|battery| self.derived.forget_resistance(battery));
+            for (number, resistance) in (1..).zip(&mut self.derived.resistance) {
+                if old.number == 0 || old.number == number {
+                    *resistance = Resistance::default();
+                }
+            }
         }
         Some(old)
     }
