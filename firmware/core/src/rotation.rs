@@ -40,34 +40,29 @@ mod tests {
         Attitude { roll, pitch, yaw, ..Attitude::default() }
     }
 
-    #[track_caller]
-    fn is_near(one: [f32; 3], other: [f32; 3]) {
-        assert!(one.iter().zip(other).all(|(one, other)| (one - other).abs() < 1e-5), "{one:?} {other:?}");
-    }
-
     #[test]
-    fn the_axes_of_the_same_attitude_are_the_same() {
-        let angles = [20.0, -35.0, 170.0];
-        let same = of(angles.map(f32::to_radians));
-        is_near(from_axes_of(same, [0.3, -1.2, 2.0], &attitude(angles)), [0.3, -1.2, 2.0]);
-    }
-
-    #[test]
-    fn a_vehicle_that_lags_its_yaw_rolls_as_the_other_one_pitches() {
-        let wanted = of([0.0, 0.0, 90_f32.to_radians()]);
-        is_near(from_axes_of(wanted, [0.0, 1.0, 0.5], &attitude([0.0; 3])), [-1.0, 0.0, 0.5]);
-    }
-
-    #[test]
-    fn a_yaw_of_what_is_to_lean_and_does_not_is_a_pitch_too() {
-        let wanted = of([30_f32.to_radians(), 0.0, 0.0]);
-        is_near(from_axes_of(wanted, [0.0, 0.0, 1.0], &attitude([0.0; 3])), [0.0, -0.5, 0.866_025_4]);
-    }
-
-    #[test]
-    fn angles_and_quaternions_are_of_the_same_rotation() {
-        is_near(turn(of([0.0, -30_f32.to_radians(), 0.0]), [1.0, 0.0, 0.0]), [0.866_025_4, 0.0, 0.5]);
-        // Right wing down: right is down.
-        is_near(turn(of([90_f32.to_radians(), 0.0, 0.0]), [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+    fn a_vector_is_turned_from_the_axes_of_one_rotation_to_those_of_another() {
+        let turned = |wanted: [f32; 3], vector, is: [f32; 3]| {
+            from_axes_of(of(wanted.map(f32::to_radians)), vector, &attitude(is))
+        };
+        let same = [20.0, -35.0, 170.0];
+        for (what, one, other) in [
+            ("the same attitude", turned(same, [0.3, -1.2, 2.0], same), [0.3, -1.2, 2.0]),
+            ("it lags its yaw", turned([0.0, 0.0, 90.0], [0.0, 1.0, 0.5], [0.0; 3]), [-1.0, 0.0, 0.5]),
+            (
+                "it does not lean",
+                turned([30.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]),
+                [0.0, -0.5, 0.866_025_4],
+            ),
+            ("nose down", to_earth(&attitude([0.0, -30.0, 0.0]), [1.0, 0.0, 0.0]), [0.866_025_4, 0.0, 0.5]),
+            (
+                "right wing down: right is down",
+                to_earth(&attitude([90.0, 0.0, 0.0]), [0.0, 1.0, 0.0]),
+                [0.0, 0.0, 1.0],
+            ),
+        ] {
+            let is_near = one.iter().zip(other).all(|(one, other)| (one - other).abs() < 1e-5);
+            assert!(is_near, "{what}: {one:?} {other:?}");
+        }
     }
 }

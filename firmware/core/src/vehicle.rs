@@ -506,23 +506,20 @@ mod tests {
     }
 
     #[test]
-    fn a_falling_boot_time_is_a_reboot_and_reordering_is_not() {
-        let mut vehicle = known();
-        for boot_ms in [5_000, 6_000, 5_500, 7_000, 300, 400] {
-            let time = SystemTime { boot_ms, utc_micros: None };
-            vehicle.observe(BootMs::ZERO, AUTOPILOT, &Observation::SystemTime(time));
+    fn a_falling_boot_time_is_a_reboot_and_reordering_and_the_end_of_the_counter_are_none() {
+        let by_time = |boot_ms| Observation::SystemTime(SystemTime { boot_ms, utc_micros: None });
+        let by_attitude =
+            |boot_ms| Observation::Attitude(Attitude { boot_ms: Some(boot_ms), ..Attitude::default() });
+        let wraps = [u32::MAX - 10, 5, 90_000, 90_400, 90_100, 1_000, 1_100];
+        for said in
+            [[5_000, 6_000, 5_500, 7_000, 300, 400].map(by_time).to_vec(), wraps.map(by_attitude).to_vec()]
+        {
+            let mut vehicle = known();
+            for observation in said {
+                vehicle.observe(BootMs::from_millis(7), AUTOPILOT, &observation);
+            }
+            assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(BootMs::from_millis(7))));
         }
-        assert_eq!(vehicle.reboots, 1);
-    }
-
-    #[test]
-    fn attitude_alone_tells_a_reboot_and_the_end_of_the_counter_is_none() {
-        let mut vehicle = known();
-        for boot_ms in [u32::MAX - 10, 5, 90_000, 90_400, 90_100, 1_000, 1_100] {
-            let attitude = Attitude { boot_ms: Some(boot_ms), ..Attitude::default() };
-            vehicle.observe(BootMs::from_millis(7), AUTOPILOT, &Observation::Attitude(attitude));
-        }
-        assert_eq!((vehicle.reboots, vehicle.rebooted_at), (1, Some(BootMs::from_millis(7))));
     }
 
     fn reboots_with(odd_ms: u32, restarts: bool) -> (u32, Option<BootMs>) {

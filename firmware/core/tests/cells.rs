@@ -1,23 +1,18 @@
 //! Cells of batteries, from the autopilot's messages to an alarm. Unknown cells raise no alarm, and are reported.
 #![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
-use crate::common::{Run, Script};
+use crate::common::{Run, Script, params};
 use hums_core::Monitor;
 use hums_core::figures::Quantity;
 use hums_core::happening::Happening;
 use hums_core::health::Level::{self, Critical, Stale};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{Battery, Feeds, Observation};
-use hums_core::params::Params;
 use hums_core::units::{Amperes, Volts};
 use hums_core::usage::UsageCounter;
 
 fn monitor(settings: &[(&str, f32)]) -> Monitor {
-    let mut params = Params::defaults();
-    for (name, value) in [("PROT_ACTION", 2.0)].iter().chain(settings) {
-        params.set(name, *value).unwrap();
-    }
-    Monitor::new(params)
+    Monitor::new(params(&[&[("PROT_ACTION", 2.0)], settings].concat()))
 }
 
 /// A flight of 100 s. Words besides the vehicle's: `amp` of its pack; `second`, the voltage of another one, and `payload`, that of a

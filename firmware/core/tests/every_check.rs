@@ -1,7 +1,7 @@
 //! Every check finds its fault within its own debounce plus 100 ms, alone, and is good again after it.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
-use crate::common::{Quad, Run};
+use crate::common::{Quad, Run, params};
 use hums_core::cause::{Alert, Cause, Urgency};
 use hums_core::health::{self, CLEAR, Finding, Level, checks};
 use hums_core::observation::{
@@ -27,27 +27,22 @@ const LIMITS: [(&str, f32); 6] = [
     ("RADIO_RSSI_WARN", 60.0),
 ];
 
-fn px4() -> Observation {
-    let kind = VehicleKind::Rotorcraft;
-    Observation::Heartbeat(Heartbeat {
-        autopilot: Autopilot::Px4,
-        kind,
-        armed: true,
-        state: 4,
-        ..Heartbeat::default()
+fn beats(autopilot: Autopilot, state: u8) -> Observation {
+    let (kind, armed) = (VehicleKind::Rotorcraft, true);
+    Observation::Heartbeat(Heartbeat { autopilot, kind, armed, state, ..Heartbeat::default() })
+}
+
+fn engine(cylinder_head_degc: f32, exhaust_degc: f32, fuel_hpa: f32) -> Observation {
+    Observation::Engine(Engine {
+        cylinder_head: Some(Celsius(cylinder_head_degc)),
+        exhaust: Some(Celsius(exhaust_degc)),
+        fuel_pressure: Some(Hectopascals(fuel_hpa)),
+        ..Engine::default()
     })
 }
 
-fn with(settings: &[(&str, f32)]) -> Run {
-    let mut params = Params::defaults();
-    for (name, value) in settings {
-        params.set(name, *value).unwrap();
-    }
-    Run::new(&params)
-}
-
 fn fly(settings: &[(&str, f32)], fault: impl Fn(&mut Quad, &mut Vec<Observation>)) -> Vec<Finding> {
-    let mut run = with(settings);
+    let mut run = Run::new(&params(settings));
     run.flies(0..END_MS, |now_ms, quad, more| {
         if now_ms >= FAULT_MS {
             fault(quad, more);
@@ -84,28 +79,19 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("esc_failure", 1, Level::Warning, |quad, _| esc(quad, 1).failures = Some(4)),
     ("motor_loss", 1, Level::Critical, |quad, _| esc(quad, 1).current = Some(Amperes(0.0))),
     ("motor_imbalance", 0, Level::Critical, |quad, _| esc(quad, 0).rpm = Some(Rpm(7_500.0))),
-    ("cylinder_head", 0, Level::Critical, |_, more| {
-        more.push(Observation::Engine(Engine { cylinder_head: Some(Celsius(250.0)), ..Engine::default() }));
-    }),
-    ("exhaust_gas", 0, Level::Critical, |_, more| {
-        more.push(Observation::Engine(Engine { exhaust: Some(Celsius(900.0)), ..Engine::default() }));
-    }),
-    ("fuel_pressure", 0, Level::Critical, |_, more| {
-        more.push(Observation::Engine(Engine {
-            fuel_pressure: Some(Hectopascals(50.0)),
-            ..Engine::default()
-        }));
-    }),
+    ("cylinder_head", 0, Level::Critical, |_, more| more.push(engine(250.0, 700.0, 300.0))),
+    ("exhaust_gas", 0, Level::Critical, |_, more| more.push(engine(150.0, 900.0, 300.0))),
+    ("fuel_pressure", 0, Level::Critical, |_, more| more.push(engine(150.0, 700.0, 50.0))),
     ("generator_speed", 0, Level::Critical, |_, more| {
         more.extend([6_000.0, 3_000.0].map(|rpm| generator(false, rpm)));
     }),
     ("vibration", 0, Level::Critical, |quad, _| quad.vibration.levels[0] = Some(70.0)),
     ("vibration_px4", 0, Level::Critical, |quad, more| {
-        more.push(px4());
+        more.push(beats(Autopilot::Px4, 4));
         quad.vibration.levels = [Some(0.0), Some(0.0), Some(12.0)];
     }),
     ("gyro_noise", 0, Level::Warning, |quad, more| {
-        more.push(px4());
+        more.push(beats(Autopilot::Px4, 4));
         quad.vibration.levels = [Some(0.0), Some(0.7), Some(2.0)];
     }),
     ("clipping", 0, Level::Critical, |quad, _| quad.vibration.clips = [200; 3]),
@@ -147,10 +133,7 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("mcu_temperature", 0, Level::Critical, |_, more| {
         more.push(Observation::Processor(Processor { temperature: Some(Celsius(105.0)) }));
     }),
-    ("autopilot_state", 0, Level::Critical, |_, more| {
-        let kind = VehicleKind::Rotorcraft;
-        more.push(Observation::Heartbeat(Heartbeat { armed: true, kind, state: 5, ..Heartbeat::default() }));
-    }),
+    ("autopilot_state", 0, Level::Critical, |_, more| more.push(beats(Autopilot::Other, 5))),
     ("roll", 0, Level::Critical, |quad, _| quad.roll = -1.2),
     ("roll", 0, Level::Critical, |quad, _| quad.roll = 1.2),
     ("pitch", 0, Level::Critical, |_, more| {
@@ -226,7 +209,7 @@ fn generator(is_off: bool, rpm: f32) -> Observation {
 }
 
 fn generator_levels(armed: bool, reports: &[(bool, f32)]) -> Vec<Level> {
-    let mut run = with(&[("GEN_SPEED_WARN", 5_500.0), ("GEN_SPEED_CRIT", 5_000.0)]);
+    let mut run = Run::new(&params(&[("GEN_SPEED_WARN", 5_500.0), ("GEN_SPEED_CRIT", 5_000.0)]));
     run.flies(0..reports.len() as u64 * 10_000, |now_ms, quad, more| {
         let (is_off, rpm) = reports[now_ms as usize / 10_000];
         quad.armed = armed;
@@ -248,7 +231,7 @@ fn a_generator_is_judged_once_it_has_run_and_until_it_is_switched_off() {
 
 fn assert_found(name: &str, instance: u8, level: Level, fault: &dyn Fn(&mut Quad, &mut Vec<Observation>)) {
     let check = health::check_named(name).expect(name);
-    let mut run = with(&LIMITS);
+    let mut run = Run::new(&params(&LIMITS));
     run.flies(0..END_MS + 25_000, |now_ms, quad, more| {
         if (FAULT_MS..END_MS).contains(&now_ms) {
             fault(quad, more);
@@ -300,20 +283,9 @@ fn what_else_is_fitted_and_well_has_no_finding() {
         let (remaining, temperature) = (Some(Fraction(0.8)), Some(Celsius(35.0)));
         more.push(Observation::Battery(Battery { id: 1, remaining, temperature, ..Battery::default() }));
         rail(more, 5.0);
-        more.push(Observation::Engine(Engine {
-            cylinder_head: Some(Celsius(150.0)),
-            exhaust: Some(Celsius(700.0)),
-            fuel_pressure: Some(Hectopascals(300.0)),
-            ..Engine::default()
-        }));
-        more.push(generator(false, 6_000.0));
-        more.push(Observation::Gnss(Gnss {
-            instance: 1,
-            fix: 3,
-            satellites: Some(14),
-            hdop: Some(0.9),
-            ..Gnss::default()
-        }));
+        more.extend([engine(150.0, 700.0, 300.0), generator(false, 6_000.0)]);
+        let (satellites, hdop) = (Some(14), Some(0.9));
+        more.push(Observation::Gnss(Gnss { instance: 1, fix: 3, satellites, hdop, ..Gnss::default() }));
         more.push(Observation::RadioControl(RadioControl { rssi: Some(200) }));
         radio(more, [90, 90], [30, 30]);
         more.push(Observation::Processor(Processor { temperature: Some(Celsius(50.0)) }));

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::common::params;
 use hums_core::Monitor;
 use hums_core::component::{ComponentKind, Label, Status};
 use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
@@ -136,17 +137,8 @@ fn sums(monitor: &Monitor) -> Vec<f64> {
 }
 
 fn with_components() -> Params {
-    let mut params = Params::defaults();
-    for (name, value) in [
-        ("CMP1_KIND", 1.0),
-        ("CMP2_KIND", 2.0),
-        ("CMP2_NUMBER", 1.0),
-        ("CMP3_KIND", 3.0),
-        ("BAT_CAPACITY", 5.0),
-    ] {
-        params.set(name, value).unwrap();
-    }
-    params
+    let parts = [("CMP1_KIND", 1.0), ("CMP2_KIND", 2.0), ("CMP2_NUMBER", 1.0), ("CMP3_KIND", 3.0)];
+    params(&[&parts[..], &[("BAT_CAPACITY", 5.0)]].concat())
 }
 
 #[test]
@@ -232,9 +224,7 @@ fn another_airframe_begins_its_own_life() {
 
 #[test]
 fn a_component_wears_over_sessions_and_is_replaced_at_once() {
-    let mut params = Params::defaults();
-    params.set("CMP3_KIND", f32::from(ComponentKind::Airframe as u8)).unwrap();
-    params.set("CMP3_FLIGHTS", 2.0).unwrap();
+    let params = params(&[("CMP3_KIND", f32::from(ComponentKind::Airframe as u8)), ("CMP3_FLIGHTS", 2.0)]);
     let mut store = Store::default();
     for status in [Status::Green, Status::Red] {
         let mut monitor = store.start(&params);

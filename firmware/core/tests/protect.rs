@@ -1,7 +1,6 @@
 //! The protective action, scripted: when it is requested, and all reasons against it.
-#![expect(clippy::unwrap_used, reason = "that is how a test fails")]
 
-use crate::common::{AUTOPILOT, Quad, Run, Said, Script, observe};
+use crate::common::{self, AUTOPILOT, Quad, Run, Said, Script, observe};
 use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
@@ -56,11 +55,7 @@ impl Outcome {
 }
 
 fn params(action: Action, more: &[(&str, f32)]) -> Params {
-    let mut params = Params::defaults();
-    for (name, value) in [("PROT_ACTION", f32::from(action as u8))].iter().chain(more) {
-        params.set(name, *value).unwrap();
-    }
-    params
+    common::params(&[&[("PROT_ACTION", f32::from(action as u8))], more].concat())
 }
 
 fn fly(script: &str) -> Outcome {

@@ -1,7 +1,7 @@
 //! More than one quad of ArduPilot: other systems on the port, other vehicles, other batteries.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "that is how a test fails")]
 
-use crate::common::{AUTOPILOT, Quad, Run, Script, observe};
+use crate::common::{AUTOPILOT, Quad, Run, Script, observe, params};
 use hums_core::happening::Happening;
 use hums_core::lifetime::{Airframe, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{AutopilotIdentity, Esc, EscGroup, Heartbeat, Observation, Source, VehicleKind};
@@ -193,8 +193,7 @@ const OUT_AND_BACK: &str = "* c=0 vibe=0.1,0.1,1 volt=15.6; 0-5 off; 70 off; 0-8
 
 #[test]
 fn each_class_of_vehicle_flies_banks_and_is_protected_as_its_class_on_both_autopilots() {
-    let mut params = Params::defaults();
-    params.set("PROT_ACTION", 2.0).unwrap();
+    let params = params(&[("PROT_ACTION", 2.0)]);
     for kind in ["quad", "hexa", "heli", "plane", "vtol", "rover", "boat", "submarine"] {
         for autopilot in ["ap", "px4"] {
             for landed in ["", "0-8 landed=ground; 8-67 landed=air; 67 landed=ground"] {

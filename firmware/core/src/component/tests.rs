@@ -10,6 +10,10 @@ fn params(set: &[(&str, f32)]) -> Params {
     params
 }
 
+fn wear(totals: &Totals) -> Wear<'_> {
+    Wear { totals, battery_cycles: &[0.0; BATTERIES_MAX] }
+}
+
 fn flown(hours: f64, flights: f64) -> Totals {
     let mut totals = Totals::default();
     totals.add(UsageCounter::Flight, hours * 3_600.0);
@@ -28,24 +32,20 @@ fn the_limit_that_trips_first_decides() {
         (2.0, 9.0, Status::Yellow),
         (2.0, 10.0, Status::Red),
     ] {
-        let totals = flown(hours, flights);
-        let wear = Wear { totals: &totals, battery_cycles: &[0.0; BATTERIES_MAX] };
         component.kind = ComponentKind::Airframe;
-        assert_eq!(component.status(1, &wear, &params), status, "{hours} h, {flights} flights");
+        let is = component.status(1, &wear(&flown(hours, flights)), &params);
+        assert_eq!(is, status, "{hours} h, {flights} flights");
     }
-    let totals = flown(1e6, 1e6);
-    let wear = Wear { totals: &totals, battery_cycles: &[0.0; BATTERIES_MAX] };
-    assert_eq!(component.used_percent(0, &wear, &params), None, "without a limit");
+    assert_eq!(component.used_percent(0, &wear(&flown(1e6, 1e6)), &params), None, "without a limit");
 }
 
 #[test]
 fn a_replaced_part_has_run_nothing_and_the_old_ones_figures_are_told() {
     let params = params(&[("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 50.0)]);
     let mut component = Component::default();
-    let totals = Totals::default();
-    assert!(component.describe(0, &Wear { totals: &totals, battery_cycles: &[0.0; BATTERIES_MAX] }, &params));
+    assert!(component.describe(0, &wear(&Totals::default()), &params));
     let totals = flown(60.0, 5.0);
-    let wear = Wear { totals: &totals, battery_cycles: &[0.0; BATTERIES_MAX] };
+    let wear = wear(&totals);
     assert_eq!(component.status(0, &wear, &params), Status::Red);
     let old = component.replace(Label::new("SN 2"), &wear);
     assert_eq!((old.serial, old.ran().flights), (Label::default(), 5.0));
@@ -57,10 +57,9 @@ fn a_replaced_part_has_run_nothing_and_the_old_ones_figures_are_told() {
 fn a_component_reads_back_and_the_session_is_added_once() {
     let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
     let totals = flown(1.0, 2.0);
-    let wear = Wear { totals: &totals, battery_cycles: &[0.75, 0.0, 0.0, 0.0] };
-    let none = Totals::default();
     let mut component = Component { name: Label::new("pack A"), ..Component::default() };
-    component.describe(0, &Wear { totals: &none, battery_cycles: &[0.0; BATTERIES_MAX] }, &params);
+    component.describe(0, &wear(&Totals::default()), &params);
+    let wear = Wear { totals: &totals, battery_cycles: &[0.75, 0.0, 0.0, 0.0] };
     let ran =
         ComponentFigures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 };
     let mut replaced = component;

@@ -64,20 +64,15 @@ mod tests {
     }
 
     #[test]
-    fn the_speed_before_the_touch_counts_also_where_the_estimate_goes_on_sinking() {
-        assert!((land(10.0, &[(4.0, 2.5), (3.0, 0.1)]) - 2.5).abs() < 1e-6);
-        assert!(
-            (land(10.0, &[(4.0, 2.49), (1.0, 0.75), (1.0, 0.5), (1.0, 0.3), (2.0, 0.0)]) - 2.49).abs() < 1e-6
-        );
-    }
-
-    #[test]
-    fn a_hover_on_the_way_down_is_no_touch() {
-        assert!((land(10.0, &[(3.0, 2.5), (3.0, 0.0), (5.0, 0.5), (2.0, 0.0)]) - 0.5).abs() < 1e-6);
-    }
-
-    #[test]
-    fn a_bounce_counts_with_its_first_and_harder_touch() {
-        assert!((land(10.0, &[(4.0, 2.5), (0.4, -0.5), (0.4, 0.5), (2.0, 0.0)]) - 2.5).abs() < 1e-6);
+    fn the_speed_before_the_first_and_hardest_touch_counts() {
+        for (what, pieces, touch_mps) in [
+            ("it stands", &[(4.0, 2.5), (3.0, 0.1)][..], 2.5),
+            ("the estimate sinks on", &[(4.0, 2.49), (1.0, 0.75), (1.0, 0.5), (1.0, 0.3), (2.0, 0.0)], 2.49),
+            ("a hover on the way down", &[(3.0, 2.5), (3.0, 0.0), (5.0, 0.5), (2.0, 0.0)], 0.5),
+            ("a bounce", &[(4.0, 2.5), (0.4, -0.5), (0.4, 0.5), (2.0, 0.0)], 2.5),
+        ] {
+            let found_mps = land(10.0, pieces);
+            assert!((found_mps - touch_mps).abs() < 1e-6, "{what}: {found_mps}");
+        }
     }
 }

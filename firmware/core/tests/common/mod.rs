@@ -281,6 +281,15 @@ impl Run {
     }
 }
 
+/// The defaults with these settings.
+pub fn params(settings: &[(&str, f32)]) -> Params {
+    let mut params = Params::defaults();
+    for (name, value) in settings {
+        params.set(name, *value).expect(name);
+    }
+    params
+}
+
 /// Feeds these observations of a source.
 pub fn observe(
     monitor: &mut Monitor,
