@@ -29,6 +29,7 @@ pub(crate) const EXACT: u16 = 1 << 9;
 
 pub(crate) const TURNED: Millis = Millis::from_secs(1);
 const EXACT_FOR: Millis = Millis::from_secs(15);
+/// A faster climb or sink is not level, and shows in the pressure.
 pub(crate) const LEVEL_MPS: f32 = 2.0;
 /// 34 degrees: a bank in which all the thrust may not carry a multicopter.
 pub(crate) const LEANS_RAD: f32 = 0.6;

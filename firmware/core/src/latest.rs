@@ -21,19 +21,13 @@ impl<T> Latest<T> {
     }
 
     /// The value, however old.
-    pub const fn get(&self) -> Option<&T> {
-        match &self.slot {
-            Some((_, value)) => Some(value),
-            None => None,
-        }
+    pub fn get(&self) -> Option<&T> {
+        self.slot.as_ref().map(|(_, value)| value)
     }
 
     /// When it was set.
-    pub const fn at(&self) -> Option<BootMs> {
-        match &self.slot {
-            Some((at, _)) => Some(*at),
-            None => None,
-        }
+    pub fn at(&self) -> Option<BootMs> {
+        self.slot.as_ref().map(|(at, _)| *at)
     }
 
     /// The value, if it is younger than `limit`.

@@ -26,15 +26,8 @@ macro_rules! numbered {
             }
 
             /// That of a stored number; `None` for one that this version does not know.
-            pub const fn from_number(number: u8) -> Option<Self> {
-                let mut place = 0;
-                while place < Self::COUNT {
-                    if Self::ALL[place] as u8 == number {
-                        return Some(Self::ALL[place]);
-                    }
-                    place += 1;
-                }
-                None
+            pub fn from_number(number: u8) -> Option<Self> {
+                Self::ALL.into_iter().find(|one| *one as u8 == number)
             }
         }
     };

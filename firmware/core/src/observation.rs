@@ -376,11 +376,8 @@ pub struct CellVoltage(NonZeroU16);
 
 impl CellVoltage {
     /// `None` of 0.
-    pub const fn from_millivolts(millivolts: u16) -> Option<Self> {
-        match NonZeroU16::new(millivolts) {
-            Some(millivolts) => Some(Self(millivolts)),
-            None => None,
-        }
+    pub fn from_millivolts(millivolts: u16) -> Option<Self> {
+        NonZeroU16::new(millivolts).map(Self)
     }
 
     /// The same in volts.

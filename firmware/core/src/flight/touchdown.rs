@@ -1,15 +1,12 @@
 //! The speed of the touchdown.
 //!
 //! The autopilot reports a landing a second or more after the touch, and its estimate goes on sinking slowly meanwhile. At the touch the sink
-//! breaks off: it falls to half of the greatest sink of the last second ([`crate::motion::WindowMax`]). This speed counts if the vehicle stays at
-//! this height until it has landed. A stop higher up was a hover.
+//! breaks off: it falls to half of the greatest sink of the last second ([`crate::motion::WindowMax`]). This speed counts if the vehicle stays
+//! within [`CLEAR_M`] of this height until it has landed: a pressure in ground effect errs. A stop higher up was a hover.
 
 use super::GROUND_LASTS;
-use crate::motion::HANGS_MPS;
+use crate::motion::{CLEAR_M, HANGS_MPS};
 use crate::time::BootMs;
-
-/// Height of the touch above or below the landed vehicle, with the error of the pressure in ground effect, m.
-const SAME_HEIGHT_M: f32 = 1.5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stop {
@@ -27,9 +24,8 @@ impl Touchdown {
         if fastest_mps < HANGS_MPS || sink_mps > fastest_mps / 2.0 {
             return;
         }
-        let same = |stop: &Stop| {
-            (stop.height_m - height_m).abs() <= SAME_HEIGHT_M && at.since(stop.at) <= GROUND_LASTS
-        };
+        let same =
+            |stop: &Stop| (stop.height_m - height_m).abs() <= CLEAR_M && at.since(stop.at) <= GROUND_LASTS;
         let stop = self.0.filter(same).filter(|stop| stop.sink_mps >= fastest_mps);
         self.0 = stop.or(Some(Stop { at, height_m, sink_mps: fastest_mps }));
     }
@@ -38,7 +34,7 @@ impl Touchdown {
     pub(super) fn take(&mut self, at: BootMs, height_m: Option<f32>) -> f32 {
         let here = |stop: &Stop| {
             at.since(stop.at) <= GROUND_LASTS
-                && height_m.is_none_or(|height_m| (stop.height_m - height_m).abs() <= SAME_HEIGHT_M)
+                && height_m.is_none_or(|height_m| (stop.height_m - height_m).abs() <= CLEAR_M)
         };
         self.0.take().filter(here).map_or(0.0, |stop| stop.sink_mps)
     }

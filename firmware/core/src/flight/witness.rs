@@ -12,7 +12,7 @@
 //! nothing of height and speed ([`crate::motion`]).
 
 use super::{Flight, Stage};
-use crate::gates::TURNED;
+use crate::gates::{LEVEL_MPS, TURNED};
 use crate::mishap::MishapKind;
 use crate::motion::{
     CLEAR_M, LOW_M, MOVES_MPS, STILL_MPS, TILTED_RAD, WINGS_MPS, airspeed_mps, climb_mps, ground_speed_mps,
@@ -37,8 +37,6 @@ const WEIGHT_G: core::ops::Range<f32> = 0.85..2.0;
 const STAYS_M: f32 = 1.2;
 /// A vehicle without power that has not sunk for so long, by the pressure, is down.
 const STEADY: Millis = Millis::from_secs(3);
-/// A climb or sink by this, m/s, shows in the pressure, or the estimate is lost.
-const LOST_MPS: f32 = 2.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vote {
@@ -252,7 +250,7 @@ impl Flight {
     /// Whether the estimate of height and speed is lost. The pressure does not follow a climb or a sink; or, in a
     /// mishap, the receiver stands.
     fn is_lost(&self, now: BootMs, vehicle: &Vehicle) -> bool {
-        let climbs = climb_mps(now, vehicle).filter(|climb_mps| climb_mps.abs() > LOST_MPS);
+        let climbs = climb_mps(now, vehicle).filter(|climb_mps| climb_mps.abs() > LEVEL_MPS);
         self.has_strayed(now)
             || climbs.is_some_and(|climb_mps| self.pressure.follows(now, climb_mps) == Some(false))
     }
