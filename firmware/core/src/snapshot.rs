@@ -171,13 +171,8 @@ impl Snapshots {
             self.left_out = self.left_out.saturating_add(1);
             return;
         };
-        *place = Some(Pending {
-            at: finding.at,
-            check: finding.check,
-            instance: finding.instance,
-            subsystem: finding.subsystem,
-            before_told: false,
-        });
+        let Finding { at, check, instance, subsystem, .. } = *finding;
+        *place = Some(Pending { at, check, instance, subsystem, before_told: false });
     }
 
     pub(crate) fn take(&mut self, now: BootMs) -> Option<Snapshot<'_>> {

@@ -244,7 +244,7 @@ fn a_component_wears_over_sessions_and_is_replaced_at_once() {
 #[test]
 fn an_item_that_cannot_be_read_is_as_if_there_were_none() {
     let mut monitor = Monitor::new(Params::defaults());
-    for key in ItemKey::ALL {
+    for key in ItemKey::all() {
         assert!(monitor.restore(key, &[]).is_err());
         assert!(monitor.restore(key, &[0; ITEM_BYTES_MAX]).is_err());
     }

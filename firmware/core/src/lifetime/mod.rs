@@ -33,14 +33,9 @@ use crate::vehicle::BATTERIES_MAX;
 /// The longest item. Each has its own length.
 pub const ITEM_BYTES_MAX: usize = 512;
 
-const _: () = {
-    let lengths = [Lifetime::BYTES, Exceedances::BYTES, Exposure::BYTES, Component::BYTES, Session::BYTES];
-    let mut place = 0;
-    while place < lengths.len() {
-        assert!(lengths[place] <= ITEM_BYTES_MAX);
-        place += 1;
-    }
-};
+const _: () = assert!(Lifetime::BYTES <= ITEM_BYTES_MAX && Exceedances::BYTES <= ITEM_BYTES_MAX);
+const _: () = assert!(Exposure::BYTES <= ITEM_BYTES_MAX && Component::BYTES <= ITEM_BYTES_MAX);
+const _: () = assert!(Session::BYTES <= ITEM_BYTES_MAX);
 
 /// The kind of a stored item. The numbers are stored and never change meaning; 2 is retired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -59,16 +54,10 @@ pub enum ItemKey {
 
 impl ItemKey {
     /// All keys, by number.
-    pub const ALL: [Self; 4 + COMPONENTS_MAX] = {
-        let mut all = [Self::Session; 4 + COMPONENTS_MAX];
-        (all[0], all[1], all[2]) = (Self::Lifetime, Self::Exceedances, Self::Exposure);
-        let mut place = 0;
-        while place < COMPONENTS_MAX {
-            all[3 + place] = Self::Component(place as u8);
-            place += 1;
-        }
-        all
-    };
+    pub fn all() -> impl Iterator<Item = Self> {
+        let first = [Self::Lifetime, Self::Exceedances, Self::Exposure].into_iter();
+        first.chain((0..COMPONENTS_MAX as u8).map(Self::Component)).chain([Self::Session])
+    }
 
     /// The stored number.
     pub const fn number(self) -> u8 {
@@ -83,7 +72,7 @@ impl ItemKey {
 
     /// The key of a stored number; `None` for an item that this version does not know.
     pub fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|key| key.number() == number)
+        Self::all().find(|key| key.number() == number)
     }
 }
 
@@ -309,8 +298,8 @@ mod tests {
     #[test]
     fn keys_have_numbers_of_their_own() {
         let known = (0..=255).filter_map(ItemKey::from_number);
-        assert!(known.eq(ItemKey::ALL), "each number is one key's");
-        for key in ItemKey::ALL {
+        assert!(known.eq(ItemKey::all()), "each number is one key's");
+        for key in ItemKey::all() {
             assert_eq!(ItemKey::from_number(key.number()), Some(key));
         }
         assert_eq!((ItemKey::Lifetime.number(), ItemKey::Component(7).number()), (1, 23));

@@ -76,7 +76,7 @@ impl Saving {
         if self.due == 0 {
             return None;
         }
-        let due = ItemKey::ALL.into_iter().find(|key| self.due & Self::bit(*key) != 0);
+        let due = ItemKey::all().find(|key| self.due & Self::bit(*key) != 0);
         if due == Some(ItemKey::Session) {
             self.session_at = now;
         }
