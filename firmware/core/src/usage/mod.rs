@@ -16,7 +16,7 @@ use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;
 use crate::params::{Param, Params};
-use crate::power_draw::{Drawn, discharge_a, drawn};
+use crate::power_draw::{Drawn, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{BootMs, Millis, PAUSE, SILENT};
 use crate::units::{Metres, Rpm};
@@ -166,8 +166,8 @@ impl Usage {
             self.totals.add(UsageCounter::BatteryCycles, charge_ah / f64::from(self.capacity_ah));
             let batteries = vehicle.batteries.iter().filter(|slot| slot.get().is_some()).count().max(1);
             let capacity_ah = f64::from(self.capacity_ah) / batteries as f64;
-            for (battery, cycles) in self.battery_cycles.iter_mut().enumerate() {
-                *cycles += discharge_a(now, vehicle, battery) * step_s / 3_600.0 / capacity_ah;
+            for (cycles, discharge_a) in self.battery_cycles.iter_mut().zip(drawn.each_a) {
+                *cycles += f64::from(discharge_a) * step_s / 3_600.0 / capacity_ah;
             }
         }
     }
