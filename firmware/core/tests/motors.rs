@@ -1,7 +1,7 @@
 //! Speeds and currents of motors against each other: frames, turning, standing and pushing motors.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
-use crate::common::{AUTOPILOT, Quad, Run, Script, observe};
+use crate::common::{AUTOPILOT, Quad, Run, Script, observe, rows};
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{Attitude, Autopilot, Esc, EscGroup, Observation, Outputs};
 use hums_core::params::Params;
@@ -93,72 +93,51 @@ const QUAD: &str = "* rpm=5000x4; 20 ";
 const QUADPLANE: &str = "* vtol mode=10 hover; 0-2 landed=ground; 2 landed=air; ";
 const GIVEN: &str = "* px4 yaw=0.3 servo rpm=5000x4; 0-4 h=0 out=1000x4; 4 h=200 out=1500x4; 20 c=-4 ";
 const AIRBORNE: &str = "* hexa start=20 landed=air fill=0 ";
+const BEGINS: [(&str, &str); 5] =
+    [("HEXA ", HEXA), ("QUAD ", QUAD), ("QUADPLANE ", QUADPLANE), ("GIVEN ", GIVEN), ("AIRBORNE ", AIRBORNE)];
 
-type Told = &'static [(&'static str, u8)];
-/// A name, the script of the beginning, that of the rest, and the findings of the motors.
-const FLIGHTS: &[(&str, &str, &str, Told)] = &[
-    ("a Y6's upper and lower motors", HEXA, "rpm=5100,3550,5050,3500,3520,5080 yaw=0.4", &[]),
-    ("a yawing quad", QUAD, "rpm=4200,4150,5900,5950 yaw=0.5", &[]),
-    ("a load that hangs before its middle", QUAD, "rpm=5800,4300,5750,4250", &[]),
-    ("alone, in groups", HEXA, "rpm=5100,3550,5050,3500,3520,7900", &[("motor_imbalance", 5)]),
-    ("alone", QUAD, "rpm=5000,6700,5050,4950", &[("motor_imbalance", 1)]),
-    ("it turns fast", QUAD, "rpm=3200,4300,5300,6500 yaw=1.8", &[]),
-    ("it turns slowly", QUAD, "rpm=3200,4300,5300,6500 yaw=0.1", &[("motor_imbalance", 3)]),
-    ("one stopped", HEXA, "rpm=5900,6000,300,6200,6100,900 yaw=1.8", &[("motor_imbalance", 2)]),
-    ("they idle on the ground", "* thr=0.02 h=12 landed=air rpm=5000x4; 20 ", "rpm=2200,2050,2900,800", &[]),
-    (
-        "a command that was cut",
-        "* amp=5x4 rpm=5000x4; 20%20:0-1.5 ",
-        "amp=5,0,5,5 rpm=5000,3900,5000,5000",
-        &[],
-    ),
-    ("the motor that pushes", QUADPLANE, "* amp=5x4,0", &[]),
-    ("it helps for a while", QUADPLANE, "* amp=5x4,0; 10-30 amp=5x4,6", &[]),
-    (
-        "it returns",
-        QUADPLANE,
-        "0-20 forward landed=air amp=0x4,12; 20-25 transition amp=5x4,12; 25 amp=5x4,3; 26 amp=5x4,0",
-        &[],
-    ),
-    ("one that lifts", QUADPLANE, "* amp=5x4,0; 40 amp=5,5,0.1,5,0", &[("motor_loss", 2)]),
-    ("stopped to turn", QUADPLANE, "* amp=5x4; 20 yaw=0.3 amp=0.05,0.2,9,8", &[]),
-    ("one is lost", QUADPLANE, "* amp=5x4; 20 yaw=0.3 amp=0.05,4,9,8", &[("motor_loss", 0)]),
-    ("alone at its end for a moment", GIVEN, "; 20-20.1 out=2000,1300,1350,1350", &[]),
-    ("two share a turn", GIVEN, "out=2000,1800,1350,1350", &[]),
-    ("all the thrust", GIVEN, "out=2000x4", &[]),
-    ("the same of DShot", GIVEN, "out=2000,1800,1350,1350; * dshot", &[]),
-    ("the same of CAN", GIVEN, "out=2000,1800,1350,1350; * can", &[]),
-    ("it hovers with about 1000 of DShot", GIVEN, "out=1525x4; * dshot", &[]),
-    ("the same of CAN", GIVEN, "out=1525x4; * can", &[]),
-    (
-        "outputs that are heard in the air first",
-        "* hexa fill=0 varies=30; 0-4 h=0; 10 ",
-        "out=1500,1480,1950,1510,1530,1600",
-        &[("motor_output", 2)],
-    ),
-    ("they are well", "* hexa fill=0 varies=30; 0-4 h=0; 10 ", "out=1500,1480,1520,1510,1530,1600", &[]),
-    (
-        "dead before it was heard",
-        AIRBORNE,
-        "rpm=5000x6 varies=30 out=1500,1480,900,1510,1530,1600",
-        &[("motor_off", 2)],
-    ),
-    (
-        "weak before",
-        AIRBORNE,
-        "rpm=5000x6 varies=30 out=1500,1480,1950,1510,1530,1600",
-        &[("motor_output", 2)],
-    ),
-    ("well", AIRBORNE, "rpm=5000x6 varies=30 out=1500,1480,1520,1510,1530,1600", &[]),
-    ("what stands still is a servo", AIRBORNE, "rpm=5000x6 out=1500,1480,1950,1510,1530,1600", &[]),
-    ("it is not used", AIRBORNE, "rpm=5000x6 varies=30 out=1500,1480,0,1510,1530,1600", &[]),
-    ("others are near it", AIRBORNE, "rpm=5000x6 varies=30 out=1500,1480,1950,1700,1750,1600", &[]),
-];
+/// A name, the findings of the motors, and the script. Its beginning may be one of the above.
+const FLIGHTS: &str = "
+a Y6's upper and lower motors | - | HEXA rpm=5100,3550,5050,3500,3520,5080 yaw=0.4
+a yawing quad | - | QUAD rpm=4200,4150,5900,5950 yaw=0.5
+a load that hangs before its middle | - | QUAD rpm=5800,4300,5750,4250
+alone, in groups | motor_imbalance.5 | HEXA rpm=5100,3550,5050,3500,3520,7900
+alone | motor_imbalance.1 | QUAD rpm=5000,6700,5050,4950
+it turns fast | - | QUAD rpm=3200,4300,5300,6500 yaw=1.8
+it turns slowly | motor_imbalance.3 | QUAD rpm=3200,4300,5300,6500 yaw=0.1
+one stopped | motor_imbalance.2 | HEXA rpm=5900,6000,300,6200,6100,900 yaw=1.8
+they idle on the ground | - | * thr=0.02 h=12 landed=air rpm=5000x4; 20 rpm=2200,2050,2900,800
+a command that was cut | - | * amp=5x4 rpm=5000x4; 20%20:0-1.5 amp=5,0,5,5 rpm=5000,3900,5000,5000
+the motor that pushes | - | QUADPLANE * amp=5x4,0
+it helps for a while | - | QUADPLANE * amp=5x4,0; 10-30 amp=5x4,6
+it returns | - | QUADPLANE 0-20 forward landed=air amp=0x4,12; 20-25 transition amp=5x4,12; 25 amp=5x4,3; 26 amp=5x4,0
+one that lifts | motor_loss.2 | QUADPLANE * amp=5x4,0; 40 amp=5,5,0.1,5,0
+stopped to turn | - | QUADPLANE * amp=5x4; 20 yaw=0.3 amp=0.05,0.2,9,8
+one is lost | motor_loss.0 | QUADPLANE * amp=5x4; 20 yaw=0.3 amp=0.05,4,9,8
+alone at its end for a moment | - | GIVEN ; 20-20.1 out=2000,1300,1350,1350
+two share a turn | - | GIVEN out=2000,1800,1350,1350
+all the thrust | - | GIVEN out=2000x4
+the same of DShot | - | GIVEN out=2000,1800,1350,1350; * dshot
+the same of CAN | - | GIVEN out=2000,1800,1350,1350; * can
+it hovers with about 1000 of DShot | - | GIVEN out=1525x4; * dshot
+the same of CAN | - | GIVEN out=1525x4; * can
+outputs that are heard in the air first | motor_output.2 | * hexa fill=0 varies=30; 0-4 h=0; 10 out=1500,1480,1950,1510,1530,1600
+they are well | - | * hexa fill=0 varies=30; 0-4 h=0; 10 out=1500,1480,1520,1510,1530,1600
+dead before it was heard | motor_off.2 | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,900,1510,1530,1600
+weak before | motor_output.2 | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,1950,1510,1530,1600
+well | - | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,1520,1510,1530,1600
+what stands still is a servo | - | AIRBORNE rpm=5000x6 out=1500,1480,1950,1510,1530,1600
+it is not used | - | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,0,1510,1530,1600
+others are near it | - | AIRBORNE rpm=5000x6 varies=30 out=1500,1480,1950,1700,1750,1600
+";
 
 #[test]
 fn motors_are_judged_by_speeds_currents_and_outputs() {
-    for (what, begins, goes_on, expected) in FLIGHTS {
-        assert_eq!(told(&format!("{begins}{goes_on}")), *expected, "{what}");
+    for [what, expected, script] in rows(FLIGHTS) {
+        let found =
+            told(&BEGINS.iter().fold(script.to_owned(), |all, (name, begin)| all.replace(name, begin)));
+        let found: Vec<_> = found.iter().map(|(check, motor)| format!("{check}.{motor}")).collect();
+        assert_eq!(found.join(" "), expected, "{what}");
     }
     for rpm in [0, 1_500, 6_500] {
         let script = format!("* amp=5x4 rpm=5000x4; 20%20:0-1.5 amp=5,0,5,5 rpm=5000,{rpm},5000,5000");

@@ -1,7 +1,7 @@
 //! Standing vehicles that report flight: on the bench, spooling up, landed by hand; and vehicles that fly though little says so.
 #![expect(clippy::panic, reason = "that is how a test fails")]
 
-use crate::common::{Quad, Run, Script};
+use crate::common::{Quad, Run, Script, rows};
 use hums_core::observation::{Air, Hud, Imu, Observation};
 use hums_core::params::Params;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
@@ -60,34 +60,30 @@ fn counts(script: &str) -> (u32, u32) {
     (flights, landings)
 }
 
+/// A name, flights and landings, and the script.
+const STANDING: &str = "
+it idles on the bench | 0 0 | * h=0.2 thr=0.12
+it takes off from there | 1 0 | * h=0.2 thr=0.12; 40 thr=0.45; 42 h=10
+received first in a hover at the height of home | 1 0 | * on h=0.3 thr=0.4
+a pilot landed it and left it armed | 2 2 | * h=0.1 thr=0 speed=0; 10-50 h=8 thr=0.4; 80-100 h=8 thr=0.4
+motors tried | 0 0 | * nowhere landed=- alt=480.3 thr=0; 20 alt=480.6 thr=0.6
+the barometer rises | 1 0 | * nowhere landed=- alt=480.3 thr=0; 20 alt=486 thr=0.6
+nothing tells its height | 0 0 | * nowhere thr=0 up=0.2
+its height drifts by 6 m | 0 0 | * thr=0.02; 0-120 h=0..6
+nobody says that it flies | 0 0 | * landed=- thr=0.02; 0-120 h=0..6
+without propellers, all its throttle | 0 0 | * h=0.4 thr=0; 20 thr=1
+a plane that stands | 0 0 | * plane h=0.3 thr=0
+half a metre up, without a position | 1 0 | * nowhere thr=0 alt=480 up=0; 20 thr=0.3 alt=480.5; 20-21 up=0.5
+with its motor off | 1 0 | * plane h=60 thr=0 c=-1 speed=14
+it descends without throttle | 1 0 | * nowhere thr=0.5 up=0; 60 thr=0 up=-4
+a simulator that hovers | 1 0 | * on thr=0.5 shake=0.03 hpa=960
+";
+
 #[test]
 fn what_stands_does_not_fly_and_what_flies_does_whatever_is_said_of_it() {
-    for (what, script, expected) in [
-        ("it idles on the bench", "* h=0.2 thr=0.12", (0, 0)),
-        ("it takes off from there", "* h=0.2 thr=0.12; 40 thr=0.45; 42 h=10", (1, 0)),
-        ("received first in a hover at the height of home", "* on h=0.3 thr=0.4", (1, 0)),
-        (
-            "a pilot landed it and left it armed",
-            "* h=0.1 thr=0 speed=0; 10-50 h=8 thr=0.4; 80-100 h=8 thr=0.4",
-            (2, 2),
-        ),
-        ("motors tried", "* nowhere landed=- alt=480.3 thr=0; 20 alt=480.6 thr=0.6", (0, 0)),
-        ("the barometer rises", "* nowhere landed=- alt=480.3 thr=0; 20 alt=486 thr=0.6", (1, 0)),
-        ("nothing tells its height", "* nowhere thr=0 up=0.2", (0, 0)),
-        ("its height drifts by 6 m", "* thr=0.02; 0-120 h=0..6", (0, 0)),
-        ("nobody says that it flies", "* landed=- thr=0.02; 0-120 h=0..6", (0, 0)),
-        ("without propellers, all its throttle", "* h=0.4 thr=0; 20 thr=1", (0, 0)),
-        ("a plane that stands", "* plane h=0.3 thr=0", (0, 0)),
-        (
-            "half a metre up, without a position",
-            "* nowhere thr=0 alt=480 up=0; 20 thr=0.3 alt=480.5; 20-21 up=0.5",
-            (1, 0),
-        ),
-        ("with its motor off", "* plane h=60 thr=0 c=-1 speed=14", (1, 0)),
-        ("it descends without throttle", "* nowhere thr=0.5 up=0; 60 thr=0 up=-4", (1, 0)),
-        ("a simulator that hovers", "* on thr=0.5 shake=0.03 hpa=960", (1, 0)),
-    ] {
-        assert_eq!(counts(script), expected, "{what}");
+    for [what, expected, script] in rows(STANDING) {
+        let (flights, landings) = counts(script);
+        assert_eq!(format!("{flights} {landings}"), expected, "{what}");
     }
 }
 

@@ -281,6 +281,16 @@ impl Run {
     }
 }
 
+/// The rows of a table: one a line, with bars between the columns. A line that begins with `#` is a comment; `-` is nothing.
+pub fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [&str; N]> {
+    let lines = table.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines.map(|line| {
+        let columns: Vec<_> =
+            line.split(" | ").map(|column| if column == "-" { "" } else { column }).collect();
+        columns.try_into().expect(line)
+    })
+}
+
 /// The defaults with these settings.
 pub fn params(settings: &[(&str, f32)]) -> Params {
     let mut params = Params::defaults();

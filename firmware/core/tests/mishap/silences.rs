@@ -2,44 +2,30 @@
 
 use super::*;
 
-const CASES: &[Case] = &[
-    (ROTORS, "it landed and is armed", "", LANDED, "0-15 unheard; 15 stands thr=0 landed=ground"),
-    (ROTORS, "it landed and is disarmed", "", LANDED, "0-15 unheard; 15 rests"),
-    (ROTORS, "it flies on", "", FLIES, "0-15 unheard"),
-    (ROTORS, "it climbs", "", ANY, "0-15 unheard; 15 h=12 c=3 thr=1"),
-    (ROTORS, "it hovers lower with all its throttle", "", ANY, "0-15 unheard; 15 h=12 thr=1"),
-    (
-        ROTORS,
-        "it was terminated and lies over",
-        "disarmed_in_air ..",
-        DOWN,
-        "0-4 unheard; 4 stands lies state=8 thr=0",
-    ),
-    (ROTORS, "it was terminated and stands", "", ANY, "0-12 unheard; 12 stands state=8 thr=0 landed=ground"),
-    (ROTORS, "home was set anew", "", LANDED, "0-6.2 unheard; 6.2 rests sank=-16"),
-    (ROTORS, "it had the time to land and was laid down", "", LANDED, "0-12 unheard; 12 rests lies roll=1.6"),
-    (ROTORS, "a landing", "", LANDED, "0-4 c=-3 h=20..8; 4 rests; 4-24 unheard; 24-27 beats"),
-    (ROTORS, "killed after a landing", "", ANY, "0 beats; 0-12 unheard; 12 rests on state=8"),
-    (
-        &["ap plane mode=10 hover landed=air"],
-        "a plane lands as ever",
-        "",
-        LANDED,
-        "0 ground=18; 0-6 unheard; 0-8 beats; 20.05 rests",
-    ),
-    (ROTORS, "it sank before it was received", "", NONE, "* state=8 thr=0 start=20; 0 c=-4 rates=2,0,0"),
-    (ROTORS, "it lay before it was received", "", NONE, "* state=8 thr=0 start=20; 0 stands lies"),
-];
+const CASES: &str = "
+rotors | it landed and is armed | - | landed | 0-15 unheard; 15 stands thr=0 landed=ground
+rotors | it landed and is disarmed | - | landed | 0-15 unheard; 15 rests
+rotors | it flies on | - | flies | 0-15 unheard
+rotors | it climbs | - | any | 0-15 unheard; 15 h=12 c=3 thr=1
+rotors | it hovers lower with all its throttle | - | any | 0-15 unheard; 15 h=12 thr=1
+rotors | it was terminated and lies over | disarmed_in_air .. | down | 0-4 unheard; 4 stands lies state=8 thr=0
+rotors | it was terminated and stands | - | any | 0-12 unheard; 12 stands state=8 thr=0 landed=ground
+rotors | home was set anew | - | landed | 0-6.2 unheard; 6.2 rests sank=-16
+rotors | it had the time to land and was laid down | - | landed | 0-12 unheard; 12 rests lies roll=1.6
+rotors | a landing | - | landed | 0-4 c=-3 h=20..8; 4 rests; 4-24 unheard; 24-27 beats
+rotors | killed after a landing | - | any | 0 beats; 0-12 unheard; 12 rests on state=8
+ap plane mode=10 hover landed=air | a plane lands as ever | - | landed | 0 ground=18; 0-6 unheard; 0-8 beats; 20.05 rests
+rotors | it sank before it was received | - | none | * state=8 thr=0 start=20; 0 c=-4 rates=2,0,0
+rotors | it lay before it was received | - | none | * state=8 thr=0 start=20; 0 stands lies
+";
 
 #[test]
 fn a_silence_is_judged_by_what_comes_after_it_and_a_vehicle_that_was_off_before_it_was_received_is_not() {
     judge(CASES);
     judge_from(
         0,
-        &[
-            (ROTORS, "it hits", "", NONE, "* off thr=0; 0-0.9 c=-9 h=8..-0.1; 0.9 c=0 h=0; 0.9-1 load=12"),
-            (ROTORS, "it is knocked", "", NONE, "* off thr=0 start=0 h=0 load=-1; 1-1.05 load=5"),
-        ],
+        "rotors | it hits | - | none | * off thr=0; 0-0.9 c=-9 h=8..-0.1; 0.9 c=0 h=0; 0.9-1 load=12
+         rotors | it is knocked | - | none | * off thr=0 start=0 h=0 load=-1; 1-1.05 load=5",
     );
 }
 

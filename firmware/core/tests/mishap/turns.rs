@@ -4,60 +4,19 @@ use super::*;
 
 const ON_GROUND: &str = "* landed=ground h=0 thr=0; ";
 
-const CASES: &[Case] = &[
-    (ROTORS, "tumbles", "tumbling", FLIES, "0-1.5 rates=15,2,0"),
-    (
-        &[
-            "ap quad mode=1 hover landed=air",
-            "px4 quad mode=acro hover landed=air",
-            "ap plane mode=4 hover landed=air",
-        ],
-        "acro",
-        "",
-        FLIES,
-        "0-3 rates=8,0,0",
-    ),
-    (WINGS, "a roll and a dive", "", FLIES, "0 ground=18; 0-1 rates=6.5,0,0 c=-12 load=0.1"),
-    (WINGS, "a spin", "tumbling", FLIES, "0 ground=18; 0-4 rates=6.5,1,3"),
-    (ROTORS, "overturned", "overturned", FLIES, "0-1.5 roll=2.5 rates=3,0.5,0"),
-    (WINGS, "a roll", "", FLIES, "0-1.5 roll=2.5 rates=3,0.5,0"),
-    (
-        &[ROTORS[0], ROTORS[1], ROTORS[2], ROTORS[3]],
-        "overturned in acro",
-        "",
-        FLIES,
-        "* acro; 0-1.5 roll=2.5 rates=3,0.5,0",
-    ),
-    (
-        ROTORS,
-        "what flies fast is carried by the air too",
-        "",
-        FLIES,
-        "0 h=40 thr=0.5 ground=30; 0-0.5 rates=0,2,0; 0.5-4 load=0.4 drag=0.9 pitch=-1.1",
-    ),
-    (
-        ROTORS,
-        "its rotors turn it over",
-        "overturned",
-        NONE,
-        "* landed=ground h=0 thr=0; 0-1.5 thr=0.4; 4 off; 0-0.5 roll=0..2 rates=4.5,0,0; 0.5 roll=0.3 rates=0 load=-0.9",
-    ),
-    (
-        ROTORS,
-        "a hand turns it over",
-        "",
-        NONE,
-        "* landed=ground h=0 thr=0; 4 off; 0-0.5 roll=0..2 rates=4.5,0,0; 0.5 roll=0.3 rates=0 load=-0.9",
-    ),
-    (
-        &[ROTORS[0]],
-        "each arming",
-        "overturned overturned overturned",
-        NONE,
-        "* landed=ground h=0 thr=0; 0%13:0-1.5 thr=0.4; 0%13:4-8.05 off; 0%13:0-0.5 roll=1 rates=4.5,0,0; \
-         0%13:0.5-6 roll=0.3 rates=0 load=-0.9",
-    ),
-];
+const CASES: &str = "
+rotors | tumbles | tumbling | flies | 0-1.5 rates=15,2,0
+ap quad mode=1 hover landed=air, px4 quad mode=acro hover landed=air, ap plane mode=4 hover landed=air | acro | - | flies | 0-3 rates=8,0,0
+wings | a roll and a dive | - | flies | 0 ground=18; 0-1 rates=6.5,0,0 c=-12 load=0.1
+wings | a spin | tumbling | flies | 0 ground=18; 0-4 rates=6.5,1,3
+rotors | overturned | overturned | flies | 0-1.5 roll=2.5 rates=3,0.5,0
+wings | a roll | - | flies | 0-1.5 roll=2.5 rates=3,0.5,0
+rotors 4 | overturned in acro | - | flies | * acro; 0-1.5 roll=2.5 rates=3,0.5,0
+rotors | what flies fast is carried by the air too | - | flies | 0 h=40 thr=0.5 ground=30; 0-0.5 rates=0,2,0; 0.5-4 load=0.4 drag=0.9 pitch=-1.1
+rotors | its rotors turn it over | overturned | none | * landed=ground h=0 thr=0; 0-1.5 thr=0.4; 4 off; 0-0.5 roll=0..2 rates=4.5,0,0; 0.5 roll=0.3 rates=0 load=-0.9
+rotors | a hand turns it over | - | none | * landed=ground h=0 thr=0; 4 off; 0-0.5 roll=0..2 rates=4.5,0,0; 0.5 roll=0.3 rates=0 load=-0.9
+rotors 1 | each arming | overturned overturned overturned | none | * landed=ground h=0 thr=0; 0%13:0-1.5 thr=0.4; 0%13:4-8.05 off; 0%13:0-0.5 roll=1 rates=4.5,0,0; 0%13:0.5-6 roll=0.3 rates=0 load=-0.9
+";
 
 #[test]
 fn turning_over_is_told_unless_a_pilot_a_plane_or_a_hand_does_it() {

@@ -50,76 +50,54 @@ fn changes(check: &Check, script: &str, start_ms: u64) -> String {
     format!("{} | {}", told.join(", "), state.level().map_or("none", Level::name))
 }
 
-/// Scripts, and the changes of level that each has.
-type Cases = &'static [(&'static str, &'static str)];
-
-const BATTERY: Cases = &[("0 15, 5000", " | ok"), ("0 14.9, 1000 16, 4000", "500 warning, 3000 ok | ok")];
+/// Limits, debounce, and seconds until stale; a script, and its changes of level.
+const CASES: &str = "
+above usual 1: 0 10, 1000 50, 3000 70, 4000 10, 10000: 1500 warning, 3200 critical, 6000 ok | ok
+above usual 1: 0 10, 1000 50, 1450 10, 5000:  | ok
+above usual 1: 0 45, 5000:  | ok
+above usual 1: 0 45.1, 1000 40, 4000: 500 warning, 3000 ok | ok
+above usual 1: 0 50, 1000 42, 20000 39, 30000: 500 warning, 22000 ok | ok
+above usual 1: 0 =1, 1500 =1, 2000: 1050 stale, 1500 ok | ok
+above usual 1: 0 NaN, 50 inf, 100 -inf, 150 -, 200:  | none
+above usual 1: 0 10, 1000 -, 3000 70, 5000: 2000 stale, 3200 critical | critical
+above usual 1: 0 10, 500 50, 2000 -, 5000: 1000 warning, 3000 stale | stale
+above usual 1: 0 70, 50:  | none
+above usual 1: 0 -, 50 +10, 100:  | ok
+above usual 1: 0 10, 50 off, 100:  | none
+above usual 1: 0 50, 1000 off, 1050: 500 warning, 1000 ok | none
+cell usual 1: 0 3.8, 1000 3.55, 3000 3.4, 4000 3.9, 10000: 1500 warning, 3200 critical, 6000 ok | ok
+battery usual 1: 0 15, 5000:  | ok
+battery usual 1: 0 14.9, 1000 16, 4000: 500 warning, 3000 ok | ok
+alone long 1: 0 10, 1000 70, 62000: 61000 critical | critical
+alone usual 1: 0 70, 50:  | none
+above usual 12: 0 =10, 2500 =170, 5000 =10, 10000:  | ok
+above usual 12: 0 =10, 2500 =170, 14000:  | ok
+above usual 12: 0 =10, 2500 =170, 5000 =170, 7500 =10, 12000: 5000 critical, 9500 ok | ok
+above usual 12: 0 =50, 1000 =50, 2000 =70, 3000 =50, 4000 =70, 5000 =70, 6000: 1000 warning, 5000 critical | critical
+above none 12: 0 =10, 2500 =170, 5000 =170, 7500: 5000 critical | critical
+above usual 5: 0 =10, 20000 =170, 40000 =170, 42000: 5050 stale, 40200 critical | critical
+";
 
 #[test]
 fn a_level_is_what_its_values_of_some_time_say() {
     let above = Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0);
-    let alone = Limits { warn: None, ..above };
-    let battery = Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0);
-    let cell = Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05);
-    let [usual, none, long] = [CHECK.debounce_ms, [0; 2], [60_000; 2]];
-    let groups: [(Limits, [u16; 2], u8, Cases); 8] = [
-        (
-            above,
-            usual,
-            1,
-            &[
-                ("0 10, 1000 50, 3000 70, 4000 10, 10000", "1500 warning, 3200 critical, 6000 ok | ok"),
-                ("0 10, 1000 50, 1450 10, 5000", " | ok"),
-                ("0 45, 5000", " | ok"),
-                ("0 45.1, 1000 40, 4000", "500 warning, 3000 ok | ok"),
-                ("0 50, 1000 42, 20000 39, 30000", "500 warning, 22000 ok | ok"),
-                ("0 =1, 1500 =1, 2000", "1050 stale, 1500 ok | ok"),
-                ("0 NaN, 50 inf, 100 -inf, 150 -, 200", " | none"),
-                ("0 10, 1000 -, 3000 70, 5000", "2000 stale, 3200 critical | critical"),
-                ("0 10, 500 50, 2000 -, 5000", "1000 warning, 3000 stale | stale"),
-                ("0 70, 50", " | none"),
-                ("0 -, 50 +10, 100", " | ok"),
-                ("0 10, 50 off, 100", " | none"),
-                ("0 50, 1000 off, 1050", "500 warning, 1000 ok | none"),
-            ],
-        ),
-        (
-            cell,
-            usual,
-            1,
-            &[("0 3.8, 1000 3.55, 3000 3.4, 4000 3.9, 10000", "1500 warning, 3200 critical, 6000 ok | ok")],
-        ),
-        (battery, usual, 1, BATTERY),
-        (alone, long, 1, &[("0 10, 1000 70, 62000", "61000 critical | critical")]),
-        (alone, usual, 1, &[("0 70, 50", " | none")]),
-        (
-            above,
-            usual,
-            12,
-            &[
-                ("0 =10, 2500 =170, 5000 =10, 10000", " | ok"),
-                ("0 =10, 2500 =170, 14000", " | ok"),
-                ("0 =10, 2500 =170, 5000 =170, 7500 =10, 12000", "5000 critical, 9500 ok | ok"),
-                (
-                    "0 =50, 1000 =50, 2000 =70, 3000 =50, 4000 =70, 5000 =70, 6000",
-                    "1000 warning, 5000 critical | critical",
-                ),
-            ],
-        ),
-        (above, none, 12, &[("0 =10, 2500 =170, 5000 =170, 7500", "5000 critical | critical")]),
-        (
-            above,
-            usual,
-            5,
-            &[("0 =10, 20000 =170, 40000 =170, 42000", "5050 stale, 40200 critical | critical")],
-        ),
-    ];
-    for (limits, debounce_ms, stale_s, cases) in groups {
-        let check = Check { limits, debounce_ms, stale_s: NonZeroU8::new(stale_s), ..CHECK };
-        for (script, expected) in cases {
-            for start_ms in [0, u64::from(u32::MAX) - 1_050] {
-                assert_eq!(changes(&check, script, start_ms), *expected, "{script}");
-            }
+    for case in CASES.trim().lines() {
+        let [kind, script, expected] = case.split(": ").collect::<Vec<_>>()[..] else { panic!("{case}") };
+        let [limits, debounce, stale_s] = kind.split(' ').collect::<Vec<_>>()[..] else { panic!("{case}") };
+        let limits = match limits {
+            "alone" => Limits { warn: None, ..above },
+            "battery" => Limits::below(Some(Param::BatRemWarn), Some(Param::BatRemCrit), 1.0),
+            "cell" => Limits::below(Some(Param::CellVoltWarn), Some(Param::CellVoltCrit), 0.05),
+            _ => above,
+        };
+        let debounce_ms = match debounce {
+            "none" => [0; 2],
+            "long" => [60_000; 2],
+            _ => CHECK.debounce_ms,
+        };
+        let check = Check { limits, debounce_ms, stale_s: stale_s.parse().ok(), ..CHECK };
+        for start_ms in [0, u64::from(u32::MAX) - 1_050] {
+            assert_eq!(changes(&check, script, start_ms), expected, "{case}");
         }
     }
 }
