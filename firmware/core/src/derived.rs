@@ -115,17 +115,9 @@ impl Derived {
                     *had_fix |= gnss.fix >= 3;
                 }
             }
-            Observation::Battery(battery) => {
-                self.take_voltages(vehicle, flight);
-                if let Some(index) = vehicle.told_battery {
-                    self.resistance[index].take(battery.voltage, battery.current);
-                }
-            }
-            Observation::SystemStatus(system) => {
-                self.take_voltages(vehicle, flight);
-                if vehicle.batteries[0].get().is_none() {
-                    self.resistance[0].take(system.voltage, system.current);
-                }
+            Observation::Battery(_) => self.take_supply(vehicle, flight, vehicle.told_battery),
+            Observation::SystemStatus(_) => {
+                self.take_supply(vehicle, flight, (vehicle.batteries_known() == 0).then_some(0));
             }
             Observation::Parameter(place, value) => self.cells.take_setting(*place, *value),
             Observation::Escs(group) => self.motors.take(at, group, vehicle, flight.airborne()),
@@ -145,7 +137,11 @@ impl Derived {
         }
     }
 
-    fn take_voltages(&mut self, vehicle: &Vehicle, flight: &Flight) {
+    /// A battery that was just told.
+    fn take_supply(&mut self, vehicle: &Vehicle, flight: &Flight, told: Option<usize>) {
+        if let Some((place, supply)) = told.and_then(|place| Some((place, vehicle.supply(place)?))) {
+            self.resistance[place].take(supply.voltage, supply.current);
+        }
         let armed = vehicle.armed();
         for battery in 0..BATTERIES_MAX {
             if let Some(pack_v) = pack_v(vehicle, battery) {

@@ -41,27 +41,20 @@ impl Form {
 
 macro_rules! counters {
     ($($(#[$doc:meta])* $variant:ident = $number:literal $form:ident $name:literal;)*) => {
-        /// The place of a counter in [`UsageCounter::ALL`].
-        #[repr(u8)]
-        enum Place {
-            $($variant,)*
-        }
-
-        /// A usage counter. The numbers are stored in logs and never change meaning.
+        /// A usage counter, by its place in [`UsageCounter::ALL`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[repr(u8)]
         pub enum UsageCounter {
-            $($(#[$doc])* $variant = $number,)*
+            $($(#[$doc])* $variant,)*
         }
 
         impl UsageCounter {
             /// All counters except those of motors. New ones are appended: the stored lifetime follows this order.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// The place in [`Self::ALL`].
-            pub const fn place(self) -> usize {
+            /// The number in logs, which never changes its meaning.
+            pub const fn number(self) -> u8 {
                 match self {
-                    $(Self::$variant => Place::$variant as usize,)*
+                    $(Self::$variant => $number,)*
                 }
             }
 
@@ -213,7 +206,7 @@ pub fn counter_name(number: u8) -> Option<CounterName> {
     }
     UsageCounter::ALL
         .iter()
-        .find(|counter| **counter as u8 == number)
+        .find(|counter| counter.number() == number)
         .map(|counter| CounterName::Vehicle(counter.name()))
 }
 

@@ -47,7 +47,7 @@ const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// A load factor that turns back by less is vibration and noise.
 const LOAD_TURN_G: f32 = 0.1;
 const _: () =
-    assert!(UsageCounter::Landing.place() - UsageCounter::Ground.place() == Phase::Landing as usize);
+    assert!(UsageCounter::Landing as usize - UsageCounter::Ground as usize == Phase::Landing as usize);
 
 impl Usage {
     /// Takes an observation's extremes, which a step could miss.
@@ -149,7 +149,7 @@ impl Usage {
         if is_known {
             let landing_s = core::mem::take(&mut self.landing_s);
             // The regimes follow each other as the phases do.
-            let regime = UsageCounter::Ground.place() + flight.phase(now, vehicle) as usize;
+            let regime = UsageCounter::Ground as usize + flight.phase(now, vehicle) as usize;
             self.totals.add(UsageCounter::ALL[regime], step_s + landing_s);
         } else if reports {
             self.landing_s += step_s;
@@ -205,7 +205,7 @@ impl Usage {
     /// Every counter as it stands now.
     pub fn totals(&self) -> Totals {
         let mut totals = self.totals;
-        let cycles = UsageCounter::ALL.iter().skip(UsageCounter::LoadCycles0.place());
+        let cycles = UsageCounter::ALL.iter().skip(UsageCounter::LoadCycles0 as usize);
         for (bin, counter) in cycles.take(LOAD_RANGES_G.len()).enumerate() {
             totals.set(*counter, self.load_cycles.cycles(bin));
         }

@@ -32,22 +32,22 @@ state! {
 impl Totals {
     /// A counter's raw value: infinite for a minimum that was never measured.
     pub const fn raw(&self, counter: UsageCounter) -> f64 {
-        self.counters[counter.place()]
+        self.counters[counter as usize]
     }
 
     /// Sets a counter.
     pub const fn set(&mut self, counter: UsageCounter, value: f64) {
-        self.counters[counter.place()] = value;
+        self.counters[counter as usize] = value;
     }
 
     /// Adds to a counter.
     pub fn add(&mut self, counter: UsageCounter, amount: f64) {
-        self.counters[counter.place()] += amount;
+        self.counters[counter as usize] += amount;
     }
 
     /// Takes one more value of a counter that keeps the greatest or the least.
     pub fn extend(&mut self, counter: UsageCounter, value: f64) {
-        let known = &mut self.counters[counter.place()];
+        let known = &mut self.counters[counter as usize];
         *known = match counter.form() {
             Form::Lowest => known.min(value),
             _ => known.max(value),
@@ -66,7 +66,7 @@ impl Totals {
     pub fn for_each(&self, mut each: impl FnMut(u8, f64)) {
         for counter in UsageCounter::ALL {
             if let Some(value) = self.value(*counter) {
-                each(*counter as u8, value);
+                each(counter.number(), value);
             }
         }
         for (motor, usage) in (0..).zip(&self.motors) {

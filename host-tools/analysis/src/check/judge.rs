@@ -392,7 +392,7 @@ impl Judge {
 
     fn box_counted(&mut self, at: Instant, usage: &Usage<'_>) {
         let mut counters = usage.iter();
-        if let Some((_, seconds)) = counters.find(|(number, _)| *number == UsageCounter::Flight as u8) {
+        if let Some((_, seconds)) = counters.find(|(number, _)| *number == UsageCounter::Flight.number()) {
             let last_s = f64::from(seconds);
             let first_s = self.box_air.map_or(last_s, |air| air.first_s);
             self.box_air = Some(BoxAir { first_s, last_s, at });
@@ -753,7 +753,7 @@ fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
 fn armed(monitor: &Monitor) -> Span {
     let mut seconds = 0.0;
     monitor.for_each_counter(|number, value| {
-        if number == UsageCounter::Armed as u8 {
+        if number == UsageCounter::Armed.number() {
             seconds = value;
         }
     });
