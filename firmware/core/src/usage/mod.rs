@@ -159,15 +159,17 @@ impl Usage {
     fn step_battery(&mut self, now: BootMs, vehicle: &Vehicle, step_s: f64) {
         let drawn = drawn(now, vehicle);
         self.current_a = drawn.current_a;
-        let charge_ah = f64::from(drawn.current_a.unwrap_or(0.0)) * step_s / 3_600.0;
+        // Dividing is dear.
+        let hours = step_s / 3_600.0;
+        let charge_ah = f64::from(drawn.current_a.unwrap_or(0.0)) * hours;
         self.totals.add(UsageCounter::Charge, charge_ah);
-        self.totals.add(UsageCounter::Energy, f64::from(drawn.power_w) * step_s / 3_600.0);
+        self.totals.add(UsageCounter::Energy, f64::from(drawn.power_w) * hours);
         if self.capacity_ah > 0.0 {
             self.totals.add(UsageCounter::BatteryCycles, charge_ah / f64::from(self.capacity_ah));
             let batteries = vehicle.batteries.iter().filter(|slot| slot.get().is_some()).count().max(1);
             let capacity_ah = f64::from(self.capacity_ah) / batteries as f64;
             for (cycles, discharge_a) in self.battery_cycles.iter_mut().zip(drawn.each_a) {
-                *cycles += f64::from(discharge_a) * step_s / 3_600.0 / capacity_ah;
+                *cycles += f64::from(discharge_a) * hours / capacity_ah;
             }
         }
     }
@@ -186,13 +188,14 @@ impl Usage {
     }
 
     fn step_motors(&mut self, now: BootMs, vehicle: &Vehicle, step_s: f64) {
+        let minutes = step_s / 60.0;
         for (number, usage) in self.totals.motors.iter_mut().enumerate() {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE);
             if fresh && turns(vehicle, number) {
                 let rpm = motor.esc.rpm.map_or(0.0, |rpm| rpm.0.abs().min(Rpm::MAX));
                 usage.seconds += step_s;
-                usage.revolutions += f64::from(rpm) * step_s / 60.0;
+                usage.revolutions += f64::from(rpm) * minutes;
             }
         }
     }
