@@ -1,61 +1,24 @@
-//! `hums box setup`: the wiring of a board, the autopilot's settings for it, and a bench check.
-//!
-//! The settings are those of `docs/wiring.md`, of the autopilot's telemetry port `--port`. The autopilot answers over its own USB
-//! or radio link, or through the box while `GS_PASS` is 1. The bench check reads both ends of the log that the box records
-//! now: so the messages and rates are those that the box received.
+//! The autopilot's settings for the box: compared, set, and restored from a file of former values.
 
 use std::io::Write as _;
 use std::path::Path;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result, bail};
-use hums_analysis::log_json::duration_s;
-use hums_boards::{Board, Wire};
-use hums_core::observation::Autopilot;
-use hums_core::params::Param as BoxParam;
-use hums_link::asking::wanted;
-use hums_link::encode::COMPONENT;
-use hums_link::messages;
-use hums_link::packet::Fields;
 use hums_link::param_line::{self, Line};
 use serde::Serialize;
 
-use super::params::{self, Param};
-use super::{Client, pull};
-use crate::cli;
+use super::{ARDUPILOT, CheckLine, Heard, Own, PX4, TRIES, autopilot, line};
 use crate::colour::level;
 use crate::files::{Inputs, Output, read_short, settle};
-use crate::mavlink::ids::{
-    ATTITUDE, BATTERY_STATUS, EKF_STATUS_REPORT, ESTIMATOR_STATUS, GLOBAL_POSITION_INT, GPS_RAW_INT,
-    HEARTBEAT, STATUSTEXT, SYS_STATUS, SYSTEM_TIME, VFR_HUD, VIBRATION,
-};
-use crate::names::message_name;
 use crate::outcome::{Outcome, usage};
-use crate::output::{self, Schema};
-use crate::plural::count;
+use crate::output;
 use crate::printable::word;
-use crate::summary::Overview;
 use crate::table::{Table, left, right};
-use crate::utc::date_and_time;
+use crate::talk::Client;
+use crate::talk::params::{self, Param};
 
-const SCHEMA: Schema = Schema::first("hums-setup");
-/// `MAV_COMP_ID_AUTOPILOT1`
-const AUTOPILOT: u8 = 1;
-/// `MAV_AUTOPILOT_ARDUPILOTMEGA`, `MAV_AUTOPILOT_PX4`
-const ARDUPILOT: u8 = 3;
-const PX4: u8 = 12;
-/// `MAV_MODE_FLAG_SAFETY_ARMED`
-const ARMED: u8 = 0x80;
 /// `MAV_PARAM_TYPE`: integers up to 32 bits. PX4 sends their bits in the place of a float.
 const INTEGERS: std::ops::RangeInclusive<u8> = 1..=6;
-/// `MAV_CMD_RUN_PREARM_CHECKS`
-const PREARM: u16 = 401;
-/// Three heartbeats.
-const HEARTBEATS: Duration = Duration::from_secs(3);
-const ANSWER: Duration = Duration::from_secs(3);
-const TRIES: usize = 3;
-/// Sectors with the record of the start.
-const HEAD_SECTORS: u32 = 8;
 const UNDO_BYTES_MAX: u64 = 64 * 1024;
 /// PX4's `MAV_X_RATE` at 921,600 baud, bytes per second.
 const RATE_BYTES: u32 = 80_000;
@@ -63,51 +26,10 @@ const RATE_BYTES: u32 = 80_000;
 const TELEM_MAX: u8 = 4;
 /// `SERIALn_PROTOCOL` of a port for the box: none, MAVLink 1 or 2.
 const FREE: [f64; 3] = [-1.0, 1.0, 2.0];
-/// What to check if the box is not heard.
-const SILENT: &str =
-    "no message of the box: check its LED, its supply, the wires to the autopilot, and the port's rate";
-/// The checks of every vehicle need them; of the last two one autopilot has one.
-const NEEDED: [u32; 10] = [
-    SYS_STATUS,
-    ATTITUDE,
-    GLOBAL_POSITION_INT,
-    GPS_RAW_INT,
-    BATTERY_STATUS,
-    VFR_HUD,
-    VIBRATION,
-    SYSTEM_TIME,
-    ESTIMATOR_STATUS,
-    EKF_STATUS_REPORT,
-];
-/// A message is slow below this part of its rate. An ArduPilot that only knows `REQUEST_DATA_STREAM` sends 2 Hz of 5.
-const SLOW: f64 = 0.35;
-
-#[derive(Debug, Serialize)]
-struct SetupJson {
-    /// MAVLink system id of the box's vehicle.
-    system: u8,
-    /// Of the board of `--board`.
-    wiring: Vec<Wiring>,
-    /// Parameters of the autopilot; empty if it is not heard on the link.
-    settings: Vec<Setting>,
-    /// The bench check.
-    checks: Vec<CheckLine>,
-    /// No check is `missing`.
-    ready: bool,
-}
-
-/// A wire or a part of the board.
-#[derive(Debug, Serialize)]
-struct Wiring {
-    /// The other end of the wire.
-    wire: &'static str,
-    /// Pad and pin of the board.
-    pad: String,
-}
 
 /// A parameter of the autopilot.
 #[derive(Debug, Serialize)]
-struct Setting {
+pub(super) struct Setting {
     /// Name of the parameter.
     name: String,
     /// `null` if the autopilot did not answer.
@@ -148,137 +70,8 @@ impl Setting {
     }
 }
 
-/// A line of the bench check.
-#[derive(Debug, Serialize)]
-struct CheckLine {
-    /// `box`, `settings`, `image`, `card`, `clock`, `messages`, `checks`.
-    check: &'static str,
-    /// `ok`, `missing`, `unknown`.
-    state: &'static str,
-    /// The reason, as a sentence.
-    detail: String,
-}
-
-fn line(check: &'static str, is_ok: bool, detail: impl Into<String>) -> CheckLine {
-    CheckLine { check, state: if is_ok { "ok" } else { "missing" }, detail: detail.into() }
-}
-
-/// Parameters of the box.
-struct Own {
-    baud: u32,
-    path: u8,
-    has_streams: bool,
-}
-
-impl Own {
-    /// `value` gives that of a parameter.
-    fn of(mut value: impl FnMut(BoxParam) -> Result<f32>) -> Result<Self> {
-        Ok(Self {
-            baud: value(BoxParam::ApBaud)? as u32,
-            path: value(BoxParam::GsPath)? as u8,
-            has_streams: value(BoxParam::ApStreams)? > 0.0,
-        })
-    }
-}
-
-/// The autopilot on the link.
-#[derive(Clone, Copy)]
-struct Heard {
-    autopilot: u8,
-    is_armed: bool,
-}
-
-/// Runs `hums box setup`.
-pub fn run(args: &cli::Setup) -> Result<Outcome> {
-    let board = args.board.as_deref().map(|name| hums_boards::find(name).map_err(usage)).transpose()?;
-    if let Some(board) = board.filter(|_| !args.json) {
-        output::line(&format!("wiring of {}, all grounds together, 3.3 V signals", board.title))?;
-        let mut table = Table::new(2, [left(0), left(0)]);
-        for Wiring { wire, pad } in wiring(board) {
-            table.row([wire.to_owned(), pad]);
-        }
-        output::line(&table.text())?;
-        board.owner.notes.iter().try_for_each(|note| output::line(&format!("  {note}")))?;
-    }
-    if let Some(file) = &args.restore {
-        let values = values_of(file)?;
-        return restore(&mut Client::connect_to(&args.at, &[AUTOPILOT])?, &values);
-    }
-    let mut client = Client::connect_to(&args.at, &[COMPONENT, AUTOPILOT]).context(SILENT)?;
-    let (system, found) = client.target();
-    let is_silent = found != COMPONENT;
-    let own = Own::of(|param| {
-        let spec = param.spec();
-        if is_silent { Ok(spec.default) } else { params::value(&mut client, spec.name) }
-    })?;
-    client.turn_to(AUTOPILOT);
-    let heard = autopilot(&mut client)?;
-    let mut settings = match heard {
-        Some(heard) => settings(&mut client, heard.autopilot, args.port, &own)?,
-        None => Vec::new(),
-    };
-    if args.set {
-        let file = args.undo.as_deref().context("--undo FILE is missing")?;
-        change(&mut client, &mut settings, file)?;
-    }
-    if !args.json {
-        show_settings(heard, &settings)?;
-    }
-    client.turn_to(COMPONENT);
-    let mut checks = vec![own_line(&own, &args.at.link.to_string()), settings_line(&settings)];
-    if is_silent {
-        let detail = format!("{SILENT}; the settings are for {} baud, its AP_BAUD as delivered", own.baud);
-        checks[0] = line("box", false, detail);
-    } else {
-        let ready = prearm(&mut client)?;
-        checks.extend(bench(client, &own, board, heard)?);
-        checks.push(ready);
-    }
-    let missing: Vec<&str> =
-        checks.iter().filter(|check| check.state == "missing").map(|check| check.check).collect();
-    let is_ready = missing.is_empty();
-    if args.json {
-        let wiring = board.map_or_else(Vec::new, wiring);
-        output::json(SCHEMA, &SetupJson { system, wiring, settings, checks, ready: is_ready })?;
-    } else {
-        let mut table = Table::new(2, [left(7), left(0), left(0)]);
-        for CheckLine { check, state, detail } in &checks {
-            let state = level(if *state == "missing" { "MISSING" } else { state }).to_string();
-            table.row([state, (*check).to_owned(), word(detail).into_owned()]);
-        }
-        output::line(&format!("bench check\n{}", table.text()))?;
-        let words = missing.join(", ");
-        output::line(&if is_ready { "ready to fly".to_owned() } else { format!("not ready: {words}") })?;
-    }
-    Ok(if is_ready { Outcome::Done } else { Outcome::Findings })
-}
-
-/// The other end of each wire, and its pad on the board.
-fn wiring(board: &Board) -> Vec<Wiring> {
-    let pad = |wire: &Wire| format!("{} ({})", wire.pad, wire.pin);
-    let Board { autopilot, radio, card, led, owner, .. } = board;
-    let all = [
-        ("autopilot's TX", pad(&autopilot.rx)),
-        ("autopilot's RX", pad(&autopilot.tx)),
-        ("radio's TX", pad(&radio.rx)),
-        ("radio's RX", pad(&radio.tx)),
-        ("card", card.slot.clone()),
-        ("LED", format!("{}, lit when {}; it blinks slowly while it records", led.pin, led.lit.name())),
-        ("power", owner.power.clone()),
-    ];
-    all.into_iter().map(|(wire, pad)| Wiring { wire, pad }).collect()
-}
-
-fn autopilot(client: &mut Client) -> Result<Option<Heard>> {
-    client.until(Instant::now() + HEARTBEATS, |frame| {
-        let fields = Fields(frame.payload());
-        let heard = Heard { autopilot: fields.u8(5), is_armed: fields.u8(6) & ARMED != 0 };
-        (frame.id() == HEARTBEAT).then_some(heard)
-    })
-}
-
 /// The wanted settings with the present values; empty for another autopilot, and for a PX4 that does not answer.
-fn settings(client: &mut Client, autopilot: u8, port: u8, own: &Own) -> Result<Vec<Setting>> {
+pub(super) fn wanted(client: &mut Client, autopilot: u8, port: u8, own: &Own) -> Result<Vec<Setting>> {
     let mut settings = match autopilot {
         ARDUPILOT => ardupilot(port, own),
         PX4 => instance(client, port)?.map_or_else(Vec::new, |instance| px4(port, instance, own)),
@@ -366,7 +159,7 @@ fn sent(autopilot: u8, kind: u8, value: f64) -> f32 {
 }
 
 /// Sets what differs, after the present values are in a file.
-fn change(client: &mut Client, settings: &mut [Setting], file: &Path) -> Result<()> {
+pub(super) fn change(client: &mut Client, settings: &mut [Setting], file: &Path) -> Result<()> {
     settable(client)?;
     if settings.iter().all(|setting| setting.now.is_none()) {
         bail!(
@@ -424,7 +217,7 @@ fn set(client: &mut Client, name: &str, kind: u8, wanted: f64) -> Result<()> {
 }
 
 /// The lines of a file of former values.
-fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
+pub(super) fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
     let wrong = |number: usize| usage(format!("{}: line {number} is no NAME,VALUE", file.display()));
     let bytes = read_short(file, UNDO_BYTES_MAX).context("--restore")?;
     let text = String::from_utf8(bytes).map_err(|_| usage(format!("{}: is no text", file.display())))?;
@@ -443,7 +236,7 @@ fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
 }
 
 /// Sets all that it can.
-fn restore(client: &mut Client, values: &[(String, f64)]) -> Result<Outcome> {
+pub(super) fn restore(client: &mut Client, values: &[(String, f64)]) -> Result<Outcome> {
     let mut failed = Vec::new();
     for (name, wanted) in values {
         let done = params::ask(client, name, TRIES).and_then(|param| {
@@ -462,7 +255,7 @@ fn restore(client: &mut Client, values: &[(String, f64)]) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn show_settings(heard: Option<Heard>, settings: &[Setting]) -> Result<()> {
+pub(super) fn show(heard: Option<Heard>, settings: &[Setting]) -> Result<()> {
     let name = match heard.map(|heard| heard.autopilot) {
         Some(ARDUPILOT) => "ArduPilot's settings",
         Some(PX4) => "PX4's settings",
@@ -486,19 +279,7 @@ fn show_settings(heard: Option<Heard>, settings: &[Setting]) -> Result<()> {
     output::line(&format!("{name}\n{}", table.text()))
 }
 
-fn own_line(own: &Own, link: &str) -> CheckLine {
-    let path = match own.path {
-        1 => "its radio",
-        2 => "the autopilot's radio",
-        _ => "nobody: GS_PATH is 0",
-    };
-    let streams = if own.has_streams { "requests its streams" } else { "requests no streams" };
-    let detail =
-        format!("reached over {link}; {} baud to the autopilot, {streams}, texts to {path}", own.baud);
-    line("box", own.path > 0, detail)
-}
-
-fn settings_line(settings: &[Setting]) -> CheckLine {
+pub(super) fn check(settings: &[Setting]) -> CheckLine {
     let of = |is_it: fn(&Setting) -> bool| {
         let names = settings.iter().filter(|setting| is_it(setting)).map(|setting| setting.name.as_str());
         names.collect::<Vec<_>>().join(", ")
@@ -515,115 +296,16 @@ fn settings_line(settings: &[Setting]) -> CheckLine {
         },
     }
 }
-
-/// The box's answer to the command for the checks before arming.
-fn prearm(client: &mut Client) -> Result<CheckLine> {
-    const READY: &str = "HUMS: ready";
-    let (system, component) = client.target();
-    let packet = messages::command_long(PREARM, &[], system, component);
-    let text = client.ask(&packet, ANSWER, TRIES, |frame| {
-        let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT)?;
-        (text.starts_with(READY) || text.starts_with("HUMS: not ready")).then(|| text.to_owned())
-    })?;
-    let text = text.unwrap_or_else(|| "no answer".to_owned());
-    Ok(line("checks", text.starts_with(READY), text.trim_start_matches("HUMS: ")))
-}
-
-/// What the box records now.
-fn bench(client: Client, own: &Own, board: Option<&Board>, heard: Option<Heard>) -> Result<Vec<CheckLine>> {
-    let checks = pull::newest(client, HEAD_SECTORS, |newest| {
-        let (end, mut boot) = (Overview::verified(&newest.end)?, None);
-        if !newest.begin.pieces.is_empty() {
-            boot = Overview::verified(&newest.begin)?.contents.boot;
-        }
-        let mut checks = Vec::new();
-        if let Some(boot) = boot.or_else(|| end.contents.boot.clone()) {
-            let is_it = board.is_none_or(|board| board.name == boot.board);
-            checks.push(line("image", is_it, format!("{} {} for {}", boot.version, boot.git, boot.board)));
-        }
-        let lost = end.contents.stats.map_or(0, |stats| stats.frames_lost);
-        let words = match (newest.is_growing, lost) {
-            (false, _) => "the newest log does not grow: the box does not record".to_owned(),
-            (true, 0) => "it records".to_owned(),
-            (true, lost) => format!("it records, and has lost {}", count(lost, "frame")),
-        };
-        checks.push(line("card", newest.is_growing && lost == 0, words));
-        let autopilot = end.contents.vehicle.map(|vehicle| vehicle.autopilot);
-        let autopilot = autopilot.or(heard.map(|heard| heard.autopilot));
-        checks.extend([clock(&end), received(&end, own, autopilot)]);
-        Ok(checks)
-    })?;
-    Ok(checks.unwrap_or_else(|| vec![line("card", false, "no log on it: is a card in the slot?")]))
-}
-
-fn clock(end: &Overview) -> CheckLine {
-    let last = end.ending.summary.last;
-    let Some(utc_us) =
-        last.zip(end.ending.summary.epoch_us).map(|(last, epoch)| epoch.saturating_add(last.as_micros()))
-    else {
-        return line("clock", false, "no UTC from the autopilot: it needs GPS time, or a ground station");
-    };
-    let here_us = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u64;
-    let apart_s = here_us.abs_diff(utc_us) / 1_000_000;
-    let apart =
-        if apart_s > 60 { format!(", {apart_s} s from this computer's clock") } else { String::new() };
-    line("clock", true, format!("{} UTC{apart}", date_and_time(utc_us)))
-}
-
-/// Messages and rates at the box's port.
-fn received(end: &Overview, own: &Own, autopilot: Option<u8>) -> CheckLine {
-    let autopilot = match autopilot {
-        Some(ARDUPILOT) => Autopilot::ArduPilot,
-        Some(PX4) => Autopilot::Px4,
-        _ => Autopilot::Other,
-    };
-    let seconds = duration_s(end);
-    let rate = |id: u32| {
-        let its = |message: &&crate::source::item::MessageCount| message.id.is_some_and(|(of, _)| of == id);
-        let frames = end.contents.messages.iter().find(its).map_or(0, |message| message.amount.count);
-        if seconds > 0.0 { frames as f64 / seconds } else { 0.0 }
-    };
-    if rate(HEARTBEAT) <= 0.0 {
-        return line(
-            "messages",
-            false,
-            "the box does not hear the autopilot: check its TX wire and the rate",
-        );
-    }
-    let (mut bad, mut all, mut other) = (Vec::new(), 0_u64, 0_u64);
-    for (id, wanted_hz) in wanted(autopilot, own.baud) {
-        let (hz, wanted_hz) = (rate(id), f64::from(wanted_hz));
-        let is_slow = hz < wanted_hz * SLOW;
-        if NEEDED.contains(&id) {
-            all += 1;
-            if is_slow {
-                bad.push(format!("{} {hz:.1} of {wanted_hz:.1} Hz", message_name(id)));
-            }
-        } else {
-            other += u64::from(!is_slow);
-        }
-    }
-    let words = if bad.is_empty() {
-        format!(
-            "{} at their rates, and {other} for parts that not every vehicle has",
-            count(all, "needed message")
-        )
-    } else if own.has_streams {
-        format!("{}; connect the autopilot's RX, over which the box requests them", bad.join(", "))
-    } else {
-        format!("{}; AP_STREAMS 1 has the box request them", bad.join(", "))
-    };
-    line("messages", bad.is_empty(), words)
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
 
-    use hums_link::packet::Packet;
+    use hums_link::messages;
+    use hums_link::packet::{Fields, Packet};
 
     use super::*;
-    use crate::mavlink::ids::{PARAM_REQUEST_READ, PARAM_SET};
+    use crate::mavlink::ids::{HEARTBEAT, PARAM_REQUEST_READ, PARAM_SET};
+    use crate::talk::setup::{ARMED, AUTOPILOT};
     use crate::talk::tests::fake::found;
 
     const OWN: Own = Own { baud: 57_600, path: 2, has_streams: false };
@@ -668,21 +350,21 @@ mod tests {
             &[("SERIAL2_PROTOCOL", 1.0, 2), ("SERIAL2_BAUD", 115.0, 4), ("BRD_SER2_RTSCTS", 0.0, 2)],
         );
         let differ = |client: &mut Client| {
-            let all = settings(client, ARDUPILOT, 2, &OWN).expect("a link");
+            let all = wanted(client, ARDUPILOT, 2, &OWN).expect("a link");
             let names: Vec<String> =
                 all.iter().filter(|setting| setting.differs()).map(|setting| setting.name.clone()).collect();
             (all, names)
         };
         let (mut all, names) = differ(&mut client);
         assert_eq!((names, all.len()), (vec!["SERIAL2_PROTOCOL".to_owned(), "SERIAL2_BAUD".to_owned()], 3));
-        assert_eq!(settings_line(&all).state, "missing");
+        assert_eq!(check(&all).state, "missing");
         change(&mut client, &mut all, &first).expect("set");
         assert_eq!(
             std::fs::read_to_string(&first).expect("a file"),
             "SERIAL2_PROTOCOL,1\nSERIAL2_BAUD,115\n"
         );
         let (mut all, names) = differ(&mut client);
-        assert!(names.is_empty() && settings_line(&all).state == "ok", "{names:?}");
+        assert!(names.is_empty() && check(&all).state == "ok", "{names:?}");
         change(&mut client, &mut all, &second).expect("nothing to do");
         assert!(!second.exists(), "nothing was changed");
         assert!(change(&mut client, &mut [], &second).is_err(), "nothing was answered");
@@ -699,7 +381,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let file = dir.path().join("undo");
         let mut client = vehicle(ARDUPILOT, 0, &[("SERIAL2_PROTOCOL", 23.0, 2), ("SERIAL2_BAUD", 115.0, 4)]);
-        let mut all = settings(&mut client, ARDUPILOT, 2, &OWN).expect("a link");
+        let mut all = wanted(&mut client, ARDUPILOT, 2, &OWN).expect("a link");
         let error = change(&mut client, &mut all, &file).expect_err("a receiver's").to_string();
         assert!(error.starts_with("SERIAL2_PROTOCOL is 23") && !file.exists(), "{error}");
         let configs = [101, 103, 1_000].map(bits);
@@ -734,7 +416,7 @@ mod tests {
                 ("MAV_1_FORWARD", bits(1), 6),
             ],
         );
-        let mut all = settings(&mut client, PX4, 2, &OWN).expect("a link");
+        let mut all = wanted(&mut client, PX4, 2, &OWN).expect("a link");
         let now: Vec<(&str, Option<f64>, bool)> =
             all.iter().map(|setting| (setting.name.as_str(), setting.now, setting.differs())).collect();
         assert_eq!(
@@ -784,32 +466,5 @@ mod tests {
             std::fs::write(&file, text).expect("written");
             assert_eq!(values_of(&file).is_ok(), is_good, "{text}");
         }
-    }
-
-    #[test]
-    fn the_messages_that_a_box_lacks_are_named_with_their_rates() {
-        use crate::source::item::{Amount, MessageCount};
-        let mut end = Overview::default();
-        let received = |end: &Overview, own: &Own| received(end, own, Some(ARDUPILOT));
-        assert!(received(&end, &OWN).detail.contains("does not hear"));
-        let instant = |s: u64| hums_core::clock::Instant::from_millis(s * 1_000);
-        (end.ending.summary.first, end.ending.summary.last) = (Some(instant(100)), Some(instant(110)));
-        let own = Own { baud: 921_600, ..OWN };
-        end.contents.messages = [&NEEDED[..], &[HEARTBEAT]]
-            .concat()
-            .into_iter()
-            .map(|id| MessageCount {
-                id: Some((id, true)),
-                name: String::new(),
-                amount: Amount { count: if id == ATTITUDE { 30 } else { 19 }, bytes: 0 },
-            })
-            .collect();
-        let told = received(&end, &own);
-        assert!(told.detail.starts_with("ATTITUDE 3.0 of 10.0 Hz; AP_STREAMS 1"), "{}", told.detail);
-        // A slow line carries less.
-        assert_eq!(received(&end, &OWN).state, "ok");
-        assert_eq!(clock(&end).state, "missing");
-        end.ending.summary.epoch_us = Some(1_700_000_000_000_000);
-        assert_eq!(clock(&end).state, "ok");
     }
 }
