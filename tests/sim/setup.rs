@@ -147,7 +147,7 @@ fn an_autopilot_is_set_for_the_box_and_the_bench_check_says_that_it_is_ready() {
     drop(board);
 }
 
-/// At the autopilot's USB. The settings are the reason for which the box hears nothing, and sends nothing.
+/// At the autopilot's USB. With these settings the autopilot sends nothing to the box.
 #[test]
 fn the_port_of_a_box_that_hears_nothing_is_set_and_restored() {
     let files = tempfile::tempdir().unwrap();

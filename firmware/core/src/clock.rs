@@ -12,7 +12,7 @@ use crate::time;
 /// 0 again, reports an earlier date.
 pub const UTC_MICROS: core::ops::Range<u64> = 1_262_304_000_000_000..4_102_444_800_000_000;
 
-/// A point in time: microseconds since the monitor's power-on. Kept one higher, so that an optional one takes no more room.
+/// A point in time: microseconds since the box's power-on. Kept one higher, so that an optional one takes no more room.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instant(NonZeroU64);
 

@@ -20,7 +20,7 @@ numbered! {
         Tumbling "tumbling",
         /// It was disarmed in the air; height above home in metres.
         Disarmed "disarmed_in_air",
-        /// It sinks without being told to; in m/s.
+        /// It sinks without a command; in m/s.
         Sinking "sinking",
         /// It was turned over by its own rotors, or lies over; degrees of tilt.
         Overturned "overturned",

@@ -100,7 +100,7 @@ with_parts! {
 {
     BatRemWarn "BAT_REM_WARN" "%" 15.0 0.0 100.0 "PX4 commander, COM_LOW_BAT (BAT_LOW_THR 15 %)";
     BatRemCrit "BAT_REM_CRIT" "%" 7.0 0.0 100.0 "PX4 commander, BAT_CRIT_THR 7 %";
-    BatCells "BAT_CELLS" "" 0.0 0.0 24.0 "0: reported, of the autopilot's parameters, or of the voltage at rest where it fits one count only" is "Cells of a battery in series";
+    BatCells "BAT_CELLS" "" 0.0 0.0 24.0 "0: from messages, the autopilot's parameters, or the voltage at rest if only one count fits it" is "Cells of a battery in series";
     CellVoltWarn "CELL_VOLT_WARN" "V" 3.6 0.0 4.5 "common LiPo practice";
     CellVoltCrit "CELL_VOLT_CRIT" "V" 3.5 0.0 4.5 "common LiPo practice";
     CellDevWarn "CELL_DEV_WARN" "V" 0.07 0.0 2.0 "AirData: 0.07 V for 10 s" is "Battery cell balance: warning above; critical where it lasts for a minute";
@@ -128,7 +128,7 @@ with_parts! {
     EkfVarCrit "EKF_VAR_CRIT" "" 0.8 0.0 10.0 "ArduPilot FS_EKF_THRESH 0.8 on two of three";
     EkfRatioWarn "EKF_RATIO_WARN" "" 0.5 0.0 10.0 "PX4 innovation test ratio, half way" is "Estimator test ratio, that of the compass too: warning above";
     EkfRatioCrit "EKF_RATIO_CRIT" "" 1.0 0.0 10.0 "PX4: a ratio above 1 rejects the sensor" is "Estimator test ratio, that of the compass too: critical above";
-    GpsSatsWarn "GPS_SATS_WARN" "" 6.0 0.0 60.0 "PX4 EKF2_REQ_NSATS 6: fewer are not flown with";
+    GpsSatsWarn "GPS_SATS_WARN" "" 6.0 0.0 60.0 "PX4 EKF2_REQ_NSATS 6, the least before a takeoff";
     GpsHdopWarn "GPS_HDOP_WARN" "" 2.5 0.0 50.0 "PX4 EKF2_REQ_PDOP 2.5";
     GpsHaccWarn "GPS_HACC_WARN" "m" 3.0 0.0 100.0 "PX4 EKF2_REQ_EPH 3 m";
     GpsFixCrit "GPS_FIX_CRIT" "" 3.0 0.0 6.0 "less than a 3D fix in flight";
@@ -143,9 +143,9 @@ with_parts! {
     CpuLoadCrit "CPU_LOAD_CRIT" "%" 95.0 0.0 100.0 "PX4 CPU check";
     McuTempWarn "MCU_TEMP_WARN" "degC" 85.0 0.0 150.0 "PX4; STM32 ambient limit";
     McuTempCrit "MCU_TEMP_CRIT" "degC" 100.0 0.0 150.0 "PX4; STM32 junction limit 105";
-    TiltWarn "TILT_WARN" "deg" 45.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60" is "Roll and pitch angle that is not wanted: warning above";
-    TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60" is "Roll and pitch angle that is not wanted: critical above";
-    RecQueueWarn "REC_QUEUE_WARN" "%" 50.0 0.0 100.0 "half of what a standing card may fill";
+    TiltWarn "TILT_WARN" "deg" 45.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60" is "Unwanted roll and pitch angle: warning above";
+    TiltCrit "TILT_CRIT" "deg" 60.0 0.0 180.0 "PX4 failure detector FD_FAIL_R, FD_FAIL_P 60" is "Unwanted roll and pitch angle: critical above";
+    RecQueueWarn "REC_QUEUE_WARN" "%" 50.0 0.0 100.0 "half of the queue, which fills while a card pauses";
     RecQueueCrit "REC_QUEUE_CRIT" "%" 90.0 0.0 100.0 "frames are lost next";
     RecStopWarn "REC_STOP_WARN" "" 0.5 0.0 3.0 "1: not recording";
     RecStopCrit "REC_STOP_CRIT" "" 1.5 0.0 3.0 "2: not recording while armed (PX4#12565, ardupilot#6863)";
@@ -169,27 +169,27 @@ with_parts! {
     RadioRssiWarn "RADIO_RSSI_WARN" "" 0.0 0.0 254.0 "device scale; 0 is off";
     RebootCrit "AP_REBOOT_CRIT" "" 0.5 0.0 100.0 "1: the autopilot restarted within 30 s";
     StateCrit "AP_STATE_CRIT" "" 4.5 0.0 10.0 "MAV_STATE: 5 is critical, 6 emergency";
-    AlertWarn "AP_ALERT_WARN" "" 0.5 0.0 3.0 "1: the autopilot says that something is wrong" is "What the autopilot says is wrong: warning above this state";
-    AlertCrit "AP_ALERT_CRIT" "" 1.5 0.0 3.0 "2: what it says is one to act on at once" is "What the autopilot says is wrong: critical above this state";
+    AlertWarn "AP_ALERT_WARN" "" 0.5 0.0 3.0 "1: the autopilot reports a fault" is "Alerts of the autopilot: warning above this state";
+    AlertCrit "AP_ALERT_CRIT" "" 1.5 0.0 3.0 "2: the autopilot reports a fault that needs action at once" is "Alerts of the autopilot: critical above this state";
     HardLanding "HARD_LANDING" "m/s" 2.0 0.1 20.0 "four times ArduPilot's LAND_SPEED of 0.5 m/s" is "Sink rate from which a landing counts as hard";
     BatCapacity "BAT_CAPACITY" "Ah" 0.0 0.0 1000.0 "of all batteries together, for counting cycles; 0: as the autopilot has it (BATT_CAPACITY, BAT1_CAPACITY)" is "Capacity of all batteries together";
-    GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead" is "Most that is sent to the ground station in a second";
+    GsBudget "GS_BUDGET" "B/s" 2000.0 100.0 5000.0 "a 57,600 baud radio shared with its own overhead" is "Limit of bytes to the ground station in a second";
     TrdVibeWarn "TRD_VIBE_WARN" "%" 30.0 0.0 10_000.0 "steady vibration above or below its baseline, of real cut propellers 35 below; off from 10,000" is "Steady vibration against earlier flights: warning above";
     TrdVibeCrit "TRD_VIBE_CRIT" "%" 150.0 0.0 10_000.0 "steady vibration above or below its baseline" is "Steady vibration against earlier flights: critical above";
     TrdThrWarn "TRD_THR_WARN" "%" 3.0 0.0 10_000.0 "hover throttle above its baseline: heavier, or less thrust; real propellers cut by 10 mm and more 10 to 20, by 5 mm 2 to 4" is "Hover throttle and power against earlier flights: warning above";
     TrdThrCrit "TRD_THR_CRIT" "%" 20.0 0.0 10_000.0 "hover throttle above its baseline" is "Hover throttle and power against earlier flights: critical above";
     TrdEscWarn "TRD_ESC_WARN" "%" 5.0 0.0 100.0 "LogHat: a motor's speed against the others, from its baseline" is "Balance of motors against earlier flights: warning above";
     TrdEscCrit "TRD_ESC_CRIT" "%" 15.0 0.0 100.0 "a motor's speed against the others, from its baseline" is "Balance of motors against earlier flights: critical above";
-    ProtAction "PROT_ACTION" "" 0.0 0.0 2.0 "MAV_CMD 20 and 21, announced first; see docs/safety.md" is "What the autopilot is asked to do by itself" of "nothing" | "return" | "land";
-    ProtCheck "PROT_CHECK" "" 0.0 0.0 9.0 "any check of the subsystem, but for 0" is "What a critical finding must be of, to ask for it" of "empty battery" | "power" | "propulsion" | "engine" | "structure" | "navigation" | "link" | "computer" | "attitude" | "recorder";
+    ProtAction "PROT_ACTION" "" 0.0 0.0 2.0 "MAV_CMD 20 and 21, announced first; see docs/safety.md" is "Protective action that the autopilot is asked for" of "nothing" | "return" | "land";
+    ProtCheck "PROT_CHECK" "" 0.0 0.0 9.0 "0: low battery alone; else any check of the subsystem" is "Subsystem whose critical finding starts the protective action" of "empty battery" | "power" | "propulsion" | "engine" | "structure" | "navigation" | "link" | "computer" | "attitude" | "recorder";
     ProtDelay "PROT_DELAY" "s" 10.0 0.0 120.0 "the time in which the pilot can cancel" is "Time from the announcement to the request";
     RecStallWarn "REC_STALL_WARN" "ms" 500.0 0.0 60_000.0 "SD cards: 250 ms are allowed, 2.5 s were seen (PX4#15596)";
     RecStallCrit "REC_STALL_CRIT" "ms" 2_500.0 0.0 60_000.0 "the queue lasts for so long at full rate";
     RecErrWarn "REC_ERR_WARN" "" 0.5 0.0 1_000_000.0 "any block write that the card refused in the last ten seconds";
     RecRoomWarn "REC_ROOM_WARN" "%" 10.0 0.0 100.0 "of the card are left for logs: other files fill it";
     RecRoomCrit "REC_ROOM_CRIT" "%" 1.0 0.0 100.0 "of the card are left for logs: other files fill it";
-    CompYellow "CMP_YELLOW" "%" 90.0 1.0 1000.0 "of the limit that trips first: soon due" is "A part's life used: warning above";
-    CompRed "CMP_RED" "%" 100.0 1.0 1000.0 "of the limit that trips first: due" is "A part's life used: critical above";
+    CompYellow "CMP_YELLOW" "%" 90.0 1.0 1000.0 "of the limit that is reached first: soon due" is "A part's life used: warning above";
+    CompRed "CMP_RED" "%" 100.0 1.0 1000.0 "of the limit that is reached first: due" is "A part's life used: critical above";
 }
 
 parts {
@@ -206,11 +206,11 @@ parts {
 {
     GsPath "GS_PATH" "" 1.0 0.0 2.0 "docs/companion.md" is "Where the summary for the ground station goes" of "nowhere" | "radio at the box" | "through the autopilot";
     GsBaud "GS_BAUD" "baud" 57_600.0 9_600.0 921_600.0 "what SiK radios come with" is "Rate of the ground station's port";
-    GsPass "GS_PASS" "" 0.0 0.0 1.0 "what is not for us passes between ground station and autopilot" is "The radio serves the autopilot too" of "no" | "yes";
+    GsPass "GS_PASS" "" 0.0 0.0 1.0 "the box forwards frames between ground station and autopilot" is "The radio serves the autopilot too" of "no" | "yes";
     GsSign "GS_SIGN" "" 0.0 0.0 2.0 "counts once there is a key" is "Signing at the ground station's port" of "no" | "our frames are signed" | "and unsigned requests are refused";
     ApBaud "AP_BAUD" "baud" 921_600.0 9_600.0 921_600.0 "PX4 TELEM2, ArduPilot SERIAL2 for companions" is "Rate of the autopilot's port";
-    ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "what we send to the autopilot, answers it carries on included" is "Most that is sent to the autopilot in a second";
-    ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM" is "The autopilot is asked for what the checks need" of "no" | "yes";
+    ApBudget "AP_BUDGET" "B/s" 2000.0 100.0 10_000.0 "the box's own frames, with the answers that the autopilot forwards" is "Limit of bytes to the autopilot in a second";
+    ApStreams "AP_STREAMS" "" 1.0 0.0 1.0 "SET_MESSAGE_INTERVAL, REQUEST_DATA_STREAM" is "The box requests the messages of its checks from the autopilot" of "no" | "yes";
     ApSign "AP_SIGN" "" 0.0 0.0 2.0 "as GS_SIGN, for what comes through the autopilot" is "Signing at the autopilot's port" of "no" | "our frames are signed" | "and unsigned requests are refused";
     SignPort "SIGN_PORT" "" 0.0 0.0 2.0 "docs/companion.md" is "The port that may bring a key" of "none" | "ground station's" | "autopilot's";
     MisFallTime "MIS_FALL_TIME" "s" 0.3 0.1 5.0 "a fall of half a metre, below 0.3 g";
@@ -229,16 +229,16 @@ parts {
     VibeRiseWarn "VIBE_RISE_WARN" "" 2.2 1.1 1000.0 "times what is usual in this flight, on rotors";
     MotOutWarn "MOT_OUT_WARN" "%" 8.0 1.0 1000.0 "a motor's output alone above its usual share and what it varies by; healthy flights stay below 7";
     MotOutCrit "MOT_OUT_CRIT" "%" 35.0 1.0 1000.0 "a motor's output alone above its usual share: it gives two thirds of its thrust";
-    StuckWarn "SENS_STUCK_WARN" "s" 1.0 0.3 1000.0 "a sensor repeats one value in flight, four times as long as it ever did before in it" is "A sensor repeats one value: warning after";
+    StuckWarn "SENS_STUCK_WARN" "s" 1.0 0.3 1000.0 "a sensor repeats one value in flight for four times its longest repetition before" is "A sensor repeats one value: warning after";
     BaroGpsWarn "BARO_GPS_WARN" "m" 8.0 1.0 10_000.0 "barometer and GPS height apart beyond usual, a tenth of the climb and half of the dynamic pressure";
     BaroNoiseWarn "BARO_NOISE_WARN" "m" 2.0 0.2 10_000.0 "steps of the barometer's height beyond usual; noise of barometers is 0.1 to 0.3 (data sheets)";
-    RateWarn "RATE_MISS_WARN" "deg/s" 30.0 5.0 1000.0 "body rate that is wanted and missing, over a second; healthy flights reach 12" is "Roll and pitch rate that are wanted and missing: warning above";
-    RateCrit "RATE_MISS_CRIT" "deg/s" 60.0 5.0 1000.0 "body rate that is wanted and missing, over a second" is "Roll and pitch rate that are wanted and missing: critical above";
+    RateWarn "RATE_MISS_WARN" "deg/s" 30.0 5.0 1000.0 "wanted less measured body rate, over a second; healthy flights reach 12" is "Missing roll and pitch rate: warning above";
+    RateCrit "RATE_MISS_CRIT" "deg/s" 60.0 5.0 1000.0 "wanted less measured body rate, over a second" is "Missing roll and pitch rate: critical above";
     ThrustWarn "THRUST_WARN" "s" 2.0 0.5 1000.0 "full throttle without a climb; ArduPilot warns of thrust loss after 1 s, and looks at the attitude too";
     EkfClimbWarn "EKF_CLIMB_WARN" "m/s" 8.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; up to 6.6 in healthy real flights";
     EkfClimbCrit "EKF_CLIMB_CRIT" "m/s" 12.0 0.5 1000.0 "estimator's climb against the barometer's, over a second; 14 and 24 where height control ran away";
     GpsSpeedWarn "GPS_SPEED_WARN" "m/s" 1.0 0.1 1000.0 "a receiver's velocity against the way between its positions, over four seconds; below 1 in healthy real flights";
-    TrdFalse "TRD_FALSE" "flights" 400.0 20.0 100_000.0 "of flights in which nothing changed, `hums check` tells one in so many by a trend: rarer is told later; beside it the trends' limits are what is worth a word" is "Flights for one false word of a trend";
+    TrdFalse "TRD_FALSE" "flights" 400.0 20.0 100_000.0 "`hums check` reports one false trend in so many unchanged flights; a larger number reports true ones later" is "Unchanged flights for one false trend";
     TrdCapWarn "TRD_CAP_WARN" "%" 20.0 0.0 100.0 "battery capacity below its baseline; cells are called worn out at 80 % of their capacity" is "Battery capacity against earlier flights: warning above";
     TrdCapCrit "TRD_CAP_CRIT" "%" 40.0 0.0 100.0 "battery capacity below its baseline" is "Battery capacity against earlier flights: critical above";
     GpsHeightWarn "GPS_HEIGHT_WARN" "m" 6.0 0.5 10_000.0 "a receiver's height moves within four seconds as neither climb nor barometer do; up to 5.3 in healthy real flights";
@@ -248,7 +248,7 @@ parts {
     GpsHdopRise "GPS_HDOP_RISE" "" 1.8 1.1 100.0 "dilution of precision times the usual one of the flight; up to 1.3 in healthy real flights" is "GPS dilution of precision times the usual one: warning above";
     Ahrs2TiltWarn "AHRS2_TILT_WARN" "deg" 30.0 1.0 180.0 "two estimators' attitudes apart; up to 22 in hard manoeuvres of healthy flights";
     Ahrs2HgtWarn "AHRS2_HGT_WARN" "m" 8.0 0.5 10_000.0 "two estimators' heights apart beyond usual; up to 3.5 in healthy real flights";
-    Ahrs2HgtCrit "AHRS2_HGT_CRIT" "m" 12.0 0.5 10_000.0 "two estimators' heights apart so far that the height that is held may be wrong";
+    Ahrs2HgtCrit "AHRS2_HGT_CRIT" "m" 12.0 0.5 10_000.0 "two estimators' heights apart; the autopilot may hold a wrong height";
     Ahrs2PosWarn "AHRS2_POS_WARN" "m" 10.0 0.5 10_000.0 "two estimators' positions apart beyond half a second of flight; up to 2.6 with it in healthy real flights";
     ImuGpsWarn "IMU_GPS_WARN" "m/s2" 1.0 0.1 1000.0 "measured force, turned by the attitude, less the change of GPS velocity; up to 0.4 in healthy flights of simulators" is "Measured force less change of GPS velocity: warning above";
     GenSpeedWarn "GEN_SPEED_WARN" "rpm" 0.0 0.0 65_000.0 "by generator, below its idle speed; off until set";

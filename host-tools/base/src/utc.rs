@@ -1,4 +1,4 @@
-//! Times as people and other tools read them: UTC in ISO 8601, and seconds since the monitor's power-on; for people hours,
+//! Times as people and other tools read them: UTC in ISO 8601, and seconds since the box's power-on; for people hours,
 //! minutes and seconds.
 
 use hums_core::clock::{Instant, Span};

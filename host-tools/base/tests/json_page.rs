@@ -14,7 +14,7 @@ the code's structs by `host-tools/base/tests/json_page.rs`.
 
 * With `--json` a command prints one object on standard output, `hums check` one object a line for each log. `schema` and `version` name it:
   each section below has its schema as the title. `version` rises when a name goes or changes its meaning. New names may come at any time.
-* Names carry units: `_s` seconds, `_us` microseconds, `_utc` ISO 8601. Other times count from the monitor's power-on, in other recordings
+* Names carry units: `_s` seconds, `_us` microseconds, `_utc` ISO 8601. Other times count from the box's power-on, in other recordings
   from their own zero. `null` means \"not known\" or \"none\". A name with `[]` is an element of a list.
 * Messages, progress and errors go to standard error, as text. [cli.md](cli.md) has the exit codes. `hums completions` and `hums man` have no `--json`.
 

@@ -31,7 +31,7 @@ OUT/LOG/ATTITUDE.csv, OUT/LOG.thesis/flightvalues.csv, OUT/ATTITUDE/date=D/bucke
 LOG names the log, the box and the session: 00001-box3f0042000d51373435363338-s1a2b3c4d. `-o -` is standard output.
 An output that exists is overwritten with --force only, once all of the new one is written. An output that is an input,
 and a folder that holds another session's tables, are refused.
-Times: boot time counts from the monitor's power-on; UTC is known for a whole session once any frame told it.";
+Times: boot time counts from the box's power-on; UTC is known for a whole session once any frame told it.";
 
 /// A name with a slash behind it is that file.
 pub(super) fn input() -> impl TypedValueParser<Value = PathBuf> {

@@ -1,7 +1,7 @@
 //! How entries (frames and records) become symbols for the range coder, and back. Writer and reader run the same code
 //! (`Model::entry`) over the two ends of the coder.
 //!
-//! An entry's time is in whole milliseconds since the monitor's power-on and never falls within a group.
+//! An entry's time is in whole milliseconds since the box's power-on and never falls within a group.
 
 mod body;
 mod describe;

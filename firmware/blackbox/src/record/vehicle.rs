@@ -80,7 +80,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// UTC at the monitor's power-on, microseconds since 1970.
+    /// UTC at the box's power-on, microseconds since 1970.
     pub const fn epoch_micros(&self) -> u64 {
         self.utc_micros.saturating_sub(self.boot.as_micros())
     }

@@ -295,10 +295,10 @@ vehicle | clipping counts | The accelerometers were at the end of their range: t
 vehicle | acceleration | The airframe carried a high load: a hard manoeuvre, a shock or a landing. | Inspect the airframe and the landing gear.
 stored | airframe registered with the monitor on board | The airframe or a part of it is due for maintenance. | Do the maintenance, and tell the monitor.
 said | texts, events or health flags of the autopilot | The autopilot said that vibration or clipping disturbed it. | Balance propellers and motors, and check the autopilot's mounting.
-ardupilot | variances of the EKF that it flies by | The EKF did not trust what it was told of position, height or speed. | Look at compass, GPS and vibration at that time.
+ardupilot | variances of the EKF that it flies by | The EKF did not trust its measurements of position, height or speed. | Look at compass, GPS and vibration at that time.
 ardupilot | variances of the EKF that it flies by, of no plane | The EKF did not trust two of compass, velocity and position: it could lose its position. | Do not fly until compass and GPS are checked.
 ardupilot | compass variance of the EKF that it flies by | The EKF did not trust the compass. | Check the compass, its calibration and currents or magnets near it.
-px4 | EKF test ratios | The EKF rejected, or nearly rejected, what it was told of position, height or speed. | Look at compass, GPS and vibration at that time.
+px4 | EKF test ratios | The EKF rejected, or nearly rejected, its measurements of position, height or speed. | Look at compass, GPS and vibration at that time.
 px4 | EKF test ratios | The EKF rejected, or nearly rejected, the compass. | Check the compass, its calibration and currents or magnets near it.
 px4 | EKF test ratio of the compass | The EKF stopped using the compass. | Check the compass, its calibration and currents or magnets near it.
 vehicle | second accelerometer on rotors | Two accelerometers came apart in flight. Which one is wrong is known only where there are three. | Do not fly until the autopilot's accelerometers are checked.
@@ -311,9 +311,9 @@ vehicle | second barometer | Two barometers came apart in flight. Which one is w
 vehicle | air pressure and GPS height | The heights of barometer and GPS came apart in flight: one of them is wrong. | Check the barometer, its cover and the airflow at it, and the GPS antenna's view.
 vehicle | air pressure and climb rate | The barometer became noisy in flight. | Check the barometer, its cover and the airflow at it.
 vehicle | air pressure and climb rate on rotors | The EKF's climb was not that of the barometer: height control may run away. | Do not fly until vibration, accelerometers, the barometer and its cover are checked.
-ardupilot | attitude of AHRS2 in flight | The autopilot's two estimators, EKF and AHRS2, told different attitudes: one of them is wrong. | Do not fly until accelerometers, gyros and vibration are checked.
-ardupilot | height of AHRS2 in flight | The autopilot's two estimators, EKF and AHRS2, told different heights: one of them is wrong. | Check the barometer, its cover, GPS and vibration.
-ardupilot | position of AHRS2 in flight | The autopilot's two estimators, EKF and AHRS2, told different positions: one of them is wrong. | Check GPS, compass and vibration at that time.
+ardupilot | attitude of AHRS2 in flight | The autopilot's two estimators, EKF and AHRS2, gave different attitudes: one of them is wrong. | Do not fly until accelerometers, gyros and vibration are checked.
+ardupilot | height of AHRS2 in flight | The autopilot's two estimators, EKF and AHRS2, gave different heights: one of them is wrong. | Check the barometer, its cover, GPS and vibration.
+ardupilot | position of AHRS2 in flight | The autopilot's two estimators, EKF and AHRS2, gave different positions: one of them is wrong. | Check GPS, compass and vibration at that time.
 vehicle | acceleration in flight | The accelerometer repeated one value: it has failed. | Do not fly until the autopilot's accelerometers are checked.
 vehicle | body rates of a gyro in flight | The gyro repeated one value: it has failed. | Do not fly until the autopilot's gyros are checked.
 vehicle | magnetic field in flight | The compass repeated one value: it has failed. | Check the compass and its wiring.
@@ -369,7 +369,7 @@ vehicle | acceleration of a vehicle on rotors | Nothing carried the vehicle thou
 vehicle | acceleration | The vehicle hit the ground or something else. | Do not fly until the whole vehicle is inspected.
 vehicle | body rates | The vehicle turned over and over: it was out of control. | Do not fly until motors, propellers and sensors are checked.
 vehicle | arming | The vehicle was disarmed, or its flight was terminated, in the air, and it fell. | Look for who or what did it; inspect the vehicle.
-vehicle | climb rate of a vehicle on rotors | The vehicle sank fast without being told to. | Look for lost thrust, vortex ring state, an empty battery or a wrong height.
+vehicle | climb rate of a vehicle on rotors | The vehicle sank fast without a command. | Look for lost thrust, vortex ring state, an empty battery or a wrong height.
 vehicle | attitude of a vehicle on rotors | The vehicle turned over, or lay over, while its motors ran. | Inspect the vehicle; check motor order, propellers and calibration.
 said | texts, events or health flags of the autopilot | The autopilot said that it crashed, released its parachute or ended the flight. | Do not fly until the whole vehicle is inspected.";
 

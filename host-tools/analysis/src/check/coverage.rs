@@ -16,7 +16,7 @@ use crate::counters::tells_flight;
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
 const CELL_VOLTAGE: &str = "cell_voltage";
 /// Reason for checks of earlier flights and worn parts.
-const UNTOLD: &str = "only earlier flights or a monitor on board tell";
+const UNTOLD: &str = "needs earlier flights (--past) or a box";
 pub(super) const OFF: &str = "its limit is off";
 const NOTE_EVERY: Span = Span::from_millis(500);
 
@@ -133,10 +133,10 @@ impl Recording<'_> {
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
             Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
             _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),
-            Scope::Recorder => return not("no monitor recorded this"),
+            Scope::Recorder => return not("needs a log of the box"),
             Scope::Wire if !self.on_the_wire => {
                 return not(if self.is_of_link {
-                    "this tells of the link to whoever recorded it, not of the autopilot's own wire"
+                    "needs a box on the autopilot's wire"
                 } else {
                     "the autopilot recorded this itself, without a link"
                 });

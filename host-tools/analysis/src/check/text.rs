@@ -246,7 +246,7 @@ fn when(checked: &Checked) -> String {
     };
     let since = match format {
         Format::DataFlash | Format::Ulog => "; times count from the autopilot's power-on",
-        Format::Hums if judged.by == JudgedBy::Board => "; times count from the monitor's power-on",
+        Format::Hums if judged.by == JudgedBy::Board => "; times count from the box's power-on",
         Format::Hums | Format::Tlog | Format::Raw => "",
     };
     format!("{utc}, {} recorded{restarts}{since}", clock(last.since(first)))

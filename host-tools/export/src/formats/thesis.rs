@@ -1,7 +1,7 @@
 //! The reference system's four tables, one row a second (`docs/decode.md`).
 //!
 //! Only latitude and longitude have seven decimals (1 cm) instead of two (1 km). The flight time counts whole
-//! seconds from the monitor's power-on, as the reference counts from its program's start; in a gap it jumps.
+//! seconds from the box's power-on, as the reference counts from its program's start; in a gap it jumps.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};

@@ -92,7 +92,7 @@ fn each_check_is_judged_or_says_why_not() {
         "nothing tells of height or speed"
     );
     assert_eq!(why("frames_lost"), "the autopilot recorded this itself, without a link");
-    assert_eq!(why("record_lost"), "no monitor recorded this");
+    assert_eq!(why("record_lost"), "needs a log of the box");
     assert_eq!(why("rc_rssi"), "its limit is off");
     // PX4's are not meant for ArduPilot.
     assert_eq!(why("vibration_px4"), "");

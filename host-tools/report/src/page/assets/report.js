@@ -27,7 +27,7 @@ const isChecked = log.checked_by !== "nobody" && !unjudged;
 const worst = data.critical ? "critical" : data.warning ? "warning" : data.judged && !data.little ? "ok" : "stale";
 // Of a recording of frames alone it is the first of them.
 const POWER_ON = "the autopilot's power-on";
-const ZEROS = { hums: "the monitor's power-on", dataflash: POWER_ON, ulog: POWER_ON };
+const ZEROS = { hums: "the box's power-on", dataflash: POWER_ON, ulog: POWER_ON };
 const when = log.start_utc ? `${log.start_utc.slice(0, 10)} ${log.start_utc.slice(11, 19)} UTC` : "time of day unknown";
 const session = log.format === "hums" ? "session " : "";
 document.title = `${name}, ${session}${log.name}, ${when}`;
