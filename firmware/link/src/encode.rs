@@ -127,7 +127,7 @@ mod tests {
             assert_eq!(frame.sequence(), sequence);
         }
         assert_eq!(encoder.frame(&mut buffer, &Packet::new(0xff_fffe)), [0; 0], "no such message");
-        let text = messages::status_text(crate::text::Severity::Notice, "HUMS: ready");
+        let text = messages::status_text(crate::statustext::Severity::Notice, "HUMS: ready");
         let frame = encoder.frame(&mut buffer, &text).to_vec();
         let again = encoder.message_of(&frame).expect("ours");
         assert_eq!((again.id(), again.payload()), (text.id(), text.payload()));

@@ -18,9 +18,9 @@ pub mod request;
 mod seen;
 pub mod sequence;
 pub mod signing;
+pub mod statustext;
 pub mod summary;
 mod telling;
-pub mod text;
 
 pub use frame::{Check, Frame};
 pub use framer::{Framer, FramerCounts};

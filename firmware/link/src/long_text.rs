@@ -9,7 +9,7 @@ use hums_dialect::ids::STATUSTEXT;
 use crate::alert;
 use crate::frame::{Check, Frame};
 use crate::packet::Fields;
-use crate::text::TEXT_BYTES_MAX;
+use crate::statustext::TEXT_BYTES_MAX;
 
 /// Time after which a text without its last part counts as complete. Autopilots send the parts in one go.
 const COMPLETE_AFTER: Millis = Millis::from_secs(1);

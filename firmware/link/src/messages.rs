@@ -5,7 +5,7 @@ use hums_dialect::ids;
 
 use crate::encode::COMPONENT;
 use crate::packet::Packet;
-use crate::text::{Severity, TEXT_BYTES_MAX};
+use crate::statustext::{Severity, TEXT_BYTES_MAX};
 
 /// `MAV_TYPE_ONBOARD_CONTROLLER`
 const TYPE: u8 = 18;

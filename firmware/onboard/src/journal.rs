@@ -8,7 +8,7 @@ use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::params::Param;
 use hums_core::time::Millis;
-use hums_link::text::Text;
+use hums_link::statustext::Text;
 use hums_recorder::status::CardStatus;
 
 use crate::ResetCause;

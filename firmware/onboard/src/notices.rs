@@ -10,7 +10,7 @@ use hums_core::protect::Step;
 use hums_link::messages;
 use hums_link::outlet::{Class, Outlet};
 use hums_link::packet::Packet;
-use hums_link::text::{Severity, Text};
+use hums_link::statustext::{Severity, Text};
 
 use crate::journal::Journal;
 use crate::queues::SectorsIn;

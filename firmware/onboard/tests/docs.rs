@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hums_link::text::TEXT_BYTES_MAX;
+use hums_link::statustext::TEXT_BYTES_MAX;
 
 fn texts(folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("readable").flatten() {

@@ -7,7 +7,7 @@ use anyhow::Result;
 use hums_core::health::{self, Level, Orders, check_named};
 use hums_core::observation::Feeds;
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
-use hums_link::text::Severity;
+use hums_link::statustext::Severity;
 use hums_link::{messages, summary};
 
 use super::context::Context;

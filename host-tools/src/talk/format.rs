@@ -112,7 +112,7 @@ fn check(result: u8) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use hums_link::messages::{command_ack, status_text};
-    use hums_link::text::Severity;
+    use hums_link::statustext::Severity;
 
     use super::*;
     use crate::talk::tests::fake::{self, found};

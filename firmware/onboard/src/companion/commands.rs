@@ -21,8 +21,8 @@ use hums_core::params::TABLE;
 use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::request::{Port, Replies, Reply};
+use hums_link::statustext::{Severity, Text};
 use hums_link::summary;
-use hums_link::text::{Severity, Text};
 use hums_recorder::CardState;
 
 use super::library::builtin::{self, BuiltinFile};

@@ -477,7 +477,7 @@ fn known(now: Instant, monitor: &Monitor) -> Option<Known> {
 mod tests {
     use hums_link::encode::Encoder;
     use hums_link::packet::Packet;
-    use hums_link::text::Severity;
+    use hums_link::statustext::Severity;
 
     use super::*;
     use crate::queues::{Ends, Queues};

@@ -72,7 +72,7 @@ const fn words(state: CardState) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use hums_link::text::TEXT_BYTES_MAX;
+    use hums_link::statustext::TEXT_BYTES_MAX;
 
     use super::*;
 

@@ -131,7 +131,7 @@ pub fn parameter(frame: &Frame<'_>, autopilot: Autopilot) -> Option<(String, f64
 mod tests {
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::messages;
-    use hums_link::text::Severity;
+    use hums_link::statustext::Severity;
 
     use super::*;
 
