@@ -1,7 +1,7 @@
 //! CI's checks as named steps.
 //!
-//! The build comes first; then what computes runs beside what waits. A table has each step's seconds. A step without its tool is
-//! left out, and the run fails at its end.
+//! The build comes first; then lints, what computes and what waits run side by side. A table has each step's seconds. A step without
+//! its tool is left out, and the run fails at its end.
 
 mod quick;
 mod steps;
@@ -65,13 +65,15 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         };
         let mut rows = run(Stage::Build);
         if rows.iter().all(|row| row.failed.is_none()) {
-            let (waiting, computing) = std::thread::scope(|scope| {
-                let waiting = scope.spawn(|| run(Stage::Wait));
-                let computing = run(Stage::Compute);
-                (waiting.join(), computing)
+            let results = std::thread::scope(|scope| {
+                let run = &run;
+                let threads = Stage::BESIDE.map(|stage| scope.spawn(move || run(stage)));
+                threads.map(std::thread::ScopedJoinHandle::join)
             });
-            let Ok(waiting) = waiting else { bail!("the tests that wait panicked") };
-            rows.extend(computing.into_iter().chain(waiting));
+            for result in results {
+                let Ok(others) = result else { bail!("a thread of the steps panicked") };
+                rows.extend(others);
+            }
         }
         println!("\n{:<16} {:>8}", "step", "seconds");
         for row in &rows {

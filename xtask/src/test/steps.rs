@@ -4,7 +4,7 @@ use std::fs;
 
 use anyhow::{Context as _, Result};
 
-use Stage::{Build, Compute, Wait};
+use Stage::{Build, Compute, Lint, Wait};
 
 use crate::browser;
 use crate::budgets;
@@ -54,15 +54,22 @@ impl Step {
     }
 }
 
-/// Two run side by side after the build.
+/// Cargo's lints often keep one core busy, and tests wait: three stages side by side fill two cores.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
     /// First.
     Build,
+    /// The compiler's.
+    Lint,
     /// Keeps the processor busy.
     Compute,
     /// Waits half of its time for links, browsers and databases.
     Wait,
+}
+
+impl Stage {
+    /// Those after the build.
+    pub(super) const BESIDE: [Self; 3] = [Self::Lint, Self::Compute, Self::Wait];
 }
 
 /// Each after its needs; `--list` and the table have this order.
@@ -75,14 +82,14 @@ pub(super) const STEPS: [Step; 19] = [
     Step::new(Build, "wasm", "the check in a browser compiles", &[BrowserTarget], browser::build),
     Step::new(Build, "budgets", "the size of the firmware, within budgets.toml", &[FirmwareTarget], size),
     Step::new(
-        Compute,
+        Lint,
         "clippy-firmware",
         "lints of the firmware, and the types of every board",
         &[Clippy, FirmwareTarget],
         lint,
     ),
-    Step::new(Compute, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
-    Step::new(Compute, "doc", "the documentation builds without a warning", &[], pc::document),
+    Step::new(Lint, "clippy", "lints of what runs on this PC", &[Clippy], pc::lint),
+    Step::new(Lint, "doc", "the documentation builds without a warning", &[], pc::document),
     Step::new(Compute, "chip", "the image that is flashed, on the model of its chip", CHIP, chip),
     Step::new(Compute, "unit", "tests of each crate on this PC", &[], pc::unit_tests),
     Step::new(
