@@ -12,7 +12,7 @@ use hums::logs;
 use hums::page::history::Cursor;
 use hums::report::replay::Replay;
 use hums::report::{page, trend};
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums::summary::Overview;
 use hums_blackbox::record::Note;
 use hums_blackbox::{FRAME_BYTES_MAX, Record, Sector, SectorSink, Writer};
@@ -89,7 +89,7 @@ pub fn check(data: &[u8]) {
 fn report(path: &Path) {
     let found = logs::find(&[path.to_owned()], false).expect("it is a log");
     let overview = Overview::of(&found.logs[0]).expect("a file that can be read");
-    let place = Place::log("log".to_owned(), found.logs[0].clone());
+    let place = LogPlace::log("log".to_owned(), found.logs[0].clone());
     let replay = Replay::of(&place, &overview).expect("a file that can be read");
     let html = page::html(&overview, &replay, &trend::of(&trend::Session::of(&overview), &[]), None, None);
     let (_, data) = html.split_once(BEGINS).expect("it has data");

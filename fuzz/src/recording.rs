@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hums::endpoint::Endpoint;
 use hums::source::item::{Rows, Want};
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums::source::{self, Timing};
 
 use crate::file::with_file;
@@ -39,7 +39,7 @@ fn stream(path: &Path, length: usize) {
 }
 
 fn items(path: &Path, length: usize) {
-    let Ok(recording) = Place::file(path).open() else { return };
+    let Ok(recording) = LogPlace::file(path).open() else { return };
     let mut count = 0;
     let want = Want { frames: true, observations: true, rows: Rows::All, ..Want::default() };
     let _ = recording.read(want, &mut |_, _| {

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use hums::source::item::{CellValue, Item, Row, Rows, Want};
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums_tests::{flights, oracle};
 use serde_json::Value as Json;
 
@@ -33,7 +33,7 @@ fn same(ours: &CellValue<'_>, theirs: &Json) -> bool {
 #[test]
 fn every_field_of_every_message_of_an_autopilots_own_log_is_read_as_pymavlink_reads_it() {
     let compressed = flights::root().join("tests/labelled/bin/f12_gps_jump.bin.gz");
-    let recording = Place::file(&compressed).open().unwrap();
+    let recording = LogPlace::file(&compressed).open().unwrap();
     // Pymavlink maps the file into memory: no compression.
     let mut plain = tempfile::Builder::new().suffix(".bin").tempfile().unwrap();
     let mut input = hums::source::input::Input::open(&compressed).unwrap();

@@ -6,7 +6,7 @@ use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 use hums::source::item::{Cause, CellValue, Item, Row, Rows, Want};
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums_tests::{flights, oracle};
 use serde_json::json;
 
@@ -54,7 +54,7 @@ fn write(log: &Path, folder: &Path) {
         }
         Ok(())
     };
-    Place::file(log).open().unwrap().read(want, take).unwrap();
+    LogPlace::file(log).open().unwrap().read(want, take).unwrap();
     let columns: BTreeMap<&String, &Vec<String>> =
         tables.iter().map(|(name, (columns, _))| (name, columns)).collect();
     fs::write(folder.join("tables.json"), json!(columns).to_string()).unwrap();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use hums_core::lifetime::{Item as _, ItemKey, Lifetime, Session};
 use hums_store::sim::SimFlash;
-use hums_store::{Found, Store, param};
+use hums_store::{Store, StoreCondition, param};
 
 /// Items that outlived power.
 #[derive(Debug, Default)]
@@ -21,7 +21,7 @@ impl Stored {
     pub fn read(path: &Path) -> Self {
         let flash = SimFlash::<16_384>::with(&fs::read(path).unwrap());
         let (mut store, found) = Store::mount(flash).unwrap_or_else(|why| panic!("{why:?}"));
-        assert_eq!(found, Found::Kept, "{}", path.display());
+        assert_eq!(found, StoreCondition::Kept, "{}", path.display());
         let (mut stored, mut session) = (Self::default(), None);
         let read = store.for_each(|key, value| {
             if key.is_param() {

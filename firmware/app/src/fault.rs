@@ -59,7 +59,7 @@ static NOTE: Note = Note {
 };
 
 /// The last messages of the autopilot: which, and when in milliseconds since the start.
-struct Seen {
+struct LastMessages {
     /// [`MARK`] in card-reader mode.
     card_reader: AtomicU32,
     now_ms: AtomicU32,
@@ -68,7 +68,7 @@ struct Seen {
 }
 
 #[unsafe(link_section = ".uninit.seen")]
-static LAST_SEEN: Seen = Seen {
+static LAST_SEEN: LastMessages = LastMessages {
     card_reader: AtomicU32::new(0),
     now_ms: AtomicU32::new(0),
     next: AtomicU32::new(0),
@@ -144,7 +144,7 @@ pub(crate) fn begin(card_reader: bool) {
 }
 
 pub(crate) fn seen(at: Instant, id: u32) {
-    let Seen { next, messages, .. } = &LAST_SEEN;
+    let LastMessages { next, messages, .. } = &LAST_SEEN;
     let index = next.load(Ordering::Relaxed) as usize % SEEN;
     next.store(index as u32 + 1, Ordering::Relaxed);
     let ms = at.as_millis() as u32;
@@ -160,7 +160,7 @@ pub(crate) fn tick(now: Instant) {
     LAST_SEEN.now_ms.store(now.as_millis() as u32, Ordering::Relaxed);
 }
 
-impl Seen {
+impl LastMessages {
     fn read(&self) -> String<LAST_BYTES> {
         let mut text = String::new();
         let at_ms = NOTE.at_ms.load(Ordering::Relaxed);

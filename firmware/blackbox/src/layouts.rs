@@ -45,7 +45,7 @@ pub(crate) enum Layouts {
 
 /// Small enough for each slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place(u16);
+pub(crate) struct LayoutIndex(u16);
 
 /// One message's layout.
 #[derive(Clone, Copy, Debug)]
@@ -63,15 +63,15 @@ impl Layouts {
         STORED.iter().find(|table| hash_of(table) == hash).map(|table| Self::Stored(table))
     }
 
-    pub(crate) fn find(self, id: u32) -> Option<Place> {
+    pub(crate) fn find(self, id: u32) -> Option<LayoutIndex> {
         let place = match self {
             Self::Current => hums_dialect::messages().binary_search_by_key(&id, |message| message.id).ok()?,
             Self::Stored(table) => find_stored(table, id)?,
         };
-        u16::try_from(place).ok().map(Place)
+        u16::try_from(place).ok().map(LayoutIndex)
     }
 
-    pub(crate) fn at(self, place: Place) -> Option<Layout> {
+    pub(crate) fn at(self, place: LayoutIndex) -> Option<Layout> {
         let place = usize::from(place.0);
         match self {
             Self::Current => hums_dialect::messages().get(place).map(Layout::Current),

@@ -115,12 +115,12 @@ impl Parity {
 #[derive(Clone, Debug)]
 pub struct Column {
     session: u32,
-    sums: [Option<Held>; 2],
+    sums: [Option<ParitySum>; 2],
 }
 
 /// An available sum.
 #[derive(Clone, Copy, Debug)]
-struct Held {
+struct ParitySum {
     last: u32,
     block: [u8; SECTOR_BYTES],
     /// Sum of the taken sectors; the latest one has the factor 1.
@@ -140,7 +140,8 @@ impl Column {
         let [p, q] = &mut self.sums;
         let held = if parity.sum == Sum::P { p } else { q };
         if held.as_ref().is_none_or(|held| held.last < parity.last) {
-            *held = Some(Held { last: parity.last, block: *block, taken: [0; SECTOR_BYTES], rows: None });
+            *held =
+                Some(ParitySum { last: parity.last, block: *block, taken: [0; SECTOR_BYTES], rows: None });
         }
     }
 
@@ -240,7 +241,7 @@ impl Column {
     }
 }
 
-impl Held {
+impl ParitySum {
     fn take(&mut self, sum: Sum, number: u32, bytes: &[u8; SECTOR_BYTES]) {
         let Some(left) = rows(self.last, number) else { return };
         let before = self.rows.map_or(0, |rows| rows.saturating_sub(left));

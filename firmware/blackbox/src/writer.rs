@@ -76,7 +76,7 @@ pub struct Writer {
     sector: Sector,
     header: Header,
     /// Entries that ended too close to the end of the sector before: the next one completes them.
-    ended: Ended,
+    ended: EndedSector,
     /// Over all entries of the session.
     chain: u32,
     /// Its value at the end of the previous group.
@@ -90,7 +90,7 @@ pub struct Writer {
 }
 
 #[derive(Clone, Copy, Default)]
-struct Ended {
+struct EndedSector {
     frames: u16,
     records: u8,
 }
@@ -122,7 +122,7 @@ impl Writer {
                 records: 0,
                 check: 0,
             },
-            ended: Ended { frames: 0, records: 0 },
+            ended: EndedSector { frames: 0, records: 0 },
             chain: 0,
             chain_before: 0,
             in_group: false,
@@ -351,7 +351,7 @@ impl Writer {
         self.end_stream(&mut header, &mut sector);
         self.header = header;
         self.sector = sector;
-        self.ended = Ended::default();
+        self.ended = EndedSector::default();
         self.chain_before = self.chain;
         self.next_sector(sink);
         self.header.closed = false;
@@ -385,7 +385,7 @@ impl Writer {
         self.header.records = self.ended.records;
         self.header.check = self.chain;
         self.changed = self.ended.frames != 0 || self.ended.records != 0;
-        self.ended = Ended::default();
+        self.ended = EndedSector::default();
     }
 }
 

@@ -132,7 +132,7 @@ struct Message {
 
 /// Pending request.
 #[derive(Clone, Copy, Debug)]
-struct Asked {
+struct PendingRequest {
     what: What,
     at: Instant,
     tries: u8,
@@ -154,7 +154,7 @@ pub struct Asking {
     vehicle: Option<(Source, Autopilot)>,
     reboots: u32,
     messages: [Message; WANTED.len()],
-    asked: Option<Asked>,
+    asked: Option<PendingRequest>,
     /// Time of the next check of the rates.
     look_at: Instant,
     window: Span,
@@ -319,7 +319,7 @@ impl Asking {
                 return;
             }
             if asked.tries < TRIES && send(&packet(asked.what, known)) {
-                self.asked = Some(Asked { at: now, tries: asked.tries + 1, ..asked });
+                self.asked = Some(PendingRequest { at: now, tries: asked.tries + 1, ..asked });
                 return;
             }
             if asked.tries < TRIES {
@@ -358,7 +358,7 @@ impl Asking {
             }
             // An unanswered parameter request is repeated once.
             let tries = if matches!(what, What::Parameter(_)) { TRIES - 1 } else { 1 };
-            self.asked = Some(Asked { what, at: now, tries });
+            self.asked = Some(PendingRequest { what, at: now, tries });
         }
     }
 

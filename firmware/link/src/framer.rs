@@ -26,7 +26,7 @@ use hums_dialect::crc;
 use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
 
 use crate::frame::{self, Frame, Header, NoHeader};
-use crate::seen::{Extra, Seen};
+use crate::seen::{Extra, VerifiedMessages};
 
 const BUFFER: usize = FRAME_BYTES_MAX + ROOM_MIN;
 /// Least length of [`Framer::room`]: 2 ms of a line at 921,600 baud.
@@ -67,7 +67,7 @@ pub struct Framer {
     /// Whether the first byte held follows a frame, a damaged frame or silence.
     after_frame: bool,
     credit: u32,
-    seen: Seen,
+    seen: VerifiedMessages,
     counts: FramerCounts,
 }
 
@@ -92,7 +92,7 @@ impl Framer {
             damage_left: 0,
             after_frame: true,
             credit: CREDIT_MAX,
-            seen: Seen::new(),
+            seen: VerifiedMessages::new(),
             counts: FramerCounts {
                 bytes: 0,
                 frames: 0,

@@ -18,7 +18,7 @@ const BYTES_MAX: usize = 2 * TEXT_BYTES_MAX;
 /// The autopilot, and a companion computer that talks at the same time.
 const SENDERS_MAX: usize = 2;
 
-struct Part<'a> {
+struct TextChunk<'a> {
     severity: u8,
     /// 0 for a text in one message.
     id: u16,
@@ -27,7 +27,7 @@ struct Part<'a> {
     words: &'a [u8],
 }
 
-impl<'a> Part<'a> {
+impl<'a> TextChunk<'a> {
     fn of(payload: &'a [u8]) -> Option<Self> {
         const TEXT: usize = 1;
         let fields = Fields(payload);
@@ -43,7 +43,7 @@ impl<'a> Part<'a> {
 
 /// The alert in a text of one message. `None` for a part of a longer text, which [`LongTexts`] takes.
 pub(crate) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
-    let part = Part::of(payload)?;
+    let part = TextChunk::of(payload)?;
     let is_whole = part.is_last() && part.sequence == 0 && !part.words.is_empty();
     if is_whole { alert::of_text(Some(part.severity), part.words) } else { None }
 }
@@ -78,7 +78,7 @@ impl LongTexts {
         if frame.id() != STATUSTEXT || frame.check() != Check::Verified {
             return;
         }
-        let Some(part) = Part::of(frame.payload()).filter(|part| part.id != 0) else { return };
+        let Some(part) = TextChunk::of(frame.payload()).filter(|part| part.id != 0) else { return };
         if part.is_last() && part.sequence == 0 {
             return; // `alert_of_text` has it.
         }

@@ -20,7 +20,7 @@ pub(crate) enum Extra {
 }
 
 #[derive(Debug)]
-pub(crate) struct Seen {
+pub(crate) struct VerifiedMessages {
     systems: [u8; SYSTEMS],
     systems_used: u8,
     /// One bit for each known message, by its index in the dialect's table.
@@ -31,7 +31,7 @@ pub(crate) struct Seen {
     confirmed: u64,
 }
 
-impl Seen {
+impl VerifiedMessages {
     pub(crate) const fn new() -> Self {
         Self {
             systems: [0; SYSTEMS],
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn systems_are_told_apart_until_places_run_out() {
-        let mut seen = Seen::new();
+        let mut seen = VerifiedMessages::new();
         for system in 1..=5 {
             assert!(!seen.was_verified(1, 7) || system > 1);
             seen.verified(system, usize::from(system));
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn an_extra_is_confirmed_by_its_second_sight() {
-        let mut seen = Seen::new();
+        let mut seen = VerifiedMessages::new();
         assert_eq!(seen.extra(1, 50_000), Extra::None);
         seen.learn(1, 50_000, 3);
         assert_eq!(seen.extra(1, 50_000), Extra::Once(3));
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn extras_of_several_ids_are_confirmed_each_by_itself_and_another_extra_begins_anew() {
-        let mut seen = Seen::new();
+        let mut seen = VerifiedMessages::new();
         seen.learn(1, 50_000, 3);
         seen.learn(1, 50_001, 5);
         seen.learn(1, 50_001, 5);
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_full_table_keeps_what_is_confirmed_and_takes_nothing_new() {
-        let mut seen = Seen::new();
+        let mut seen = VerifiedMessages::new();
         for id in 0..EXTRAS as u32 {
             seen.learn(1, 60_000 + id, 1);
             seen.learn(1, 60_000 + id, 1);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn chance_sights_give_way_when_the_table_is_full() {
-        let mut seen = Seen::new();
+        let mut seen = VerifiedMessages::new();
         for id in 0..EXTRAS as u32 {
             seen.learn(1, 60_000 + id, 1);
         }

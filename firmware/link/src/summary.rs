@@ -381,7 +381,7 @@ pub fn heartbeat(monitor: &Monitor) -> Packet {
 }
 
 #[derive(Clone, Copy)]
-enum Told {
+enum ValueSource {
     /// A part's level: 0 ok, 1 advisory, 2 warning, 3 critical, 4 stale.
     Level(Subsystem),
     /// A usage figure.
@@ -389,38 +389,40 @@ enum Told {
     Own(fn(&OwnFigures) -> f32),
 }
 
-/// The overall level, on the scale of [`Told::Level`]: every other value, before each of [`VALUES_TOLD`].
+/// The overall level, on the scale of [`ValueSource::Level`]: every other value, before each of [`VALUES_TOLD`].
 const OVERALL: &str = "HUMS_LEVEL";
 
 /// Values with a ground station's names.
-const VALUES_TOLD: [(&str, Told); 17] = [
-    ("L_POWER", Told::Level(Subsystem::Power)),
-    ("L_PROPULS", Told::Level(Subsystem::Propulsion)),
-    ("L_ENGINE", Told::Level(Subsystem::Engine)),
-    ("L_STRUCT", Told::Level(Subsystem::Structure)),
-    ("L_NAVIG", Told::Level(Subsystem::Navigation)),
-    ("L_LINK", Told::Level(Subsystem::Link)),
-    ("L_COMPUT", Told::Level(Subsystem::Computer)),
-    ("L_ATTITU", Told::Level(Subsystem::Attitude)),
-    ("L_RECORD", Told::Level(Subsystem::Recorder)),
-    ("L_MISHAP", Told::Level(Subsystem::Mishap)),
-    ("FLT_TIME_S", Told::Usage(UsageCounter::Flight)),
-    ("FLIGHTS", Told::Usage(UsageCounter::Flights)),
-    ("DIST_M", Told::Usage(UsageCounter::Distance)),
-    ("CPU_PCT", Told::Own(|own| own.cpu_percent)),
-    ("STACK_PCT", Told::Own(|own| own.stack_percent)),
-    ("QUEUE_PCT", Told::Own(|own| own.queue_percent)),
-    ("SD_STALL_S", Told::Own(|own| own.stall_s)),
+const VALUES_TOLD: [(&str, ValueSource); 17] = [
+    ("L_POWER", ValueSource::Level(Subsystem::Power)),
+    ("L_PROPULS", ValueSource::Level(Subsystem::Propulsion)),
+    ("L_ENGINE", ValueSource::Level(Subsystem::Engine)),
+    ("L_STRUCT", ValueSource::Level(Subsystem::Structure)),
+    ("L_NAVIG", ValueSource::Level(Subsystem::Navigation)),
+    ("L_LINK", ValueSource::Level(Subsystem::Link)),
+    ("L_COMPUT", ValueSource::Level(Subsystem::Computer)),
+    ("L_ATTITU", ValueSource::Level(Subsystem::Attitude)),
+    ("L_RECORD", ValueSource::Level(Subsystem::Recorder)),
+    ("L_MISHAP", ValueSource::Level(Subsystem::Mishap)),
+    ("FLT_TIME_S", ValueSource::Usage(UsageCounter::Flight)),
+    ("FLIGHTS", ValueSource::Usage(UsageCounter::Flights)),
+    ("DIST_M", ValueSource::Usage(UsageCounter::Distance)),
+    ("CPU_PCT", ValueSource::Own(|own| own.cpu_percent)),
+    ("STACK_PCT", ValueSource::Own(|own| own.stack_percent)),
+    ("QUEUE_PCT", ValueSource::Own(|own| own.queue_percent)),
+    ("SD_STALL_S", ValueSource::Own(|own| own.stall_s)),
 ];
 
 fn value(now: Instant, monitor: &Monitor, own: &OwnFigures, turn: usize) -> Packet {
     let (name, value) = match VALUES_TOLD.get(turn / 2).filter(|_| turn % 2 == 1) {
         None => (OVERALL, f32::from(monitor.health().overall() as u8)),
-        Some((name, Told::Level(subsystem))) => {
+        Some((name, ValueSource::Level(subsystem))) => {
             (*name, f32::from(monitor.health().subsystem(*subsystem) as u8))
         }
-        Some((name, Told::Usage(counter))) => (*name, monitor.usage().value(*counter).unwrap_or(0.0) as f32),
-        Some((name, Told::Own(figure))) => (*name, figure(own)),
+        Some((name, ValueSource::Usage(counter))) => {
+            (*name, monitor.usage().value(*counter).unwrap_or(0.0) as f32)
+        }
+        Some((name, ValueSource::Own(figure))) => (*name, figure(own)),
     };
     messages::named_float(now, name, value)
 }

@@ -42,14 +42,14 @@ impl Counters {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Recorded {
+pub(crate) struct RecordedState {
     vehicle: VehicleRecord,
     /// UTC of power-on, microseconds since 1970.
     epoch_micros: Option<u64>,
     usage_at: Instant,
 }
 
-impl Recorded {
+impl RecordedState {
     pub(crate) fn new() -> Self {
         Self { vehicle: VehicleRecord::default(), epoch_micros: None, usage_at: Instant::ZERO }
     }

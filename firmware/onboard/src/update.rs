@@ -34,7 +34,7 @@ pub struct UpdateStatus {
 
 /// An update file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum UpdateOffer {
     /// Its header is good.
     Offered,
     /// It is not for this board now.
@@ -47,21 +47,21 @@ impl UpdateStatus {
         Self { found: AtomicU32::new(NOTHING) }
     }
 
-    fn set(&self, found: Option<Found>) {
+    fn set(&self, found: Option<UpdateOffer>) {
         let kind = match found {
             None => NOTHING,
-            Some(Found::Offered) => OFFERED,
-            Some(Found::Refused(why)) => REFUSED + why as u32,
+            Some(UpdateOffer::Offered) => OFFERED,
+            Some(UpdateOffer::Refused(why)) => REFUSED + why as u32,
         };
         self.found.store(kind, Ordering::Relaxed);
     }
 
     /// The update file of the card.
-    pub fn read(&self) -> Option<Found> {
+    pub fn read(&self) -> Option<UpdateOffer> {
         match self.found.load(Ordering::Relaxed) {
             NOTHING => None,
-            OFFERED => Some(Found::Offered),
-            kind => Some(Found::Refused(*Refusal::ALL.get(kind.wrapping_sub(REFUSED) as usize)?)),
+            OFFERED => Some(UpdateOffer::Offered),
+            kind => Some(UpdateOffer::Refused(*Refusal::ALL.get(kind.wrapping_sub(REFUSED) as usize)?)),
         }
     }
 }
@@ -120,7 +120,7 @@ impl UpdateSearch {
         let mut block = [0; BLOCK_BYTES];
         status.set(match card.read(&mut segment, 0, &mut block) {
             Ok(()) => judge(&block, bytes, running),
-            Err(_) => Some(Found::Refused(Refusal::NoFile)),
+            Err(_) => Some(UpdateOffer::Refused(Refusal::NoFile)),
         });
     }
 
@@ -135,8 +135,8 @@ impl UpdateSearch {
 }
 
 /// `None` for the running image itself.
-fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<Found> {
-    let Some(header) = Header::read(block) else { return Some(Found::Refused(Refusal::Damaged)) };
+fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<UpdateOffer> {
+    let Some(header) = Header::read(block) else { return Some(UpdateOffer::Refused(Refusal::Damaged)) };
     let id = header.id();
     let own = running.header.as_ref();
     if own.is_some_and(|own| own.has_image_of(&header)) {
@@ -156,8 +156,8 @@ fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<Found> {
         header.check(running.board, floor, hums_update::keys::ALL).map(drop)
     };
     Some(match checked {
-        Ok(()) => Found::Offered,
-        Err(why) => Found::Refused(why),
+        Ok(()) => UpdateOffer::Offered,
+        Err(why) => UpdateOffer::Refused(why),
     })
 }
 
@@ -166,7 +166,7 @@ fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<Found> {
 pub struct UpdateWatch {
     message: Option<Message>,
     cause: ResetCause,
-    told: Option<Found>,
+    told: Option<UpdateOffer>,
     /// The resident program refused this card's update: it is not asked for again.
     was_refused: bool,
 }
@@ -179,7 +179,7 @@ impl UpdateWatch {
 
     /// Whether an image is refused, for the LED.
     pub const fn is_refused(&self) -> bool {
-        self.was_refused || matches!(self.told, Some(Found::Refused(_)))
+        self.was_refused || matches!(self.told, Some(UpdateOffer::Refused(_)))
     }
 
     /// The next text with its `MAV_SEVERITY`.
@@ -198,7 +198,7 @@ impl UpdateWatch {
         // Without a card nothing is found.
         self.was_refused &= found.is_some();
         self.told = found;
-        let Some(Found::Refused(why)) = found else { return None };
+        let Some(UpdateOffer::Refused(why)) = found else { return None };
         Some((4, text(why)))
     }
 
@@ -213,7 +213,7 @@ impl UpdateWatch {
     ) -> bool {
         let is_silent =
             self.cause == ResetCause::PowerOn && frames == 0 && now.since(Instant::ZERO) >= SILENT;
-        let is_offered = status.read() == Some(Found::Offered) && !self.was_refused;
+        let is_offered = status.read() == Some(UpdateOffer::Offered) && !self.was_refused;
         is_offered && !on_trial && !self.cause.may_be_in_flight() && (calm == Calm::Grounded || is_silent)
     }
 }
@@ -252,7 +252,7 @@ mod tests {
         let key = |header: Header| Header { key: *hums_update::keys::TEST.first_chunk().unwrap(), ..header };
         let judged = |header: &Header, bytes: u32| judge(&header.bytes(), bytes, &running);
         let good = key(header("matek", 6));
-        assert_eq!(judged(&good, 520), Some(Found::Offered));
+        assert_eq!(judged(&good, 520), Some(UpdateOffer::Offered));
         assert_eq!(judged(&header("matek", 5), 520), None);
         for (header, bytes, why) in [
             (good.clone(), 519, Refusal::Damaged),
@@ -260,9 +260,9 @@ mod tests {
             (key(header("matek", 0)), 520, Refusal::TooOld),
             (Header { key: *b"somebody", ..good.clone() }, 520, Refusal::ForeignKey),
         ] {
-            assert_eq!(judged(&header, bytes), Some(Found::Refused(why)));
+            assert_eq!(judged(&header, bytes), Some(UpdateOffer::Refused(why)));
         }
-        assert_eq!(judge(&[0; 512], 520, &running), Some(Found::Refused(Refusal::Damaged)));
+        assert_eq!(judge(&[0; 512], 520, &running), Some(UpdateOffer::Refused(Refusal::Damaged)));
     }
 
     #[test]
@@ -277,12 +277,12 @@ mod tests {
         sector[..16].copy_from_slice(&Record::Confirmed(Version(0)).bytes(newer.id()));
         let running = Running { state: State::read(&sector), ..running() };
         for (header, wanted) in [
-            (older, Found::Refused(Refusal::TooOld)),
-            (key(4, 1), Found::Offered),
-            (key(0, 1), Found::Refused(Refusal::TooOld)),
-            (newer, Found::Refused(Refusal::Replaced)),
-            (key(6, 1), Found::Offered),
-            (key(7, NO_WISH), Found::Offered),
+            (older, UpdateOffer::Refused(Refusal::TooOld)),
+            (key(4, 1), UpdateOffer::Offered),
+            (key(0, 1), UpdateOffer::Refused(Refusal::TooOld)),
+            (newer, UpdateOffer::Refused(Refusal::Replaced)),
+            (key(6, 1), UpdateOffer::Offered),
+            (key(7, NO_WISH), UpdateOffer::Offered),
         ] {
             assert_eq!(judge(&header.bytes(), 520, &running), Some(wanted), "{}", header.version.0);
         }
@@ -304,7 +304,7 @@ mod tests {
         };
         let power = ResetCause::PowerOn;
         assert!(!due(None, power, 100, Calm::Grounded, 9, false), "there is no file");
-        status.set(Some(Found::Offered));
+        status.set(Some(UpdateOffer::Offered));
         let refused = Some(Message::Refused(Refusal::BadSignature));
         for (message, cause, secs, calm, frames, trial, wanted) in [
             (None, power, 12, Calm::Grounded, 9, false, true),
@@ -336,7 +336,7 @@ mod tests {
         let mut watch = UpdateWatch::new(Some(Message::Installed), ResetCause::Update);
         assert_eq!(watch.news(&status), Some((5, "HUMS: update installed, on trial for a minute")));
         assert_eq!((watch.news(&status), watch.is_refused()), (None, false));
-        for found in [Found::Refused(Refusal::OtherBoard), Found::Refused(Refusal::TooOld)] {
+        for found in [UpdateOffer::Refused(Refusal::OtherBoard), UpdateOffer::Refused(Refusal::TooOld)] {
             status.set(Some(found));
             assert!(watch.news(&status).is_some());
             assert_eq!((watch.news(&status), watch.is_refused()), (None, true));
@@ -356,10 +356,10 @@ mod tests {
         };
         for (found, wanted) in [
             (None, (false, true)),
-            (Some(Found::Offered), (false, true)),
+            (Some(UpdateOffer::Offered), (false, true)),
             (None, (false, false)),
-            (Some(Found::Refused(Refusal::TooOld)), (false, true)),
-            (Some(Found::Offered), (true, false)),
+            (Some(UpdateOffer::Refused(Refusal::TooOld)), (false, true)),
+            (Some(UpdateOffer::Offered), (true, false)),
         ] {
             assert_eq!(due(found), wanted, "{found:?}");
         }

@@ -15,7 +15,7 @@ use crate::free::{FreeSearch, chain_free, free_chain, write_hint};
 use crate::layout::{Layout, LayoutError};
 use crate::name::LogName;
 use crate::recorder::Buffers;
-use crate::status::{CardStatus, Counted};
+use crate::status::{CardStatus, CardUsage};
 use crate::volume::Volume;
 use crate::{BLOCK_BYTES, Block, CardDevice};
 
@@ -32,12 +32,12 @@ const UNCHAINED_MAX: usize = 8;
 const UNSEARCHED: u32 = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct EntryAddress {
     block: u32,
     offset: u16,
 }
 
-impl Place {
+impl EntryAddress {
     pub(crate) const fn of(block: u32, index: u32) -> Self {
         Self { block, offset: (index % BLOCK_ENTRIES) as u16 * ENTRY_BYTES as u16 }
     }
@@ -55,7 +55,7 @@ pub struct LogEntry {
     /// When it was written, in seconds since 1970 UTC; 0: unknown.
     pub utc_secs: u32,
     pub(crate) first: u32,
-    pub(crate) place: Place,
+    pub(crate) place: EntryAddress,
 }
 
 /// A segment's place on the card, for reading it and writing it in place. Good until the card is unmounted or the
@@ -67,7 +67,7 @@ pub struct Segment {
     /// The file's length in bytes.
     pub bytes: u32,
     chain: ClusterChain,
-    place: Place,
+    place: EntryAddress,
 }
 
 impl Segment {
@@ -302,7 +302,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
 
     /// The place of a new entry; an error if a file has it, because the directory then differs from the notes.
     /// `None`: the directory needs another cluster.
-    fn place_for_new(&mut self) -> Result<Option<Place>, CardError<D::Error>> {
+    fn place_for_new(&mut self) -> Result<Option<EntryAddress>, CardError<D::Error>> {
         let place = self.directory.place_for_new(&self.volume)?;
         match place {
             Some(place) if !self.is_unused(place)? => Err(CardError::Damaged),
@@ -389,7 +389,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
         let (mut is_changed, mut is_end) = (false, false);
         for (index, bytes) in (0..).zip(block[0].as_chunks_mut::<ENTRY_BYTES>().0) {
             is_end |= bytes[0] == 0;
-            let slot = Slot { index, place: Place::of(at, index), bytes };
+            let slot = Slot { index, place: EntryAddress::of(at, index), bytes };
             let log = slot.log().filter(|log| !is_end && !log.hidden && log.bytes > 0);
             if let Some(log) = log.filter(|log| Some(log.name.session) != except) {
                 bytes[ATTRIBUTES] |= HIDDEN;
@@ -416,7 +416,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
     #[inline(never)]
     fn change_entry(
         &self,
-        place: Place,
+        place: EntryAddress,
         change: impl FnOnce(&mut Entry) -> bool,
     ) -> Result<(), CardError<D::Error>> {
         let mut block = [[0; BLOCK_BYTES]];
@@ -429,7 +429,7 @@ impl<'a, D: CardDevice> Card<'a, D> {
     }
 
     #[inline(never)]
-    fn is_unused(&self, place: Place) -> Result<bool, CardError<D::Error>> {
+    fn is_unused(&self, place: EntryAddress) -> Result<bool, CardError<D::Error>> {
         let mut block = [[0; BLOCK_BYTES]];
         self.volume.read(&mut block, place.block)?;
         Ok(block[0].get(usize::from(place.offset)..).is_some_and(is_unused))
@@ -495,12 +495,12 @@ impl<'a, D: CardDevice> Card<'a, D> {
 
     /// Counts the share of the card that logs can have, one block of the FAT per call. Returns the result at the last
     /// block.
-    pub(crate) fn count_room(&mut self) -> Result<Option<Counted>, CardError<D::Error>> {
+    pub(crate) fn count_room(&mut self) -> Result<Option<CardUsage>, CardError<D::Error>> {
         let Some(free) = self.free.count(&self.volume)? else { return Ok(None) };
         let Layout { clusters, cluster_blocks, .. } = self.volume.layout;
         let for_logs = u64::from(free) + u64::from(self.directory.clusters);
         let mib = |clusters: u32| (u64::from(clusters) * u64::from(cluster_blocks) / BLOCKS_PER_MIB) as u32;
-        Ok(Some(Counted {
+        Ok(Some(CardUsage {
             permille: (for_logs * 1000 / u64::from(clusters)).min(1000) as u32,
             used_mib: mib(clusters.saturating_sub(free)),
             total_mib: mib(clusters),
@@ -512,7 +512,7 @@ fn file_of((first, bytes): (u32, u32)) -> (Segment, u32) {
     // Its last block is read whole.
     let blocks = bytes.checked_next_multiple_of(BLOCK_BYTES as u32).unwrap_or(u32::MAX);
     let (name, chain) = (LogName { session: 0, segment: 0 }, ClusterChain::new(first));
-    (Segment { name, bytes: blocks, chain, place: Place::of(0, 0) }, bytes)
+    (Segment { name, bytes: blocks, chain, place: EntryAddress::of(0, 0) }, bytes)
 }
 
 fn is_unused(entry: &[u8]) -> bool {

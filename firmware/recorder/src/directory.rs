@@ -17,7 +17,7 @@ use core::ops::{ControlFlow, Range};
 
 use heapless::Vec;
 
-use crate::card::{CardError, LogEntry, Place, SEGMENT_BYTES_MAX};
+use crate::card::{CardError, EntryAddress, LogEntry, SEGMENT_BYTES_MAX};
 use crate::chain::ClusterChain;
 use crate::name::LogName;
 use crate::status::utc_secs;
@@ -309,10 +309,10 @@ impl Directory {
     pub(crate) fn place_for_new<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,
-    ) -> Result<Option<Place>, CardError<D::Error>> {
+    ) -> Result<Option<EntryAddress>, CardError<D::Error>> {
         let index = self.deleted.last().copied().unwrap_or(self.end);
         let located = self.root.locate(volume, index / BLOCK_ENTRIES, 1)?;
-        Ok(located.map(|(block, _)| Place::of(block, index)))
+        Ok(located.map(|(block, _)| EntryAddress::of(block, index)))
     }
 
     /// Skips the place of a new entry until the next walk. Returns `false` if there is no other.
@@ -335,7 +335,7 @@ type Step<E> = Result<ControlFlow<()>, CardError<E>>;
 
 pub(crate) struct Slot<'b> {
     pub(crate) index: u32,
-    pub(crate) place: Place,
+    pub(crate) place: EntryAddress,
     pub(crate) bytes: &'b Entry,
 }
 
@@ -395,7 +395,7 @@ pub(crate) fn walk<D: CardDevice>(
             if bytes[0] == NEVER_USED {
                 return Ok(index);
             }
-            let slot = Slot { index, place: Place::of(block + at / BLOCK_ENTRIES, index), bytes };
+            let slot = Slot { index, place: EntryAddress::of(block + at / BLOCK_ENTRIES, index), bytes };
             index += 1;
             if each(&slot)?.is_break() {
                 return Ok(index);

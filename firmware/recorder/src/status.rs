@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-use hums_blackbox::record::{Before, Found};
+use hums_blackbox::record::{Before, PreviousEnd};
 use hums_core::clock::{Instant, Span};
 
 const IDLE: u32 = u32::MAX;
@@ -102,7 +102,7 @@ pub struct CardStatus {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Counted {
+pub(crate) struct CardUsage {
     pub(crate) permille: u32,
     /// Used space, logs included, in MiB.
     pub(crate) used_mib: u32,
@@ -172,7 +172,7 @@ impl CardStatus {
             format_wanted: AtomicBool::new(false),
             fat_time: AtomicU32::new(0),
             before_news: AtomicBool::new(false),
-            before_found: AtomicU8::new(Found::Unknown as u8),
+            before_found: AtomicU8::new(PreviousEnd::Unknown as u8),
             before_number: AtomicU32::new(0),
             before_session: AtomicU32::new(0),
             before_sectors: AtomicU32::new(0),
@@ -235,8 +235,8 @@ impl CardStatus {
     }
 
     /// `None`: not counted.
-    pub(crate) fn set_room(&self, room: Option<Counted>) {
-        let room = room.unwrap_or(Counted { permille: UNCOUNTED, used_mib: 0, total_mib: 0 });
+    pub(crate) fn set_room(&self, room: Option<CardUsage>) {
+        let room = room.unwrap_or(CardUsage { permille: UNCOUNTED, used_mib: 0, total_mib: 0 });
         self.used_mib.store(room.used_mib, Ordering::Relaxed);
         self.total_mib.store(room.total_mib, Ordering::Relaxed);
         self.room.store(room.permille, Ordering::Relaxed);
@@ -309,7 +309,7 @@ impl CardStatus {
     /// looks for one once a second.
     pub fn take_before(&self) -> Option<Before> {
         self.before_news.swap(false, Ordering::Acquire).then(|| Before {
-            found: Found::from_number(self.before_found.load(Ordering::Relaxed)),
+            found: PreviousEnd::from_number(self.before_found.load(Ordering::Relaxed)),
             number: self.before_number.load(Ordering::Relaxed),
             session: self.before_session.load(Ordering::Relaxed),
             sectors: self.before_sectors.load(Ordering::Relaxed),

@@ -9,7 +9,7 @@ use common::{MIB_BLOCKS, MemCard, held};
 use hums_blackbox::parity::{
     COLUMNS, Column, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block,
 };
-use hums_blackbox::record::{Before, Found};
+use hums_blackbox::record::{Before, PreviousEnd};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::card::Card;
@@ -415,18 +415,18 @@ fn the_next_start_finds_where_the_session_before_ended() {
         for sector in written {
             assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
         }
-        assert_eq!(status.take_before().map(|before| before.found), Some(Found::Nothing));
+        assert_eq!(status.take_before().map(|before| before.found), Some(PreviousEnd::Nothing));
         assert_eq!(status.take_before(), None, "told once");
         let frames = written.iter().map(|sector| u32::from(sector.frames())).sum();
         let before = found_at_next_start(&device);
         if written.is_empty() {
-            assert_eq!((before.found, before.number), (Found::Unreadable, 1));
+            assert_eq!((before.found, before.number), (PreviousEnd::Unreadable, 1));
             continue;
         }
         let session = stored(&device)[0].2.session;
         let check = check_of(written.last().expect("it is not empty"));
         let sectors = written.len() as u32;
-        let expected = Before { found: Found::Frames, number: 1, session, sectors, frames, check };
+        let expected = Before { found: PreviousEnd::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
         assert_eq!(
             Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
@@ -518,7 +518,7 @@ fn the_end_is_found_wherever_power_goes_around_the_beginning_of_a_file() {
             let ends = (found.found, found.session, found.sectors, found.frames, found.check);
             assert_eq!(
                 ends,
-                (Found::Frames, session, number + 1, frames, newest.check),
+                (PreviousEnd::Frames, session, number + 1, frames, newest.check),
                 "{older_sessions}, sector {number}"
             );
             let Some(before) = before.filter(|_| own.is_some()) else { continue };

@@ -7,7 +7,7 @@
 //! counts. The older one is marked as superseded. This mark reveals damage of the newer header, and the newer items still count.
 //!
 //! A damaged item is skipped: the previous value of its key counts, if there is one. Each start reports damage
-//! ([`Found::Damaged`]) and copies the live items to the other sector.
+//! ([`StoreCondition::Damaged`]) and copies the live items to the other sector.
 //!
 //! An erase stops a processor that runs from the same flash, for up to 0.5 s. It needs permission by [`Store::allow_erase`].
 //! Without it, a save that needs an erase returns [`Error::NotNow`] and changes nothing. [`Store::turn_ahead`] erases early, at a
@@ -29,4 +29,4 @@ mod store;
 mod tests;
 
 pub use key::{Key, NAME_BYTES_MAX, PARAM_BYTES_MAX, param, param_value};
-pub use store::{Error, Found, Saved, Store, VALUE_BYTES_MAX};
+pub use store::{Error, Saved, Store, StoreCondition, VALUE_BYTES_MAX};

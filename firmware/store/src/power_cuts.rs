@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::sim::SimFlash;
-use crate::{Error, Found, Key, Store};
+use crate::{Error, Key, Store, StoreCondition};
 
 struct Random(u64);
 
@@ -44,7 +44,7 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
         flash.cut_after(1 + random.below(steps_max), cut);
         let mut writing = None;
         if let Ok((mut store, found)) = Store::mount(&mut flash) {
-            assert!(cut == 0 || found == Found::Kept, "{found:?} before cut {cut}");
+            assert!(cut == 0 || found == StoreCondition::Kept, "{found:?} before cut {cut}");
             loop {
                 if random.below(20) == 0 {
                     store.allow_erase(random.below(2) == 0);
@@ -70,7 +70,7 @@ fn cut_and_look<const SECTOR: usize>(cuts: u64, seed: u64, length_max: u64, step
         erases += flash.erases() - before;
         flash.revive();
         let (mut store, found) = Store::mount(&mut flash).expect("power stays");
-        assert!(found == Found::Kept || expected.is_empty(), "{found:?} after cut {cut}");
+        assert!(found == StoreCondition::Kept || expected.is_empty(), "{found:?} after cut {cut}");
         let now = items(&mut store);
         if let Some((key, value)) = writing
             && now.get(&key) == Some(&value)

@@ -40,7 +40,7 @@ pub enum Saved {
 
 /// State of the flash at a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum StoreCondition {
     /// An intact store.
     Kept,
     /// A store with damaged items. Of these the previous value counts, or none.
@@ -64,7 +64,7 @@ pub struct Store<F: NorFlash> {
 impl<F: NorFlash> Store<F> {
     /// Opens the store and completes an interrupted change of sectors; erases are allowed here. Later erases need
     /// [`Self::allow_erase`].
-    pub fn mount(flash: F) -> Outcome<(Self, Found), F> {
+    pub fn mount(flash: F) -> Outcome<(Self, StoreCondition), F> {
         let mut store = Self { flash, in_use: 0, generation: 0, end: 0, may_erase: true };
         let found = store.choose()?;
         let count = store.mounts()?.saturating_add(1);
@@ -74,10 +74,10 @@ impl<F: NorFlash> Store<F> {
             Err(error) => return Err(error),
         }
         match found {
-            Found::Kept => {}
+            StoreCondition::Kept => {}
             // Damaged items are not copied, so they are reported once. If this fails, the next start tries again.
-            Found::Damaged => drop(store.turn()),
-            Found::Blank | Found::Unreadable => store.current().complete()?,
+            StoreCondition::Damaged => drop(store.turn()),
+            StoreCondition::Blank | StoreCondition::Unreadable => store.current().complete()?,
         }
         store.may_erase = false;
         Ok((store, found))
@@ -85,7 +85,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Selects the newer complete sector. If it is marked as superseded by the other one, the other header is damaged; the items
     /// of the other sector count.
-    fn choose(&mut self) -> Outcome<Found, F> {
+    fn choose(&mut self) -> Outcome<StoreCondition, F> {
         let headers = [self.sector(0).header()?, self.sector(1).header()?];
         let contents = [self.sector(0).content()?, self.sector(1).content()?];
         let generation = |index: usize| headers[index].generation.filter(|_| headers[index].is_complete);
@@ -102,14 +102,14 @@ impl<F: NorFlash> Store<F> {
         (self.in_use, self.end) = (chosen, end);
         self.generation = headers.iter().filter_map(|header| header.generation).max().unwrap_or(0);
         if items > 0 {
-            return Ok(if is_whole && !is_damaged { Found::Kept } else { Found::Damaged });
+            return Ok(if is_whole && !is_damaged { StoreCondition::Kept } else { StoreCondition::Damaged });
         }
         let is_empty = contents.iter().all(|content| content.end == HEADER_BYTES);
         // A complete sector has at least one item. Without any, all items are lost.
         let found = match headers.iter().any(|header| header.is_complete) {
-            _ if !is_empty => Found::Unreadable,
-            true => Found::Damaged,
-            false => Found::Blank,
+            _ if !is_empty => StoreCondition::Unreadable,
+            true => StoreCondition::Damaged,
+            false => StoreCondition::Blank,
         };
         for index in [1, 0] {
             self.sector(index).begin(1)?;

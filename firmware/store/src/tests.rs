@@ -3,11 +3,11 @@
 use embedded_storage::nor_flash::{NorFlash as _, NorFlashErrorKind};
 
 use crate::sim::SimFlash;
-use crate::{Error, Found, Key, Saved, Store, VALUE_BYTES_MAX, param, param_value};
+use crate::{Error, Key, Saved, Store, StoreCondition, VALUE_BYTES_MAX, param, param_value};
 
 type Flash = SimFlash<16384>;
 
-fn mounted(flash: &mut Flash) -> (Store<&mut Flash>, Found) {
+fn mounted(flash: &mut Flash) -> (Store<&mut Flash>, StoreCondition) {
     Store::mount(flash).expect("this flash works")
 }
 
@@ -22,7 +22,7 @@ fn what_is_saved_is_there_at_the_next_start_and_starts_are_counted() {
     let mut buffer = [0; VALUE_BYTES_MAX];
     {
         let (mut store, found) = mounted(&mut flash);
-        assert_eq!((found, store.mounts()), (Found::Blank, Ok(1)));
+        assert_eq!((found, store.mounts()), (StoreCondition::Blank, Ok(1)));
         assert_eq!(value(&mut store, Key::item(1), &mut buffer), None);
         assert_eq!(store.save(Key::item(1), &[1, 2, 3]), Ok(Saved::Written));
         assert_eq!(store.save(Key::item(1), &[1, 2]), Ok(Saved::Written));
@@ -30,7 +30,7 @@ fn what_is_saved_is_there_at_the_next_start_and_starts_are_counted() {
         assert_eq!(store.save(Key::item(2), &[0; VALUE_BYTES_MAX + 1]), Err(Error::TooLong));
     }
     let (mut store, found) = mounted(&mut flash);
-    assert_eq!((found, store.mounts()), (Found::Kept, Ok(2)));
+    assert_eq!((found, store.mounts()), (StoreCondition::Kept, Ok(2)));
     assert_eq!(value(&mut store, Key::item(1), &mut buffer), Some(&[1, 2][..]));
     assert_eq!(value(&mut store, Key::item(2), &mut buffer), Some(&[0xFF; VALUE_BYTES_MAX][..]));
     assert_eq!(value(&mut store, Key::item(2), &mut [0; 9]), None, "no room for it");
@@ -119,7 +119,7 @@ fn it_turns_at_any_fill() {
     let mut flash = Flash::blank();
     for fill in 0..700_usize {
         let (mut store, found) = mounted(&mut flash);
-        assert_ne!(found, Found::Unreadable);
+        assert_ne!(found, StoreCondition::Unreadable);
         store.save(Key::item(1), &[fill as u8; 77]).expect("room");
         store.save(Key::item(2), &vec![fill as u8; fill % 400]).expect("room");
         store.turn_ahead(16_000 - 2 * fill).expect("it turns");
@@ -146,7 +146,7 @@ fn more_than_fits_is_refused_and_what_is_there_stays() {
         assert_eq!(value(&mut store, Key::item(number), &mut buffer), Some(&[number; 512][..]), "{number}");
     }
     let (mut store, found) = mounted(&mut flash);
-    assert_eq!(found, Found::Kept);
+    assert_eq!(found, StoreCondition::Kept);
     assert_eq!(value(&mut store, Key::item(29), &mut buffer), Some(&[29; 512][..]));
 }
 
@@ -178,13 +178,13 @@ fn whatever_is_in_the_flash_it_is_told_made_anew_and_works() {
         let mut flash = Flash::with(&bytes);
         let (mut store, found) = mounted(&mut flash);
         if run % 4 != 3 {
-            assert_eq!(found, Found::Unreadable, "{run}");
+            assert_eq!(found, StoreCondition::Unreadable, "{run}");
         }
         store.for_each(|key, value| panic!("{run}: {key:?} {value:?} out of noise")).expect("readable");
         store.allow_erase(true);
         store.save(Key::item(1), b"works").expect("room");
         let (mut store, found) = mounted(&mut flash);
-        assert_eq!((found, store.mounts()), (Found::Kept, Ok(2)), "{run}");
+        assert_eq!((found, store.mounts()), (StoreCondition::Kept, Ok(2)), "{run}");
         assert_eq!(value(&mut store, Key::item(1), &mut [0; 5]), Some(&b"works"[..]), "{run}");
     }
 }
@@ -197,8 +197,8 @@ fn one_sector_that_is_overwritten_is_told() {
     let mut bytes = flash.bytes().to_vec();
     bytes[..16_384].fill(0x12);
     let mut flash = Flash::with(&bytes);
-    assert_eq!(mounted(&mut flash).1, Found::Unreadable);
-    assert_eq!(mounted(&mut flash).1, Found::Kept);
+    assert_eq!(mounted(&mut flash).1, StoreCondition::Unreadable);
+    assert_eq!(mounted(&mut flash).1, StoreCondition::Kept);
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn an_item_that_is_damaged_is_told_once_and_the_value_before_it_counts() {
         damaged[value.strict_add_signed(place)..][..bytes.len()].copy_from_slice(bytes);
         let mut flash = Flash::with(&damaged);
         let (mut store, found) = mounted(&mut flash);
-        assert_eq!(found, Found::Damaged, "{bytes:x?} at {place}");
+        assert_eq!(found, StoreCondition::Damaged, "{bytes:x?} at {place}");
         let mut of = |item| {
             let mut buffer = [0; VALUE_BYTES_MAX];
             value_of(&mut store, item, &mut buffer).map(<[u8]>::to_vec)
@@ -252,7 +252,7 @@ fn an_item_that_is_damaged_is_told_once_and_the_value_before_it_counts() {
         assert_eq!((of(1), of(2)), (Some(first.into()), second), "{bytes:x?} at {place}");
         assert_eq!(of(3), Some(b"another value".to_vec()));
         let (mut store, found) = mounted(&mut flash);
-        assert_eq!((found, store.mounts()), (Found::Kept, Ok(3)), "{bytes:x?} at {place}");
+        assert_eq!((found, store.mounts()), (StoreCondition::Kept, Ok(3)), "{bytes:x?} at {place}");
     }
 }
 
@@ -266,12 +266,12 @@ fn damage_of_a_sectors_marks_loses_nothing() {
     let (mut store, _) = mounted(&mut flash);
     store.save(Key::item(1), b"stays").expect("room");
     let whole = flash.bytes().to_vec();
-    for (sector, found_first) in [(0, Found::Damaged), (16_384, Found::Kept)] {
+    for (sector, found_first) in [(0, StoreCondition::Damaged), (16_384, StoreCondition::Kept)] {
         for at in 0..8 {
             let mut damaged = whole.clone();
             damaged[sector + at] ^= 0x40;
             let mut flash = Flash::with(&damaged);
-            for found_now in [found_first, Found::Kept] {
+            for found_now in [found_first, StoreCondition::Kept] {
                 let (mut store, found) = mounted(&mut flash);
                 assert_eq!(found, found_now, "byte {at} of the sector at {sector}");
                 assert_eq!(value_of(&mut store, 1, &mut [0; 5]), Some(&b"stays"[..]));
@@ -334,10 +334,17 @@ fn whatever_is_damaged_no_value_goes_back_without_a_word() {
                 assert!(now.as_ref().is_none_or(|now| had.contains(now)), "{fill:x} at {at}: {now:x?}");
                 newest &= now.as_ref() == had.last();
             }
-            assert!(newest || found != Found::Kept, "{fill:x} at {at}: {found:?}");
-            assert!(fill == 0xFF || found != Found::Unreadable, "{fill:x} at {at}: other items are whole");
-            told += u32::from(found == Found::Damaged);
-            assert_eq!(Store::mount(&mut flash).map(|(_, found)| found), Ok(Found::Kept), "{fill:x} at {at}");
+            assert!(newest || found != StoreCondition::Kept, "{fill:x} at {at}: {found:?}");
+            assert!(
+                fill == 0xFF || found != StoreCondition::Unreadable,
+                "{fill:x} at {at}: other items are whole"
+            );
+            told += u32::from(found == StoreCondition::Damaged);
+            assert_eq!(
+                Store::mount(&mut flash).map(|(_, found)| found),
+                Ok(StoreCondition::Kept),
+                "{fill:x} at {at}"
+            );
         }
     }
     assert!(told > 100, "{told}");

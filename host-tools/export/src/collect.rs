@@ -6,10 +6,10 @@ use hums_link as link;
 
 use super::checked::OnBoard;
 use super::context::Context;
-use super::format::{Entry, Part};
+use super::format::{Entry, GroupEncoder};
 use super::record::{gap_row, rows};
 use super::row::Row;
-use super::story::{Observed, Said, Story};
+use super::story::{Observed, Story, StoryEntry};
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::item::Item;
@@ -20,7 +20,7 @@ use crate::source::told::Finding;
 pub struct Collected<'a> {
     context: &'a Context,
     /// By format.
-    pub parts: Vec<Box<dyn Part>>,
+    pub parts: Vec<Box<dyn GroupEncoder>>,
     /// For outputs that are made in order.
     pub story: Story,
     /// Frames written.
@@ -106,7 +106,7 @@ impl ItemCollector for Collected<'_> {
                 self.rows(at, &rows(record));
             }
             // Without need they would only make the parts smaller.
-            item if self.context.formats.has_words() => self.story.said.extend(Said::of(at, &item)),
+            item if self.context.formats.has_words() => self.story.said.extend(StoryEntry::of(at, &item)),
             _ => {}
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::checked::Checked;
 use super::findings::Findings;
 use super::fleet::Fleet;
-use super::format::{self, Files, Format, Part, Way};
+use super::format::{self, Files, Format, GroupEncoder, Way};
 use super::formats::influx::Tags;
 use super::identity::{Identity, RecordingContent};
 use super::native::Tables;
@@ -39,7 +39,7 @@ impl Formats {
     }
 
     /// An empty part of each.
-    pub fn parts(&self) -> Vec<Box<dyn Part>> {
+    pub fn parts(&self) -> Vec<Box<dyn GroupEncoder>> {
         let ways = self.formats.iter().map(|format| &format.way);
         ways.filter_map(|way| if let Way::Parts { part, .. } = way { Some(part()) } else { None }).collect()
     }

@@ -13,7 +13,7 @@ use hums_link::{messages, summary};
 use super::context::Context;
 use crate::check;
 use crate::check::judge::{Heard, Limits};
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::source::told::Finding;
 
 /// Bytes of time before each frame of a tlog.
@@ -28,7 +28,7 @@ pub struct Findings {
 
 impl Findings {
     /// As `hums check` has them.
-    pub fn of(place: &Place) -> Result<Self> {
+    pub fn of(place: &LogPlace) -> Result<Self> {
         let judged = check::recording(place, &Limits::default(), Heard::Somewhere)?.judged;
         let system = judged.vehicle().source.map_or(1, |source| source.system);
         Ok(Self { system, list: judged.findings })

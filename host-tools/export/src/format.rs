@@ -94,21 +94,21 @@ pub struct Entry<'a> {
 }
 
 /// The entries of a group, encoded. Several threads make several parts at once.
-pub trait Part: Any + Send {
+pub trait GroupEncoder: Any + Send {
     /// Adds a frame.
     fn frame(&mut self, _context: &Context, _entry: &Entry<'_>) {}
 
     /// Adds a row: of the monitor's own, or of an autopilot's log.
     fn row(&mut self, _context: &Context, _at: Instant, _row: &Row) {}
 
-    /// Adds a finding, of which [`Part::row`] gets a row too.
+    /// Adds a finding, of which [`GroupEncoder::row`] gets a row too.
     fn finding(&mut self, _context: &Context, _finding: &Finding) {}
 
     /// Bytes of memory that it holds, roughly.
     fn held_bytes(&self) -> usize;
 }
 
-impl Part for () {
+impl GroupEncoder for () {
     fn held_bytes(&self) -> usize {
         0
     }
@@ -154,13 +154,13 @@ pub trait Writer: Sized + 'static {
     /// Its description.
     const ABOUT: FormatDetails;
     /// Its encoder.
-    type Part: Part + Default;
+    type Encoder: GroupEncoder + Default;
 
     /// Opens the file or folder; `-` is standard output.
     fn open(context: &Context, path: &Path) -> Result<Self>;
 
     /// Takes the next part, and the ordered content if the format asks for it.
-    fn part(&mut self, context: &Context, part: Self::Part, story: &Story) -> Result<()>;
+    fn part(&mut self, context: &Context, part: Self::Encoder, story: &Story) -> Result<()>;
 
     /// Data are missing here. Formats with a place for records get a row of the gap too.
     fn gap(&mut self, _context: &Context, _gap: &Gap) -> Result<()> {
@@ -179,7 +179,7 @@ pub trait Writer: Sized + 'static {
 /// A [`Writer`] of any format.
 pub trait AnyWriter {
     /// As [`Writer::part`].
-    fn part(&mut self, context: &Context, part: Box<dyn Part>, story: &Story) -> Result<()>;
+    fn part(&mut self, context: &Context, part: Box<dyn GroupEncoder>, story: &Story) -> Result<()>;
     /// As [`Writer::gap`].
     fn gap(&mut self, context: &Context, gap: &Gap) -> Result<()>;
     /// As [`Writer::is_empty`].
@@ -189,9 +189,9 @@ pub trait AnyWriter {
 }
 
 impl<W: Writer> AnyWriter for W {
-    fn part(&mut self, context: &Context, part: Box<dyn Part>, story: &Story) -> Result<()> {
+    fn part(&mut self, context: &Context, part: Box<dyn GroupEncoder>, story: &Story) -> Result<()> {
         let part: Box<dyn Any> = part;
-        match part.downcast::<W::Part>() {
+        match part.downcast::<W::Encoder>() {
             Ok(part) => Writer::part(self, context, *part, story),
             Err(_) => bail!("{}: a part of another format", W::ABOUT.name),
         }
@@ -223,7 +223,7 @@ pub enum Way {
     /// In parts, side by side with other formats.
     Parts {
         /// Makes an empty part.
-        part: fn() -> Box<dyn Part>,
+        part: fn() -> Box<dyn GroupEncoder>,
         /// As [`Writer::open`].
         open: fn(&Context, &Path) -> Result<Box<dyn AnyWriter>>,
     },
@@ -234,7 +234,7 @@ pub enum Way {
 impl Format {
     /// Of this writer.
     pub const fn of<W: Writer>() -> Self {
-        let part = || -> Box<dyn Part> { Box::new(W::Part::default()) };
+        let part = || -> Box<dyn GroupEncoder> { Box::new(W::Encoder::default()) };
         let open = |context: &Context, path: &Path| -> Result<Box<dyn AnyWriter>> {
             Ok(Box::new(W::open(context, path)?))
         };

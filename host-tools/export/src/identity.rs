@@ -19,7 +19,7 @@ use crate::names::{autopilot_name, type_name};
 use crate::naming::Traits;
 use crate::source::epochs::Epochs;
 use crate::source::item::Item;
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::story::Observed;
 use crate::summary::Overview;
 use crate::utc::iso8601;
@@ -72,7 +72,7 @@ pub struct Known {
 
 /// Vehicle, date, UTC and content of a recording, read once. With `judges`, also the findings by the monitor
 /// here. `session` comes from the files' names, so it does not depend on this version's messages.
-pub fn identity(place: &Place, traits: &Traits, judges: bool, given: Option<&str>) -> Result<Known> {
+pub fn identity(place: &LogPlace, traits: &Traits, judges: bool, given: Option<&str>) -> Result<Known> {
     let (mut sources, mut epochs) = (Sources::default(), Epochs::default());
     let (mut motion, mut track, mut speeds) = (Motion::default(), Track::default(), Track::default());
     let (overview, judged) = overview_telling(place, &mut |at, item| {
@@ -148,7 +148,7 @@ impl Sources {
         }
     }
 
-    fn vehicle(&self, place: &Place, given: Option<&str>) -> String {
+    fn vehicle(&self, place: &LogPlace, given: Option<&str>) -> String {
         let recorded = self.recorded.map(|of| (of.system, of.vehicle_type, of.autopilot));
         let uid = self.recorded.map(|vehicle| vehicle.uid).filter(|uid| *uid != 0).or(self.uid);
         match (uid, given, self.board, recorded.or(self.heard)) {

@@ -9,7 +9,7 @@ use hums_core::units::Position;
 
 use crate::checked::finding_words;
 use crate::context::Context;
-use crate::format::Part;
+use crate::format::GroupEncoder;
 use crate::motion::{Fix, Motion};
 use crate::plural::count;
 use crate::source::told::Finding;
@@ -26,7 +26,7 @@ const SILENCE: Span = Span::from_secs(5);
 #[derive(Default)]
 pub(crate) struct Findings(pub(crate) Vec<Finding>);
 
-impl Part for Findings {
+impl GroupEncoder for Findings {
     fn finding(&mut self, _: &Context, finding: &Finding) {
         self.0.push(finding.clone());
     }

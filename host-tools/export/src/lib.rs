@@ -85,8 +85,8 @@ use source::epochs::Epochs;
 use source::find::{FoundRecordings, find, sessions_of};
 use source::item::{Gap, Item, RecordingSummary, Rows, Want};
 use source::parts::{ItemCollector, PartReceiver};
-use source::recording::{Format, Place};
-use story::Said;
+use source::recording::{Format, LogPlace};
+use story::StoryEntry;
 use summary::damaged_places;
 use utc::When;
 use works::{NamedLog, check_forms, works};
@@ -318,14 +318,14 @@ struct Done {
 }
 
 impl Done {
-    fn of(log: &Place) -> Self {
+    fn of(log: &LogPlace) -> Self {
         let (made, remarks) = (Vec::new(), Vec::new());
         let (name, lacks, outcome) = (log.name.clone(), Soundness::Whole, Outcome::Done);
         Self { name, outcome, ending: None, lacks, skipped: false, written: false, made, remarks }
     }
 
     /// Of a log that was read, with remarks on its losses.
-    fn read(log: &Place, summary: RecordingSummary, lacks: Soundness) -> Self {
+    fn read(log: &LogPlace, summary: RecordingSummary, lacks: Soundness) -> Self {
         let mut done = Self { lacks, written: true, ..Self::of(log) };
         done.ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
         if done.ending.is_none() && summary.gaps > 0 {
@@ -499,7 +499,12 @@ impl Task<'_> {
     /// UTC at power-on from a reading, if the log's files were begun with another one. A reading that failed
     /// because the existing files differ may have failed for that reason.
     #[expect(clippy::option_option, reason = "it may be known now that nobody told it")]
-    fn better_epoch(&self, place: &Place, context: &Context, read: &Result<Read<'_>>) -> Option<Option<u64>> {
+    fn better_epoch(
+        &self,
+        place: &LogPlace,
+        context: &Context,
+        read: &Result<Read<'_>>,
+    ) -> Option<Option<u64>> {
         let epoch_us = match (read, place.own()) {
             (_, None) => return None,
             _ if self.standard_output => return None,
@@ -509,7 +514,7 @@ impl Task<'_> {
         Some(epoch_us).filter(|epoch_us| *epoch_us != context.epochs.whole())
     }
 
-    fn read<'a>(&self, place: &Place, name: &str, context: &'a Context) -> Result<Read<'a>> {
+    fn read<'a>(&self, place: &LogPlace, name: &str, context: &'a Context) -> Result<Read<'a>> {
         let destination = if self.standard_output {
             Destination::Standard
         } else {
@@ -536,7 +541,7 @@ impl Task<'_> {
                 judge.item(at, item);
             }
             if has_words && context.selection.has_time(at, &context.epochs) {
-                said.borrow_mut().extend(Said::of(at, &item));
+                said.borrow_mut().extend(StoryEntry::of(at, &item));
             }
             Ok(())
         })?;
@@ -544,7 +549,7 @@ impl Task<'_> {
     }
 }
 
-fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
+fn flights(log: &LogPlace) -> Result<Vec<(Instant, Instant)>> {
     let flights = check::overview(log)?.contents.flights();
     let middle = |landing: Instant, take_off: Instant| {
         Instant::from_micros(landing.as_micros() + take_off.since(landing).as_micros() / 2)
@@ -559,7 +564,7 @@ fn flights(log: &Place) -> Result<Vec<(Instant, Instant)>> {
 }
 
 /// A log whose files are there already. It is read for its losses, which count as if it was written.
-fn unwritten(log: &Place, why: &str) -> Result<Done> {
+fn unwritten(log: &LogPlace, why: &str) -> Result<Done> {
     let (want, mut gaps) = (Want { frames: true, ..Want::default() }, Gaps(Soundness::Whole));
     let summary = log.in_parts(want, || Gaps(Soundness::Whole), &mut gaps)?;
     let mut done = Done::read(log, summary, gaps.0);
@@ -589,7 +594,7 @@ impl PartReceiver<Self> for Gaps {
     }
 }
 
-fn nothing_of(log: &Place, summary: &RecordingSummary, selection: &Selection) -> String {
+fn nothing_of(log: &LogPlace, summary: &RecordingSummary, selection: &Selection) -> String {
     let seconds = |at: Option<Instant>| at.map_or(0.0, |at| at.as_micros() as f64 / 1e6);
     let names = selection.names().join(", ");
     if !selection.has_limits() {

@@ -18,7 +18,7 @@ pub struct Observed {
 
 /// A text or a parameter.
 #[derive(Clone, Debug)]
-pub enum Said {
+pub enum StoryEntry {
     /// A text of a component.
     Text {
         /// Time of its first part.
@@ -39,7 +39,7 @@ pub enum Said {
     },
 }
 
-impl Said {
+impl StoryEntry {
     /// That of an item, if it is one.
     pub fn of(at: Instant, item: &Item<'_>) -> Option<Self> {
         match item {
@@ -72,12 +72,13 @@ pub struct Story {
     /// Observations, also from before the wanted time: later ones depend on them.
     pub observed: Vec<Observed>,
     /// Texts and parameters in the wanted time.
-    pub said: Vec<Said>,
+    pub said: Vec<StoryEntry>,
 }
 
 impl Story {
     /// Bytes of memory that it holds, roughly.
     pub fn held_bytes(&self) -> usize {
-        size_of::<Observed>() * self.observed.len() + self.said.iter().map(Said::held_bytes).sum::<usize>()
+        size_of::<Observed>() * self.observed.len()
+            + self.said.iter().map(StoryEntry::held_bytes).sum::<usize>()
     }
 }

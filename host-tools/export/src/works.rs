@@ -7,15 +7,15 @@ use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
 use crate::naming::{self, Named, Traits};
 use crate::outcome::usage as usage_error;
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 
 pub(super) struct NamedLog<'a> {
-    pub(super) log: &'a Place,
+    pub(super) log: &'a LogPlace,
     pub(super) traits: Traits,
     pub(super) named: Named,
 }
 
-pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<NamedLog<'a>>> {
+pub(super) fn works<'a>(logs: &'a [LogPlace], sessions: &Sessions) -> Result<Vec<NamedLog<'a>>> {
     let mut traits = Vec::new();
     // A log that cannot be read is named all the same: reading it says why.
     side_by_side(
@@ -26,7 +26,7 @@ pub(super) fn works<'a>(logs: &'a [Place], sessions: &Sessions) -> Result<Vec<Na
             Ok(())
         },
     )?;
-    let logs: Vec<(&Place, Traits)> = logs.iter().zip(traits).collect();
+    let logs: Vec<(&LogPlace, Traits)> = logs.iter().zip(traits).collect();
     let names = naming::names(&logs, sessions);
     Ok(logs.into_iter().zip(names).map(|((log, traits), named)| NamedLog { log, traits, named }).collect())
 }

@@ -13,7 +13,7 @@ use super::collect::Collected;
 use super::context::Context;
 use super::destination::Destination;
 use super::format::{AnyWriter, Files, Finished, Totals, Way};
-use super::story::Said;
+use super::story::StoryEntry;
 use crate::outcome::Exists;
 use crate::plural::count;
 use crate::source::item;
@@ -24,7 +24,7 @@ pub struct Writers<'a> {
     context: &'a Context,
     files: Vec<Box<dyn AnyWriter>>,
     /// Texts and parameters of a log of ours, whose parts have none.
-    said: Rc<RefCell<Vec<Said>>>,
+    said: Rc<RefCell<Vec<StoryEntry>>>,
     frames: u64,
     records: u64,
     on_board: OnBoard,
@@ -69,7 +69,7 @@ impl<'a> Writers<'a> {
     }
 
     /// The place for texts and parameters that are read in order, beside the parts.
-    pub fn said(&self) -> Rc<RefCell<Vec<Said>>> {
+    pub fn said(&self) -> Rc<RefCell<Vec<StoryEntry>>> {
         self.said.clone()
     }
 

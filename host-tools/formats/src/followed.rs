@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use hums_blackbox::record::{Before, Found};
+use hums_blackbox::record::{Before, PreviousEnd};
 
 use crate::ending::{Ending, Proof, SessionBefore};
 use crate::logs::sessions::{Sessions, place};
@@ -45,7 +45,7 @@ impl<T: HasEnding> EndResolver<T> {
             {
                 if before.has_end() {
                     self.tell(&before, ending);
-                } else if before.found == Found::Unreadable {
+                } else if before.found == PreviousEnd::Unreadable {
                     self.tell_empty(before.number, &ending.name);
                 }
             }
@@ -145,7 +145,7 @@ mod tests {
         assert!(log.strange().join("").contains("9 sectors of 00006_01.HUM"), "{:?}", log.strange());
         let mut next = Ending { name: "00007".to_owned(), ..Ending::default() };
         next.summary.session = Some(9);
-        let before = Before { found: Found::Frames, number: 6, session: 7, ..Before::default() };
+        let before = Before { found: PreviousEnd::Frames, number: 6, session: 7, ..Before::default() };
         next.summary.marks.before = Some(before);
         let mut followed = EndResolver::new(Sessions::default());
         let mut done = followed.push(log);
@@ -166,7 +166,7 @@ mod tests {
             let mut next = Ending { name: "00002".into(), ..Ending::default() };
             next.summary.session = Some(9);
             next.summary.marks.before =
-                Some(Before { found: Found::Unreadable, number, ..Before::default() });
+                Some(Before { found: PreviousEnd::Unreadable, number, ..Before::default() });
             let mut followed = EndResolver::new(Sessions::default());
             let mut done = followed.push(log);
             done.extend(followed.push(next));

@@ -17,7 +17,7 @@ use crate::logs::groups::Groups;
 use crate::logs::naming::{ends_with_identity, segment_name, session_name};
 use crate::logs::sessions::Sessions;
 use crate::source::input::Input;
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 
 /// File systems allow 255 bytes, and at most 55 follow.
 const NAME_BYTES_MAX: usize = 190;
@@ -35,7 +35,7 @@ pub struct Traits {
 
 impl Traits {
     /// Reads all sectors, or all bytes of another recording.
-    pub fn of(place: &Place) -> Result<Self> {
+    pub fn of(place: &LogPlace) -> Result<Self> {
         let Some(log) = place.own() else {
             let fingerprint = place.path().map(fingerprint).transpose()?.unwrap_or_default();
             return Ok(Self { fingerprint, ..Self::default() });
@@ -60,7 +60,7 @@ impl Traits {
     }
 
     /// The name of the log's files.
-    pub fn name(&self, place: &Place) -> String {
+    pub fn name(&self, place: &LogPlace) -> String {
         let Some(log) = place.own() else {
             return format!("{}-{}", file_name(place), self.identity());
         };
@@ -70,7 +70,7 @@ impl Traits {
     /// The name of a recording in the tables of a fleet, which no other recording has: its [`identity`](Self::identity), and 96
     /// bits of the box, of the vehicle's unique id (for a log without the record of a box's start), or of the bytes of another
     /// recording.
-    pub fn unique(&self, place: &Place, vehicle: &str) -> String {
+    pub fn unique(&self, place: &LogPlace, vehicle: &str) -> String {
         // Another name of a vehicle is of the log's place, which a copy of the log does not share.
         let uid = vehicle.starts_with("uid-").then(|| Sha256::digest(vehicle.as_bytes()));
         let of_vehicle = || uid.and_then(|hash| hash.first_chunk().copied()).unwrap_or_default();
@@ -122,7 +122,7 @@ pub struct Names {
 
 impl Names {
     /// Names the log of this index.
-    pub fn name(&mut self, index: usize, log: &Place, traits: &Traits) -> Named {
+    pub fn name(&mut self, index: usize, log: &LogPlace, traits: &Traits) -> Named {
         if let Some(first) = self.known.get(&(traits.session, traits.fingerprint)) {
             return Named::Copy(*first);
         }
@@ -141,13 +141,13 @@ impl Names {
 }
 
 /// Names one command's logs; copies have none.
-pub fn names(logs: &[(&Place, Traits)], sessions: &Sessions) -> Vec<Named> {
+pub fn names(logs: &[(&LogPlace, Traits)], sessions: &Sessions) -> Vec<Named> {
     let mut names = Names::default();
-    let original = |log: &Place| {
+    let original = |log: &LogPlace| {
         let of = sessions.again(&log.name)?;
         logs.iter().position(|(other, _)| other.name == of)
     };
-    let name = |(index, (log, traits)): (usize, &(&Place, Traits))| match original(log) {
+    let name = |(index, (log, traits)): (usize, &(&LogPlace, Traits))| match original(log) {
         Some(of) => Named::Copy(of),
         None => names.name(index, log, traits),
     };
@@ -206,7 +206,7 @@ fn head(path: &Path) -> Vec<u8> {
 
 const GENERATOR: &[u8] = b"name=\"generator\" content=\"hums report\"";
 
-fn file_name(place: &Place) -> String {
+fn file_name(place: &LogPlace) -> String {
     let name = place.path().and_then(Path::file_name);
     name.map_or_else(|| "recording".to_owned(), |name| cut(name.to_string_lossy().into_owned()))
 }
@@ -268,7 +268,7 @@ mod tests {
             left_over: false,
         };
         let traits = Traits { session: Some(u32::MAX), board: Some([0xFF; 12]), fingerprint: [0; 16] };
-        let name = traits.name(&Place::log(file, log));
+        let name = traits.name(&LogPlace::log(file, log));
         assert!(name.starts_with("öö") && name.ends_with("-sffffffff"), "{name}");
         assert!(name.len() + "-10.tlog.gaps.csv".len() <= 255, "{}", name.len());
     }
@@ -283,7 +283,7 @@ mod tests {
                 session: None,
                 left_over: false,
             };
-            Place::log(name.to_owned(), log)
+            LogPlace::log(name.to_owned(), log)
         };
         let traits = |session, fingerprint, board| Traits {
             session: Some(session),

@@ -19,7 +19,7 @@ use crate::part::Limit;
 use crate::plural::count;
 use crate::printable::word;
 use crate::source::find::{FoundRecordings, find};
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::summary::{ComponentLine, Overview};
 use crate::table::{Table, left};
 use crate::utc::{clock, iso8601};
@@ -62,7 +62,7 @@ fn vehicle(log: &Overview, found: &FoundRecordings, given: Option<&str>) -> Stri
         return given.to_owned();
     }
     let place = found.places.iter().find(|place| place.name == log.ending.name);
-    let folder = place.and_then(Place::folder);
+    let folder = place.and_then(LogPlace::folder);
     let folder = folder.map_or_else(|| "no folder".to_owned(), |folder| folder.display().to_string());
     let kind = known.map_or_else(
         || "unknown vehicle".to_owned(),
@@ -102,10 +102,10 @@ struct Vehicle {
     span_us: Option<(u64, u64)>,
     is_of_box: bool,
     /// By place, from 1.
-    parts: BTreeMap<u8, Part>,
+    parts: BTreeMap<u8, PartInUse>,
 }
 
-struct Part {
+struct PartInUse {
     line: ComponentLine,
     limit: Option<Limit>,
     /// Figures of the first log that has it.
@@ -127,9 +127,9 @@ impl Vehicle {
         }
         for (place, line, limit) in log.parts {
             let first = (limit.map_or(0.0, |limit| limit.run), line.figures.flights, start_us);
-            let new = |is_new| Part { line: line.clone(), limit, first, last_us: start_us, is_new };
+            let new = |is_new| PartInUse { line: line.clone(), limit, first, last_us: start_us, is_new };
             let part = self.parts.entry(place).or_insert_with(|| new(false));
-            let is_same = |of: &Part| {
+            let is_same = |of: &PartInUse| {
                 (of.line.kind, of.line.number, &of.line.serial, of.line.replaced)
                     == (line.kind, line.number, &line.serial, line.replaced)
             };
@@ -220,8 +220,8 @@ impl From<Vehicle> for VehicleJson {
 }
 
 impl PartJson {
-    fn of(place: u8, part: &Part) -> Self {
-        let Part { line, limit, first: (first_run, first_flights, first_us), last_us, is_new } = part;
+    fn of(place: u8, part: &PartInUse) -> Self {
+        let PartInUse { line, limit, first: (first_run, first_flights, first_us), last_us, is_new } = part;
         let left = limit.map(|limit| (limit.limit - limit.run).max(0.0));
         let ran = limit.map_or(0.0, |limit| limit.run);
         // Over the logs; of a single log over the part's life.

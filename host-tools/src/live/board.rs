@@ -30,7 +30,7 @@ fn without_advice(finding: &Finding) -> String {
 
 /// One subsystem.
 #[derive(Debug, Serialize)]
-pub struct Part {
+pub struct SubsystemState {
     subsystem: &'static str,
     level: &'static str,
     /// The judge: `on board`, `here`, or `nobody`.
@@ -53,7 +53,7 @@ pub struct Board {
     /// The last level before it became unknown.
     pub was: Option<&'static str>,
     /// All subsystems, in the order of [`Subsystem::ALL`].
-    pub parts: Vec<Part>,
+    pub parts: Vec<SubsystemState>,
 }
 
 #[derive(Clone, Copy)]
@@ -147,7 +147,7 @@ fn seconds(craft: &Craft, now: Instant) -> String {
     format!("{} s", now.since(craft.heard).as_millis() / 1000)
 }
 
-fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Part {
+fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> SubsystemState {
     let onboard = craft.companion.level(now, subsystem);
     let recorder = subsystem == Subsystem::Recorder;
     let silent = is_silent(craft, now);
@@ -198,7 +198,7 @@ fn part(craft: &Craft, now: Instant, subsystem: Subsystem, known: &Known) -> Par
         (None, reason, action)
     };
     let reason = if doubt && !silent { format!("{reason}; {CELLS_UNKNOWN}") } else { reason };
-    Part { subsystem: subsystem.name(), level: level.name(), by, calm, reason, action }
+    SubsystemState { subsystem: subsystem.name(), level: level.name(), by, calm, reason, action }
 }
 
 fn is_silent(craft: &Craft, now: Instant) -> bool {

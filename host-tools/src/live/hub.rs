@@ -8,7 +8,7 @@ use std::time::Duration;
 use hums_core::clock::Instant;
 
 use super::world::Histories;
-use crate::page::history::{Cursor, Part};
+use crate::page::history::{Cursor, HistoryPart};
 
 /// Commands of all pages; a refused one is repeated by a second key press.
 const COMMANDS_MAX: usize = 64;
@@ -81,7 +81,7 @@ impl Hub {
     }
 
     /// The part of a vehicle's history that a page lacks.
-    pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<Part> {
+    pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<HistoryPart> {
         self.histories().get(&vehicle)?.since(vehicle, cursor, until)
     }
 

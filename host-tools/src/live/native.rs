@@ -11,7 +11,7 @@ use hums_core::observation::{Observation, Source};
 
 use crate::page::more::{More, rows};
 use crate::source::item::{Item, Stop, Want};
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::statustext::StatusText;
 
 /// Entries of a batch, and waiting batches.
@@ -59,14 +59,14 @@ type Batch = Vec<(Instant, Entry)>;
 /// A played log.
 #[derive(Debug)]
 pub struct Native {
-    place: Place,
+    place: LogPlace,
     batches: Option<Receiver<Batch>>,
     waiting: VecDeque<(Instant, Entry)>,
 }
 
 impl Native {
     /// From its beginning.
-    pub fn new(place: Place) -> Self {
+    pub fn new(place: LogPlace) -> Self {
         Self { place, batches: None, waiting: VecDeque::new() }
     }
 
@@ -127,7 +127,7 @@ mod tests {
     fn entries_come_by_their_time_and_again_from_any_place() {
         // Any recording will do: the stream is the same.
         let flight = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/flights/px4_hil_quad_low.tlog");
-        let mut native = Native::new(Place::file(&flight));
+        let mut native = Native::new(LogPlace::file(&flight));
         let take = |native: &mut Native, until_s: u64| {
             let (until, mut times) = (Instant::from_millis(until_s * 1_000), Vec::new());
             while let Some((at, _)) = native.next_until(until).expect("it is read") {

@@ -14,7 +14,7 @@ use super::hub::{Hub, PageCommand, Published};
 use super::influx::{Figures, Influx};
 use super::native::Native;
 use super::rate::{PUBLISH, Rate};
-use super::recording::{self, Content, Opened};
+use super::recording::{self, Content, OpenedInput};
 use super::show::{self, HeadInputs, SourceJson};
 use super::spool::{Spool, SpoolWriter, Spooled};
 use super::told::{Limits, MonitorRecord};
@@ -44,8 +44,8 @@ struct Copy {
 
 /// A read recording.
 #[derive(Debug)]
-struct Loaded {
-    played: Played,
+struct LoadedRecording {
+    played: PlaybackSource,
     told: Vec<(Instant, MonitorRecord)>,
     told_next: usize,
     copies: Vec<Copy>,
@@ -55,7 +55,7 @@ struct Loaded {
 }
 
 #[derive(Debug)]
-enum Played {
+enum PlaybackSource {
     /// Frames, kept.
     Frames(Spool),
     /// Read again.
@@ -65,12 +65,12 @@ enum Played {
 /// Callback after each frame, or entry without frames; `false` ends it.
 type Each<'a> = dyn FnMut(Instant, Option<&Frame<'_>>, &mut World) -> bool + 'a;
 
-impl Loaded {
+impl LoadedRecording {
     fn seek(&mut self, offset: u64, told: usize) -> io::Result<()> {
         self.told_next = told;
         match &mut self.played {
-            Played::Frames(spool) => spool.seek(offset),
-            Played::Native(native) => native.seek(offset),
+            PlaybackSource::Frames(spool) => spool.seek(offset),
+            PlaybackSource::Native(native) => native.seek(offset),
         }
     }
 
@@ -83,7 +83,7 @@ impl Loaded {
 
     fn follow(&mut self, world: &mut World, now: Instant, each: &mut Each<'_>) -> io::Result<()> {
         match &mut self.played {
-            Played::Frames(spool) => {
+            PlaybackSource::Frames(spool) => {
                 while let Some(Spooled { at, check, bytes }) = spool.next_until(now)? {
                     tell(&self.told, &mut self.told_next, at, world);
                     if let Some(frame) = Frame::again(bytes, check) {
@@ -94,7 +94,7 @@ impl Loaded {
                     }
                 }
             }
-            Played::Native(native) => {
+            PlaybackSource::Native(native) => {
                 while let Some((at, entry)) = native.next_until(now)? {
                     world.entry(at, &entry, None);
                     if !each(at, None, world) {
@@ -169,7 +169,7 @@ impl Player {
     }
 
     /// Returns points to write; an unreadable recording shows on the page too.
-    pub fn run(mut self, mut opened: Opened) -> Result<Option<Influx>> {
+    pub fn run(mut self, mut opened: OpenedInput) -> Result<Option<Influx>> {
         let mut loaded =
             self.load(&mut opened).with_context(|| format!("{}: cannot be read", self.source.name))?;
         drop(opened);
@@ -184,7 +184,7 @@ impl Player {
     }
 
     /// Reads it through.
-    fn load(&mut self, opened: &mut Opened) -> Result<Loaded> {
+    fn load(&mut self, opened: &mut OpenedInput) -> Result<LoadedRecording> {
         self.is_of_box = opened.is_of_box();
         let mut world = self.world();
         let mut writer = SpoolWriter::new()?;
@@ -252,14 +252,14 @@ impl Player {
         self.timeline = timeline(hub);
         self.rate = Rate::default();
         let played = match opened.native() {
-            Some(native) => Played::Native(native),
-            None => Played::Frames(writer.finish()?),
+            Some(native) => PlaybackSource::Native(native),
+            None => PlaybackSource::Frames(writer.finish()?),
         };
-        Ok(Loaded { played, told, told_next: 0, copies, start, end, frames })
+        Ok(LoadedRecording { played, told, told_next: 0, copies, start, end, frames })
     }
 
     /// Vehicle and date are known now.
-    fn write(&mut self, loaded: &mut Loaded) -> io::Result<()> {
+    fn write(&mut self, loaded: &mut LoadedRecording) -> io::Result<()> {
         let Some(influx) = &mut self.influx else { return Ok(()) };
         let epoch_us = self.epoch_us.unwrap_or(0);
         let mut world = World::new(self.limits.clone()).on_the_wire(self.is_of_box);
@@ -287,7 +287,7 @@ impl Player {
         loaded.seek(0, 0)
     }
 
-    fn play(&mut self, loaded: &mut Loaded) -> Result<()> {
+    fn play(&mut self, loaded: &mut LoadedRecording) -> Result<()> {
         let mut world = self.world();
         world.begin(loaded.start);
         let mut now = loaded.start;
@@ -330,7 +330,7 @@ impl Player {
     fn obey(
         &mut self,
         command: PageCommand,
-        loaded: &mut Loaded,
+        loaded: &mut LoadedRecording,
         world: &mut World,
         now: &mut Instant,
     ) -> Result<()> {
@@ -359,7 +359,13 @@ impl Player {
     }
 
     /// A time from the last copy before it, or from here if nearer.
-    fn seek(&mut self, to: Instant, loaded: &mut Loaded, world: &mut World, now: &mut Instant) -> Result<()> {
+    fn seek(
+        &mut self,
+        to: Instant,
+        loaded: &mut LoadedRecording,
+        world: &mut World,
+        now: &mut Instant,
+    ) -> Result<()> {
         let copy = loaded.copies.iter().rev().find(|copy| copy.at <= to);
         if to < *now {
             self.epoch += 1;

@@ -15,22 +15,22 @@ use crate::logs::groups::has_start;
 use crate::outcome::usage;
 use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
-use crate::source::recording::{Place, Recording};
+use crate::source::recording::{LogPlace, Recording};
 
 /// Maximum number of sessions listed for a choice.
 const LISTED_MAX: usize = 12;
 
 /// An input, found good.
-pub struct Opened {
+pub struct OpenedInput {
     /// Its name.
     pub name: String,
     recording: Option<Recording>,
     /// Its place, if it has no frames.
-    native: Option<Place>,
+    native: Option<LogPlace>,
     is_of_box: bool,
 }
 
-impl Opened {
+impl OpenedInput {
     /// Recorded by a box, on the autopilot's own wire.
     pub fn is_of_box(&self) -> bool {
         self.is_of_box
@@ -43,10 +43,10 @@ impl Opened {
 }
 
 /// The newest session, or the one of this name.
-pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
+pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<OpenedInput> {
     let place = match endpoint {
         Endpoint::File(path) => chosen(path, session)?,
-        _ => Place::standard(),
+        _ => LogPlace::standard(),
     };
     if session.is_some() && place.own().is_none() {
         return Err(usage(format!("--session is for a log, a card or a folder, and {endpoint} is none")));
@@ -65,10 +65,10 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<Opened> {
     };
     // A packed recording may be of any link.
     let is_of_box = place.own().is_some_and(has_start);
-    Ok(Opened { name, recording: Some(recording), native, is_of_box })
+    Ok(OpenedInput { name, recording: Some(recording), native, is_of_box })
 }
 
-fn chosen(path: &Path, session: Option<&str>) -> Result<Place> {
+fn chosen(path: &Path, session: Option<&str>) -> Result<LogPlace> {
     let mut found = find(&[path.to_owned()], false)?;
     let names: Vec<String> = found.places.iter().map(|place| place.name.clone()).collect();
     let Some(newest) = names.last() else { bail!("{}: there is no log in it", path.display()) };
@@ -101,7 +101,7 @@ pub enum Content<'a> {
 pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
 
 /// Reads once; returns the evidence of a log's end.
-pub fn each(opened: &mut Opened, take: &mut Take<'_>) -> Result<Option<Ending>> {
+pub fn each(opened: &mut OpenedInput, take: &mut Take<'_>) -> Result<Option<Ending>> {
     let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;

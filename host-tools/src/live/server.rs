@@ -38,9 +38,9 @@ struct Server {
 }
 
 /// One of a limited number. Freed when dropped.
-struct Place(Arc<AtomicUsize>);
+struct Permit(Arc<AtomicUsize>);
 
-impl Place {
+impl Permit {
     /// `None` if `max` are taken.
     fn take(taken: &Arc<AtomicUsize>, max: usize) -> Option<Self> {
         let place = Self(Arc::clone(taken));
@@ -48,7 +48,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Permit {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::SeqCst);
     }
@@ -64,7 +64,7 @@ pub fn start(listener: TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
                 thread::sleep(AGAIN);
                 continue;
             };
-            let Some(place) = Place::take(&connections, CONNECTIONS_MAX) else { continue };
+            let Some(place) = Permit::take(&connections, CONNECTIONS_MAX) else { continue };
             let server = Arc::clone(&server);
             // Without a thread the connection is closed; so it is after an error.
             let _ = Builder::new().name("page".to_owned()).spawn(move || {
@@ -79,7 +79,7 @@ pub fn start(listener: TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
 
 #[derive(Debug, Deserialize)]
 #[serde(tag = "cmd", rename_all = "lowercase")]
-enum Asked {
+enum CommandJson {
     Pause,
     Play,
     Seek { to: f64 },
@@ -120,10 +120,10 @@ impl Server {
 
     fn obey(&self, stream: &mut TcpStream, command: &[u8]) -> io::Result<()> {
         let command = match serde_json::from_slice(command) {
-            Ok(Asked::Pause) => PageCommand::Pause,
-            Ok(Asked::Play) => PageCommand::Play,
-            Ok(Asked::Seek { to }) => PageCommand::Seek(to),
-            Ok(Asked::Speed { to }) => PageCommand::Speed(to),
+            Ok(CommandJson::Pause) => PageCommand::Pause,
+            Ok(CommandJson::Play) => PageCommand::Play,
+            Ok(CommandJson::Seek { to }) => PageCommand::Seek(to),
+            Ok(CommandJson::Speed { to }) => PageCommand::Speed(to),
             Err(_) => return say(stream, "400 Bad Request", "This is no command.\n"),
         };
         if self.hub.command(command) {
@@ -135,7 +135,7 @@ impl Server {
 
     /// Ends with the connection, or with a page that takes nothing.
     fn follow(&self, stream: &mut TcpStream, vehicle: Option<&str>) -> io::Result<()> {
-        let Some(_place) = Place::take(&self.pages, PAGES_MAX) else {
+        let Some(_place) = Permit::take(&self.pages, PAGES_MAX) else {
             return say(stream, "503 Service Unavailable", "Too many pages are open.\n");
         };
         http::begin(stream, "text/event-stream")?;

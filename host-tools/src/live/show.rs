@@ -124,7 +124,7 @@ struct State<'a> {
     values: Values<'a>,
     motors: Motors<'a>,
     cells: Vec<f32>,
-    board: &'a [board::Part],
+    board: &'a [board::SubsystemState],
     usage: Vec<CounterJson>,
     components: Vec<ComponentJson>,
     link: LinkJson,

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use hums_core::params::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
-use hums_store::{Found, Key, Store, param_value};
+use hums_store::{Key, Store, StoreCondition, param_value};
 
 use crate::files::{cannot_write, make_in_place, open_in_place};
 use crate::source::format::STORE_SECTOR_BYTES as SECTOR;
@@ -25,7 +25,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
         None => (Vec::new(), None),
     };
     // Overwritten with the items that still count.
-    if let Some(path) = path.filter(|_| found(&bytes) == Some(Found::Damaged)) {
+    if let Some(path) = path.filter(|_| found(&bytes) == Some(StoreCondition::Damaged)) {
         drop(file);
         let whole = |mut file: &File| file.write_all(&bytes).with_context(|| cannot_write(path));
         file = Some(make_in_place(path, true, whole).context("--store")?);
@@ -53,7 +53,7 @@ pub(super) fn open(path: Option<&Path>, params: &[(&ParamSpec, f32)]) -> Result<
 pub(super) fn check(path: &Path) -> Result<()> {
     if path.exists() {
         let (bytes, _) = read(path)?;
-        if found(&bytes) == Some(Found::Damaged) {
+        if found(&bytes) == Some(StoreCondition::Damaged) {
             let path = path.display();
             note!(
                 "--store {path}: is damaged: a stored item was lost, its older value counts or it begins anew"
@@ -96,7 +96,7 @@ fn read(path: &Path) -> Result<(Vec<u8>, Option<File>)> {
         bail!("--store {}: is no store, though it has the length of one; name a new file", path.display());
     }
     // A board begins anew; here the file stays.
-    if found(&bytes) == Some(Found::Unreadable) {
+    if found(&bytes) == Some(StoreCondition::Unreadable) {
         bail!(
             "--store {}: is damaged: nothing in it can be read, and the run would begin it anew; move it away, or name a new file",
             path.display()
@@ -110,7 +110,7 @@ fn fill(mut file: &File, path: &Path) -> Result<()> {
     file.write_all(&vec![0xFF; BYTES]).with_context(|| cannot_write(path))
 }
 
-fn found(bytes: &[u8]) -> Option<Found> {
+fn found(bytes: &[u8]) -> Option<StoreCondition> {
     Store::mount(SimFlash::<SECTOR>::with(bytes)).ok().map(|(_, found)| found)
 }
 

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use hums::source::item::{Item, Rows, Want};
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::health::Level;
@@ -20,7 +20,7 @@ type Found = Vec<(&'static str, u8, Level, f64)>;
 
 fn found(name: &str) -> Found {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/labelled/px4").join(name);
-    let recording = Place::file(&path).open().expect("a recording");
+    let recording = LogPlace::file(&path).open().expect("a recording");
     let mut monitor = Monitor::new(Params::default());
     let (mut next, mut boot_s, mut found) = (None::<Instant>, None, Vec::new());
     let want = Want { frames: false, observations: true, rows: Rows::None, system: None };

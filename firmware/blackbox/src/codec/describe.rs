@@ -7,7 +7,7 @@ use super::body::Body;
 use super::element::{Element, What};
 use super::links;
 use super::slots::{INSTANCE_BYTES, Key, Slot};
-use crate::layouts::{FieldLayout, Layout, Place};
+use crate::layouts::{FieldLayout, Layout, LayoutIndex};
 
 /// Arrays of this many bytes or more are data, not numbers.
 const DATA_BYTES: u8 = 16;
@@ -46,7 +46,7 @@ fn elements_of(field: FieldLayout) -> (What, u8, u8) {
 
 impl Body {
     /// A new slot with its elements; without a layout if the model has no room for them.
-    pub(super) fn describe(&mut self, key: Key, place: Option<Place>, layout: Option<Layout>) -> Slot {
+    pub(super) fn describe(&mut self, key: Key, place: Option<LayoutIndex>, layout: Option<Layout>) -> Slot {
         let (mut count, mut described) = (0, 0);
         let mut index = 0;
         while let Some(field) = layout.and_then(|layout| layout.field(index)) {

@@ -4,7 +4,7 @@
 use super::frame::Frame;
 use crate::coder::Coder;
 use crate::distribution::{Cdf, Cell};
-use crate::layouts::{Layout, Place};
+use crate::layouts::{Layout, LayoutIndex};
 
 /// Slots at most. Further streams are coded as plain bytes.
 pub(crate) const SLOTS: usize = 112;
@@ -33,7 +33,7 @@ pub(crate) enum Length {
 #[derive(Clone, Copy)]
 pub(crate) struct Slot {
     pub(crate) key: Key,
-    pub(crate) layout: Option<Place>,
+    pub(crate) layout: Option<LayoutIndex>,
     /// First element, and their number.
     pub(crate) elements: u16,
     pub(crate) elements_count: u8,
@@ -90,7 +90,7 @@ impl Slot {
 
     pub(crate) fn new(
         key: Key,
-        place: Option<Place>,
+        place: Option<LayoutIndex>,
         layout: Option<Layout>,
         elements: u16,
         described: usize,

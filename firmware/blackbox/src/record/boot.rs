@@ -5,7 +5,7 @@ use super::stored::{Fields, Sink};
 /// The previous session found on the card.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Found {
+pub enum PreviousEnd {
     /// Nobody has looked yet: the first boot record of a log is written before the card is open.
     #[default]
     Unknown = 0,
@@ -19,7 +19,7 @@ pub enum Found {
     Unreadable = 4,
 }
 
-impl Found {
+impl PreviousEnd {
     /// Unknown for later ones.
     pub const fn from_number(number: u8) -> Self {
         match number {
@@ -48,7 +48,7 @@ impl Found {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Before {
     /// The result of the search.
-    pub found: Found,
+    pub found: PreviousEnd,
     /// Beginning of its files' names.
     pub number: u32,
     /// The sectors' session.
@@ -64,7 +64,7 @@ pub struct Before {
 impl Before {
     /// End of the previous session, if found.
     pub const fn has_end(&self) -> bool {
-        matches!(self.found, Found::Sectors | Found::Frames)
+        matches!(self.found, PreviousEnd::Sectors | PreviousEnd::Frames)
     }
 }
 
@@ -113,7 +113,7 @@ impl<'a> Boot<'a> {
                 sectors: fields.u32(),
                 frames: fields.u32(),
                 check: fields.u32(),
-                found: Found::from_number(fields.u8()),
+                found: PreviousEnd::from_number(fields.u8()),
             },
         }
     }

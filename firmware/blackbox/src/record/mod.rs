@@ -19,7 +19,7 @@ mod wear;
 use core::fmt;
 
 pub use crate::limits::{NAME_BYTES_MAX, RECORD_BYTES_MAX, TEXT_BYTES_MAX};
-pub use boot::{Before, Boot, Fault, Found};
+pub use boot::{Before, Boot, Fault, PreviousEnd};
 pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
 pub use loss::{Loss, Lost, Stats};
@@ -193,7 +193,7 @@ mod tests {
             uid: *b"123456789012",
             boots: 99,
             before: Before {
-                found: Found::Frames,
+                found: PreviousEnd::Frames,
                 number: 7,
                 session: 0xfeed,
                 sectors: 99,

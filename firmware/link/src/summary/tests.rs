@@ -259,7 +259,7 @@ fn the_state_holds_every_subsystem() {
         assert_eq!(state(&monitor) >> (3 * index) & 7, monitor.health().subsystem(subsystem) as i32);
     }
     let parts = VALUES_TOLD.iter().filter_map(|(_, told)| match told {
-        Told::Level(part) => Some(*part),
+        ValueSource::Level(part) => Some(*part),
         _ => None,
     });
     assert!(parts.eq(Subsystem::ALL));

@@ -9,7 +9,7 @@ use super::marks::Marks;
 use crate::journal::Logbook;
 use crate::notices::{Notice, Notices};
 use crate::queues::SectorsIn;
-use crate::records::Recorded;
+use crate::records::RecordedState;
 
 /// `MAV_SEVERITY_WARNING`
 const WARNING: u8 = 4;
@@ -24,7 +24,7 @@ pub(super) const CRITICAL: u8 = 8;
 pub(super) fn record(
     now: Instant,
     book: &mut Logbook<'_>,
-    recorded: &mut Recorded,
+    recorded: &mut RecordedState,
     notices: &mut Notices,
     marks: &mut Marks,
     sectors: &mut SectorsIn,

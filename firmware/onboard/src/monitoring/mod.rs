@@ -30,7 +30,7 @@ use crate::notices::{Notice, Notices};
 use crate::persist::{Handover, StoreWriter};
 use crate::port::PortStatus;
 use crate::queues::{FramesOut, GsIn, SectorsIn, SummaryRoute, UplinkOut};
-use crate::records::Recorded;
+use crate::records::RecordedState;
 use crate::supervisor::Task;
 use card_notices::CardNotices;
 use figures::Figures;
@@ -74,7 +74,7 @@ pub struct Monitoring<'a> {
     sequences: Sequences,
     long_texts: LongTexts,
     identity: Boot<'a>,
-    recorded: Recorded,
+    recorded: RecordedState,
     notices: Notices,
     card_notices: CardNotices,
     /// Files of storage at the last tick.
@@ -102,7 +102,7 @@ impl<'a> Monitoring<'a> {
             sequences: Sequences::new(),
             long_texts: LongTexts::new(),
             identity,
-            recorded: Recorded::new(),
+            recorded: RecordedState::new(),
             notices: Notices::new(),
             card_notices: CardNotices::new(),
             files: 0,

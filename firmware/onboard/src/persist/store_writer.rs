@@ -5,7 +5,7 @@ use hums_core::Monitor;
 use hums_core::health::exceedance::Exceedances;
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room, Session};
 use hums_core::params::ParamError;
-use hums_store::{Error, Found, Key, Store, param};
+use hums_store::{Error, Key, Store, StoreCondition, param};
 
 use super::mailbox::MailboxOut;
 use super::status::{Calm, StoreState, StoreStatus, count};
@@ -54,13 +54,13 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
                 return None;
             };
             status.set_state(match found {
-                Found::Kept => StoreState::Kept,
-                Found::Damaged => {
+                StoreCondition::Kept => StoreState::Kept,
+                StoreCondition::Damaged => {
                     count(&status.unreadable);
                     StoreState::Kept
                 }
-                Found::Blank => StoreState::New,
-                Found::Unreadable => StoreState::Remade,
+                StoreCondition::Blank => StoreState::New,
+                StoreCondition::Unreadable => StoreState::Remade,
             });
             Some(store)
         });

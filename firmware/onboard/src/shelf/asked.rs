@@ -48,7 +48,7 @@ pub enum Which {
 
 /// A request; the ticket comes back with the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Want {
+pub struct LogRequest {
     /// Tells answers from earlier ones.
     pub ticket: u16,
     /// The log.

@@ -23,7 +23,7 @@ use hums_recorder::card::{LogEntry, Segment};
 use hums_recorder::{BLOCK_BYTES, Card, CardDevice, CardError, Recorder};
 
 use crate::queues::ring::{In, Out, Ring};
-pub use asked::{Answer, DATA_MAX, LogId, NoLog, Want, What, Which};
+pub use asked::{Answer, DATA_MAX, LogId, LogRequest, NoLog, What, Which};
 use on_card::{for_each_part, holds, in_work, measure};
 
 /// Requests at once.
@@ -35,14 +35,14 @@ pub(crate) type Answered = (Answer, heapless::Vec<u8, DATA_MAX>);
 
 /// Part of the firmware's one static.
 pub struct Shelf {
-    wants: Ring<Want, WANTS>,
+    wants: Ring<LogRequest, WANTS>,
     answers: Ring<Answered, 1>,
 }
 
 impl Shelf {
     /// Empty.
     pub(crate) const fn new() -> Self {
-        const NONE: Want = Want { ticket: 0, which: Which::At(0), what: What::Length };
+        const NONE: LogRequest = LogRequest { ticket: 0, which: Which::At(0), what: What::Length };
         Self {
             wants: Ring::new([NONE; WANTS]),
             answers: Ring::new([(Answer::none(0), heapless::Vec::new())]),
@@ -59,7 +59,7 @@ impl Shelf {
                 answers: answers_in,
                 last: None,
                 sum: None,
-                listed: Listed::default(),
+                listed: ListedLog::default(),
                 erases: None,
             },
         )
@@ -68,13 +68,13 @@ impl Shelf {
 
 /// The monitor's ends.
 pub struct Reader<'a> {
-    wants: In<'a, Want, WANTS>,
+    wants: In<'a, LogRequest, WANTS>,
     answers: Out<'a, Answered, 1>,
 }
 
 impl Reader<'_> {
     /// `false` without room.
-    pub fn want(&mut self, want: Want) -> bool {
+    pub fn want(&mut self, want: LogRequest) -> bool {
         let Some(place) = self.wants.free() else { return false };
         *place = want;
         self.wants.commit();
@@ -97,12 +97,12 @@ impl Reader<'_> {
 
 /// Storage's ends.
 pub struct Server<'a> {
-    wants: Out<'a, Want, WANTS>,
+    wants: Out<'a, LogRequest, WANTS>,
     answers: In<'a, Answered, 1>,
-    last: Option<Found>,
+    last: Option<FoundLog>,
     sum: Option<Sum>,
-    /// Found last, by place.
-    listed: Listed,
+    /// FoundLog last, by place.
+    listed: ListedLog,
     /// An erase in progress, a block of the directory at a call: its next entry.
     erases: Option<u32>,
 }
@@ -110,14 +110,14 @@ pub struct Server<'a> {
 /// The place of a log in the list of shown logs, and its entry in the directory, valid while the directory has these
 /// names.
 #[derive(Clone, Copy, Default)]
-struct Listed {
+struct ListedLog {
     names: u32,
     place: u16,
     entry: u32,
 }
 
 #[derive(Clone, Copy)]
-struct Found {
+struct FoundLog {
     answer: Answer,
     segment: Segment,
 }
@@ -125,7 +125,7 @@ struct Found {
 /// A checksum in progress: of `done` bytes of the log's first `answer.offset` ones.
 #[derive(Clone, Copy)]
 struct Sum {
-    log: Found,
+    log: FoundLog,
     done: u32,
     so_far: u32,
 }
@@ -138,7 +138,7 @@ impl Server<'_> {
 
     #[cfg(test)]
     pub(crate) fn serve_text(&mut self, text: &[u8]) {
-        let Some(&mut Want { ticket, which: Which::Settings, what: What::Data(offset) }) =
+        let Some(&mut LogRequest { ticket, which: Which::Settings, what: What::Data(offset) }) =
             self.wants.waiting().first_mut()
         else {
             return;
@@ -160,7 +160,7 @@ impl Server<'_> {
             return true;
         }
         match self.wants.waiting().first().copied() {
-            Some(Want { what: What::Erase, .. }) => {
+            Some(LogRequest { what: What::Erase, .. }) => {
                 self.wants.release(1);
                 self.erases = Some(0);
                 true
@@ -170,7 +170,7 @@ impl Server<'_> {
         }
     }
 
-    fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &Want) -> bool {
+    fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &LogRequest) -> bool {
         let Some((to, data)) = self.answers.free() else { return false };
         self.wants.release(1);
         if want.which != Which::Settings {
@@ -188,12 +188,12 @@ impl Server<'_> {
                 }
                 What::Checksum(bytes) => {
                     let bytes = if bytes == 0 { answer.bytes } else { bytes.min(answer.bytes) };
-                    let log = Found { answer: Answer { offset: bytes, ..answer }, segment };
+                    let log = FoundLog { answer: Answer { offset: bytes, ..answer }, segment };
                     self.sum = Some(Sum { log, done: 0, so_far: 0 });
                 }
                 What::Length | What::Erase => {}
             }
-            self.last = Some(Found { answer, segment })
+            self.last = Some(FoundLog { answer, segment })
                 .filter(|found| want.which != Which::Settings && found.answer.found.is_ok());
         }
         if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
@@ -205,7 +205,7 @@ impl Server<'_> {
     }
 
     fn add<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>) -> bool {
-        let Some(Sum { log: Found { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
+        let Some(Sum { log: FoundLog { mut answer, mut segment }, mut done, mut so_far }) = self.sum else {
             return false;
         };
         let Some(place) = self.answers.free() else { return false };
@@ -221,7 +221,7 @@ impl Server<'_> {
         });
         done = end;
         if is_read && done < answer.offset {
-            self.sum = Some(Sum { log: Found { answer, segment }, done, so_far });
+            self.sum = Some(Sum { log: FoundLog { answer, segment }, done, so_far });
             return true;
         }
         self.sum = None;
@@ -242,33 +242,33 @@ fn erase_next<D: CardDevice>(recorder: &mut Recorder<'_, D>, entry: u32) -> Opti
     more.is_ok_and(|more| more).then_some(entry + BLOCK_BYTES as u32 / 32)
 }
 
-struct Looked {
+struct Lookup {
     answer: Answer,
     segment: Option<Segment>,
 }
 
 fn find<D: CardDevice>(
     recorder: &mut Recorder<'_, D>,
-    want: &Want,
-    last: Option<Found>,
-    listed: &mut Listed,
-) -> Looked {
-    let none = Looked { answer: Answer::none(want.ticket), segment: None };
+    want: &LogRequest,
+    last: Option<FoundLog>,
+    listed: &mut ListedLog,
+) -> Lookup {
+    let none = Lookup { answer: Answer::none(want.ticket), segment: None };
     let recorded = recorder.in_work();
     let Some(card) = recorder.card() else { return none };
     let mut answer = none.answer;
     (answer.count, answer.directory) = card.shown();
-    let of_none = |why| Looked { answer: answer.without(why), segment: None };
+    let of_none = |why| Lookup { answer: answer.without(why), segment: None };
     let found = match want.which {
         Which::Settings => {
             let Some((segment, bytes)) = card.settings() else { return none };
-            return Looked { answer: Answer { found: Ok(()), bytes, ..none.answer }, segment: Some(segment) };
+            return Lookup { answer: Answer { found: Ok(()), bytes, ..none.answer }, segment: Some(segment) };
         }
         Which::Same(log) => {
-            if let Some(Found { answer, mut segment }) = last.filter(|last| last.answer.log == log)
+            if let Some(FoundLog { answer, mut segment }) = last.filter(|last| last.answer.log == log)
                 && holds(card, &mut segment, &log) == Some(true)
             {
-                return Looked { answer, segment: Some(segment) };
+                return Lookup { answer, segment: Some(segment) };
             }
             card.shown_log(log.name)
         }
@@ -279,7 +279,7 @@ fn find<D: CardDevice>(
     let entry = match found {
         Ok(Some(entry)) => entry,
         Ok(None) => return of_none(NoLog::Absent),
-        Err(_) => return Looked { answer: none.answer.without(NoLog::Unread), segment: None },
+        Err(_) => return Lookup { answer: none.answer.without(NoLog::Unread), segment: None },
     };
     let mut segment = Segment::of(&entry);
     let measured = match recorded.filter(|recorded| recorded.name == entry.name) {
@@ -292,17 +292,17 @@ fn find<D: CardDevice>(
     }
     (answer.log, answer.bytes, answer.found) = (log, blocks * BLOCK_BYTES as u32, Ok(()));
     answer.utc_secs = entry.utc_secs;
-    Looked { answer, segment: Some(segment) }
+    Lookup { answer, segment: Some(segment) }
 }
 
 fn at_place<D: CardDevice>(
     card: &Card<'_, D>,
     place: u16,
-    listed: &mut Listed,
+    listed: &mut ListedLog,
 ) -> Result<Option<LogEntry>, CardError<D::Error>> {
     let (_, names) = card.shown();
     if listed.names != names || listed.place > place {
-        *listed = Listed { names, ..Listed::default() };
+        *listed = ListedLog { names, ..ListedLog::default() };
     }
     let found = card.shown_behind(listed.entry, place - listed.place)?;
     if let Some((entry, _)) = found {

@@ -9,7 +9,7 @@
 
 use crate::{BLOCK_BYTES, Block, CardDevice};
 use hums_blackbox::parity::data_blocks;
-use hums_blackbox::record::{Before, Found};
+use hums_blackbox::record::{Before, PreviousEnd};
 use hums_blackbox::{GROUP_SECTORS, Header, Sector};
 
 use crate::card::{Card, CardError, LogEntry, Segment};
@@ -21,7 +21,7 @@ const PROBE_BLOCKS: u32 = 9;
 /// the one before it does.
 pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> Before {
     let number = newest.first().map_or(0, |newest| newest.name.session);
-    let unreadable = Before { found: Found::Unreadable, number, ..Before::default() };
+    let unreadable = Before { found: PreviousEnd::Unreadable, number, ..Before::default() };
     search(card, newest).ok().flatten().unwrap_or(unreadable)
 }
 
@@ -73,7 +73,7 @@ fn end_of<D: CardDevice>(
     }
     let end = reader.end(base, last, &header)?;
     Ok(Some(Before {
-        found: if end.is_some() { Found::Frames } else { Found::Sectors },
+        found: if end.is_some() { PreviousEnd::Frames } else { PreviousEnd::Sectors },
         number: entry.name.session,
         session,
         sectors: header.number.wrapping_add(1),

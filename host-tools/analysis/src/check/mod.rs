@@ -39,7 +39,7 @@ use crate::output;
 use crate::params;
 use crate::progress;
 use crate::source::find::{FoundRecordings, find, sessions_of};
-use crate::source::recording::{Format, Place};
+use crate::source::recording::{Format, LogPlace};
 use checked::Checked;
 use judge::{Heard, Limits};
 use judged::Judged;
@@ -153,7 +153,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     }
 }
 
-fn told(past: &Past, place: &Place, shows: bool) -> Told {
+fn told(past: &Past, place: &LogPlace, shows: bool) -> Told {
     let read = past.judge(place, Heard::Somewhere, shows).and_then(|read| {
         overview::is_heard(place, read.judged.vehicle().source.is_some())?;
         Ok(checked(place, read))
@@ -162,7 +162,7 @@ fn told(past: &Past, place: &Place, shows: bool) -> Told {
 }
 
 /// A link's recording, once for each of several vehicles; empty for one. Of standard input, read once, one is judged.
-fn vehicles(place: &Place, format: Format, judged: &Judged) -> Vec<Place> {
+fn vehicles(place: &LogPlace, format: Format, judged: &Judged) -> Vec<LogPlace> {
     let is_of_several = place.system.is_none() && format.is_of_link() && judged.systems.len() > 1;
     let is_apart = is_of_several && place.path().is_some();
     if is_apart { judged.systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
@@ -170,7 +170,7 @@ fn vehicles(place: &Place, format: Format, judged: &Judged) -> Vec<Place> {
 
 /// A recording, once for each of its vehicles: those that `hums check` judges, with their system ids in the names. An
 /// unreadable recording is returned as it is.
-pub fn by_vehicle(place: &Place) -> Vec<Place> {
+pub fn by_vehicle(place: &LogPlace) -> Vec<LogPlace> {
     let is_of_link = place.path().is_some() && place.open().is_ok_and(|open| open.format.is_of_link());
     let read = is_of_link.then(|| overview::judge(place, &Limits::default(), Heard::Somewhere, false));
     let read = read.and_then(Result::ok);
@@ -210,7 +210,7 @@ struct Told {
 
 impl Told {
     /// `place` is its recording.
-    fn vehicles(&self, place: &Place) -> Vec<Place> {
+    fn vehicles(&self, place: &LogPlace) -> Vec<LogPlace> {
         let checked = self.checked.as_ref().ok();
         checked.map_or_else(Vec::new, |checked| vehicles(place, checked.format, &checked.judged))
     }
@@ -223,11 +223,11 @@ impl HasEnding for Told {
 }
 
 /// Judges one recording, as `hums check` does.
-pub fn recording(place: &Place, limits: &Limits, heard: Heard) -> Result<Checked> {
+pub fn recording(place: &LogPlace, limits: &Limits, heard: Heard) -> Result<Checked> {
     overview::judge(place, limits, heard, false).map(|read| checked(place, read))
 }
 
-fn checked(place: &Place, read: Read) -> Checked {
+fn checked(place: &LogPlace, read: Read) -> Checked {
     let Read { format, judged, summary, .. } = read;
     let ending = summary.ending.map(|ending| Ending { name: place.name.clone(), ..ending });
     Checked { name: place.title.clone(), format, judged, ending }

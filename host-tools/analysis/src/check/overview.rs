@@ -24,7 +24,7 @@ use crate::names::counter_name;
 use crate::outcome::usage;
 use crate::progress;
 use crate::source::item::{Gap, Item, RecordingSummary, Take, Want};
-use crate::source::recording::{Format, Place};
+use crate::source::recording::{Format, LogPlace};
 use crate::summary::{Contents, ExceedanceLine, Overview};
 
 /// Fewer kinds of messages may be too little to judge, though the recorder checks.
@@ -45,12 +45,12 @@ pub(super) struct Read {
 }
 
 /// `shows`: progress.
-pub(super) fn judge(place: &Place, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
+pub(super) fn judge(place: &LogPlace, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
     judge_telling(place, limits, heard, shows, &mut |_, _| Ok(()))
 }
 
 fn judge_telling(
-    place: &Place,
+    place: &LogPlace,
     limits: &Limits,
     heard: Heard,
     shows: bool,
@@ -74,24 +74,28 @@ fn judge_telling(
 }
 
 /// Checked here if no monitor did.
-pub fn overview(place: &Place) -> Result<Overview> {
+pub fn overview(place: &LogPlace) -> Result<Overview> {
     read(place, None).map(|(overview, _)| overview)
 }
 
 /// The same, and hands on the recording's content in order: one reading for both. Returns the judgement too, if the monitor
 /// here checked the recording.
-pub fn overview_telling(place: &Place, take: &mut Take<'_>) -> Result<(Overview, Option<Judged>)> {
+pub fn overview_telling(place: &LogPlace, take: &mut Take<'_>) -> Result<(Overview, Option<Judged>)> {
     read(place, Some(take))
 }
 
-fn read(place: &Place, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+fn read(place: &LogPlace, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
     match place.own() {
         Some(log) => read_own(place, log, take),
         None => read_other(place, take),
     }
 }
 
-fn read_own(place: &Place, log: &Log, mut take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+fn read_own(
+    place: &LogPlace,
+    log: &Log,
+    mut take: Option<&mut Take<'_>>,
+) -> Result<(Overview, Option<Judged>)> {
     let (limits, is_told) = (Limits::default(), take.is_some());
     // A monitor ran: not judged here.
     let has_start = has_start(log);
@@ -136,7 +140,7 @@ fn read_own(place: &Place, log: &Log, mut take: Option<&mut Take<'_>>) -> Result
     Ok((overview, kept))
 }
 
-fn read_other(place: &Place, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+fn read_other(place: &LogPlace, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
     let (limits, is_told) = (Limits::default(), take.is_some());
     let mut nothing = |_, _: Item<'_>| Ok(());
     let take = take.unwrap_or(&mut nothing);
@@ -182,7 +186,7 @@ fn peaks(contents: &mut Contents) {
     give_worst(&mut contents.findings, &problems);
 }
 
-pub(super) fn is_heard(place: &Place, heard: bool) -> Result<()> {
+pub(super) fn is_heard(place: &LogPlace, heard: bool) -> Result<()> {
     let Some(wanted) = place.system.filter(|_| !heard) else { return Ok(()) };
     let mut systems = BTreeSet::new();
     if !place.is_standard() {

@@ -14,7 +14,7 @@ use super::trends::{Baselines, FLIGHTS_MIN};
 use crate::names::type_name;
 use crate::outcome::usage;
 use crate::source::find::find;
-use crate::source::recording::{Format, Place};
+use crate::source::recording::{Format, LogPlace};
 
 /// Limits, and a vehicle's earlier flights.
 pub(super) struct Past {
@@ -44,7 +44,7 @@ impl Past {
     }
 
     /// `shows`: progress; another vehicle's trends are not judged, with a message.
-    pub(super) fn judge(&self, place: &Place, heard: Heard, shows: bool) -> Result<Read> {
+    pub(super) fn judge(&self, place: &LogPlace, heard: Heard, shows: bool) -> Result<Read> {
         let mut read = overview::judge(place, &self.limits, heard, shows)?;
         let Some((baselines, past)) = &self.taught else { return Ok(read) };
         match (past, vehicle(&read.judged, read.format)) {
@@ -92,11 +92,11 @@ impl Series {
 ///
 /// # Errors
 /// A usage error for different vehicles.
-pub fn learn(limits: &Limits, places: &[Place]) -> Result<Baselines> {
+pub fn learn(limits: &Limits, places: &[LogPlace]) -> Result<Baselines> {
     learnt(limits, places).map(|(baselines, _)| baselines)
 }
 
-fn learnt(limits: &Limits, places: &[Place]) -> Result<(Baselines, Option<Vehicle>)> {
+fn learnt(limits: &Limits, places: &[LogPlace]) -> Result<(Baselines, Option<Vehicle>)> {
     let (mut baselines, mut first) = (Baselines::default(), None::<(&str, Vehicle)>);
     for place in places {
         let mut read = overview::judge(place, limits, Heard::Somewhere, false)?;

@@ -24,7 +24,7 @@ impl Writer for Gpx {
         omits: "attitude, battery, motors, texts, parameters: all but the track and findings",
         ..FormatDetails::new("gpx", "The track with time, findings as waypoints, for maps", Files::One("gpx"))
     };
-    type Part = Findings;
+    type Encoder = Findings;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self { file: Single::open(context, path)?, track: Spool::new()?, journey: Journey::default() })

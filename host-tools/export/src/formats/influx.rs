@@ -14,7 +14,7 @@ use hums_dialect::{Field, Kind};
 
 use crate::context::Context;
 use crate::field_names::free_name;
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Totals, Writer, lines_of};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Totals, Writer, lines_of};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::mavlink::frame::Frame;
@@ -369,7 +369,7 @@ pub(super) struct Influx {
 #[derive(Default)]
 pub(super) struct Points(Lines);
 
-impl Part for Points {
+impl GroupEncoder for Points {
     fn frame(&mut self, context: &Context, entry: &Entry<'_>) {
         self.0.frame(&context.tags, entry.at, entry.frame, entry.known);
     }
@@ -389,7 +389,7 @@ impl Writer for Influx {
         needs_identity: true,
         ..FormatDetails::new("influx", "Lines for InfluxDB, VictoriaMetrics and QuestDB", Files::One("lp"))
     };
-    type Part = Points;
+    type Encoder = Points;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self {

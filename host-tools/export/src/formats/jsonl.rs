@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 
 use crate::context::Context;
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Totals, Writer, lines_of};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Totals, Writer, lines_of};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::names::message_name;
@@ -25,7 +25,7 @@ pub(super) struct Jsonl {
 #[derive(Default)]
 pub(super) struct Lines(Vec<u8>);
 
-impl Part for Lines {
+impl GroupEncoder for Lines {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let Entry { frame, known, .. } = entry;
         let out = &mut self.0;
@@ -70,7 +70,7 @@ impl Writer for Jsonl {
         "An object a line, in order of time, for scripts and log stores",
         Files::One("jsonl"),
     );
-    type Part = Lines;
+    type Encoder = Lines;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self { file: Single::open(context, path)?, objects: 0 })

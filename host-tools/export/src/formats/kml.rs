@@ -80,7 +80,7 @@ impl Writer for Kml {
             Files::One("kml"),
         )
     };
-    type Part = Findings;
+    type Encoder = Findings;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         let mut file = Single::open(context, path)?;

@@ -94,7 +94,7 @@ impl Writer for Srt {
             Files::One("srt"),
         )
     };
-    type Part = Findings;
+    type Encoder = Findings;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         // Those of this program are known before; those of a board come in order.

@@ -106,7 +106,7 @@ impl Writer for Thesis {
             Files::Tables(Some("thesis"), "csv"),
         )
     };
-    type Part = ();
+    type Encoder = ();
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         let folder = Folder::create(path, &context.inputs, &context.session)?;

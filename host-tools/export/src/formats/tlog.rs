@@ -9,7 +9,7 @@ use hums_blackbox::{Cause, Gap};
 use crate::context::Context;
 use crate::files::{Output, appended, settle};
 use crate::findings::Texts;
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Totals, Writer};
 use crate::made::OutputFile;
 use crate::plural::count;
 use crate::record::gap_row;
@@ -27,7 +27,7 @@ pub(super) struct Tlog {
 #[derive(Default)]
 pub(super) struct Records(Vec<u8>);
 
-impl Part for Records {
+impl GroupEncoder for Records {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let utc = entry.utc_us.unwrap_or_else(|| entry.at.as_micros());
         self.0.extend_from_slice(&utc.to_be_bytes());
@@ -56,7 +56,7 @@ impl Writer for Tlog {
             Files::One("tlog"),
         )
     };
-    type Part = Records;
+    type Encoder = Records;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         let tlog = Self {

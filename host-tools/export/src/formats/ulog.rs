@@ -16,7 +16,7 @@ use hums_core::vehicle::Vehicle;
 
 use crate::checked::finding_words;
 use crate::context::Context;
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Single, Spool, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Spool, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::ids::RC_CHANNELS;
 use crate::mavlink::values::{FieldValue, Scalar};
@@ -24,7 +24,7 @@ use crate::motion::{Motion, quaternion};
 use crate::plural::count;
 use crate::source::told::Finding;
 use crate::source::ulog::nav_state;
-use crate::story::{Said, Story};
+use crate::story::{Story, StoryEntry};
 
 const MAGIC: [u8; 8] = [0x55, 0x4C, 0x6F, 0x67, 0x01, 0x12, 0x35, 1];
 /// Parameters at most: autopilots have some 1,500.
@@ -86,7 +86,7 @@ pub(crate) struct Words {
     findings: Vec<Finding>,
 }
 
-impl Part for Words {
+impl GroupEncoder for Words {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let Some(payload) = entry.known.filter(|_| entry.frame.id == RC_CHANNELS) else { return };
         let number = |name: &str| payload.number(name).unwrap_or(0.0);
@@ -245,10 +245,10 @@ impl Ulog {
         self.data.write(&message(b'L', &content))
     }
 
-    fn said(&mut self, said: &Said) -> Result<()> {
+    fn said(&mut self, said: &StoryEntry) -> Result<()> {
         match said {
-            Said::Text { at, severity, words } => self.text(*at, *severity, words),
-            Said::Parameter { name, value, .. } => match self.parameters.get(name).copied() {
+            StoryEntry::Text { at, severity, words } => self.text(*at, *severity, words),
+            StoryEntry::Parameter { name, value, .. } => match self.parameters.get(name).copied() {
                 Some(known) if known.to_bits() == value.to_bits() => Ok(()),
                 Some(_) => self.data.write(&parameter(name, *value)),
                 None if self.parameters.len() < PARAMETERS_MAX => {
@@ -396,7 +396,7 @@ impl Writer for Ulog {
             Files::One("ulg"),
         )
     };
-    type Part = Words;
+    type Encoder = Words;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self {

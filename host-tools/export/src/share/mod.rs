@@ -30,8 +30,8 @@ use crate::plural::count;
 use crate::printable;
 use crate::source::find::find;
 use crate::source::item::{Item, Want};
-use crate::source::recording::Place;
-use crate::story::{Observed, Said, Story};
+use crate::source::recording::LogPlace;
+use crate::story::{Observed, Story, StoryEntry};
 use moved::{Moved, SHARED_UTC_US};
 use rules::{Rule, Rules};
 
@@ -153,7 +153,7 @@ impl Share {
     }
 
     /// Returns whether the recording has damage.
-    fn link(&mut self, place: &Place, context: &Context, args: &ShareRequest) -> Result<bool> {
+    fn link(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
         let mut file = Single::open(context, &args.output)?;
         let want = Want { frames: true, ..Want::default() };
         let (mut bytes, mut lossy) = (Vec::new(), false);
@@ -206,7 +206,8 @@ impl Share {
             self.remove(&name);
             return None;
         }
-        let value = |place: &rules::Place| payload.get(place.at..place.at + place.size).unwrap_or_default();
+        let value =
+            |place: &rules::FieldRule| payload.get(place.at..place.at + place.size).unwrap_or_default();
         let degrees = |rule| {
             let place = fields.iter().find(|place| place.rule == Some(rule))?;
             Some(i32::from_le_bytes(*value(place).first_chunk()?))
@@ -241,7 +242,7 @@ impl Share {
     }
 
     /// Returns whether the recording has damage.
-    fn own(&mut self, place: &Place, context: &Context, args: &ShareRequest) -> Result<bool> {
+    fn own(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
         let mut file = Ulog::open(context, &args.output)?;
         let (mut story, mut lossy) = (Story::default(), false);
         let want = Want { observations: true, ..Want::default() };
@@ -264,7 +265,7 @@ impl Share {
                 Item::Text(text) if !self.rules.keeps_text(text.words) => self.remove(TEXTS),
                 Item::Parameter(told) if !self.rules.keeps_parameter(told.name) => self.remove(PARAMETERS),
                 Item::Gap(gap) => lossy |= gap.cause.is_damage(),
-                item => story.said.extend(Said::of(at, &item)),
+                item => story.said.extend(StoryEntry::of(at, &item)),
             }
             if story.observed.len() >= PART_ITEMS {
                 file.part(context, Words::default(), &std::mem::take(&mut story))?;

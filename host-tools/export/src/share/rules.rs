@@ -38,7 +38,7 @@ impl Rule {
 
 /// A field of a message: its name, type, place in the payload and size, and its treatment; `None` if it is removed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct FieldRule {
     pub(super) name: &'static str,
     pub(super) kind: Kind,
     pub(super) at: usize,
@@ -48,7 +48,7 @@ pub(super) struct Place {
 
 /// All rules.
 pub(super) struct Rules {
-    messages: BTreeMap<u32, Vec<Place>>,
+    messages: BTreeMap<u32, Vec<FieldRule>>,
     keep: Vec<&'static str>,
     drop: Vec<&'static str>,
     words: BTreeSet<&'static str>,
@@ -58,12 +58,12 @@ fn lines(text: &'static str) -> impl Iterator<Item = std::str::SplitWhitespace<'
     text.lines().filter(|line| !line.starts_with('#')).map(str::split_whitespace)
 }
 
-pub(super) fn places(message: &'static Message, kept: &BTreeMap<&str, Rule>) -> Vec<Place> {
+pub(super) fn places(message: &'static Message, kept: &BTreeMap<&str, Rule>) -> Vec<FieldRule> {
     let mut at = 0;
     let place = |field: &'static hums_dialect::Field| {
         let begin = at;
         at += field.size();
-        Place {
+        FieldRule {
             name: field.name,
             kind: field.kind,
             at: begin,
@@ -96,7 +96,7 @@ impl Rules {
         Self { messages, keep: parts("keep"), drop: parts("drop"), words: lines(WORDS).flatten().collect() }
     }
 
-    pub(super) fn fields(&self, id: u32) -> Option<&[Place]> {
+    pub(super) fn fields(&self, id: u32) -> Option<&[FieldRule]> {
         self.messages.get(&id).map(Vec::as_slice)
     }
 

@@ -32,7 +32,7 @@ fn secrets() -> Vec<Vec<u8>> {
 }
 
 /// A value of a field: a secret unless the field stays as it is.
-fn planted(place: &rules::Place) -> Vec<u8> {
+fn planted(place: &rules::FieldRule) -> Vec<u8> {
     let (rule, kind) = (place.rule, place.kind);
     let mut bytes = match (rule, kind) {
         (Some(Rule::Keep), _) => vec![1; place.size],

@@ -1,6 +1,6 @@
 //! The proof of a log's end.
 
-use hums_blackbox::record::{Before, Found, Resting};
+use hums_blackbox::record::{Before, PreviousEnd, Resting};
 use hums_core::clock::Instant;
 
 use crate::logs::reader::LogSummary;
@@ -52,7 +52,7 @@ impl Proof {
         if let Some(next) = next
             && next.sectors >= sectors
         {
-            let counted = (next.found == Found::Frames).then_some(next.frames);
+            let counted = (next.found == PreviousEnd::Frames).then_some(next.frames);
             let frames = counted.zip(summary.frames_end).map(|(there, here)| there.wrapping_sub(here));
             let frames = frames.filter(|missing| *missing < 1 << 31);
             // The sector in progress is written again and again: an older copy has fewer frames.
@@ -189,8 +189,13 @@ mod tests {
             frames_end: Some(3047),
             ..LogSummary::default()
         };
-        let next =
-            |frames| Before { found: Found::Frames, session: 7, sectors: 26, frames, ..Before::default() };
+        let next = |frames| Before {
+            found: PreviousEnd::Frames,
+            session: 7,
+            sectors: 26,
+            frames,
+            ..Before::default()
+        };
         let short = Proof::Short { sectors: 0, frames: Some(17), by: Teller::NextStart };
         assert_eq!(Proof::of(&summary, Some(&next(3064))), short);
         assert_eq!(short.words(&summary), "17 frames missing at its end: the next start found them");

@@ -1,7 +1,7 @@
 //! Facts from a log's own records.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::{Before, Found, Resting};
+use hums_blackbox::record::{Before, PreviousEnd, Resting};
 use hums_core::clock::Instant;
 
 use crate::loss::lost;
@@ -68,7 +68,7 @@ impl Marks {
             Record::Boot(boot) => {
                 self.has_boot = true;
                 self.before =
-                    Some(boot.before).filter(|before| before.found != Found::Unknown).or(self.before);
+                    Some(boot.before).filter(|before| before.found != PreviousEnd::Unknown).or(self.before);
             }
             _ => {}
         }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
-use super::recording::{Place, of_one_vehicle};
+use super::recording::{LogPlace, of_one_vehicle};
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::{make_unique, name_after};
@@ -31,7 +31,7 @@ const PASSED_OVER_MAX: usize = 20;
 #[derive(Debug, Default)]
 pub struct FoundRecordings {
     /// Recordings in named order, a folder's by name.
-    pub places: Vec<Place>,
+    pub places: Vec<LogPlace>,
     /// Facts from the file systems of cards and images.
     pub images: Vec<Image>,
     /// Remarks, as sentences.
@@ -61,7 +61,7 @@ impl FoundRecordings {
                 _ if single => path.display().to_string(),
                 _ => format!("{}:{}", path.display(), log.name),
             };
-            self.places.push(Place::log(name, log));
+            self.places.push(LogPlace::log(name, log));
         }
     }
 
@@ -95,14 +95,14 @@ impl FoundRecordings {
 
     /// Made by `hums decode` from another input: a flight counts once.
     fn drop_made(&mut self) {
-        let made_of = |stem: &str, other: &Place| match other.own() {
+        let made_of = |stem: &str, other: &LogPlace| match other.own() {
             Some(log) => first_session(log).is_some_and(|session| stem.contains(&format!("-s{session:08x}"))),
             None => other
                 .path()
                 .and_then(|path| stem.strip_prefix(path.file_name()?.to_str()?))
                 .is_some_and(|rest| rest.starts_with("-r")),
         };
-        let original = |place: &Place| {
+        let original = |place: &LogPlace| {
             let stem = place.path()?.file_name()?.to_str()?.strip_suffix(".tlog")?;
             let original = self.places.iter().find(|other| made_of(stem, other))?;
             Some(format!(
@@ -124,7 +124,7 @@ impl FoundRecordings {
                 own.title
             )));
         }
-        let files = self.places.iter().filter(|_| system.is_some()).filter_map(Place::path);
+        let files = self.places.iter().filter(|_| system.is_some()).filter_map(LogPlace::path);
         for path in files {
             if format_of(&start_of(path)).is_some_and(|format| !format.is_of_link()) {
                 return Err(of_one_vehicle(&path.display().to_string()));
@@ -137,7 +137,7 @@ impl FoundRecordings {
     /// A session by name, number, or the title that `hums check` gives it.
     pub fn session(&self, name: &str) -> Result<usize> {
         let number = |name: &str| name.parse::<u32>().ok();
-        let is_it = |place: &Place| {
+        let is_it = |place: &LogPlace| {
             place.name == name
                 || place.title == name
                 || number(name).is_some_and(|wanted| number(&place.name) == Some(wanted))
@@ -166,8 +166,8 @@ impl FoundRecordings {
 
     /// All files.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        let pieces = self.places.iter().filter_map(Place::own).flat_map(|log| &log.pieces);
-        let files = self.places.iter().filter_map(Place::path);
+        let pieces = self.places.iter().filter_map(LogPlace::own).flat_map(|log| &log.pieces);
+        let files = self.places.iter().filter_map(LogPlace::path);
         pieces.map(|piece| piece.path.as_path()).chain(files)
     }
 }
@@ -179,10 +179,10 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
     let mut segments: Vec<PathBuf> = inputs.iter().filter(is_segment).cloned().collect();
     for input in inputs {
         if input == Path::new("-") {
-            if found.places.iter().any(Place::is_standard) {
+            if found.places.iter().any(LogPlace::is_standard) {
                 return Err(usage("-: standard input is named twice, and can be read once only"));
             }
-            found.places.push(Place::standard());
+            found.places.push(LogPlace::standard());
             continue;
         }
         let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
@@ -197,7 +197,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
             let own = logs::find::find_in(input, salvage)?;
             let mut walk = Walk::of(input, &own)?;
             found.add_own(input, own);
-            found.places.extend(walk.paths.iter().map(|path| Place::file(path)));
+            found.places.extend(walk.paths.iter().map(|path| LogPlace::file(path)));
             found.drop_made();
             found.is_cut |= walk.left_out > 0;
             found.remarks.extend(walk.left_out_words(input));
@@ -220,7 +220,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
             let own = logs::find(&together, salvage).map_err(|error| not_known(input, error))?;
             found.add_own(input, own);
         } else {
-            found.places.push(Place::file(input));
+            found.places.push(LogPlace::file(input));
         }
         found.drop_repeats(before);
         if inputs.len() > 1 && segment_name(input).is_none() {
@@ -251,7 +251,7 @@ pub fn besides(folder: &Path, own: &logs::FoundLogs) -> Result<(Vec<String>, boo
 }
 
 /// Which session each number of the cards holds.
-pub fn sessions_of(places: &[Place]) -> Sessions {
+pub fn sessions_of(places: &[LogPlace]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }
 

@@ -9,7 +9,7 @@
 //! | PX4's `ULog` | `ulog` |
 //!
 //! A further format is a [`item::Reader`], and a line of [`recording::Recording::new`]. Items come in order
-//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::Place::in_parts`]) for all cores.
+//! ([`recording::Recording::read`]), or in [`parts`] ([`recording::LogPlace::in_parts`]) for all cores.
 //!
 //! # Bytes
 //!

@@ -26,8 +26,8 @@ pub const RAW_BAUD: u32 = 115_200;
 
 /// A found recording, not yet open.
 #[derive(Clone, Debug)]
-pub struct Place {
-    /// Place for people: path, or path and session.
+pub struct LogPlace {
+    /// LogPlace for people: path, or path and session.
     pub title: String,
     /// Name for files made of it, unique within one call: the file's, or a session's as in `hums info`.
     pub name: String,
@@ -44,7 +44,7 @@ enum From {
     Log(Box<Log>),
 }
 
-impl Place {
+impl LogPlace {
     /// The place with only this system id.
     pub fn of_system(&self, system: u8) -> Self {
         Self { system: Some(system), ..self.clone() }

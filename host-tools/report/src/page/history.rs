@@ -26,7 +26,7 @@ use super::note::Note;
 use super::parameters::{ParameterJson, Parameters};
 use super::plots::{self, Line, Plot};
 use super::samples::Samples;
-use super::spans::{Rest, Seen, Spans};
+use super::spans::{Rest, SentSpans, Spans};
 use crate::reference::Reference;
 use crate::series::{self, Store};
 use crate::track::Point;
@@ -73,8 +73,8 @@ pub struct Cursor {
     described: (usize, u64),
     notes: u64,
     places: usize,
-    phases: Seen,
-    modes: Seen,
+    phases: SentSpans,
+    modes: SentSpans,
     gaps: usize,
     until: Option<Instant>,
     /// Time of its last update of series.
@@ -83,7 +83,7 @@ pub struct Cursor {
 
 /// The part of a history that a page does not have yet.
 #[derive(Debug, Serialize)]
-pub struct Part {
+pub struct HistoryPart {
     pub(super) t: &'static str,
     pub(super) vehicle: u8,
     /// Drop all earlier data of it.
@@ -96,7 +96,7 @@ pub struct Part {
     pub(super) notes: Vec<Note>,
     /// Notes that there was no room for: the oldest ones.
     pub(super) notes_gone: u64,
-    pub(super) track: Vec<Place>,
+    pub(super) track: Vec<TrackPoint>,
     pub(super) phases: Option<Rest>,
     pub(super) modes: Option<Rest>,
     /// All gaps of the record, if there is a new one: from and to, seconds.
@@ -108,7 +108,7 @@ pub struct Part {
 }
 
 /// Seconds, degrees north, degrees east, height in metres.
-pub type Place = (f64, f64, f64, Option<f32>);
+pub type TrackPoint = (f64, f64, f64, Option<f32>);
 
 /// A plot in words, as [`plots`] has them.
 #[derive(Debug, Serialize)]
@@ -258,7 +258,7 @@ impl History {
 
     /// The part up to `until` that a page with this cursor lacks; moves the cursor there. `None` without
     /// news.
-    pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<Part> {
+    pub fn since(&self, vehicle: u8, cursor: &mut Cursor, until: Instant) -> Option<HistoryPart> {
         let Samples { store, track, thinned, .. } = &self.samples;
         let spacing_ms = store.spacing_ms();
         let same = (cursor.thinned, cursor.spacing_ms) == (*thinned, spacing_ms);
@@ -312,7 +312,7 @@ impl History {
             || phases.is_some()
             || modes.is_some()
             || gaps.is_some();
-        something.then(|| Part {
+        something.then(|| HistoryPart {
             t: "history",
             vehicle,
             reset,
@@ -361,7 +361,7 @@ fn name((plot, line): Line) -> String {
     name
 }
 
-pub(super) fn told(place: &Point, from: Instant) -> Place {
+pub(super) fn told(place: &Point, from: Instant) -> TrackPoint {
     let height_m = place.height_m.filter(|height_m| height_m.is_finite());
     (place.at.as_secs_f64() - from.as_secs_f64(), place.latitude_deg, place.longitude_deg, height_m)
 }

@@ -4,7 +4,7 @@
 use hums_core::clock::Instant;
 use hums_core::observation::Autopilot;
 
-use super::history::{History, Part, Place, PlotJson, Series, told};
+use super::history::{History, HistoryPart, PlotJson, Series, TrackPoint, told};
 use super::plots::{self, Limits, Plot};
 use crate::series::Store;
 
@@ -53,7 +53,7 @@ const fn is_compared(plot: Plot, line: u8) -> bool {
 }
 
 /// One part that is all of them, in the order in which they are given; limits are those of the first one.
-pub fn merged(flights: &[MergedFlight<'_>]) -> Part {
+pub fn merged(flights: &[MergedFlight<'_>]) -> HistoryPart {
     let mut store: Store<Quantity> = Store::of(SERIES_EACH * flights.len());
     // Take-off is the beginning of all.
     store.interval(Instant::ZERO);
@@ -65,7 +65,7 @@ pub fn merged(flights: &[MergedFlight<'_>]) -> Part {
     let series = store.part(0..=u16::MAX);
     let series = series.map(|(line, part)| (name(line), about(line.0).decimals, part)).collect();
     let plots = plots(&store, flights);
-    Part {
+    HistoryPart {
         t: "history",
         vehicle: 0,
         reset: true,
@@ -110,7 +110,7 @@ fn add(store: &mut Store<Quantity>, number: u8, flight: &MergedFlight<'_>) {
 
 /// The track of a flight, from its take-off on: the first place of each of at most `PLACES_MAX` pieces, and
 /// the last.
-pub fn places(flight: &MergedFlight<'_>) -> Vec<Place> {
+pub fn places(flight: &MergedFlight<'_>) -> Vec<TrackPoint> {
     let (from, to) = flight.span;
     let track = flight.history.track();
     let begin = track.partition_point(|place| place.at < from);

@@ -36,12 +36,12 @@ pub struct Note {
     pub words: String,
     /// More of a finding of a check.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub found: Option<Found>,
+    pub found: Option<FindingNote>,
 }
 
 /// A finding of a check.
 #[derive(Clone, Debug, Serialize)]
-pub struct Found {
+pub struct FindingNote {
     /// The check's stable name.
     pub check: String,
     /// Which one of several, from 0.
@@ -150,7 +150,7 @@ impl Note {
             from: "here".to_owned(),
             subsystem: finding.subsystem.name(),
             words,
-            found: Some(Found {
+            found: Some(FindingNote {
                 check: finding.check.clone(),
                 instance: finding.instance,
                 previous: finding.previous.name(),
@@ -221,7 +221,7 @@ impl Note {
                 "" => name,
                 rest => format!("{name}: {rest}"),
             },
-            found: Some(Found {
+            found: Some(FindingNote {
                 check: check.to_owned(),
                 instance,
                 previous: "",

@@ -16,7 +16,7 @@ pub struct Spans {
 
 /// The part of it that a page has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
+pub struct SentSpans {
     revision: u64,
     count: usize,
 }
@@ -54,9 +54,9 @@ impl Spans {
     }
 
     /// The part up to `until` that a page with these spans lacks; `None` if there is nothing new.
-    pub fn since(&self, seen: &mut Seen, until: Instant) -> Option<Rest> {
+    pub fn since(&self, seen: &mut SentSpans, until: Instant) -> Option<Rest> {
         let count = self.begun.partition_point(|(at, _)| *at <= until);
-        let now = Seen { revision: self.revision, count };
+        let now = SentSpans { revision: self.revision, count };
         if *seen == now {
             return None;
         }
@@ -83,13 +83,13 @@ mod tests {
         spans.extend(seconds(1), "hover".into(), Span::from_secs(2));
         spans.extend(seconds(9), "climb".into(), Span::from_secs(2));
         spans.begin_as("cruise".into());
-        let (_, whole) = spans.since(&mut Seen::default(), seconds(100)).expect("all of it");
+        let (_, whole) = spans.since(&mut SentSpans::default(), seconds(100)).expect("all of it");
         assert_eq!(whole, [(0.0, "hover".into()), (9.0, "climb".into())]);
     }
 
     #[test]
     fn a_page_that_follows_has_what_a_page_has_that_comes_late_and_short_ones_are_taken_back() {
-        let (mut spans, mut seen, mut page) = (Spans::default(), Seen::default(), Vec::new());
+        let (mut spans, mut seen, mut page) = (Spans::default(), SentSpans::default(), Vec::new());
         for (second, name) in [(0, "a"), (10, "b"), (11, "a"), (20, "c"), (21, "d"), (22, "e"), (40, "b")] {
             spans.extend(seconds(second), name.into(), Span::from_secs(2));
             if let Some((stay, rest)) = spans.since(&mut seen, seconds(second)) {
@@ -97,10 +97,13 @@ mod tests {
                 page.extend(rest);
             }
         }
-        let (_, whole) = spans.since(&mut Seen::default(), seconds(100)).expect("all of it");
+        let (_, whole) = spans.since(&mut SentSpans::default(), seconds(100)).expect("all of it");
         assert_eq!(page, whole);
         let names: Vec<_> = whole.iter().map(|(at_s, name)| (*at_s as u64, &**name)).collect();
         assert_eq!(names, [(0, "a"), (22, "e"), (40, "b")]);
-        assert!(spans.since(&mut Seen::default(), seconds(30)).expect("a part").1.len() == 2, "no future");
+        assert!(
+            spans.since(&mut SentSpans::default(), seconds(30)).expect("a part").1.len() == 2,
+            "no future"
+        );
     }
 }

@@ -13,10 +13,10 @@ use super::tiles::Tiles;
 use super::trend::airframe;
 use crate::check;
 use crate::names::{autopilot_name, type_name};
-use crate::page::history::{Part, Place as Whereabouts};
+use crate::page::history::{HistoryPart, TrackPoint};
 use crate::page::merged::{self, merged, places};
 use crate::page::note::Note;
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::summary::Overview;
 use crate::utc::iso8601;
 
@@ -29,7 +29,7 @@ const FINDINGS_MAX: usize = 100;
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<'a> {
     /// Its place.
-    pub place: &'a Place,
+    pub place: &'a LogPlace,
     /// The file of its page beside this one.
     pub page: Option<&'a str>,
 }
@@ -43,7 +43,7 @@ struct Recorded<'a> {
 #[derive(Serialize)]
 struct Data {
     version: &'static str,
-    flight: Part,
+    flight: HistoryPart,
     /// The newest first.
     flights: Vec<FlightJson>,
     /// Parameters that differ, and each flight's values; `null` without one.
@@ -63,7 +63,7 @@ struct FlightJson {
     findings: Vec<(f64, &'static str, String)>,
     findings_count: usize,
     /// From its take-off on.
-    track: Vec<Whereabouts>,
+    track: Vec<TrackPoint>,
 }
 
 /// A page of the last flights in recordings, in order; `None` for fewer than two.

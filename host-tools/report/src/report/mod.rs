@@ -38,7 +38,7 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::{path as shown, word};
 use crate::source::find::{FoundRecordings, find, sessions_of};
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::summary::Overview;
 
 /// Output of `hums report --json`.
@@ -176,7 +176,7 @@ fn beside(inputs: &[PathBuf]) -> Result<PathBuf> {
 }
 
 struct Making<'a> {
-    places: &'a [Place],
+    places: &'a [LogPlace],
     inputs: &'a Inputs,
     wanted: &'a Wanted,
     /// The data of each session that later ones are compared with.
@@ -250,7 +250,7 @@ impl Making<'_> {
     fn page(
         &mut self,
         index: usize,
-        place: &Place,
+        place: &LogPlace,
         overview: &Overview,
         this: &trend::Session,
         path: &Path,
@@ -391,7 +391,7 @@ fn without_folders(overview: &Overview) -> Overview {
 #[derive(Clone, Copy, Debug)]
 pub enum What<'a> {
     /// Of this recording.
-    Session(&'a Place),
+    Session(&'a LogPlace),
     /// The table of this many pages.
     Table(usize),
     /// Of flights side by side.
@@ -416,7 +416,7 @@ impl Display for What<'_> {
 
 /// Whether two sessions are of one card, and so of one box: in one image, or segments in one folder. A
 /// recording or a packed log may have any neighbours.
-fn are_of_one_card(one: &Place, other: &Place) -> bool {
+fn are_of_one_card(one: &LogPlace, other: &LogPlace) -> bool {
     let Some((one, other)) = one.own().zip(other.own()) else { return false };
     let image = |log: &Log| log.pieces.first().map(|piece| piece.path.clone());
     let folder = |log: &Log| {

@@ -13,7 +13,7 @@ use super::tiles::Tiles;
 use super::trend::Trend;
 use crate::counters::{self, Counters};
 use crate::log_json::LogJson;
-use crate::page::history::{Cursor, Part};
+use crate::page::history::{Cursor, HistoryPart};
 use crate::page::json::embedded;
 use crate::page::program::{STYLE, UPLOT, program};
 use crate::page::spectrum::SpectrumJson;
@@ -26,7 +26,7 @@ struct Data<'a> {
     version: &'static str,
     log: LogJson,
     epoch_us: Option<u64>,
-    flight: Option<Part>,
+    flight: Option<HistoryPart>,
     flights: &'a [Flight],
     /// The gaps.
     missing: &'a [Missing],

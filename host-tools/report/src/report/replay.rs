@@ -22,7 +22,7 @@ use crate::page::parameters::Parameters;
 use crate::page::spectrum::{ROWS, Spectra, SpectrumJson};
 use crate::reference::Reference;
 use crate::source::item::{Cause, Item, Rows, Text, Want};
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 use crate::statustext;
 use crate::summary::{EndsInAir, JudgedChecks, Overview};
 
@@ -71,7 +71,7 @@ pub struct Replay {
 }
 
 /// The autopilot's parameters as they were at the end of a recording.
-pub fn parameters(place: &Place) -> Result<Vec<(String, f64)>> {
+pub fn parameters(place: &LogPlace) -> Result<Vec<(String, f64)>> {
     let mut parameters = Parameters::default();
     place.open()?.read(Want::default(), &mut |at, item| {
         if let Item::Parameter(parameter) = item {
@@ -84,7 +84,7 @@ pub fn parameters(place: &Place) -> Result<Vec<(String, f64)>> {
 
 impl Replay {
     /// Reads a recording with this overview.
-    pub fn of(place: &Place, overview: &Overview) -> Result<Self> {
+    pub fn of(place: &LogPlace, overview: &Overview) -> Result<Self> {
         let mut replay = Self::default();
         let want = Want { frames: true, observations: true, rows: Rows::Named(&NAMES), ..Want::default() };
         let mut spectra = Spectra::default();

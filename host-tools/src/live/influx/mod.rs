@@ -262,7 +262,7 @@ mod tests {
             let text = String::from_utf8(batch.text).expect("text");
             assert_eq!(text.lines().count() as u64, batch.points);
             lines.extend(text.lines().map(str::to_owned));
-            queue.done(queue::Delivered { written: batch.points, ..queue::Delivered::default() });
+            queue.done(queue::Delivery { written: batch.points, ..queue::Delivery::default() });
         }
         lines
     }

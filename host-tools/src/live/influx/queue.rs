@@ -18,7 +18,7 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// A batch's result.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Delivered {
+pub struct Delivery {
     /// Points in the database.
     pub written: u64,
     /// Invalid points.
@@ -98,7 +98,7 @@ impl Queue {
     }
 
     /// The taken batch was delivered.
-    pub fn done(&self, delivered: Delivered) {
+    pub fn done(&self, delivered: Delivery) {
         let mut inner = self.lock();
         inner.in_hand = 0;
         inner.figures.written += delivered.written;
@@ -155,8 +155,8 @@ mod tests {
         Batch { text: format!("m value={number} {number}\n").repeat(100).into_bytes(), points: 100 }
     }
 
-    fn all() -> Delivered {
-        Delivered { written: 100, ..Delivered::default() }
+    fn all() -> Delivery {
+        Delivery { written: 100, ..Delivery::default() }
     }
 
     fn queue(bytes_max: usize, patient: bool) -> Queue {
@@ -210,7 +210,7 @@ mod tests {
         queue.put(batch(1));
         queue.take().expect("it waits");
         assert_eq!(queue.figures().waiting, 100, "it is in the writer's hand");
-        queue.done(Delivered { written: 97, refused: 3, why: "field type conflict".to_owned() });
+        queue.done(Delivery { written: 97, refused: 3, why: "field type conflict".to_owned() });
         let figures = queue.figures();
         assert_eq!((figures.written, figures.rejected, figures.waiting), (97, 3, 0));
         assert_eq!(

@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result};
 use ureq::Agent;
 
 use super::batch::Batch;
-use super::queue::{Delivered, Queue};
+use super::queue::{Delivery, Queue};
 use super::target::Target;
 
 const LIMIT: Duration = Duration::from_secs(10);
@@ -90,8 +90,8 @@ fn persist(agent: &Agent, target: &Target, queue: &Queue, lines: &[u8]) -> Optio
 }
 
 /// Refused parts in halves, with bounded requests.
-fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) -> Option<Delivered> {
-    let mut delivered = Delivered::default();
+fn in_halves(batch: &Batch, mut deliver: impl FnMut(&[u8]) -> Option<Answer>) -> Option<Delivery> {
+    let mut delivered = Delivery::default();
     // The first one last.
     let mut parts: Vec<(&[u8], u64)> = vec![(&batch.text, batch.points)];
     let mut requests = 0;
@@ -236,7 +236,7 @@ mod tests {
     }
 
     /// Refuses any request with a bad line. Returns result, stored lines and requests.
-    fn deliver(batch: &Batch) -> (Delivered, Vec<String>, usize) {
+    fn deliver(batch: &Batch) -> (Delivery, Vec<String>, usize) {
         let (mut has, mut requests) = (Vec::new(), 0);
         let delivered = in_halves(batch, |lines| {
             requests += 1;
@@ -262,7 +262,7 @@ mod tests {
         }
         let (delivered, _, requests) = deliver(&batch(1, &[0]));
         assert_eq!((delivered.written, delivered.refused, requests), (0, 1, 1));
-        assert_eq!(deliver(&batch(2_048, &[])).0, Delivered { written: 2_048, ..Delivered::default() });
+        assert_eq!(deliver(&batch(2_048, &[])).0, Delivery { written: 2_048, ..Delivery::default() });
     }
 
     #[test]

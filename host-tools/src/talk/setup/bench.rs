@@ -10,7 +10,7 @@ use hums_link::asking::wanted;
 use hums_link::messages;
 use hums_link::packet::Fields;
 
-use super::{ARDUPILOT, CheckLine, Heard, Own, PX4, TRIES, line};
+use super::{ARDUPILOT, BoxSettings, CheckLine, HeardAutopilot, PX4, TRIES, line};
 use crate::mavlink::ids::{
     ATTITUDE, BATTERY_STATUS, EKF_STATUS_REPORT, ESTIMATOR_STATUS, GLOBAL_POSITION_INT, GPS_RAW_INT,
     HEARTBEAT, STATUSTEXT, SYS_STATUS, SYSTEM_TIME, VFR_HUD, VIBRATION,
@@ -42,7 +42,7 @@ const NEEDED: [u32; 10] = [
 /// A message is slow below this part of its rate. An ArduPilot that only knows `REQUEST_DATA_STREAM` sends 2 Hz of 5.
 const SLOW: f64 = 0.35;
 
-pub(super) fn own(own: &Own, link: &str) -> CheckLine {
+pub(super) fn own(own: &BoxSettings, link: &str) -> CheckLine {
     let path = match own.path {
         1 => "its radio",
         2 => "the autopilot's radio",
@@ -70,9 +70,9 @@ pub(super) fn prearm(client: &mut Client) -> Result<CheckLine> {
 /// What the box records now.
 pub(super) fn recorded(
     client: Client,
-    own: &Own,
+    own: &BoxSettings,
     board: Option<&Board>,
-    heard: Option<Heard>,
+    heard: Option<HeardAutopilot>,
 ) -> Result<Vec<CheckLine>> {
     let checks = pull::newest(client, HEAD_SECTORS, |newest| {
         let (end, mut boot) = (Overview::verified(&newest.end)?, None);
@@ -114,7 +114,7 @@ fn clock(end: &Overview) -> CheckLine {
 }
 
 /// Messages and rates at the box's port.
-fn received(end: &Overview, own: &Own, autopilot: Option<u8>) -> CheckLine {
+fn received(end: &Overview, own: &BoxSettings, autopilot: Option<u8>) -> CheckLine {
     let autopilot = match autopilot {
         Some(ARDUPILOT) => Autopilot::ArduPilot,
         Some(PX4) => Autopilot::Px4,
@@ -164,16 +164,16 @@ mod tests {
     use super::*;
     use crate::source::item::{Amount, MessageCount};
 
-    const OWN: Own = Own { baud: 57_600, path: 2, has_streams: false };
+    const OWN: BoxSettings = BoxSettings { baud: 57_600, path: 2, has_streams: false };
 
     #[test]
     fn the_messages_that_a_box_lacks_are_named_with_their_rates() {
         let mut end = Overview::default();
-        let received = |end: &Overview, own: &Own| received(end, own, Some(ARDUPILOT));
+        let received = |end: &Overview, own: &BoxSettings| received(end, own, Some(ARDUPILOT));
         assert!(received(&end, &OWN).detail.contains("does not hear"));
         let instant = |s: u64| hums_core::clock::Instant::from_millis(s * 1_000);
         (end.ending.summary.first, end.ending.summary.last) = (Some(instant(100)), Some(instant(110)));
-        let own = Own { baud: 921_600, ..OWN };
+        let own = BoxSettings { baud: 921_600, ..OWN };
         end.contents.messages = [&NEEDED[..], &[HEARTBEAT]]
             .concat()
             .into_iter()

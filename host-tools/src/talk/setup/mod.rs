@@ -80,13 +80,13 @@ fn line(check: &'static str, is_ok: bool, detail: impl Into<String>) -> CheckLin
 }
 
 /// Parameters of the box.
-struct Own {
+struct BoxSettings {
     baud: u32,
     path: u8,
     has_streams: bool,
 }
 
-impl Own {
+impl BoxSettings {
     /// `value` gives that of a parameter.
     fn of(mut value: impl FnMut(BoxParam) -> Result<f32>) -> Result<Self> {
         Ok(Self {
@@ -99,7 +99,7 @@ impl Own {
 
 /// The autopilot on the link.
 #[derive(Clone, Copy)]
-struct Heard {
+struct HeardAutopilot {
     autopilot: u8,
     is_armed: bool,
 }
@@ -123,7 +123,7 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
     let mut client = Client::connect_to(&args.at, &[COMPONENT, AUTOPILOT]).context(SILENT)?;
     let (system, found) = client.target();
     let is_silent = found != COMPONENT;
-    let own = Own::of(|param| {
+    let own = BoxSettings::of(|param| {
         let spec = param.spec();
         if is_silent { Ok(spec.default) } else { params::value(&mut client, spec.name) }
     })?;
@@ -185,10 +185,10 @@ fn wiring(board: &Board) -> Vec<Wiring> {
     all.into_iter().map(|(wire, pad)| Wiring { wire, pad }).collect()
 }
 
-fn autopilot(client: &mut Client) -> Result<Option<Heard>> {
+fn autopilot(client: &mut Client) -> Result<Option<HeardAutopilot>> {
     client.until(Instant::now() + HEARTBEATS, |frame| {
         let fields = Fields(frame.payload());
-        let heard = Heard { autopilot: fields.u8(5), is_armed: fields.u8(6) & ARMED != 0 };
+        let heard = HeardAutopilot { autopilot: fields.u8(5), is_armed: fields.u8(6) & ARMED != 0 };
         (frame.id() == HEARTBEAT).then_some(heard)
     })
 }

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use hums_link::param_line::{self, Line};
 use serde::Serialize;
 
-use super::{ARDUPILOT, CheckLine, Heard, Own, PX4, TRIES, autopilot, line};
+use super::{ARDUPILOT, BoxSettings, CheckLine, HeardAutopilot, PX4, TRIES, autopilot, line};
 use crate::colour::level;
 use crate::files::{Inputs, Output, read_short, settle};
 use crate::outcome::{Outcome, usage};
@@ -71,7 +71,12 @@ impl Setting {
 }
 
 /// The wanted settings with the present values; empty for another autopilot, and for a PX4 that does not answer.
-pub(super) fn wanted(client: &mut Client, autopilot: u8, port: u8, own: &Own) -> Result<Vec<Setting>> {
+pub(super) fn wanted(
+    client: &mut Client,
+    autopilot: u8,
+    port: u8,
+    own: &BoxSettings,
+) -> Result<Vec<Setting>> {
     let mut settings = match autopilot {
         ARDUPILOT => ardupilot(port, own),
         PX4 => instance(client, port)?.map_or_else(Vec::new, |instance| px4(port, instance, own)),
@@ -91,7 +96,7 @@ pub(super) fn wanted(client: &mut Client, autopilot: u8, port: u8, own: &Own) ->
 }
 
 /// `SERIALn_BAUD` is in thousands, cut off.
-fn ardupilot(port: u8, own: &Own) -> Vec<Setting> {
+fn ardupilot(port: u8, own: &BoxSettings) -> Vec<Setting> {
     let flow = Setting::new(format!("BRD_SER{port}_RTSCTS"), 0, "CTS and RTS are open");
     vec![
         Setting::new(format!("SERIAL{port}_PROTOCOL"), 2, "MAVLink 2"),
@@ -101,7 +106,7 @@ fn ardupilot(port: u8, own: &Own) -> Vec<Setting> {
 }
 
 /// TELEM 1 to 4 are 101 to 104 in `MAV_n_CONFIG`.
-fn px4(port: u8, instance: u8, own: &Own) -> Vec<Setting> {
+fn px4(port: u8, instance: u8, own: &BoxSettings) -> Vec<Setting> {
     let rate = RATE_BYTES.min(own.baud / 12);
     let mut settings = vec![
         Setting::new(format!("MAV_{instance}_CONFIG"), 100 + port, "MAVLink at this port"),
@@ -196,7 +201,7 @@ pub(super) fn change(client: &mut Client, settings: &mut [Setting], file: &Path)
 }
 
 /// The autopilot, if its next heartbeat says that it is disarmed.
-fn settable(client: &mut Client) -> Result<Heard> {
+fn settable(client: &mut Client) -> Result<HeardAutopilot> {
     let heard = autopilot(client)?.context(
         "the autopilot is not heard on this link: connect to the autopilot's USB or radio, or set the box's GS_PASS to 1",
     )?;
@@ -207,7 +212,7 @@ fn settable(client: &mut Client) -> Result<Heard> {
 }
 
 fn set(client: &mut Client, name: &str, kind: u8, wanted: f64) -> Result<()> {
-    let Heard { autopilot, .. } = settable(client)?;
+    let HeardAutopilot { autopilot, .. } = settable(client)?;
     let kept = params::set(client, name, sent(autopilot, kind, wanted), kind)?;
     let kept = value(autopilot, &kept);
     if (kept - wanted).abs() > wanted.abs() * 1e-6 {
@@ -255,7 +260,7 @@ pub(super) fn restore(client: &mut Client, values: &[(String, f64)]) -> Result<O
     Ok(Outcome::Done)
 }
 
-pub(super) fn show(heard: Option<Heard>, settings: &[Setting]) -> Result<()> {
+pub(super) fn show(heard: Option<HeardAutopilot>, settings: &[Setting]) -> Result<()> {
     let name = match heard.map(|heard| heard.autopilot) {
         Some(ARDUPILOT) => "ArduPilot's settings",
         Some(PX4) => "PX4's settings",
@@ -308,7 +313,7 @@ mod tests {
     use crate::talk::setup::{ARMED, AUTOPILOT};
     use crate::talk::tests::fake::found;
 
-    const OWN: Own = Own { baud: 57_600, path: 2, has_streams: false };
+    const OWN: BoxSettings = BoxSettings { baud: 57_600, path: 2, has_streams: false };
 
     /// An autopilot with these parameters, each with its type; values are as on the line.
     fn vehicle(autopilot: u8, mut mode: u8, values: &[(&str, f32, u8)]) -> Client {

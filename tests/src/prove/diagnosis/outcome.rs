@@ -9,7 +9,7 @@ use hums::check::judge::{Heard, Limits};
 use hums::check::judged::Judged;
 use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums::source::told::Finding;
 use hums_core::clock::Span;
 use hums_core::health::Level;
@@ -76,7 +76,7 @@ pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Leve
 }
 
 /// Judges one flight.
-pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
+pub(super) fn judge(place: &LogPlace, label: Option<&Label>) -> Result<Outcome> {
     // Labelled flights come from a telemetry port.
     let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
     let past = label.map_or(&[][..], |label| &label.past);
@@ -88,7 +88,7 @@ pub(super) fn judge(place: &Place, label: Option<&Label>) -> Result<Outcome> {
 }
 
 fn learn(past: &[PathBuf]) -> Result<Baselines> {
-    let places: Vec<_> = past.iter().map(|path| Place::file(path)).collect();
+    let places: Vec<_> = past.iter().map(|path| LogPlace::file(path)).collect();
     hums::check::past::learn(&Limits::default(), &places)
 }
 

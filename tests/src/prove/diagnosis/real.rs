@@ -22,7 +22,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use hums::check::judge::{Heard, Limits};
 use hums::check::judged::Judged as Judgement;
 use hums::names::vocabulary;
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 use hums_core::health::Level;
 use rayon::prelude::*;
 
@@ -226,7 +226,7 @@ fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Re
 
 pub(super) fn judge(set: &Set) -> Result<Results> {
     let outcomes = set.flights.par_iter().with_max_len(1).map(|flight| {
-        let place = Place::file(&flight.path);
+        let place = LogPlace::file(&flight.path);
         let recording = hums::check::recording(&place, &Limits::default(), Heard::Somewhere);
         Ok(of(flight, &recording.with_context(|| flight.name.clone())?.judged))
     });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use hums::source::find::find;
-use hums::source::recording::Place;
+use hums::source::recording::LogPlace;
 
 use super::labels::{self, FILE, Label};
 use super::options::{Flights, Known};
@@ -20,7 +20,7 @@ pub(super) struct Set {
     pub(super) name: String,
     pub(super) known: Known,
     /// Flights in the order of labels or names.
-    pub(super) flights: Vec<(Place, Option<Label>)>,
+    pub(super) flights: Vec<(LogPlace, Option<Label>)>,
 }
 
 impl Set {
@@ -47,7 +47,7 @@ pub(super) fn find_all(options: &Flights) -> Result<(Vec<Set>, Vec<real::Set>)> 
         return Ok((sets, reals));
     }
     let unlabelled = flights::more().into_iter().filter(|path| !has_labels_beside(path));
-    let flights: Vec<_> = unlabelled.map(|path| (Place::file(&path), None)).collect();
+    let flights: Vec<_> = unlabelled.map(|path| (LogPlace::file(&path), None)).collect();
     if !flights.is_empty() {
         sets.push(Set { name: "further recordings".to_owned(), known: Known::Seen, flights });
     }
@@ -100,7 +100,7 @@ fn below(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-fn labelled(folder: &Path) -> Result<Vec<(Place, Option<Label>)>> {
+fn labelled(folder: &Path) -> Result<Vec<(LogPlace, Option<Label>)>> {
     let labels = labels::read(folder)?;
-    Ok(labels.into_iter().map(|label| (Place::file(&folder.join(&label.file)), Some(label))).collect())
+    Ok(labels.into_iter().map(|label| (LogPlace::file(&folder.join(&label.file)), Some(label))).collect())
 }

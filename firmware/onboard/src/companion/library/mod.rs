@@ -22,7 +22,7 @@ use self::log::Places;
 use self::step::{Out, Step};
 use super::limiter::Asker;
 use super::ways::Ways;
-use crate::shelf::{Answered, Want, What, Which};
+use crate::shelf::{Answered, LogRequest, What, Which};
 
 /// Answers looked at in one call. The port's budget limits them too.
 const LOOKS_MAX: usize = 64;
@@ -108,7 +108,8 @@ impl Library {
     pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();
-            self.erases = !ways.queues.shelf.want(Want { ticket, which: Which::At(0), what: What::Erase });
+            self.erases =
+                !ways.queues.shelf.want(LogRequest { ticket, which: Which::At(0), what: What::Erase });
         }
         self.job = self.job.filter(|job| ways.queues.is_open(job.asker.port));
         for _ in 0..LOOKS_MAX {
@@ -142,7 +143,7 @@ impl Library {
         let seen = ways.queues.shelf.answer(self.ticket).cloned();
         if seen.is_none() && !self.asked {
             let ticket = self.next_ticket();
-            self.asked = ways.queues.shelf.want(Want { ticket, which, what });
+            self.asked = ways.queues.shelf.want(LogRequest { ticket, which, what });
         }
         seen
     }

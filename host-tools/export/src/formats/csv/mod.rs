@@ -11,7 +11,7 @@ use hums_core::clock::Instant;
 
 use crate::context::Context;
 use crate::files::Folder;
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Totals, Writer};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::row::Row;
@@ -49,7 +49,7 @@ impl Lines {
     }
 }
 
-impl Part for Lines {
+impl GroupEncoder for Lines {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let Entry { frame, known, .. } = entry;
         let head = |out: &mut Vec<u8>| {
@@ -102,7 +102,7 @@ impl Writer for Csv {
         "A table for each type of message, units in the header, for spreadsheets and scripts",
         Files::Tables(None, "csv"),
     );
-    type Part = Lines;
+    type Encoder = Lines;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         let folder = Folder::create(path, &context.inputs, &context.session)?;

@@ -6,13 +6,13 @@ use crate::text::push_integer;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct UnknownLines {
     text: Vec<u8>,
-    places: Vec<Place>,
+    places: Vec<BufferedRow>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct BufferedRow {
     id: u32,
-    /// Place for the id.
+    /// BufferedRow for the id.
     middle: usize,
     end: usize,
 }
@@ -31,7 +31,7 @@ impl UnknownLines {
         head(&mut self.text);
         let middle = self.text.len();
         tail(&mut self.text);
-        self.places.push(Place { id, middle, end: self.text.len() });
+        self.places.push(BufferedRow { id, middle, end: self.text.len() });
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = UnknownLine<'_>> {
@@ -45,7 +45,7 @@ impl UnknownLines {
     }
 
     pub(crate) fn held_bytes(&self) -> usize {
-        self.text.len() + size_of::<Place>() * self.places.len()
+        self.text.len() + size_of::<BufferedRow>() * self.places.len()
     }
 }
 

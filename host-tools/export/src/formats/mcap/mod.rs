@@ -17,7 +17,7 @@ use hums_core::observation::Observation;
 
 use crate::checked::finding_words;
 use crate::context::Context;
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::values::{Array, FieldValue, Scalar};
 use crate::motion::{Motion, quaternion_up};
@@ -25,7 +25,7 @@ use crate::plural::count;
 use crate::row::{Cell, Row};
 use crate::source::epochs::Epochs;
 use crate::source::told::Finding;
-use crate::story::{Said, Story};
+use crate::story::{Story, StoryEntry};
 use container::Container;
 use protobuf::{bytes, double, float, inside, signed, unsigned, varint};
 use schemas::Schema;
@@ -71,7 +71,7 @@ fn time_ns(epochs: &Epochs, at: Instant) -> u64 {
     epochs.utc_us(at).unwrap_or_else(|| at.as_micros()).saturating_mul(1000)
 }
 
-impl Part for Messages {
+impl GroupEncoder for Messages {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         let frame = entry.frame;
         let time_ns = entry.utc_us.unwrap_or_else(|| entry.at.as_micros()).saturating_mul(1000);
@@ -273,8 +273,8 @@ impl Mcap {
     }
 }
 
-fn text(messages: &mut Messages, epochs: &Epochs, said: &Said) {
-    let Said::Text { at, severity, words } = said else { return };
+fn text(messages: &mut Messages, epochs: &Epochs, said: &StoryEntry) {
+    let StoryEntry::Text { at, severity, words } = said else { return };
     let level = match severity {
         0..=2 => 5,
         3 => 4,
@@ -293,7 +293,7 @@ impl Writer for Mcap {
         needs_identity: true,
         ..FormatDetails::new("mcap", "Everything, for Foxglove and PlotJuggler", Files::One("mcap"))
     };
-    type Part = Messages;
+    type Encoder = Messages;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         let mut file = Container::open(context, path)?;

@@ -35,7 +35,7 @@ use parquet::schema::types::Type;
 use crate::context::Context;
 use crate::files::cannot_write;
 use crate::fleet::{SESSIONS, Session, sessions};
-use crate::format::{Entry, Files, Finished, FormatDetails, Part, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Totals, Writer};
 use crate::identity::Identity;
 use crate::logs::in_order::{in_order, workers};
 use crate::row::Row;
@@ -190,7 +190,7 @@ impl ParquetTables {
     }
 }
 
-impl Part for Batches {
+impl GroupEncoder for Batches {
     fn frame(&mut self, _: &Context, entry: &Entry<'_>) {
         Self::frame(self, entry.at, entry.utc_us, entry.frame, entry.known);
     }
@@ -215,7 +215,7 @@ impl Writer for Parquet {
             Files::Fleet("parquet"),
         )
     };
-    type Part = Batches;
+    type Encoder = Batches;
 
     fn open(context: &Context, _: &Path) -> Result<Self> {
         Ok(Self(ParquetTables::new(Session::begin(context)?, &context.identity)))

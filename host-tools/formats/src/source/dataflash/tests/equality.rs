@@ -14,7 +14,7 @@ use hums_core::status::{LinkReading, RecorderStatus};
 use hums_onboard::monitoring::TICK;
 
 use crate::source::item::{Item, Want};
-use crate::source::recording::Place;
+use crate::source::recording::LogPlace;
 
 /// Check, instance, level, seconds since the autopilot's power-on.
 type Change = (&'static str, u8, Level, f64);
@@ -22,7 +22,7 @@ type Change = (&'static str, u8, Level, f64);
 /// Findings, and the recording's beginning, seconds since power-on.
 fn findings(name: &str) -> (Vec<Change>, f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/labelled").join(name);
-    let recording = Place::file(&path).open().expect("a recording");
+    let recording = LogPlace::file(&path).open().expect("a recording");
     let mut monitor = Monitor::new(Params::default());
     let (link, recorder) = (LinkReading::default(), RecorderStatus::default());
     let (mut next, mut boot_s, mut begins_s): (Option<Instant>, f64, f64) = (None, 0.0, f64::INFINITY);
