@@ -23,8 +23,8 @@ use crate::frame::Frame;
 use crate::messages::{self, ComputerStatus};
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
-use crate::telling::{self, Fate, Telling, order};
 use crate::statustext::{Severity, TEXT_BYTES_MAX, Text};
+use crate::telling::{self, Fate, Telling, order};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
