@@ -45,5 +45,5 @@ fn code(board: &Board) -> String {
 }
 
 fn pin(pin: Pin) -> String {
-    format!("Pin {{ port: {}, number: {} }}", pin.port, pin.number)
+    format!("Pin::new({}, {})", pin.port, pin.number)
 }

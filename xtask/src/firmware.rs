@@ -21,6 +21,7 @@ pub(crate) const LAST: [&str; 2] = ["--", "-Cllvm-args=-inline-threshold=40"];
 /// Packages that only cross-compile.
 pub(crate) const APPLICATION: &str = "hums-app";
 pub(crate) const RESIDENT: &str = "hums-resident";
+pub(crate) const CHIP: &str = "hums-stm32f4";
 
 /// Every change is tried for it.
 pub(crate) fn default_board() -> &'static Board {
@@ -166,8 +167,8 @@ pub(crate) fn check_others() -> Result<()> {
 
 /// A warning is an error.
 pub(crate) fn lint(board: &Board) -> Result<()> {
-    let both = ["clippy", "--package", RESIDENT];
-    cargo(board)?.args(both).args(cargo_arguments()).args(["--", "-D", "warnings"]).run()
+    let others = ["clippy", "--package", RESIDENT, "--package", CHIP];
+    cargo(board)?.args(others).args(cargo_arguments()).args(["--", "-D", "warnings"]).run()
 }
 
 /// An unchanged image keeps its time, and nothing is made anew.

@@ -15,8 +15,14 @@ use crate::repo;
 use crate::shell::Shell;
 
 /// Without the firmware's binaries, which turn on other features in shared crates.
-pub(crate) const CHOICE: [&str; 5] =
-    ["--workspace", "--exclude=hums-app", "--exclude=hums-resident", "--features", FEATURES];
+pub(crate) const CHOICE: [&str; 6] = [
+    "--workspace",
+    "--exclude=hums-app",
+    "--exclude=hums-resident",
+    "--exclude=hums-stm32f4",
+    "--features",
+    FEATURES,
+];
 
 const FEATURES: &str = "hums-tests/chip,hums-tests/browser,hums-tests/databases";
 

@@ -1,4 +1,4 @@
-//! Clock, watchdog, supply detector and the words that survive a reset.
+//! Clock, and the words that survive a reset.
 
 use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -9,23 +9,13 @@ use hums_update::map;
 use hums_update::message::Message;
 use hums_update::resident::Cause;
 use stm32_metapac::flash::vals::Latency;
-use stm32_metapac::iwdg::vals::{Key, Pr};
 use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
-use stm32_metapac::{DBGMCU, FLASH, IWDG, PWR, RCC};
+use stm32_metapac::{DBGMCU, FLASH, RCC};
 
 /// Cycles of a microsecond.
 const MHZ: u64 = 168;
-/// 2.7 V, as in the application: programming 32 bits at once needs it (RM0090, table 7).
-const LEVEL_2V7: u8 = 0b101;
 /// The chip revision with a broken prefetch (ES0182, 2.1.1).
 const REVISION_A: u16 = 0x1000;
-/// Looks until the watchdog's registers are taken over.
-const TRIES_MAX: u32 = 20_000;
-
-/// The watchdog of a trial's start: 4 s of 32 kHz, 2.7 s at the fastest.
-pub(crate) const TRIAL: Pr = Pr::DIVIDE_BY32;
-/// The watchdog of this program: 32 s, 22 s at the fastest. The longest erase takes 4 s, a silent card 8 s.
-pub(crate) const SERVICE: Pr = Pr::DIVIDE_BY256;
 
 /// By the reset's flags, which stay for the application, and by its message, which is taken.
 pub(crate) fn cause() -> Cause {
@@ -51,33 +41,6 @@ pub(crate) fn restart(message: Message) -> ! {
     // SAFETY: no variable of either program has these words.
     unsafe { words.write_volatile(message.words()) };
     SCB::sys_reset()
-}
-
-/// A debugger that halts the processor halts it as well.
-pub(crate) fn start_watchdog(divider: Pr) {
-    DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
-    IWDG.kr().write(|w| w.set_key(Key::START));
-    IWDG.kr().write(|w| w.set_key(Key::ENABLE));
-    IWDG.pr().write(|w| w.set_pr(divider));
-    IWDG.rlr().write(|w| w.set_rl(0xFFF));
-    let mut tries = 0_u32;
-    while (IWDG.sr().read().pvu() || IWDG.sr().read().rvu()) && tries < TRIES_MAX {
-        tries += 1;
-    }
-    feed();
-}
-
-pub(crate) fn feed() {
-    IWDG.kr().write(|w| w.set_key(Key::RESET));
-}
-
-/// Without it the flash would be written with a supply that is too low. The application sets the same.
-pub(crate) fn watch_supply() {
-    RCC.apb1enr().modify(|w| w.set_pwren(true));
-    PWR.cr1().modify(|w| {
-        w.set_pls(LEVEL_2V7);
-        w.set_pvde(true);
-    });
 }
 
 /// 168 MHz from the chip's own oscillator, peripheral buses at 42 and 84 MHz; counts time from here.
@@ -109,10 +72,6 @@ pub(crate) fn start_clock() {
         (*DCB::PTR).demcr.modify(|word| word | 1 << 24);
         (*DWT::PTR).ctrl.modify(|word| word | 1);
     }
-}
-
-pub(crate) fn is_supply_low() -> bool {
-    PWR.csr1().read().pvdo()
 }
 
 /// Time since [`start_clock`]. To be asked at least every 25 s, when the counter wraps.

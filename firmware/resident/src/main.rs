@@ -17,15 +17,23 @@ use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use hums_core::clock::Span;
 use hums_recorder::SpiCard;
+use hums_stm32f4::supply;
+use hums_stm32f4::watchdog::{self, Divider};
 use hums_update::resident::{Decision, Job, Next, Resident, decide};
 use hums_update::{keys, map};
 
+/// Of the watchdog: 128 ms by the divider at 32 kHz.
+const TURNS: u16 = 4_096;
+/// The watchdog of a trial's start: 4 s of 32 kHz, 2.7 s at the fastest.
+const TRIAL: Divider = Divider::DIVIDE_BY32;
+/// The watchdog of this program: 32 s, 22 s at the fastest. The longest erase takes 4 s, a silent card 8 s.
+const SERVICE: Divider = Divider::DIVIDE_BY256;
 /// Period of the search for a card.
 const LOOK_EVERY: Span = Span::from_secs(2);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    chip::watch_supply();
+    supply::watch();
     match decide(&mut flash::Flash::new(), board::NAME, chip::cause()) {
         Decision::Start { on_trial } => start(on_trial),
         Decision::Work(job) => serve(job),
@@ -35,7 +43,7 @@ fn main() -> ! {
 fn start(on_trial: bool) -> ! {
     if on_trial {
         // A program that hangs before its own watchdog runs.
-        chip::start_watchdog(chip::TRIAL);
+        watchdog::start(TRIAL, TURNS);
     }
     // SAFETY: the header is complete, so there is a vector table behind it; all registers but the supply detector's are as
     // after a reset.
@@ -47,7 +55,7 @@ fn start(on_trial: bool) -> ! {
 
 #[inline(never)]
 fn serve(mut job: Job) -> ! {
-    chip::start_watchdog(chip::SERVICE);
+    watchdog::start(SERVICE, TURNS);
     chip::start_clock();
     board::hold();
     let card = SpiCard::new(port::Port::new());
@@ -61,7 +69,7 @@ fn serve(mut job: Job) -> ! {
         let end = chip::now() + LOOK_EVERY;
         while chip::now() < end {
             board::show_waiting();
-            chip::feed();
+            watchdog::feed();
         }
         hums_recorder::CardDevice::reset(&card);
     }

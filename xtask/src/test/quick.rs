@@ -11,7 +11,7 @@ use crate::repo;
 use crate::shell::Shell;
 
 /// Packages that only cross-compile.
-const FIRMWARE: [&str; 2] = [firmware::APPLICATION, firmware::RESIDENT];
+const FIRMWARE: [&str; 3] = [firmware::APPLICATION, firmware::RESIDENT, firmware::CHIP];
 
 /// Changed packages: since the last commit, or in it.
 pub(super) fn run() -> Result<()> {

@@ -8,23 +8,18 @@
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac;
-
+use hums_stm32f4::supply::is_low;
+use hums_stm32f4::{supply, watchdog};
 use hums_update::message::Message;
 
-use super::watchdog;
 use crate::{fault, update};
 
 /// The PVD's line into the interrupt controller (RM0090, 12.2.5).
 const LINE: usize = 16;
-/// 2.7 V falling, the fifth of the detector's eight levels (RM0090, 5.4.1).
-const LEVEL_2V7: u8 = 0b101;
 
 /// Starts monitoring.
 pub(super) fn watch() {
-    pac::PWR.cr1().modify(|w| {
-        w.set_pls(LEVEL_2V7);
-        w.set_pvde(true);
-    });
+    supply::watch();
     // Rising, because the detector's output is high while the supply is low.
     pac::EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     pac::EXTI.imr(0).modify(|w| w.set_line(LINE, true));
@@ -36,16 +31,12 @@ pub(super) fn watch() {
     }
 }
 
-pub(super) fn is_low() -> bool {
-    pac::PWR.csr1().read().pvdo()
-}
-
 #[interrupt]
 fn PVD() {
     fault::supply_low();
     while is_low() {
         // A reset would not restore the supply. The note explains why no other code feeds the watchdog.
-        watchdog::reload();
+        watchdog::feed();
     }
     update::restart(Message::Planned);
 }
