@@ -1,14 +1,19 @@
 //! A USB host at the board's plug: the serial port while it records, and card-reader mode from the command to the next record.
 
-use anyhow::{Result, ensure};
+use std::collections::HashSet;
+
+use anyhow::{Context as _, Result, ensure};
+use hums_core::clock::Instant;
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::Frame;
 use hums_link::framer::Framer;
 use hums_link::messages;
+use hums_link::packet::Packet;
+use hums_link::signing::{Clock, Key, Seal};
 use hums_sdcard::{Event, Kind, Model};
 use hums_tests::chip::rig::{Rig, frame, heartbeat, heartbeat_in, set};
-use hums_tests::chip::usart;
 use hums_tests::chip::usb::{Bus, Disk, Serial, host};
+use hums_tests::chip::{put, usart};
 use stm32f405_model::machine::Board;
 use stm32f405_model::otg::{Action, Reply};
 use stm32f405_model::rcc::Cause;
@@ -25,6 +30,8 @@ const ARMED: u8 = 0xD1;
 /// Urgencies that serve the USB port: exception (16 and the interrupt's number), and limit of the stack as in `budgets.toml`.
 const STACKS: [(&str, u16, u32); 3] =
     [("monitor", 16 + 20, 5_344), ("downlink", 16 + 21, 1_360), ("USB", 16 + 67, 1_360)];
+/// In thousandths, with a bus full of control transfers and full rate at the autopilot's port.
+const LOAD_MAX: u64 = 900;
 /// In kB/s: an hour's log in a minute. The bus itself carries 1,216 (USB 2.0, table 5-9).
 const READ_KBPS_MIN: u64 = 900;
 
@@ -237,6 +244,119 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
         println!("{name}: {depth} bytes of stack");
         assert!(depth <= limit, "{name}: {depth} bytes of stack");
     }
+}
+
+#[test]
+#[ignore = "a busy bus for ten seconds: `cargo xtask prove chip`"]
+fn ten_seconds_of_control_transfers_cost_no_frame() {
+    let mut rig = bench().settled(Board::default()).unwrap();
+    let now = rig.machine.now();
+    rig.run(now + SECOND, false).unwrap();
+    let resets = rig.machine.resets.len();
+    let count = use_host_while(&mut rig, 60 * SECOND, true, |bus| {
+        bus.enumerate()?;
+        let (end, mut count) = (bus.now + 10 * SECOND, 0);
+        while bus.now < end {
+            ensure!(bus.control_in(0, 6, 0x0100, 0, 64)?.is_some(), "no descriptor");
+            count += 1;
+        }
+        Ok(count)
+    });
+    let now = rig.machine.now();
+    rig.run(now + 2 * SECOND, false).unwrap();
+    assert_eq!(rig.machine.resets.len(), resets, "{:?}", rig.machine.resets);
+    let (compared, session) = (rig.compared(), rig.sessions().pop().unwrap());
+    assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
+    assert!(session.losses.is_empty(), "{:?}", session.losses);
+    let load = session.loads.iter().max().unwrap();
+    println!("{count} transfers, load of {load} in a thousand: {:?}", session.loads);
+    assert!(count > 10_000 && *load < LOAD_MAX, "{count} transfers, load {load}");
+}
+
+/// Waits for a station's answer.
+fn one_of(answers: &[Told], id: u32, is_it: impl Fn(&[u8]) -> bool) -> Result<()> {
+    ensure!(ours(answers).any(|one| one.0 == id && is_it(&one.3)), "no answer of kind {id}: {answers:?}");
+    Ok(())
+}
+
+#[test]
+#[ignore = "a minute: `cargo xtask prove chip`"]
+fn a_station_at_the_plug_downloads_a_log_and_sets_a_key() {
+    const SIGNED: &str = "correct-horse-battery";
+    let mut rig = bench().rig(Board::default());
+    put(&rig.medium, &[(b"PARAMS  TXT", b"SIGN_PORT 1\nGS_SIGN 2\n")]);
+    rig.run(2 * SECOND, false).unwrap();
+    rig.run(5 * SECOND, true).unwrap();
+    rig.machine.power_off();
+    rig.run(5 * SECOND + 100 * MS, false).unwrap();
+    rig.machine.power_on();
+    rig.run(6 * SECOND, false).unwrap();
+    for _ in 0..4 {
+        heartbeats(&mut rig, DISARMED);
+    }
+    let blocks = use_host(&mut rig, 120 * SECOND, |bus| {
+        let serial = &mut Serial::attach(bus)?;
+        ensure!(!serial.listen(SECOND)?.is_empty(), "it says nothing");
+        let list = answers_to(serial, &frame(117, &[0, 0, 0xFF, 0xFF, 1, COMPONENT], 128, 1))?;
+        // LOG_ENTRY: time, bytes, number.
+        let entry = |one: &Told| Some((u32::from_le_bytes(*one.3.get(4..)?.first_chunk()?), one.3[8]));
+        let entries = ours(&list).filter(|one| one.0 == 118).filter_map(entry);
+        let (bytes, number) = entries.max().context("no LOG_ENTRY")?;
+        let (bytes, mut log) = ((bytes as usize).min(8 * 512), Vec::new());
+        while log.len() < bytes {
+            let ([o0, o1, o2, o3], count) =
+                ((log.len() as u32).to_le_bytes(), (bytes - log.len()).min(900) as u32);
+            let [c0, c1, ..] = count.to_le_bytes();
+            let request = frame(119, &[o0, o1, o2, o3, c0, c1, 0, 0, number, 0, 1, COMPONENT], 116, 2);
+            let answers = answers_to(serial, &request)?;
+            let before = log.len();
+            for one in ours(&answers).filter(|one| one.0 == 120) {
+                let mut data = one.3.clone();
+                data.resize(97, 0);
+                let at = u32::from_le_bytes([data[0], data[1], data[2], data[3]]) as usize;
+                if at == log.len() {
+                    log.extend_from_slice(&data[7..7 + usize::from(data[6])]);
+                }
+            }
+            ensure!(log.len() > before, "no data from {before} on: {answers:?}");
+        }
+        Ok(log.as_chunks::<512>().0.to_vec())
+    });
+    let card: HashSet<[u8; 512]> = rig.medium.content().into_values().collect();
+    let wrong = blocks.iter().filter(|block| !card.contains(*block)).count();
+    assert!(wrong == 0 && blocks.len() == 8, "{wrong} of {} blocks are not the card's", blocks.len());
+
+    use_host(&mut rig, 60 * SECOND, |bus| {
+        let serial = &mut Serial::attach(bus)?;
+        let is = |value: f32| move |payload: &[u8]| payload.starts_with(&value.to_le_bytes());
+        let key = Key::of_passphrase(SIGNED);
+        let setup = Packet::new(256).u64(0, 1_000_000_000).u8(8, 1).u8(9, COMPONENT).bytes(10, &key.0);
+        let (mut out, mut station) = ([0; FRAME_BYTES_MAX], Encoder::of(255, 190));
+        serial.send(station.frame(&mut out, &setup))?;
+        serial.listen(SECOND)?;
+        one_of(&answers_to(serial, &set("GS_BUDGET", 4_000.0, 3))?, 22, is(2_000.0))?;
+        let mut seal = Seal::new(key, 0, Clock::default(), 1_000_000_000);
+        let wanted =
+            Packet::new(23).f32(0, 4_000.0).u8(4, 1).u8(5, COMPONENT).text(6, 16, "GS_BUDGET").u8(22, 9);
+        let signed = station.frame_signed(&mut out, &wanted, Instant::ZERO, &mut seal).to_vec();
+        serial.send(&signed)?;
+        let answers = serial.listen(SECOND)?;
+        one_of(&told(&answers), 22, is(4_000.0))?;
+        let (mut framer, mut unsigned) = (Framer::new(), 0);
+        framer.push(&answers, &mut |frame: Frame<'_>| {
+            unsigned += u32::from(frame.component() == COMPONENT && !frame.signed());
+        });
+        ensure!(unsigned == 0, "{unsigned} frames of the box are not signed");
+        // The same again is a replay.
+        serial.send(&signed)?;
+        one_of(&answers_to(serial, &set("GS_BUDGET", 3_000.0, 4))?, 22, is(4_000.0))
+    });
+    let key = Key::of_passphrase(SIGNED).0;
+    let content = rig.medium.content();
+    assert!(
+        !content.values().any(|block| block.windows(32).any(|bytes| bytes == key)),
+        "the key is on the card"
+    );
 }
 
 #[test]

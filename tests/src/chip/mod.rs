@@ -8,7 +8,9 @@ pub mod usb;
 use std::collections::VecDeque;
 use std::path::Path;
 
+use hums_recorder::layout::Layout;
 use hums_sdcard::{Kind, Medium, Model, Plan, Slot};
+use hums_update::files;
 use stm32f405_model::gpio::Pin;
 use stm32f405_model::image::Image;
 use stm32f405_model::machine::{Board, Machine};
@@ -113,6 +115,37 @@ pub fn pin(pin: hums_boards::Pin) -> Pin {
 /// A port, as the model counts it.
 pub fn usart(port: &hums_boards::Port) -> usize {
     usize::from(port.usart) - 1
+}
+
+/// Puts files on an empty card, each in a row of clusters.
+///
+/// # Panics
+/// The card has no file system.
+pub fn put(medium: &Medium, all: &[(&files::Name, &[u8])]) {
+    let Layout { fat_start, fat_stride, fat_copies, data_start, cluster_blocks, root, .. } =
+        Layout::read(medium).expect("a formatted card");
+    let block_of = |cluster: u32| data_start + (cluster - 2) * cluster_blocks;
+    let mut cluster = 1_000;
+    for (number, (name, file)) in all.iter().enumerate() {
+        let count = (file.len() as u32).div_ceil(512 * cluster_blocks);
+        let mut entry = [0; 32];
+        entry[..11].copy_from_slice(*name);
+        entry[11] = 0x20;
+        entry[26..28].copy_from_slice(&(cluster as u16).to_le_bytes());
+        entry[28..].copy_from_slice(&(file.len() as u32).to_le_bytes());
+        medium.patch(block_of(root), 32 * number, &entry);
+        for (at, block) in file.chunks(512).enumerate() {
+            medium.patch(block_of(cluster) + at as u32, 0, block);
+        }
+        for at in cluster..cluster + count {
+            let next = if at + 1 < cluster + count { at + 1 } else { 0x0FFF_FFFF };
+            for copy in 0..fat_copies {
+                let block = fat_start + copy * fat_stride + at / 128;
+                medium.patch(block, (at % 128 * 4) as usize, &next.to_le_bytes());
+            }
+        }
+        cluster += count;
+    }
 }
 
 /// Writes the card's image.

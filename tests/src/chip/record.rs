@@ -17,6 +17,8 @@ pub struct Session {
     pub losses: Vec<(&'static str, u64, u64, u64)>,
     /// Faults and notes.
     pub texts: Vec<String>,
+    /// The processor's load in thousandths, of some seconds.
+    pub loads: Vec<u64>,
     /// Unreadable parts.
     pub gaps: usize,
 }
@@ -85,6 +87,7 @@ fn take(reader: &mut LogReader, session: &mut Session) {
                 session.texts.push(format!("fault: {} in {} at {}", fault.message, fault.task, fault.place));
             }
             Item::Record { record: Record::Note(note), .. } => session.texts.push(note.text.to_owned()),
+            Item::Record { record: Record::Stats(stats), .. } => session.loads.push(stats.cpu_permille),
             Item::Gap(_) => session.gaps += 1,
             Item::Record { .. } | Item::End(_) => {}
         }
