@@ -12,16 +12,17 @@ use object::read::elf::{ElfFile32, FileHeader as _, ProgramHeader as _};
 use object::{Endianness, Object as _, ObjectSection as _, SectionFlags};
 use serde::Deserialize;
 
-use crate::firmware::{self, Board};
+use crate::firmware::{self, Board, Programs};
 use crate::repo;
 
 /// Name, first address, one past the last, bytes for the program (`memory.x`): the application's flash, the resident program's
-/// (sectors 0 and 4), RAM, CCM without the stack.
-const MEMORIES: [(&str, u64, u64, u64); 4] = [
+/// (sectors 0 and 4), RAM, CCM without the stack; the resident program's memory, which is the same CCM at another time.
+const MEMORIES: [(&str, u64, u64, u64); 5] = [
     ("flash", 0x0802_0000, 0x0810_0000, 896 * 1024),
     ("resident", 0x0800_0000, 0x0802_0000, 80 * 1024),
     ("ram", 0x2000_0000, 0x2002_0000, 128 * 1024),
     ("ccm", 0x1000_0000, 0x1001_0000, 48 * 1024),
+    ("resident_ram", 0, 0, 48 * 1024),
 ];
 /// The rest of CCM.
 const STACK_BYTES: u64 = 16 * 1024;
@@ -122,7 +123,9 @@ pub(crate) fn check(boards: &[&Board], write: bool) -> Result<()> {
     let mut rows = Vec::new();
     for (index, board) in boards.iter().enumerate() {
         let image = firmware::build(board)?;
-        let used = sizes(&fs::read(&image)?).with_context(|| format!("{}", image.display()))?;
+        let mut used = sizes(&fs::read(&image)?).with_context(|| format!("{}", image.display()))?;
+        let resident = sizes(&Programs::read(&repo::target())?.resident)?;
+        used.insert("resident_ram", resident.get("ccm").copied().unwrap_or(0));
         rows.extend(compare(&board.name, &used, &budgets.memory)?);
         if write && index == 0 {
             write_taken(&used)?;
@@ -241,7 +244,7 @@ mod tests {
     fn one_byte_over_is_over() {
         let used = BTreeMap::from([("flash", 100), ("ram", 101)]);
         let rows = compare("matek", &used, &limits(100)).unwrap();
-        assert_eq!(rows.iter().map(|row| row.over).collect::<Vec<_>>(), [false, false, true, false]);
+        assert_eq!(rows.iter().map(|row| row.over).collect::<Vec<_>>(), [false, false, true, false, false]);
         assert!(rows[2].text.contains("OVER: because"));
     }
 

@@ -105,7 +105,7 @@ fn write(board: &Board, programs: &Programs, suffix: &str) -> Result<PathBuf> {
 /// The ELF files of both programs.
 pub(crate) struct Programs {
     application: Vec<u8>,
-    resident: Vec<u8>,
+    pub(crate) resident: Vec<u8>,
 }
 
 impl Programs {
