@@ -62,11 +62,13 @@ fn what_is_disarmed_or_killed_in_the_air_is_told_and_what_has_landed_dives_or_is
 
 #[test]
 fn a_long_fall_is_no_bad_sensor() {
-    let script =
+    let falls =
         "* h=1000; 0-15 load=0.05 h=1000..250 c=-50; 15 h=0 c=0 thr=0 rates=0 ground=0; 15-15.1 load=15";
     for of in ROTORS {
-        let outcome = fly(of, script);
-        assert!(!outcome.flies_on() && outcome.flights() == DOWN, "{of}: {:?}", outcome.changes);
+        for pilots in ["", "; * stick"] {
+            let outcome = fly(of, &format!("{falls}{pilots}"));
+            assert!(!outcome.flies_on() && outcome.flights() == DOWN, "{of}{pilots}: {:?}", outcome.changes);
+        }
     }
 }
 
