@@ -310,9 +310,9 @@ impl MotorOutputs {
         if is_quiet {
             self.outputs.iter_mut().for_each(|output| output.share.learn(step_s));
         }
-        // Opposite to a motor that alone drives, an idle motor is the balance, and no fault.
+        // Opposite to a motor that alone drives, an idle motor is the balance, and no fault. An oscillating one idles for moments.
         let mut outputs = (0_u8..).zip(&self.outputs).take(count).filter(|_| is_quiet);
-        let shut_off = outputs.find(|(_, output)| output.share.smooth < SHUT_OFF_SHARE);
+        let shut_off = outputs.find(|(_, output)| output.off && output.share.smooth < SHUT_OFF_SHARE);
         self.verdict = match shut_off {
             Some((place, _)) => (place, Verdict::ShutOff),
             None => (place, if self.is_known() { Verdict::Weak(stands_out) } else { Verdict::Ok }),

@@ -817,6 +817,8 @@ fn a_weak_a_dead_and_a_shut_off_motor_of_a_hexarotor_are_named() {
         assert!(told.iter().all(|one| (one.check, one.instance) == (check, instance)), "{told:?}");
         assert_eq!(told.last().map(|one| one.level), Some(Critical), "{check}");
     }
+    let idles = hexa([125.0, 125.0, -385.0, 125.0, 125.0, -365.0]);
+    assert!(idles.iter().all(|one| one.check != "motor_off"), "it turns: {idles:?}");
 }
 
 /// Changes of the commands of eight motors that make up for these amounts of thrust, tilt towards an arm, and yaw.

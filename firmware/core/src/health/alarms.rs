@@ -1,6 +1,7 @@
 //! The standing alarms: their onsets, and the alarm that explains each.
 
 use super::finding::Level;
+use super::suppression::Alarm;
 use super::tables::STATES;
 use crate::time::{BootMs, Millis};
 
@@ -13,18 +14,17 @@ pub(super) const OUTLIVES: Millis = Millis::from_secs(8);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Standing {
-    pub(super) slot: u16,
-    pub(super) level: Level,
-    pub(super) since: BootMs,
+    slot: u16,
+    level: Level,
+    since: BootMs,
     /// The state whose alarm explains it, and when that ended or fell below this one.
-    cause: Option<u16>,
+    pub(super) cause: Option<u16>,
     cause_ended: Option<BootMs>,
 }
 
 impl Standing {
-    /// By another one, which may have ended of late.
-    pub(super) const fn is_explained(&self) -> bool {
-        self.cause.is_some()
+    pub(super) fn alarm(&self) -> Option<Alarm> {
+        Alarm::at(self.slot, self.level, self.since)
     }
 }
 
@@ -45,9 +45,9 @@ impl Alarms {
         self.standing.iter().flatten()
     }
 
-    /// A state's level changes. Gives since when it has an alarm; `None` where it has none, or no place is left for it. A rise is
-    /// an onset of its own, with no cause yet. From now on an effect outlives this alarm if that no longer explains it at its new level.
-    pub(super) fn change(&mut self, slot: u16, level: Level, now: BootMs) -> Option<BootMs> {
+    /// A state's level changes. A rise is an onset of its own, with no cause yet. From now on an effect outlives this alarm if that no longer
+    /// explains it at its new level.
+    pub(super) fn change(&mut self, slot: u16, level: Level, now: BootMs) {
         let is_alarm = level.alarm() > 0;
         for known in self.standing.iter_mut().flatten() {
             let explains = is_alarm && level as u8 >= known.level as u8;
@@ -63,14 +63,13 @@ impl Alarms {
             move |place: &Option<Standing>| place.as_ref().map(|known| known.slot) == slot
         };
         let mut places = self.standing.iter();
-        let place = places.clone().position(of(Some(slot))).or_else(|| places.position(of(None)))?;
-        let place = self.standing.get_mut(place)?;
+        let place = places.clone().position(of(Some(slot))).or_else(|| places.position(of(None)));
+        let Some(place) = place.and_then(|place| self.standing.get_mut(place)) else { return };
         *place = match *place {
             _ if !is_alarm => None,
             Some(known) if (level as u8) < known.level as u8 => Some(Standing { level, ..known }),
             _ => Some(Standing { slot, level, since: now, cause: None, cause_ended: None }),
         };
-        Some(place.as_ref()?.since)
     }
 
     pub(super) fn of(&self, slot: u16) -> Option<&Standing> {
@@ -82,12 +81,13 @@ impl Alarms {
         known.cause.filter(|_| known.cause_ended.is_none())
     }
 
-    pub(super) fn unexplained(&self, place: usize) -> Option<Standing> {
-        (*self.standing.get(place)?).filter(|known| known.cause.is_none() || known.cause_ended.is_some())
+    pub(super) fn unexplained(&self, place: usize) -> Option<Alarm> {
+        let known = self.standing.get(place)?.as_ref()?;
+        if known.cause.is_none() || known.cause_ended.is_some() { known.alarm() } else { None }
     }
 
-    pub(super) fn explain(&mut self, slot: u16, cause: Option<u16>) {
-        if let Some(known) = self.standing.iter_mut().flatten().find(|known| known.slot == slot) {
+    pub(super) fn explain(&mut self, place: usize, cause: Option<u16>) {
+        if let Some(known) = self.standing.get_mut(place).and_then(Option::as_mut) {
             (known.cause, known.cause_ended) = (cause, None);
         }
     }
@@ -96,6 +96,7 @@ impl Alarms {
         let known = self.standing.get(place)?.as_ref()?;
         (now.since(known.cause_ended?) >= OUTLIVES).then_some(known.slot)
     }
+
     fn set_silenced(&mut self, slot: u16, is: bool) {
         if let Some(word) = self.silenced.get_mut(usize::from(slot / 32)) {
             let bit = 1 << (slot % 32);

@@ -34,7 +34,7 @@ pub use vocabulary::{Said, Scope, Words, all_words, said, vocabulary};
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::{BootMs, Millis, SILENT};
-use alarms::{ALARMS_MAX, Alarms, Standing};
+use alarms::{ALARMS_MAX, Alarms};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
 
@@ -102,7 +102,7 @@ impl Health {
             if let Some(slot) = self.alarms.outliving(place, inputs.now)
                 && let Some(finding) = self.outlives(slot, inputs)
             {
-                self.alarms.explain(slot, None);
+                self.alarms.explain(place, None);
                 findings(&finding);
             }
         }
@@ -162,17 +162,14 @@ impl Health {
     /// The check whose alarm explains a change to a level; empty where none does. An alarm keeps its cause while that goes on and is as
     /// bad, until it rises itself. An earlier alarm without a cause has one from now on if this one explains it.
     fn explain(&mut self, slot: u16, level: Level, now: BootMs) -> &'static str {
+        self.alarms.change(slot, level, now);
         let cause = if level == Level::Stale {
-            let since = self.alarms.change(slot, level, now).unwrap_or(now);
-            let cause = self.cause(Alarm::at(slot, level, since));
+            let cause = self.cause(Alarm::at(slot, level, now));
             cause.inspect(|cause| self.alarms.silence(slot, *cause))
         } else {
-            self.alarms.change(slot, level, now);
             for place in 0..ALARMS_MAX {
-                if let Some(Standing { slot, level, since, .. }) = self.alarms.unexplained(place)
-                    && let Some(cause) = self.cause(Alarm::at(slot, level, since))
-                {
-                    self.alarms.explain(slot, Some(cause));
+                if let Some(cause) = self.cause(self.alarms.unexplained(place)) {
+                    self.alarms.explain(place, Some(cause));
                 }
             }
             self.alarms.cause(slot)
@@ -185,7 +182,7 @@ impl Health {
     }
 
     fn standing(&self) -> impl Iterator<Item = Alarm> {
-        self.alarms.iter().filter_map(|standing| Alarm::at(standing.slot, standing.level, standing.since))
+        self.alarms.iter().filter_map(|standing| standing.alarm())
     }
 
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
@@ -228,7 +225,7 @@ impl Health {
     /// The alarm of a check that stands, and whether another one explains it by now.
     pub fn alarm(&self, check: &str, instance: u8) -> Option<(Alarm, bool)> {
         let known = self.alarms.of(slot_of(check, instance)?)?;
-        Some((Alarm::at(known.slot, known.level, known.since)?, known.is_explained()))
+        Some((known.alarm()?, known.cause.is_some()))
     }
 
     /// Of each check, in the order of [`checks`], the levels of its instances.
