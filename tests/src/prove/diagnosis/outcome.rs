@@ -11,7 +11,6 @@ use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::LogPlace;
 use hums::source::told::Finding;
-use hums_core::clock::Span;
 use hums_core::health::Level;
 use hums_link::hold;
 
@@ -145,49 +144,31 @@ pub(super) fn rises(judged: &Judged) -> impl Iterator<Item = &Finding> {
 }
 
 fn alarms(judged: &Judged) -> Vec<Alarm> {
-    rises(judged)
-        .map(|finding| Alarm {
-            check: finding.check.clone(),
-            level: finding.level,
-            at_s: finding.at.as_secs_f64(),
-        })
-        .collect()
+    let alarm = |of: &Finding| Alarm { check: of.check.clone(), level: of.level, at_s: of.at.as_secs_f64() };
+    rises(judged).map(alarm).collect()
 }
 
 /// What a pilot hears, in order: a critical finding at once, a warning after its [`hold`] if it still stands. Not what another one explains by
 /// then. A critical finding that a milder one explains is told in that one's words.
 pub(super) fn heard(findings: &[Finding]) -> Vec<Alarm> {
     let mut heard = Vec::new();
-    for (place, finding) in findings.iter().enumerate() {
+    let risen = |(_, one): &(usize, &Finding)| rank(one.level) > rank(one.previous);
+    for (place, finding) in findings.iter().enumerate().filter(risen) {
         let is_critical = finding.level == Level::Critical;
-        let wait = if is_critical { Span::ZERO } else { hold(&finding.check) };
-        let by_then = findings.partition_point(|other| other.at <= finding.at + wait);
-        let by_then = &findings[..by_then.max(place + 1)];
+        let at = if is_critical { finding.at } else { finding.at + hold(&finding.check) };
+        let by_then = &findings[..findings.partition_point(|other| other.at <= at)];
         let is_same = |other: &&Finding| (&other.check, other.instance) == (&finding.check, finding.instance);
         let is_so = by_then.iter().rfind(is_same).is_some_and(|last| last.level == finding.level);
-        if rank(finding.level) <= rank(finding.previous) || !is_so || cause(by_then, place).is_some() {
-            continue;
+        if is_so && causes_of(by_then)[place].is_none() {
+            let as_warning = |one: &Finding| if rank(one.level) > 0 { Level::Warning } else { one.level };
+            let milder = by_then.iter().map(|one| Finding { level: as_warning(one), ..one.clone() });
+            let cause = causes_of(&milder.collect::<Vec<_>>()).swap_remove(place).filter(|_| is_critical);
+            let (check, level) = (cause.unwrap_or_else(|| finding.check.clone()), finding.level);
+            heard.push(Alarm { check, level, at_s: at.as_secs_f64() });
         }
-        let milder: Vec<Finding> = by_then.iter().map(as_warning).collect();
-        let cause = cause(&milder, place).filter(|_| is_critical);
-        let at_s = (finding.at + wait).as_secs_f64();
-        heard.push(Alarm {
-            check: cause.unwrap_or_else(|| finding.check.clone()),
-            level: finding.level,
-            at_s,
-        });
     }
     heard.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
     heard
-}
-
-fn cause(findings: &[Finding], place: usize) -> Option<String> {
-    causes_of(findings).swap_remove(place)
-}
-
-fn as_warning(finding: &Finding) -> Finding {
-    let level = if finding.level == Level::Critical { Level::Warning } else { finding.level };
-    Finding { level, ..finding.clone() }
 }
 
 fn fault(alarms: &[Alarm], heard: &[Alarm], label: &Label) -> Option<Fault> {
@@ -283,20 +264,22 @@ mod tests {
     #[test]
     fn a_pilot_hears_a_warning_after_its_hold_if_nothing_explains_it_and_a_critical_finding_at_once() {
         let (warning, critical) = (Level::Warning, Level::Critical);
-        let heard = |findings: &[(u64, &str, Level)]| {
-            let findings: Vec<Finding> =
-                findings.iter().map(|(at, check, level)| finding(*at, check, *level)).collect();
-            let words = |alarm: &Alarm| format!("{:.1} {} {}", alarm.at_s, alarm.check, alarm.level.name());
-            heard(&findings).iter().map(words).collect::<Vec<_>>()
-        };
-        let found_late = [(0, "ekf_variance", warning), (2_000, "gps_stuck", warning)];
-        assert_eq!(heard(&found_late), ["3.0 gps_stuck warning"]);
-        let found_too_late = [(0, "ekf_variance", warning), (3_500, "gps_stuck", warning)];
-        assert_eq!(heard(&found_too_late), ["3.0 ekf_variance warning", "4.5 gps_stuck warning"]);
-        let worse = [found_late[0], (500, "gps_stuck", warning), (700, "ekf_failsafe", critical)];
-        assert_eq!(heard(&worse), ["0.7 gps_stuck critical", "1.5 gps_stuck warning"]);
-        assert_eq!(heard(&[found_late[0], (900, "ekf_variance", Level::Ok)]), [""; 0], "it is over");
-        assert_eq!(heard(&[(0, "gps_fix", critical), found_late[0]]), ["0.0 gps_fix critical"]);
+        let doubts = (0, "ekf_variance", warning);
+        for (findings, expected) in [
+            (&[doubts, (2_000, "gps_stuck", warning)][..], "3.0 gps_stuck"),
+            (&[doubts, (3_500, "gps_stuck", warning)], "3.0 ekf_variance, 4.5 gps_stuck"),
+            (
+                &[doubts, (500, "gps_stuck", warning), (700, "ekf_failsafe", critical)],
+                "0.7 gps_stuck, 1.5 gps_stuck",
+            ),
+            (&[doubts, (900, "ekf_variance", Level::Ok)], ""),
+            (&[(0, "gps_fix", critical), doubts], "0.0 gps_fix"),
+        ] {
+            let findings = findings.iter().map(|(at, check, level)| finding(*at, check, *level));
+            let heard = heard(&findings.collect::<Vec<_>>());
+            let heard: Vec<_> = heard.iter().map(|one| format!("{:.1} {}", one.at_s, one.check)).collect();
+            assert_eq!(heard.join(", "), expected);
+        }
     }
 
     #[test]

@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use super::causes::{self, Class};
 use super::judged::{Judged, with_label};
 use super::options::Known;
-use super::outcome::{Alarm, count, heard, rises};
+use super::outcome::{count, heard, rises};
 use super::rates::{an_hour, hours, share};
 use super::table::{Form, records};
 
@@ -257,7 +257,10 @@ fn of(flight: &Flight, judged: &Judgement) -> Outcome {
     Outcome {
         name: flight.name.clone(),
         armed_s: judged.armed.as_millis() as f64 / 1e3,
-        right_first: flight.fault.map(|fault| is_right_first(&heard(&judged.findings), fault)),
+        right_first: flight.fault.map(|Fault { class, onset_s }| {
+            let first = heard(&judged.findings).into_iter().find(|one| onset_s - EARLIER_S <= one.at_s);
+            first.is_some_and(|first| class.checks.contains(&first.check.as_str()))
+        }),
         told: told.collect(),
     }
 }
@@ -319,11 +322,6 @@ fn right_first(faults: impl Iterator<Item = bool>) -> String {
     let (right, all) = (faults.iter().filter(|is_right| **is_right).count(), faults.len());
     let [part, least] = share(right as u64, all as u64);
     format!("{right} of {all} ({part}, at least {least})")
-}
-
-fn is_right_first(heard: &[Alarm], fault: Fault) -> bool {
-    let first = heard.iter().find(|one| fault.onset_s - EARLIER_S <= one.at_s);
-    first.is_some_and(|first| fault.class.checks.contains(&first.check.as_str()))
 }
 
 pub(super) fn each(real: &[Results]) -> Vec<Vec<String>> {
