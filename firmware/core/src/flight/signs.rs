@@ -173,7 +173,6 @@ impl Flight {
                 let hovers = vehicle.is_multicopter()
                     && self.airborne()
                     && !self.stage.is_mishap()
-                    && self.shock.is_none()
                     && climb_mps(at, vehicle).is_some_and(|climb_mps| climb_mps.abs() < STILL_MPS)
                     && self.is_away(at, vehicle);
                 if let Some(part) = throttle(at, vehicle) {
