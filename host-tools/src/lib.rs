@@ -26,20 +26,21 @@ pub mod talk;
 pub mod verify;
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser as _};
 
 use cli::{BoxAction, Cli, Command};
 use decode::fleet::overview;
+use decode::storage::Fetched;
 use outcome::Outcome;
 
 /// The first argument is the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     interrupt::no_end_by_file_size();
     match Cli::try_parse_from(with_command(arguments.into_iter().collect())) {
-        Ok(cli) => outcome::exit_code(command(&cli.command)),
+        Ok(mut cli) => outcome::exit_code(fetched(&mut cli.command)),
         Err(error) => {
             // Help and version succeed; so does output to a reader that has gone.
             let _ = error.print();
@@ -67,6 +68,27 @@ fn report_page(request: &report::Request<'_>) -> anyhow::Result<Outcome> {
         [folder] if overview::is_fleet(folder) => report::fleet::page(request, &overview::read(folder)?),
         _ => report::run(request),
     }
+}
+
+/// With inputs of object storage on this computer.
+fn fetched(given: &mut Command) -> anyhow::Result<Outcome> {
+    let inputs: Vec<&mut PathBuf> = match given {
+        Command::Check(args) => args.inputs.iter_mut().chain(&mut args.past).collect(),
+        Command::Report(args) => args.inputs.iter_mut().collect(),
+        Command::Decode(args) => args.inputs.iter_mut().collect(),
+        Command::Share(args) => vec![&mut args.input],
+        Command::Info(args) => args.inputs.iter_mut().collect(),
+        Command::Due(args) => args.inputs.iter_mut().collect(),
+        Command::Logbook(args) => args.inputs.iter_mut().collect(),
+        _ => Vec::new(),
+    };
+    let fetched = Fetched::inputs(inputs)?;
+    if fetched.is_any() && matches!(given, Command::Report(args) if args.output.is_none()) {
+        return Err(outcome::usage(
+            "-o: name the page; without it the page is beside its input, which is in object storage",
+        ));
+    }
+    command(given)
 }
 
 fn command(command: &Command) -> anyhow::Result<Outcome> {

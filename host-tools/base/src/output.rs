@@ -1,8 +1,11 @@
 //! Results on standard output. A reader that has gone away ends the program quietly (see [`ReaderGone`]), where
 //! `println!` would panic.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{PoisonError, RwLock};
 
 use anyhow::Result;
 use serde::Serialize;
@@ -13,6 +16,21 @@ use crate::printable;
 
 /// Whether a command's output uses standard output.
 static TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// Folders of this computer that are shown by other names.
+static ALIASES: RwLock<Vec<(String, String)>> = RwLock::new(Vec::new());
+
+/// From now on paths in `folder` are shown below `name`: copies of what is elsewhere.
+pub fn alias(folder: &Path, name: &str) {
+    let alias = (folder.display().to_string(), name.to_owned());
+    ALIASES.write().unwrap_or_else(PoisonError::into_inner).push(alias);
+}
+
+/// A text with the names by which folders are shown.
+pub fn aliased(text: &str) -> Cow<'_, str> {
+    let aliases = ALIASES.read().unwrap_or_else(PoisonError::into_inner);
+    aliases.iter().fold(text.into(), |text, (folder, name)| text.replace(folder, name).into())
+}
 
 /// Reserves standard output for a command's output: results go to standard error from now on.
 pub fn leave_standard_output() {
@@ -75,7 +93,7 @@ pub fn note(text: &str) {
 /// Prints a line on standard error. One that is gone, or lies on a full disk, changes nothing: `eprintln!` would panic, in the middle of
 /// a recording too.
 pub fn aside(text: &str) {
-    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
+    let _ = io::stderr().lock().write_all(format!("{}\n", aliased(text)).as_bytes());
 }
 
 fn raw_line(text: &str) -> Result<()> {
@@ -135,6 +153,7 @@ fn indented(value: &impl Serialize, by: &str) -> Result<String> {
 }
 
 fn print(text: &str) -> Result<()> {
+    let text = aliased(text);
     let bytes = text.as_bytes();
     // `anstream` has an older Windows show colours too.
     settle(match (TAKEN.load(Ordering::Relaxed), is_in_colour()) {

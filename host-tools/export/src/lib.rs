@@ -44,6 +44,7 @@ pub mod record;
 pub mod row;
 pub mod selection;
 pub mod share;
+pub mod storage;
 pub mod story;
 pub mod table;
 pub mod text;
@@ -67,6 +68,7 @@ use ending::Ending;
 use files::{Inputs, means_standard_output, says_directory};
 use findings::Findings;
 use fleet::Fleet;
+use fleet::bucket::Bucket;
 use followed::{EndResolver, HasEnding};
 use format::{Files, Finished, Way};
 use formats::FORMATS;
@@ -86,6 +88,7 @@ use source::find::{FoundRecordings, find, sessions_of};
 use source::item::{Gap, Item, RecordingSummary, Rows, Want};
 use source::parts::{ItemCollector, PartReceiver};
 use source::recording::{Format, LogPlace};
+use storage::{Address, Upload};
 use story::StoryEntry;
 use summary::damaged_places;
 use utc::When;
@@ -136,6 +139,20 @@ pub struct DecodeRequest {
 /// Runs `hums decode`.
 pub fn run(args: &DecodeRequest) -> Result<Outcome> {
     check_request(args)?;
+    let Some(address) = Address::of(&args.output)? else { return decode(args, None) };
+    if args.manifest.is_some() {
+        return Err(usage_error("--manifest: lists files on this computer, and -o names object storage"));
+    }
+    let upload = Upload::new(&address, &args.output, args.force)?;
+    let outcome = decode(
+        &DecodeRequest { output: upload.path().to_owned(), ..args.clone() },
+        Some(Bucket::open(&address)?),
+    )?;
+    upload.send(args.force)?;
+    Ok(outcome)
+}
+
+fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
     let alone = |format: &&format::Format| if let Way::Alone(run) = format.way { Some(run) } else { None };
     if let Some(run) = args.formats.iter().find_map(alone) {
         return run(args);
@@ -168,7 +185,7 @@ pub fn run(args: &DecodeRequest) -> Result<Outcome> {
         has_findings: args.findings,
         offset_s: args.offset_s,
         vehicle: args.vehicle.as_deref(),
-        fleet: Arc::new(Fleet::new(&args.output)),
+        fleet: Arc::new(Fleet::new(&args.output, bucket)),
     };
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);

@@ -20,6 +20,7 @@ const DECODE_EXAMPLES: &str = "Examples:
   hums decode cards/ -o some --format csv --message ATTITUDE --message GPS_RAW_INT
   hums decode 00001_00.HUM -o - --format jsonl --from 60 --to 2026-11-21T10:20:00Z | head
   hums decode cards/ -o fleet --format parquet
+  hums decode card.img -o s3://bucket/fleet --format parquet
   hums decode card.img --session 00001 -o - --format influx | curl --data-binary @- http://localhost:8428/write
   hums decode card.img -o out --format tlog --split flights
   hums decode flight.tlog -o found.tlog --format tlog --findings
@@ -58,7 +59,7 @@ pub struct Decode {
     /// Only this session of a card or folder, by the name that `hums info --list` prints
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
-    /// The file or directory to write
+    /// The file or directory to write, or an address in object storage (docs/fleet.md)
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Formats, separated by commas
@@ -280,6 +281,7 @@ impl Logbook {
 
 const COMPACT_EXAMPLES: &str = "Examples:
   hums compact fleet
+  hums compact s3://bucket/fleet
 
 The folder is that of hums decode --format parquet. Sessions of one date and bucket share a file for each table afterwards, sorted by
 vehicle and session. New sessions may be added at any time; run it again for them. docs/fleet.md";
@@ -288,7 +290,7 @@ vehicle and session. New sessions may be added at any time; run it again for the
 #[derive(Args, Clone, Debug)]
 #[command(after_help = COMPACT_EXAMPLES)]
 pub struct Compact {
-    /// The folder of the tables
+    /// The folder of the tables, or its address in object storage (docs/fleet.md)
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
 }

@@ -20,6 +20,7 @@ use parquet::schema::printer::print_schema;
 use parquet::schema::types::TypePtr;
 use sha2::{Digest as _, Sha256};
 
+use super::bucket::Bucket;
 use super::transaction::{self, OWN, Transaction};
 use super::{EXTENSION, SESSIONS, folders, names, session_of};
 use crate::hex::hex;
@@ -28,6 +29,7 @@ use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::printable::word;
+use crate::storage::Address;
 use column::Input;
 
 const PREFIX: &str = "compact-";
@@ -45,22 +47,62 @@ pub struct CompactRequest {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Sum {
+pub(super) struct Sum {
     files: u64,
     bytes: u64,
     new_files: u64,
     new_bytes: u64,
-    sessions: u64,
+    pub(super) sessions: u64,
+}
+
+impl Sum {
+    pub(super) fn add(&mut self, part: Self) {
+        self.files += part.files;
+        self.bytes += part.bytes;
+        self.new_files += part.new_files;
+        self.new_bytes += part.new_bytes;
+        self.sessions += part.sessions;
+    }
+}
+
+pub(super) fn no_tables(shown: &str) -> anyhow::Error {
+    usage(format!("{shown}: has no tables of hums; hums decode --format parquet writes them"))
+}
+
+/// Whether a file of this name and size is of several sessions, and has room for more.
+pub(super) fn is_compacted(name: &str, bytes: u64) -> bool {
+    name.starts_with(PREFIX) && name.ends_with(EXTENSION) && bytes < LARGE_BYTES
 }
 
 /// Runs `hums compact`.
 pub fn run(args: &CompactRequest) -> Result<Outcome> {
-    let root = args.folder.as_path();
+    let mut failures = 0;
+    let mut failed = |partition: &str, error: &anyhow::Error| {
+        failures += 1;
+        note!("{partition}: {error:#}; its files stay as they are");
+    };
+    let (sum, partitions) = match Address::of(&args.folder)? {
+        Some(address) => Bucket::open(&address)?.compact(&mut failed)?,
+        None => in_folder(&args.folder, &mut failed)?,
+    };
+    output::line(&word(&format!(
+        "{}: {} in {}, {} bytes, from {}, {} bytes",
+        args.folder.display(),
+        count(sum.sessions, "session"),
+        count(sum.new_files, "file"),
+        sum.new_bytes,
+        count(sum.files, "file"),
+        sum.bytes
+    )))?;
+    if failures > 0 {
+        bail!("{failures} of {} could not be compacted", count(partitions as u64, "partition"));
+    }
+    Ok(Outcome::Done)
+}
+
+fn in_folder(root: &Path, failed: &mut dyn FnMut(&str, &anyhow::Error)) -> Result<(Sum, usize)> {
     if !root.join(OWN).is_dir() {
-        return Err(usage(format!(
-            "{}: has no tables of hums; hums decode --format parquet writes them",
-            root.display()
-        )));
+        return Err(no_tables(&root.display().to_string()));
     }
     let mut partitions = BTreeSet::new();
     let tables = folders(root)?;
@@ -70,20 +112,11 @@ pub fn run(args: &CompactRequest) -> Result<Outcome> {
             partitions.extend(buckets.into_iter().map(|bucket| format!("{date}/{bucket}")));
         }
     }
-    let (mut sum, mut failed) = (Sum::default(), 0);
+    let mut sum = Sum::default();
     for partition in &partitions {
         match of_partition(root, &tables, partition) {
-            Ok(part) => {
-                sum.files += part.files;
-                sum.bytes += part.bytes;
-                sum.new_files += part.new_files;
-                sum.new_bytes += part.new_bytes;
-                sum.sessions += part.sessions;
-            }
-            Err(error) => {
-                failed += 1;
-                note!("{partition}: {error:#}; its files stay as they are");
-            }
+            Ok(part) => sum.add(part),
+            Err(error) => failed(partition, &error),
         }
     }
     let parts =
@@ -95,30 +128,34 @@ pub fn run(args: &CompactRequest) -> Result<Outcome> {
             count(parts, "folder")
         );
     }
-    output::line(&word(&format!(
-        "{}: {} in {}, {} bytes, from {}, {} bytes",
-        root.display(),
-        count(sum.sessions, "session"),
-        count(sum.new_files, "file"),
-        sum.new_bytes,
-        count(sum.files, "file"),
-        sum.bytes
-    )))?;
-    if failed > 0 {
-        bail!("{} of {} could not be compacted", failed, count(partitions.len() as u64, "partition"));
-    }
-    Ok(Outcome::Done)
+    Ok((sum, partitions.len()))
 }
 
 fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> {
     let lock = transaction::lock(root)?;
+    let Some(merged) = merged(root, tables, partition)? else { return Ok(Sum::default()) };
+    merged.transaction.sync()?.commit(&lock, &merged.replaced, &merged.sessions)?;
+    Ok(merged.sum)
+}
+
+/// New files of a date and bucket, which do not count yet.
+pub(super) struct Merged {
+    pub(super) transaction: Transaction,
+    /// Places of the files that they replace.
+    pub(super) replaced: BTreeSet<String>,
+    sessions: Vec<String>,
+    pub(super) sum: Sum,
+}
+
+/// `None` without a session that has files of its own.
+pub(super) fn merged(root: &Path, tables: &[String], partition: &str) -> Result<Option<Merged>> {
     let (mut work, mut new) = (Vec::new(), BTreeSet::new());
     for table in tables {
         let folder = root.join(table).join(partition);
         let (mut paths, mut has_new) = (Vec::new(), false);
         for name in names(&folder)? {
             let path = folder.join(&name);
-            let is_compacted = name.starts_with(PREFIX) && name.ends_with(EXTENSION);
+            let is_of_hums = name.starts_with(PREFIX) && name.ends_with(EXTENSION);
             match session_of(&name) {
                 Some(session) if path.is_file() => {
                     has_new = true;
@@ -127,8 +164,8 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
                     }
                     paths.push(path);
                 }
-                None if is_compacted => {
-                    if fs::metadata(&path)?.len() < LARGE_BYTES {
+                None if is_of_hums => {
+                    if is_compacted(&name, fs::metadata(&path)?.len()) {
                         paths.push(path);
                     }
                 }
@@ -140,7 +177,7 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
         }
     }
     if work.is_empty() {
-        return Ok(Sum::default());
+        return Ok(None);
     }
     let transaction = Transaction::begin(root)?;
     let mut sum = Sum { sessions: new.len() as u64, ..Sum::default() };
@@ -165,9 +202,7 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
             Ok(())
         },
     )?;
-    let new: Vec<String> = new.into_iter().collect();
-    transaction.sync()?.commit(&lock, &replaced, &new)?;
-    Ok(sum)
+    Ok(Some(Merged { transaction, replaced, sessions: new.into_iter().collect(), sum }))
 }
 
 /// Writes one file for each set of columns. Returns the number of files and their bytes.

@@ -9,6 +9,7 @@
 //! The files of a session have the name of its recording, so the same recording twice is the same files. All files of a
 //! session take their places in one transaction. The session's file in `sessions` tells that the session is there.
 
+pub(crate) mod bucket;
 pub mod compact;
 pub mod overview;
 pub(crate) mod sessions;
@@ -29,6 +30,7 @@ use crate::context::Context;
 use crate::files::{Inputs, cannot_write, make_directory};
 use crate::hex::hex;
 use crate::outcome::exists;
+use bucket::Bucket;
 use transaction::{OWN, Transaction};
 
 pub(crate) const SESSIONS: &str = "sessions";
@@ -64,7 +66,9 @@ fn session_of(name: &str) -> Option<&str> {
 
 #[derive(Debug)]
 pub(crate) struct Fleet {
+    /// The folder of the tables, or of files that go to the bucket.
     root: PathBuf,
+    bucket: Option<Bucket>,
     /// The number of frames of each session.
     written: Mutex<BTreeMap<String, u64>>,
 }
@@ -76,12 +80,20 @@ enum Found {
 }
 
 impl Fleet {
-    pub(crate) fn new(root: &Path) -> Self {
-        Self { root: root.to_owned(), written: Mutex::default() }
+    pub(crate) fn new(root: &Path, bucket: Option<Bucket>) -> Self {
+        Self { root: root.to_owned(), bucket, written: Mutex::default() }
+    }
+
+    /// The path of a file as it is shown.
+    fn shown(&self, place: &str) -> PathBuf {
+        self.bucket.as_ref().map_or_else(|| self.root.join(place), |bucket| bucket.address.shown(place))
     }
 
     /// Looks for a session, in any date and bucket.
     fn find(&self, session: &str) -> Result<Option<Found>> {
+        if let Some(bucket) = &self.bucket {
+            return bucket.find(session);
+        }
         let name = file_name(session, 1);
         for date in folders(&self.root.join(SESSIONS))? {
             for bucket in folders(&self.root.join(SESSIONS).join(&date))? {
@@ -113,11 +125,11 @@ impl Fleet {
         match found {
             Found::Compacted => {
                 let why = format!("session {session} is in a file of several sessions, which stays as it is");
-                Err(exists(&self.root.join(SESSIONS), false).context(why))
+                Err(exists(&self.shown(SESSIONS), false).context(why))
             }
             Found::Alone(partition) if !inputs.may_replace() => {
-                let path = self.root.join(SESSIONS).join(partition).join(file_name(session, 1));
-                Err(exists(&path, inputs.can_replace()))
+                let path = format!("{SESSIONS}/{partition}/{}", file_name(session, 1));
+                Err(exists(&self.shown(&path), inputs.can_replace()))
             }
             Found::Alone(_) => Ok(()),
         }
@@ -140,7 +152,7 @@ fn shard(session: &str) -> String {
     hex(&Sha256::digest(session.as_bytes())[..1])
 }
 
-fn names(folder: &Path) -> Result<Vec<String>> {
+pub(crate) fn names(folder: &Path) -> Result<Vec<String>> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
@@ -164,6 +176,8 @@ fn folders(folder: &Path) -> Result<Vec<String>> {
 
 pub(crate) struct Session {
     transaction: Transaction,
+    /// The path of the tables as it is shown.
+    root: PathBuf,
     partition: String,
     name: String,
 }
@@ -174,7 +188,10 @@ impl Session {
         let identity = &context.identity;
         context.inputs.refuse(&fleet.root)?;
         make_directory(&fleet.root)?;
-        transaction::recover(&fleet.root)?;
+        match &fleet.bucket {
+            Some(bucket) => bucket.begin()?,
+            None => transaction::recover(&fleet.root)?,
+        }
         let name = identity.recording.clone();
         if fleet.is_written(&name).is_none()
             && let Some(found) = fleet.find(&name)?
@@ -182,7 +199,8 @@ impl Session {
             fleet.check(&name, &found, &context.inputs)?;
         }
         let partition = partition(&identity.vehicle, identity.date.as_deref());
-        Ok(Self { transaction: Transaction::begin(&fleet.root)?, partition, name })
+        let root = fleet.shown("");
+        Ok(Self { transaction: Transaction::begin(&fleet.root)?, root, partition, name })
     }
 
     fn place(&self, table: &str, part: u32) -> String {
@@ -190,7 +208,7 @@ impl Session {
     }
 
     pub(crate) fn path(&self, table: &str, part: u32) -> PathBuf {
-        self.transaction.root().join(self.place(table, part))
+        self.root.join(self.place(table, part))
     }
 
     pub(crate) fn file(&self, table: &str, part: u32) -> Result<File> {
@@ -204,6 +222,9 @@ impl Session {
     /// stays; `None` if that is the other one. Returns the paths of the files.
     pub(crate) fn finish(self, context: &Context, frames: u64) -> Result<Option<Vec<PathBuf>>> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
+        if let Some(bucket) = &fleet.bucket {
+            return self.upload(fleet, bucket, context, frames);
+        }
         let Self { transaction, name, .. } = self;
         let transaction = transaction.sync()?;
         let lock = transaction::lock(&fleet.root)?;
@@ -221,5 +242,38 @@ impl Session {
         let files = transaction.commit(&lock, &replaced, &[])?;
         written.insert(name, frames);
         Ok(Some(files))
+    }
+
+    /// [`Self::finish`] in object storage: no other program adds this session meanwhile.
+    fn upload(
+        self,
+        fleet: &Fleet,
+        bucket: &Bucket,
+        context: &Context,
+        frames: u64,
+    ) -> Result<Option<Vec<PathBuf>>> {
+        let Self { transaction, root, partition, name } = self;
+        let places = transaction.places()?;
+        let lease = bucket.lease(&name, &places)?;
+        let found = fleet.find(&name)?;
+        let refused = match (fleet.is_written(&name), &found) {
+            (Some(other), _) if other >= frames => Some(Ok(None)),
+            (None, Some(found)) => fleet.check(&name, found, &context.inputs).err().map(Err),
+            (Some(_), Some(found @ Found::Compacted)) => {
+                fleet.check(&name, found, &context.inputs).err().map(Err)
+            }
+            _ => None,
+        };
+        if let Some(refused) = refused {
+            lease.end()?;
+            return refused;
+        }
+        let files: Vec<(String, PathBuf)> =
+            places.iter().map(|place| (place.clone(), transaction.path(place))).collect();
+        let replaced =
+            if let Some(Found::Alone(partition)) = &found { Some(partition.as_str()) } else { None };
+        bucket.add(lease, &name, &partition, &files, replaced)?;
+        fleet.written.lock().unwrap_or_else(PoisonError::into_inner).insert(name, frames);
+        Ok(Some(places.iter().map(|place| root.join(place)).collect()))
     }
 }

@@ -18,13 +18,13 @@ use crate::identity::Identity;
 
 /// Numbers of vehicles; three of them share a bucket.
 const VEHICLES: [u64; 5] = [0, 2, 10, 1, 3];
-const TABLES: [&str; 3] = ["A", "B", SESSIONS];
+pub(super) const TABLES: [&str; 3] = ["A", "B", SESSIONS];
 
-fn session(number: u64) -> String {
+pub(super) fn session(number: u64) -> String {
     format!("s{number:08x}-{number:024x}")
 }
 
-fn context(fleet: &Arc<Fleet>, number: u64, date: Option<&str>, force: bool) -> Context {
+pub(super) fn context(fleet: &Arc<Fleet>, number: u64, date: Option<&str>, force: bool) -> Context {
     let identity = Identity {
         vehicle: format!("uid-{number:016x}"),
         date: date.map(str::to_owned),
@@ -39,7 +39,7 @@ fn context(fleet: &Arc<Fleet>, number: u64, date: Option<&str>, force: bool) -> 
     }
 }
 
-fn table(file: File, vehicle: &str, session: &str, rows: std::ops::Range<i64>) {
+pub(super) fn table(file: File, vehicle: &str, session: &str, rows: std::ops::Range<i64>) {
     let field = |name, physical, logical| {
         let field = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
         Arc::new(field.with_logical_type(logical).build().expect("a type"))
@@ -69,8 +69,17 @@ fn table(file: File, vehicle: &str, session: &str, rows: std::ops::Range<i64>) {
 }
 
 fn add(root: &Path, number: u64, date: Option<&str>, rows: i64, force: bool) -> Result<bool> {
-    let fleet = Arc::new(Fleet::new(root));
-    let context = context(&fleet, number, date, force);
+    add_to(&Arc::new(Fleet::new(root, None)), number, date, rows, force)
+}
+
+pub(super) fn add_to(
+    fleet: &Arc<Fleet>,
+    number: u64,
+    date: Option<&str>,
+    rows: i64,
+    force: bool,
+) -> Result<bool> {
+    let context = context(fleet, number, date, force);
     let open = Session::begin(&context)?;
     for name in TABLES {
         table(open.file(name, 1)?, &context.identity.vehicle, &session(number), 0..rows);
@@ -78,7 +87,7 @@ fn add(root: &Path, number: u64, date: Option<&str>, rows: i64, force: bool) -> 
     Ok(open.finish(&context, rows as u64)?.is_some())
 }
 
-fn rows(root: &Path, table: &str) -> Vec<(String, i64)> {
+pub(super) fn rows(root: &Path, table: &str) -> Vec<(String, i64)> {
     let mut all = Vec::new();
     for date in folders(&root.join(table)).expect("dates") {
         for bucket in folders(&root.join(table).join(&date)).expect("buckets") {
@@ -99,7 +108,7 @@ fn rows(root: &Path, table: &str) -> Vec<(String, i64)> {
     all
 }
 
-fn all_rows(root: &Path) -> Vec<Vec<(String, i64)>> {
+pub(super) fn all_rows(root: &Path) -> Vec<Vec<(String, i64)>> {
     TABLES.iter().map(|table| rows(root, table)).collect()
 }
 
@@ -271,7 +280,7 @@ fn programs_that_add_the_same_sessions_at_once_add_each_once() {
 fn the_longer_log_of_a_session_stays() {
     for order in [[10, 20], [20, 10]] {
         let dir = tempfile::tempdir().expect("a directory");
-        let fleet = Arc::new(Fleet::new(dir.path()));
+        let fleet = Arc::new(Fleet::new(dir.path(), None));
         let kept = order.map(|rows| {
             let context = context(&fleet, 1, None, false);
             let open = Session::begin(&context).expect("begun");

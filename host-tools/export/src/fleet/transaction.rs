@@ -10,7 +10,7 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Write as _};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use tempfile::TempDir;
@@ -18,6 +18,7 @@ use tempfile::TempDir;
 use super::{names, shard};
 use crate::files::{check_parent, settle};
 use crate::logs::in_order::in_order;
+use crate::storage::is_inside;
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
 pub(crate) const OWN: &str = ".hums-fleet";
@@ -127,24 +128,27 @@ impl Transaction {
         Ok(Self { root: root.to_owned(), part: settle(part, root)? })
     }
 
-    pub(crate) fn root(&self) -> &Path {
-        &self.root
-    }
-
     pub(crate) fn path(&self, place: &str) -> PathBuf {
         self.part.path().join(FILES).join(place)
+    }
+
+    /// Places of the new files.
+    pub(crate) fn places(&self) -> Result<Vec<String>> {
+        let mut places = Vec::new();
+        let listed = each(&self.part.path().join(FILES), "", &mut |place| {
+            places.push(place.to_owned());
+            Ok(())
+        });
+        settle(listed, &self.root)?;
+        Ok(places)
     }
 
     /// All files are there and closed: they go to the disk. A change that counts must have them after a power cut.
     /// Other changes may be made meanwhile.
     pub(crate) fn sync(self) -> Result<Synced> {
+        let places = self.places()?;
         let Self { root, part } = self;
-        let (folder, mut places) = (part.path().join(FILES), Vec::new());
-        let listed = each(&folder, "", &mut |place| {
-            places.push(place.to_owned());
-            Ok(())
-        });
-        settle(listed, &root)?;
+        let folder = part.path().join(FILES);
         let mut next = places.iter();
         let sync = |place: &String| File::open(folder.join(place)).and_then(|file| file.sync_all());
         in_order(SYNCS_AT_ONCE, places.len(), || Ok(next.next()), sync, |synced| settle(synced, &root))?;
@@ -242,12 +246,6 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     fs::rename(folder, &done)?;
     stop::step()?;
     fs::remove_dir_all(done)
-}
-
-/// Whether a place of a list is below the folder of the tables.
-fn is_inside(place: &str) -> bool {
-    let mut parts = Path::new(place).components();
-    !place.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
 fn each(folder: &Path, prefix: &str, take: &mut dyn FnMut(&str) -> io::Result<()>) -> io::Result<()> {

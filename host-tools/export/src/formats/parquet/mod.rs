@@ -377,7 +377,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a directory");
         let decode = |limits, name: &str| {
             let context = Context {
-                fleet: Some(Arc::new(Fleet::new(dir.path()))),
+                fleet: Some(Arc::new(Fleet::new(dir.path(), None))),
                 inputs: Inputs::none().forcing(true),
                 identity: Identity {
                     vehicle: "uid-1".to_owned(),
