@@ -29,11 +29,27 @@ fn run(script: &str, arguments: &[PathBuf]) -> String {
 }
 
 fn outcome(script: &str, arguments: &[PathBuf]) -> child::Outcome {
-    let mut command = Command::new(from_environment("HUMS_PYTHON", "target/venv/bin/python"));
+    child::run(&mut command(script, arguments), LIMIT).expect_code(&[0])
+}
+
+fn command(script: &str, arguments: &[PathBuf]) -> Command {
+    let mut command = Command::new(beside_python("python"));
     command.arg(root().join("tests/oracle").join(script)).args(arguments);
     // No compiled scripts in the repository.
     command.env("PYTHONDONTWRITEBYTECODE", "1");
-    child::run(&mut command, LIMIT).expect_code(&[0])
+    command
+}
+
+/// A program of the environment.
+pub fn beside_python(name: &str) -> PathBuf {
+    from_environment("HUMS_PYTHON", "target/venv/bin/python").with_file_name(name)
+}
+
+/// Another client of object storage: `tests/oracle/storage.py`. `None` if it fails.
+pub fn storage(environment: &[(String, String)], arguments: &[PathBuf]) -> Option<Value> {
+    let mut command = command("storage.py", arguments);
+    let outcome = child::run(command.envs(environment.iter().map(|(name, value)| (name, value))), LIMIT);
+    if outcome.code == Some(0) { Some(json(&outcome.text())) } else { None }
 }
 
 fn json(text: &str) -> Value {

@@ -46,12 +46,14 @@ enum Command {
     Test(test::Options),
     /// Run the campaigns: power cuts, damage, stalls, endurance, hostile ground station, noise
     ///
-    /// All of them take an hour and make docs/proof.md. Six names are no campaigns:
+    /// All of them take an hour and make docs/proof.md. Seven names are no campaigns:
     ///
     /// `prove diagnosis [FOLDER]... [--unseen FOLDER]... [--write]` counts found faults and false alarms in labelled
     /// flights; --write makes docs/diagnosis.md.
     ///
     /// `prove fleet [--short] [--runs N]` makes 20,000 sessions of 10,000 vehicles, and measures ingest, size and queries.
+    ///
+    /// `prove storage` tries tables in object storage, on a server of its own.
     ///
     /// `prove chip [TEST]...` runs the long tests of the image on the model of its chip.
     ///

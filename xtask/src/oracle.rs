@@ -66,12 +66,12 @@ pub(crate) fn prepare() -> Result<()> {
     Ok(())
 }
 
-/// Half a gigabyte, for `prove fleet` alone.
-pub(crate) fn prepare_spark() -> Result<()> {
-    let list = repo::root().join(FOLDER).join("requirements-spark.txt");
+/// More packages, for one command: Spark has half a gigabyte.
+pub(crate) fn install(list: &str) -> Result<()> {
+    let list = repo::root().join(FOLDER).join(list);
     let pip =
         Shell::new(python()).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]);
-    pip.arg(list).run().context("Spark cannot be installed: is there a network?")
+    pip.arg(&list).run().with_context(|| format!("{}: is there a network?", list.display()))
 }
 
 /// Definitions in the `mavlink` crate of `Cargo.lock`.

@@ -1,7 +1,7 @@
 //! `cargo xtask prove`: the campaigns, thousands of cases each; their results are `docs/proof.md`.
 //!
 //! They are in the tests' crate; this builds them. Apart: `diagnosis` (labelled flights, `docs/diagnosis.md`), `fleet` (20,000
-//! sessions as tables), `chip` (long tests on the model), `boards` (every board's image), `foreign` (foreign programs on the
+//! sessions as tables), `storage` (object storage), `chip` (long tests on the model), `boards` (every board's image), `foreign` (foreign programs on the
 //! model), `browser` (the check in a browser: time and memory).
 
 use anyhow::Result;
@@ -30,6 +30,8 @@ const DIAGNOSIS: &str = "diagnosis";
 
 const FLEET: &str = "fleet";
 
+const STORAGE: &str = "storage";
+
 /// Names, `--short`, `--seed N`, `--runs N`; `diagnosis`, `chip` and `foreign` have their own.
 pub(crate) fn run(arguments: &[String]) -> Result<()> {
     match arguments.split_first().map(|(first, rest)| (first.as_str(), rest)) {
@@ -40,6 +42,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
         Some((FOREIGN, rest)) => return foreign::run(rest),
         Some((BROWSER, [])) => return in_browsers(),
         Some((FLEET, _)) => return fleet(arguments),
+        Some((STORAGE, [])) => return storage(arguments),
         _ => {}
     }
     let is_diagnosis = arguments.first().is_some_and(|first| first == DIAGNOSIS);
@@ -59,10 +62,22 @@ fn fleet(arguments: &[String]) -> Result<()> {
     setup::require(&[Need::Linker, Need::PythonVenv])?;
     oracle::prepare()?;
     if setup::ensure(&[Need::Java], false).has(Need::Java) {
-        oracle::prepare_spark()?;
+        oracle::install("requirements-spark.txt")?;
     }
     let hums = hums::build_release()?;
     campaigns(arguments).env("HUMS_BIN", hums).env("HUMS_PYTHON", oracle::python()).run()
+}
+
+/// `hums` with its feature, which is linted here alone, and a server.
+fn storage(arguments: &[String]) -> Result<()> {
+    const FEATURE: [&str; 2] = ["--features", "hums/object-storage,hums-export/object-storage"];
+    setup::require(&[Need::Linker, Need::PythonVenv, Need::Clippy])?;
+    oracle::prepare()?;
+    oracle::install("requirements-storage.txt")?;
+    let lint = ["clippy", "--package=hums", "--package=hums-export", "--all-targets"];
+    Shell::cargo().args(lint).args(FEATURE).args(["--", "-D", "warnings"]).run()?;
+    Shell::cargo().args(["build", "--package=hums", "--features", "object-storage"]).run()?;
+    campaigns(arguments).env("HUMS_BIN", hums::program()).env("HUMS_PYTHON", oracle::python()).run()
 }
 
 /// Some or all.

@@ -9,6 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use hums_tests::flights::root;
 use hums_tests::prove::diagnosis::{self, DIAGNOSIS, Flights};
 use hums_tests::prove::fleet::{self, FLEET, Fleet};
+use hums_tests::prove::storage::{self, STORAGE};
 use hums_tests::prove::{CAMPAIGNS, Campaign, Counting, Options, Part, Provenance, write_report};
 
 #[global_allocator]
@@ -16,13 +17,17 @@ static ALLOCATOR: Counting = Counting;
 
 const USAGE: &str = "prove [NAME...] [--short] [--seed N] [--runs N] [--no-report] [--list]
 prove diagnosis [FOLDER]... [--unseen FOLDER]... [--short] [--write]
-prove fleet [--short] [--runs N]";
+prove fleet [--short] [--runs N]
+prove storage";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let run = match words.split_first() {
         Some((first, rest)) if first == DIAGNOSIS => Flights::parse(rest).map(|flights| judge(&flights)),
-        Some((first, rest)) if first == FLEET => Fleet::parse(rest).map(|extent| analyse(&extent)),
+        Some((first, rest)) if first == FLEET => {
+            Fleet::parse(rest).map(|extent| timed(FLEET, || fleet::run(&extent)))
+        }
+        Some((first, [])) if first == STORAGE => Ok(timed(STORAGE, storage::run)),
         _ => Arguments::parse(words.into_iter()).map(|arguments| run(&arguments)),
     };
     match run {
@@ -51,10 +56,10 @@ fn judge(flights: &Flights) -> Result<()> {
     Ok(())
 }
 
-fn analyse(extent: &Fleet) -> Result<()> {
+fn timed(name: &str, run: impl FnOnce() -> Result<String>) -> Result<()> {
     let start = Instant::now();
-    let text = fleet::run(extent)?;
-    println!("{FLEET} held in {:.1} s\n{text}", start.elapsed().as_secs_f64());
+    let text = run()?;
+    println!("{name} held in {:.1} s\n{text}", start.elapsed().as_secs_f64());
     Ok(())
 }
 
@@ -102,6 +107,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         if all {
             println!("{DIAGNOSIS:<12} {}", diagnosis::ABOUT);
             println!("{FLEET:<12} {}", fleet::ABOUT);
+            println!("{STORAGE:<12} {}", storage::ABOUT);
         }
         return Ok(());
     }

@@ -19,6 +19,7 @@ mod power_cuts;
 mod record;
 mod report;
 mod stalls;
+pub mod storage;
 mod stream;
 
 use anyhow::Result;
