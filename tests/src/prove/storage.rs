@@ -146,9 +146,12 @@ pub fn run() -> Result<String> {
     Ok(text)
 }
 
+/// Variables of the environment; without a value they are removed.
+type Settings = &'static [(&'static str, Option<&'static str>)];
+
 fn wrong_settings(server: &Server, cards: &Path) -> Result<()> {
     let tlog = cards.join(OWN[0]);
-    let cases: [(&str, &[(&str, Option<&str>)], &str); 4] = [
+    let cases: [(&str, Settings, &str); 4] = [
         ("s3://no-such-bucket/all", &[], "create the bucket"),
         (FLEET, &[("AWS_SECRET_ACCESS_KEY", Some("wrong"))], "check AWS_ACCESS_KEY_ID"),
         (FLEET, &[("AWS_ACCESS_KEY_ID", None), ("AWS_SECRET_ACCESS_KEY", None)], "no credentials"),
@@ -313,7 +316,7 @@ fn inputs(server: &Server, dir: &Path) -> Result<()> {
         let line: Value = serde_json::from_str(&outcome.text())?;
         Ok(serde_json::json!([line["verdict"], line["findings"], line["log"]]))
     };
-    let near = verdict(child::run(&mut command(["check", "--json"]).arg(&log), LIMIT).expect_code(&[0, 4]))?;
+    let near = verdict(child::run(command(["check", "--json"]).arg(&log), LIMIT).expect_code(&[0, 4]))?;
     for name in ["s3://fleet/logs/a.tlog", "s3://fleet/logs"] {
         let far = verdict(server.hums(&["check", "--json", name]).expect_code(&[0, 4]))?;
         ensure!(far[0] == near[0] && far[1] == near[1] && far[2] == "s3://fleet/logs/a.tlog", "{far}");
