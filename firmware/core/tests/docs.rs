@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use hums_core::exposure;
-use hums_core::health::{Check, Said, Side, When, all_words, checks};
+use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Millis;
 
@@ -153,7 +153,7 @@ fn every_check_is_documented_as_it_is() {
 #[test]
 fn every_check_is_explained_as_people_are_told() {
     let mut table = "| check | name | means | do | needs |\n|---|---|---|---|---|\n".to_owned();
-    for words in all_words() {
+    for words in VOCABULARY {
         let Said { check, name, part, .. } = words.said;
         let part = if part.is_empty() { String::new() } else { format!(", by {part}") };
         let _ = writeln!(
@@ -169,7 +169,7 @@ fn every_check_is_explained_as_people_are_told() {
 fn every_text_of_a_check_is_in_the_runbook() {
     let mut table = "| HUMS: | if critical | what is so | what to do |\n|---|---|---|---|\n".to_owned();
     let mut told = Vec::new();
-    for (words, check) in all_words().zip(checks()) {
+    for (words, check) in VOCABULARY.iter().zip(checks()) {
         let Said { alarm, advice, .. } = words.said;
         if told.contains(&alarm) {
             continue;

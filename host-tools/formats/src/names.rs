@@ -17,8 +17,8 @@ pub fn message_name(id: u32) -> Cow<'static, str> {
 }
 
 /// The board's, or trends'.
-pub fn vocabulary(check: &str) -> Option<Words> {
-    let of_trends = || WORDS.into_iter().find(|words| words.said.check == check);
+pub fn vocabulary(check: &str) -> Option<&'static Words> {
+    let of_trends = || WORDS.iter().find(|words| words.said.check == check);
     health::vocabulary(check).or_else(of_trends)
 }
 

@@ -11,7 +11,7 @@ use hums_core::component::{COMPONENTS_MAX, Component};
 use hums_core::flight::Phase;
 use hums_core::happening::Happening;
 use hums_core::health::exceedance::Exceedance;
-use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, all_words, check_named};
+use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, VOCABULARY, check_named};
 use hums_core::observation::{Autopilot, Feeds, Observation, Source};
 use hums_core::params::Params;
 use hums_core::status::{RecorderStatus, Recording};
@@ -421,7 +421,7 @@ impl Craft {
 /// Whether a check is about the autopilot's own wire.
 pub fn is_of_wire(check: &str) -> bool {
     static WIRE: LazyLock<Vec<&str>> = LazyLock::new(|| {
-        let of_wire = all_words().filter(|words| words.scope == Scope::Wire);
+        let of_wire = VOCABULARY.iter().filter(|words| words.scope == Scope::Wire);
         of_wire.map(|words| words.said.check).collect()
     });
     WIRE.contains(&check)

@@ -29,7 +29,7 @@ pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
 pub use tables::{check_named, checks, instances};
-pub use vocabulary::{Said, Scope, Words, all_words, said, vocabulary};
+pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
 use crate::params::Param;

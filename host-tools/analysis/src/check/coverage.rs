@@ -2,7 +2,7 @@
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Check, Level, Scope, Side, When, checks, vocabulary};
+use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
@@ -37,7 +37,7 @@ pub(super) type Lists = (Vec<&'static str>, Vec<(&'static str, String)>);
 impl Coverage {
     /// Empty.
     pub(super) fn new() -> Self {
-        Self { seen: vec![Seen::default(); checks().len()], next: Instant::ZERO }
+        Self { seen: vec![Seen::default(); VOCABULARY.len()], next: Instant::ZERO }
     }
 
     /// Values and levels, now and then; `steps`: monitor's time.

@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, Said, all_words, instances};
+use hums_core::health::{Finding, Said, VOCABULARY, instances};
 use hums_core::observation::{Feeds, MOTORS_MAX};
 use hums_formats::trend_words::WORDS;
 use hums_link::encode::COMPONENT;
@@ -100,8 +100,9 @@ fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
         0 => MOTORS_MAX as u8,
         parts => parts,
     };
-    let each = all_words()
-        .chain(WORDS)
+    let each = VOCABULARY
+        .iter()
+        .chain(&WORDS)
         .flat_map(|words| (0..parts(&words.said)).map(move |part| (words.said, part)));
     let told = each.filter_map(|(said, part)| {
         let rest = match silent {

@@ -2,7 +2,7 @@
 
 use hums_blackbox::Record;
 use hums_blackbox::record::{FindingRecord, Moment, Parameter, Usage};
-use hums_core::health::{Level, Words, all_words};
+use hums_core::health::{Level, VOCABULARY, Words};
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VtolState,
 };
@@ -97,8 +97,8 @@ fn each_check_is_judged_or_says_why_not() {
     // PX4's are not meant for ArduPilot.
     assert_eq!(why("vibration_px4"), "");
     let named = judged.judged.len() + judged.not_judged.len();
-    let meant = |words: &Words| !matches!(words.scope, Scope::Px4 | Scope::Said);
-    assert_eq!(named, all_words().chain(WORDS).filter(meant).count());
+    let meant = |words: &&Words| !matches!(words.scope, Scope::Px4 | Scope::Said);
+    assert_eq!(named, VOCABULARY.iter().chain(&WORDS).filter(meant).count());
 }
 
 fn disarmed_high(falls: bool) -> Judged {
@@ -436,7 +436,7 @@ fn a_recording_that_was_joined_on_is_judged_by_itself() {
 #[test]
 fn trends_over_flights_are_not_judged_from_one_recording() {
     for format in [Format::DataFlash, Format::Tlog, Format::Hums] {
-        let stored = all_words().filter(|words| words.scope == Scope::Stored);
+        let stored = VOCABULARY.iter().filter(|words| words.scope == Scope::Stored);
         assert!(stored.clone().count() > 3);
         for words in stored {
             assert!(!is_of(words.said.check, format, false), "{}", words.said.check);
