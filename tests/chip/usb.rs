@@ -279,6 +279,29 @@ fn one_of(answers: &[Told], id: u32, is_it: impl Fn(&[u8]) -> bool) -> Result<()
     Ok(())
 }
 
+/// The first bytes of a log, by `LOG_REQUEST_DATA` and `LOG_DATA`.
+fn log_data(serial: &mut Serial<'_>, number: u8, bytes: usize) -> Result<Vec<u8>> {
+    let mut log = Vec::new();
+    while log.len() < bytes {
+        let ([o0, o1, o2, o3], count) =
+            ((log.len() as u32).to_le_bytes(), (bytes - log.len()).min(900) as u32);
+        let [c0, c1, ..] = count.to_le_bytes();
+        let request = frame(119, &[o0, o1, o2, o3, c0, c1, 0, 0, number, 0, 1, COMPONENT], 116, 2);
+        let answers = answers_to(serial, &request)?;
+        let before = log.len();
+        for one in ours(&answers).filter(|one| one.0 == 120) {
+            let mut data = one.3.clone();
+            data.resize(97, 0);
+            let at = u32::from_le_bytes([data[0], data[1], data[2], data[3]]) as usize;
+            if at == log.len() {
+                log.extend_from_slice(&data[7..7 + usize::from(data[6])]);
+            }
+        }
+        ensure!(log.len() > before, "no data from {before} on: {answers:?}");
+    }
+    Ok(log)
+}
+
 #[test]
 #[ignore = "a minute: `cargo xtask prove chip`"]
 fn a_station_at_the_plug_downloads_a_log_and_sets_a_key() {
@@ -302,24 +325,7 @@ fn a_station_at_the_plug_downloads_a_log_and_sets_a_key() {
         let entry = |one: &Told| Some((u32::from_le_bytes(*one.3.get(4..)?.first_chunk()?), one.3[8]));
         let entries = ours(&list).filter(|one| one.0 == 118).filter_map(entry);
         let (bytes, number) = entries.max().context("no LOG_ENTRY")?;
-        let (bytes, mut log) = ((bytes as usize).min(8 * 512), Vec::new());
-        while log.len() < bytes {
-            let ([o0, o1, o2, o3], count) =
-                ((log.len() as u32).to_le_bytes(), (bytes - log.len()).min(900) as u32);
-            let [c0, c1, ..] = count.to_le_bytes();
-            let request = frame(119, &[o0, o1, o2, o3, c0, c1, 0, 0, number, 0, 1, COMPONENT], 116, 2);
-            let answers = answers_to(serial, &request)?;
-            let before = log.len();
-            for one in ours(&answers).filter(|one| one.0 == 120) {
-                let mut data = one.3.clone();
-                data.resize(97, 0);
-                let at = u32::from_le_bytes([data[0], data[1], data[2], data[3]]) as usize;
-                if at == log.len() {
-                    log.extend_from_slice(&data[7..7 + usize::from(data[6])]);
-                }
-            }
-            ensure!(log.len() > before, "no data from {before} on: {answers:?}");
-        }
+        let log = log_data(serial, number, (bytes as usize).min(8 * 512))?;
         Ok(log.as_chunks::<512>().0.to_vec())
     });
     let card: HashSet<[u8; 512]> = rig.medium.content().into_values().collect();

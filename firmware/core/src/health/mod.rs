@@ -34,7 +34,7 @@ pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
 use crate::latest::Reading;
 use crate::params::Param;
 use crate::time::{BootMs, Millis, SILENT};
-use alarms::{ALARMS_MAX, Alarms};
+use alarms::{ALARMS_MAX, Alarms, Standing};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
 
@@ -182,7 +182,7 @@ impl Health {
     }
 
     fn standing(&self) -> impl Iterator<Item = Alarm> {
-        self.alarms.iter().filter_map(|standing| standing.alarm())
+        self.alarms.iter().filter_map(Standing::alarm)
     }
 
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {

@@ -101,7 +101,7 @@ pub struct Server<'a> {
     answers: In<'a, Answered, 1>,
     last: Option<FoundLog>,
     sum: Option<Sum>,
-    /// FoundLog last, by place.
+    /// Found last, by place.
     listed: ListedLog,
     /// An erase in progress, a block of the directory at a call: its next entry.
     erases: Option<u32>,

@@ -27,7 +27,7 @@ pub const RAW_BAUD: u32 = 115_200;
 /// A found recording, not yet open.
 #[derive(Clone, Debug)]
 pub struct LogPlace {
-    /// LogPlace for people: path, or path and session.
+    /// Place for people: path, or path and session.
     pub title: String,
     /// Name for files made of it, unique within one call: the file's, or a session's as in `hums info`.
     pub name: String,

@@ -12,7 +12,7 @@ pub(crate) struct UnknownLines {
 #[derive(Clone, Copy, Debug)]
 struct BufferedRow {
     id: u32,
-    /// BufferedRow for the id.
+    /// Place for the id.
     middle: usize,
     end: usize,
 }
