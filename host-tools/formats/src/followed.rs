@@ -34,7 +34,7 @@ impl<T: HasEnding> EndResolver<T> {
         Self { held: VecDeque::new(), sessions }
     }
 
-    /// Returns the logs that no later one concerns.
+    /// Returns the logs that no later one concerns, in order: what is no HUMS log waits at most for one.
     pub fn push(&mut self, mut next: T) -> Vec<T> {
         let mut has_sectors = false;
         if let Some(ending) = next.ending() {
@@ -53,8 +53,11 @@ impl<T: HasEnding> EndResolver<T> {
         self.held.push_back(next);
         // The next start found the newest log with sectors.
         let keep = if has_sectors { 1 } else { HELD_MAX };
-        let done = self.held.len().saturating_sub(keep);
-        self.held.drain(..done).collect()
+        let mut done = Vec::new();
+        while self.held.len() > keep || self.held.front_mut().is_some_and(|log| log.ending().is_none()) {
+            done.extend(self.held.pop_front());
+        }
+        done
     }
 
     /// Ends the list of logs.
@@ -130,6 +133,24 @@ mod tests {
         fn ending(&mut self) -> Option<&mut Self> {
             Some(self)
         }
+    }
+
+    impl HasEnding for Option<Ending> {
+        fn ending(&mut self) -> Option<&mut Ending> {
+            self.as_mut()
+        }
+    }
+
+    #[test]
+    fn only_a_hums_log_and_what_follows_it_wait_for_later_ones() {
+        let mut followed = EndResolver::new(Sessions::default());
+        let waiting = |followed: &mut EndResolver<_>, log: Option<Ending>| followed.push(log).len();
+        assert_eq!([None, None].map(|log| waiting(&mut followed, log)), [1, 1]);
+        assert_eq!([Some(Ending::default()), None].map(|log| waiting(&mut followed, log)), [0, 0]);
+        let mut log = Ending::default();
+        log.summary.session = Some(9);
+        assert_eq!([Some(log), None].map(|log| waiting(&mut followed, log)), [2, 0]);
+        assert_eq!(followed.finish().count(), 2);
     }
 
     #[test]
