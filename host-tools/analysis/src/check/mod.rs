@@ -168,16 +168,12 @@ fn vehicles(place: &LogPlace, format: Format, judged: &Judged) -> Vec<LogPlace> 
     if is_apart { judged.systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
 }
 
-/// A recording, once for each of its vehicles: those that `hums check` judges, with their system ids in the names. An
-/// unreadable recording is returned as it is.
+/// A recording, once for each of its vehicles: those that `hums check` judges. An unreadable recording is returned as it is.
 pub fn by_vehicle(place: &LogPlace) -> Vec<LogPlace> {
     let is_of_link = place.path().is_some() && place.open().is_ok_and(|open| open.format.is_of_link());
     let read = is_of_link.then(|| overview::judge(place, &Limits::default(), Heard::Somewhere, false));
     let read = read.and_then(Result::ok);
-    let mut all = read.map(|read| vehicles(place, read.format, &read.judged)).unwrap_or_default();
-    for vehicle in &mut all {
-        vehicle.name = format!("{}, system {}", place.name, vehicle.system.unwrap_or_default());
-    }
+    let all = read.map(|read| vehicles(place, read.format, &read.judged)).unwrap_or_default();
     if all.is_empty() { vec![place.clone()] } else { all }
 }
 

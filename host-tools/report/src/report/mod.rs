@@ -113,6 +113,11 @@ pub fn run_into(args: &Request<'_>, put: &mut PageSink<'_>) -> Result<Outcome> {
         found.places = all;
     }
     let wanted = wanted(args, output, &found)?;
+    for place in &mut found.places {
+        if let Some(system) = place.system {
+            place.name = format!("{}, system {system}", place.name);
+        }
+    }
     if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pdf")) {
         return Err(usage(format!(
             "-o {}: a page is HTML: give it that name, and print it from a browser",
