@@ -16,7 +16,7 @@ use crate::counters::tells_flight;
 const OF_A_FIX: [&str; 4] = ["gps_satellites", "gps_hdop", "gps_accuracy", "gps_fix"];
 const CELL_VOLTAGE: &str = "cell_voltage";
 /// Reason for checks of earlier flights and worn parts.
-const UNTOLD: &str = "needs earlier flights (--past) or a box";
+const UNTOLD: &str = "needs earlier flights or a box";
 pub(super) const OFF: &str = "its limit is off";
 const NOTE_EVERY: Span = Span::from_millis(500);
 
