@@ -175,21 +175,19 @@ pub(crate) fn fill(template: &str, texts: &[(&str, &str)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::browser;
 
     #[test]
-    fn each_mark_of_the_template_stands_once() {
-        let program = program("report");
-        for mark in
-            ["{{images}}", "{{scripts}}", "{{tiles}}", "{{style}}", "{{uplot}}", "{{program}}", "{{data}}"]
-        {
-            assert_eq!(TEMPLATE.matches(mark).count(), 1, "{mark}");
-            assert!(
-                !UPLOT.contains(mark) && !program.contains(mark) && !STYLE.concat().contains(mark),
-                "{mark}"
-            );
+    fn each_mark_of_a_template_stands_once() {
+        let programs = ["report", "compare", "check", "worker"].map(program);
+        let texts: Vec<&str> = programs.iter().map(String::as_str).chain([UPLOT]).chain(STYLE).collect();
+        for template in [TEMPLATE, browser::TEMPLATE] {
+            for mark in template.split("{{").skip(1).filter_map(|rest| rest.split("}}").next()) {
+                let mark = &format!("{{{{{mark}}}}}");
+                assert_eq!(template.matches(mark).count(), 1, "{mark}");
+                assert!(!texts.iter().any(|text| text.contains(mark)), "{mark}");
+            }
         }
-        for text in [UPLOT, program.as_str()] {
-            assert!(!text.contains("</script"), "a program would end early");
-        }
+        assert!(!texts.iter().any(|text| text.contains("</script")), "a program would end early");
     }
 }
