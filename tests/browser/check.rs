@@ -16,9 +16,6 @@ use hums_tests::program::{LIMIT, Machine, Recording, browser, command, release};
 
 use super::live::shoot;
 
-/// The page is opened within a second or two; a phone's flash is no faster than this.
-const PAGE_BYTES_MAX: usize = 6_000_000;
-
 struct Page {
     dir: tempfile::TempDir,
     shown: LivePage,
@@ -32,7 +29,6 @@ impl Page {
     fn sized(width: u32, height: u32) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let html = hums_report::browser::page(&fs::read(browser()).unwrap()).unwrap();
-        assert!(html.len() < PAGE_BYTES_MAX, "{} bytes", html.len());
         let path = dir.path().join("hums-check.html");
         fs::write(&path, html).unwrap();
         let mut shown = LivePage::start();
@@ -76,7 +72,7 @@ impl Page {
              const text = document.getElementById('worker').textContent;
              const worker = new Worker(URL.createObjectURL(new Blob([text], {{ type: 'text/javascript' }})));
              window.ended = null;
-             worker.onmessage = ({{ data }}) => {{ if (data.kind === 'end') window.ended = data; }};
+             worker.onmessage = ({{ data }}) => {{ window.ended ??= data; }};
              WebAssembly.compile(bytes).then((module) => worker.postMessage({{ module, command: ['check'], files: [] }}));
              return null"
         ));
@@ -88,6 +84,10 @@ impl Page {
             "return [...document.querySelectorAll({selector:?})].map((node) => node.textContent).join('\\n')"
         );
         self.shown.run(&script).as_str().unwrap().to_owned()
+    }
+
+    fn cancel(&mut self) {
+        self.shown.run("[...document.querySelectorAll('button')].find((one) => one.textContent === 'Cancel').click(); return null");
     }
 
     #[track_caller]
@@ -243,11 +243,13 @@ fn the_reports_are_those_of_the_command_line_also_of_a_card_and_side_by_side() {
     }
     // A report runs inside the page.
     let screen = hums_in(&folder, &["check"], &names[..1]).text();
-    let shown = page.text("[data-log='a.tlog'] .verdict, [data-log='a.tlog'] > .screen");
-    assert_eq!(shown, screen.replace(" (-v lists them)", "").trim_end());
+    let shown = page.text("[data-log='a.tlog'] .verdict, [data-log='a.tlog'] > .screen div");
+    let screen: Vec<&str> = screen.trim_end().lines().map(str::trim_start).collect();
+    assert_eq!(shown, screen.join("\n").replace(" (-v lists them)", ""));
     let listed = hums_in(&folder, &["check", "-v"], &names[..1]).text();
-    let reasons = page.text("[data-log='a.tlog'] details .screen");
-    assert!(reasons.lines().count() > 3 && listed.contains(&reasons), "{reasons}");
+    let reasons = page.text("[data-log='a.tlog'] details .screen div");
+    let is_listed = |reason| listed.lines().any(|line| line.trim_start() == reason);
+    assert!(reasons.lines().count() > 3 && reasons.lines().all(is_listed), "{reasons}");
     page.shown.run("document.querySelector('[data-log=\"a.tlog\"] button').click(); return null");
     page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
     assert_eq!(page.shown.console(), serde_json::json!([]), "a script of the report is refused");
@@ -278,9 +280,36 @@ fn what_is_dropped_is_judged_also_folders_and_two_files_of_one_name() {
     let one = flight("one/flight.tlog", "tests/flights/px4_hil_quad_low.tlog");
     let two = flight("two/flight.tlog", "tests/flights/ap_quad_faults.tlog");
     let both = flight("card/a/b.bin.gz", "tests/labelled/bin/f12_gps_jump.bin.gz");
+    page.shown.run(
+        "addEventListener('change', ({ target }) => { window.chosen ??= [...target.files]; }, { capture: true });
+         return null",
+    );
     page.check("#files", &[one.clone(), two.clone()]);
     let shown = page.text("#logs h2");
     assert!(shown.contains("flight.tlog") && shown.contains("flight (2).tlog"), "{shown}");
+    // What a browser without folders gives for one.
+    page.shown.run(
+        "const data = new DataTransfer(), input = document.getElementById('folder');
+         for (const file of chosen) data.items.add(file);
+         document.documentElement.dataset.state = '';
+         input.files = data.files;
+         input.dispatchEvent(new Event('change')); return null",
+    );
+    page.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
+    assert_eq!(page.text("#logs h2"), shown);
+    // A folder with an entry that cannot be read.
+    page.shown.run(
+        "const entries = [{ name: 'bad.tlog', getFile: async () => { throw new Error('locked'); } },
+                          { name: 'good.tlog', getFile: async () => chosen[0] }];
+         const folder = { async *values() { yield* entries; } };
+         const item = { kind: 'file', getAsFile: () => null, getAsFileSystemHandle: async () => folder,
+                        webkitGetAsEntry: () => ({ isDirectory: true, name: 'card' }) };
+         document.documentElement.dataset.state = '';
+         dispatchEvent(Object.assign(new Event('drop'), { dataTransfer: { items: [item] } })); return null",
+    );
+    page.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
+    assert!(page.text("#logs h2").contains("card/good.tlog"), "{}", page.text("#logs h2"));
+    assert_eq!(page.text("#remarks li"), "card/bad.tlog: was dropped, and cannot be read: locked.");
     page.shown.run("document.documentElement.dataset.state = ''; return null");
     page.shown.drop_files(&[one, two, both.ancestors().nth(2).unwrap().to_owned()]);
     page.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
@@ -288,8 +317,15 @@ fn what_is_dropped_is_judged_also_folders_and_two_files_of_one_name() {
     for name in ["flight.tlog", "flight (1).tlog", "card/a/b.bin.gz"] {
         assert!(shown.contains(name), "{name}: {shown}");
     }
-    page.shown.run("document.querySelector('[data-log=\"flight.tlog\"] button').click(); return null");
-    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
+    // Of the reports the last one that was asked for is shown.
+    page.shown.run(
+        "const [a, b, c] = [...document.querySelectorAll('.log button')].filter((one) => one.textContent === 'Report');
+         for (const one of [a, b, c, a, b]) one.click(); return null",
+    );
+    page.save("Save report", 3);
+    let title = page.shown.wait("return document.querySelector('iframe[data-ready]')?.title", 20);
+    let second = page.shown.run("return document.querySelectorAll('.log')[1].dataset.log");
+    assert_eq!(title, format!("Report of {}", second.as_str().unwrap()));
     assert_eq!(page.shown.console(), serde_json::json!([]));
 }
 
@@ -303,6 +339,8 @@ fn a_log_that_is_not_read_shows_its_reason_alone() {
         "return [...document.querySelectorAll('.log')].map((log) => log.querySelectorAll('details').length)",
     );
     assert_eq!(details, serde_json::json!([1, 0]));
+    assert_eq!(page.text("#remarks"), "");
+    assert_eq!(fs::read_to_string(&page.save("Save all findings", 1)[0]).unwrap().lines().count(), 2);
 }
 
 #[test]
@@ -386,7 +424,9 @@ fn each_vehicle_of_a_recording_of_several_has_its_answer_and_its_report() {
         let expected = made.find(|path| path.to_string_lossy().ends_with(&end)).unwrap();
         let same =
             saved.iter().find(|path| path.file_name() == expected.file_name()).expect("it has its name");
-        assert!(fs::read(same).unwrap() == fs::read(&expected).unwrap(), "system {system} differs");
+        let html = fs::read_to_string(same).unwrap();
+        assert!(html == fs::read_to_string(&expected).unwrap(), "system {system} differs");
+        assert!(data_of(&html).contains(&format!("\"two.tlog.gz, system {system}\"")), "the page has no id");
     }
     page.all_text();
     hums_in(&folder, &["report", "-o", "../both/"], &names).expect_code(&[0, 3]);
@@ -415,6 +455,24 @@ fn a_log_twenty_times_as_large_takes_no_more_memory() {
     });
     let more = large - small;
     assert!(more < 60 * MB as u64, "{small} bytes for 5 MB, {more} more for 100 MB");
+}
+
+#[test]
+fn a_check_that_ends_early_keeps_its_verdicts_and_an_empty_folder_does_not_end_it() {
+    let mut page = Page::open(1280);
+    let logs = [1, 100].map(|mb| large(page.dir.path(), &format!("{mb}.tlog"), mb * MB));
+    page.shown.files("#files", &logs);
+    page.shown.wait("return document.querySelector('.log') !== null", 60);
+    let folder = page.dir.path().join("empty");
+    fs::create_dir(&folder).unwrap();
+    page.shown.drop_files(&[folder]);
+    page.shown.wait("return document.querySelector('[role=status]').textContent.includes('100.tlog')", 60);
+    assert_eq!(page.shown.run("return document.documentElement.dataset.state"), "busy");
+    page.cancel();
+    let words =
+        "The check ended early, while reading 100.tlog: you cancelled it. 1 of 2 inputs: 1 log checked.";
+    assert_eq!(page.text("[role=status]"), words);
+    assert_eq!(page.save("Save findings", 1).len(), 1);
 }
 
 #[test]
@@ -452,10 +510,18 @@ fn firefox_judges_and_saves_what_the_command_line_does() {
     let shown = oracle::firefox(&page, &logs);
     let expected = hums_in(folder.path(), &["check", "--json"], &names).text();
     assert_eq!(shown["saved"], expected);
-    let reports: Vec<&str> =
-        shown["reports"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
-    let [a, b] = reports[..] else { panic!("{reports:?}") };
-    assert!(a.starts_with("a.tlog-") && b.starts_with("b.bin.gz-"), "{reports:?}");
+    for name in &names {
+        let pages = ["report", "-o", "pages/"];
+        hums_in(folder.path(), &pages, std::slice::from_ref(name)).expect_code(&[0, 3]);
+    }
+    let reports = shown["reports"].as_object().unwrap();
+    assert_eq!(reports.len(), names.len());
+    for (name, html) in reports {
+        assert!(
+            fs::read_to_string(folder.path().join("pages").join(name)).unwrap() == *html,
+            "{name} differs"
+        );
+    }
 }
 
 /// A module of WebAssembly whose program ends as one without memory does: by a trap.
@@ -475,6 +541,11 @@ fn a_program_that_stops_by_itself_or_lacks_memory_ends_with_a_sentence() {
     assert!(why.contains("the program stopped") && why.contains("unreachable"), "{why}");
     let why = page.reason(NO_MEMORY);
     assert!(why.contains("the memory of this page does not suffice"), "{why}");
+    let hex = |words: &str| words.bytes().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let [memory, panic] =
+        ["memory allocation of 9 bytes failed", "thread 'main' panicked at a.rs:1:2:"].map(hex);
+    let why = page.reason(&NO_MEMORY.replace(&memory, &panic));
+    assert!(why.contains("the program stopped (thread 'main' panicked at a.rs:1:2:)"), "{why}");
 }
 
 #[test]
@@ -502,12 +573,24 @@ fn a_card_folder_is_one_card_and_a_phone_shows_all_of_the_page() {
     fs::create_dir(&folder).unwrap();
     fs::copy(card.image(), folder.join("card.img")).unwrap();
     fs::copy(own("ap_quad_signed.raw"), folder.join("other.raw")).unwrap();
+    fs::copy(own("ap_quad_faults.tlog"), folder.join("third.tlog")).unwrap();
     page.check("#folder", &[folder]);
     let expected = hums_in(page.dir.path(), &["check", "--json"], &["card".to_owned()]).text();
     let saved = page.save("Save all findings", 1);
     assert_eq!(fs::read_to_string(&saved[0]).unwrap(), expected);
     let width = page.shown.run("return [document.documentElement.scrollWidth, innerWidth]");
     assert!(width[0].as_f64() <= width[1].as_f64(), "wider than a phone: {width}");
+    let indents = page.shown.run(
+        "const lines = [...document.querySelectorAll('.log > .screen div')];
+         return lines.map((line) => parseFloat(getComputedStyle(line).paddingLeft))",
+    );
+    let indents: Vec<f64> = serde_json::from_value(indents).unwrap();
+    assert!(indents.len() > 10 && indents.iter().all(|indent| *indent < 80.0), "{indents:?}");
+    let bottom = page.shown.run(
+        "scrollTo(0, 0); const { top, bottom } = document.querySelector('.running').getBoundingClientRect();
+         return [top >= 0, bottom <= innerHeight, document.documentElement.scrollHeight > innerHeight]",
+    );
+    assert_eq!(bottom, serde_json::json!([true, true, true]), "what runs is out of sight");
 }
 
 #[test]
@@ -540,8 +623,9 @@ fn a_damaged_file_ends_with_a_sentence_and_the_page_goes_on() {
         }
     }
     page.shown.files("#files", &[own("ap_quad_faults.tlog")]);
-    page.shown.run("[...document.querySelectorAll('button')].find((one) => one.textContent === 'Cancel').click(); return null");
-    assert_eq!(page.text("[role=status]"), "The check ended early: you cancelled it. 0 logs checked.");
+    page.cancel();
+    let words = page.text("[role=status]");
+    assert!(words.ends_with(": you cancelled it. 0 of 1 input: 0 logs checked."), "{words}");
     page.check("#files", &[own("ap_quad_faults.tlog")]);
     assert!(page.text("#logs .verdict").contains("2 critical findings"), "{}", page.text("#logs"));
 }
@@ -552,6 +636,14 @@ fn nothing_leaves_the_page_whatever_runs_in_it() {
     server.set_nonblocking(true).unwrap();
     let address = server.local_addr().unwrap();
     let mut page = Page::open(1280);
+    page.check("#files", &[own("px4_hil_quad_low.tlog")]);
+    page.shown.wait("return document.querySelector('iframe[data-ready]') !== null", 20);
+    page.shown.run(
+        "indexedDB.databases().then((all) => {
+           window.stored = [localStorage.length, sessionStorage.length, document.cookie.length, all.length];
+         }); return null",
+    );
+    assert_eq!(page.shown.wait("return window.stored", 20), serde_json::json!([0, 0, 0, 0]));
     let script = format!(
         "window.ended = [];
          const worker = (text) => new Worker(URL.createObjectURL(new Blob([text])));

@@ -2,7 +2,7 @@
 
 usage: firefox.py FIREFOX PAGE INPUT...      at least two files; the answer is a JSON object:
 
-  {"seconds": from the choice to the first verdict, "saved": findings as JSON lines, "reports": names of the saved pages}
+  {"seconds": from the choice to the first verdict, "saved": findings as JSON lines, "reports": {name: the saved page}}
 """
 
 import json
@@ -131,7 +131,7 @@ def main():
             firefox.process.wait()
         lines, = (path.read_text() for path in saved if path.suffix not in (".html", ".htm"))
         print(json.dumps({"seconds": seconds, "saved": lines,
-                          "reports": sorted(path.name for path in saved if path.suffix == ".html")}))
+                          "reports": {path.name: path.read_bytes().decode() for path in saved if path.suffix == ".html"}}))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,8 @@ const choose = (label, options) => {
   const input = el("input", { type: "file", multiple: true, ...options });
   input.addEventListener("change", () => {
     const files = [...input.files].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
-    start(options.webkitdirectory ? [files] : files.map((file) => [file]));
+    // Some browsers take a folder for files without a folder.
+    start(files.every(({ path }) => path.includes("/")) ? [files] : files.map((file) => [file]));
     input.value = "";
   });
   return el("label", { class: "choose" }, label, input);
@@ -37,9 +38,8 @@ const zone = el(
     "p",
     { class: "choices" },
     choose("Choose files", { id: "files" }),
-    choose("Choose a folder", { id: "folder", webkitdirectory: true }),
+    "webkitdirectory" in HTMLInputElement.prototype ? choose("Choose a folder", { id: "folder", webkitdirectory: true }) : null,
   ),
-  el("p", { class: "running" }, status, meter, stop),
 );
 const list = el("div", { id: "logs" });
 const beside = el("p", { class: "choices" });
@@ -55,7 +55,7 @@ document
       "Finds what is wrong with a flight. Nothing is uploaded: this page works without a network, and may not use one.",
     ),
   );
-main.append(zone, beside, list, remarks, shown);
+main.append(zone, beside, list, remarks, shown, el("p", { class: "running" }, status, meter, stop));
 
 // ---- Saving and showing.
 const save = (name, content, type) => {
@@ -64,35 +64,49 @@ const save = (name, content, type) => {
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 };
 const button = (words, onclick) => el("button", { type: "button", onclick }, words);
-const show = async (title, { html }) => {
+const show = (title, srcdoc) => {
   // The report runs apart from this page, under the same policy.
-  const frame = el("iframe", { title, sandbox: "allow-scripts allow-modals", srcdoc: await html.text() });
+  const frame = el("iframe", { title, sandbox: "allow-scripts allow-modals", srcdoc });
   frame.addEventListener("load", () => frame.setAttribute("data-ready", ""));
   shown.replaceChildren(el("h2", {}, title), frame);
   shown.hidden = false;
 };
-// A page is made when it is first asked for. `make` resolves to it, or to nothing if its run ended early.
+// Of several pages that were asked for, the last one is shown.
+let asked = 0;
+// A page is made when it is first asked for. `make` resolves to it, or to nothing if its run ended early. Returns what shows it.
 const pageButtons = (host, words, title, make) => {
   let making = null;
   const page = async (use) => {
     making ??= make();
     const made = await making;
-    if (made) use(made);
+    if (made) await use(made);
     // It may be tried again.
     else making = null;
   };
-  const open = () => page((page) => show(title, page).then(() => shown.scrollIntoView({ behavior: "smooth" })));
+  const open = () => {
+    const mine = ++asked;
+    return page(async ({ html }) => {
+      const text = await html.text();
+      if (mine === asked) show(title, text);
+    });
+  };
   host.append(
-    button(words, open),
+    button(words, () => open().then(() => shown.scrollIntoView({ behavior: "smooth" }))),
     button(`Save ${words.toLowerCase()}`, () => page(({ file, html }) => save(file, html, "text/html"))),
   );
-  return page;
+  return open;
 };
 
 // ---- A log's verdict.
 const LEVELS = ["ok", "advisory", "warning", "critical"];
+const NOT_JUDGED = "Which checks were not judged, and why (with those that need a box or earlier flights)";
 // The answer for each log, and for each vehicle of a log of several.
 let logs = [];
+// A block for each line, so that the rest of a long one stays below its beginning.
+const linesOf = (text) => {
+  const line = (words) => el("div", { style: `--in: ${words.search(/\S|$/)}ch` }, words.trimStart());
+  return el("pre", { class: "screen" }, text.split("\n").map(line));
+};
 const addLog = (line, told, { screen, state, reasons }) => {
   const mark = badge();
   const level = LEVELS.includes(state) ? state : "stale";
@@ -105,16 +119,16 @@ const addLog = (line, told, { screen, state, reasons }) => {
     { class: "panel log", "data-log": told.log },
     el("h2", {}, mark.node, ` ${told.log}`),
     el("p", { class: `verdict ${level}` }, verdict),
-    el("pre", { class: "screen" }, lines.join("\n")),
+    linesOf(lines.join("\n")),
   );
-  if (reasons) node.append(el("details", {}, el("summary", {}, "Checks without data"), el("pre", { class: "screen" }, reasons)));
+  if (reasons) node.append(el("details", {}, el("summary", {}, NOT_JUDGED), linesOf(reasons)));
   node.append(buttons);
   logs.push({ line, told, buttons, heading: node.firstChild });
   list.append(node);
 };
 
 // ---- Runs of the program, one at a time, each in a worker of its own: its memory ends with it.
-// A run ends with `why` it ended early, or null; itself it is null if other logs were given meanwhile.
+// A run ends with `why` it ended early, or null, and the log that it read; itself it is null if other logs were given meanwhile.
 let endRun = () => {};
 let turn = 0;
 const idle = (words) => {
@@ -127,9 +141,11 @@ const interrupt = (result) => {
   turn++;
   endRun(result);
 };
-// Once each: a report repeats those of the check.
+const early = (what, { why, name }) => `The ${what} ended early${name ? `, while reading ${name}` : ""}: ${why}.`;
+// Once each: a report repeats those of the check. Why a log could not be read stands with its name.
 const remark = (words) => {
-  if (![...remarks.children].some((item) => item.textContent === words)) remarks.append(el("li", {}, words));
+  if (!/could not be read$/.test(words) && ![...remarks.children].some((item) => item.textContent === words))
+    remarks.append(el("li", {}, words));
 };
 const run = (words, command, files, takeLine) => {
   const mine = turn;
@@ -139,9 +155,10 @@ const run = (words, command, files, takeLine) => {
         // It may have been cancelled before it began.
         if (mine !== turn) return resolve(null);
         const own = new Worker(workerAddress);
+        let name = null;
         const end = (result) => {
           own.terminate();
-          resolve(result);
+          resolve(result && { ...result, name });
         };
         endRun = end;
         status.textContent = words;
@@ -151,8 +168,9 @@ const run = (words, command, files, takeLine) => {
           if (data.kind === "line") takeLine(data.line);
           else if (data.kind === "remark") remark(data.line.replace(/^hums: /, ""));
           else if (data.kind === "progress") {
+            name = data.name;
             meter.value = data.part;
-            status.textContent = `${words} ${data.name}, ${Math.round(data.part * 100)} %`;
+            status.textContent = `${words} ${name}, ${Math.round(data.part * 100)} %`;
           } else end(data);
         };
         own.onerror = ({ message }) => end({ why: `the program stopped (${message})` });
@@ -177,9 +195,9 @@ const pageOf = (command, files, log, words) => {
       if (of === log) made = { file: page, html: new Blob([html]) };
     });
     if (!ended) return null;
-    const early = ended.why ?? (made ? null : "see the remarks");
-    idle(early ? `The report ended early: ${early}.` : words);
-    return early ? null : made;
+    const why = ended.why ?? (made ? null : "see the remarks");
+    idle(why ? early("report", { ...ended, why }) : words);
+    return why ? null : made;
   });
   return lastRun;
 };
@@ -196,12 +214,16 @@ const named = (items) => {
   });
 };
 
+// Of what is listed while more is given only the last is read.
+let drops = 0;
 // `items`: the files of each chosen or dropped file or folder; `unread`: sentences about others.
 const start = async (items, unread = []) => {
   const given = named(items.filter((files) => files.length));
+  // What runs goes on.
+  if (given.length + unread.length === 0) return stop.hidden && idle("Nothing to read was given.");
   interrupt(null);
-  idle("Nothing to read was given.");
-  if (given.length + unread.length === 0) return;
+  drops++;
+  asked++;
   root.dataset.state = "busy";
   logs = [];
   for (const node of [list, beside, remarks, shown]) node.replaceChildren();
@@ -220,7 +242,7 @@ const start = async (items, unread = []) => {
   });
   if (!checked) return;
   const read = logs.filter(({ told }) => !told.error);
-  if (read.length > 1)
+  if (logs.length > 1)
     beside.append(
       button("Save all findings", () => save("findings.jsonl", logs.map(({ line }) => `${line}\n`).join(""), "application/json")),
     );
@@ -228,10 +250,11 @@ const start = async (items, unread = []) => {
   const count = new Set(read.map(({ told }) => told.log)).size;
   const counts = `${plural(count, "log")} checked${failed.size ? `, ${failed.size} not read` : ""}.`;
   const none = `No log could be read${logs.length ? "" : " in what was given"}.`;
-  const end = checked.why ? `The check ended early: ${checked.why}. ${counts}` : count ? counts : none;
-  idle(end);
   // Inputs with one of these logs. Segments of one log may be inputs, and only the first has its name.
   const isOf = (log, input) => log === input || log.startsWith(`${input}/`) || log.startsWith(`${input}:`);
+  const begun = inputs.filter((input) => logs.some(({ told }) => isOf(told.log, input))).length;
+  const end = checked.why ? `${early("check", checked)} ${begun} of ${plural(inputs.length, "input")}: ${counts}` : count ? counts : none;
+  idle(end);
   const holding = (some) =>
     inputs.filter((input) => !failed.has(input) && (/\.hum$/i.test(input) || some.some(({ told }) => isOf(told.log, input))));
   const filesOf = (some) => given.filter(({ path }) => !failed.has(path) && some.includes(path.split("/")[0]));
@@ -248,43 +271,42 @@ const start = async (items, unread = []) => {
     const file = told.format === "hums" ? null : given.find(({ path }) => path === told.log);
     const [session, own, of] = file ? ["-", [told.log], [file]] : [told.log, cards, filesOf(cards)];
     const make = () => pageOf(["report", system, session, ...own], of, told.log, end);
-    const use = pageButtons(buttons, "Report", `Report of ${name}`, make);
+    const open = pageButtons(buttons, "Report", `Report of ${name}`, make);
     const saved = `${name.replace(/[^\w.-]+/g, "_")}.json`;
     buttons.append(button("Save findings", () => save(saved, `${line}\n`, "application/json")));
-    if (read.length === 1) use((page) => show(`Report of ${name}`, page));
+    if (read.length === 1 && !checked.why) open();
   }
 };
 
 // ---- Dropping: files, and folders with all that is in them.
-// A folder as a handle, where the browser has those: on a page from disk Chromium refuses to read entries.
-const ofHandle = async (folder, path) => {
-  const all = [];
-  for await (const one of folder.values()) {
-    const name = `${path}/${one.name}`;
-    if (one.kind === "file") all.push({ path: name, file: await one.getFile() });
-    else all.push(...(await ofHandle(one, name)));
-  }
-  return all;
-};
-const ofEntry = async (entry, path) => {
-  if (entry.isFile) return [{ path, file: await new Promise((resolve, reject) => entry.file(resolve, reject)) }];
-  const reader = entry.createReader();
-  const all = [];
+async function* entriesOf(folder) {
+  const reader = folder.createReader();
   // It tells a part of its entries at a time.
   for (;;) {
     const part = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
-    if (part.length === 0) break;
-    for (const inner of part) all.push(...(await ofEntry(inner, `${path}/${inner.name}`)));
+    if (part.length === 0) return;
+    yield* part;
   }
-  return all;
+}
+// Adds the files of an entry, or of a handle, to `found`. Of one that cannot be read `unread` gets the name.
+const collect = async (given, path, found, unread) => {
+  try {
+    const one = await given;
+    if (one.getFile) found.push({ path, file: await one.getFile() });
+    else if (one.isFile) found.push({ path, file: await new Promise((resolve, reject) => one.file(resolve, reject)) });
+    else for await (const inner of one.values?.() ?? entriesOf(one)) await collect(inner, `${path}/${inner.name}`, found, unread);
+  } catch (error) {
+    unread.push(`${path}: was dropped, and cannot be read: ${error.message}.`);
+  }
 };
 // Begins at once: what was dropped is known only within its event.
-const dropped = (item) => {
+const dropped = (item, unread) => {
   const entry = item.webkitGetAsEntry(),
-    file = item.getAsFile();
+    file = item.getAsFile(),
+    found = [];
   if (!entry?.isDirectory) return file ? [{ path: file.name, file }] : [];
-  const handle = item.getAsFileSystemHandle?.();
-  return handle ? handle.then((folder) => ofHandle(folder, folder.name)) : ofEntry(entry, entry.name);
+  // A handle, where the browser has those: on a page from disk Chromium refuses to read entries.
+  return collect(item.getAsFileSystemHandle?.() ?? entry, entry.name, found, unread).then(() => found);
 };
 // A report would take for itself what is dropped on it, and open it.
 const overReport = (takes) => {
@@ -296,19 +318,13 @@ addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", async (event) => {
   event.preventDefault();
   overReport(true);
-  const items = [...event.dataTransfer.items].filter(({ kind }) => kind === "file").map(dropped);
+  const unread = [];
+  const items = [...event.dataTransfer.items].filter(({ kind }) => kind === "file").map((item) => dropped(item, unread));
   if (items.length === 0) return;
-  interrupt(null);
-  idle("Listing what was dropped.");
-  root.dataset.state = "busy";
-  const mine = turn;
-  const ended = await Promise.allSettled(items);
-  if (mine !== turn) return;
-  const failed = ended.filter(({ status }) => status === "rejected");
-  start(
-    ended.filter(({ status }) => status === "fulfilled").map(({ value }) => value),
-    failed.map(({ reason }) => `A folder that was dropped cannot be read: ${reason.message}.`),
-  );
+  if (stop.hidden) idle("Listing what was dropped.");
+  const mine = ++drops;
+  const found = await Promise.all(items);
+  if (mine === drops) start(found, unread);
 });
 
 compiled.then(

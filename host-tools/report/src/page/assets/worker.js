@@ -65,7 +65,8 @@ const system = (files, commandLine, say) => {
   ]);
   let memory,
     next = 4,
-    told = 0;
+    told = 0,
+    named = null;
   const words = commandLine.map((word) => binary.encode(`${word}\0`));
   // The memory may have grown since the call before.
   const view = () => new DataView(memory.buffer);
@@ -93,8 +94,9 @@ const system = (files, commandLine, say) => {
     Array.from({ length: count }, (_, i) => [view().getUint32(at + 8 * i, true), view().getUint32(at + 8 * i + 4, true)]);
   const progress = (node, at) => {
     const now = performance.now();
-    if (now - told < EVERY_MS) return;
+    if (node === named && now - told < EVERY_MS) return;
     told = now;
+    named = node;
     say({ kind: "progress", name: node.name, part: node.file.size ? at / node.file.size : 1 });
   };
   const read = (file, from, at, count, result) => {
@@ -148,8 +150,8 @@ const system = (files, commandLine, say) => {
       return OK;
     },
     sched_yield: () => OK,
-    proc_exit: (code) => {
-      throw new Exit(String(code));
+    proc_exit: () => {
+      throw new Exit();
     },
     fd_close: (fd) => (open.delete(fd) ? OK : BAD_FILE),
     fd_fdstat_get: (fd, at) => {
@@ -263,30 +265,27 @@ const system = (files, commandLine, say) => {
   return { imports, attach };
 };
 
-// Why it ended before its end, as a sentence.
-const reason = (error, remarks) => {
-  const last = remarks.join(" ");
-  if (error instanceof RangeError || /memory allocation of|out of memory/i.test(`${last} ${error.message}`))
+// Why it ended before its end, as a sentence; `last` are Rust's own words of it.
+const reason = (error, last) => {
+  if (error instanceof RangeError || /^memory allocation of/.test(last[0]) || /out of memory/i.test(error.message))
     return "the memory of this page does not suffice; give fewer or smaller files, or use the program hums";
-  return `the program stopped (${error.message}); the program hums may read more, and a report of this fault helps`;
+  return `the program stopped (${last.slice(0, 2).join(" ") || error.message}); the program hums may read more, and a report of this fault helps`;
 };
 
 self.onmessage = async ({ data: { module, command, files } }) => {
-  const remarks = [];
+  const last = [];
   const say = (message) => {
-    if (message.kind === "remark") remarks.push(message.line);
-    self.postMessage(message);
+    if (message.kind === "remark" && (last.length || /^(memory allocation of|thread) /.test(message.line))) last.push(message.line);
+    else self.postMessage(message);
   };
-  let why = null,
-    code = null;
+  let why = null;
   try {
     const { imports, attach } = system(files, ["hums", ...command], say);
     const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: imports });
     attach(instance.exports.memory);
     instance.exports._start();
   } catch (error) {
-    if (error instanceof Exit) code = Number(error.message);
-    else why = reason(error, remarks);
+    if (!(error instanceof Exit)) why = reason(error, last);
   }
-  say({ kind: "end", why, code });
+  say({ kind: "end", why });
 };
