@@ -279,8 +279,6 @@ impl Summary {
         while let Some(finding) = self.waiting.get(place) {
             let is_critical = finding.level == Level::Critical;
             let check = health::check_named(finding.check);
-            let revises =
-                !is_critical && health.is_some_and(|health| self.telling.has_effect(finding, health));
             // A value of several sensors may recover while it waits for its cause.
             let is_so = |health: &Health| {
                 check.is_none_or(|check| {
@@ -291,9 +289,9 @@ impl Summary {
                 health.alarm(finding.check, finding.instance).is_some_and(|(_, is_explained)| is_explained)
             };
             let fate = match health {
-                _ if is_critical => self.telling.fate(now, finding, false),
+                _ if is_critical => self.telling.fate(now, finding, None),
                 Some(health) if is_explained(health) => Fate::Never,
-                Some(health) if is_so(health) => self.telling.fate(now, finding, revises),
+                Some(health) if is_so(health) => self.telling.fate(now, finding, Some(health)),
                 _ => Fate::Later,
             };
             match fate {
@@ -309,8 +307,14 @@ impl Summary {
             }
             let class = if is_critical { Class::Critical } else { Class::Finding };
             let severity = severity(finding).unwrap_or(Severity::Notice);
-            let cause = telling::cause(finding, &self.waiting).filter(|_| is_critical);
-            let text = words(cause.as_ref().unwrap_or(finding), finding, revises);
+            let revises =
+                !is_critical && health.is_some_and(|health| self.telling.has_effect(finding, health));
+            let mut cause = if is_critical { telling::cause(finding, &self.waiting) } else { None };
+            let mut text = words(cause.as_ref().unwrap_or(finding), finding, revises);
+            if cause.is_some() && !text.as_str().ends_with(order(finding)) {
+                // The order matters more than the cause.
+                (cause, text) = (None, words(finding, finding, revises));
+            }
             let packet = messages::status_text(severity, text.as_str());
             if !self.outlet.send(now, class, &packet, out) {
                 return;

@@ -109,8 +109,8 @@ impl Telling {
                 false
             }
             Level::Ok => self.open.contains(&key) && !self.is_explained(finding),
-            // It outlives its cause, and was sent before that was found.
-            level if level == finding.previous && self.open.contains(&key) => false,
+            // It outlives its cause, and was sent before that was found. It may have been sent as a warning only.
+            Level::Warning if finding.previous == Level::Warning && self.open.contains(&key) => false,
             Level::Stale => finding.because.is_empty() && self.open.is_empty(),
             _ => finding.because.is_empty(),
         }
@@ -122,8 +122,8 @@ impl Telling {
         open.any(|cause| health::explains(cause, check))
     }
 
-    /// `revises`: it explains what was sent.
-    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding, revises: bool) -> Fate {
+    /// `health` is not known at a change of level.
+    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding, health: Option<&Health>) -> Fate {
         let event = &self.events[family(finding.subsystem) as usize];
         let is_mishap = finding.subsystem == Subsystem::Mishap;
         if finding.level == Level::Critical {
@@ -139,7 +139,11 @@ impl Telling {
         let is_held =
             finding.level == Level::Warning && now.since(Instant::of(finding.at, now)) < hold(finding.check);
         let mut others = self.events.iter().filter(|event| event.critical[0].is_some());
-        let is_busy = !revises && (event.is_running(now) || others.any(|event| event.is_running(now)));
+        let is_busy = event.is_running(now) || others.any(|event| event.is_running(now));
+        let is_busy = is_busy && !health.is_some_and(|health| self.has_effect(finding, health));
+        if health.is_some_and(|health| self.leaves_effect(finding, health)) {
+            return Fate::Later;
+        }
         while self.mild.front().is_some_and(|at_ms| since(now, *at_ms) >= SPAN.as_millis()) {
             self.mild.pop_front();
         }
@@ -198,6 +202,21 @@ impl Telling {
         let open = self.open.iter().filter_map(known);
         open.map(|(alarm, _)| mild(alarm)).any(|effect| root_cause(&effect, iter::once(cause)).is_some())
     }
+
+    /// Whether a finding is over and its critical effect is not. The effect's text may have had the words of its cause, so `over:` would
+    /// give the all-clear.
+    fn leaves_effect(&self, cause: &Finding, health: &Health) -> bool {
+        let Some(cause) = health::check_named(cause.check).filter(|_| cause.level == Level::Ok) else {
+            return false;
+        };
+        self.open.iter().any(|(number, instance)| {
+            check_of(*number).is_some_and(|effect| {
+                let alarm = health.alarm(effect.name, *instance);
+                health::explains(cause, effect)
+                    && alarm.is_some_and(|(alarm, _)| alarm.level == Level::Critical)
+            })
+        })
+    }
 }
 
 /// As a warning, which a milder one may explain.
@@ -215,7 +234,7 @@ pub fn hold(check: &str) -> Span {
 /// The waiting warning that explains a critical finding.
 pub(crate) fn cause(finding: &Finding, waiting: &[Finding]) -> Option<Finding> {
     let alarm = |of: &Finding| Alarm::of(of.check, of.instance, Level::Warning, of.at);
-    let alarms = waiting.iter().filter(|waits| is_alarm(waits)).filter_map(alarm);
+    let alarms = waiting.iter().filter(|waits| waits.level == Level::Warning).filter_map(alarm);
     let cause = root_cause(&alarm(finding)?, alarms)?;
     let is_it = |waits: &&Finding| (waits.check, waits.instance) == (cause.check.name, cause.instance);
     waiting.iter().find(is_it).copied()

@@ -169,17 +169,20 @@ impl<D: CardDevice> Disk<D> {
         blocks: &mut [Block],
         meanwhile: Meanwhile<'_>,
     ) -> Result<usize, Sense> {
+        // A card that was put in within the command is another one.
+        let Slot::Card(_) = self.slot else { return Err(Sense::NO_MEDIUM) };
         self.card.begin_service();
         let all = self.access(|card| card.read_while(blocks, first, meanwhile));
         let Err(Sense::UNREADABLE) = all else { return all.map(|()| blocks.len()) };
         let mut count = 0;
         for (block, at) in blocks.chunks_mut(1).zip(first..) {
-            if self.access(|card| card.read_while(block, at, meanwhile)).is_err() {
-                break;
+            match self.access(|card| card.read_while(block, at, meanwhile)) {
+                Ok(()) => count += 1,
+                Err(sense) if count == 0 => return Err(sense),
+                Err(_) => break,
             }
-            count += 1;
         }
-        if count > 0 { Ok(count) } else { Err(Sense::UNREADABLE) }
+        Ok(count)
     }
 
     fn execute(&mut self, block: &[u8]) -> Result<Answer, Sense> {

@@ -145,6 +145,7 @@ impl<'a, 'b> Server<'a, 'b> {
             return self.wait(meanwhile, |_| None::<()>);
         };
         loop {
+            meanwhile();
             self.wait(meanwhile, |server| server.chunks.try_send().map(drop))?;
             let Some(chunk) = self.chunks.try_send() else { continue };
             let step = transport.step(disk, chunk, meanwhile);

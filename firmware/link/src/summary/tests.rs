@@ -379,6 +379,25 @@ fn an_estimator_waits_for_its_cause_and_gives_its_order_in_the_words_of_one_that
     ];
     let expected = [(8, "GPS 1 frozen, LAND, MANUAL"), (300, "over: GPS 1 frozen")];
     assert_eq!(texts(&told(&fails)), expected);
+    let long = [comes(5, "accel_mismatch", 0, WARNING), comes(8, "ekf_test_ratio", 0, CRITICAL)];
+    let expected =
+        [(8, "EKF rejects position or speed, LAND, MANUAL"), (108, "accelerometer 1 and others differ")];
+    assert_eq!(texts(&told(&long)), expected, "the order would be cut");
+}
+
+#[test]
+fn a_critical_finding_that_outlives_its_cause_is_sent_though_it_was_sent_as_a_warning() {
+    let outlives = |level| [comes(0, "ekf_test_ratio", 0, WARNING), comes(300, "ekf_test_ratio", 0, level)];
+    let mut expected = vec![(30, "EKF rejects position or speed")];
+    assert_eq!(texts(&told(&outlives((Level::Warning, Level::Warning)))), expected);
+    expected.push((300, "EKF rejects position or speed, LAND, MANUAL"));
+    assert_eq!(texts(&told(&outlives((Level::Critical, Level::Critical)))), expected);
+}
+
+#[test]
+fn the_words_of_a_cause_are_of_a_warning_that_waits_and_of_no_critical_finding() {
+    let cause = |level| telling::cause(&of("roll", Level::Critical), &[of("motor_loss", level)]);
+    assert!(cause(Level::Warning).is_some() && cause(Level::Critical).is_none());
 }
 
 #[test]
