@@ -33,7 +33,7 @@ use clap::{CommandFactory as _, Parser as _};
 
 use cli::{BoxAction, Cli, Command};
 use decode::fleet::overview;
-use decode::storage::Fetched;
+use decode::storage::{Address, Fetched};
 use outcome::Outcome;
 
 /// The first argument is the program's name.
@@ -72,6 +72,12 @@ fn report_page(request: &report::Request<'_>) -> anyhow::Result<Outcome> {
 
 /// With inputs of object storage on this computer.
 fn fetched(given: &mut Command) -> anyhow::Result<Outcome> {
+    let is_far = |input: &PathBuf| Address::of(input).is_ok_and(|address| address.is_some());
+    if matches!(given, Command::Report(args) if args.output.is_none() && args.inputs.iter().any(is_far)) {
+        return Err(outcome::usage(
+            "-o: name the page; without it the page is beside its input, which is in object storage",
+        ));
+    }
     let inputs: Vec<&mut PathBuf> = match given {
         Command::Check(args) => args.inputs.iter_mut().chain(&mut args.past).collect(),
         Command::Report(args) => args.inputs.iter_mut().collect(),
@@ -82,12 +88,8 @@ fn fetched(given: &mut Command) -> anyhow::Result<Outcome> {
         Command::Logbook(args) => args.inputs.iter_mut().collect(),
         _ => Vec::new(),
     };
-    let fetched = Fetched::inputs(inputs)?;
-    if fetched.is_any() && matches!(given, Command::Report(args) if args.output.is_none()) {
-        return Err(outcome::usage(
-            "-o: name the page; without it the page is beside its input, which is in object storage",
-        ));
-    }
+    // Until the end of the command.
+    let _fetched = Fetched::inputs(inputs)?;
     command(given)
 }
 
