@@ -24,6 +24,7 @@ use std::collections::hash_map::RandomState;
 use std::fs;
 use std::hash::{BuildHasher as _, Hasher as _};
 use std::path::PathBuf;
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
@@ -31,11 +32,12 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::{Context as _, Result, bail};
 
 use super::compact::{self, Sum};
-use super::transaction::OWN;
+use super::transaction::{OWN, STORAGE};
 use super::{Found, SESSIONS, file_name, session_of};
-use crate::logs::in_order::in_order;
 use crate::plural::count;
-use crate::storage::{self, AT_ONCE, Address, DELETED_MAX, Object, Objects, REQUEST_S, Tag, When, is_inside};
+use crate::storage::{
+    self, Address, COPIED_BYTES_MAX, DELETED_MAX, Object, Objects, REQUEST_S, Tag, When, each, is_inside,
+};
 
 /// A lease without a renewal for so long has no holder.
 const PATIENCE: Duration = Duration::from_mins(3);
@@ -82,7 +84,7 @@ impl Bucket {
         if *is_begun {
             return Ok(());
         }
-        let mark = format!("{OWN}/storage");
+        let mark = format!("{OWN}/{STORAGE}");
         if self.objects.get(&mark)?.is_none() {
             if !self.objects.folders(SESSIONS)?.is_empty() {
                 bail!(
@@ -90,12 +92,13 @@ impl Bucket {
                     self.address
                 );
             }
-            let write = || self.objects.put(&mark, b"1\n".to_vec(), When::IsNew);
-            // The second one must fail: without conditional writes two programs could add one session.
-            if write()?.is_some() && write()?.is_some() {
+            let is_written = |when| anyhow::Ok(self.objects.put(&mark, b"1\n".to_vec(), when)?.is_some());
+            let wrong = "\"0123456789abcdef0123456789abcdef\"".to_owned();
+            // The first and the last one must fail: without conditional writes two programs could add one session.
+            if is_written(When::Is(&wrong))? || is_written(When::IsNew)? && is_written(When::IsNew)? {
                 self.objects.delete(&[mark])?;
                 bail!(
-                    "{}: this server has no conditional writes (If-None-Match); decode into a folder, and copy it",
+                    "{}: this server has no conditional writes (If-None-Match, If-Match); decode into a folder, and copy it",
                     self.address
                 );
             }
@@ -111,12 +114,12 @@ impl Bucket {
     }
 
     fn finish(&self, name: &str) -> Result<()> {
-        self.partition(name)?.end()
+        self.partition(name, None)?.end()
     }
 
     /// The lease of a date and bucket, without a begun change.
-    fn partition(&self, name: &str) -> Result<Lease<'_>> {
-        let lease = self.lease(name, &[])?;
+    fn partition<'a>(&'a self, name: &str, outer: Option<&'a Lease<'a>>) -> Result<Lease<'a>> {
+        let lease = self.lease(name, &[], outer)?;
         self.apply(&lease, name)?;
         Ok(lease)
     }
@@ -133,7 +136,7 @@ impl Bucket {
         for session in &sessions {
             let is_complete = || anyhow::Ok(self.objects.head(&own("index", session))?.is_some());
             if is_complete()? {
-                let lease = self.lease(session, &[])?;
+                let lease = self.lease(session, &[], None)?;
                 if is_complete()? {
                     lease.end()?;
                 }
@@ -150,46 +153,42 @@ impl Bucket {
         Ok(Some(if is_alone { Found::Alone(partition) } else { Found::Compacted }))
     }
 
-    /// Waits for other programs. `places` are those of files that may be left if this program stops.
-    pub(super) fn lease(&self, name: &str, places: &[String]) -> Result<Lease<'_>> {
+    /// Waits for other programs. `places` are those of files that may be left if this program stops. The lease `outer` is
+    /// kept with the new one.
+    pub(super) fn lease<'a>(
+        &'a self,
+        name: &str,
+        places: &[String],
+        outer: Option<&'a Lease<'a>>,
+    ) -> Result<Lease<'a>> {
         let (key, owner) =
             (own("lease", name), format!("{:016x}", RandomState::new().build_hasher().finish()));
         let places: BTreeSet<String> = places.iter().cloned().collect();
         let mut seen: Option<(Tag, Instant)> = None;
         loop {
+            outer.map_or(Ok(()), Lease::keep)?;
             let since = Moment::now();
-            let held = |left: BTreeSet<String>, tag| {
-                let left = left.difference(&places).cloned().collect();
-                let held = Held { tag, renewals: 0, since, places: places.clone() };
-                Lease {
-                    bucket: self,
-                    key: key.clone(),
-                    owner: owner.clone(),
-                    left,
-                    held: Mutex::new(Some(held)),
-                }
-            };
             let old = self.objects.get(&key)?;
-            let Some((old, tag)) = old else {
-                let text = format!("{owner} 0\n{}", lines(&places));
-                if let Some(tag) = self.objects.put(&key, text.into(), When::IsNew)? {
-                    return Ok(held(BTreeSet::new(), tag));
+            let is_over = |(of, since): &(Tag, Instant)| {
+                old.as_ref().is_some_and(|(_, tag)| tag == of) && since.elapsed() > self.patience
+            };
+            let is_free = old.as_ref().is_none_or(|(old, _)| old.starts_with(FREE.as_bytes()));
+            if is_free || seen.as_ref().is_some_and(is_over) {
+                let text = old
+                    .as_ref()
+                    .map_or_else(String::new, |(old, _)| String::from_utf8_lossy(old).into_owned());
+                let left: BTreeSet<String> =
+                    text.lines().skip(1).map(str::to_owned).filter(|place| !places.contains(place)).collect();
+                let all: BTreeSet<String> = places.union(&left).cloned().collect();
+                let text = format!("{owner} 0\n{}", lines(&all));
+                if let Some(tag) = self.write(&key, &text, old.as_ref().map(|(_, tag)| tag))? {
+                    let held = Mutex::new(Some(Held { tag, renewals: 0, since, places: all }));
+                    return Ok(Lease { bucket: self, outer, key, owner, left, held });
                 }
                 continue;
-            };
-            let old = String::from_utf8_lossy(&old).into_owned();
-            let is_over = |(of, since): &(Tag, Instant)| *of == tag && since.elapsed() > self.patience;
-            if old.starts_with(FREE) || seen.as_ref().is_some_and(is_over) {
-                let left: BTreeSet<String> = old.lines().skip(1).map(str::to_owned).collect();
-                let text = format!("{owner} 0\n{}", lines(places.union(&left)));
-                if let Some(tag) = self.objects.put(&key, text.into(), When::Is(&tag))? {
-                    let mut lease = held(left.clone(), tag);
-                    if let Some(held) = lease.held.get_mut().unwrap_or_else(PoisonError::into_inner) {
-                        held.places.extend(left);
-                    }
-                    return Ok(lease);
-                }
-            } else if seen.as_ref().is_none_or(|(of, _)| *of != tag) {
+            }
+            let Some((_, tag)) = old else { continue };
+            if seen.as_ref().is_none_or(|(of, _)| *of != tag) {
                 if seen.is_none() {
                     note!(
                         "{}: another program works on {name}; this one waits, {} s if the other one was stopped",
@@ -203,6 +202,19 @@ impl Bucket {
         }
     }
 
+    /// Writes a lease in place of `old`; `None` if another program did. If the answer to an earlier try was lost, its own
+    /// text is there.
+    fn write(&self, key: &str, text: &str, old: Option<&Tag>) -> Result<Option<Tag>> {
+        let put = self.objects.put(key, text.into(), old.map_or(When::IsNew, When::Is));
+        if matches!(put, Ok(Some(_))) {
+            return put;
+        }
+        match self.objects.get(key) {
+            Ok(Some((now, tag))) if now == text.as_bytes() => Ok(Some(tag)),
+            _ => put,
+        }
+    }
+
     /// Adds a session's files, in place of those of `found`.
     pub(super) fn add(
         &self,
@@ -213,10 +225,9 @@ impl Bucket {
         replaced: Option<&str>,
     ) -> Result<()> {
         let mut gone: Vec<String> = lease.left.iter().filter(|place| is_inside(place)).cloned().collect();
-        let mut other = None;
         if let Some(old) = replaced {
-            // No compaction takes it meanwhile.
-            other = Some(self.partition(old)?);
+            // A compaction that took it is over, and later ones leave a session with a lease.
+            self.partition(old, Some(&lease))?.end()?;
             if !matches!(self.find(session)?, Some(Found::Alone(_))) {
                 lease.end()?;
                 bail!("{}: session {session} was compacted meanwhile, and stays as it is", self.address);
@@ -232,14 +243,10 @@ impl Bucket {
         lease.delete(&then.into_iter().filter(|place| !is_new(place)).collect::<Vec<_>>())?;
         let (last, first): (Vec<_>, Vec<_>) = files.iter().partition(|(place, _)| is_summary(place));
         for files in [first, last] {
-            let mut next = files.into_iter();
-            let put =
-                |(place, path): &(String, PathBuf)| self.objects.put_file(place, path, &|| lease.keep());
-            in_order(AT_ONCE, AT_ONCE, || Ok(next.next()), put, |put| put)?;
+            each(files, |(place, path)| self.objects.put_file(place, path, &|| lease.keep()))?;
         }
         lease.keep()?;
         self.objects.put(&own("index", session), format!("{partition}\n").into(), When::Always)?;
-        other.map_or(Ok(()), Lease::end)?;
         lease.end()
     }
 
@@ -260,7 +267,7 @@ impl Bucket {
 
     /// Compacts all dates and buckets. The error of one leaves it as it is, and is passed to `failed`.
     pub(super) fn compact(&self, failed: &mut dyn FnMut(&str, &anyhow::Error)) -> Result<(Sum, usize)> {
-        if self.objects.get(&format!("{OWN}/storage"))?.is_none() {
+        if self.objects.get(&format!("{OWN}/{STORAGE}"))?.is_none() {
             return Err(compact::no_tables(&self.address.to_string()));
         }
         self.recover()?;
@@ -305,7 +312,7 @@ impl Bucket {
         if self.complete(partition)?.is_empty() {
             return Ok(Sum::default());
         }
-        let lease = self.partition(partition)?;
+        let lease = self.partition(partition, None)?;
         let new = own("new", partition);
         let sessions = self.complete(partition)?;
         if sessions.is_empty() {
@@ -314,29 +321,29 @@ impl Bucket {
         }
         let dir = storage::scratch()?;
         let (tables, objects) = (self.tables()?, self.to_compact(partition, &sessions)?);
-        let mut next = objects.iter();
-        let fetch = |object: &Object| {
+        each(&objects, |object| {
             let file = dir.path().join(&object.key);
             file.parent().map_or(Ok(()), fs::create_dir_all)?;
             self.objects.fetch(object, &file, &|| lease.keep())
-        };
-        in_order(AT_ONCE, AT_ONCE, || Ok(next.next()), fetch, |fetched| fetched)?;
+        })?;
         let merged = thread::scope(|scope| {
-            let work = scope.spawn(|| compact::merged(dir.path(), &tables, partition));
-            while !work.is_finished() {
+            let (working, ended) = mpsc::channel::<()>();
+            let (root, tables) = (dir.path(), &tables);
+            let work = scope.spawn(move || {
+                let _working = working;
+                compact::merged(root, tables, partition)
+            });
+            while ended.recv_timeout(self.patience / LOOKS) == Err(RecvTimeoutError::Timeout) {
                 lease.keep()?;
-                thread::sleep(self.patience / LOOKS);
             }
             work.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         })?;
         let Some(merged) = merged else { bail!("{partition}: its objects were changed by others") };
         let places = merged.transaction.places()?;
-        let mut next = places.iter();
-        let put = |place: &String| {
+        each(&places, |place| {
             let path = merged.transaction.path(place);
             self.objects.put_file(&format!("{new}/{place}"), &path, &|| lease.keep())
-        };
-        in_order(AT_ONCE, AT_ONCE, || Ok(next.next()), put, |put| put)?;
+        })?;
         let gone =
             merged.replaced.iter().filter(|place| !places.contains(place)).map(|place| format!("-{place}"));
         let change: Vec<String> = gone.chain(places.iter().map(|place| format!("+{place}"))).collect();
@@ -372,24 +379,31 @@ impl Bucket {
             .get(&commit)?
             .map_or_else(String::new, |(change, _)| String::from_utf8_lossy(&change).into_owned());
         if let Some(place) = change.lines().filter_map(|line| line.get(1..)).find(|place| !is_inside(place)) {
-            bail!("{}: {commit} wants to change {place}, which is outside of the tables", self.address);
+            bail!(
+                "{}: {commit} wants to change {place}, which is outside of the tables; if it is not your own, delete this object",
+                self.address
+            );
         }
         let of = |sign| change.lines().filter_map(move |line| line.strip_prefix(sign)).map(str::to_owned);
         lease.delete(&of('-').collect::<Vec<_>>())?;
         let new = own("new", name);
-        let mut next = of('+');
-        let copy = |place: String| {
+        let objects = self.objects.list(&new)?;
+        each(of('+'), |place| {
+            let object = objects.iter().find(|object| object.key == format!("{new}/{place}"));
+            let object = object.with_context(|| {
+                format!("{}: {commit}: {place} is missing in {new}; restore it", self.address)
+            })?;
             lease.keep()?;
-            self.objects.copy(&format!("{new}/{place}"), &place)
-        };
-        in_order(AT_ONCE, AT_ONCE, || Ok(next.next()), copy, |copied| copied)?;
-        lease.delete(&[commit])?;
-        self.delete_all(lease, &new)
-    }
-
-    fn delete_all(&self, lease: &Lease<'_>, folder: &str) -> Result<()> {
-        let keys: Vec<String> = self.objects.list(folder)?.into_iter().map(|object| object.key).collect();
-        lease.delete(&keys)
+            if object.bytes <= COPIED_BYTES_MAX {
+                return self.objects.copy(&object.key, &place);
+            }
+            let dir = storage::scratch()?;
+            let file = dir.path().join("object");
+            self.objects.fetch(object, &file, &|| lease.keep())?;
+            self.objects.put_file(&place, &file, &|| lease.keep())
+        })?;
+        lease.delete(std::slice::from_ref(&commit))?;
+        lease.delete(&objects.iter().map(|object| object.key.clone()).collect::<Vec<_>>())
     }
 }
 
@@ -420,6 +434,8 @@ struct Held {
 /// The right to change a session, or a date and bucket. Dropped, it is free, with its list.
 pub(super) struct Lease<'a> {
     bucket: &'a Bucket,
+    /// Is renewed with this one.
+    outer: Option<&'a Self>,
     key: String,
     owner: String,
     /// Files of a program that stopped, besides its own ones.
@@ -429,33 +445,37 @@ pub(super) struct Lease<'a> {
 }
 
 impl Lease<'_> {
-    /// Before each request: renews the lease if it is old.
+    /// Before each request: renews the lease if it is old, again if that took long.
     fn keep(&self) -> Result<()> {
-        self.renew(&[], |held| held.since.elapsed() > self.bucket.patience / RENEWALS)
+        self.outer.map_or(Ok(()), Self::keep)?;
+        let is_due = |held: &Held| held.since.elapsed() > self.bucket.patience / RENEWALS;
+        while self.renew(&[], is_due)? {}
+        Ok(())
     }
 
     fn add(&self, places: &[String]) -> Result<()> {
-        self.renew(places, |_| true)
+        self.renew(places, |_| true).map(|_| ())
     }
 
-    fn renew(&self, places: &[String], is_due: impl FnOnce(&Held) -> bool) -> Result<()> {
+    /// Whether it was due.
+    fn renew(&self, places: &[String], is_due: impl FnOnce(&Held) -> bool) -> Result<bool> {
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         let lost =
             || format!("{}: another program has taken over {}; run again", self.bucket.address, self.key);
         let now = held.as_mut().with_context(lost)?;
         if !is_due(now) {
-            return Ok(());
+            return Ok(false);
         }
         now.places.extend(places.iter().cloned());
         now.renewals += 1;
         let since = Moment::now();
         let text = format!("{} {}\n{}", self.owner, now.renewals, lines(&now.places));
-        let Some(tag) = self.bucket.objects.put(&self.key, text.into(), When::Is(&now.tag))? else {
+        let Some(tag) = self.bucket.write(&self.key, &text, Some(&now.tag))? else {
             *held = None;
             bail!(lost());
         };
         (now.tag, now.since) = (tag, since);
-        Ok(())
+        Ok(true)
     }
 
     fn delete(&self, keys: &[String]) -> Result<()> {

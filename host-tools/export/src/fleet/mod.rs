@@ -254,10 +254,11 @@ impl Session {
     ) -> Result<Option<Vec<PathBuf>>> {
         let Self { transaction, root, partition, name } = self;
         let places = transaction.places()?;
-        let lease = bucket.lease(&name, &places)?;
+        let lease = bucket.lease(&name, &places, None)?;
         let found = fleet.find(&name)?;
         let refused = match (fleet.is_written(&name), &found) {
-            (Some(other), _) if other >= frames => Some(Ok(None)),
+            // Without its index it is gone, and the lease has its files.
+            (Some(other), Some(_)) if other >= frames => Some(Ok(None)),
             (None, Some(found)) => fleet.check(&name, found, &context.inputs).err().map(Err),
             (Some(_), Some(found @ Found::Compacted)) => {
                 fleet.check(&name, found, &context.inputs).err().map(Err)

@@ -22,6 +22,8 @@ use crate::storage::is_inside;
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
 pub(crate) const OWN: &str = ".hums-fleet";
+/// The mark of tables in object storage.
+pub(crate) const STORAGE: &str = "storage";
 const COMMIT: &str = "commit-";
 pub(crate) const PART: &str = ".hums-part";
 /// Files in a change's folder: new files, replaced ones, and sessions that share a file from now on.
@@ -68,6 +70,7 @@ pub(crate) struct Lock(#[expect(dead_code, reason = "holds the lock")] File);
 /// Waits for other programs, and completes the change of one that ended.
 pub(crate) fn lock(root: &Path) -> Result<Lock> {
     let own = root.join(OWN);
+    refuse_copy(&own)?;
     settle(fs::create_dir_all(&own), &own)?;
     let path = own.join("lock");
     let file = settle(File::options().create(true).truncate(false).write(true).open(&path), &path)?;
@@ -91,7 +94,20 @@ pub(crate) fn lock(root: &Path) -> Result<Lock> {
     Ok(lock)
 }
 
+/// The index of tables in object storage is there.
+fn refuse_copy(own: &Path) -> Result<()> {
+    if own.join(STORAGE).exists() {
+        bail!(
+            "{}: its tables are a copy of object storage; decode there, or into another folder",
+            own.display()
+        );
+    }
+    Ok(())
+}
+
+/// Completes a begun change. Tables that were copied from object storage are an error.
 pub(crate) fn recover(root: &Path) -> Result<()> {
+    refuse_copy(&root.join(OWN))?;
     let is_begun = names(&root.join(OWN))?.iter().any(|name| is_begun(name));
     if is_begun { lock(root).map(|_| ()) } else { Ok(()) }
 }

@@ -13,6 +13,8 @@ use ureq::http::{Request, Response};
 use ureq::tls::{RootCerts, TlsConfig};
 use ureq::{Agent, Error};
 
+use super::listed;
+
 /// Time of one request. Parts of a file have 5 MiB.
 pub(super) const LIMIT: Duration = Duration::from_secs(30);
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
@@ -57,7 +59,7 @@ impl HttpService for Client {
             let answer = self.0.run(Request::from_parts(head, &body[..]));
             let (head, mut body) = answer.map_err(failed)?.into_parts();
             let body = body.with_config().limit(ANSWER_BYTES_MAX).read_to_vec().map_err(failed)?;
-            Ok(Response::from_parts(head, body.into()))
+            Ok(Response::from_parts(head, listed(body).into()))
         })
     }
 }

@@ -24,7 +24,7 @@ const SCHEME: &str = "s3://";
 /// The folder of all buckets.
 const ROOT: &str = "s3:/";
 /// Objects that are sent or received at once.
-pub(crate) const AT_ONCE: usize = 4;
+const AT_ONCE: usize = 4;
 /// Objects of an input at most: each takes some hundred bytes.
 const INPUTS_MAX: usize = 10_000;
 
@@ -46,8 +46,7 @@ impl Address {
         let Some(rest) = path.to_str().and_then(|text| text.strip_prefix(SCHEME)) else { return Ok(None) };
         let (bucket, prefix) = rest.split_once('/').unwrap_or((rest, ""));
         let prefix = prefix.trim_end_matches('/');
-        let is_good = |part: &str| !["", ".", ".."].contains(&part);
-        if !is_good(bucket) || !prefix.is_empty() && !prefix.split('/').all(is_good) {
+        if !is_name(bucket) || !prefix.is_empty() && !prefix.split('/').all(is_name) {
             return Err(usage(format!("{}: is not s3://BUCKET/PREFIX", path.display())));
         }
         Ok(Some(Self { bucket: bucket.to_owned(), prefix: prefix.to_owned() }))
@@ -114,11 +113,23 @@ pub(crate) trait Objects: Send + Sync {
     fn folders(&self, folder: &str) -> Result<Vec<String>>;
     /// At most [`DELETED_MAX`] objects; missing ones are no error.
     fn delete(&self, keys: &[String]) -> Result<()>;
+    /// An object of at most [`COPIED_BYTES_MAX`].
     fn copy(&self, from: &str, to: &str) -> Result<()>;
 }
 
+/// Does `work` for all items, some at once. The first error ends it.
+pub(crate) fn each<T: Send>(
+    items: impl IntoIterator<Item = T>,
+    work: impl Fn(T) -> Result<()> + Sync,
+) -> Result<()> {
+    let mut items = items.into_iter();
+    in_order(AT_ONCE, AT_ONCE, || Ok(items.next()), work, |done| done)
+}
+
 /// A request with all of its repetitions takes at most so long.
-pub(crate) const REQUEST_S: u64 = 120;
+pub(crate) const REQUEST_S: u64 = 140;
+/// A server copies a larger object too slowly for one request. In tests two sessions in a file are smaller, and three larger.
+pub(crate) const COPIED_BYTES_MAX: u64 = if cfg!(test) { 620 } else { 128 << 20 };
 /// The protocol's limit for one request.
 pub(crate) const DELETED_MAX: usize = 1_000;
 
@@ -130,7 +141,7 @@ pub(crate) fn open(address: &Address) -> Result<Box<dyn Objects>> {
 #[cfg(not(feature = "object-storage"))]
 pub(crate) fn open(address: &Address) -> Result<Box<dyn Objects>> {
     bail!(
-        "{address}: this hums was built without object storage; build it with `cargo install --path host-tools --features object-storage`"
+        "{address}: this hums was built without object storage; build it with `cargo install --locked --path host-tools --features object-storage`"
     )
 }
 
@@ -151,11 +162,6 @@ impl Fetched {
             }
         }
         Ok(fetched)
-    }
-
-    /// Whether any input is in object storage.
-    pub const fn is_any(&self) -> bool {
-        self.0.is_some()
     }
 
     fn fetch(&mut self, address: &Address) -> Result<PathBuf> {
@@ -186,13 +192,11 @@ impl Fetched {
             _ => {}
         }
         fs::create_dir_all(&to)?;
-        let mut next = objects.iter();
-        let fetch = |object: &Object| {
+        each(&objects, |object| {
             let file = to.join(&object.key);
             file.parent().map_or(Ok(()), fs::create_dir_all)?;
             from.fetch(object, &file, &|| Ok(()))
-        };
-        in_order(AT_ONCE, AT_ONCE, || Ok(next.next()), fetch, |fetched| fetched)?;
+        })?;
         Ok(to)
     }
 }
@@ -240,14 +244,12 @@ impl Upload {
         };
         let mut places = Vec::new();
         files(folder, "", &mut places)?;
-        let mut next = places.iter();
-        let put = |place: &String| {
+        each(&places, |place| {
             if !force && objects.head(place)?.is_some() {
                 return Err(exists(&folder.join(place), true));
             }
             objects.put_file(place, &folder.join(place), &|| Ok(()))
-        };
-        in_order(AT_ONCE, AT_ONCE, || Ok(next.next()), put, |sent| sent)
+        })
     }
 }
 
@@ -266,6 +268,38 @@ fn files(folder: &Path, prefix: &str, places: &mut Vec<String>) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// A server's list without folders as objects (`logs/`), and keys that are no paths (`logs//a`): the client would refuse it.
+#[cfg(any(test, feature = "object-storage"))]
+fn listed(body: Vec<u8>) -> Vec<u8> {
+    let Some(text) = str::from_utf8(&body).ok().filter(|text| text.contains("<ListBucketResult")) else {
+        return body;
+    };
+    let is_path = |item: &str| {
+        let key = item.split_once("<Key>").or_else(|| item.split_once("<Prefix>"));
+        let key = key.and_then(|(_, key)| key.split_once('<')).map_or("", |(key, _)| key);
+        let path = if item.contains("<Key>") { key } else { key.strip_suffix('/').unwrap_or(key) };
+        let is_path = path.split('/').all(is_name);
+        if !is_path && !key.ends_with('/') {
+            note!("{key}: is no path, so this object is left out; rename it");
+        }
+        is_path
+    };
+    let mut left = text.to_owned();
+    for end in ["</Contents>", "</CommonPrefixes>"] {
+        let begin = end.replace('/', "");
+        let items = left.split_inclusive(end).map(|part| {
+            let (before, item) = part.split_once(&begin).unwrap_or((part, ""));
+            if item.is_empty() || is_path(item) { part } else { before }
+        });
+        left = items.collect();
+    }
+    left.into_bytes()
+}
+
+fn is_name(part: &str) -> bool {
+    !["", ".", ".."].contains(&part)
 }
 
 /// Whether a key is a path below a folder.

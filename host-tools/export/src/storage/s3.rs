@@ -3,12 +3,16 @@
 use std::error::Error as _;
 use std::fs::File;
 use std::io::{Read as _, Write as _};
+use std::iter;
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, anyhow, bail};
 use futures_util::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::aws::{AmazonS3, AmazonS3Builder};
+use object_store::client::{HttpError, HttpErrorKind};
 use object_store::path::Path as Key;
 use object_store::{
     BackoffConfig, Error, GetOptions, GetRange, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutMode,
@@ -21,8 +25,13 @@ use crate::files::cannot_write;
 
 /// Bytes of a part: the protocol's least, so that a slow line sends it in time.
 const PART_BYTES: u64 = 5 << 20;
-/// No repetition of a failed request begins later.
-const RETRIES_END: Duration = Duration::from_secs(20);
+/// Larger parts go one after the other: a line of 2 Mbit/s is enough.
+const SMALL_BYTES: u64 = 256 << 10;
+/// A part waits so long before it looks again.
+const TURN: Duration = Duration::from_millis(20);
+/// No repetition of a failed request begins later: one after a timeout.
+const RETRIES_END: Duration = Duration::from_secs(40);
+const _: () = assert!(RETRIES_END.as_secs() > LIMIT.as_secs());
 const RETRIES_MAX: usize = 4;
 /// Credentials may be fetched before a request, with repetitions of their own.
 const _: () = assert!(2 * (LIMIT.as_secs() + RETRIES_END.as_secs()) <= REQUEST_S);
@@ -30,6 +39,8 @@ const _: () = assert!(2 * (LIMIT.as_secs() + RETRIES_END.as_secs()) <= REQUEST_S
 pub(super) struct S3 {
     store: AmazonS3,
     address: Address,
+    /// Held while a large part goes over it.
+    line: Mutex<()>,
 }
 
 impl S3 {
@@ -47,7 +58,7 @@ impl S3 {
             .with_retry(retries)
             .build()
             .with_context(|| address.to_string())?;
-        Ok(Self { store, address: address.clone() })
+        Ok(Self { store, address: address.clone(), line: Mutex::default() })
     }
 
     fn key(&self, key: &str) -> Result<Key> {
@@ -65,26 +76,47 @@ impl S3 {
     fn failed(&self, error: &Error) -> anyhow::Error {
         let whole = error.to_string();
         let between = |begin: &str, end| Some(whole.split_once(begin)?.1.split_once(end)?.0);
-        let mut cause = error.source();
-        while let Some(next) = cause.and_then(|cause| cause.source()) {
-            cause = Some(next);
-        }
+        let causes = || iter::successors(error.source(), |&cause| cause.source());
+        let is_late = |cause: &(dyn std::error::Error + 'static)| {
+            cause.downcast_ref::<HttpError>().is_some_and(|error| error.kind() == HttpErrorKind::Timeout)
+        };
         let words = match (between("<Code>", "</Code>"), between("<Message>", "</Message>")) {
             (Some(code), message) => format!("{code}: {}", message.unwrap_or_default()),
-            _ => cause.map_or_else(|| whole.clone(), ToString::to_string),
+            _ => causes().last().map_or_else(|| whole.clone(), ToString::to_string),
         };
         let server = between("://", "/").unwrap_or("the server");
         let advice = match error {
             _ if whole.contains("NoSuchBucket") => "create the bucket, or correct its name".to_owned(),
-            _ if whole.contains("/latest/") => {
+            _ if whole.contains("/latest/meta-data") || whole.contains("/latest/api/token") => {
                 "no credentials: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY".to_owned()
             }
             Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => {
                 "check AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, and their rights".to_owned()
             }
+            Error::NotFound { .. } | Error::Precondition { .. } | Error::AlreadyExists { .. } => {
+                "an object was changed meanwhile: run again".to_owned()
+            }
+            _ if causes().any(is_late) => {
+                format!("{server} took {} s: find a faster line (2 Mbit/s), and run again", LIMIT.as_secs())
+            }
             _ => format!("{server} failed: check AWS_ENDPOINT_URL and AWS_REGION, and run again"),
         };
         anyhow!("{}: {}; {advice}", self.address, words.trim_end_matches('.'))
+    }
+
+    /// Before each part: a large one waits for others, and the lease is kept meanwhile.
+    fn turn(&self, bytes: u64, proceed: &dyn Fn() -> Result<()>) -> Result<Option<MutexGuard<'_, ()>>> {
+        loop {
+            proceed()?;
+            if bytes <= SMALL_BYTES {
+                return Ok(None);
+            }
+            match self.line.try_lock() {
+                Ok(turn) => return Ok(Some(turn)),
+                Err(TryLockError::Poisoned(turn)) => return Ok(Some(turn.into_inner())),
+                Err(TryLockError::WouldBlock) => thread::sleep(TURN),
+            }
+        }
     }
 
     fn settle<T>(&self, result: object_store::Result<T>) -> Result<T> {
@@ -114,7 +146,11 @@ impl Objects for S3 {
         };
         let options = PutOptions { mode, ..PutOptions::default() };
         match wait(self.store.put_opts(&self.key(key)?, PutPayload::from(bytes), options))? {
-            Err(Error::AlreadyExists { .. } | Error::Precondition { .. }) => Ok(None),
+            Err(Error::AlreadyExists { .. } | Error::Precondition { .. })
+                if !matches!(when, When::Always) =>
+            {
+                Ok(None)
+            }
             put => Ok(Some(self.settle(put)?.e_tag.unwrap_or_default())),
         }
     }
@@ -123,19 +159,21 @@ impl Objects for S3 {
         let to = self.key(key)?;
         let file = File::open(path)?;
         let mut left = file.metadata()?.len();
-        let part = || {
+        let part = |left| {
+            let turn = self.turn(left, proceed)?;
             let mut bytes = Vec::new();
             (&file).take(PART_BYTES).read_to_end(&mut bytes)?;
-            proceed()?;
-            anyhow::Ok(PutPayload::from(bytes))
+            anyhow::Ok((turn, PutPayload::from(bytes)))
         };
         if left <= PART_BYTES {
-            return self.settle(wait(self.store.put(&to, part()?))?).map(|_| ());
+            let (_turn, part) = part(left)?;
+            return self.settle(wait(self.store.put(&to, part))?).map(|_| ());
         }
         let mut upload = self.settle(wait(self.store.put_multipart(&to))?)?;
         let mut send = || {
             while left > 0 {
-                self.settle(wait(upload.put_part(part()?))?)?;
+                let (_turn, part) = part(left)?;
+                self.settle(wait(upload.put_part(part))?)?;
                 left = left.saturating_sub(PART_BYTES);
             }
             proceed()
@@ -171,7 +209,7 @@ impl Objects for S3 {
         let mut file = File::create_new(to).with_context(|| cannot_write(to))?;
         let mut from = 0;
         while from < object.bytes {
-            proceed()?;
+            let _turn = self.turn(object.bytes - from, proceed)?;
             let end = object.bytes.min(from + PART_BYTES);
             // All parts are of one version.
             let if_match = Some(object.tag.clone()).filter(|tag| !tag.is_empty());

@@ -11,6 +11,19 @@ pub(crate) struct Memory {
     pub(crate) objects: Mutex<BTreeMap<String, Vec<u8>>>,
     /// Requests until the failure of all further ones.
     pub(crate) left: Mutex<Option<u32>>,
+    pub(crate) kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Kind {
+    #[default]
+    Sound,
+    /// The answer to a conditional write is lost, and the client repeats it.
+    Repeated,
+    /// Without `If-None-Match`.
+    NoneMatches,
+    /// Without `If-Match`.
+    AllMatch,
 }
 
 impl Memory {
@@ -44,14 +57,16 @@ impl Objects for Arc<Memory> {
         self.request(|objects| {
             let is_met = match (when, objects.get(key)) {
                 (When::Always, _) | (When::IsNew, None) => true,
-                (When::Is(wanted), Some(old)) => tag(old) == *wanted,
-                (When::IsNew, Some(_)) | (When::Is(_), None) => false,
+                (When::Is(wanted), Some(old)) => tag(old) == *wanted || self.kind == Kind::AllMatch,
+                (When::IsNew, Some(_)) => self.kind == Kind::NoneMatches,
+                (When::Is(_), None) => self.kind == Kind::AllMatch,
             };
             let new = tag(&bytes);
             if is_met {
                 objects.insert(key.to_owned(), bytes);
             }
-            is_met.then_some(new)
+            let is_repeated = self.kind == Kind::Repeated && !matches!(when, When::Always);
+            (is_met && !is_repeated).then_some(new)
         })
     }
 
@@ -93,7 +108,7 @@ impl Objects for Arc<Memory> {
 
     fn copy(&self, from: &str, to: &str) -> Result<()> {
         let is_there = self.request(|objects| {
-            let bytes = objects.get(from).cloned();
+            let bytes = objects.get(from).cloned().filter(|bytes| bytes.len() as u64 <= COPIED_BYTES_MAX);
             bytes.map(|bytes| objects.insert(to.to_owned(), bytes)).is_some()
         })?;
         if is_there { Ok(()) } else { bail!("{from}: is missing") }
@@ -124,6 +139,23 @@ fn a_key_of_others_is_no_path_out_of_a_folder() {
     }
     for key in ["", "/etc/passwd", "../a", "a/../../b", "folder/"] {
         assert!(!is_inside(key), "{key}");
+    }
+}
+
+#[test]
+fn a_list_leaves_out_folders_and_keys_that_are_no_paths() {
+    let begin = "<?xml version=\"1.0\"?><ListBucketResult><Prefix>all/</Prefix>";
+    let object = |key: &str| format!("<Contents><Size>0</Size><Key>{key}</Key></Contents>");
+    let folder = |key: &str| format!("<CommonPrefixes><Prefix>{key}</Prefix></CommonPrefixes>");
+    let list = |keys: &[&str], folders: &[&str]| {
+        let keys = keys.iter().map(|key| object(key)).chain(folders.iter().map(|key| folder(key)));
+        format!("{begin}{}<KeyCount>1</KeyCount></ListBucketResult>", keys.collect::<String>())
+    };
+    let all =
+        list(&["logs/", "logs/a", "logs//b", "/c", "./d", "logs/.d", "logs/.."], &["all/A/", "all//", "//"]);
+    assert_eq!(String::from_utf8(listed(all.into())), Ok(list(&["logs/a", "logs/.d"], &["all/A/"])));
+    for other in [&b"\xff<ListBucketResult"[..], b"<Contents><Key>a//b</Key></Contents>"] {
+        assert_eq!(listed(other.to_vec()), other);
     }
 }
 

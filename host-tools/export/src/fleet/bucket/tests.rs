@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use super::super::Fleet;
 use super::super::tests::{TABLES, add_to, all_rows, session};
 use super::*;
-use crate::storage::tests::Memory;
+use crate::storage::tests::{Kind, Memory};
 
 /// Of one thread at a time.
 const SHORT: Duration = Duration::from_millis(5);
@@ -70,8 +70,12 @@ fn filled() -> (Arc<Memory>, Rows) {
 }
 
 fn copy(memory: &Arc<Memory>) -> Arc<Memory> {
+    copy_as(memory, Kind::Sound)
+}
+
+fn copy_as(memory: &Arc<Memory>, kind: Kind) -> Arc<Memory> {
     let objects = memory.objects.lock().expect("no panic").clone();
-    Arc::new(Memory { objects: objects.into(), ..Memory::default() })
+    Arc::new(Memory { objects: objects.into(), kind, ..Memory::default() })
 }
 
 /// The lease of a date and bucket may stay: the next program waits once.
@@ -221,9 +225,9 @@ fn the_holder_of_a_lease_that_was_taken_over_does_nothing_more() {
     let memory = Arc::new(Memory::default());
     let places = vec!["A/date=2026-05-01/bucket=01/a.parquet".to_owned()];
     let (slow, next) = (bucket(&memory, SHORT), bucket(&memory, SHORT));
-    let old = slow.lease("session", &places).expect("free");
+    let old = slow.lease("session", &places, None).expect("free");
     // It waits until the first one has not renewed it for long.
-    let new = next.lease("session", &[]).expect("taken over");
+    let new = next.lease("session", &[], None).expect("taken over");
     assert_eq!(new.left, places.iter().cloned().collect());
     let before = memory.objects.lock().expect("no panic").clone();
     let error = old.delete(&places).expect_err("it is taken over").to_string();
@@ -234,15 +238,74 @@ fn the_holder_of_a_lease_that_was_taken_over_does_nothing_more() {
     // A program that fails leaves it free, with its list: nobody waits.
     drop(new);
     let patient = bucket(&memory, Duration::from_hours(1));
-    let last = patient.lease("session", &[]).expect("free");
+    let last = patient.lease("session", &[], None).expect("free");
     assert_eq!(last.left, places.into_iter().collect());
     last.end().expect("ended");
     assert!(memory.objects.lock().expect("no panic").is_empty());
 }
 
 #[test]
+fn a_lease_is_kept_while_its_program_waits_for_another_one() {
+    let memory = Arc::new(Memory::default());
+    memory.objects.lock().expect("no panic").insert(own("lease", "part"), b"stopped 0\n".to_vec());
+    let bucket = bucket(&memory, SHORT);
+    let outer = bucket.lease("session", &[], None).expect("free");
+    bucket.lease("part", &[], Some(&outer)).expect("taken over").end().expect("ended");
+    let text = memory.objects.lock().expect("no panic").get(&own("lease", "session")).cloned();
+    assert!(text.is_some_and(|text| !text.ends_with(b" 0\n")), "it was not renewed");
+    outer.end().expect("ended");
+}
+
+#[test]
+fn a_program_whose_answers_are_lost_waits_for_no_lease_of_its_own() {
+    let (filled, before) = filled();
+    let memory = copy_as(&filled, Kind::Repeated);
+    let patience = Duration::from_hours(1);
+    assert!(add(&memory, patience, 7, DAY, 10, false).expect("added"));
+    assert!(add(&memory, patience, 7, DAY, 20, true).expect("replaced"));
+    let (sum, _) = bucket(&memory, patience).compact(&mut |_, error| panic!("{error:#}")).expect("compacted");
+    assert_eq!(sum.sessions, 3);
+    assert!(rows(&memory).iter().zip(&before).all(|(all, before)| all.len() == before.len() + 20));
+    nothing_is_left(&memory);
+}
+
+#[test]
+fn a_session_that_another_program_began_to_replace_is_added_again() {
+    let (memory, before) = filled();
+    let dir = tempfile::tempdir().expect("a directory");
+    let fleet = Arc::new(Fleet::new(dir.path(), Some(bucket(&memory, SHORT))));
+    assert!(add_to(&fleet, 7, DAY, 10, false).expect("added"));
+    let whole = memory.objects.lock().expect("no panic").clone();
+    let mut steps = 1;
+    while memory.objects.lock().expect("no panic").contains_key(&own("index", &session(7))) {
+        memory.objects.lock().expect("no panic").clone_from(&whole);
+        stop_after(&memory, Some(steps));
+        add(&memory, SHORT, 7, None, 20, true).expect_err("stopped");
+        stop_after(&memory, None);
+        steps += 1;
+    }
+    assert!(add_to(&fleet, 7, DAY, 10, false).expect("added"));
+    assert!(rows(&memory).iter().zip(&before).all(|(all, before)| all.len() == before.len() + 10));
+    nothing_is_left(&memory);
+}
+
+#[test]
+fn a_server_without_conditional_writes_is_refused() {
+    for kind in [Kind::NoneMatches, Kind::AllMatch] {
+        let memory = copy_as(&Arc::default(), kind);
+        let error = add(&memory, SHORT, 7, DAY, 1, false).expect_err("unsafe").to_string();
+        assert!(error.contains("no conditional writes"), "{kind:?}: {error}");
+        assert!(memory.objects.lock().expect("no panic").is_empty(), "{kind:?}");
+    }
+}
+
+#[test]
 fn tables_that_were_copied_there_and_a_commit_of_others_are_refused() {
     let (memory, _) = filled();
+    let here = folder(&memory);
+    let fleet = Arc::new(Fleet::new(here.path(), None));
+    let error = add_to(&fleet, 7, DAY, 1, false).expect_err("copied here").to_string();
+    assert!(error.contains("a copy of object storage"), "{error}");
     memory.objects.lock().expect("no panic").retain(|key, _| !key.starts_with(OWN));
     let before = memory.objects.lock().expect("no panic").clone();
     let error = add(&memory, SHORT, 7, DAY, 1, false).expect_err("unknown sessions").to_string();
