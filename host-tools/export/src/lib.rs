@@ -419,7 +419,9 @@ fn check_clock(name: &str, context: &Context) -> Result<Option<String>> {
 impl Task<'_> {
     fn decode_or_skip(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
         let done = self.decode(work, all);
-        if self.logs == 1 {
+        // A job of a fleet may be repeated.
+        let is_of_fleet = self.formats.about().all(|about| matches!(about.files, Files::Fleet(_)));
+        if self.logs == 1 && (!is_of_fleet || self.inputs.may_replace()) {
             return done;
         }
         match or_skipped(done)? {

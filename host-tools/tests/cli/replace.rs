@@ -106,11 +106,11 @@ fn an_output_that_exists_is_overwritten_with_force_only_by_every_format() {
         fs::remove_dir_all(&out).expect("removed");
     }
     run(dir.path(), "decode cut/log.hum -o fleet --format parquet", 3);
-    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 1);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet", 0);
     run(dir.path(), "decode whole/log.hum -o fleet --format parquet --force", 0);
     let fleet = dir.path().join("fleet");
     let before = contents(&fleet);
-    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 1);
+    run(dir.path(), "decode whole/log.hum -o fleet --format parquet --message ATTITUDE", 0);
     assert!(contents(&fleet) == before);
     assert_eq!(parquet_sessions(&fleet).len(), 1);
 }
@@ -382,7 +382,7 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
         );
         for path in each {
             let (code, told) = decode(&format!("logs/{path}"), "");
-            assert!(code == Some(1) && told.contains("exists, and was not overwritten"), "{path}: {told}");
+            assert!(code == Some(0) && told.contains("exists, and was not overwritten"), "{path}: {told}");
         }
         let (code, told) = decode("logs", "--vehicle quad-7");
         assert_eq!((code, told.matches("skipped: ").count()), (Some(0), 4), "{told}");
