@@ -17,7 +17,7 @@ use super::support::{hums, px4, run, text};
 /// The commands that run until Ctrl-C; they work if they print the address of their page.
 const SERVES: &str = "live";
 /// Examples that need a firmware image (`tests/chip` runs one) or a board (`tests/sim/companion.rs` simulates one).
-const ELSEWHERE: [&str; 2] = ["--firmware", "box "];
+const ELSEWHERE: [&str; 3] = ["--firmware", "box ", "s3://"];
 
 /// The files of the documents' examples.
 const DOCUMENTED: [(&str, &str); 2] = [
