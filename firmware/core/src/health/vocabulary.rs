@@ -165,7 +165,7 @@ vocabulary! {
     "rail_5v_high" Vehicle "5 V supply, high", "", says "5 V supply high", "", needs "voltage of the 5 V supply";
     "The autopilot's 5 V supply was too high: it can be damaged."; "Check the power module before the next flight.";
     "battery_due" Stored "battery life", "", says "a battery's life used|~", "REPLACE IT", needs "battery registered with the monitor on board";
-    "A battery has reached the end of its life."; "Replace it, and tell the monitor.";
+    "A battery has reached the end of its life."; "Replace it, then `hums box replaced PART`.";
 
     "battery_alert" Said "autopilot's battery alert", "", says "autopilot warns: battery", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a battery or a supply was low or had failed.";
@@ -201,7 +201,7 @@ vocabulary! {
     "The vehicle did not pitch as the autopilot wanted: a motor, propeller, servo or surface failed.";
     "Do not fly until motors, propellers, servos and control surfaces are checked.";
     "drive_due" Stored "life of motors, propellers, ESCs", "", says "motor/prop/ESC life used", "REPLACE IT", needs "motor, propeller or ESC registered with the monitor on board";
-    "A motor, propeller or ESC has reached the end of its life."; "Replace it, and tell the monitor.";
+    "A motor, propeller or ESC has reached the end of its life."; "Replace it, then `hums box replaced PART`.";
 
     "drive_alert" Said "autopilot's motor alert", "", says "autopilot warns: motor", "LAND NOW", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a motor, propeller or ESC had failed or gave too little thrust.";
@@ -216,7 +216,7 @@ vocabulary! {
     "generator_speed" Vehicle "generator speed", "", says "generator speed low", "LAND", needs "generator data";
     "The generator turned too slowly: the flight may have gone on by battery alone."; "Check fuel, engine and generator before the next flight.";
     "engine_due" Stored "engine life", "", says "engine life used", "SERVICE IT", needs "engine registered with the monitor on board";
-    "The engine is due for maintenance."; "Do the maintenance, and tell the monitor.";
+    "The engine is due for maintenance."; "Do the maintenance, then `hums box replaced PART`.";
 
     "vibration" ArduPilot "vibration", "", says "vibration high", "LAND BY HAND", needs "vibration levels";
     "Vibration was strong enough to disturb the autopilot's estimator (EKF).";
@@ -234,7 +234,7 @@ vocabulary! {
     "The airframe carried a high load: a hard manoeuvre, a shock or a landing.";
     "Inspect the airframe and the landing gear.";
     "airframe_due" Stored "airframe life", "", says "airframe life used", "SERVICE IT", needs "airframe registered with the monitor on board";
-    "The airframe or a part of it is due for maintenance."; "Do the maintenance, and tell the monitor.";
+    "The airframe or a part of it is due for maintenance."; "Do the maintenance, then `hums box replaced PART`.";
 
     "vibration_alert" Said "autopilot's vibration alert", "", says "autopilot warns: vibration", "LAND BY HAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that vibration or clipping disturbed it.";
@@ -404,7 +404,7 @@ vocabulary! {
     "card_room" Recorder "room on the card", "", says "other files fill card", "CLEAR CARD", needs "monitor's own recorder";
     "Other files take the card's room."; "Copy them elsewhere, then remove them.";
     "card_due" Stored "card life", "", says "card life used", "REPLACE IT", needs "card registered with the monitor on board";
-    "The card has reached the end of its life."; "Copy its logs, replace it, and tell the monitor.";
+    "The card has reached the end of its life."; "Copy its logs, replace it, then `hums box replaced card`.";
 
     "free_fall" Vehicle "free fall", "", says "falling", "KEEP CLEAR", needs "acceleration of a vehicle on rotors";
     "Nothing carried the vehicle though its throttle asked for thrust.";
