@@ -75,7 +75,7 @@ overall.node.id = "overall";
 picture.node.id = "source";
 
 // ---- Body.
-const rows = [general(), movement(), esc(), condition()],
+const rows = [movement(), general(), esc(), condition()],
   sides = [board(), usage(), link()],
   body = el("div", { class: "rows" });
 const linked = (now, count, token) => {
