@@ -49,14 +49,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
+/// Adds `check` before files, standard input, `--`, and flags of `check`.
 fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
-    let is_file = |first: &OsString| {
-        let is_command = Cli::command().find_subcommand(first).is_some() || first == "help";
+    let is_of_check = |first: &OsString| {
+        let words = first.to_string_lossy();
+        let is_own = matches!(&*words, "-h" | "--help" | "-V" | "--version" | "help");
+        let is_command = Cli::command().find_subcommand(first).is_some();
         // A path that is missing is an error of that path, not of a command.
-        let is_path = first.to_string_lossy().contains(['.', '/', '\\']) || Path::new(first).exists();
-        !is_command && !first.to_string_lossy().starts_with('-') && is_path
+        let is_path = words.contains(['.', '/', '\\']) || Path::new(first).exists();
+        !is_command && !is_own && (words.starts_with('-') || is_path)
     };
-    if arguments.get(1).is_some_and(is_file) {
+    if arguments.get(1).is_some_and(is_of_check) {
         arguments.insert(1, "check".into());
     }
     arguments

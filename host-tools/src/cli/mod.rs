@@ -33,10 +33,10 @@ const AFTER: &str = "Where bytes come from and go to (SRC, SINK):
   serial:DEVICE:BAUD    a serial port, e.g. serial:/dev/ttyUSB0:921600
 
 Examples:
-  hums flight.tlog                                           the faults of a flight: the same as hums check flight.tlog
+  hums flight.tlog                                   the faults of a flight: the same as hums check flight.tlog
   hums sim flight.tlog --sd card.img                 record a flight onto an SD card image
-  hums info --list card.img                                  the flights on a card, a line each
-  hums info card.img --session 00001                         all facts about one of them
+  hums info --list card.img                          the flights on a card, a line each
+  hums info card.img --session 00001                 all facts about one of them
   hums decode card.img -o out --format tlog,csv              a card's logs for other tools
   hums live udpin:0.0.0.0:14550 --open               a live page of the vehicle in the browser
 
@@ -44,12 +44,14 @@ Exit codes: 0 done; 1 failed; 2 usage; 3 done, but the log has losses or damage 
 4 done, and `hums check` found something wrong with the vehicle, also in a damaged log.
 Results go to standard output, everything else to standard error. Colours are for terminals only, and NO_COLOR=1 turns them off.";
 
+const USAGE: &str = "hums FILE...\n       hums <COMMAND>";
+
 /// This program, its version and its commit.
 pub(crate) const PROGRAM: &str = concat!("hums ", env!("HUMS_VERSION"));
 
 /// The whole command line.
 #[derive(Debug, Parser)]
-#[command(name = "hums", version = env!("HUMS_VERSION"), about = ABOUT, after_help = AFTER, max_term_width = 110)]
+#[command(name = "hums", version = env!("HUMS_VERSION"), about = ABOUT, after_help = AFTER, override_usage = USAGE, max_term_width = 110)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -97,6 +99,15 @@ mod tests {
 
     fn without_redirection(line: &str) -> &str {
         line.split(['|', '>']).next().unwrap_or_default().trim_end()
+    }
+
+    #[test]
+    fn files_flags_and_standard_input_without_a_command_are_checked() {
+        for words in ["-", "-- f", "-v f", "--json f", "a/b", "f.bin --json"] {
+            let words = std::iter::once("hums").chain(words.split(' ')).map(Into::into);
+            let cli = Cli::try_parse_from(crate::with_command(words.collect()));
+            assert!(matches!(cli, Ok(Cli { command: Command::Check(_) })), "{cli:?}");
+        }
     }
 
     #[test]
