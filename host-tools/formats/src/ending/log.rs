@@ -29,7 +29,8 @@ pub struct Ending {
 
 impl Ending {
     /// A log alone; [`crate::followed`] adds later evidence.
-    pub fn of(log: &Log, summary: LogSummary) -> Self {
+    pub fn of(log: &Log, mut summary: LogSummary) -> Self {
+        summary.is_cut_by_image = log.ends_with_image();
         let proof = Proof::of(&summary, None);
         let (name, files, left_over) = (log.name.clone(), log.files.clone(), log.left_over);
         Self { name, files, summary, proof, left_over, ..Self::default() }

@@ -122,6 +122,7 @@ impl Proof {
                     moment(at)
                 ),
             },
+            Self::None if summary.is_cut_by_image => "the image ends here, and the log in it".to_owned(),
             Self::None => {
                 let after = |(at, why): (Instant, Resting)| {
                     format!(" (the last {} was at {})", why.words(), moment(at))
@@ -179,6 +180,8 @@ mod tests {
         let flown =
             "not proved to its end: armed or in the air since 0:40.0 when power went or the card was pulled";
         assert_eq!(words(Some(40_000)), flown);
+        let summary = LogSummary { is_cut_by_image: true, ..LogSummary::default() };
+        assert_eq!(Proof::None.words(&summary), "the image ends here, and the log in it");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 
 use super::fat::{Extent, ReadAt as _};
 use super::naming::segment_name;
+use crate::card::image::length;
 
 /// One sector.
 pub const BLOCK_BYTES: usize = 512;
@@ -46,6 +47,16 @@ impl Log {
     pub fn ends_short(&self) -> bool {
         let last = self.pieces.last().and_then(|piece| piece.extents.last());
         last.is_some_and(|extent| extent.length % BLOCK_BYTES as u64 != 0)
+    }
+
+    /// Found by a scan, and ends at the end of its image: a copy of a part of a card.
+    pub fn ends_with_image(&self) -> bool {
+        let last = || self.pieces.last().and_then(|piece| Some((&piece.path, piece.extents.last()?)));
+        let is_last = |(path, extent): (&PathBuf, &Extent)| {
+            let length = File::open(path).and_then(|file| length(&file)).unwrap_or(u64::MAX);
+            length.saturating_sub(extent.start + extent.length) < BLOCK_BYTES as u64
+        };
+        self.session.is_some() && last().is_some_and(is_last)
     }
 
     /// The first file's number, by its name. Earlier files were deleted by a full card, or by the ring of a

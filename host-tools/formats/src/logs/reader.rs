@@ -56,6 +56,8 @@ pub struct LogSummary {
     pub session: Option<u32>,
     /// Ended in order; otherwise power failed.
     pub closed: bool,
+    /// It ends where its image ends.
+    pub is_cut_by_image: bool,
     /// Frames read.
     pub frames: u64,
     /// Groups read.
