@@ -11,9 +11,9 @@ use hums_core::health::{Level, Side, Subsystem};
 
 use super::checked::Checked;
 use super::flights::{Flight, Mishap};
-use super::grouped::{grouped, is_critical};
+use super::grouped::{Group, grouped, is_critical};
 use super::judged::{Judged, JudgedBy};
-use super::problem::{Problem, side};
+use super::problem::{IMPACT, Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
 use crate::names::{autopilot_name, type_name, vocabulary};
@@ -357,11 +357,34 @@ pub fn verdict(judged: &Judged) -> String {
         Some(Level::Critical) => "do not fly before this is cleared up",
         Some(_) => "look at this before the next flight",
     };
-    format!("{}; {what} ({counts})", headline(&judged.problems))
+    format!("{}; {what} ({counts})", headline(judged))
 }
 
-fn headline(problems: &[Problem]) -> String {
-    let groups = grouped(problems);
+/// A crash first: it is what the flight is known for.
+fn headline(judged: &Judged) -> String {
+    let groups = grouped(&judged.problems);
+    let found = found(&groups);
+    let mishap = judged.flights.iter().find_map(|flight| flight.mishap);
+    let Some(Mishap { at, is_impact, .. }) = mishap else { return found };
+    let is_mishap = |problem: &&Problem| problem.subsystem == Subsystem::Mishap;
+    let what = if is_impact { "crashed" } else { "ended by a mishap" };
+    let mut mishaps = judged.problems.iter().filter(is_mishap);
+    let how =
+        mishaps.find(|problem| !is_impact || problem.check == IMPACT).map_or_else(String::new, |problem| {
+            let worst = match shown(&problem.check, problem.value, problem.limit) {
+                Shown::Quantity(Some(worst), _) => format!(" {}", quantity(worst, &problem.unit)),
+                _ => String::new(),
+            };
+            format!(" ({}{worst})", alarm(&[problem]))
+        });
+    let crash = format!("{what} at {}{how}", moment(at));
+    match groups.first().and_then(Group::first).filter(|first| !is_mishap(first)) {
+        Some(_) => format!("{crash}; first {found}"),
+        None => crash,
+    }
+}
+
+fn found(groups: &[Group<'_>]) -> String {
     let Some((group, first)) = groups.first().and_then(|group| Some((group, group.first()?))) else {
         return String::new();
     };
