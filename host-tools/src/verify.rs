@@ -27,7 +27,7 @@ use crate::source::find::{besides, not_ours};
 use crate::summary::{Contents, Overview};
 use crate::table::{Table, left};
 use hums_analysis::log_json::images_json;
-use hums_analysis::manifest::Manifest;
+use hums_analysis::manifest::{Manifest, ReadLog};
 use hums_analysis::soundness::Soundness;
 
 const SCHEMA: Schema = Schema::first("hums-info-verify");
@@ -49,6 +49,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         made_again: 0,
         unprotected: 0,
         without_earlier: None,
+        is_card_damaged: false,
     };
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
@@ -62,7 +63,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     let mut list = args.json.then(begin).transpose()?;
     for image in &found.images {
         let check = file_system(image);
-        ok &= check.failed == 0;
+        all.is_card_damaged |= check.failed > 0;
         if !args.json {
             output::line(&format!("Card {}", path(&image.path)))?;
             print(&[check])?;
@@ -70,9 +71,21 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         }
     }
     let mut manifest = Manifest::default();
+    manifest.images(&found.images, &args.inputs);
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
-        manifest.log(&overview.ending.name, overview.soundness(), Some(&overview.ending), &[]);
+        let (soundness, ending) = (overview.soundness(), Some(&overview.ending));
+        let (name, frames, gaps) = (&overview.ending.name, 0, 0);
+        manifest.log(ReadLog {
+            name,
+            session: None,
+            frames,
+            gaps,
+            copy_of: None,
+            soundness,
+            ending,
+            remarks: &[],
+        });
         all.add(overview, log.verdict);
         if let Some(list) = &mut list {
             return list.element(&log);
@@ -82,7 +95,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     if !ok || failed > 0 {
         all.worst = Verdict::NotProved;
     }
-    let ok = all.worst != Verdict::NotProved && !all.is_damage();
+    let ok = all.worst != Verdict::NotProved && !all.is_damage() && !all.is_card_damaged;
     if let Some(list) = list {
         list.end_with("ok", &ok)?;
     } else {
@@ -109,6 +122,8 @@ struct Totals {
     unprotected: u64,
     /// The logs before it were not read.
     without_earlier: Option<String>,
+    /// The file system of a card.
+    is_card_damaged: bool,
 }
 
 impl Totals {
@@ -132,7 +147,8 @@ impl Totals {
     fn words(&self, has_passed_over: bool) -> String {
         let all = self.without_earlier.is_none() && !has_passed_over;
         let words = match (self.worst, self.is_damage(), all) {
-            (Verdict::Holds, false, true) => "everything holds",
+            (Verdict::Holds, false, true) if !self.is_card_damaged => "everything holds",
+            (Verdict::Holds, false, true) => "all that was found holds",
             (Verdict::Holds, false, false) => "all that was read holds",
             (Verdict::Holds, true, true) => "nothing is lost",
             (Verdict::Holds, true, false) => "nothing is lost of what was read",
@@ -142,7 +158,9 @@ impl Totals {
             (Verdict::NotProved, ..) => "a check failed or a log could not be read: see above",
         };
         let earlier = self.without_earlier.as_ref();
+        let damage = "the file system is damaged".to_owned();
         let more = [
+            self.is_card_damaged.then_some(damage),
             made_again_words(self.made_again),
             unprotected_words(self.unprotected),
             earlier.map(|first| format!("the logs before {} were not read", word(first))),
@@ -444,13 +462,17 @@ mod tests {
 
     use super::*;
 
-    /// A card's file system, a cut search or an unreadable log fails beside logs that lost nothing.
+    /// A cut search or an unreadable log fails beside logs that lost nothing.
     #[test]
     fn logs_that_lost_nothing_do_not_name_what_failed() {
-        let words = |soundness| {
-            let (worst, without_earlier) = (Verdict::NotProved, None);
-            Totals { logs: 1, worst, soundness, made_again: 0, unprotected: 0, without_earlier }.words(false)
+        let totals = |soundness| {
+            let (worst, without_earlier, is_card_damaged) = (Verdict::NotProved, None, false);
+            let (made_again, unprotected) = (0, 0);
+            Totals { logs: 1, worst, soundness, made_again, unprotected, without_earlier, is_card_damaged }
         };
+        let found = Totals { worst: Verdict::Holds, is_card_damaged: true, ..totals(Soundness::Whole) };
+        assert_eq!(found.words(false), "all that was found holds; the file system is damaged");
+        let words = |soundness| totals(soundness).words(false);
         for soundness in [Soundness::Whole, Soundness::Repaired, Soundness::Unprotected] {
             assert_eq!(words(soundness), "a check failed or a log could not be read: see above");
         }

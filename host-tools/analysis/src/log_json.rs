@@ -1,5 +1,7 @@
 //! Output of `hums info --json`. Names carry units; times are since power-on or UTC.
 
+use std::path::Path;
+
 use hums_core::clock::Instant;
 use serde::Serialize;
 
@@ -29,6 +31,19 @@ pub struct ImageJson {
     not_looked_at: Option<String>,
 }
 
+impl ImageJson {
+    /// With this name.
+    pub fn of(image: &logs::find::Image, path: &Path) -> Self {
+        Self {
+            path: path.display().to_string(),
+            damage: image.damage.clone(),
+            lost_clusters: image.lost_clusters,
+            found_by_scan: image.scanned,
+            not_looked_at: image.not_looked_at(),
+        }
+    }
+}
+
 /// The images of a run.
 #[derive(Debug, Serialize)]
 pub struct ImagesJson {
@@ -37,13 +52,7 @@ pub struct ImagesJson {
 
 /// The images of a run as JSON.
 pub fn images_json(images: &[logs::find::Image]) -> ImagesJson {
-    let json = |image: &logs::find::Image| ImageJson {
-        path: image.path.display().to_string(),
-        damage: image.damage.clone(),
-        lost_clusters: image.lost_clusters,
-        found_by_scan: image.scanned,
-        not_looked_at: image.not_looked_at(),
-    };
+    let json = |image: &logs::find::Image| ImageJson::of(image, &image.path);
     ImagesJson { images: images.iter().map(json).collect() }
 }
 

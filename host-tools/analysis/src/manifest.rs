@@ -13,6 +13,8 @@ use serde::Serialize;
 use crate::ending::Ending;
 use crate::files::{Inputs, Output, digest, settle};
 use crate::hex::hex;
+use crate::log_json::ImageJson;
+use crate::logs::find::Image;
 use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::path as shown;
@@ -30,6 +32,8 @@ pub struct Manifest {
     made_utc: String,
     /// Each file that was read.
     inputs: Vec<FileJson>,
+    /// The file systems of cards among them.
+    images: Vec<ImageJson>,
     /// Each file that was made.
     outputs: Vec<FileJson>,
     logs: Vec<LogJson>,
@@ -47,11 +51,15 @@ struct FileJson {
 #[derive(Debug, Serialize)]
 struct LogJson {
     name: String,
-    /// `null` for recordings of other programs.
+    /// Number of its sectors, hexadecimal; of other programs' recordings `r` and a number made of the bytes.
     session: Option<String>,
+    /// Messages, for an autopilot's log.
+    frames: u64,
+    /// Damaged or lost places.
+    gaps: u64,
+    /// The original, if the log is a copy.
+    copy_of: Option<String>,
     /// `null` for recordings of other programs.
-    frames: Option<u64>,
-    gaps: Option<u64>,
     frames_missing: Option<u64>,
     /// From parity.
     sectors_rebuilt: Option<u64>,
@@ -61,21 +69,51 @@ struct LogJson {
     faults: Vec<String>,
 }
 
+/// A log that was read.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadLog<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// For a recording of another program, as are frames and gaps.
+    pub session: Option<&'a str>,
+    /// Frames or messages.
+    pub frames: u64,
+    /// Damaged or lost places.
+    pub gaps: u64,
+    /// The original, if it is a copy.
+    pub copy_of: Option<&'a str>,
+    /// What it lacks.
+    pub soundness: Soundness,
+    /// Recordings of other programs have none.
+    pub ending: Option<&'a Ending>,
+    /// Sentences on its faults.
+    pub remarks: &'a [String],
+}
+
 impl Manifest {
-    /// Adds a log that was read, with the remarks on it. Recordings of other programs have no ending.
-    pub fn log(&mut self, name: &str, soundness: Soundness, ending: Option<&Ending>, remarks: &[String]) {
+    /// Adds a log that was read.
+    pub fn log(&mut self, log: ReadLog<'_>) {
+        let ReadLog { name, session, frames, gaps, copy_of, soundness, ending, remarks } = log;
         let summary = ending.map(|ending| &ending.summary);
         let faults = ending.map_or_else(Vec::new, Ending::faults);
+        let number = summary.and_then(|summary| summary.session).map(|session| format!("{session:08x}"));
         self.logs.push(LogJson {
             name: name.to_owned(),
-            session: summary.and_then(|summary| summary.session).map(|session| format!("{session:08x}")),
-            frames: summary.map(|summary| summary.frames),
-            gaps: summary.map(|summary| summary.gaps),
+            session: number.or_else(|| session.map(str::to_owned)),
+            frames: summary.map_or(frames, |summary| summary.frames),
+            gaps: summary.map_or(gaps, |summary| summary.gaps),
+            copy_of: copy_of.or(ending.and_then(|ending| ending.again.as_deref())).map(str::to_owned),
             frames_missing: summary.map(|summary| summary.frames_missing),
             sectors_rebuilt: ending.map(Ending::made_again),
             lacks: soundness.words(),
             faults: faults.into_iter().chain(remarks.iter().cloned()).collect(),
         });
+    }
+
+    /// Adds the file systems of cards, named from the `given` paths on.
+    pub fn images(&mut self, images: &[Image], given: &[PathBuf]) {
+        let json = |image| ImageJson::of(image, &name_below(&image.path, given));
+        self.images.extend(images.iter().map(json));
     }
 
     /// Hashes all files, tells people of them, and writes the manifest. Files are named from the `given` paths on.

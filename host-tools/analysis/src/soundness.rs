@@ -46,6 +46,16 @@ impl Soundness {
         }
     }
 
+    /// In JSON: `whole`, `repaired` (nothing is lost), `not_proved`, `lacks`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Whole => "whole",
+            Self::Repaired | Self::Unprotected => "repaired",
+            Self::NotProved => "not_proved",
+            Self::NotFrames | Self::Lossy | Self::Damaged => "lacks",
+        }
+    }
+
     /// As a part of a sentence about the log; empty if it is whole.
     pub const fn words(self) -> &'static str {
         match self {

@@ -237,8 +237,8 @@ pub struct Contents {
     pub stats: Option<Stats>,
     /// Gaps, in order, up to [`LISTED_MAX`].
     pub gaps: Vec<Gap>,
-    /// Offset and cause, in another format.
-    pub gap_words: Vec<(Option<u64>, String)>,
+    /// Cause, offset and words, in another format.
+    pub gap_words: Vec<(item::Cause, Option<u64>, String)>,
     /// No vehicle, judged here.
     pub unheard: Option<String>,
     /// Remarks, as sentences.

@@ -32,7 +32,7 @@ const OBJECTS: &str = "\
 `hums-info-list` 1; images: Vec<ImageJson>, /// The oldest first. logs: Vec<LogJson>,; src/info/list.rs; Of `hums info --list`.
 `hums-info` 1; images: Vec<ImageJson>, logs: Vec<LogJson>,; analysis/src/log_json.rs analysis/src/summary.rs; Of `hums info`.
 `hums-info-verify` 1; images: Vec<ImageJson>, logs: Vec<LogJson>, /// Of all logs and images. ok: bool,; src/verify.rs; Of `hums info --verify`.
-`hums-manifest` 1; Manifest; analysis/src/manifest.rs; The file of `--manifest FILE` of `hums info --verify` and `hums decode`.
+`hums-manifest` 1; Manifest; analysis/src/manifest.rs analysis/src/log_json.rs; The file of `--manifest FILE` of `hums info --verify` and `hums decode`.
 `hums-due` 1; DueJson; src/info/due.rs; Of `hums due`.
 `hums-decode` 1; MadeJson; export/src/made.rs; Of `hums decode`.
 `hums-report` 1; PagesJson; report/src/report/mod.rs; Of `hums report`.

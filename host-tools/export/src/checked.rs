@@ -7,8 +7,9 @@ use hums_core::health::Level;
 use super::row::{Cell, CellType, Row};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
 use crate::check::problem::{Problem, problems};
-use crate::names::{check_name, unit_name};
+use crate::names::check_name;
 use crate::source::told::Finding;
+use crate::states::{Shown, quantity, shown};
 use crate::summary::Contents;
 
 /// Word for the monitor on board, as `checked_by` in `hums info --json`.
@@ -170,9 +171,17 @@ pub fn problem_words(problem: &Problem) -> String {
 /// A finding in words: `battery 1 cell voltage critical: 3.4 V (limit 3.5 V)`.
 pub fn finding_words(finding: &Finding) -> String {
     let Finding { check, instance, level, value, limit, unit, .. } = finding;
-    let unit = if unit.is_empty() { String::new() } else { format!(" {}", unit_name(unit)) };
-    let number = |number: f32| format!("{}{unit}", (f64::from(number) * 1000.0).round() / 1000.0);
-    let value = if value.is_nan() { String::new() } else { format!(": {}", number(*value)) };
-    let limit = if limit.is_nan() { String::new() } else { format!(" (limit {})", number(*limit)) };
-    format!("{} {}{value}{limit}", check_name(check, *instance), level.name())
+    let words = match shown(check, *value, *limit) {
+        // Its level again.
+        Shown::State(state) => {
+            let state = state.filter(|state| !state.ends_with(level.name()));
+            state.map(|state| format!(": {state}")).unwrap_or_default()
+        }
+        Shown::Quantity(value, limit) => {
+            let value = value.map(|value| format!(": {}", quantity(value, unit))).unwrap_or_default();
+            let limit = limit.map(|limit| format!(" (limit {})", quantity(limit, unit))).unwrap_or_default();
+            format!("{value}{limit}")
+        }
+    };
+    format!("{} {}{words}", check_name(check, *instance), level.name())
 }

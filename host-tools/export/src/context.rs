@@ -28,6 +28,13 @@ impl Formats {
         Self { formats: super::formats::FORMATS.iter().filter(is_asked).collect(), split }
     }
 
+    /// Those for a log without MAVLink frames.
+    #[must_use]
+    pub fn without_frames(&self) -> Self {
+        let formats = self.formats.iter().copied().filter(|format| !format.about.is_of_frames);
+        Self { formats: formats.collect(), split: self.split }
+    }
+
     /// Their descriptions.
     pub fn about(&self) -> impl Iterator<Item = &'static format::FormatDetails> {
         self.formats.iter().map(|format| &format.about)
@@ -52,6 +59,11 @@ impl Formats {
     /// Whether any of them has texts and parameters of any recording.
     pub fn has_words(&self) -> bool {
         self.about().any(|about| about.has_words)
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(&self) -> bool {
+        self.formats.is_empty()
     }
 
     /// Whether a log becomes exactly one file.

@@ -53,6 +53,11 @@ impl Texts {
         Some(Self(texts.collect()))
     }
 
+    /// Number of texts to come.
+    pub fn count(&self) -> u64 {
+        self.0.len() as u64
+    }
+
     /// Records of a tlog with the texts that are due between them.
     pub fn among(&mut self, mut records: &[u8]) -> Vec<u8> {
         let mut merged = Vec::with_capacity(records.len());

@@ -21,7 +21,7 @@
 extern crate hums_base;
 
 use hums_analysis::soundness::Soundness;
-use hums_analysis::{check, manifest, reference, summary};
+use hums_analysis::{check, manifest, reference, states, summary};
 use hums_base::{endpoint, files, hex, outcome, output, plural, printable, utc};
 use hums_formats::{ending, followed, logs, loss, mavlink, names, naming, source};
 
@@ -70,14 +70,14 @@ use findings::Findings;
 use fleet::Fleet;
 use fleet::bucket::Bucket;
 use followed::{EndResolver, HasEnding};
-use format::{Files, Finished, Way};
+use format::{Files, Finished, FormatDetails, Way};
 use formats::FORMATS;
 use formats::influx::Tags;
 use identity::identity;
 use logs::reader;
 use logs::side_by_side::side_by_side;
 use made::{LogJson, MadeJson, OutputFile};
-use manifest::Manifest;
+use manifest::{Manifest, ReadLog};
 use naming::Named;
 use outcome::{Outcome, or_skipped, usage as usage_error};
 use output::Schema;
@@ -92,7 +92,7 @@ use storage::{Address, Upload};
 use story::StoryEntry;
 use summary::damaged_places;
 use utc::When;
-use works::{NamedLog, check_forms, works};
+use works::{NamedLog, check_forms, without_frames, works};
 use write::Writers;
 
 /// Output of `hums decode --json`.
@@ -165,14 +165,14 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
     let inputs = Inputs::of(given.iter().map(PathBuf::as_path).chain(found.paths())).forcing(args.force);
     let sessions = sessions_of(&found.places);
     let wanted = found.name_of(args.session.as_deref())?;
-    let works = works(&found.places, &sessions)?;
+    let mut works = works(&found.places, &sessions)?;
     inputs.refuse(&args.output)?;
     args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
     let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
     let standard_output = check_output(args, asked, &formats)?;
-    let native = check_forms(&works, &formats)?;
-    let selection = Selection::new(args, native)?;
+    check_forms(&mut works, &formats)?;
+    let selection = Selection::new(args, works.iter().any(|work| work.is_native))?;
     let logs = asked;
     let mut followed = EndResolver::new(sessions);
     let task = Task {
@@ -189,14 +189,16 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
     };
     let mut written = works.is_empty();
     let mut json = args.json.then(MadeJson::default);
-    let (mut manifest, mut made) = (Manifest::default(), BTreeSet::new());
+    let (mut manifest, mut made, mut existing) = (Manifest::default(), BTreeSet::new(), Vec::new());
+    manifest.images(&found.images, &given);
     let mut tell = |done: Done| {
         if !is_wanted(&done.name) {
             return Ok(());
         }
         outcome = outcome.and(done.outcome());
         written |= done.written;
-        manifest.log(&done.name, done.soundness(), done.ending.as_ref(), &done.remarks);
+        manifest.log(done.of_manifest());
+        existing.extend(done.exists.clone());
         made.extend(done.made.iter().flat_map(OutputFile::files).cloned());
         done.tell(json.as_mut())
     };
@@ -208,6 +210,13 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         |done| followed.push(done?).into_iter().try_for_each(&mut tell),
     )?;
     followed.finish().try_for_each(&mut tell)?;
+    match existing.as_slice() {
+        [] => {}
+        [one] => note!("{one}"),
+        all => {
+            note!("skipped: {} are there already; --force replaces them", count(all.len() as u64, "session"))
+        }
+    }
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
@@ -328,6 +337,12 @@ struct Done {
     lacks: Soundness,
     skipped: bool,
     written: bool,
+    /// Session, messages and gaps of another program's recording.
+    counts: (Option<String>, u64, u64),
+    /// The original, if it is a copy.
+    copy_of: Option<String>,
+    /// A sentence: its outputs are there already.
+    exists: Option<String>,
     /// The files written.
     made: Vec<OutputFile>,
     /// Remarks on it.
@@ -338,20 +353,20 @@ impl Done {
     fn of(log: &LogPlace) -> Self {
         let (made, remarks) = (Vec::new(), Vec::new());
         let (name, lacks, outcome) = (log.name.clone(), Soundness::Whole, Outcome::Done);
-        Self { name, outcome, ending: None, lacks, skipped: false, written: false, made, remarks }
+        let (skipped, written, counts) = (false, false, (None, 0, 0));
+        let (ending, copy_of, exists) = (None, None, None);
+        Self { name, outcome, ending, lacks, skipped, written, counts, copy_of, exists, made, remarks }
     }
 
     /// Of a log that was read, with remarks on its losses.
     fn read(log: &LogPlace, summary: RecordingSummary, lacks: Soundness) -> Self {
-        let mut done = Self { lacks, written: true, ..Self::of(log) };
+        let frames = summary.messages.iter().map(|message| message.amount.count).sum::<u64>();
+        let counts = (None, frames + summary.other_messages.count, summary.gaps + summary.losses);
+        let mut done = Self { lacks, written: true, counts, ..Self::of(log) };
         done.ending = summary.ending.map(|ending| Ending { name: log.name.clone(), ..ending });
         if done.ending.is_none() && summary.gaps > 0 {
             done.outcome = Outcome::Losses;
             done.remarks.push(format!("{}: {}", log.name, damaged_places(summary.gaps)));
-        }
-        if done.ending.is_none() && summary.losses > 0 {
-            let places = count(summary.losses, "place");
-            done.remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
         }
         done
     }
@@ -360,10 +375,18 @@ impl Done {
         self.outcome = self.outcome.and(next.outcome);
         self.ending = next.ending.or_else(|| self.ending.take());
         self.written |= next.written;
+        self.counts = next.counts;
         self.lacks = self.lacks.max(next.lacks);
         self.made.extend(next.made);
         let new = next.remarks.into_iter().filter(|remark| !self.remarks.contains(remark));
         self.remarks.extend(new.collect::<Vec<_>>());
+    }
+
+    fn of_manifest(&self) -> ReadLog<'_> {
+        let ((session, frames, gaps), soundness) = (&self.counts, self.soundness());
+        let (copy_of, ending) = (self.copy_of.as_deref(), self.ending.as_ref());
+        let (name, session, frames, gaps) = (&self.name, session.as_deref(), *frames, *gaps);
+        ReadLog { name, session, frames, gaps, copy_of, soundness, ending, remarks: &self.remarks }
     }
 
     fn soundness(&self) -> Soundness {
@@ -379,7 +402,12 @@ impl Done {
         for remark in &self.remarks {
             note!("{remark}");
         }
-        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.faults()).collect::<Vec<_>>();
+        if let Some(of) = &self.copy_of {
+            note!("{}: is a copy of {of}, which is written once", self.name);
+        }
+        // A copy was named as one.
+        let aside = |ending: &Ending| ending.aside().filter(|_| self.copy_of.is_none());
+        let said = |ending: &Ending| aside(ending).into_iter().chain(ending.faults()).collect::<Vec<_>>();
         for why in self.ending.iter().flat_map(said) {
             note!("{}: {why}", self.name);
         }
@@ -387,7 +415,8 @@ impl Done {
             return self.made.iter().try_for_each(|made| output::line(&printable::word(&made.line())));
         };
         let whole = self.outcome() == Outcome::Done && !self.skipped;
-        json.logs.push(LogJson { name: self.name, whole, files: self.made });
+        let state = self.soundness().name();
+        json.logs.push(LogJson { name: self.name, state, whole, files: self.made });
         Ok(())
     }
 }
@@ -421,13 +450,19 @@ impl Task<'_> {
         let done = self.decode(work, all);
         // A job of a fleet may be repeated.
         let is_of_fleet = self.formats.about().all(|about| matches!(about.files, Files::Fleet(_)));
-        if self.logs == 1 && (!is_of_fleet || self.inputs.may_replace()) {
-            return done;
-        }
-        match or_skipped(done)? {
-            Ok(done) => Ok(done),
-            Err(why) => Ok(Done { skipped: true, ..unwritten(work.log, &format!("skipped: {why}"))? }),
-        }
+        let mut done = if self.logs == 1 && (!is_of_fleet || self.inputs.may_replace()) {
+            done?
+        } else {
+            match or_skipped(done)? {
+                Ok(done) => done,
+                Err(why) => {
+                    let exists = Some(format!("{}: skipped: {why}", work.log.name));
+                    Done { skipped: true, exists, ..unwritten(work.log)? }
+                }
+            }
+        };
+        done.counts.0 = Some(work.traits.identity());
+        Ok(done)
     }
 
     fn decode(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
@@ -435,10 +470,22 @@ impl Task<'_> {
         let name = match &work.named {
             Named::As(name, _) => name,
             Named::Copy(of) => {
-                let of = all.get(*of).map_or("another log", |work| &work.log.name);
-                return unwritten(log, &format!("is a copy of {of}, which is written once"));
+                let of = all.get(*of).map(|work| work.log.name.clone()).unwrap_or_default();
+                return Ok(Done { copy_of: Some(of.clone()), ..unwritten(log)? });
             }
         };
+        let remark = without_frames(work, &self.formats)?;
+        if remark.is_some() && self.formats.without_frames().is_empty() {
+            let remarks = remark.into_iter().collect();
+            return Ok(Done { skipped: true, remarks, ..Done::of(log) });
+        }
+        let mut done = self.decode_flights(work, name)?;
+        done.remarks.extend(remark);
+        Ok(done)
+    }
+
+    fn decode_flights(&self, work: &NamedLog<'_>, name: &str) -> Result<Done> {
+        let log = work.log;
         let flights = if self.formats.split { flights(log)? } else { Vec::new() };
         if flights.is_empty() {
             return self.decode_part(work, name, self.context(work)?);
@@ -475,7 +522,12 @@ impl Task<'_> {
         remarks.extend(not_checked.map(|why| format!("{}: {why}", log.name)));
         let (rows_left_out, lacks) = (writers.rows_left_out(), writers.lacks());
         let Finished { made, remarks: left_out } = writers.finish()?;
+        let losses = summary.losses;
         let read = Done::read(log, summary, lacks);
+        if read.ending.is_none() && losses > 0 {
+            let places = count(losses, "place");
+            remarks.push(format!("{}: {places} of loss or noise; hums check says what", log.name));
+        }
         remarks.extend(read.remarks);
         remarks.extend(left_out.into_iter().map(|words| format!("{}: {words}", log.name)));
         let outcome = read.outcome.and(Outcome::lossy(rows_left_out > 0));
@@ -485,7 +537,7 @@ impl Task<'_> {
 
     fn context(&self, work: &NamedLog<'_>) -> Result<Context> {
         let mut context = Context {
-            formats: self.formats.clone(),
+            formats: if work.is_native { self.formats.without_frames() } else { self.formats.clone() },
             selection: self.selection.clone(),
             inputs: self.inputs.clone(),
             offset_s: self.offset_s,
@@ -540,7 +592,7 @@ impl Task<'_> {
             Destination::new(self.output, name, self.logs, &self.formats)
         };
         let mut writers = Writers::new(context, &destination, self.output)?;
-        let formats = &self.formats;
+        let formats = &context.formats;
         let rows = match context.selection.names() {
             [] if formats.has_records() => Rows::All,
             [] => Rows::None,
@@ -583,12 +635,12 @@ fn flights(log: &LogPlace) -> Result<Vec<(Instant, Instant)>> {
 }
 
 /// A log whose files are there already. It is read for its losses, which count as if it was written.
-fn unwritten(log: &LogPlace, why: &str) -> Result<Done> {
-    let (want, mut gaps) = (Want { frames: true, ..Want::default() }, Gaps(Soundness::Whole));
+fn unwritten(log: &LogPlace) -> Result<Done> {
+    // As for its files: gaps show in messages of every kind.
+    let want = Want { frames: true, observations: true, ..Want::default() };
+    let mut gaps = Gaps(Soundness::Whole);
     let summary = log.in_parts(want, || Gaps(Soundness::Whole), &mut gaps)?;
-    let mut done = Done::read(log, summary, gaps.0);
-    done.remarks.insert(0, format!("{}: {why}", log.name));
-    Ok(done)
+    Ok(Done::read(log, summary, gaps.0))
 }
 
 /// Takes no items, and what a recording lacks by its gaps.

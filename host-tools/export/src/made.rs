@@ -19,6 +19,8 @@ pub struct MadeJson {
 pub struct LogJson {
     /// Its name.
     pub name: String,
+    /// `whole`, `repaired` (nothing is lost), `not_proved`, or `lacks` for a log with losses or damage.
+    pub state: &'static str,
     /// No loss, no damage, a proved end, and all requested outputs.
     pub whole: bool,
     /// Its files and folders.

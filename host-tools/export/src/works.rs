@@ -13,6 +13,8 @@ pub(super) struct NamedLog<'a> {
     pub(super) log: &'a LogPlace,
     pub(super) traits: Traits,
     pub(super) named: Named,
+    /// It has no MAVLink frames.
+    pub(super) is_native: bool,
 }
 
 pub(super) fn works<'a>(logs: &'a [LogPlace], sessions: &Sessions) -> Result<Vec<NamedLog<'a>>> {
@@ -28,29 +30,36 @@ pub(super) fn works<'a>(logs: &'a [LogPlace], sessions: &Sessions) -> Result<Vec
     )?;
     let logs: Vec<(&LogPlace, Traits)> = logs.iter().zip(traits).collect();
     let names = naming::names(&logs, sessions);
-    Ok(logs.into_iter().zip(names).map(|((log, traits), named)| NamedLog { log, traits, named }).collect())
+    let work = |((log, traits), named)| NamedLog { log, traits, named, is_native: false };
+    Ok(logs.into_iter().zip(names).map(work).collect())
 }
 
-/// Whether any of these has messages of its own instead of MAVLink's; an error if one cannot become the
-/// requested format.
-pub(super) fn check_forms(works: &[NamedLog<'_>], formats: &Formats) -> Result<bool> {
-    let mut native = false;
-    for place in works.iter().map(|work| work.log).filter(|place| place.own().is_none()) {
-        if place.is_standard() {
+/// Finds the logs that have messages of their own instead of MAVLink's; an error if no log can become a requested format.
+pub(super) fn check_forms(works: &mut [NamedLog<'_>], formats: &Formats) -> Result<()> {
+    let (mut of_frames, mut first) = (works.is_empty(), None);
+    for work in works {
+        if work.log.is_standard() {
             return Err(usage_error("-: a recording is read twice here; give a file"));
         }
-        let format = place.open()?.format;
-        if !format.is_of_link() {
-            native = true;
-            if let Some(about) = formats.about().find(|about| about.is_of_frames) {
-                return Err(usage_error(format!(
-                    "{}: is {}, which has no MAVLink frames for a {}; --format csv, jsonl or parquet has all of it",
-                    place.title,
-                    format.with_article(),
-                    about.name
-                )));
-            }
+        let foreign = work.log.own().is_none().then(|| work.log.open()).transpose()?;
+        work.is_native = foreign.is_some_and(|open| !open.format.is_of_link());
+        of_frames |= !work.is_native;
+        if work.is_native && first.is_none() {
+            first = without_frames(work, formats)?;
         }
     }
-    Ok(native)
+    first.filter(|_| !of_frames).map_or(Ok(()), |why| Err(usage_error(why)))
+}
+
+/// Why a log cannot become one of these formats.
+pub(super) fn without_frames(work: &NamedLog<'_>, formats: &Formats) -> Result<Option<String>> {
+    let Some(about) = formats.about().find(|about| work.is_native && about.is_of_frames) else {
+        return Ok(None);
+    };
+    Ok(Some(format!(
+        "{}: is {}, which has no MAVLink frames for a {}; --format csv, jsonl or parquet has all of it",
+        work.log.title,
+        work.log.open()?.format.with_article(),
+        about.name
+    )))
 }

@@ -218,7 +218,10 @@ fn cut(mut name: String) -> String {
 }
 
 /// Hash of all bytes of a recording, unpacked: a compressed copy is the same recording.
-fn fingerprint(path: &Path) -> Result<[u8; 16]> {
+///
+/// # Errors
+/// The file cannot be read.
+pub fn fingerprint(path: &Path) -> Result<[u8; 16]> {
     let digest =
         digest_of(Input::open(path)?).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(digest.first_chunk().copied().unwrap_or_default())

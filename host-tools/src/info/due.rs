@@ -18,7 +18,7 @@ use crate::output::{self, Schema};
 use crate::part::Limit;
 use crate::plural::count;
 use crate::printable::word;
-use crate::source::find::{FoundRecordings, find};
+use crate::source::find::{FoundRecordings, find_each};
 use crate::source::recording::LogPlace;
 use crate::summary::{ComponentLine, Overview};
 use crate::table::{Table, left};
@@ -29,7 +29,7 @@ const DAY_US: f64 = 86_400e6;
 
 /// Runs `hums due`.
 pub fn run(args: &cli::Due) -> Result<Outcome> {
-    let found = find(&args.inputs, false)?;
+    let found = find_each(&args.inputs, false)?;
     let mut logs = Vec::new();
     let read = each(&found, None, |log| {
         if log.ending.is_counted() {

@@ -38,6 +38,9 @@ pub(super) fn each(
     for remark in &found.remarks {
         note!("{remark}");
     }
+    for (_, error) in &found.failed {
+        note!("{error:#}");
+    }
     let mut outcome = Outcome::lossy(found.is_lossy());
     let mut followed = EndResolver::new(sessions_of(&found.places));
     let mut done = |overview: &Overview| {
@@ -47,7 +50,8 @@ pub(super) fn each(
         outcome = outcome.and(Outcome::lossy(!overview.is_sound()));
         show(overview)
     };
-    let (mut failed, is_one) = (0, places.len() == 1);
+    let inputs_failed = found.failed.len();
+    let (mut failed, is_one) = (inputs_failed as u64, places.len() + inputs_failed == 1);
     side_by_side(places, check::overview, |overview| match overview {
         Ok(overview) => followed.push(overview).iter().try_for_each(&mut done),
         Err(error) if is_one => Err(error),
@@ -58,5 +62,5 @@ pub(super) fn each(
         }
     })?;
     followed.finish().try_for_each(|overview| done(&overview))?;
-    Ok(Read { outcome, failed, all: places.len() })
+    Ok(Read { outcome, failed, all: places.len() + inputs_failed })
 }

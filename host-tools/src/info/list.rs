@@ -17,7 +17,7 @@ use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, JsonList, Schema};
 use crate::printable::word;
-use crate::source::find::find;
+use crate::source::find::find_each;
 use crate::source::recording::Format;
 use crate::summary::{BOX_COUNTS, Overview};
 use crate::table::{Table, left, right};
@@ -28,7 +28,7 @@ use hums_analysis::order::{self, LogTime};
 const SCHEMA: Schema = Schema::first("hums-info-list");
 
 pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
-    let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
+    let found = find_each(&args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
     let mut list =
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
@@ -55,7 +55,7 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
     }
     if let Some(list) = list {
         list.end()?;
-    } else if found.places.is_empty() {
+    } else if found.places.is_empty() && found.failed.is_empty() {
         output::line("no log is on it")?;
     } else if box_counts {
         output::line(BOX_COUNTS)?;
@@ -96,6 +96,8 @@ struct LogJson {
     lossy: bool,
     /// Recorded bytes, without reserved room on the card.
     bytes: u64,
+    /// `whole`, `repaired` (nothing is lost), `not_proved`, or `lacks` for a log with losses or damage.
+    state: &'static str,
     /// No loss, no damage, and a proved end.
     whole: bool,
 }
@@ -127,6 +129,7 @@ impl LogJson {
             ends_in_air: log.contents.ends_in_air.is_some(),
             lossy: log.contents.is_lossy,
             bytes: bytes(log),
+            state: log.soundness().name(),
             whole: log.is_sound(),
         }
     }

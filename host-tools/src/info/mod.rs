@@ -14,7 +14,7 @@ use crate::cli;
 use crate::files::Inputs;
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, JsonList, Schema};
-use crate::source::find::find;
+use crate::source::find::find_each;
 use crate::verify;
 use each::each;
 use hums_analysis::log_json::{LogJson, images_json};
@@ -36,7 +36,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     if args.list {
         return list::run(args);
     }
-    let found = find(&args.inputs, args.salvage)?.of_system(args.system)?;
+    let found = find_each(&args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = args.session.as_deref().map(|name| found.session(name)).transpose()?;
     let mut list =
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
@@ -52,7 +52,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     })?;
     if let Some(list) = list {
         list.end()?;
-    } else if found.places.is_empty() {
+    } else if found.places.is_empty() && found.failed.is_empty() {
         output::line("no log is on it")?;
     }
     outcome.end()

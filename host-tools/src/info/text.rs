@@ -20,7 +20,7 @@ use crate::names::{check_kind, check_name};
 use crate::part;
 use crate::plural::count;
 use crate::printable::{path, word};
-use crate::source::item::MessageCount;
+use crate::source::item::{self, MessageCount};
 use crate::source::told::Finding;
 use crate::states::{Shown, Values, quantity, shown};
 use crate::summary::{LISTED_MAX, Overview};
@@ -300,17 +300,18 @@ fn gaps_text(text: &mut String, log: &Overview) {
 
 fn foreign_gaps(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
-    for (gap, (place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
+    for (gap, (cause, place, found)) in contents.gaps.iter().zip(&contents.gap_words).take(SHOWN_MAX) {
         let when = match (gap.from, gap.to) {
             (Some(from), Some(to)) => format!("from {} to {}", moment(from), moment(to)),
             (Some(from), None) => format!("at {}", moment(from)),
             (None, _) => "at the beginning".to_owned(),
         };
         let place = place.map_or_else(String::new, |place| format!("byte {place}: "));
-        let what = match gap.cause {
-            Cause::Missing => "lost: ",
-            Cause::Disarmed => "",
-            _ => "damaged or cut short: ",
+        let what = match cause {
+            item::Cause::Lost | item::Cause::Silent => "lost: ",
+            item::Cause::NotKept | item::Cause::NoTimes => "",
+            item::Cause::Cut => "cut off by the end of the log: ",
+            _ => "damaged: ",
         };
         let _ = writeln!(text, "    {when}: {what}{place}{}", word(found));
     }

@@ -131,6 +131,12 @@ fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_n
         fs::create_dir_all(dir.path().join(folder)).expect("a folder");
         fs::copy(flight(name), dir.path().join(folder).join(name)).expect("a copy");
     }
+    // Equal bytes are one flight.
+    let blue = dir.path().join("blue/ap_quad_guided.tlog");
+    let whole = fs::read(&blue).expect("a recording");
+    let last = records(&whole).last().map_or(0, |(_, frame)| 8 + frame.len());
+    fs::write(&blue, &whole[..whole.len() - last]).expect("written");
+    fs::copy(&blue, dir.path().join("blue/again.tlog")).expect("a copy");
     let vehicles = |line: &str| {
         let told = json(&run(dir.path(), line, 0));
         let vehicles = told["vehicles"].as_array().expect("a list").clone();
@@ -157,6 +163,18 @@ fn logs_without_an_id_are_of_the_vehicle_of_their_folder_or_of_the_one_that_is_n
     let named = vehicles("due . --json --vehicle mine");
     let [(name, 3, all_s)] = named.as_slice() else { panic!("{named:?}") };
     assert!(name == "mine" && (all_s - blue_s - red_s).abs() < 1e-6, "{named:?}");
+    let listed = json(&run(dir.path(), "info --list . --json", 0));
+    assert_eq!(listed["logs"].as_array().map(Vec::len), Some(3), "{listed}");
+    let checked = text(&run(dir.path(), "check .", 4));
+    assert!(checked.contains("3 logs checked"), "{checked}");
+    fs::create_dir(dir.path().join("empty")).expect("a folder");
+    for input in ["empty", "nothere.tlog"] {
+        for command in ["due", "check", "info --list"] {
+            let said = run(dir.path(), &format!("{command} red {input} blue"), 1);
+            let told = String::from_utf8_lossy(&said.stderr).into_owned();
+            assert!(!text(&said).is_empty() && told.contains(&format!("{input}: ")), "{command}: {told}");
+        }
+    }
 }
 
 #[test]
@@ -197,4 +215,8 @@ fn a_manifest_says_what_a_damaged_recording_lacks() {
     let lacks = |log: usize| made["logs"][log]["lacks"].as_str().expect("words");
     assert!(!lacks(0).is_empty() && listed.contains(lacks(0)), "{made} {listed}");
     assert_eq!((lacks(1), &made["inputs"][0]["file"]), ("", &"logs/noisy.tlog".into()));
+    let log = &made["logs"][1];
+    let session = log["session"].as_str().is_some_and(|session| session.starts_with('r'));
+    assert!(session && log["frames"].as_u64() > Some(50_000) && log["gaps"] == 0, "{log}");
+    assert!(made["logs"][0]["gaps"].as_u64() > Some(0), "{made}");
 }

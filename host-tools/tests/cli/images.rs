@@ -130,6 +130,7 @@ fn an_image_that_was_cut_short_is_told_as_that() {
     let words = format!("the image is cut short: it has {half} bytes, and its partition ends at byte ");
     for (command, code, said) in readers(dir.path(), "card.img") {
         assert!(code == 3 && said.contains(&words), "{command}: {said}");
+        assert!(!said.contains("the card was pulled"), "{command}: {said}");
         assert!(!said.contains("larger than its partition"), "{command}: {said}");
     }
 }
@@ -145,6 +146,14 @@ fn a_damaged_image_in_a_folder_is_read_as_where_it_is_named() {
     for (command, code, said) in readers(dir.path(), "cards") {
         assert!(code == 3 && !said.contains("no log"), "{command}: {said}");
     }
+    let said = text(&run(dir.path(), "info --verify cards", 3));
+    assert!(said.ends_with(": all that was found holds; the file system is damaged\n"), "{said}");
+    run(dir.path(), "info --verify cards --manifest made.json", 3);
+    let made = fs::read(dir.path().join("made.json")).expect("a manifest");
+    let made: serde_json::Value = serde_json::from_slice(&made).expect("JSON");
+    let card = &made["images"][0];
+    assert_eq!((&card["path"], &card["found_by_scan"]), (&"cards/card.img".into(), &true.into()), "{made}");
+    assert!(card["damage"].as_array().is_some_and(|damage| !damage.is_empty()), "{made}");
     fs::write(cards.join("card.img"), &image[..300]).expect("written");
     fs::write(cards.join("notes.xyz"), "notes").expect("written");
     fs::copy(px4(), cards.join("flight.tlog")).expect("copied");

@@ -74,6 +74,20 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         let (from, to) = (checked["from_s"].as_f64(), checked["to_s"].as_f64());
         assert!(to.zip(from).is_some_and(|(to, from)| to - from > 60.0), "{name}: {checked}");
         let said = text(&run(dir.path(), &format!("check {name}"), 4));
+        let is_crash = said.contains(": crashed at 1:14.1 (impact 27.73 g); first roll does not follow");
+        assert_eq!(is_crash, name == "flight.ulg", "{said}");
         assert!(said.contains(&place(gap).to_string()), "{name}: its place is for people too: {said}");
+    }
+    fs::copy(labelled("f12_gps_jump.tlog.gz"), dir.path().join("flight.tlog.gz")).expect("a copy");
+    let decode =
+        |format: &str| text(&run(dir.path(), &format!("decode . -o out --format {format} --force"), 3));
+    assert!(decode("tlog").contains(".tlog: "));
+    assert!(decode("tlog,csv").contains("flight.bin-"));
+    run(dir.path(), "decode flight.bin flight.ulg -o out --format tlog", 2);
+    fs::copy(labelled("bin/f12_gps_jump.bin.gz"), dir.path().join("whole.bin.gz")).expect("a copy");
+    for _ in 0..2 {
+        let said = run(dir.path(), "decode whole.bin.gz -o again --format parquet", 0).stderr;
+        let said = String::from_utf8_lossy(&said).into_owned();
+        assert!(!said.contains("of loss"), "a skipped log has what it had: {said}");
     }
 }

@@ -28,6 +28,8 @@ struct LogJson<'a> {
     /// `ok`, `warning`, `critical`; `too_little`: no finding, and fewer than one check in ten had data; `unknown`: no autopilot,
     /// or no times.
     verdict: &'static str,
+    /// `whole`, `repaired` (nothing is lost), `not_proved`, or `lacks` for a log with losses or damage.
+    state: &'static str,
     damaged: bool,
     /// Sentences: why a log of HUMS is not proved complete, and sectors rebuilt from parity.
     not_proved: Vec<String>,
@@ -180,6 +182,7 @@ pub fn line(checked: &Checked) -> serde_json::Result<String> {
         log: &checked.name,
         format: checked.format.name(),
         verdict: judged.verdict(),
+        state: checked.soundness().name(),
         damaged: judged.damages > 0,
         not_proved: checked.faults(),
         judged_by: match judged.by {

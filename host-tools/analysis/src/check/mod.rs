@@ -38,7 +38,7 @@ use crate::outcome::{Outcome, Usage};
 use crate::output;
 use crate::params;
 use crate::progress;
-use crate::source::find::{FoundRecordings, find, sessions_of};
+use crate::source::find::{find_each, sessions_of};
 use crate::source::recording::{Format, LogPlace};
 use checked::Checked;
 use judge::{Heard, Limits};
@@ -82,12 +82,19 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
 /// `show` gets each log before it is printed.
 pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<()>) -> Result<Outcome> {
     let past = Past::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
-    let (found, mut failed) = logs(args)?;
-    let found = found.of_system(args.system)?;
+    let found = find_each(args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = found.name_of(args.session)?;
     found.tell();
+    let mut failed = found.failed.len();
+    for (input, error) in &found.failed {
+        if args.json {
+            output::json_line(&json::error(&input.display().to_string(), error))?;
+        } else {
+            note!("{error:#}");
+        }
+    }
     let mut outcome = Outcome::lossy(found.is_lossy());
-    let many = found.places.len() > 1 && wanted.is_none();
+    let many = found.places.len() + failed > 1 && wanted.is_none();
     let (bar, mut table) = (progress::logs(found.places.len()), Table::default());
     let mut followed = EndResolver::new(sessions_of(&found.places));
     // The next log shows how this one ends.
@@ -175,27 +182,6 @@ pub fn by_vehicle(place: &LogPlace) -> Vec<LogPlace> {
     let read = read.and_then(Result::ok);
     let all = read.map(|read| vehicles(place, read.format, &read.judged)).unwrap_or_default();
     if all.is_empty() { vec![place.clone()] } else { all }
-}
-
-fn logs(args: &Request<'_>) -> Result<(FoundRecordings, usize)> {
-    let error = match find(args.inputs, args.salvage) {
-        Ok(found) => return Ok((found, 0)),
-        Err(error) => error,
-    };
-    // Would look like an input's object.
-    if !args.json || error.is::<Usage>() {
-        return Err(error);
-    }
-    let (mut good, mut bad) = (Vec::new(), Vec::new());
-    for input in args.inputs {
-        match find(std::slice::from_ref(input), args.salvage) {
-            Ok(_) => good.push(input.clone()),
-            Err(error) if error.is::<Usage>() => return Err(error),
-            Err(error) => bad.push(json::error(&input.display().to_string(), &error)),
-        }
-    }
-    bad.iter().try_for_each(|error| output::json_line(error))?;
-    Ok((find(&good, args.salvage)?, args.inputs.len() - good.len()))
 }
 
 struct Told {

@@ -152,7 +152,7 @@ fn read_other(place: &LogPlace, take: Option<&mut Take<'_>>) -> Result<(Overview
         other_messages: summary.other_messages,
         epoch_us: judged.epochs.whole(),
         gaps: judged.gaps.iter().map(Gap::to_own).collect(),
-        gap_words: judged.gaps.iter().map(|gap| (gap.place, gap.words.clone())).collect(),
+        gap_words: judged.gaps.iter().map(|gap| (gap.cause, gap.place, gap.words.clone())).collect(),
         ..Contents::default()
     };
     let (first, last) = judged.span.unzip();

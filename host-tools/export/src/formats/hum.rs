@@ -26,6 +26,7 @@ use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
 use crate::{DecodeRequest, SCHEMA};
+use hums_analysis::soundness::Soundness;
 
 /// Where UTC came from: the recording's own times (see `hums_blackbox::record::Clock`).
 const FROM_RECORDING: u8 = 2;
@@ -103,7 +104,8 @@ fn run(args: &DecodeRequest) -> Result<Outcome> {
     let whole = source.damages() == 0 && done.wrong_checksums.is_none();
     let made = OutputFile::of(path, "hum", &[(done.frames, "frame"), (done.log_bytes, "byte")]);
     if args.json {
-        let logs = vec![LogJson { name, whole, files: vec![made] }];
+        let state = if whole { Soundness::Whole } else { Soundness::Damaged }.name();
+        let logs = vec![LogJson { name, state, whole, files: vec![made] }];
         output::json(SCHEMA, &MadeJson { logs })?;
     } else {
         output::line(&printable::word(&made.line()))?;

@@ -22,6 +22,7 @@ pub(super) struct Tlog {
     /// Gaps of a tlog that is not a file and so has no table beside it.
     gaps_left_out: u64,
     texts: Option<Texts>,
+    texts_count: u64,
 }
 
 #[derive(Default)]
@@ -59,12 +60,10 @@ impl Writer for Tlog {
     type Encoder = Records;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
-        let tlog = Self {
-            file: Single::open(context, path)?,
-            gaps: None,
-            gaps_left_out: 0,
-            texts: Texts::of(context),
-        };
+        let texts = Texts::of(context);
+        let texts_count = texts.as_ref().map_or(0, Texts::count);
+        let tlog =
+            Self { file: Single::open(context, path)?, gaps: None, gaps_left_out: 0, texts, texts_count };
         if let Some(path) = tlog.gaps_path() {
             Output::check(&path, &context.inputs)?;
         }
@@ -129,7 +128,9 @@ impl Writer for Tlog {
             self.file.write(&texts.rest())?;
         }
         let gaps = self.gaps.map(Single::finish).transpose()?;
-        finished.made.push(OutputFile::of(self.file.finish()?, "tlog", &[(totals.frames, "frame")]));
+        let (frames, findings) = ((totals.frames, "frame"), (self.texts_count, "finding"));
+        let counts: &[_] = if self.texts_count > 0 { &[frames, findings] } else { &[frames] };
+        finished.made.push(OutputFile::of(self.file.finish()?, "tlog", counts));
         finished.made.extend(gaps.map(|path| OutputFile::with_words(path, "gaps", "gaps".to_owned())));
         Ok(finished)
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::Read as _;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::mem;
 use std::path::{Path, PathBuf};
 
@@ -10,12 +10,14 @@ use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::format::{KNOWN, begins_recording, detect, format_of, hint, is_recording, start_of};
 use super::recording::{LogPlace, of_one_vehicle};
+use crate::archive::GZIP;
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::{make_unique, name_after};
 use crate::logs::sessions::{Sessions, first_session};
 use crate::logs::{self, Content, segment_name};
-use crate::outcome::usage;
+use crate::naming::fingerprint;
+use crate::outcome::{Usage, usage};
 use crate::plural::count;
 use crate::printable;
 
@@ -38,6 +40,8 @@ pub struct FoundRecordings {
     pub remarks: Vec<String>,
     /// Logs beyond the limit, or files named like a recording without one.
     pub is_cut: bool,
+    /// Inputs without a recording, each with its error.
+    pub failed: Vec<(PathBuf, anyhow::Error)>,
     seen: BTreeSet<FileId>,
 }
 
@@ -91,6 +95,96 @@ impl FoundRecordings {
             }
         }
         self.seen.extend(inside.into_keys());
+    }
+
+    /// One of so many inputs. `segments` are those named one by one, which are read together.
+    fn add_input(
+        &mut self,
+        input: &Path,
+        of: usize,
+        segments: &mut Vec<PathBuf>,
+        salvage: bool,
+    ) -> Result<()> {
+        if input == Path::new("-") {
+            if self.places.iter().any(LogPlace::is_standard) {
+                return Err(usage("-: standard input is named twice, and can be read once only"));
+            }
+            self.places.push(LogPlace::standard());
+            return Ok(());
+        }
+        let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
+        let before = self.places.len();
+        check_seekable(input, &about)?;
+        // As the shell names it.
+        if let Some(why) = why_unread(input).filter(|_| about.is_dir() && of > 1) {
+            self.remarks.push(format!("{}: {why}", input.display()));
+            return Ok(());
+        }
+        if about.is_dir() {
+            let own = logs::find::find_in(input, salvage)?;
+            let mut walk = Walk::of(input, &own)?;
+            self.add_own(input, own);
+            self.places.extend(walk.paths.iter().map(|path| LogPlace::file(path)));
+            self.drop_made();
+            self.is_cut |= walk.left_out > 0;
+            self.remarks.extend(walk.left_out_words(input));
+            self.is_cut |= walk.unknown > 0;
+            self.remarks.append(&mut walk.remarks);
+            if self.places.len() == before {
+                let passed_over = walk.hinted.iter();
+                let remarks: Vec<String> =
+                    self.remarks.iter().chain(passed_over).map(|remark| format!("\n  {remark}")).collect();
+                bail!("{}: no log and no recording is in there{}", input.display(), remarks.concat());
+            }
+            self.remarks.extend(walk.passed_over_words(input));
+        } else if is_own(input)? {
+            // As in a folder.
+            let together =
+                if segment_name(input).is_none() { vec![input.to_owned()] } else { mem::take(segments) };
+            if together.is_empty() {
+                return Ok(());
+            }
+            let own = logs::find(&together, salvage).map_err(|error| not_known(input, error))?;
+            self.add_own(input, own);
+        } else {
+            self.places.push(LogPlace::file(input));
+        }
+        self.drop_repeats(before);
+        if of > 1 && segment_name(input).is_none() {
+            let own = self.places.iter_mut().skip(before).filter(|place| place.own().is_some());
+            name_after(input, own.map(|place| &mut place.name));
+        }
+        Ok(())
+    }
+
+    /// Recordings of equal bytes: a flight counts once. The same for `hums decode`, which names outputs by these bytes.
+    fn drop_copies(&mut self) {
+        let mut by_length: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for (index, path) in self.places.iter().enumerate().filter_map(|(n, place)| Some((n, place.path()?)))
+        {
+            by_length.entry(unpacked_length(path).unwrap_or_default()).or_default().push(index);
+        }
+        let mut copies: BTreeMap<usize, usize> = BTreeMap::new();
+        for alike in by_length.into_values().filter(|alike| alike.len() > 1) {
+            let mut known: BTreeMap<[u8; 16], usize> = BTreeMap::new();
+            for index in alike {
+                let path = self.places.get(index).and_then(LogPlace::path);
+                // An unreadable file is reported when it is read.
+                let Some(bytes) = path.and_then(|path| fingerprint(path).ok()) else { continue };
+                let first = *known.entry(bytes).or_insert(index);
+                if first != index {
+                    copies.insert(index, first);
+                }
+            }
+        }
+        let title = |index: usize| self.places.get(index).map_or("", |place| place.title.as_str());
+        let words = |(copy, of): (&usize, &usize)| {
+            format!("{}: is a copy of {}, which is read once", title(*copy), title(*of))
+        };
+        let remarks: Vec<String> = copies.iter().map(words).take(REMARKS_MAX).collect();
+        self.remarks.extend(remarks);
+        let mut index = 0..;
+        self.places.retain(|_| index.next().is_none_or(|index| !copies.contains_key(&index)));
     }
 
     /// Made by `hums decode` from another input: a flight counts once.
@@ -174,60 +268,24 @@ impl FoundRecordings {
 
 /// Files, folders, cards, images, `-`. Named inputs must be recordings; others in a folder are passed over.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
+    let mut found = find_each(inputs, salvage)?;
+    found.failed.pop().map_or(Ok(found), |(_, error)| Err(error))
+}
+
+/// As [`find`], but one of several inputs without a recording keeps no other from being read.
+pub fn find_each(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
     let mut found = FoundRecordings::default();
     let is_segment = |input: &&PathBuf| segment_name(input).is_some() && is_own(input).unwrap_or(false);
     let mut segments: Vec<PathBuf> = inputs.iter().filter(is_segment).cloned().collect();
     for input in inputs {
-        if input == Path::new("-") {
-            if found.places.iter().any(LogPlace::is_standard) {
-                return Err(usage("-: standard input is named twice, and can be read once only"));
+        match found.add_input(input, inputs.len(), &mut segments, salvage) {
+            Err(error) if inputs.len() > 1 && !error.is::<Usage>() => {
+                found.failed.push((input.clone(), error))
             }
-            found.places.push(LogPlace::standard());
-            continue;
-        }
-        let about = fs::metadata(input).with_context(|| format!("{}: cannot be read", input.display()))?;
-        let before = found.places.len();
-        check_seekable(input, &about)?;
-        // As the shell names it.
-        if let Some(why) = why_unread(input).filter(|_| about.is_dir() && inputs.len() > 1) {
-            found.remarks.push(format!("{}: {why}", input.display()));
-            continue;
-        }
-        if about.is_dir() {
-            let own = logs::find::find_in(input, salvage)?;
-            let mut walk = Walk::of(input, &own)?;
-            found.add_own(input, own);
-            found.places.extend(walk.paths.iter().map(|path| LogPlace::file(path)));
-            found.drop_made();
-            found.is_cut |= walk.left_out > 0;
-            found.remarks.extend(walk.left_out_words(input));
-            found.is_cut |= walk.unknown > 0;
-            found.remarks.append(&mut walk.remarks);
-            if found.places.len() == before {
-                let passed_over = walk.hinted.iter();
-                let remarks: Vec<String> =
-                    found.remarks.iter().chain(passed_over).map(|remark| format!("\n  {remark}")).collect();
-                bail!("{}: no log and no recording is in there{}", input.display(), remarks.concat());
-            }
-            found.remarks.extend(walk.passed_over_words(input));
-        } else if is_own(input)? {
-            // As in a folder.
-            let together =
-                if segment_name(input).is_none() { vec![input.clone()] } else { mem::take(&mut segments) };
-            if together.is_empty() {
-                continue;
-            }
-            let own = logs::find(&together, salvage).map_err(|error| not_known(input, error))?;
-            found.add_own(input, own);
-        } else {
-            found.places.push(LogPlace::file(input));
-        }
-        found.drop_repeats(before);
-        if inputs.len() > 1 && segment_name(input).is_none() {
-            let own = found.places.iter_mut().skip(before).filter(|place| place.own().is_some());
-            name_after(input, own.map(|place| &mut place.name));
+            added => added?,
         }
     }
+    found.drop_copies();
     make_unique(found.places.iter_mut().map(|place| &mut place.name));
     Ok(found)
 }
@@ -274,6 +332,19 @@ fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
     let mut start = Vec::new();
     fs::File::open(content).and_then(|file| file.take(bytes as u64).read_to_end(&mut start)).ok()?;
     Some(start)
+}
+
+/// Bytes of a recording, modulo 2^32 for a compressed one (RFC 1952, ISIZE of its last member).
+fn unpacked_length(path: &Path) -> Result<u64> {
+    let mut file = fs::File::open(path)?;
+    let length = file.metadata()?.len();
+    if !start_of_bytes(path, GZIP.len()).is_some_and(|start| start == GZIP) {
+        return Ok(length % (1 << 32));
+    }
+    let mut isize = [0; 4];
+    file.seek(SeekFrom::End(-4))?;
+    file.read_exact(&mut isize)?;
+    Ok(u32::from_le_bytes(isize).into())
 }
 
 /// Names an input that is another kind of recording.
@@ -421,10 +492,11 @@ fn is_named_as_recording(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write as _;
+
     use hums_blackbox::{SECTOR_BYTES, Sector};
 
     use super::*;
-    use crate::archive::GZIP;
     use crate::source::recording::tests::dataflash;
 
     #[test]
@@ -484,5 +556,13 @@ mod tests {
         let found = find(&[dir.path().to_owned()], false).expect("a log");
         assert_eq!(found.places.len(), 1);
         assert!(found.remarks.iter().any(|remark| remark.contains("read once")), "{:?}", found.remarks);
+        fs::copy(dir.path().join("a.bin"), dir.path().join("c.bin")).expect("a copy");
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(&fs::read(dir.path().join("a.bin")).expect("there")).expect("packed");
+        fs::write(dir.path().join("d.bin.gz"), gzip.finish().expect("packed")).expect("room");
+        let found = find(&[dir.path().to_owned()], false).expect("a log");
+        assert_eq!(found.places.len(), 1);
+        let copies = found.remarks.iter().filter(|remark| remark.contains("is a copy of")).count();
+        assert_eq!(copies, 2, "{:?}", found.remarks);
     }
 }
