@@ -45,7 +45,7 @@ const OBJECTS: &str = "\
 `hums-card-reader` 1; CardReaderJson; src/talk/card_reader.rs; Of `hums box card-reader`.
 `hums-box-update` 1; UpdateJson; src/talk/update.rs; Of `hums box update`.
 `hums-format` 1; FormattedJson; src/talk/format.rs; Of `hums box format-card`.
-`hums-setup` 1; SetupJson; src/talk/setup.rs; Of `hums box setup`.
+`hums-setup` 1; SetupJson; src/talk/setup/mod.rs src/talk/setup/settings.rs; Of `hums box setup`.
 `hums-box-report` 1; ReportJson; src/talk/report.rs; The file of `hums box report`.
 `hums-live` 1; PagesJson; src/live/mod.rs; Of `hums live`, at its start.
 ";

@@ -70,7 +70,7 @@ use findings::Findings;
 use fleet::Fleet;
 use fleet::bucket::Bucket;
 use followed::{EndResolver, HasEnding};
-use format::{Files, Finished, FormatDetails, Way};
+use format::{Files, Finished, Way};
 use formats::FORMATS;
 use formats::influx::Tags;
 use identity::identity;
@@ -405,9 +405,7 @@ impl Done {
         if let Some(of) = &self.copy_of {
             note!("{}: is a copy of {of}, which is written once", self.name);
         }
-        // A copy was named as one.
-        let aside = |ending: &Ending| ending.aside().filter(|_| self.copy_of.is_none());
-        let said = |ending: &Ending| aside(ending).into_iter().chain(ending.faults()).collect::<Vec<_>>();
+        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.faults()).collect::<Vec<_>>();
         for why in self.ending.iter().flat_map(said) {
             note!("{}: {why}", self.name);
         }

@@ -37,7 +37,6 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
         }
         Ok(())
     })?;
-    let outcome = read.end()?;
     let mut vehicles: BTreeMap<String, Vehicle> = BTreeMap::new();
     for (time, (name, log)) in order::sort(logs) {
         let vehicle = vehicles.entry(name.clone()).or_insert_with(|| Vehicle { name, ..Vehicle::default() });
@@ -50,7 +49,7 @@ pub fn run(args: &cli::Due) -> Result<Outcome> {
     } else {
         vehicles.iter().try_for_each(|vehicle| output::line(text(vehicle).trim_end()))?;
     }
-    Ok(outcome.and(if is_due { Outcome::Findings } else { Outcome::Done }))
+    Ok(read.end()?.and(if is_due { Outcome::Findings } else { Outcome::Done }))
 }
 
 fn vehicle(log: &Overview, found: &FoundRecordings, given: Option<&str>) -> String {

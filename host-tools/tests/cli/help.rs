@@ -12,7 +12,7 @@ use hums::cli::Cli;
 use tempfile::TempDir;
 
 use super::inputs::leaves;
-use super::support::{hums, px4, run, text};
+use super::support::{flight, hums, px4, run, text};
 
 /// The commands that run until Ctrl-C; they work if they print the address of their page.
 const SERVES: &str = "live";
@@ -100,9 +100,10 @@ fn furnished() -> TempDir {
     run(dir.path(), "decode --format ulog flight.tlog -o flight.ulg", 0);
     run(dir.path(), "decode --format parquet flight.tlog -o fleet", 0);
     fs::create_dir_all(path("flights/may")).expect("a directory");
-    for copy in ["flights/may/flight.tlog", "flights/june.bin", "before.tlog", "after.tlog"] {
+    for copy in ["flights/may/flight.tlog", "flights/june.bin", "before.tlog"] {
         fs::copy(px4(), path(copy)).expect("a copy");
     }
+    fs::copy(flight("ap_quad_guided.tlog"), path("after.tlog")).expect("a copy");
     dir
 }
 

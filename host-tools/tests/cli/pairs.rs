@@ -79,14 +79,16 @@ fn a_damaged_log_of_an_autopilot_is_read_around_the_damage_which_is_told_with_it
         assert!(said.contains(&place(gap).to_string()), "{name}: its place is for people too: {said}");
     }
     fs::copy(labelled("f12_gps_jump.tlog.gz"), dir.path().join("flight.tlog.gz")).expect("a copy");
-    let decode =
-        |format: &str| text(&run(dir.path(), &format!("decode . -o out --format {format} --force"), 3));
-    assert!(decode("tlog").contains(".tlog: "));
-    assert!(decode("tlog,csv").contains("flight.bin-"));
+    let decode = |format: &str, code| {
+        text(&run(dir.path(), &format!("decode . -o out --format {format} --force"), code))
+    };
+    assert!(decode("tlog", 0).contains(".tlog: "));
+    assert!(decode("tlog,csv", 3).contains("flight.bin-"));
     run(dir.path(), "decode flight.bin flight.ulg -o out --format tlog", 2);
     fs::copy(labelled("bin/f12_gps_jump.bin.gz"), dir.path().join("whole.bin.gz")).expect("a copy");
+    fs::copy(labelled("f12_gps_jump.tlog.gz"), dir.path().join("other.tlog.gz")).expect("a copy");
     for _ in 0..2 {
-        let said = run(dir.path(), "decode whole.bin.gz -o again --format parquet", 0).stderr;
+        let said = run(dir.path(), "decode whole.bin.gz other.tlog.gz -o again --format parquet", 0).stderr;
         let said = String::from_utf8_lossy(&said).into_owned();
         assert!(!said.contains("of loss"), "a skipped log has what it had: {said}");
     }
