@@ -42,15 +42,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         note!("{remark}");
     }
     let mut ok = !found.is_cut();
-    let mut all = Totals {
-        logs: 0,
-        worst: Verdict::Holds,
-        soundness: Soundness::Whole,
-        made_again: 0,
-        unprotected: 0,
-        without_earlier: None,
-        is_card_damaged: false,
-    };
+    let mut all = Totals::none();
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
         for words in words {
@@ -127,6 +119,18 @@ struct Totals {
 }
 
 impl Totals {
+    const fn none() -> Self {
+        Self {
+            logs: 0,
+            worst: Verdict::Holds,
+            soundness: Soundness::Whole,
+            made_again: 0,
+            unprotected: 0,
+            without_earlier: None,
+            is_card_damaged: false,
+        }
+    }
+
     fn add(&mut self, overview: &Overview, verdict: Verdict) {
         let ending = &overview.ending;
         self.worst = self.worst.max(verdict);

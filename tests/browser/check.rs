@@ -541,7 +541,7 @@ fn a_program_that_stops_by_itself_or_lacks_memory_ends_with_a_sentence() {
     assert!(why.contains("the program stopped") && why.contains("unreachable"), "{why}");
     let why = page.reason(NO_MEMORY);
     assert!(why.contains("the memory of this page does not suffice"), "{why}");
-    let hex = |words: &str| words.bytes().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let hex = |words: &str| words.bytes().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat();
     let [memory, panic] =
         ["memory allocation of 9 bytes failed", "thread 'main' panicked at a.rs:1:2:"].map(hex);
     let why = page.reason(&NO_MEMORY.replace(&memory, &panic));

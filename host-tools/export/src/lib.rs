@@ -210,13 +210,7 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         |done| followed.push(done?).into_iter().try_for_each(&mut tell),
     )?;
     followed.finish().try_for_each(&mut tell)?;
-    match existing.as_slice() {
-        [] => {}
-        [one] => note!("{one}"),
-        all => {
-            note!("skipped: {} are there already; --force replaces them", count(all.len() as u64, "session"))
-        }
-    }
+    tell_existing(&existing);
     json.map_or(Ok(()), |json| output::json(SCHEMA, &json))?;
     if let Some(to) = &args.manifest {
         let read: BTreeSet<PathBuf> = found.paths().map(Path::to_owned).collect();
@@ -229,6 +223,17 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         bail!("no data match the selection, so nothing was written");
     }
     Ok(outcome)
+}
+
+fn tell_existing(existing: &[String]) {
+    match existing {
+        [] => {}
+        [one] => note!("{one}"),
+        all => {
+            let sessions = count(all.len() as u64, "session");
+            note!("skipped: {sessions} are there already; --force replaces them");
+        }
+    }
 }
 
 fn check_request(args: &DecodeRequest) -> Result<()> {

@@ -311,7 +311,7 @@ fn foreign_gaps(text: &mut String, log: &Overview) {
             item::Cause::Lost | item::Cause::Silent => "lost: ",
             item::Cause::NotKept | item::Cause::NoTimes => "",
             item::Cause::Cut => "cut off by the end of the log: ",
-            _ => "damaged: ",
+            item::Cause::Damaged => "damaged: ",
         };
         let _ = writeln!(text, "    {when}: {what}{place}{}", word(found));
     }

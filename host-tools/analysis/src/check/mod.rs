@@ -86,12 +86,15 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     let wanted = found.name_of(args.session)?;
     found.tell();
     let mut failed = found.failed.len();
-    for (input, error) in &found.failed {
+    let unread = |name: &str, error: &anyhow::Error| {
         if args.json {
-            output::json_line(&json::error(&input.display().to_string(), error))?;
-        } else {
-            note!("{error:#}");
+            return output::json_line(&json::error(name, error));
         }
+        note!("{error:#}");
+        Ok(())
+    };
+    for (input, error) in &found.failed {
+        unread(&input.display().to_string(), error)?;
     }
     let mut outcome = Outcome::lossy(found.is_lossy());
     let many = found.places.len() + failed > 1 && wanted.is_none();
@@ -121,25 +124,16 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
         Err(error) if error.is::<Usage>() => Err(error),
         Err(error) => {
             failed += 1;
-            if args.json {
-                return bar.suspend(|| output::json_line(&json::error(&name, &error)));
-            }
-            if many {
-                bar.suspend(|| note!("{error:#}"));
-                return Ok(());
-            }
-            Err(error)
+            if args.json || many { bar.suspend(|| unread(&name, &error)) } else { Err(error) }
         }
     };
     side_by_side(
         &found.places,
         |place| {
-            let told = told(&past, place, !many);
+            let told_of = |place: &LogPlace| told(&past, place, !many);
+            let told = told_of(place);
             let vehicles = told.vehicles(place);
-            if vehicles.is_empty() {
-                return vec![told];
-            }
-            vehicles.iter().map(|place| self::told(&past, place, !many)).collect()
+            if vehicles.is_empty() { vec![told] } else { vehicles.iter().map(told_of).collect() }
         },
         |all| {
             bar.inc(1);
@@ -151,12 +145,11 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     if many && !args.json {
         output::line(&table.text(failed))?;
     }
+    let all = args.inputs.len().max(found.places.len());
     match (failed, args.inputs) {
         (0, _) => Ok(outcome),
         (_, [input]) if !many => bail!("{}: could not be read", input.display()),
-        (failed, inputs) => {
-            bail!("{failed} of {} logs could not be read", inputs.len().max(found.places.len()))
-        }
+        (failed, _) => bail!("{failed} of {all} logs could not be read"),
     }
 }
 

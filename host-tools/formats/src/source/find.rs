@@ -280,7 +280,7 @@ pub fn find_each(inputs: &[PathBuf], salvage: bool) -> Result<FoundRecordings> {
     for input in inputs {
         match found.add_input(input, inputs.len(), &mut segments, salvage) {
             Err(error) if inputs.len() > 1 && !error.is::<Usage>() => {
-                found.failed.push((input.clone(), error))
+                found.failed.push((input.clone(), error));
             }
             added => added?,
         }
@@ -338,7 +338,7 @@ fn start_of_bytes(content: &Path, bytes: usize) -> Option<Vec<u8>> {
 fn unpacked_length(path: &Path) -> Result<u64> {
     let mut file = fs::File::open(path)?;
     let length = file.metadata()?.len();
-    if !start_of_bytes(path, GZIP.len()).is_some_and(|start| start == GZIP) {
+    if start_of_bytes(path, GZIP.len()).is_none_or(|start| start != GZIP) {
         return Ok(length % (1 << 32));
     }
     let mut isize = [0; 4];
