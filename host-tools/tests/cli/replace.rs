@@ -382,7 +382,7 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
         );
         for path in each {
             let (code, told) = decode(&format!("logs/{path}"), "");
-            assert!(code == Some(1) && told.contains("exists, and was not overwritten"), "{path}: {told}");
+            assert!(code == Some(0) && told.contains("exists, and was not overwritten"), "{path}: {told}");
         }
         let (code, told) = decode("logs", "--vehicle quad-7");
         assert!(code == Some(0) && told.contains("skipped: 4 sessions are there already"), "{told}");
