@@ -9,7 +9,6 @@ const PREAMBLE_BYTES: usize = 26;
 
 const BODY_AT: usize = 19;
 
-/// The longest entry: a record.
 const ENTRY_BYTES_MAX: usize = 512;
 
 struct First(Option<Sector>);

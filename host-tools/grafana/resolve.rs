@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 
-/// The folders of the databases, each with the type of its data source in Grafana.
 pub(crate) const DATABASES: [(&str, &str); 3] =
     [("flux", "influxdb"), ("influxql", "influxdb"), ("victoriametrics", "prometheus")];
 

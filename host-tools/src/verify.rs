@@ -387,7 +387,6 @@ fn weakened(log: &Overview) -> Vec<Check> {
     vec![intact, check("sectors protected", written, ending.unprotected(), words)]
 }
 
-/// The checks of a log's end and place.
 fn ends(log: &Overview) -> [Check; 7] {
     let ending = &log.ending;
     let summary = &ending.summary;

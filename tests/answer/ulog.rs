@@ -21,7 +21,6 @@ fn every_field_of_a_px4_log_is_what_pyulog_reads() {
     assert!(result["parameters"].as_u64() > Some(800) && result["texts"].as_u64() > Some(5), "{result}");
 }
 
-/// The values that hums reads, as input of the script: see `tests/oracle/ulog.py`.
 fn write(log: &Path, folder: &Path) {
     let mut tables: BTreeMap<String, (Vec<String>, BufWriter<File>)> = BTreeMap::new();
     let (mut parameters, mut texts, mut dropouts) = (BTreeMap::new(), Vec::new(), Vec::new());

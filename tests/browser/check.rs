@@ -52,7 +52,6 @@ impl Page {
         self.shown.wait("return document.documentElement.dataset.state === 'done'", 300);
     }
 
-    /// Seconds from the choice of this log to its verdict; returns when its report is there too.
     fn first_verdict_s(&mut self, log: &Path) -> f64 {
         self.shown.run(
             "window.times = {};
@@ -132,7 +131,6 @@ fn assert_no_command(text: &str) {
     assert_eq!((option, command), (None, None));
 }
 
-/// The data of a saved report.
 fn data_of(html: &str) -> &str {
     html.split_once("id=\"data\"")
         .and_then(|(_, rest)| rest.split_once("</script>"))

@@ -386,7 +386,6 @@ fn words_of_a_hostile_vehicle_stay_words_on_the_live_page() {
     assert_sound(&mut page);
 }
 
-/// The status line of the answer.
 fn ask(address: &str, line: &str, headers: &[(&str, &str)]) -> String {
     let host = address.trim_start_matches("http://").trim_end_matches('/');
     let mut stream = TcpStream::connect(host).unwrap();

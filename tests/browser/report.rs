@@ -682,7 +682,6 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     assert_eq!(page.console(), serde_json::json!([]));
 }
 
-/// Answers every request with a tile, and sends the path of each.
 fn tile_server() -> (String, mpsc::Receiver<String>) {
     const TILE: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" width="256" height="256"/>"#;
     let server = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -50,7 +50,6 @@ enum Against {
     Numbers,
 }
 
-/// Compares the image's record with the recording, and with this PC's record of the same frames at the same times.
 #[track_caller]
 fn the_record_is_the_one_of_this_pc(path: &Path, manifest: &Manifest, against: Against) {
     let data = fs::read(path).unwrap();

@@ -23,7 +23,6 @@ fn release() -> Vec<u8> {
     fs::read(program::firmware().with_extension("upd")).unwrap()
 }
 
-/// Signed by the test key.
 fn signed(image: &[u8], version: u32) -> Vec<u8> {
     let text = include_str!("../../firmware/update/keys/test.key");
     let seed: Vec<u8> =
@@ -34,7 +33,6 @@ fn signed(image: &[u8], version: u32) -> Vec<u8> {
     [&header.bytes()[..], image].concat()
 }
 
-/// A program of these instructions.
 fn program_of(code: &[u16], version: u32) -> Vec<u8> {
     let mut image = vec![0; 512];
     image[..4].copy_from_slice(&0x1000_4000_u32.to_le_bytes());

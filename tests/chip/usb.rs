@@ -273,7 +273,6 @@ fn ten_seconds_of_control_transfers_cost_no_frame() {
     assert!(count > 10_000 && *load < LOAD_MAX, "{count} transfers, load {load}");
 }
 
-/// Waits for a station's answer.
 fn one_of(answers: &[Told], id: u32, is_it: impl Fn(&[u8]) -> bool) -> Result<()> {
     ensure!(ours(answers).any(|one| one.0 == id && is_it(&one.3)), "no answer of kind {id}: {answers:?}");
     Ok(())

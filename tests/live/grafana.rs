@@ -41,7 +41,6 @@ const UNITS: [&str; 14] = [
     "short",
 ];
 const TYPES: [&str; 6] = ["row", "stat", "gauge", "bargauge", "timeseries", "table"];
-/// The reference system's panels, row by row.
 const PANELS: [&str; 22] = [
     "Flight Time",
     "Battery (%)",

@@ -17,7 +17,6 @@ const BLOCK: usize = 512;
 /// An orderly end is one sector and the parity of the last stretch.
 const CLOSING_WRITES: u64 = 1 + 2 * COLUMNS as u64;
 
-/// Records with a power cut at this block write; returns the number of writes.
 fn record(image: &Path, cut: Option<u64>) -> u64 {
     record_of(&own(FLIGHT), image, cut)["blocks_written"].as_u64().unwrap()
 }

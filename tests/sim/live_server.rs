@@ -10,7 +10,6 @@ use hums_tests::live::{Live, Page, Running, ask_for_events, free_port};
 use hums_tests::program::{self, command};
 use rustix::net::sockopt::set_socket_linger;
 
-/// Waits until a page opens.
 fn open_page(live: &Live) -> Page {
     let end = Instant::now() + Duration::from_secs(5);
     loop {

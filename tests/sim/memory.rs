@@ -83,7 +83,6 @@ fn assert_all_bounded(input: &Path, empty: u64) {
     assert_bounded_but(input, empty, |_| false);
 }
 
-/// Leaves out command lines with this beginning.
 fn assert_bounded_but(input: &Path, empty: u64, is_left_out: impl Fn(&str) -> bool) {
     let shown = input.to_str().unwrap();
     for command in Cli::command().get_subcommands() {

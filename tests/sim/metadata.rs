@@ -117,7 +117,6 @@ fn both_files_are_as_the_public_schemas_want_them() {
     }
 }
 
-/// All `required`, some optional ones, no others.
 #[track_caller]
 fn assert_members(object: &Value, required: &[&str], optional: &[&str]) {
     let object = object.as_object().expect("an object");

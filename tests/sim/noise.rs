@@ -83,7 +83,6 @@ fn covered(frame: &[u8]) -> usize {
     if signed { frame.len() - 13 } else { frame.len() }
 }
 
-/// Damaged here, independent of the program's own noise.
 #[test]
 fn each_frame_that_is_not_itself_damaged_survives() {
     for (seed, name) in OWN.into_iter().enumerate() {

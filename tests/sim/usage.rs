@@ -9,7 +9,6 @@ use hums_tests::flights::{OWN, own, root};
 use hums_tests::program::{Machine, Recording};
 use serde_json::Value;
 
-/// Columns with their decimals.
 const COLUMNS: [(&str, usize); 12] = [
     ("flights", 0),
     ("flight_time_s", 1),

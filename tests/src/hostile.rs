@@ -20,7 +20,6 @@ use crate::program::hums;
 const HEARTBEAT: [u8; 17] = [0xfe, 9, 0x4e, 1, 1, 0, 0, 0, 0, 0, 2, 3, 0x51, 4, 3, 0x1c, 0x7f];
 /// 65,536 entries of 32 bytes.
 const DIRECTORY_BLOCKS: u32 = 4_096;
-/// Clusters before it stay.
 const CLUSTER: u32 = 60_000;
 
 fn packed(dir: &Path, name: &str, raw: &[u8]) -> PathBuf {

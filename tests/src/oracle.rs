@@ -56,7 +56,6 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("the script prints JSON")
 }
 
-/// The environment may set another path.
 fn program(variable: &str, path: &str) -> PathBuf {
     std::env::var_os(variable).map_or_else(|| PathBuf::from(path), PathBuf::from)
 }

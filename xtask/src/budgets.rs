@@ -62,7 +62,6 @@ pub(crate) struct Load {
     pub(crate) reason: String,
 }
 
-/// Limits of a folder (`cargo xtask test --only lines`).
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Lines {

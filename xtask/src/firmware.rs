@@ -102,7 +102,6 @@ fn write(board: &Board, programs: &Programs, suffix: &str) -> Result<PathBuf> {
     Ok(image.with_file_name(format!("hums-{}{suffix}.elf", board.name)))
 }
 
-/// The ELF files of both programs.
 pub(crate) struct Programs {
     application: Vec<u8>,
     pub(crate) resident: Vec<u8>,
@@ -131,7 +130,6 @@ pub(crate) fn build_beside(
     })
 }
 
-/// Flashable: name and content, the ELF file last. The update file only with a key.
 pub(crate) fn files(
     board: &Board,
     programs: &Programs,

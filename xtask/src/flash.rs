@@ -12,7 +12,6 @@ const PROBE_RS: (&str, &str) =
     ("probe-rs", "cargo install probe-rs-tools --locked (or see https://probe.rs)");
 const DFU_UTIL: (&str, &str) = ("dfu-util", "apt-get install dfu-util (macOS: brew install dfu-util)");
 
-/// The chip of every board, as probe-rs calls it.
 const CHIP: &str = "STM32F405RGTx";
 
 /// Arguments of `flash`.

@@ -13,7 +13,6 @@ use crate::repo::{self, FIRMWARE_TARGET};
 use crate::setup::{self, Need};
 use crate::shell::Shell;
 
-/// A package that brings programs.
 struct Package {
     name: &'static str,
     version: &'static str,

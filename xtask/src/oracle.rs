@@ -74,7 +74,6 @@ pub(crate) fn install(list: &str) -> Result<()> {
     pip.arg(&list).run().with_context(|| format!("{}: is there a network?", list.display()))
 }
 
-/// Definitions in the `mavlink` crate of `Cargo.lock`.
 fn definitions() -> Result<PathBuf> {
     let metadata = MetadataCommand::new().current_dir(repo::root()).exec()?;
     let package = metadata.packages.iter().find(|package| package.name.as_str() == "mavlink");

@@ -31,7 +31,6 @@ const END_TO_END: &str = "hums-tests";
 #[derive(Debug)]
 struct TestProgram {
     package: String,
-    /// The crate's name for its own tests.
     name: String,
     /// From `tests/`, not from the sources.
     is_integration: bool,
@@ -73,7 +72,6 @@ pub(crate) fn build() -> Result<()> {
     Ok(())
 }
 
-/// The test programs among cargo's outputs.
 fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<TestProgram>> {
     let mut programs = Vec::new();
     for Artifact { package_id, target, profile, executable, .. } in artifacts {
@@ -102,7 +100,6 @@ pub(crate) fn unit_tests() -> Result<()> {
     Ok(())
 }
 
-/// Chosen by the runner's arguments; prepares the oracle.
 pub(crate) fn end_to_end(arguments: &[&str]) -> Result<()> {
     let program = programs()?.iter().find(|one| one.is_integration && one.package == END_TO_END);
     run(program.with_context(|| format!("{END_TO_END} has no tests"))?, arguments)

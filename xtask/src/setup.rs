@@ -55,7 +55,6 @@ enum Source {
     Packages(&'static str, &'static str),
 }
 
-/// Each need with its purpose.
 const TABLE: [(Need, &str, Source); 18] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
@@ -108,7 +107,6 @@ impl Need {
         }
     }
 
-    /// The line that installs it.
     fn install(self) -> String {
         match self.row().1 {
             Source::Target(target) => format!("rustup target add {target}"),

@@ -41,12 +41,10 @@ pub(crate) fn file(
     Ok(file)
 }
 
-/// The secret key of development builds.
 pub(crate) fn test_key() -> Result<SecretKey> {
     read_key(&repo::root().join(TEST_KEY))
 }
 
-/// The secret key of a release: one of the public keys, and not the test key.
 pub(crate) fn release_key(path: &Path) -> Result<SecretKey> {
     let key = read_key(path)?;
     let public = *key.public_key();

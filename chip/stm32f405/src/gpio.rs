@@ -2,7 +2,6 @@
 //!
 //! Not modelled: the lock (`LCKR` reads back), analog levels, pins driven twice.
 
-/// Ports A to I.
 const PORTS: usize = 9;
 
 /// Port (0 is A) and number.

@@ -19,14 +19,10 @@ const BIT: Ps = 83_333;
 const OVERHEAD_BYTES: u64 = 14;
 /// A token with NAK, STALL or nothing behind it.
 const REFUSAL_BYTES: u64 = 8;
-/// A reset of the bus.
 const RESET: Ps = 10 * MS;
-/// How often a host looks for a device.
 const LOOK: Ps = MS;
 const ENDPOINTS: usize = 4;
-/// Words of the FIFO memory.
 const FIFO_WORDS: usize = 320;
-/// Bytes of a packet.
 const PACKET_BYTES: usize = 64;
 /// Words of the receive FIFO that are kept for SETUP packets (RM0090, 34.11.1).
 const SETUP_WORDS: usize = 10;
@@ -152,7 +148,6 @@ impl Endpoint {
     }
 }
 
-/// A packet in the receive FIFO.
 #[derive(Clone, Debug)]
 struct Received {
     endpoint: u32,
@@ -177,7 +172,6 @@ pub struct Otg {
     diepempmsk: u32,
     pcgcctl: u32,
     enumerated: bool,
-    /// The last frame that the host began.
     frame: u32,
     /// Its address on the bus: a new one counts from the end of the status stage on.
     address: u32,
@@ -192,7 +186,6 @@ pub struct Otg {
     action: Action,
     /// The device has refused the host's token, which it does at once.
     refused: Option<Reply>,
-    /// When the action is over.
     over: Ps,
     /// The pins are the port's, and its clock is 48 MHz.
     pub(crate) is_wired: bool,

@@ -38,7 +38,6 @@ pub struct Tim {
     /// Ticks since the counter's value, at this cycle.
     ticks: u64,
     at: u64,
-    /// Processor cycles of a clock of the timer's.
     clock: u64,
 }
 

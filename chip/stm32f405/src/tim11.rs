@@ -8,7 +8,6 @@ const EACH_EIGHTH: u32 = 0b1101;
 /// `TI1_RMP`.
 const CRYSTAL: u32 = 2;
 const CC1IF: u32 = 1 << 1;
-/// Edges of a capture.
 const EDGES: u64 = 8;
 
 /// The timer's clocks at the moment of an access.

@@ -10,7 +10,6 @@ use stm32f405_model::time::{MS, Ps, SECOND, US};
 const NOWHERE: [u16; 4] = [0x4800, 0x4700, 0x0001, 0x3000];
 /// `ldr r0, =0x40012000 (the ADC's status); ldr r1, [r0]; b .`
 const ADC: [u16; 6] = [0x4801, 0x6801, 0xE7FE, 0x0000, 0x2000, 0x4001];
-/// The watchdog as after a reset.
 const WATCHDOG: [u16; 8] = [0x4802, 0xF64C, 0x41CC, 0x6001, 0xE7FE, 0x0000, 0x3000, 0x4000];
 /// Erases sector 1 by x32, waits, makes PC0 high.
 const ERASE: [u16; 34] = [
@@ -18,7 +17,6 @@ const ERASE: [u16; 34] = [
     0xD4FC, 0x4A07, 0xF04F, 0x0104, 0x6011, 0x4A06, 0xF04F, 0x0101, 0x6011, 0x6151, 0xE7FE, 0x3C00, 0x4002,
     0x0123, 0x4567, 0x89AB, 0xCDEF, 0x3830, 0x4002, 0x0800, 0x4002,
 ];
-/// Power, and the chip's start.
 const START: Ps = 1_500 * US;
 
 /// Sector 1 is filled with zeros.

@@ -43,7 +43,6 @@ const LOOK_EVERY: Span = Span::from_millis(100);
 
 const IDENTITY: Identity = Identity { product: 1, name: "HUMS card reader" };
 
-/// Mark of a restart by this module, for the next start.
 #[unsafe(link_section = ".uninit.card_reader")]
 static MARK: AtomicU32 = AtomicU32::new(0);
 
@@ -61,7 +60,6 @@ pub(crate) fn cause(reset: ResetCause) -> ResetCause {
     reset.with_mark(MARK.swap(0, Ordering::Relaxed))
 }
 
-/// The autopilot's port, and its rate.
 pub(crate) struct Autopilot {
     pub(crate) port: (board::PortRx, board::PortTx),
     pub(crate) baud: u32,

@@ -30,7 +30,6 @@ pub(crate) fn number_of(task: Task) -> u16 {
     16 + interrupt as u16
 }
 
-/// Rank of an exception, most urgent first: interrupts, then the tasks, then idle.
 pub(crate) fn rank(number: u16) -> usize {
     let tasks = [Task::Reception, Task::Monitor, Task::Downlink, Task::Storage];
     match tasks.into_iter().position(|task| number_of(task) == number) {

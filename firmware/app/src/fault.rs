@@ -181,7 +181,6 @@ impl LastMessages {
     }
 }
 
-/// Counts a start; how many there were since power-on, this one included.
 pub(crate) fn count_start() -> u32 {
     let starts = if STARTS.mark.swap(MARK, Ordering::Relaxed) == MARK {
         STARTS.count.load(Ordering::Relaxed).saturating_add(1)

@@ -12,7 +12,6 @@ pub(crate) static PORT_STATUS: PortStatus = PortStatus::new();
 /// Counters of storage.
 pub(crate) static CARD_STATUS: CardStatus = CardStatus::new();
 pub(crate) static STORE_STATUS: StoreStatus = StoreStatus::new();
-/// The update file of the card, by storage.
 pub(crate) static UPDATE_STATUS: UpdateStatus = UpdateStatus::new();
 /// Monitor to storage: after the last sector the log ends.
 pub(crate) static LOG_ENDS: AtomicBool = AtomicBool::new(false);

@@ -14,7 +14,6 @@ use hums_update::state::{Record, State};
 
 use crate::boards::board;
 
-/// The image is on trial.
 static ON_TRIAL: AtomicBool = AtomicBool::new(false);
 
 fn words() -> *mut [u32; 4] {
@@ -33,7 +32,6 @@ pub(crate) fn take(reset: ResetCause) -> (ResetCause, Option<Message>) {
     }
 }
 
-/// Restarts into the resident program with a message for it.
 pub(crate) fn restart(message: Message) -> ! {
     // SAFETY: no variable of either program has these words.
     unsafe { words().write_volatile(message.words()) };

@@ -23,7 +23,6 @@ pub(crate) fn value_of(entry: &Entry<'_>) -> u32 {
     crc.value()
 }
 
-/// The chained value after a group's preamble, which holds the one before the group.
 pub(crate) fn begun(preamble: &[u8]) -> u32 {
     crc32c(preamble)
 }

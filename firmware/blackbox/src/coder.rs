@@ -45,7 +45,6 @@ impl<const N: usize> Scratch<N> {
         self.len = 0;
     }
 
-    /// The first eight bytes, whatever of them counts.
     pub(crate) fn first(&self) -> [u8; 8] {
         self.bytes.first_chunk().copied().unwrap_or_default()
     }

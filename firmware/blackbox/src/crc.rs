@@ -33,12 +33,10 @@ impl Crc32c {
         Self(u32::MAX)
     }
 
-    /// Goes on where this was the value.
     pub(crate) const fn going_on(value: u32) -> Self {
         Self(!value)
     }
 
-    /// Checksum of constants, at compile time.
     pub(crate) const fn of_constant(bytes: &[u8]) -> u32 {
         let tables = tables();
         let (mut crc, mut at) = (u32::MAX, 0);

@@ -113,7 +113,6 @@ impl Layout {
         })
     }
 
-    /// A field; `None` after the last one.
     pub(crate) fn field(self, index: usize) -> Option<FieldLayout> {
         match self {
             Self::Current(message) => message.fields.get(index).map(|field| FieldLayout {

@@ -125,7 +125,6 @@ struct ParitySum {
     block: [u8; SECTOR_BYTES],
     /// Sum of the taken sectors; the latest one has the factor 1.
     taken: [u8; SECTOR_BYTES],
-    /// Rows from that one to the last one; none before the first.
     rows: Option<u32>,
 }
 
@@ -254,7 +253,6 @@ impl ParitySum {
     }
 }
 
-/// Rows from a sector to the last covered one; `None` if the sector is not covered.
 const fn rows(last: u32, number: u32) -> Option<u32> {
     match last.checked_sub(number) {
         Some(numbers) => Some(numbers / COLUMNS as u32),

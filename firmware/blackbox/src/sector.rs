@@ -37,13 +37,11 @@ const CRC_AT: usize = SECTOR_BYTES - 4;
 const MAGIC: u8 = b'H';
 /// Byte 1, with the format version.
 const PLAIN: u8 = 0xb0;
-/// Sealed by means that this format does not have yet.
 const SEALED: u8 = 0xa0;
 const PARTIAL: u8 = 0x40;
 const CLOSED: u8 = 0x80;
 const SINCE_FIRST: u8 = 0x3f;
 
-/// Maximum records completed in a sector: the limit of its field.
 pub(crate) const RECORDS_MAX: u8 = 127;
 
 const _: () = assert!(GROUP_SECTORS == SINCE_FIRST as usize + 1 && BODY_BYTES < 1 << 9);

@@ -393,7 +393,6 @@ impl Writer {
 mod tests {
     use super::*;
 
-    /// Whether each sector starts a group.
     struct Starts(Vec<bool>);
 
     impl SectorSink for Starts {

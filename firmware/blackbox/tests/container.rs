@@ -34,7 +34,6 @@ fn queue() -> Queue {
 
 type Frame = (u64, Vec<u8>, bool);
 
-/// `seed` varies the bytes.
 fn frames(count: usize, seed: u32) -> Vec<Frame> {
     let mut state = seed | 1;
     let mut random = move || {

@@ -15,7 +15,6 @@ use hums_blackbox::{Item, LogReader, Record, SECTOR_BYTES, Writer};
 use hums_core::clock::Instant;
 use kinds::{Entry, entries};
 
-/// Batches in groups of their own.
 fn write(batches: &[Vec<Entry>]) -> Vec<u8> {
     let (mut writer, mut card) = (Box::new(Writer::new()), Card::default());
     for batch in batches {

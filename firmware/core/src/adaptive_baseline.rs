@@ -22,7 +22,6 @@ state! {
 }
 
 impl AdaptiveBaseline {
-    /// It is known to be zero.
     pub(crate) fn zero() -> Self {
         Self { learnt_s: MEMORY_S, ..Self::default() }
     }

@@ -87,7 +87,6 @@ state! {
 }
 
 impl Alerts {
-    /// Each arming begins anew.
     pub(crate) fn take_armed(&mut self, at: BootMs, armed: bool) {
         if armed && !self.armed {
             let Self { had, had_both, .. } = *self;

@@ -162,7 +162,6 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A field of fixed length.
 pub(crate) trait Field {
     fn code(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable>;
 }

@@ -99,7 +99,6 @@ state! {
         highest_v: f32,
         /// The autopilot's id of the battery, by which parameters go. The order of first messages may differ.
         id: u8,
-        /// The highest voltage, or part of it, was measured at rest.
         rested: bool,
         /// 0: none.
         before: u8,

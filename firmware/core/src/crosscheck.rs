@@ -30,7 +30,6 @@ use crate::time::{BootMs, FRESH, Millis, Stamp};
 use crate::vehicle::{RECEIVERS_MAX, Vehicle};
 use crate::{ahrs2_residual, gnss_constellation};
 
-/// A sample that is not compared: it is apart from none.
 const NOT_COMPARED: [f32; 3] = [f32::NAN; 3];
 /// Between steps.
 const EVERY: Millis = Millis::from_millis(100);

@@ -24,7 +24,6 @@ const SAG_MAX_V: f32 = 0.3;
 const OFF_THROTTLE: f32 = 0.03;
 /// A link on which nothing at all came for so long was silent, unless it often is: streams of one a second have such pauses.
 const SILENCE_S: f32 = 0.3;
-/// A silence is longer than the longest recent pause by this factor.
 const SILENCE_PAUSES: f32 = 3.0;
 /// A pause counts as at most this, s. Each observation shortens the longest one by this part, so it is forgotten
 /// after some hundred.

@@ -170,12 +170,10 @@ state! {
     /// The phases of a flight.
     pub struct Flight {
         stage: Stage,
-        /// Since when it is in the air; kept in a mishap.
         airborne_since: Option<BootMs>,
         /// A flight is open, and when the vehicle was in the air last.
         flew_at: Option<BootMs>,
         changing_since: Option<BootMs>,
-        /// The vehicle was seen on the ground: a take-off follows.
         seen_on_ground: bool,
         arming: Arming,
         beat: Beat,

@@ -25,7 +25,6 @@ use crate::time::{BootMs, Millis, PAUSE, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, norm};
 use crate::vehicle::Vehicle;
 
-/// Maximum age of a climb.
 const CLIMB_AGE: Millis = Millis::from_millis(500);
 /// Time constant, s.
 const SMOOTHING_S: f32 = 1.0;

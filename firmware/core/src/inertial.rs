@@ -41,7 +41,6 @@ const LEVEL: f32 = 0.866;
 const OVER: f32 = 0.5;
 /// Time constant of the steps from sample to sample.
 const SHAKES_S: f32 = 0.5;
-/// The steps are known this long after the first sample.
 const STEPS_KNOWN: Millis = Millis::from_secs(2);
 /// Carrying motors make the steps larger than at rest by this factor, and by this many m/s2, the change of a sensor's
 /// noise.
@@ -68,7 +67,6 @@ state! {
         rate: [f32; 3],
         rates_at: Stamp,
         still: bool,
-        /// Time of the last fast turn.
         turned_at: Stamp,
         /// Whether the estimator's attitude contradicts the sensors, and since when that attitude has been far from
         /// level.

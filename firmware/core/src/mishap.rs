@@ -28,7 +28,6 @@ numbered! {
 }
 
 impl MishapKind {
-    /// The limit that it is above.
     pub(crate) const fn limit(self) -> Param {
         match self {
             Self::FreeFall => Param::MisFallTime,

@@ -54,9 +54,7 @@ pub struct Monitor {
     before_tick: Before,
     ticked_at: BootMs,
     cells_told: bool,
-    /// The autopilot has been asked for all its parameters.
     parameters_asked: bool,
-    /// The parts in the vehicle are known: their wear is judged.
     parts_known: bool,
 }
 

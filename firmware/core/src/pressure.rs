@@ -9,7 +9,6 @@ use crate::time::{BootMs, Millis, PAUSE};
 pub(crate) const SCALE_HEIGHT_M: f32 = 8_430.0;
 /// A barometer that repeats its value for longer is stuck: its height is not known. One at rest repeats a value for a second or two.
 const STUCK: Millis = Millis::from_secs(5);
-/// A pressure is compared with one that is one to two windows older.
 const WINDOW: Millis = Millis::from_secs(1);
 /// Parachutes let drones down at 4 to 6 m/s (ASTM F3322 leaves it to the energy of the impact).
 const PARACHUTE_MPS: f32 = 4.0;

@@ -434,7 +434,6 @@ fn approaches(situation: &Situation<'_>) -> bool {
         && motion::height_m(now, vehicle).is_some_and(|height_m| height_m.abs() < APPROACH_M)
 }
 
-/// An answer to our command, and not to what somebody else asked.
 fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
     let system = vehicle.source.map_or(0, |source| source.system);
     let us = Source { system, component: OUR_COMPONENT };
@@ -468,9 +467,7 @@ struct Modes {
     /// Failsafes wait in it: a pilot's choice of it cancels nothing.
     waits: u32,
     mission: u32,
-    /// The autopilot changes to it at a mission's end.
     after_mission: &'static [u32],
-    /// A mission's landing shows in its landed state.
     tells_landing: bool,
 }
 

@@ -179,7 +179,6 @@ impl Row {
         gates.are(self.gates)
     }
 
-    /// The weight of a sample this long after the one before.
     pub(crate) fn weight(&self, step: Millis) -> f32 {
         let step_s = step.min(self.step_max).as_secs_f32();
         step_s / (self.smoothing_s + step_s)

@@ -9,7 +9,6 @@ use crate::time::{BootMs, Millis, PAUSE};
 pub(crate) const CARRIES: f32 = 0.2;
 /// Full throttle. Controllers keep some back for attitude.
 pub(crate) const FULL: f32 = 0.95;
-/// The part of the hover throttle below which rotors do not carry the vehicle.
 const HOVER_PART: f32 = 0.5;
 /// Time constant of the hover throttle, and the hover time until it is known, s.
 const HOVER_S: f32 = 10.0;

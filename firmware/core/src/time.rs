@@ -88,7 +88,6 @@ impl Sub<Millis> for BootMs {
     }
 }
 
-/// A point in time, or none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Stamp(Option<BootMs>);
 
@@ -119,7 +118,6 @@ impl Stamp {
         Some(self.0?.earlier(now))
     }
 
-    /// Runs while `on`; whether it has run for `span`.
     pub(crate) fn run(&mut self, on: bool, now: BootMs, span: Millis) -> bool {
         let began = self.0.filter(|_| on).or_else(|| on.then_some(now));
         *self = Self(began);

@@ -202,7 +202,6 @@ impl Vehicle {
         matches!(self.kind(), VehicleKind::Plane | VehicleKind::Vtol)
     }
 
-    /// Whether its autopilot is an `ArduPilot`.
     pub(crate) fn is_ardupilot(&self) -> bool {
         self.heartbeat.get().is_some_and(|heartbeat| heartbeat.autopilot == Autopilot::ArduPilot)
     }

@@ -821,7 +821,6 @@ fn a_weak_a_dead_and_a_shut_off_motor_of_a_hexarotor_are_named() {
     assert!(idles.iter().all(|one| one.check != "motor_off"), "it turns: {idles:?}");
 }
 
-/// Changes of the commands of eight motors that make up for these amounts of thrust, tilt towards an arm, and yaw.
 fn eight(arms: bool, thrust: f32, tilt: f32, yaw: f32) -> [f32; 8] {
     core::array::from_fn(|motor| {
         let round = if arms { (motor / 2) as f32 / 4.0 } else { motor as f32 / 8.0 };

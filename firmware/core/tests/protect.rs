@@ -14,7 +14,6 @@ const FOUND_MS: u64 = 22_000;
 const ASKED_MS: u64 = FOUND_MS + 10_000;
 /// No answer comes.
 const UNANSWERED: &str = "announced, asked, asked, asked, unanswered";
-/// The landed state is sent.
 const SENT: &str = "0-2 landed=ground; 2 landed=air; ";
 const VEHICLES: [&str; 5] = [
     "* ap quad mode=4; ",

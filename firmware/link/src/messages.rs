@@ -36,12 +36,10 @@ pub fn named_int(now: Instant, name: &str, value: i32) -> Packet {
     Packet::new(ids::NAMED_VALUE_INT).u32(0, now.as_millis() as u32).u32(4, value as u32).text(8, 10, name)
 }
 
-/// `PARAM_REQUEST_READ`, by its name
 pub(crate) fn param_request_read(name: &str, system: u8, component: u8) -> Packet {
     Packet::new(ids::PARAM_REQUEST_READ).u16(0, u16::MAX).u8(2, system).u8(3, component).text(4, 16, name)
 }
 
-/// `REQUEST_EVENT`: these again, please.
 pub(crate) fn request_event(first: u16, last: u16, system: u8, component: u8) -> Packet {
     Packet::new(ids::REQUEST_EVENT).u16(0, first).u16(2, last).u8(4, system).u8(5, component)
 }

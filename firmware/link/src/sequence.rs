@@ -25,7 +25,6 @@ struct Sender {
     sequence: u8,
     /// The most frames of a window since the last loss: a falling rate does not make a loss a larger part.
     of: u16,
-    /// One entry a second of the window, by second modulo its length.
     seconds: [Second; WINDOW_SECS],
     newest_s: u32,
 }

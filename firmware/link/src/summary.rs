@@ -64,9 +64,7 @@ const TURNS: usize = COMPUTER + 1;
 const VALUES_MS: u16 = 700;
 const STATE_MS: u16 = 2_000;
 const COMPUTER_MS: u16 = 10_000;
-/// `NAMED_VALUE_FLOAT` and `_INT` with their header.
 const VALUE_BYTES: usize = 30;
-/// `ONBOARD_COMPUTER_STATUS` with its header, and a signature.
 const COMPUTER_BYTES: usize = 250 + SIGNATURE_BYTES;
 
 /// Bytes that may wait at the port, findings apart: 50 ms at 57,600 baud.
@@ -396,7 +394,6 @@ enum ValueSource {
 /// The overall level, on the scale of [`ValueSource::Level`]: every other value, before each of [`VALUES_TOLD`].
 const OVERALL: &str = "HUMS_LEVEL";
 
-/// Values with a ground station's names.
 const VALUES_TOLD: [(&str, ValueSource); 17] = [
     ("L_POWER", ValueSource::Level(Subsystem::Power)),
     ("L_PROPULS", ValueSource::Level(Subsystem::Propulsion)),

@@ -183,7 +183,6 @@ impl Telling {
         }
     }
 
-    /// A text that went named it.
     pub(crate) fn names(&mut self, finding: &Finding) {
         let Some(key) = key(finding) else { return };
         self.open.retain(|open| *open != key);
@@ -195,7 +194,6 @@ impl Telling {
         }
     }
 
-    /// Whether an effect of a finding was sent before it.
     pub(crate) fn has_effect(&self, cause: &Finding, health: &Health) -> bool {
         let Some((cause, _)) = health.alarm(cause.check, cause.instance) else { return false };
         let known = |(number, instance): &(u8, u8)| health.alarm(check_of(*number)?.name, *instance);
@@ -231,7 +229,6 @@ pub fn hold(check: &str) -> Span {
     if is_derived { DERIVED_HOLD } else { HOLD }
 }
 
-/// The waiting warning that explains a critical finding.
 pub(crate) fn cause(finding: &Finding, waiting: &[Finding]) -> Option<Finding> {
     let alarm = |of: &Finding| Alarm::of(of.check, of.instance, Level::Warning, of.at);
     let alarms = waiting.iter().filter(|waits| waits.level == Level::Warning).filter_map(alarm);

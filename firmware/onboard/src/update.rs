@@ -167,7 +167,6 @@ pub struct UpdateWatch {
     message: Option<Message>,
     cause: ResetCause,
     told: Option<UpdateOffer>,
-    /// The resident program refused this card's update: it is not asked for again.
     was_refused: bool,
 }
 

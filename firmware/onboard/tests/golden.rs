@@ -198,7 +198,6 @@ impl BoxUnderTest {
     }
 }
 
-/// The text of a frame that has one.
 fn text_of(frame: &[u8]) -> Option<String> {
     let frame = Frame::again(frame, Check::Verified).filter(|frame| frame.id() == STATUSTEXT)?;
     let text = frame.payload().get(1..)?;

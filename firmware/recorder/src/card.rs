@@ -233,7 +233,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         &self.directory.newest
     }
 
-    /// The newest session's name, and the first name of the next session; `None` when the numbers are used up.
     pub(crate) fn next_session(&self) -> (Option<LogName>, Option<LogName>) {
         self.directory.next_session()
     }
@@ -403,7 +402,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(!is_end)
     }
 
-    /// In one block write; it stays open.
     pub(crate) fn date_open(&mut self) -> Result<(), CardError<D::Error>> {
         let Segment { name, place, .. } = self.open.ok_or(CardError::NotOpen)?;
         let date = self.status.fat_date();

@@ -31,7 +31,6 @@ pub(crate) const BLOCK_ENTRIES: u32 = BLOCK_BYTES as u32 / ENTRY_BYTES as u32;
 const NEWEST_MAX: usize = 4;
 const OLDEST_MAX: usize = 8;
 const DELETED_MAX: usize = 8;
-/// The shortest log that may be overwritten: two groups.
 const OVERWRITTEN_MIN: u32 = 2 * (hums_blackbox::GROUP_SECTORS * hums_blackbox::SECTOR_BYTES) as u32;
 /// FAT blocks that one walk checks for claims.
 pub(crate) const VERIFY_BLOCKS: u32 = 64;
@@ -58,7 +57,6 @@ pub(crate) const DELETED: u8 = 0xE5;
 
 pub(crate) type Entry = [u8; ENTRY_BYTES];
 
-/// The files of parameters and of an update, as an entry has their names.
 const UPDATE: &[u8; LogName::SHORT_BYTES] = b"HUMS    UPD";
 const SETTINGS: &[u8; LogName::SHORT_BYTES] = b"PARAMS  TXT";
 
@@ -82,7 +80,6 @@ pub(crate) struct Directory {
     pub(crate) names: u32,
     pub(crate) settings: Option<(u32, u32)>,
     pub(crate) update: Option<(u32, u32)>,
-    /// The end of all clusters that logs claimed at mounting; later logs are chained.
     claimed_end: u32,
     verified: Range<u32>,
     /// Looking on: the next entry, and the FAT blocks that are being checked for claims.
@@ -357,7 +354,6 @@ impl Slot<'_> {
         })
     }
 
-    /// Whether it is a file of this name, as an entry holds it.
     pub(crate) fn is_file(&self, short: &[u8; LogName::SHORT_BYTES]) -> bool {
         self.bytes.starts_with(short) && self.bytes[ATTRIBUTES] & NO_FILE == 0
     }

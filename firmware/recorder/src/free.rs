@@ -66,7 +66,6 @@ impl FreeSearch {
         self.next
     }
 
-    /// Counts the free clusters of one more block of the FAT; the total once all of it is counted.
     pub(crate) fn count<D: CardDevice>(
         &mut self,
         volume: &Volume<'_, D>,

@@ -22,7 +22,6 @@ impl LogName {
     /// Bytes of a name in a directory entry.
     pub const SHORT_BYTES: usize = 11;
 
-    /// The next name within the session; `None` when the numbers are used up.
     pub(crate) const fn next_segment(self) -> Option<Self> {
         if self.segment < Self::SEGMENT_MAX {
             Some(Self { session: self.session, segment: self.segment + 1 })
@@ -31,7 +30,6 @@ impl LogName {
         }
     }
 
-    /// The first segment of the next session; `None` when the numbers are used up.
     pub(crate) const fn next_session(self) -> Option<Self> {
         if self.session < Self::SESSION_MAX {
             Some(Self { session: self.session + 1, segment: 0 })

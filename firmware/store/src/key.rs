@@ -14,7 +14,6 @@ impl Key {
     const PARAM: u32 = 1 << 31;
     const OWN: u32 = 1 << 30;
 
-    /// Mount count, four bytes.
     pub(crate) const MOUNTS: Self = Self(Self::OWN);
 
     /// An item's key by number, which its owner never changes.

@@ -51,9 +51,7 @@ const fn decoded(word: u32) -> Option<u16> {
 pub(crate) struct Header {
     /// Generation; readable even if the rest of the header is damaged.
     pub(crate) generation: Option<u16>,
-    /// All live items were copied into the sector.
     pub(crate) is_complete: bool,
-    /// Generation of the superseding sector.
     pub(crate) superseded_by: Option<u16>,
 }
 

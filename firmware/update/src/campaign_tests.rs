@@ -23,7 +23,6 @@ const SERVICE_SECS: u32 = 8;
 /// Two sectors behind the header's, the last one in part.
 const IMAGE_BYTES: usize = 700;
 
-/// Power goes in this operation.
 struct PowerCut;
 
 thread_local! {
@@ -42,7 +41,6 @@ fn is_cut() -> bool {
     left == 0
 }
 
-/// Runs with power for so many operations; `None` if it went.
 fn powered<T>(operations: u32, act: impl FnOnce() -> T) -> Option<T> {
     LEFT.set(operations);
     let done = catch_unwind(AssertUnwindSafe(act));
@@ -154,7 +152,6 @@ impl Disk {
         if is_gone || is_late { Err(()) } else { Ok(()) }
     }
 
-    /// The first cluster of a file; each cluster is a block.
     fn first(&self, number: usize) -> u32 {
         3 + self.files[..number]
             .iter()
@@ -253,7 +250,6 @@ fn image(number: u8) -> Vec<u8> {
     (0..IMAGE_BYTES).map(|at| (at as u8).wrapping_mul(31) ^ number).collect()
 }
 
-/// A signed update file.
 fn signed(number: u8, version: u32, floor: u32) -> Vec<u8> {
     let image = image(number);
     let mut header = Header::new(BOARD, "commit", Version(version), Version(floor), &image);
@@ -265,7 +261,6 @@ fn id(file: &[u8]) -> u32 {
     Header::read(file).unwrap().id()
 }
 
-/// What runs after a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Runs {
     /// The application of this id, on trial or not.

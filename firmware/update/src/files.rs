@@ -8,7 +8,6 @@ use crate::header::Refusal;
 /// A name as an entry of a directory has it: eight letters and three, filled with spaces.
 pub type Name = [u8; 11];
 
-/// Bytes of an entry, and offsets of its fields.
 const ENTRY_BYTES: usize = 32;
 const ATTRIBUTES: usize = 11;
 const CLUSTER_HIGH: usize = 20;
@@ -26,7 +25,6 @@ pub struct File<'a, D> {
     device: &'a D,
     layout: Layout,
     cluster: u32,
-    /// The next block within the cluster.
     block: u32,
     /// Bytes of the file.
     pub bytes: u32,

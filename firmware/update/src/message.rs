@@ -20,7 +20,6 @@ pub enum Message {
     Retried,
 }
 
-/// First word of every message.
 const MARK: u32 = 0x5550_4454;
 
 impl Message {

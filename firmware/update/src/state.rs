@@ -13,7 +13,6 @@ pub type Bytes = [u8; RECORD_BYTES];
 
 const NONE: (u32, Status) = (0, Status::Confirmed);
 const BLANK: Bytes = [0xFF; RECORD_BYTES];
-/// Images whose end of trial is remembered.
 const ENDED_MAX: usize = 8;
 
 /// An event in the life of an image.

@@ -261,7 +261,6 @@ impl<B: driver::Bus> driver::Bus for GuardedBus<'_, B> {
 pub struct GuardedPipe<P> {
     inner: P,
     port: Port,
-    /// A SETUP packet that has ended the transfer before it.
     setup: Option<[u8; 8]>,
 }
 

@@ -69,7 +69,6 @@ impl<'b> Chunk<'b> {
 /// Chunks on their way to the host.
 pub type Chunks<'a, 'b> = zerocopy_channel::Channel<'a, NoopRawMutex, Chunk<'b>>;
 pub(crate) type Outgoing<'a, 'b> = zerocopy_channel::Receiver<'a, NoopRawMutex, Chunk<'b>>;
-/// A packet of the host, and its length.
 pub(crate) type Packet = ([u8; PACKET_BYTES], usize);
 
 /// Packets of the host on their way to the card's side. Both sides run in turns, never at once.
@@ -101,7 +100,6 @@ pub struct Server<'a, 'b> {
     chunks: zerocopy_channel::Sender<'a, NoopRawMutex, Chunk<'b>>,
     lane: &'a Lane,
     link: &'a Link,
-    /// Aborts of the lane as the command began.
     aborts: u32,
 }
 

@@ -29,7 +29,6 @@ const COMMAND_SIGNATURE: [u8; 4] = *b"USBC";
 const STATUS_SIGNATURE: [u8; 4] = *b"USBS";
 /// Longest command block.
 const BLOCK_MAX: usize = 16;
-/// The bit of the wrapper's flags for data to the host.
 const TO_HOST: u8 = 0x80;
 
 /// The packet is no command wrapper, or one for another unit. Only a reset by the host ends this state (BOT, 6.6.1).
@@ -68,9 +67,7 @@ enum Stage {
 /// A command in work.
 pub struct Transport {
     tag: [u8; 4],
-    /// Bytes that the host expects or sends.
     expected: u32,
-    /// Bytes sent to the host.
     sent: u32,
     status: Status,
     stage: Stage,

@@ -161,7 +161,6 @@ pub fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
 }
 
 const FLIGHTS: &str = UsageCounter::Flights.name();
-/// The session before counted the flight.
 const BEGUN_BEFORE: &str = "it was in the air at its start: that flight is counted in the log before";
 
 /// By meaning; unknown ones keep their names.

@@ -171,7 +171,6 @@ fn below(output: &Path, given: &[PathBuf]) -> Result<Vec<FileJson>> {
     Ok(files)
 }
 
-/// The name of a file from one of these paths on: with that path if it is relative, otherwise with its last part.
 fn name_below(file: &Path, given: &[PathBuf]) -> PathBuf {
     let name = given.iter().find_map(|of| {
         let rest = file.strip_prefix(of).ok()?;

@@ -21,11 +21,9 @@ type Count = (u32, Option<Instant>);
 /// A log's place in time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogTime {
-    /// Its card, if its name is a card's number.
     card: Option<String>,
     board: Option<Board>,
     count: Option<Count>,
-    /// Its session, if it begins at power-on.
     power_on: Option<u32>,
     /// UTC of its start in microseconds since 1970; `None` if unknown, or if the other logs of its card contradict it.
     pub start_us: Option<u64>,

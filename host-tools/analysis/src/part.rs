@@ -9,7 +9,6 @@ use hums_core::health::Subsystem;
 /// Hours, flights, battery cycles, motor hours; 0 without a limit.
 pub type ServiceLimits = [f64; 4];
 
-/// How the names of their parameters end.
 const ENDS: [&str; 4] = ["_HOURS", "_FLIGHTS", "_CYCLES", "_MOT_HOURS"];
 
 /// Place from 0, and limit: `CMP1_FLIGHTS` is 0 and 1.

@@ -76,7 +76,6 @@ pub enum Quantity {
     EscTemperature(usize),
 }
 
-/// ESC quantities in the reference system.
 const ESC: [fn(usize) -> Quantity; 6] = [
     Quantity::EscRpm,
     Quantity::EscVoltage,

@@ -73,7 +73,6 @@ impl Series {
         Some((numbers, some.iter().flat_map(|(_, extremes)| pair(extremes)).collect()))
     }
 
-    /// Whether it is the interval's first.
     fn push(&mut self, interval: u16, value: f32) -> bool {
         let first = (interval, Extremes { low: value, high: value, rises: true });
         match self.values.last_mut() {
@@ -109,10 +108,8 @@ pub type Line<P> = (P, u8);
 pub struct Store<P> {
     grid: Grid,
     series: BTreeMap<Line<P>, Series>,
-    /// Intervals that have a value, of all series.
     filled: usize,
     series_max: usize,
-    /// Number of values in all series.
     taken: u64,
 }
 

@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// The exit code that a shell reports after Ctrl-C.
 const EXIT_CODE: i32 = 130;
 
 /// Signals within this time after one belong to it: `timeout -s INT` sends two.

@@ -98,7 +98,6 @@ pub fn or_skipped<T>(result: anyhow::Result<T>) -> anyhow::Result<Result<T, Stri
     }
 }
 
-/// An error of this type, however deep: a writer has it inside its `io::Error`.
 fn find<E: StdError + 'static>(error: &anyhow::Error) -> Option<&E> {
     error.chain().find_map(|cause| {
         let inner = || cause.downcast_ref::<io::Error>()?.get_ref()?.downcast_ref();

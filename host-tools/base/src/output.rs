@@ -14,7 +14,6 @@ use crate::colour;
 use crate::outcome::ReaderGone;
 use crate::printable;
 
-/// Whether a command's output uses standard output.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
 /// Folders of this computer that are shown by other names.

@@ -138,7 +138,6 @@ impl GroundInput {
     }
 }
 
-/// The flag in errors of `--gs`.
 const FLAG: &str = "--gs";
 
 /// Opens SINK, which must not be one of the inputs.

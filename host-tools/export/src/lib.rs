@@ -325,10 +325,8 @@ struct Task<'a> {
     output: &'a Path,
     standard_output: bool,
     logs: usize,
-    /// A tlog has the findings as texts.
     has_findings: bool,
     offset_s: f64,
-    /// The vehicle of all logs without a unique id.
     vehicle: Option<&'a str>,
     /// The tables of the output's folder.
     fleet: Arc<Fleet>,

@@ -16,7 +16,6 @@ use crate::utc::When;
 pub struct Selection {
     from: Option<When>,
     to: Option<When>,
-    /// Message ids; empty: all.
     ids: Vec<u32>,
     /// The names as they were given: those of other messages than MAVLink's.
     names: Vec<String>,

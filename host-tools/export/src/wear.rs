@@ -26,7 +26,6 @@ pub(crate) struct PartLine {
     pub(crate) cycles: f64,
 }
 
-/// All parts of a recording.
 pub(crate) fn parts_of(contents: &Contents) -> Vec<PartLine> {
     let line = |(place, line): (&u8, &crate::summary::ComponentLine)| {
         let (name, limit) = contents.part(*place, line);
@@ -45,7 +44,6 @@ pub(crate) fn parts_of(contents: &Contents) -> Vec<PartLine> {
     contents.components.iter().map(line).collect()
 }
 
-/// One row a counter.
 pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
     let row = |(number, value)| {
         let cells = vec![
@@ -62,7 +60,6 @@ pub(super) fn lifetime(life: &Lifetime<'_>) -> Vec<Row> {
     life.iter().map(row).collect()
 }
 
-/// Two rows: of the session and of the airframe's life.
 pub(super) fn exceedance(exceedance: &Exceedance<'_>) -> Vec<Row> {
     let row = |(of, crossings): (&str, hums_core::health::exceedance::Crossings)| {
         let cells = vec![

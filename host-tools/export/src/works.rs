@@ -34,7 +34,6 @@ pub(super) fn works<'a>(logs: &'a [LogPlace], sessions: &Sessions) -> Result<Vec
     Ok(logs.into_iter().zip(names).map(work).collect())
 }
 
-/// Finds the logs that have messages of their own instead of MAVLink's; an error if no log can become a requested format.
 pub(super) fn check_forms(works: &mut [NamedLog<'_>], formats: &Formats) -> Result<()> {
     let (mut of_frames, mut first) = (works.is_empty(), None);
     for work in works {
@@ -51,7 +50,6 @@ pub(super) fn check_forms(works: &mut [NamedLog<'_>], formats: &Formats) -> Resu
     first.filter(|_| !of_frames).map_or(Ok(()), |why| Err(usage_error(why)))
 }
 
-/// Why a log cannot become one of these formats.
 pub(super) fn without_frames(work: &NamedLog<'_>, formats: &Formats) -> Result<Option<String>> {
     let Some(about) = formats.about().find(|about| work.is_native && about.is_of_frames) else {
         return Ok(None);

@@ -28,7 +28,6 @@ pub struct Writers<'a> {
     frames: u64,
     records: u64,
     on_board: OnBoard,
-    /// Rows of tables without room for their names.
     rows_left_out: u64,
     /// The state of the recording, by its gaps.
     lacks: Soundness,

@@ -46,7 +46,6 @@ Results go to standard output, everything else to standard error. Colours are fo
 
 const USAGE: &str = "hums FILE...\n       hums <COMMAND>";
 
-/// This program, its version and its commit.
 pub(crate) const PROGRAM: &str = concat!("hums ", env!("HUMS_VERSION"));
 
 /// The whole command line.

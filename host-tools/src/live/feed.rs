@@ -35,7 +35,6 @@ const PIECES: usize = 8;
 const SOON: Duration = Duration::from_millis(40);
 /// How soon a broken connection is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
-/// A source without data for this long is silent.
 const SILENT: Duration = Duration::from_secs(3);
 
 /// Follows a live source until Ctrl-C.
@@ -51,7 +50,6 @@ pub struct Feed {
     /// UTC at `start`, see [`epoch_us`].
     epoch_us: u64,
     heard: Option<Wall>,
-    /// When the port was looked at last.
     looked: Instant,
     rate: Rate,
 }

@@ -15,7 +15,6 @@ use crate::outcome::usage;
 
 /// A token of this length cannot be guessed.
 const TOKEN_BYTES: usize = 16;
-/// Minimum length of the user's own token.
 const TOKEN_CHARS_MIN: usize = 8;
 
 /// Checks of a request.

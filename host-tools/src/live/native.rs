@@ -14,7 +14,6 @@ use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::LogPlace;
 use crate::statustext::StatusText;
 
-/// Entries of a batch, and waiting batches.
 const BATCH: usize = 256;
 const BATCHES: usize = 4;
 

@@ -30,7 +30,6 @@ const COPY_EVERY: Span = Span::from_secs(5);
 const SPEEDS: (f64, f64) = (0.1, 64.0);
 /// Reports besides frames: a log's parameters and parts.
 const TOLD_MAX: usize = 8_192;
-/// Frames between two looks at the clock.
 const LOOK_EVERY: u64 = 4_096;
 
 #[derive(Debug)]

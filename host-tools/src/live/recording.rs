@@ -17,7 +17,6 @@ use crate::source::find::find;
 use crate::source::item::{Item, Stop, Want};
 use crate::source::recording::{LogPlace, Recording};
 
-/// Maximum number of sessions listed for a choice.
 const LISTED_MAX: usize = 12;
 
 /// An input, found good.

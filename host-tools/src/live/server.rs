@@ -41,7 +41,6 @@ struct Server {
 struct Permit(Arc<AtomicUsize>);
 
 impl Permit {
-    /// `None` if `max` are taken.
     fn take(taken: &Arc<AtomicUsize>, max: usize) -> Option<Self> {
         let place = Self(Arc::clone(taken));
         (taken.fetch_add(1, Ordering::SeqCst) < max).then_some(place)

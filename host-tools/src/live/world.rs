@@ -337,7 +337,6 @@ mod tests {
         }));
     }
 
-    /// Known at the second's end, which a looking page has just seen.
     #[test]
     fn a_page_is_told_how_many_frames_came_in_each_second() {
         let (mut world, mut histories) = (World::new(Limits::default()), Histories::new());

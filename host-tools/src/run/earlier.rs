@@ -13,7 +13,6 @@ use crate::logs::{Card, Log, segment_name};
 use crate::outcome::usage;
 use crate::source::input::Input;
 
-/// Segments of a card: a small one holds several.
 const SEGMENTS_MIN: u64 = 16;
 
 /// Name on the card, number in its sectors, number of files.

@@ -114,7 +114,6 @@ fn found(bytes: &[u8]) -> Option<StoreCondition> {
     Store::mount(SimFlash::<SECTOR>::with(bytes)).ok().map(|(_, found)| found)
 }
 
-/// Written through to a file; clones share it.
 #[derive(Clone, Debug)]
 pub(super) struct FileFlash(Rc<RefCell<Inside>>);
 
@@ -126,7 +125,6 @@ struct Inside {
 }
 
 impl FileFlash {
-    /// A cut at the `steps`-th word or erase, in its middle.
     pub(super) fn cut_after(&self, steps: u64, seed: u64) {
         self.0.borrow_mut().flash.cut_after(steps, seed);
     }

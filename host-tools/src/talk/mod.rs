@@ -63,7 +63,6 @@ pub struct Client {
     begun: Instant,
     /// 0 until known.
     system: u8,
-    /// The component of the system that is spoken to.
     component: u8,
     frames: VecDeque<Vec<u8>>,
     heartbeat_at: Option<Instant>,
@@ -310,7 +309,6 @@ fn not_found<'a>(
     }
 }
 
-/// The result of a command of ours.
 fn result_of(frame: &Frame<'_>, command: u16) -> Option<u8> {
     let fields = Fields(frame.payload());
     let is_it = frame.id() == COMMAND_ACK && fields.u16(0) == command;

@@ -102,7 +102,6 @@ fn place_of(
     }
 }
 
-/// The place of a part by the board's parameters.
 fn on_board(client: &mut Client, part: ComponentKind, number: u8) -> Result<usize> {
     let mut known = Vec::new();
     for place in 1..=COMPONENTS_MAX {
@@ -127,7 +126,6 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     answer.and_then(|result| accepted(result, denied)).with_context(|| format!("system {}", client.system()))
 }
 
-/// Place and serial number, by the newest log with components.
 fn on_card(card: &Path, part: ComponentKind, number: u8) -> Result<(usize, String)> {
     if !card.is_dir() {
         return Err(usage(format!(
@@ -152,7 +150,6 @@ fn on_card(card: &Path, part: ComponentKind, number: u8) -> Result<(usize, Strin
     bail!("{}: no log on it has components; set CMPn_KIND first (docs/usage.md)", card.display())
 }
 
-/// New and old serial number as the first line; other lines stay.
 fn write(card: &Path, place: usize, serial: &str, old: &str) -> Result<PathBuf> {
     if serial.is_empty() {
         return Err(usage("--serial is missing: on a card, the box knows a new part by its serial number"));

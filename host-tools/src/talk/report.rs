@@ -26,7 +26,6 @@ use crate::source::item::Item;
 use crate::summary::Overview;
 
 const SCHEMA: Schema = Schema::first("hums-box-report");
-/// Tables of the report, with the newest records of a log that are kept: bounded memory.
 const KEPT: [(&str, usize); 6] = [
     ("HUMS_BOOT", 100),
     ("HUMS_FAULT", 100),
@@ -35,7 +34,6 @@ const KEPT: [(&str, usize); 6] = [
     ("HUMS_PARAM", 800),
     ("HUMS_STATS", 1),
 ];
-/// Newest logs of a card.
 const LOGS_MAX: usize = 20;
 
 #[derive(Debug, Serialize)]

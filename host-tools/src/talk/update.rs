@@ -108,7 +108,6 @@ fn judge(bytes: &[u8]) -> Result<Header, &'static str> {
     good.map(|()| header).map_err(|_| "is damaged or forged: its signature does not fit")
 }
 
-/// By the newest log on the card.
 struct Newest {
     board: String,
     version: String,

@@ -11,7 +11,6 @@ use tempfile::TempDir;
 use crate::support::{attempt, end_of, made_once};
 
 pub(crate) const BLOCK: usize = 512;
-/// A segment of the cards here, with its parity at its end.
 pub(crate) const SEGMENT: usize = 7_999 * BLOCK;
 
 /// The commands that read; the first one is the judge.

@@ -53,7 +53,6 @@ fn files(dir: &Path, ending: &str) -> BTreeMap<String, PathBuf> {
     found
 }
 
-/// The name of a packed log's files in a directory: its own name and its session's.
 fn named(dir: &Path, stem: &str) -> String {
     let entries = fs::read_dir(dir).expect("a directory").map(|entry| entry.expect("an entry").file_name());
     let mut names: Vec<String> = entries

@@ -19,7 +19,6 @@ const SERVES: &str = "live";
 /// Examples that need a firmware image (`tests/chip` runs one) or a board (`tests/sim/companion.rs` simulates one).
 const ELSEWHERE: [&str; 3] = ["--firmware", "box ", "s3://"];
 
-/// The files of the documents' examples.
 const DOCUMENTED: [(&str, &str); 2] = [
     ("flight.tlog", "tests/flights/ap_quad_faults.tlog"),
     ("f12.bin", "tests/labelled/bin/f12_gps_jump.bin.gz"),

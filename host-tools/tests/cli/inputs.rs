@@ -46,7 +46,6 @@ const ELSE_REFUSED: [(&str, &str, &str, &str); 1] = [(
     "what it writes lies in that folder",
 )];
 
-/// Commands without a pair of input and output to try, with the reason.
 const NO_PAIRS: [(&str, &str); 15] = [
     ("check", "prints"),
     ("live", "shows and sends"),
@@ -65,7 +64,6 @@ const NO_PAIRS: [(&str, &str); 15] = [
     ("box params set", "talks with a board"),
 ];
 
-/// A valid value for an argument that needs one.
 pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     match (command, arg) {
         ("decode" | "report" | "info" | "box", "inputs") | ("check", "past") => "log.hum",
@@ -87,7 +85,6 @@ pub(crate) fn value(command: &str, arg: &str) -> &'static str {
     }
 }
 
-/// The words of a command line: its name, its required arguments, and these.
 pub(crate) fn words(command: &clap::Command, path: &[&str], given: &[(&Arg, String)]) -> Vec<String> {
     let mut words: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
     let mut push = |arg: &Arg, value: String| {

@@ -10,7 +10,6 @@ use super::support::{attempt, recorded, run, text};
 /// Members whose own names are data: counters, messages' fields, parameters.
 const MAPS: [&str; 5] = ["usage", "lifetime", "cycles", "stack_by_urgency", "counts"];
 
-/// The names of all members, with those around them: `logs[].vehicle.system`.
 fn members(value: &Value, around: &str, names: &mut BTreeSet<String>) {
     match value {
         Value::Object(object) => {

@@ -8,7 +8,6 @@ use crate::model::{Kind, Model, crc7, crc16};
 
 /// Clocks with an unselected card that it needs before its first command (6.4.1).
 const WAKE_CLOCKS: u32 = 74;
-/// Clocks before its identification, and afterwards.
 const IDENTIFICATION_HZ: u32 = 400_000;
 const TRANSFER_HZ: u32 = 25_000_000;
 

@@ -9,7 +9,6 @@ use rig::{FILE_TRANSFER_PROTOCOL, LOG_DATA, LOG_ENTRY, Rig, read as read_card};
 
 const MIB: u32 = 2_048;
 const S: u64 = 1_000;
-/// The next log to be overwritten.
 const VICTIM: LogName = LogName { session: 2, segment: 0 };
 
 const LIST: u8 = 3;

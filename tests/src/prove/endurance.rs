@@ -120,7 +120,6 @@ pub(super) fn run(options: &Options) -> Result<Figures> {
     Ok(figures)
 }
 
-/// Recordings in turn, until the day is over.
 struct Day<'a> {
     streams: &'a [Stream],
     next: usize,

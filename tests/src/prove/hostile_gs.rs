@@ -31,7 +31,6 @@ const GS_BAUD: u64 = 57_600;
 const STEP_US: u64 = 5_000;
 const SECOND_US: u64 = 1_000_000;
 const KEY: [u8; 32] = [0x5a; 32];
-/// Budget with a key, bytes a second.
 const BUDGET: u32 = 1_000;
 /// The highest value that anybody may set.
 const BUDGET_MAX: u32 = 5_000;

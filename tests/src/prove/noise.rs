@@ -12,7 +12,6 @@ use super::stream::{Stream, hash};
 use crate::damage;
 use crate::flights::{OWN, own};
 
-/// The probability that a byte is damaged.
 const PROBABILITIES: [f64; 5] = [0.000_01, 0.000_1, 0.001, 0.003, 0.01];
 /// Far below the recorder's limit: only the noise matters.
 const BAUD: u64 = 230_400;

@@ -96,7 +96,6 @@ pub(super) struct Tally {
     pub(super) noticed: u64,
     /// Whole up to an end mark, and it is.
     pub(super) told: u64,
-    /// Nothing is missing, and the repair is reported.
     pub(super) repaired: u64,
     /// Read as the other session: its sector is the first one.
     pub(super) other: u64,

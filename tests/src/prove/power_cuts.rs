@@ -189,12 +189,10 @@ struct Session {
     card: Card,
     before: Vec<u8>,
     files: Vec<CardFile>,
-    /// Files of earlier sessions that this one overwrote.
     overwritten: BTreeSet<String>,
     /// The earlier session's file of a block.
     owners: BTreeMap<u32, usize>,
     trace: Vec<Written>,
-    /// The session's own logs, and its number in sectors.
     logs: BTreeSet<String>,
     sealed_as: u32,
     arrivals_us: Vec<u64>,

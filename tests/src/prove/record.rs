@@ -18,7 +18,6 @@ pub(super) struct Frame {
 pub(super) struct Record {
     pub(super) frames: Vec<Frame>,
     pub(super) groups: Vec<usize>,
-    /// Each gap with the number of frames before it.
     pub(super) gaps: Vec<(usize, Gap)>,
     pub(super) summary: LogSummary,
 }

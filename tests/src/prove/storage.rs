@@ -28,7 +28,6 @@ pub const ABOUT: &str = "tables in object storage: jobs at once, kills, wrong se
 /// A killed program's lease is over in three minutes.
 const LIMIT: Duration = Duration::from_mins(6);
 const START: Duration = Duration::from_mins(1);
-/// An error of a server that is not there comes within this time.
 const ERROR_LIMIT: Duration = Duration::from_mins(1);
 const KEYS: [(&str, &str); 2] = [("AWS_ACCESS_KEY_ID", "hums"), ("AWS_SECRET_ACCESS_KEY", "secret")];
 const CONFIG: &str = r#"{"identities": [{"name": "hums", "credentials": [{"accessKey": "hums", "secretKey": "secret"}],
@@ -98,7 +97,6 @@ impl Server {
         oracle::storage(&self.environment(), &arguments).context("the other client failed")
     }
 
-    /// Keys of the fleet that begin so.
     fn keys(&self, begin: &str) -> Result<Vec<String>> {
         let keys = self.ask(&["list", "fleet/all"])?;
         let keys = keys.as_array().context("a list")?.iter().filter_map(Value::as_str);

@@ -17,13 +17,11 @@ use super::tools::{files_below, folders, on_one_core, repeat, work_folder};
 use crate::hums;
 use crate::oracle;
 
-/// MB a second, on one core.
 const ASKED_MB_S: f64 = 100.0;
 /// Least bytes of a log.
 const BYTES_MIN: f64 = 16e6;
 const ROUNDS: usize = 5;
 
-/// A reader in Python; the first argument is the log.
 const DATAFLASH: &str = "import sys\n\
     from pymavlink import DFReader\n\
     log = DFReader.DFReader_binary(sys.argv[1])\n\

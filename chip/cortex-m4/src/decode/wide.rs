@@ -112,7 +112,6 @@ pub(super) fn plain_immediate(place: Place, a: u32, b: u32) -> Op {
     }
 }
 
-/// Data processing (shifted register).
 pub(super) fn shifted_register(a: u32, b: u32) -> Op {
     let (n, d, m, flags) = (reg(a, 0), reg(b, 8), reg(b, 0), a & 0x10 != 0);
     let amount = field(b, 12, 3) << 2 | field(b, 6, 2);

@@ -11,7 +11,6 @@ const USART1: usize = 0;
 const USART2: usize = 1;
 const FAST: f64 = 115_200.0;
 const SLOW: f64 = 9_600.0;
-/// The button, to ground; the LED of most.
 const BUTTON: Pin = Pin(0, 0);
 const LED: Pin = Pin(2, 13);
 

@@ -48,7 +48,6 @@ const PULL_CYCLES: u32 = 168_000;
 
 pub(crate) type UsbDriver<'d> = usb::Driver<'d, peripherals::USB_OTG_FS>;
 
-/// The USB port, which is off until it is used.
 pub(crate) struct Usb {
     port: Peri<'static, peripherals::USB_OTG_FS>,
     plus: Peri<'static, peripherals::PA12>,

@@ -22,7 +22,6 @@ use crate::links::{self, now};
 
 const REPORT: Duration = Duration::from_secs(1);
 
-/// Period after the end of the log.
 const END_LOOK: Duration = Duration::from_millis(10);
 
 type Recording = Storage<'static, board::Card>;

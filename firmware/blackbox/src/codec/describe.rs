@@ -45,7 +45,6 @@ fn elements_of(field: FieldLayout) -> (What, u8, u8) {
 }
 
 impl Body {
-    /// A new slot with its elements; without a layout if the model has no room for them.
     pub(super) fn describe(&mut self, key: Key, place: Option<LayoutIndex>, layout: Option<Layout>) -> Slot {
         let (mut count, mut described) = (0, 0);
         let mut index = 0;

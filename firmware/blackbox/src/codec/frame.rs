@@ -113,7 +113,6 @@ impl Frame {
             + if self.signed() { SIGNATURE_BYTES } else { 0 }
     }
 
-    /// The frame with this seed's checksum, or with its own.
     pub(crate) fn assemble(&mut self, seed: Option<u8>, out: &mut [u8; ENTRY_BYTES_MAX]) {
         if let Some(seed) = seed {
             self.checksum = crc::step(self.checksum_before_seed(), seed);

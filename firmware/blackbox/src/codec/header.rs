@@ -20,7 +20,6 @@ const SYMBOL: Cdf = Cdf::from_sizes([80, 4, 8, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 
 /// Statistics of headers.
 pub(super) struct Headers {
     last: u8,
-    /// For a slot's first frame.
     first: Cdf,
     /// For unexpected frames, by the coding of the slot's last one, and of the one before.
     symbols: [Cdf; 16],

@@ -9,7 +9,6 @@ const NONE: u16 = u16::MAX;
 
 pub(crate) struct Recall {
     slot: usize,
-    /// Seed of the frame's checksum, if the checksum was not sent.
     pub(crate) seed: Option<u8>,
     /// Limits of the fields in each slot's last payload, which has no other bytes.
     limits: [u16; SLOTS],
@@ -28,7 +27,6 @@ impl Recall {
         self.slot = slot;
     }
 
-    /// Whether the last payload is there and was limited as this one is.
     #[inline]
     pub(super) fn has(&self, limit: usize) -> bool {
         self.limits.get(self.slot).is_some_and(|&known| usize::from(known) == limit)
@@ -43,7 +41,6 @@ impl Recall {
     }
 }
 
-/// One end of the coder; the reader includes its memory.
 pub(super) trait End: Coder {
     fn reading(&mut self) -> Option<Reading<'_, Recall>>;
 }

@@ -34,7 +34,6 @@ pub(crate) enum Length {
 pub(crate) struct Slot {
     pub(crate) key: Key,
     pub(crate) layout: Option<LayoutIndex>,
-    /// First element, and their number.
     pub(crate) elements: u16,
     pub(crate) elements_count: u8,
     /// The distribution of the times before its frames; 0: none yet.

@@ -7,7 +7,6 @@ use crate::distribution::{Cdf, Cell};
 /// Rows, hashed without check: a distribution of four bits each.
 const ROWS: usize = 64;
 
-/// Bytes in a row as in the text before.
 const MATCHES: usize = 8;
 
 pub(crate) struct TextModel {

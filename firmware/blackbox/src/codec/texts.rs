@@ -7,7 +7,6 @@ use crate::distribution::Cdf;
 
 const TEXT_BYTES: usize = 1_024;
 
-/// The longest text: a payload.
 const TEXT_BYTES_MAX: usize = 255;
 
 const NOT_KEPT: u32 = u32::MAX;

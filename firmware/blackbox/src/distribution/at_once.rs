@@ -41,7 +41,6 @@ impl Cdf {
     }
 }
 
-/// Each part begins at `part_of`.
 #[cfg(not(target_arch = "x86_64"))]
 fn find(width: u16, offset: u32, part_of: impl Fn(usize) -> (u32, u32)) -> usize {
     let part = (offset / u32::from(width)).min(u32::from(u16::MAX));

@@ -187,7 +187,6 @@ impl<'a> Sink<'a> {
         self.cut(text, NAME_BYTES_MAX)
     }
 
-    /// A text, cut likewise.
     pub(crate) fn text(&mut self, text: &str) -> &mut Self {
         self.cut(text, TEXT_BYTES_MAX)
     }

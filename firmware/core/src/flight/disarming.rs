@@ -26,7 +26,6 @@ pub(super) struct DisarmWatch {
     /// Height above mean sea level, m.
     altitude_m: Option<f32>,
     pub(super) is_unloaded: bool,
-    /// It stood still and level since.
     stood: bool,
 }
 

@@ -23,7 +23,6 @@ const FALL_G: f32 = 0.3;
 const UNLOADED_G: f32 = 0.65;
 const UNLOADED: Millis = Millis::from_millis(200);
 const DROPS: Millis = Millis::from_millis(300);
-/// A speed has broken off when it is below this part of it within so long.
 const BROKEN_OFF: f32 = 0.4;
 pub(super) const BREAKS_OFF: Millis = Millis::from_secs(1);
 /// A vehicle whose speed broke off thrashes about for so long at most.
@@ -90,7 +89,6 @@ state! {
     pub(super) struct Signs {
         /// The worst of each sign, in its own unit; 0 for none.
         pub(super) worst: [f32; MishapKind::COUNT],
-        /// A sign of this step; the time of the last one.
         pub(super) seen: Option<MishapKind>,
         pub(super) seen_at: BootMs,
         /// Since when an inertial sensor has fallen or turned while the others say that it flies.

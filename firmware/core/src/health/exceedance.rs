@@ -70,7 +70,6 @@ const fn worse(known: f32, value: f32, side: Side) -> f32 {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
-    /// Its place among all checks.
     check: u16,
     instance: u8,
     /// [`Level::Ok`] while nothing is exceeded.
@@ -127,7 +126,6 @@ impl Exceedances {
     /// instance, warnings and criticals (u16), tenths of a second of both (u32), peak (f32).
     pub const BYTES: usize = 1 + EXCEEDANCES_MAX * (4 + 1 + 2 + 2 + 4 + 4 + 4);
 
-    /// `check`: its place among all checks.
     pub(crate) fn change(&mut self, check: u16, side: Side, finding: &Finding) {
         let Some(entry) = self.entry(check, finding) else { return };
         entry.extend(finding.at);

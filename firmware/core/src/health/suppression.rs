@@ -117,7 +117,6 @@ pub(super) const TURNS: u64 = GYROS | Group::GyroNoise.bit();
 pub(super) const COMPASS: u64 = Group::CompassFault.bit() | Group::CompassMismatch.bit();
 pub(super) const SENSORS: u64 =
     INERTIAL | TURNS | COMPASS | Group::CompassUse.bit() | Group::BaroFault.bit() | Group::Sensor.bit();
-/// Whatever disturbs an estimator.
 pub(super) const DISTURBANCES: u64 = RECEIVERS | SENSORS | SHAKING;
 pub(super) const ESTIMATORS: u64 = Group::EkfClimb.bit() | Group::Ekf.bit();
 /// Made of several sensors.

@@ -16,7 +16,6 @@ pub(super) const TABLES: [&[Check]; 10] = [
     mishap::CHECKS,
 ];
 
-/// Checks in all tables, and states: one for each instance.
 const COUNTS: (usize, usize) = {
     let (mut rows, mut states) = (0, 0);
     let mut table = 0;
@@ -62,7 +61,6 @@ pub fn checks() -> impl ExactSizeIterator<Item = &'static Check> + Clone {
     CHECKS.iter()
 }
 
-/// Number, check and instance of each state.
 pub(super) fn slots() -> impl Iterator<Item = (u16, &'static Check, u8)> + Clone {
     let each = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
     (0..).zip(each).map(|(slot, (check, instance))| (slot, check, instance))

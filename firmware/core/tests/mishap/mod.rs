@@ -36,7 +36,6 @@ struct Motion {
     pitch: f32,
     pressure_hpa: Option<f32>,
     shock_g: Option<f32>,
-    /// The climb on the display.
     displayed_mps: Option<f32>,
     roll_wanted: Option<f32>,
     unheard: bool,
@@ -207,7 +206,6 @@ const LANDED: Counts = (1, 1, 0);
 const DOWN: Counts = (1, 0, 1);
 const NONE: Counts = (0, 0, 0);
 
-/// The vehicles of a case: all or the first of those on rotors or on wings, or these.
 fn vehicles(text: &str) -> Vec<&str> {
     let (of, count) = text.split_once(' ').unwrap_or((text, "6"));
     match of {

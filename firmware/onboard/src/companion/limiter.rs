@@ -11,7 +11,6 @@ pub(crate) struct Asker {
     pub(crate) by: By,
 }
 
-/// Requests of a port at once, and each second.
 const REQUESTS_MAX: u32 = 20;
 const REQUESTS_PER_S: u32 = 5;
 

@@ -25,9 +25,7 @@ use hums_link::request::Port;
 use super::ways::Ways;
 use crate::queues::SummaryRoute;
 
-/// Messages of a telemetry radio.
 const RADIO: [u32; 2] = [ids::RADIO, ids::RADIO_STATUS];
-/// Answers without an address.
 const ANSWERS: [u32; 13] = [
     ids::PARAM_VALUE,
     ids::GPS_GLOBAL_ORIGIN,

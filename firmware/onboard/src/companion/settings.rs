@@ -28,7 +28,6 @@ use crate::shelf::{LogRequest, Reader, What, Which};
 const BYTES_MAX: u32 = 16 * 1024;
 /// A card that is there is open by then; without one, no file replaces a part.
 const CARD_COMES: Span = Span::from_secs(10);
-/// A line without its comment.
 const LINE_MAX: usize = 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -47,7 +47,6 @@ const PARTIAL: Span = Span::from_millis(150);
 const STATS: Span = Span::from_secs(10);
 const USAGE: Span = Span::from_secs(60);
 
-/// The `MAV_SEVERITY` of a restart after a fault.
 const FAULT_SEVERITY: u8 = 4;
 
 /// The steps of a frame, in order.
@@ -77,7 +76,6 @@ pub struct Monitoring<'a> {
     recorded: RecordedState,
     notices: Notices,
     card_notices: CardNotices,
-    /// Files of storage at the last tick.
     files: u32,
     figures: Figures<'a>,
     marks: Marks,

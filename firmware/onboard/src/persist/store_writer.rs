@@ -36,7 +36,6 @@ pub struct StoreWriter<'a, F: NorFlash> {
     store: Option<Store<F>>,
     items: MailboxOut<'a>,
     pub(crate) status: &'a StoreStatus,
-    /// The item has been counted as waiting.
     waits: bool,
     /// The work of this calm time is done.
     turned: bool,

@@ -2,7 +2,6 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// Bytes of the length that the queue puts before each frame.
 pub(super) const HEAD_BYTES: usize = 2;
 
 /// It includes the queue's own bytes, but not the gap before it wraps to its start, which is shorter than a
@@ -13,7 +12,6 @@ pub(super) struct Level {
     bytes_max: AtomicU32,
     /// A reader takes the bytes. The USB port may have none.
     is_open: AtomicBool,
-    /// Frames that the reader dropped.
     dropped: AtomicU32,
 }
 

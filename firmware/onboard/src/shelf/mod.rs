@@ -107,8 +107,6 @@ pub struct Server<'a> {
     erases: Option<u32>,
 }
 
-/// The place of a log in the list of shown logs, and its entry in the directory, valid while the directory has these
-/// names.
 #[derive(Clone, Copy, Default)]
 struct ListedLog {
     names: u32,

@@ -28,7 +28,6 @@ const HIGH_CAPACITY: u32 = 1 << 30;
 const RESET_MAX: Span = Span::from_millis(200);
 /// Maximum time until a card ends a row of blocks, by the specification.
 const STOP_MAX: Span = Span::from_millis(500);
-/// Timeouts of a busy card before it is reset.
 const BUSY_TIMES: u8 = 4;
 /// Maximum start time of a card. The specification allows 1 s.
 const START_MAX: Span = Span::from_secs(2);

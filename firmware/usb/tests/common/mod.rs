@@ -12,7 +12,6 @@ use hums_usb::transport::{Invalid, STATUS_BYTES, Step, Transport};
 
 pub(crate) const BLOCKS: u32 = 1_000;
 pub(crate) const SERIAL: [u8; 24] = *b"0123456789ABCDEF01234567";
-/// Blocks of a chunk.
 pub(crate) const CHUNK: usize = 4;
 /// `bCBWFlags` of a command whose data goes to the host.
 pub(crate) const IN: u8 = 0x80;
@@ -28,7 +27,6 @@ pub(crate) struct Numbered {
     pub(crate) resets: Rc<Cell<u32>>,
     /// The highest block that was read, plus 1.
     pub(crate) end: Rc<Cell<u32>>,
-    /// How many were read.
     pub(crate) reads: Rc<Cell<u32>>,
     pub(crate) now: Rc<Cell<Instant>>,
     /// Its content is another one.

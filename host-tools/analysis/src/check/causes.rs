@@ -13,7 +13,6 @@ struct Open<'a> {
     level: Level,
     check: &'a str,
     instance: u8,
-    /// Findings of the check without a cause yet.
     unexplained: Vec<usize>,
 }
 

@@ -90,7 +90,6 @@ pub(super) struct Recording<'a> {
     pub(super) by: JudgedBy,
     pub(super) monitor: &'a Monitor,
     pub(super) is_of_link: bool,
-    /// The recording was taken on the monitor's own wire.
     pub(super) on_the_wire: bool,
     /// Time armed.
     pub(super) armed: Span,
@@ -98,7 +97,6 @@ pub(super) struct Recording<'a> {
     pub(super) arming: Option<&'a str>,
     /// It was in the air.
     pub(super) flew: bool,
-    /// The cell count of the battery is unknown.
     pub(super) cells_unknown: bool,
     /// The problems found.
     pub(super) problems: &'a [Problem],

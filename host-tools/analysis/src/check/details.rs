@@ -91,7 +91,6 @@ impl Details {
         all
     }
 
-    /// These failsafes are in force from here on.
     pub(super) fn failsafes(&mut self, words: &str) {
         words.clone_into(&mut self.failsafes);
     }

@@ -50,15 +50,12 @@ pub(super) struct Flights {
     /// Silence; not seen to fly since.
     unseen: bool,
     silence: Option<Silence>,
-    /// Time since a possible landing; flight if it goes on.
     landing: Span,
     stepped_at: Option<Instant>,
 }
 
-/// A silent vehicle, not known to be still on its flight.
 #[derive(Clone, Copy, Debug)]
 struct Silence {
-    /// The flight's end, when last received.
     to: Instant,
     air: Span,
     /// Received again.

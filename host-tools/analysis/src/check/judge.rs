@@ -89,7 +89,6 @@ impl Limits {
     }
 }
 
-/// The last reception, and whether it was in the air.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     at: Instant,
@@ -101,14 +100,12 @@ struct Last {
 struct Silence {
     to: Instant,
     airborne: bool,
-    /// Index of the gap.
     gap: usize,
 }
 
 /// Item by item.
 pub struct Judge {
     monitor: Box<Monitor>,
-    /// The monitor of the file's last part with an autopilot.
     earlier: Option<Box<Monitor>>,
     limits: Limits,
     format: Format,
@@ -749,7 +746,6 @@ fn place_deg(vehicle: &Vehicle) -> Option<(f64, f64)> {
     estimated.or_else(received).map(|position| (position.latitude_deg, position.longitude_deg))
 }
 
-/// Time armed by the usage counters: without gaps.
 fn armed(monitor: &Monitor) -> Span {
     let mut seconds = 0.0;
     monitor.for_each_counter(|number, value| {

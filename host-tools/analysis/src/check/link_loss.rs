@@ -342,7 +342,6 @@ impl LinkLoss {
         (slow && lost_m > CAME_DOWN_M && (in_vain || fell)).then_some((IMPACT, None))
     }
 
-    /// Whether it lies by an attitude that no sensor contradicts, or on its back.
     fn lies(&self, now: BootMs, vehicle: &Vehicle) -> bool {
         let tilts = |attitude: &Attitude| attitude.roll.0.abs().max(attitude.pitch.0.abs()) > TILTED_RAD;
         let is_tilted =

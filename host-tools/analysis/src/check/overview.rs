@@ -38,7 +38,6 @@ pub(super) struct Read {
     pub(super) format: Format,
     /// The judgement.
     pub(super) judged: Judged,
-    /// Summary of the data read.
     pub(super) summary: RecordingSummary,
     /// Bytes of the file that were read.
     taken: u64,

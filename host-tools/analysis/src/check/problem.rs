@@ -239,7 +239,6 @@ impl Problems {
         }
     }
 
-    /// May exceed the values at changes.
     pub(super) fn peak(&mut self, check: &str, instance: u8, value: f32) {
         if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), instance)) {
             problem.value = worse(problem.value, measured(check, value, problem.limit), check);
@@ -351,7 +350,6 @@ pub fn problems<'a>(
     problems.worst_first()
 }
 
-/// Gives the worst value of each problem to the finding from which it counts.
 pub(super) fn give_worst(findings: &mut [Finding], problems: &[Problem]) {
     for problem in problems {
         let is_it = |of: &&mut Finding| {

@@ -33,11 +33,9 @@ use crate::source::told::Finding;
 
 /// Flights that make a baseline; before, nothing is compared.
 pub const FLIGHTS_MIN: u16 = 3;
-/// Weight of a flight in a baseline of many.
 const WEIGHT: f32 = 0.1;
 /// Remembered flights.
 const REMEMBERED: u16 = 10;
-/// The prior spread's weight, flights.
 const PRIOR_FLIGHTS: f32 = 8.0;
 /// See above.
 const WEIGHT_EXPONENT: f32 = 1.25;
@@ -54,7 +52,6 @@ pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
     causes.iter().find(is_cause).map(|cause| (*cause).to_owned())
 }
 
-/// A part that a figure depends on was changed.
 pub(super) fn is_change(record: &Record<'_>) -> bool {
     match record {
         Record::Component(part) => part.why == Why::Replaced && part.kind != ComponentKind::Card,

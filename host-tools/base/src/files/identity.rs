@@ -37,7 +37,6 @@ impl FileId {
     }
 }
 
-/// A path without links, if the file exists.
 pub(super) fn without_links(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

@@ -58,7 +58,6 @@ pub fn make_directory(dir: &Path) -> Result<()> {
     fs::create_dir_all(dir).with_context(|| format!("{}: cannot be made", dir.display()))
 }
 
-/// Refuses a directory if it, or a parent, is a file or a device such as `/dev/null`.
 fn check_directory(dir: &Path) -> Result<()> {
     // Without a slash at its end, with which a file is not found.
     let dir: PathBuf = dir.components().collect();

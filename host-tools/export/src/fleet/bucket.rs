@@ -117,7 +117,6 @@ impl Bucket {
         self.partition(name, None)?.end()
     }
 
-    /// The lease of a date and bucket, without a begun change.
     fn partition<'a>(&'a self, name: &str, outer: Option<&'a Lease<'a>>) -> Result<Lease<'a>> {
         let lease = self.lease(name, &[], outer)?;
         self.apply(&lease, name)?;
@@ -265,7 +264,6 @@ impl Bucket {
         Ok(files)
     }
 
-    /// Compacts all dates and buckets. The error of one leaves it as it is, and is passed to `failed`.
     pub(super) fn compact(&self, failed: &mut dyn FnMut(&str, &anyhow::Error)) -> Result<(Sum, usize)> {
         if self.objects.get(&format!("{OWN}/{STORAGE}"))?.is_none() {
             return Err(compact::no_tables(&self.address.to_string()));
@@ -297,7 +295,6 @@ impl Bucket {
         Ok((sum, partitions))
     }
 
-    /// Sessions of a date and bucket that are complete, and share no file yet.
     fn complete(&self, partition: &str) -> Result<BTreeSet<String>> {
         let rows = self.objects.list(&format!("{SESSIONS}/{partition}"))?;
         // Later than that list: a session without a lease was complete in it.
@@ -354,7 +351,6 @@ impl Bucket {
         Ok(merged.sum)
     }
 
-    /// Files of complete sessions, and smaller ones of several sessions in the same tables.
     fn to_compact(&self, partition: &str, sessions: &BTreeSet<String>) -> Result<Vec<Object>> {
         let mut all = Vec::new();
         for table in self.tables()? {

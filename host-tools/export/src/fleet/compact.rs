@@ -141,7 +141,6 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
 /// New files of a date and bucket, which do not count yet.
 pub(super) struct Merged {
     pub(super) transaction: Transaction,
-    /// Places of the files that they replace.
     pub(super) replaced: BTreeSet<String>,
     sessions: Vec<String>,
     pub(super) sum: Sum,

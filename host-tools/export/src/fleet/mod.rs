@@ -89,7 +89,6 @@ impl Fleet {
         self.bucket.as_ref().map_or_else(|| self.root.join(place), |bucket| bucket.address.shown(place))
     }
 
-    /// Looks for a session, in any date and bucket.
     fn find(&self, session: &str) -> Result<Option<Found>> {
         if let Some(bucket) = &self.bucket {
             return bucket.find(session);
@@ -176,7 +175,6 @@ fn folders(folder: &Path) -> Result<Vec<String>> {
 
 pub(crate) struct Session {
     transaction: Transaction,
-    /// The path of the tables as it is shown.
     root: PathBuf,
     partition: String,
     name: String,

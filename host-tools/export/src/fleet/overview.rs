@@ -135,7 +135,6 @@ pub struct Outlier {
 struct Gathered {
     vehicle: Vehicle,
     flown: Vec<Flown>,
-    /// Time of the last session, and of the last one with parts.
     last: Option<f64>,
     last_parts: Option<f64>,
     due: Vec<Due>,
@@ -176,7 +175,6 @@ fn once(mut flown: Vec<Flown>) -> Vec<Flown> {
 /// Of a vehicle, by the number of the figure.
 type Medians = BTreeMap<usize, f64>;
 
-/// Figures that vehicles are compared by: their columns, quantities.
 fn figures() -> Vec<(String, Quantity)> {
     let figure = |number| match meaning(number) {
         // A motor differs from its neighbours, not from other vehicles.

@@ -16,7 +16,6 @@ use super::transaction::stop;
 use super::*;
 use crate::identity::Identity;
 
-/// Numbers of vehicles; three of them share a bucket.
 const VEHICLES: [u64; 5] = [0, 2, 10, 1, 3];
 pub(super) const TABLES: [&str; 3] = ["A", "B", SESSIONS];
 
@@ -215,7 +214,6 @@ fn a_complete_change_is_never_applied_again_whatever_is_left_of_its_folder() {
     }
 }
 
-/// A folder of tables may come from elsewhere.
 #[test]
 fn a_change_that_names_files_elsewhere_removes_none() {
     let dir = tempfile::tempdir().expect("a directory");

@@ -22,11 +22,9 @@ use crate::storage::is_inside;
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
 pub(crate) const OWN: &str = ".hums-fleet";
-/// The mark of tables in object storage.
 pub(crate) const STORAGE: &str = "storage";
 const COMMIT: &str = "commit-";
 pub(crate) const PART: &str = ".hums-part";
-/// Files in a change's folder: new files, replaced ones, and sessions that share a file from now on.
 const FILES: &str = "files";
 const REPLACED: &str = "replaced";
 const COMPACTED: &str = "compacted";
@@ -132,7 +130,6 @@ pub(crate) struct Transaction {
 pub(crate) struct Synced {
     root: PathBuf,
     part: TempDir,
-    /// Places of the new files.
     places: Vec<String>,
 }
 
@@ -148,7 +145,6 @@ impl Transaction {
         self.part.path().join(FILES).join(place)
     }
 
-    /// Places of the new files.
     pub(crate) fn places(&self) -> Result<Vec<String>> {
         let mut places = Vec::new();
         let listed = each(&self.part.path().join(FILES), "", &mut |place| {

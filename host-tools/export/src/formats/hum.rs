@@ -182,7 +182,6 @@ struct Packer<W> {
     checksums: Checksums,
     /// Bytes of frames of unknown messages that the framer took for none, and that are kept all the same.
     unknown_bytes: u64,
-    /// Places of the recording that are damaged, until now.
     damages: u64,
 }
 

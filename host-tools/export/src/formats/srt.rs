@@ -17,7 +17,6 @@ use crate::source::told::Finding;
 use crate::story::Story;
 
 const SECOND_US: i64 = 1_000_000;
-/// A finding is shown this long.
 const SHOWN_US: i64 = 5 * SECOND_US;
 
 /// The open file.

@@ -130,7 +130,6 @@ impl Writer for Thesis {
         story.observed.iter().try_for_each(|observed| self.observe(context, observed))
     }
 
-    /// Gaps have no rows.
     fn gap(&mut self, _: &Context, gap: &Gap) -> Result<()> {
         let seconds =
             |at: Option<Instant>| at.map_or_else(String::new, |at| format!("{:.3}", at.as_secs_f64()));

@@ -32,7 +32,6 @@ const PARAMETERS_MAX: usize = 16_384;
 /// Bytes of a text: a message has a length of 16 bits.
 const TEXT_BYTES_MAX: usize = 1_024;
 
-/// The topics, by their index, and their fields after the time.
 const TOPICS: [(&str, &str); 14] = [
     ("vehicle_attitude", "float[4] q;"),
     ("vehicle_angular_velocity", "float[3] xyz;"),

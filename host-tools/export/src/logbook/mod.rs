@@ -111,7 +111,6 @@ impl LogbookEntry {
         !self.key.ends_with("-0")
     }
 
-    /// The name of its recording.
     fn recording(&self) -> &str {
         self.key.rsplit_once('-').map_or(&self.key, |(recording, _)| recording)
     }
@@ -221,7 +220,6 @@ impl Form {
     }
 }
 
-/// A recording as a logbook has it.
 struct Session {
     recording: String,
     vehicle: String,

@@ -35,9 +35,7 @@ use crate::story::{Observed, Story, StoryEntry};
 use moved::{Moved, SHARED_UTC_US};
 use rules::{Rule, Rules};
 
-/// Items of a part of an autopilot's own log.
 const PART_ITEMS: usize = 4_096;
-/// Names in the list of removed data.
 const REMOVED_MAX: usize = 2_000;
 const RECORDS: &str = "records of the board";
 /// With places, identities or texts.
@@ -117,7 +115,6 @@ struct Share {
     seen: BTreeMap<String, u64>,
     removed_others: u64,
     kept: u64,
-    /// New system ids, by their first frame.
     systems: BTreeMap<u8, u8>,
 }
 

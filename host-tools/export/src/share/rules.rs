@@ -8,9 +8,7 @@ use hums_dialect::{Kind, Message};
 const FIELDS: &str = include_str!("fields.txt");
 const PARAMETERS: &str = include_str!("parameters.txt");
 const WORDS: &str = include_str!("words.txt");
-/// Digits of a number in a text at most.
 const DIGITS_MAX: usize = 3;
-/// Numbers in a text that stays, at most.
 const NUMBERS_MAX: usize = 2;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -23,7 +23,6 @@ use crate::output;
 const SCHEME: &str = "s3://";
 /// The folder of all buckets.
 const ROOT: &str = "s3:/";
-/// Objects that are sent or received at once.
 const AT_ONCE: usize = 4;
 /// Objects of an input at most: each takes some hundred bytes.
 const INPUTS_MAX: usize = 10_000;
@@ -62,7 +61,6 @@ impl Address {
         Self { prefix: prefix.to_owned(), ..self.clone() }
     }
 
-    /// The last name of it, for a file or folder on this computer.
     fn name(&self) -> &str {
         if self.prefix.is_empty() { &self.bucket } else { self.prefix.rsplit('/').next().unwrap_or_default() }
     }
@@ -78,7 +76,6 @@ impl fmt::Display for Address {
 /// The content of an object at one moment: its `ETag`.
 pub(crate) type Tag = String;
 
-/// An object in a list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Object {
     pub(crate) key: String,
@@ -257,7 +254,6 @@ pub(crate) fn scratch() -> Result<TempDir> {
     tempfile::tempdir().context("a temporary folder cannot be made; TMPDIR names another folder for it")
 }
 
-/// Places of all files below a folder, without hidden ones.
 fn files(folder: &Path, prefix: &str, places: &mut Vec<String>) -> Result<()> {
     for name in crate::fleet::names(&folder.join(prefix))?.into_iter().filter(|name| !name.starts_with('.')) {
         let place = if prefix.is_empty() { name } else { format!("{prefix}/{name}") };
@@ -302,7 +298,6 @@ fn is_name(part: &str) -> bool {
     !["", ".", ".."].contains(&part)
 }
 
-/// Whether a key is a path below a folder.
 pub(crate) fn is_inside(key: &str) -> bool {
     let mut parts = Path::new(key).components();
     !key.is_empty() && !key.ends_with('/') && parts.all(|part| matches!(part, Component::Normal(_)))

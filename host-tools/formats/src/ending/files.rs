@@ -12,7 +12,6 @@ use crate::logs::segment_name;
 use crate::logs::strangers::Strange;
 use crate::plural::count;
 
-/// Files of a log that are named one by one.
 const NAMED_MAX: usize = 3;
 
 impl Ending {

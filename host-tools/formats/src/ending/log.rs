@@ -86,7 +86,6 @@ impl Ending {
         if self.has_parity() && !self.summary.marks.refused { self.summary.parity.missing } else { 0 }
     }
 
-    /// Whether its parity should be there.
     fn has_parity(&self) -> bool {
         self.aside().is_none() && self.summary.marks.has_boot
     }

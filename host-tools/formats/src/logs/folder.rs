@@ -15,14 +15,11 @@ use super::naming::{SegmentName, is_part, segment_name, segment_or_part};
 use super::places::Log;
 use crate::files::{FileId, why_unread};
 
-/// Deeper folders are not walked.
 const DEPTH_MAX: usize = 16;
 /// Folders that wait.
 const WAITING_MAX: usize = 10_000;
-/// Segments of one folder that are kept.
 const SEGMENTS_MAX: usize = 8 * LOGS_MAX;
 
-/// Endings of cards' images.
 const IMAGES: [&str; 3] = [".img", ".dd", ".iso"];
 /// Endings of their compressed forms.
 const PACKED: [&str; 5] = [".gz", ".xz", ".zst", ".bz2", ".zip"];

@@ -107,7 +107,6 @@ impl<T> Queue<T> {
     }
 }
 
-/// Closes the queue on every way out.
 struct Closing<'a, T>(&'a Queue<T>);
 
 impl<T> Drop for Closing<'_, T> {

@@ -11,7 +11,6 @@ use super::places::BLOCK_BYTES;
 use crate::archive;
 use crate::mavlink::frame::{Peek, peek};
 
-/// Blocks searched for a first sector.
 const LOOK_BLOCKS: usize = 2048;
 
 /// A file's kind.

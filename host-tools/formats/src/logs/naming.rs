@@ -83,7 +83,6 @@ pub fn segment_name(path: &Path) -> Option<SegmentName> {
     Some(SegmentName { of, session, segment })
 }
 
-/// Mark of a part of a log, in front of the ending.
 const PART: &str = ".part";
 
 /// Path of a part, made by `hums box pull --around`: `00042-s1a2b3c4d_07.part.HUM`.

@@ -17,7 +17,6 @@ pub use super::repair::Evidence;
 use super::strangers::Strange;
 use crate::plural::count;
 
-/// Groups in work for each worker, and at most.
 const GROUPS_PER_WORKER: usize = 2;
 const GROUPS_MAX: usize = 16;
 /// Bytes of a group's entries before they are handed on. A usual flight's group is smaller in any format (a
@@ -224,11 +223,9 @@ struct Decoded<C> {
     damaged: bool,
     sectors: u32,
     number: u32,
-    /// Frames that its sectors complete, by their own counts.
     frames_said: u32,
     /// First time and frames before it; `None` if it cannot be decoded.
     begun: Option<(Instant, u32)>,
-    /// Checks before the group, and up to its last sector.
     check_before: Option<u32>,
     check_end: Option<u32>,
     frames: u32,
@@ -417,7 +414,6 @@ impl Stitch {
         Ok(())
     }
 
-    /// Missing frames by the group's own count before it.
     fn frames_missing(&self, before: u32) -> Option<u32> {
         let missing = before.wrapping_sub(self.expected.unwrap_or(0));
         Some(missing).filter(|missing| *missing < 1 << 31)

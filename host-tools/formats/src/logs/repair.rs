@@ -16,7 +16,6 @@ use hums_recorder::card::SEGMENT_BYTES_MAX;
 
 use super::places::{BLOCK_BYTES, Log};
 
-/// Lost sectors of a column.
 const LOST_MAX: usize = 2;
 /// Twice the recorder's longest file. A hostile file of parity is held whole.
 const FILE_BYTES_MAX: u64 = 2 * SEGMENT_BYTES_MAX as u64;

@@ -14,11 +14,9 @@ const LOOK_BLOCKS: usize = 128;
 /// The numbers of each session, by card.
 #[derive(Clone, Debug, Default)]
 pub struct Sessions {
-    /// Logs by the names' prefix and the session.
     logs: BTreeMap<(String, u32), Vec<u32>>,
     /// Original by name of the copy.
     again: BTreeMap<String, String>,
-    /// Numbers by card; also logs without a sector.
     numbers: BTreeMap<String, BTreeSet<u32>>,
 }
 

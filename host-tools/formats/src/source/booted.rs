@@ -84,7 +84,6 @@ pub struct Booted<S> {
     /// Another recording began with the latest chunk.
     begins: bool,
     blocks: BlockFinder,
-    /// The end cuts off a frame.
     is_cut: bool,
 }
 

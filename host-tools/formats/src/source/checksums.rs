@@ -21,11 +21,9 @@ pub fn wrong_checksums(frames: u64) -> String {
 pub struct Checksums {
     /// Message known; `None` once the record's frame has come.
     waits: Option<bool>,
-    /// Length of its frame, and its time and place.
     length: usize,
     at: Instant,
     place: u64,
-    /// Number of damaged frames, and the first one.
     damaged: u64,
     first: Option<(Instant, u64)>,
     /// Frames that cannot be checked.

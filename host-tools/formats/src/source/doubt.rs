@@ -21,9 +21,7 @@ const GOES_ON_US: u64 = 500_000;
 /// Out of order up to here: slow topics come late.
 const FAR_US: u64 = 800_000;
 
-/// Value of each time in a row.
 const TIME: i32 = 10;
-/// Cost of a fall.
 const FALL: i32 = RUN * TIME + TIME / 2;
 /// Cost of disorder: a little more than a time's value.
 const LATE: i32 = TIME + 2;
@@ -129,7 +127,6 @@ impl Question<'_> {
         if step > longest.max(self.usual_us.saturating_mul(2)) { self.fall() } else { PAUSE }
     }
 
-    /// The fall: with few times most of them decide.
     fn fall(&self) -> i32 {
         let most = self.times.len() as i32 * TIME / 2;
         if self.is_end { FALL } else { FALL.min(most) }

@@ -10,11 +10,9 @@ use super::sniff::{InputKind, sniff_bytes};
 use super::{dataflash, ulog};
 use crate::archive;
 
-/// Read to find the format.
 pub(super) const LOOK_BYTES: usize = 64 * 1024;
 /// Noise has a frame by chance once in a hundred times of this size: more are MAVLink.
 const BY_CHANCE_BYTES: usize = LOOK_BYTES / 2;
-/// Other formats, for messages.
 pub(super) const KNOWN: &str = "a recording that this program knows: a tlog, raw MAVLink, an ArduPilot log (.bin, .log), a PX4 log (.ulg), \
                      each also as .gz";
 

@@ -23,7 +23,6 @@ pub struct Progress(Arc<State>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Bytes taken from the file, before unpacking.
     taken: AtomicU64,
     /// 0 if unknown.
     total: AtomicU64,

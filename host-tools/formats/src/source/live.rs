@@ -29,7 +29,6 @@ struct Live {
     buffer: Vec<u8>,
 }
 
-/// Opens a live SRC, with its writer.
 pub(super) fn open(endpoint: &Endpoint) -> Result<(Box<dyn Source>, Box<dyn Write + Send>)> {
     let duplex = duplex::open(endpoint, SILENCE)?;
     interrupt::watch();

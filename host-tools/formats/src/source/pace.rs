@@ -44,17 +44,14 @@ struct Falls {
 /// Follows a recording's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
-    /// First and latest time.
     first: Option<Instant>,
     last: Option<Instant>,
-    /// Place of the latest message.
     place: u64,
     /// Bytes still without time, and their beginning.
     level: u64,
     since: Option<(Instant, u64)>,
     /// Both times, before the first became too slow.
     witness: Option<(Instant, u64)>,
-    /// The clock's falls in a row.
     falls: Option<Falls>,
     /// First time and place at which the clock did not run.
     stands: Option<(Instant, u64)>,

@@ -35,9 +35,7 @@ use crate::track::Point;
 const NOTES_MAX: usize = 2_000;
 /// Drawing period of a page's plots, and period of its updates.
 const DRAWN_EVERY: Span = Span::from_millis(100);
-/// A phase that lasts less is part of the one before.
 const PHASE_MIN: Span = Span::from_secs(2);
-/// Gaps kept at most.
 const GAPS_MAX: usize = 2_000;
 
 /// Everything that is kept.
@@ -54,7 +52,6 @@ pub struct History {
     gaps: Vec<(Instant, Instant)>,
     autopilot: Autopilot,
     params: Option<Box<Params>>,
-    /// Cells of the one battery.
     cells: u8,
     /// Counts the changes of plots' names and limits.
     words: u64,
@@ -397,7 +394,6 @@ mod tests {
         Observation::Hud(Hud { airspeed: Some(MetresPerSecond(1.0)), ..Hud::default() })
     }
 
-    /// All values in the parts of a history, the newest of each interval.
     fn follow(cursor: &mut Cursor, history: &History, until: Instant) -> (bool, usize, usize) {
         let Some(part) = history.since(1, cursor, until) else { return (false, 0, 0) };
         let values = part.series.0.iter().map(|(_, _, (numbers, _))| numbers.len()).sum();

@@ -28,7 +28,6 @@ pub struct MergedFlight<'a> {
     pub span: (Instant, Instant),
 }
 
-/// Whether a line is compared: measurements are, setpoints and commands are not.
 const fn is_compared(plot: Plot, line: u8) -> bool {
     match plot {
         Plot::Height | Plot::Vertical => line == 0,
@@ -163,7 +162,6 @@ mod tests {
     use super::*;
     use crate::reference::Reference;
 
-    /// Rises by a metre a second from its take-off on.
     fn rises(take_off_s: u64) -> History {
         let mut history = History::default();
         for second in 0..take_off_s + 60 {

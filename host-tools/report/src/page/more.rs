@@ -12,7 +12,6 @@ use crate::mavlink::ids::{
 };
 use crate::source::item::{CellValue, Row, Rows};
 
-/// Channels of radio control that are shown.
 const CHANNELS: u8 = 16;
 /// `POSITION_TARGET_TYPEMASK`: ignored parts of a target.
 const IGNORES_Z: u16 = 1 << 2;

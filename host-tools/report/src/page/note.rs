@@ -90,7 +90,6 @@ const AGAIN_S: f64 = 45.0;
 const OVER: &str = "over: ";
 const CAUSE: &str = "cause: ";
 
-/// Check, part, and the rest of the text.
 fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).or_else(|| words.strip_prefix(CAUSE)).unwrap_or(words);

@@ -126,7 +126,6 @@ fn battery(line: u8) -> String {
     numbered("Battery", line)
 }
 
-/// Cells of the first battery have no other name.
 fn cell(line: u8) -> String {
     let (pack, cell) = (line / CELLS_MAX as u8, line % CELLS_MAX as u8);
     if pack == 0 { numbered("Cell", cell) } else { format!("{}, cell {}", battery(pack), cell + 1) }

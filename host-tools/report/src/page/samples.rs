@@ -217,7 +217,6 @@ impl Samples {
         self.put(at, (Plot::Temperature, 1), imu.temperature.map(|celsius| celsius.0));
     }
 
-    /// `lines` are those of temperature and pressure.
     fn air(&mut self, at: Instant, air: &Air, lines: [u8; 2]) {
         self.put(at, (Plot::Temperature, lines[0]), air.temperature.map(|celsius| celsius.0));
         self.put(at, (Plot::Pressure, lines[1]), air.pressure.map(|pressure| pressure.0));

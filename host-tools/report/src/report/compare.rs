@@ -20,9 +20,7 @@ use crate::source::recording::LogPlace;
 use crate::summary::Overview;
 use crate::utc::iso8601;
 
-/// Flights on a page: one, and the ten before it.
 const FLIGHTS_MAX: usize = 11;
-/// Findings of a flight that are listed.
 const FINDINGS_MAX: usize = 100;
 
 /// A recording that may be compared.

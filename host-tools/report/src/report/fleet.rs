@@ -11,7 +11,6 @@ use crate::output;
 use crate::plural::count;
 use crate::printable::path as shown;
 
-/// The page's file in a directory.
 const FILE: &str = "fleet.html";
 
 #[derive(Serialize)]

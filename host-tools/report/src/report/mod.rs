@@ -184,9 +184,7 @@ struct Making<'a> {
     places: &'a [LogPlace],
     inputs: &'a Inputs,
     wanted: &'a Wanted,
-    /// The data of each session that later ones are compared with.
     earlier: Vec<Option<trend::Session>>,
-    /// Files of pages, by the index of their session.
     pages: BTreeMap<usize, String>,
     rows: Vec<index::Row>,
     /// The folder's table of earlier runs.

@@ -6,7 +6,6 @@ use std::str::FromStr;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tiles {
     address: String,
-    /// Scheme, host and port.
     origin: String,
 }
 

@@ -36,10 +36,8 @@ use crate::source::epochs::Epochs;
 const BATCH_BYTES: usize = 256 * 1024;
 /// Or when its first point is this old.
 const BATCH_AGE: Duration = Duration::from_millis(250);
-/// Period of the usage counters.
 const USAGE_EVERY: Span = Span::from_secs(10);
 const LOOK: Duration = Duration::from_millis(20);
-/// Maximum wait for the database at the end.
 const LAST_WAIT: Duration = Duration::from_secs(15);
 
 /// The side that makes points.

@@ -18,7 +18,6 @@ const LIMIT: Duration = Duration::from_secs(10);
 /// Wait after a failure; doubles up to the longest.
 const WAIT_MIN: Duration = Duration::from_millis(200);
 const WAIT_MAX: Duration = Duration::from_secs(5);
-/// Maximum number of bytes read from an answer.
 const ANSWER_BYTES_MAX: u64 = 64 * 1024;
 /// Maximum number of characters reported from it.
 const WORDS_MAX: usize = 200;

@@ -33,7 +33,6 @@ const STEP: Ps = 20 * MS;
 /// Autopilot's, and radio's until a parameter sets another.
 const BAUDS: [f64; 2] = [921_600.0, 57_600.0];
 
-/// Stages of the firmware's account; the first is idle.
 const STAGES: [&str; 9] =
     ["idle", "tasks", "framer", "monitor", "encode", "observe", "summary", "tick", "storage"];
 const STAGE_CYCLES: &str = "STAGE_CYCLES";
@@ -73,7 +72,6 @@ pub(super) struct Board {
 struct Wiring {
     /// Autopilot's and radio's.
     ports: [usize; 2],
-    /// Exceptions of the DMA of ports and card.
     dma: Vec<u16>,
 }
 
@@ -170,7 +168,6 @@ impl Board {
         Ok(())
     }
 
-    /// Power goes at `at_us`, and comes back.
     fn lose_power(&mut self, at_us: u64) -> Result<()> {
         self.run_until(Self::moment(at_us))?;
         self.chip.power_off();

@@ -229,7 +229,6 @@ impl World<'_> {
         report.gs_bytes += stats.gs_bytes;
     }
 
-    /// The report, with the data of the card itself.
     fn settle(self, card: &Path, earlier: &EarlierSessions) -> Result<RunReport> {
         let mut report = self.report;
         report.blocks_written = self.card.writes();

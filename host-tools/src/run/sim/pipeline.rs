@@ -174,7 +174,6 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         Ok(true)
     }
 
-    /// The next event; of several at once the most urgent.
     fn next_event(&self) -> Option<(Instant, Event)> {
         let silence = self.silent_at.map(|at| (at, Event::Silence));
         let storage = self.storage_at.map(|at| (at, Event::Storage));

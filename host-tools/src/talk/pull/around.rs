@@ -41,7 +41,6 @@ const SECTOR: u32 = SECTOR_BYTES as u32;
 
 #[derive(Debug)]
 pub(super) struct Brought {
-    /// Names on the board, and the partial files.
     pub(super) files: Vec<(String, PathBuf)>,
     /// The moment.
     pub(super) at: Instant,
@@ -475,7 +474,6 @@ impl PartialFile {
         Ok(())
     }
 
-    /// A downloaded sector, if it belongs at this place.
     fn sector(&mut self, at: u32) -> Result<Option<(Header, Sector)>> {
         let mut bytes = [0; SECTOR_BYTES];
         self.seek(at)

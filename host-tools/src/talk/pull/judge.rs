@@ -14,9 +14,7 @@ use crate::outcome::Outcome;
 use crate::summary::Overview;
 use crate::verify::{failed, verify_each};
 
-/// Need all files of a log.
 const NEED_ALL_FILES: [&str; 5] = ["sector sequence", "group decoding", "frames missing", "files", "end"];
-/// Needs the log before.
 const NEEDS_LOG_BEFORE: &str = "session before";
 
 #[derive(Debug, Serialize)]

@@ -29,7 +29,6 @@ use crate::output::{self, Schema};
 use crate::plural::count;
 use crate::printable::word;
 
-/// Bytes between two progress messages.
 const TOLD_BYTES: u32 = 8 * 1024;
 
 const SCHEMA: Schema = Schema::first("hums-pull");

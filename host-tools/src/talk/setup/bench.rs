@@ -24,7 +24,6 @@ use crate::utc::date_and_time;
 /// `MAV_CMD_RUN_PREARM_CHECKS`
 const PREARM: u16 = 401;
 const ANSWER: Duration = Duration::from_secs(3);
-/// Sectors with the record of the start.
 const HEAD_SECTORS: u32 = 8;
 /// The checks of every vehicle need them; of the last two one autopilot has one.
 const NEEDED: [u32; 10] = [
@@ -67,7 +66,6 @@ pub(super) fn prearm(client: &mut Client) -> Result<CheckLine> {
     Ok(line("checks", text.starts_with(READY), text.trim_start_matches("HUMS: ")))
 }
 
-/// What the box records now.
 pub(super) fn recorded(
     client: Client,
     own: &BoxSettings,

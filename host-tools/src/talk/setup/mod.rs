@@ -169,7 +169,6 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
     Ok(if is_ready { Outcome::Done } else { Outcome::Findings })
 }
 
-/// The other end of each wire, and its pad on the board.
 fn wiring(board: &Board) -> Vec<Wiring> {
     let pad = |wire: &Wire| format!("{} ({})", wire.pad, wire.pin);
     let Board { autopilot, radio, card, led, owner, .. } = board;

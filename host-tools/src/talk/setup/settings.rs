@@ -154,7 +154,6 @@ fn value(autopilot: u8, param: &Param) -> f64 {
     }
 }
 
-/// The value as a message has it.
 fn sent(autopilot: u8, kind: u8, value: f64) -> f32 {
     if autopilot == PX4 && INTEGERS.contains(&kind) {
         f32::from_bits((value as i32).cast_unsigned())
@@ -221,7 +220,6 @@ fn set(client: &mut Client, name: &str, kind: u8, wanted: f64) -> Result<()> {
     Ok(())
 }
 
-/// The lines of a file of former values.
 pub(super) fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
     let wrong = |number: usize| usage(format!("{}: line {number} is no NAME,VALUE", file.display()));
     let bytes = read_short(file, UNDO_BYTES_MAX).context("--restore")?;
@@ -315,7 +313,6 @@ mod tests {
 
     const OWN: BoxSettings = BoxSettings { baud: 57_600, path: 2, has_streams: false };
 
-    /// An autopilot with these parameters, each with its type; values are as on the line.
     fn vehicle(autopilot: u8, mut mode: u8, values: &[(&str, f32, u8)]) -> Client {
         let mut values: BTreeMap<String, (f32, u8)> =
             values.iter().map(|(name, value, kind)| ((*name).to_owned(), (*value, *kind))).collect();

@@ -15,7 +15,6 @@ pub(super) struct Judged {
     pub(super) outcomes: Vec<Outcome>,
 }
 
-/// Judges as many at once as there are processors, each as a stream.
 pub(super) fn judge_all(set: &Set) -> Result<Judged> {
     let outcomes = set
         .flights

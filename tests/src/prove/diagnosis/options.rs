@@ -16,7 +16,6 @@ pub(super) enum Known {
 /// Flights to judge, and the results' use.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Flights {
-    /// Folders of flights besides those of the repository.
     pub(super) folders: Vec<(PathBuf, Known)>,
     pub(super) short: bool,
     pub(super) write: bool,

@@ -39,9 +39,7 @@ pub(super) struct False {
 pub(super) struct Fault {
     /// Whether the messages show it at all.
     pub(super) visible: bool,
-    /// The first alarm; time from the fault.
     pub(super) told: Option<Alarm>,
-    /// The first that names its cause.
     pub(super) named: Option<Alarm>,
     /// Whether the first that a pilot hears names it.
     pub(super) right_first: bool,
@@ -138,7 +136,6 @@ const fn rank(level: Level) -> u8 {
     }
 }
 
-/// Rises of a level to a warning or to critical, in order.
 pub(super) fn rises(judged: &Judged) -> impl Iterator<Item = &Finding> {
     judged.findings.iter().filter(|finding| rank(finding.level) > rank(finding.previous))
 }

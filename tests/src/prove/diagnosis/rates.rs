@@ -30,7 +30,6 @@ fn short(rate: f64) -> String {
     if rate >= 10.0 || rate == 0.0 { format!("{rate:.0}") } else { format!("{rate:.2}") }
 }
 
-/// Seconds: this share of all delays is within.
 pub(super) fn quantile_s(delays_s: &[f64], share: f64) -> String {
     let mut sorted = delays_s.to_vec();
     sorted.sort_by(f64::total_cmp);

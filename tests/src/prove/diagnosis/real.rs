@@ -272,7 +272,6 @@ const fn judged_when(known: Known) -> &'static str {
     }
 }
 
-/// Two rows for each set of real flights, then two for the simulators.
 pub(super) fn rates(real: &[Results], sets: &[Judged]) -> Vec<Vec<String>> {
     let levels = [(Level::Warning, "warning"), (Level::Critical, "critical")];
     let mut rows = Vec::new();

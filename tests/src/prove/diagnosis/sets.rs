@@ -12,14 +12,12 @@ use super::options::{Flights, Known};
 use super::real;
 use crate::flights;
 
-/// Depth of the search for labels in folders.
 const DEPTH_MAX: usize = 4;
 
 #[derive(Debug)]
 pub(super) struct Set {
     pub(super) name: String,
     pub(super) known: Known,
-    /// Flights in the order of labels or names.
     pub(super) flights: Vec<(LogPlace, Option<Label>)>,
 }
 
@@ -29,7 +27,6 @@ impl Set {
     }
 }
 
-/// Sets of flights, and those of real flights.
 pub(super) fn find_all(options: &Flights) -> Result<(Vec<Set>, Vec<real::Set>)> {
     let mut reals = Vec::new();
     let mut sets = vec![

@@ -39,7 +39,6 @@ const DISK_MAX: u64 = 3 << 30;
 pub struct Fleet {
     sessions: u64,
     days: u64,
-    /// Seconds of each session.
     seconds: u64,
     /// Sessions for the comparison of speeds.
     compared: u64,
@@ -103,7 +102,6 @@ fn compact(folder: &Path) -> f64 {
     begun.elapsed().as_secs_f64()
 }
 
-/// Bytes and number of the files below a folder.
 fn taken(folder: &Path) -> Result<(u64, u64)> {
     let mut sum = (0, 0);
     for entry in fs::read_dir(folder)? {
@@ -282,7 +280,6 @@ fn ask(fleet: &Fleet, dir: &Path, text: &mut String) -> Result<f64> {
     Ok(slowest)
 }
 
-/// A year of sessions like those of the proof; its bytes are of the different recordings.
 fn year(fleet: &Fleet, cost: &Cost, bytes: Option<f64>, query_s: f64, text: &mut String) {
     let times = YEAR / fleet.sessions as f64;
     let hours = |seconds: f64| YEAR * seconds / 3600.0;

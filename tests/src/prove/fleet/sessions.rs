@@ -15,7 +15,6 @@ const RECORDINGS: [&str; 3] = ["ap_quad_guided.tlog", "ap_quad_faults.tlog", "px
 const BEGIN_US: u64 = 60_000_000;
 const APART_US: u64 = 30_000_000;
 const STRETCHES: u64 = 4;
-/// Vehicles of the fleet; a place is a degree from the next.
 pub(super) const VEHICLES: u64 = 10_000;
 /// 2026-01-01.
 const FIRST_DAY_US: u64 = 1_767_225_600_000_000;
@@ -42,7 +41,6 @@ fn number<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
     bytes.get(at..at + N)?.try_into().ok()
 }
 
-/// The id of the frame of an entry.
 fn id(entry: &[u8]) -> u32 {
     number(entry, STAMP + 7).map_or(0, |[low, middle, high]| u32::from_le_bytes([low, middle, high, 0]))
 }
@@ -128,7 +126,6 @@ fn moved(payload: &mut [u8], at: usize, by: [i32; 2]) {
     }
 }
 
-/// Adds the checksum of the entry that begins here.
 fn seal(bytes: &mut Vec<u8>, begin: usize) {
     let entry = bytes.get(begin..).unwrap_or_default();
     let extra = message(id(entry)).map_or(0, |message| message.crc_extra);

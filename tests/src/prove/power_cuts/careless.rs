@@ -50,7 +50,6 @@ const SCENARIOS: &[Scenario] = &[
 ];
 /// Cases that are described in words.
 const NOTES_MAX: usize = 40;
-/// Scenarios of the short form.
 const SCENARIOS_SHORT: usize = 2;
 
 pub(in crate::prove) const LABELS: Labels = Labels {
@@ -354,7 +353,6 @@ impl Subject {
         self.record_again(wrong, tally)
     }
 
-    /// The readers' results on the earlier sessions.
     fn read(&self, wrong: &Blocks, tally: &mut Tally) -> Result<()> {
         // Overwritten in normal operation, and changed by the fault.
         let (mut made_room, mut spoiled) = (BTreeSet::new(), BTreeSet::new());

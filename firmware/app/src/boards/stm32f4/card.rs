@@ -19,7 +19,6 @@ use hums_recorder::spi::{Clock, Port, PortFailed};
 use super::time;
 use crate::costs::{Stage, measure};
 
-/// Most bytes of one busy poll.
 const LOOK_BYTES: usize = 4;
 /// Unsuccessful polls before the processor sleeps: some 50 µs.
 const LOOKS: u32 = 16;
@@ -48,14 +47,12 @@ impl Pause {
         Self { looks: 0 }
     }
 
-    /// Before bytes are exchanged.
     pub(super) fn before(&self) {
         if self.looks > LOOKS {
             time::nap(NAP_US);
         }
     }
 
-    /// After these were received.
     pub(super) fn after(&mut self, bytes: &[u8]) {
         let is_busy = bytes.len() <= LOOK_BYTES && bytes.iter().all(|byte| *byte == 0);
         self.looks = if is_busy || *bytes == [0xFF] { self.looks.saturating_add(1) } else { 0 };

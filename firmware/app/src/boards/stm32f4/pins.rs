@@ -16,7 +16,6 @@ pub(crate) struct PinPort {
 }
 
 impl PinPort {
-    /// A port with its select pin high.
     #[expect(clippy::needless_pass_by_value, reason = "nothing else may use the pins")]
     pub(crate) fn new(
         sck: Peri<'static, impl gpio::Pin>,

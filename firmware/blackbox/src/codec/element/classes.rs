@@ -4,7 +4,6 @@ use super::Element;
 use crate::coder::Coder;
 use crate::distribution::{Cdf, SYMBOLS};
 
-/// Distributions of elements and of times at most.
 const BLOCKS: usize = 432;
 
 /// Kinds whose elements behave alike: integers of 1, 2 and 4 bytes, floats, decimal floats, random floats, times, computed floats.

@@ -83,7 +83,6 @@ pub(crate) struct Element {
     kind: u8,
     /// For a text or instance its bytes; for a number its row in the table of links.
     detail: u8,
-    /// End offset in the payload.
     pub(crate) end: u8,
     /// Bits 0-2: how surely it is a multiple of 1/100 (float) or of 1000 (64-bit integer): 3 and more. Bits 3-6: the last
     /// class. Bit 7: `step` is in hundredths.

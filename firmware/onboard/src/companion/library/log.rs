@@ -11,7 +11,6 @@ use hums_link::request::Reply;
 use super::step::{Out, Step};
 use crate::shelf::{Answer, LogId, NoLog, What, Which};
 
-/// Bytes in one `LOG_DATA`.
 const DATA_BYTES: usize = 90;
 
 /// A number keeps its log.

@@ -19,7 +19,6 @@ pub(super) enum Step {
     End(Reply),
 }
 
-/// Bytes that an FTP message adds to its data, signed: frame, target, head.
 const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
 /// Worth a message.
 const FTP_DATA_MIN: usize = 20;

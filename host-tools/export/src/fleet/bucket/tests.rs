@@ -11,7 +11,6 @@ use crate::storage::tests::{Kind, Memory};
 
 /// Of one thread at a time.
 const SHORT: Duration = Duration::from_millis(5);
-/// Numbers of vehicles of one bucket.
 const NUMBERS: [u64; 2] = [0, 2];
 const DAY: Option<&str> = Some("2026-05-01");
 
@@ -43,7 +42,6 @@ fn stop_after(memory: &Arc<Memory>, requests: Option<u32>) {
     *memory.left.lock().expect("no panic") = requests;
 }
 
-/// The tables in a folder, as other programs read them.
 fn folder(memory: &Arc<Memory>) -> TempDir {
     let dir = tempfile::tempdir().expect("a directory");
     for (key, bytes) in memory.objects.lock().expect("no panic").iter() {

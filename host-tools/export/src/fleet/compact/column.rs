@@ -119,7 +119,6 @@ impl Input {
     }
 }
 
-/// Values of one type without the nulls, and the levels of their column.
 pub(super) struct Values<T: DataType> {
     present: Vec<T::T>,
     definition: Vec<i16>,

@@ -13,7 +13,6 @@ use crate::files::cannot_write;
 use crate::format::Single;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-/// Bytes of a chunk before its compression.
 const CHUNK_BYTES: usize = 1 << 20;
 const HEADER: u8 = 1;
 const FOOTER: u8 = 2;

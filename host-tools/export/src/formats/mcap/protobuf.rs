@@ -1,7 +1,6 @@
 //! Messages and their descriptors in Protocol Buffers, by the
 //! [encoding](https://protobuf.dev/programming-guides/encoding/) and `descriptor.proto`.
 
-/// The type of a field: the number in `FieldDescriptorProto.Type`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Type {
     Double,
@@ -111,7 +110,6 @@ pub(super) fn inside(out: &mut Vec<u8>, number: u32, write: impl FnOnce(&mut Vec
     out.splice(place..=place, long);
 }
 
-/// One file of definitions, as an element of a `FileDescriptorSet`.
 pub(super) fn file(
     out: &mut Vec<u8>,
     (name, package): (&str, &str),

@@ -24,7 +24,6 @@ pub(crate) type TimedRow = (Instant, Option<u64>, Row);
 /// Memory of an empty table, and of a row besides the values of its message: its times, its sender.
 const TABLE_BYTES: usize = 4_096;
 const ROW_BYTES: usize = 32;
-/// Memory of an offset or a length, for each field.
 const FIELD_BYTES: usize = 4;
 /// Memory of a cell of a row, a short text on the heap included; a long one takes its length in addition.
 const CELL_BYTES: usize = 96;

@@ -21,7 +21,6 @@ use crate::table::Table;
 pub(super) const NAMES: [&str; 2] = ["vehicle", "session"];
 /// Names that every table has: its own first columns, and those that its place among the directories adds.
 const TAKEN: [&str; 6] = ["boot_s", "utc", "vehicle", "date", "session", "bucket"];
-/// Names that tables of frames have: those, and who sent the frame.
 pub(crate) const TAKEN_FRAMES: [&str; 8] =
     ["boot_s", "utc", "vehicle", "date", "session", "bucket", "system", "component"];
 /// Digits of seconds, and those behind the point.
@@ -379,7 +378,6 @@ pub(super) fn write_name(
 pub(crate) struct TableRows {
     columns: Vec<Column>,
     rows: usize,
-    /// They are of frames, not of cells.
     has_frames: bool,
 }
 

@@ -49,13 +49,10 @@ use columns::{Column, NAMES, TableRows, name_type, write_name};
 const LIMITS: Limits = Limits { pending_bytes: 12 << 20, open_bytes: 8 << 20 };
 /// Number of rows in a row group: a good size for one read of an engine.
 const GROUP_ROWS: usize = 128 * 1024;
-/// Bytes of a page and of a column's dictionary at most.
 const PAGE_BYTES: usize = 32 * 1024;
 /// Columns of texts of a table at most that have a dictionary: it takes 73 kB of each.
 const DICTIONARIES_MAX: usize = 32;
-/// Memory of an open file: its buffer, and its writer.
 const OPEN_FILE_BYTES: usize = 10 << 10;
-/// Memory of each of its columns in its schema.
 const OPEN_COLUMN_BYTES: usize = 1_000;
 /// Memory of each column of a written row group.
 const CHUNK_BYTES: usize = 800;

@@ -15,7 +15,6 @@ use super::buffer::Buffer;
 use super::format::{HEADER_BYTES, Lengths};
 
 const HEAD: [u8; 2] = [0xA3, 0x95];
-/// Longer than any message.
 const MESSAGE_BYTES_MAX: u64 = 256;
 /// The longest message, and the next head.
 const LOOKAHEAD_BYTES: usize = 2 * 258;

@@ -32,7 +32,6 @@ impl<R: Read> Buffer<R> {
         self.base + self.at as u64
     }
 
-    /// Whether the file ends after the buffer.
     pub(super) const fn ended(&self) -> bool {
         self.ended
     }

@@ -28,7 +28,6 @@ pub(super) struct Clock {
     times: clock::Clock,
     /// The log's only clock.
     week_first_us: Option<u64>,
-    /// Start of a silence before the present message.
     silence: Option<Instant>,
 }
 

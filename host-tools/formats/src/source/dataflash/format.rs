@@ -8,7 +8,6 @@ use crate::source::item::Table;
 pub(super) const HEADER_BYTES: usize = 3;
 /// Its layout is fixed.
 pub(super) const FMT_TYPE: u8 = 128;
-/// Length of FMT with its header.
 pub(super) const FMT_BYTES: u8 = 89;
 /// FMT defines itself.
 pub(super) const BEGINNING: &[u8] = &[0xA3, 0x95, FMT_TYPE, FMT_TYPE, FMT_BYTES];
@@ -140,13 +139,10 @@ pub(super) struct Format {
     pub(super) length: u8,
     /// Its columns.
     pub(super) fields: Vec<Field>,
-    /// Length by the fields, if it differs.
     pub(super) fields_length: Option<u8>,
     /// Unreadable parts, until reported.
     odd: Option<String>,
-    /// All format characters are known.
     is_known: bool,
-    /// Fewer names than format characters.
     lacks_names: bool,
     pub(super) characters: usize,
     /// Column and kind.

@@ -40,7 +40,6 @@ use super::item::{Cause, Reader, RecordingSummary, Take, Want};
 /// Searched first. Definitions and parameters, 100 KiB, come in the first second, among up to 1 MiB of other
 /// messages.
 const FIRST_BYTES: usize = 2 * 1024 * 1024;
-/// Searched for a first definition.
 const SEARCHED_BYTES: usize = 64 * 1024;
 
 /// A log's encoding.

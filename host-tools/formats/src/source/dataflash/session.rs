@@ -166,7 +166,6 @@ pub(super) struct Session<'w> {
     clock: Clock,
     handlers: Handlers,
     tables: Tables,
-    /// Needed types; unknown after a definition.
     needed: Vec<Option<bool>>,
     /// Messages and bytes by type, and by former names.
     counts: Vec<(u64, u64)>,

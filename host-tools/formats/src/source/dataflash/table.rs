@@ -64,7 +64,6 @@ fn columns(format: &Format, units: Vec<String>, is_words: bool) -> Vec<Column> {
     columns.finish()
 }
 
-/// Holds files: its text may be anything.
 const FILE: &str = "FILE";
 
 fn kind(format: &Format, field: FieldKind, is_words: bool) -> ColumnType {

@@ -12,7 +12,6 @@ const LINE_BYTES_MAX: usize = 64 * 1024;
 #[derive(Debug)]
 pub(super) struct Line<'a> {
     pub(super) place: u64,
-    /// Its bytes in the file, with its end.
     pub(super) bytes: u64,
     /// Invalid UTF-8 is read as ISO 8859-1.
     pub(super) words: Cow<'a, str>,
@@ -67,7 +66,6 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// As many values as columns; the last may contain commas.
 pub(super) fn values(line: &str, columns: usize) -> Vec<&str> {
     match line.split_once(',') {
         Some((_, rest)) if columns > 0 => rest.splitn(columns, ',').collect(),

@@ -10,7 +10,6 @@ use crate::source::stream::read_some;
 
 pub(in crate::source) const TIME_BYTES: usize = 8;
 const BUFFER_BYTES: usize = 64 * 1024;
-/// A record and the next header.
 const RECORD_BYTES: usize = 2 * (TIME_BYTES + FRAME_BYTES_MAX);
 /// Records that confirm a time, behind damage as well.
 const AHEAD_BYTES: usize = 256 * 1024;
@@ -52,7 +51,6 @@ impl<R: Read> Records<R> {
         Self { input, buffer: Vec::new(), at: 0, ended: false, ahead_bytes: RECORD_BYTES }
     }
 
-    /// Further on: following records confirm a time.
     pub(in crate::source) fn ahead(input: R) -> Self {
         Self { ahead_bytes: AHEAD_BYTES, ..Self::new(input) }
     }
@@ -70,7 +68,6 @@ impl<R: Read> Records<R> {
         (times, is_end)
     }
 
-    /// The first result among buffered frames.
     pub(in crate::source) fn frames_after<T>(
         &self,
         mut told: impl FnMut(u64, &[u8]) -> Option<T>,

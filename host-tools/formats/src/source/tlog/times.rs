@@ -38,10 +38,8 @@ const DISORDER_US: i64 = 1_000_000;
 struct Beside {
     /// The first system that reports its time, that time, the recording's.
     last: Option<(u8, i64, i64)>,
-    /// Least lead over the autopilot's time.
     ahead_us: i64,
     stands: bool,
-    /// Time by the autopilot's clock alone, and its beginning.
     passed_us: u64,
     began: Option<(Instant, u64)>,
 }

@@ -88,9 +88,7 @@ pub(super) struct Field {
     /// `esc[3].esc_rpm`, with the definitions around it.
     pub(super) name: String,
     pub(super) number: Number,
-    /// Elements of an array.
     pub(super) array: Option<u32>,
-    /// Offset in the message's data.
     pub(super) offset: u32,
 }
 
@@ -100,7 +98,6 @@ pub(super) struct Layout {
     pub(super) name: String,
     /// Without padding, in order of their places.
     pub(super) fields: Vec<Field>,
-    /// Bytes of its data.
     pub(super) bytes: usize,
     /// Bytes without padding at the end, which a writer leaves out.
     pub(super) least_bytes: usize,

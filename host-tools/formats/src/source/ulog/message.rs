@@ -18,7 +18,6 @@ pub(super) const VERSION_AT: usize = MAGIC.len();
 pub(super) const VERSION_MAX: u8 = 1;
 /// In a search, other than data: checking 65,536 bytes for each byte would take seconds a megabyte.
 const FOUND_BYTES_MAX: usize = 2_048;
-/// Content of a synchronisation message.
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

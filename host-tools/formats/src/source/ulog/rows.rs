@@ -36,8 +36,6 @@ pub(super) const PARAMETERS: &str = "parameters";
 pub(super) const TEXTS: &str = "logged_messages";
 const OWN: [&str; 4] = [DEFAULTS, INFORMATION, PARAMETERS, TEXTS];
 
-/// The topic's, without characters that are invalid in file names; like one of our tables' names, with a
-/// prefix.
 pub(super) fn table_name(layout: &Layout) -> String {
     let name = layout.name.replace('/', "_");
     let is_taken =

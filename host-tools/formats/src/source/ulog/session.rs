@@ -29,9 +29,7 @@ use crate::source::pace::Pace;
 /// An older event is from before the log.
 const OLD_US: u64 = 1_000_000;
 
-/// The longest message, and the look-ahead.
 const LOOK_BYTES: usize = MESSAGE_BYTES_MAX + times::AHEAD_BYTES;
-/// Bytes needed for a search for the next message.
 const FIND_BYTES: usize = LOOK_BYTES + 64 * 1024;
 /// Data was appended.
 const APPENDED: [u8; 8] = [1, 0, 0, 0, 0, 0, 0, 0];

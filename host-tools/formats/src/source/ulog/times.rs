@@ -13,7 +13,6 @@ pub(super) const RULES: Rules =
     Rules { from_first: false, old_values: true, ends: Ends { steady_us: 1_000_000, seldom_us: 10_000_000 } };
 /// Definitions come before data, 100 to 200 KiB.
 const FIRST_BYTES: usize = 512 * 1024;
-/// Bytes after a jump, damage too.
 pub(super) const AHEAD_BYTES: usize = 256 * 1024;
 /// Longer than any message: the rest is erased memory.
 const NOTHING_BYTES: usize = 2 * MESSAGE_BYTES_MAX;

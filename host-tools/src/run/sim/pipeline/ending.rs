@@ -10,7 +10,6 @@ use hums_recorder::CardState;
 
 use super::Pipeline;
 
-/// Wait at the end, for a card that is out.
 const CARD_PATIENCE: Span = Span::from_secs(5);
 
 impl Pipeline<'_, '_> {
@@ -65,12 +64,10 @@ impl Pipeline<'_, '_> {
         *self.monitoring.monitor().params()
     }
 
-    /// Whether the card had no room in the end.
     pub(in crate::run::sim) fn is_full(&self) -> bool {
         self.slot_status.read().state == CardState::Full
     }
 
-    /// Oldest segments were overwritten.
     pub(in crate::run::sim) fn has_overwritten(&self) -> bool {
         self.slot_status.read().segments_overwritten > 0
     }

@@ -35,7 +35,6 @@ impl Word {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Arming {
     armed: Option<bool>,
-    /// State in the first message about arming.
     first_told: Option<bool>,
     /// Since when and until when the evidence has lasted.
     evidence: Option<(Instant, Instant)>,

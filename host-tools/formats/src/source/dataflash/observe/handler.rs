@@ -10,7 +10,6 @@ use crate::source::dataflash::message::Message;
 /// Columns that one handler reads at most.
 const SLOTS_MAX: usize = 16;
 
-/// Column by slot; `None` if the file lacks it.
 pub(in crate::source::dataflash) type Slots = [Option<u8>; SLOTS_MAX];
 
 pub(in crate::source::dataflash) struct Handler {
@@ -41,7 +40,6 @@ impl std::fmt::Debug for Handler {
 }
 
 impl Handler {
-    /// A fact about the whole log.
     pub(super) const fn fact(self) -> Self {
         Self { is_fact: true, ..self }
     }

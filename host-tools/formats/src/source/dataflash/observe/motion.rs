@@ -37,7 +37,6 @@ const SHOCK_MIN: f32 = 2.0 * GRAVITY;
 const AT_ONCE: Span = Span::from_millis(100);
 /// Larger angles are invalid.
 const TURN_DEG: f32 = 360.0;
-/// Rates go with an attitude within this.
 const RATES_AGE: Span = Span::from_millis(500);
 
 /// Columns of GPS.

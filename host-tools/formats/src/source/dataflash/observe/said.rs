@@ -60,7 +60,6 @@ fn parameter(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     out.say(&Say::Parameter(&name, value));
 }
 
-/// The battery of a capacity parameter.
 fn capacity_of(name: &str) -> Option<usize> {
     let number = name.strip_prefix("BATT")?.strip_suffix("_CAPACITY")?;
     if number.is_empty() { Some(0) } else { number.parse::<usize>().ok()?.checked_sub(1) }

@@ -34,7 +34,6 @@ impl<T: Copy> Dated<T> {
         self.0 = Some((at, value));
     }
 
-    /// The value, while it is not older than `age`.
     pub(super) fn within(&self, now: Instant, age: Span) -> Option<T> {
         self.0.filter(|(at, _)| now.since(*at) <= age).map(|(_, value)| value)
     }
@@ -110,7 +109,6 @@ pub(in crate::source::dataflash) struct Facts {
     pub(super) capacity_mah: [Option<f32>; INSTANCES],
     /// `AHRS_EKF_TYPE`: 2 or 3; 0 without a filter.
     pub(super) estimator: Option<u8>,
-    /// Version of the firmware, from the top byte down.
     pub(super) version: u32,
     /// POS is logged.
     pub(super) has_positions: bool,
@@ -139,7 +137,6 @@ pub(in crate::source::dataflash) struct State {
     pub(super) arming: Arming,
     pub(super) landed: LandedState,
     pub(super) mode: u32,
-    /// Failsafes in force, a bit for each subsystem of ERR.
     pub(super) failsafes: u64,
     pub(super) load: Dated<f32>,
     pub(super) voltage: Dated<f32>,
@@ -171,7 +168,6 @@ pub(in crate::source::dataflash) struct State {
     pub(super) airspeed: Dated<f32>,
     pub(super) ground_speed: Dated<f32>,
     pub(super) heading_deg: Dated<f32>,
-    /// First fix: the reference without a better one.
     pub(super) first_altitude: Option<f32>,
     /// Height of home.
     pub(super) home_altitude: Option<f32>,
@@ -183,7 +179,6 @@ pub(in crate::source::dataflash) struct State {
     /// Lacks its last part, of this number.
     pub(in crate::source::dataflash) open_text: Option<(u64, String)>,
     pub(super) utc_said: Option<Instant>,
-    /// Last event of arming.
     armed_at: Option<Instant>,
     rearms: Rearms,
     said_at: Option<Instant>,
@@ -205,7 +200,6 @@ enum Rearms {
     Since(Instant),
 }
 
-/// State from messages of arming and take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::source::dataflash) struct Standing {
     arming: Arming,

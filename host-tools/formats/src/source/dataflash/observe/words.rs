@@ -66,12 +66,10 @@ impl Craft {
         })
     }
 
-    /// Whether events report take-off and landing.
     pub(super) const fn tells_landing(self) -> bool {
         matches!(self, Self::Copter | Self::Heli)
     }
 
-    /// Whether every version reports arming.
     pub(super) const fn tells_arming(self) -> bool {
         matches!(self, Self::Sub)
     }

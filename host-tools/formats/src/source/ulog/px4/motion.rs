@@ -149,7 +149,6 @@ fn other_air(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// The source of `SERVO_OUTPUT_RAW`.
 fn outputs(px4: &mut Px4, sample: &Sample<'_>) {
     let pulse = |output: usize| sample.fields.element(0, output).map_or(0, |pulse| pulse.round() as u16);
     let pulses = std::array::from_fn::<u16, MOTORS_MAX, _>(pulse);

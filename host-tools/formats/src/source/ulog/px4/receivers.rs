@@ -18,7 +18,6 @@ const SILENCE: Span = Span::from_millis(2_500);
 /// A fix with a position: `FIX_TYPE_2D`.
 const FIX_2D: u8 = 2;
 
-/// Fields of both topics.
 const FIELDS: &str = "fix_type satellites_used hdop eph latitude_deg longitude_deg altitude_msl_m lat lon alt vel_m_s \
     time_utc_usec jamming_state spoofing_state cog_rad";
 

@@ -13,7 +13,6 @@ pub(in crate::source::ulog) struct Topic {
     pub(in crate::source::ulog) instances: u8,
     /// Least microseconds between two messages.
     pub(in crate::source::ulog) every_us: u64,
-    /// Fields of all versions, with spaces between.
     pub(in crate::source::ulog) fields: &'static str,
     pub(in crate::source::ulog) take: fn(&mut Px4, &Sample<'_>),
 }
@@ -39,7 +38,6 @@ pub(in crate::source::ulog) struct Sample<'a> {
     pub(in crate::source::ulog) fields: Fields<'a>,
 }
 
-/// Bytes of an event's arguments that are looked at.
 pub(in crate::source::ulog) const ARGUMENTS: usize = 8;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +96,6 @@ impl Px4 {
 pub(super) struct System {
     /// `MAV_SYS_ID`.
     pub(super) number: Option<u8>,
-    /// `MAV_TYPE`, if `vehicle_status` lacks it.
     pub(super) type_number: Option<u8>,
     /// `COM_FLIGHT_UUID`
     pub(super) flight: Option<u64>,
@@ -113,7 +110,6 @@ pub(super) struct System {
     pub(super) landed: Option<bool>,
     pub(super) told_mode: Option<u32>,
     pub(super) told_identity: bool,
-    /// Set flags of `failsafe_flags`.
     pub(super) failsafes: String,
     pub(super) told_failsafes: String,
     pub(super) reached: Option<i64>,
@@ -154,9 +150,7 @@ pub(super) struct Motion {
     pub(super) airspeed: Option<f32>,
     pub(super) airspeed_validated: bool,
     pub(super) thrust: [Option<f32>; 2],
-    /// Motor outputs, if the log has no thrust setpoint.
     pub(super) motors: Option<f32>,
-    /// The log has `estimator_status`.
     pub(super) estimator_status: bool,
     /// Flags as far as `estimator_status_flags` has them.
     pub(super) estimator_flags: u16,
