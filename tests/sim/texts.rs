@@ -64,7 +64,7 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
 /// Attitude belongs to the motors.
 fn family(text: &str) -> Subsystem {
     let words = text.strip_prefix("HUMS: ").unwrap_or(text);
-    let words = words.strip_prefix("over: ").unwrap_or(words);
+    let words = ["over: ", "cause: "].iter().find_map(|begin| words.strip_prefix(begin)).unwrap_or(words);
     if ["down at", "mishap over", "it flies again"].iter().any(|begin| words.starts_with(begin)) {
         return Subsystem::Mishap;
     }
