@@ -1,4 +1,5 @@
-//! Selection of the findings that a pilot receives: at most three texts of one event, critical ones at once.
+//! Selection of the findings that a pilot receives: at most three texts of one event, critical ones at once, and the cause of one
+//! that was sent.
 //!
 //! An event is the set of findings of one family ([`family`]) within [`EVENT`] of its first text. A mishap is an
 //! event until it is over.
