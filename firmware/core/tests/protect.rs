@@ -164,7 +164,7 @@ fn an_autopilot_that_does_not_answer_is_asked_three_times() {
     assert_eq!(outcome.story(), UNANSWERED);
 }
 
-/// A flight, what came of it (`unanswered`: [`UNANSWERED`]), and its script.
+/// A flight, its outcome (`unanswered`: [`UNANSWERED`]), and its script.
 const STORIES: &str = "
 an answer to another command | unanswered | @32.3 ack=21,0
 an answer before the request | unanswered | @31 ack=20,0

@@ -461,7 +461,7 @@ pub fn text(finding: &Finding) -> Text {
     words(finding, finding, false)
 }
 
-/// The text of a finding with the order of another one; of the cause of what was sent before if it revises that.
+/// The text of a finding with the order of `orders`. `revises`: it is the cause of an earlier text.
 #[inline(never)]
 fn words(finding: &Finding, orders: &Finding, revises: bool) -> Text {
     let Finding { check, instance, level, value, feeds, .. } = *finding;

@@ -82,7 +82,7 @@ pub struct ReadLog<'a> {
     pub gaps: u64,
     /// The original, if it is a copy.
     pub copy_of: Option<&'a str>,
-    /// What it lacks.
+    /// Damage and losses.
     pub soundness: Soundness,
     /// Recordings of other programs have none.
     pub ending: Option<&'a Ending>,

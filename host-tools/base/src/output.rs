@@ -19,7 +19,7 @@ static TAKEN: AtomicBool = AtomicBool::new(false);
 /// Folders of this computer that are shown by other names.
 static ALIASES: RwLock<Vec<(String, String)>> = RwLock::new(Vec::new());
 
-/// From now on paths in `folder` are shown below `name`: copies of what is elsewhere.
+/// From now on paths in `folder` are shown below `name`: the folder has copies of distant files.
 pub fn alias(folder: &Path, name: &str) {
     let alias = (folder.display().to_string(), name.to_owned());
     ALIASES.write().unwrap_or_else(PoisonError::into_inner).push(alias);

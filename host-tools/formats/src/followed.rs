@@ -34,7 +34,7 @@ impl<T: HasEnding> EndResolver<T> {
         Self { held: VecDeque::new(), sessions }
     }
 
-    /// Returns the logs that no later one concerns, in order: what is no HUMS log waits at most for one.
+    /// Returns the logs whose end is settled, in order. A log of another program waits for at most one other log.
     pub fn push(&mut self, mut next: T) -> Vec<T> {
         let mut has_sectors = false;
         if let Some(ending) = next.ending() {

@@ -1,4 +1,4 @@
-//! The bench check: what the box says of itself, and both ends of the log that it records now.
+//! The bench check: the state of the box, and both ends of its present log.
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 

@@ -233,7 +233,7 @@ fn the_holder_of_a_lease_that_was_taken_over_does_nothing_more() {
     old.keep().expect_err("for ever");
     drop(old);
     assert!(*memory.objects.lock().expect("no panic") == before);
-    // A program that fails leaves it free, with its list: nobody waits.
+    // A failed program frees its lease and keeps its list, so no program waits.
     drop(new);
     let patient = bucket(&memory, Duration::from_hours(1));
     let last = patient.lease("session", &[], None).expect("free");
