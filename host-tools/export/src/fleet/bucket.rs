@@ -128,20 +128,19 @@ impl Bucket {
         Ok(objects.filter_map(|object| Some(object.key.rsplit('/').next()?.to_owned())).collect())
     }
 
-    /// Sessions that programs add, or did not complete. Removes the leases of complete ones.
-    fn begun(&self) -> Result<Vec<String>> {
-        let mut sessions = self.last_names(&format!("{OWN}/lease"))?;
-        sessions.retain(|name| session_of(&file_name(name, 1)).is_some());
-        for session in &sessions {
-            let is_complete = || anyhow::Ok(self.objects.head(&own("index", session))?.is_some());
-            if is_complete()? {
-                let lease = self.lease(session, &[], None)?;
-                if is_complete()? {
-                    lease.end()?;
-                }
+    /// Sessions with a lease, complete ones or the others: programs add or replace them, or were stopped.
+    fn leased(&self, is_complete: bool) -> Result<Vec<String>> {
+        let mut sessions = Vec::new();
+        for name in self.last_names(&format!("{OWN}/lease"))? {
+            if session_of(&file_name(&name, 1)).is_some() && self.is_complete(&name)? == is_complete {
+                sessions.push(name);
             }
         }
         Ok(sessions)
+    }
+
+    fn is_complete(&self, session: &str) -> Result<bool> {
+        Ok(self.objects.head(&own("index", session))?.is_some())
     }
 
     pub(super) fn find(&self, session: &str) -> Result<Option<Found>> {
@@ -271,7 +270,13 @@ impl Bucket {
         self.recover()?;
         // Of a compaction that did not count, or was complete.
         self.objects.folders(&format!("{OWN}/new"))?.iter().try_for_each(|name| self.finish(name))?;
-        self.begun()?;
+        // Of a program that was stopped after its session was complete.
+        for session in self.leased(true)? {
+            let lease = self.lease(&session, &[], None)?;
+            if self.is_complete(&session)? {
+                lease.end()?;
+            }
+        }
         let (mut sum, mut partitions) = (Sum::default(), 0);
         for date in self.objects.folders(SESSIONS)? {
             for bucket in self.objects.folders(&format!("{SESSIONS}/{date}"))? {
@@ -283,7 +288,7 @@ impl Bucket {
                 }
             }
         }
-        let left = self.begun()?;
+        let left = self.leased(false)?;
         if !left.is_empty() {
             note!(
                 "{}: {} not complete, by programs that run or were stopped; decode again the logs of {}",

@@ -255,6 +255,19 @@ fn a_lease_is_kept_while_its_program_waits_for_another_one() {
 }
 
 #[test]
+fn a_list_of_sessions_that_are_not_complete_takes_no_lease() {
+    let (memory, _) = filled();
+    let programs = bucket(&memory, Duration::from_hours(1));
+    let (replaced, new) = (session(NUMBERS[0]), session(7));
+    let leases = [&replaced, &new].map(|session| programs.lease(session, &[], None).expect("free"));
+    let before = memory.objects.lock().expect("no panic").clone();
+    assert_eq!(programs.leased(false).expect("listed"), [new]);
+    assert_eq!(programs.leased(true).expect("listed"), [replaced]);
+    assert!(*memory.objects.lock().expect("no panic") == before);
+    drop(leases);
+}
+
+#[test]
 fn a_program_whose_answers_are_lost_waits_for_no_lease_of_its_own() {
     let (filled, before) = filled();
     let memory = copy_as(&filled, Kind::Repeated);
