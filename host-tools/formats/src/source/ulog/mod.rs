@@ -14,7 +14,7 @@
 //! | `px4` | observations from PX4's topics, the same as from PX4's MAVLink messages |
 //! | `session` | one pass over all of it |
 //!
-//! Memory: a window of 768 KiB, 1,024 definitions with 32,768 fields, 4,096 subscriptions. Appended data (a
+//! Memory: a window of 1 MiB, 1,024 definitions with 32,768 fields, 4,096 subscriptions. Appended data (a
 //! crash dump) come last.
 
 mod fields;

@@ -46,9 +46,12 @@ impl<R: Read> Window<R> {
         if self.rest().len() >= bytes || self.ended {
             return;
         }
-        self.buffer.drain(..self.at);
-        self.at = 0;
-        while self.buffer.len() < bytes && !self.ended {
+        // Each byte is moved once at most.
+        if self.at >= self.rest().len() {
+            self.buffer.drain(..self.at);
+            self.at = 0;
+        }
+        while self.rest().len() < bytes && !self.ended {
             let old = self.buffer.len();
             self.buffer.resize(old + READ_BYTES, 0);
             let got = match read_some(&mut self.input, self.buffer.get_mut(old..).unwrap_or_default()) {
