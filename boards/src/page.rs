@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::{Board, Port, all};
+use crate::{Board, Owner, Port, all};
 
 const HEAD: &str = "\
 # Boards
@@ -44,15 +44,18 @@ pub fn render() -> String {
 
 /// What to buy: a line for each board, with links to the page at this path.
 pub fn table(page: &str) -> String {
-    let mut table = "| board | card | plug | price | 5 V input |\n|---|---|---|---|---|\n".to_owned();
+    let mut table = "| board | card | plug | to buy | 5 V input |\n|---|---|---|---|---|\n".to_owned();
     for Board { name, title, card, owner, .. } in all() {
         let slot = if card.has_slot { "slot on the board" } else { "no slot: wire a socket" };
         let input = if owner.takes_5v { "documented" } else { "not documented" };
-        let (anchor, usb, price) = (anchor(title), &owner.usb, &owner.price);
-        let _ =
-            writeln!(table, "| [{title}]({page}#{anchor}) `{name}` | {slot} | {usb} | {price} | {input} |");
+        let (anchor, usb, buy) = (anchor(title), &owner.usb, to_buy(owner));
+        let _ = writeln!(table, "| [{title}]({page}#{anchor}) `{name}` | {slot} | {usb} | {buy} | {input} |");
     }
     table
+}
+
+fn to_buy(Owner { buy, price, .. }: &Owner) -> String {
+    format!("{buy}; {price}")
 }
 
 fn anchor(title: &str) -> String {
@@ -96,7 +99,7 @@ fn section(page: &mut String, board: &Board) -> std::fmt::Result {
     writeln!(page, "| crystal | | {} MHz |", crystal_hz / 1_000_000)?;
     writeln!(page, "| power | {} | |", owner.power)?;
     writeln!(page, "| boot loader | {}; USB plug: {} | |", owner.boot, owner.usb)?;
-    writeln!(page, "| to buy | {}; price: {} | |", owner.buy, owner.price)?;
+    writeln!(page, "| to buy | {} | |", to_buy(owner))?;
     for note in owner.notes.iter().take(1) {
         write!(page, "\n* {note}\n")?;
     }
