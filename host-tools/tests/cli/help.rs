@@ -20,7 +20,7 @@ const SERVES: &str = "live";
 const ELSEWHERE: [&str; 3] = ["--firmware", "box ", "s3://"];
 
 const DOCUMENTED: [(&str, &str); 2] = [
-    ("flight.tlog", "tests/flights/ap_quad_faults.tlog"),
+    ("tests/flights/ap_quad_faults.tlog", "tests/flights/ap_quad_faults.tlog"),
     ("f12.bin", "tests/labelled/bin/f12_gps_jump.bin.gz"),
 ];
 
@@ -30,6 +30,7 @@ fn the_documents_show_what_the_program_prints() {
     let (dir, root) =
         (tempfile::tempdir().expect("directory"), Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
     for (name, from) in DOCUMENTED {
+        fs::create_dir_all(dir.path().join(name).parent().expect("a folder")).expect("a folder");
         fs::copy(root.join(from), dir.path().join(name)).expect("a copy");
     }
     for document in ["README.md", "docs/check.md"] {
