@@ -56,4 +56,6 @@ fn the_version_names_the_commit() {
     let commit = Command::new("git").args(["rev-parse", "--short=12", "HEAD"]).output().expect("git");
     let commit = String::from_utf8_lossy(&commit.stdout).trim().to_owned();
     assert_eq!(version.trim_end(), format!("hums {} (commit {commit})", env!("CARGO_PKG_VERSION")));
+    let newest = include_str!("../../../CHANGELOG.md").lines().find_map(|line| line.strip_prefix("## "));
+    assert!(newest.is_some_and(|title| title.starts_with(env!("CARGO_PKG_VERSION"))), "{newest:?}");
 }
