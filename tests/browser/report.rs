@@ -345,6 +345,17 @@ fn table(page: &mut LivePage, selector: &str) -> Vec<Vec<String>> {
     serde_json::from_value(rows).unwrap()
 }
 
+/// All cells of a table are in view, each as wide as its text.
+fn assert_uncut(page: &mut LivePage, selector: &str, width: u32) {
+    let cut = page.run(&format!(
+        "const cells = [...document.querySelectorAll('{selector} td')].filter((cell) => cell.textContent);
+         const isCut = (cell) => cell.getBoundingClientRect().right > innerWidth || cell.scrollWidth > cell.clientWidth;
+         return [cells.length, document.documentElement.scrollWidth, cells.filter(isCut).map((cell) => cell.textContent)]"
+    ));
+    assert!(cut[0].as_u64() > Some(5) && cut[1].as_u64() <= Some(width.into()), "{selector}, {width}: {cut}");
+    assert_eq!(cut[2], serde_json::json!([]), "{selector}, {width}");
+}
+
 fn data_of(path: &Path) -> Value {
     let text = fs::read_to_string(path).unwrap();
     let data = text.split_once("id=\"data\">").unwrap().1;
@@ -425,15 +436,11 @@ fn a_folder_of_pages_has_a_table_and_flights_stand_side_by_side() {
             .contains("does not tell which parameters are at their defaults")
     );
 
-    page.open(&index, "light", 390, 844);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
-    let width = page.run("return [document.documentElement.scrollWidth, innerWidth]");
-    assert!(width[0].as_f64() <= width[1].as_f64(), "{width}");
-    let found = page.run(
-        "return [...document.querySelectorAll('#pages .badge')].map((badge) => badge.getBoundingClientRect().right)",
-    );
-    let found: Vec<f64> = found.as_array().unwrap().iter().map(|right| right.as_f64().unwrap()).collect();
-    assert!(found.len() == 2 && found.iter().all(|right| *right < 390.0), "out of view: {found:?}");
+    for width in [800, 390] {
+        page.open(&index, "light", width, 844);
+        page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+        assert_uncut(&mut page, "#pages", width);
+    }
     page.run("document.querySelector('#comparisons a').click()");
     page.wait(
         "return document.title.includes('side by side') && document.documentElement.dataset.ready === 'true'",
@@ -676,8 +683,11 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
     page.pdf(&pdf);
     let bytes = fs::read(&pdf).unwrap();
     assert!(bytes.starts_with(b"%PDF") && bytes.len() > 50_000, "{} bytes", bytes.len());
-    page.open(&address, "light", 390, 844);
-    page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+    for width in [800, 390] {
+        page.open(&address, "light", width, 844);
+        page.wait("return document.documentElement.dataset.ready === 'true'", 20);
+        assert_uncut(&mut page, "#flights", width);
+    }
     shoot(&mut page, "report-phone");
     assert_eq!(page.console(), serde_json::json!([]));
 }

@@ -35,11 +35,12 @@ export const rows = (headings, body, options = {}) =>
     ),
     el("tbody", {}, body),
   );
-export const cells = (values, kinds, attributes = {}) =>
+// With `titles` a row may become a card.
+export const cells = (values, kinds, attributes = {}, titles = []) =>
   el(
     "tr",
     attributes,
-    values.map((value, i) => el("td", { class: kinds[i] || "" }, value)),
+    values.map((value, i) => el("td", { class: kinds[i] || "", "data-title": titles[i] }, value)),
   );
 export const facts = (pairs) =>
   el(

@@ -20,7 +20,7 @@ export const sorted = (id, items, columns, { by = 0, placeholder, label }) => {
     el(
       "tr",
       {},
-      columns.map(([, kind, , shown]) => el("td", { class: kind }, shown(item))),
+      columns.map(([title, kind, , shown]) => el("td", { class: kind, "data-title": title }, shown(item))),
     );
   const rows = items.map((item) => ({ item, node: null }));
   const has = (row, part) => {
@@ -49,5 +49,5 @@ export const sorted = (id, items, columns, { by = 0, placeholder, label }) => {
   };
   word.addEventListener("input", draw);
   draw();
-  return [word, el("div", { class: "panel scroll", id }, el("table", {}, el("thead", {}, el("tr", {}, heads)), body)), more];
+  return [word, el("div", { class: "panel scroll cards", id }, el("table", {}, el("thead", {}, el("tr", {}, heads)), body)), more];
 };

@@ -73,10 +73,12 @@ const landing = (f) => {
   return flight.end - f.to_s < 5 ? "in the air at the end" : `not seen, last in the air ${at}`;
 };
 
+const TITLES = ["#", "Take-off", "Landing", "Time", "Height", "Speed", "Battery"];
+const KINDS = ["n", "t", "t", "n", "n", "n", "n"];
 const flights = (go) =>
   data.flights.length
     ? rows(
-        [["#", "n"], ["Take-off"], ["Landing"], ["Time", "n"], ["Height", "n"], ["Speed", "n"], ["Battery", "n"]],
+        TITLES.map((title, i) => [title, KINDS[i]]),
         data.flights.map((f, i) =>
           cells(
             [
@@ -88,13 +90,14 @@ const flights = (go) =>
               f.speed_max_m_s == null ? "" : `${fixed(f.speed_max_m_s, 1)} m/s`,
               f.percent_from != null && f.percent_to != null ? `${fixed(f.percent_from, 0)} \u2192 ${fixed(f.percent_to, 0)} %` : "",
             ],
-            ["n", "t", "t", "n", "n", "n", "n"],
+            KINDS,
             {
               class: "go",
               tabindex: 0,
               onclick: () => go(f.from_s, f.to_s),
               onkeydown: (e) => e.key === "Enter" && go(f.from_s, f.to_s),
             },
+            TITLES,
           ),
         ),
       )
@@ -114,7 +117,7 @@ export const summary = (go) => {
       "div",
       { class: "split" },
       el("div", { class: "panel scroll" }, identity()),
-      el("div", { class: "panel scroll", id: "flights" }, flights(go)),
+      el("div", { class: "panel scroll cards", id: "flights" }, flights(go)),
     ),
   );
 };
