@@ -75,6 +75,7 @@ use formats::FORMATS;
 use formats::influx::Tags;
 use identity::identity;
 use logs::reader;
+use logs::sessions::copy_words;
 use logs::side_by_side::side_by_side;
 use made::{LogJson, MadeJson, OutputFile};
 use manifest::{Manifest, ReadLog};
@@ -405,11 +406,9 @@ impl Done {
         for remark in &self.remarks {
             note!("{remark}");
         }
-        if let Some(of) = &self.copy_of {
-            note!("{}: is a copy of {of}, which is written once", self.name);
-        }
-        let said = |ending: &Ending| ending.aside().into_iter().chain(ending.faults()).collect::<Vec<_>>();
-        for why in self.ending.iter().flat_map(said) {
+        let ending = self.ending.as_ref();
+        let aside = self.copy_of.as_deref().map(copy_words).or_else(|| ending.and_then(Ending::aside));
+        for why in aside.into_iter().chain(ending.into_iter().flat_map(Ending::faults)) {
             note!("{}: {why}", self.name);
         }
         let Some(json) = json else {

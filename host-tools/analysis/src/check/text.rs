@@ -175,7 +175,7 @@ impl Table {
         let unsound = self.unsound.iter().rev();
         let unsound = unsound.map(|(what, count)| (*count, format!("{} (counted above too)", what.words())));
         let others = [
-            (self.copies, "the same session once more (not counted above)".to_owned()),
+            (self.copies, "copy of another log (not counted above)".to_owned()),
             (failed as u64, "could not be read".to_owned()),
         ];
         for (count, what) in levels.into_iter().chain(unsound).chain(others) {

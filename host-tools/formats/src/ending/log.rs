@@ -4,7 +4,7 @@ use super::place::SessionBefore;
 use super::proof::Proof;
 use crate::logs::Log;
 use crate::logs::reader::LogSummary;
-use crate::logs::sessions::again_words;
+use crate::logs::sessions::copy_words;
 use crate::logs::strangers::Strange;
 use crate::plural::{are, count, noun};
 
@@ -49,7 +49,7 @@ impl Ending {
                 count(self.summary.frames, "frame")
             )
         };
-        let again = self.again.as_deref().map(again_words);
+        let again = self.again.as_deref().map(copy_words);
         again.or_else(|| self.left_over.then(left_over))
     }
 

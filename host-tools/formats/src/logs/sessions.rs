@@ -100,8 +100,8 @@ fn copies(mut logs: Vec<Candidate<'_>>) -> Vec<(String, String)> {
 }
 
 /// Words about a copy.
-pub fn again_words(original: &str) -> String {
-    format!("is the same session as {original} once more (not counted)")
+pub fn copy_words(original: &str) -> String {
+    format!("is a copy of {original} (not counted)")
 }
 
 /// Prefix and number.

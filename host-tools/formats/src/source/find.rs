@@ -14,7 +14,7 @@ use crate::archive::GZIP;
 use crate::files::{FileId, why_unread};
 use crate::logs::find::{Image, REMARKS_MAX, check_seekable};
 use crate::logs::naming::{make_unique, name_after};
-use crate::logs::sessions::{Sessions, first_session};
+use crate::logs::sessions::{Sessions, copy_words, first_session};
 use crate::logs::{self, Content, segment_name};
 use crate::naming::fingerprint;
 use crate::outcome::{Usage, usage};
@@ -178,9 +178,7 @@ impl FoundRecordings {
             }
         }
         let title = |index: usize| self.places.get(index).map_or("", |place| place.title.as_str());
-        let words = |(copy, of): (&usize, &usize)| {
-            format!("{}: is a copy of {}, which is read once", title(*copy), title(*of))
-        };
+        let words = |(copy, of): (&usize, &usize)| format!("{}: {}", title(*copy), copy_words(title(*of)));
         let remarks: Vec<String> = copies.iter().map(words).take(REMARKS_MAX).collect();
         self.remarks.extend(remarks);
         let mut index = 0..;

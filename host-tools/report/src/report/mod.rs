@@ -30,6 +30,7 @@ use serde::Serialize;
 use crate::check;
 use crate::files::{Inputs, Output, appended, make_parent, says_directory, settle};
 use crate::followed::{EndResolver, HELD_MAX};
+use crate::logs::sessions::copy_words;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
 use crate::naming::{Named, Names, Traits, without_made};
@@ -202,6 +203,7 @@ struct Making<'a> {
 impl Making<'_> {
     fn session(&mut self, overview: &Overview) -> Result<()> {
         let (index, this) = (self.earlier.len(), trend::Session::of(overview));
+        let mut copy = None;
         let is_wanted = self.wanted.pages && self.wanted.sessions.contains(&index);
         if let Some(place) = self.places.get(index).filter(|_| is_wanted) {
             let traits = Traits::of(place)?;
@@ -212,10 +214,7 @@ impl Making<'_> {
                 None => self.names.entry(place.system).or_default().name(index, place, &traits),
             };
             match named {
-                Named::Copy(of) => {
-                    let of = self.places.get(of).map_or("another log", |place| &place.name);
-                    note!("{}: is a copy of {of}, whose page is written once", place.name);
-                }
+                Named::Copy(of) => copy = self.places.get(of).map(|place| copy_words(&place.name)),
                 Named::As(name, _) => {
                     let path = self.wanted.path(&of_vehicle(name, place.system));
                     let free = Output::check(&path, self.inputs);
@@ -241,7 +240,7 @@ impl Making<'_> {
             }
         }
         // Also of the sessions before, which the page compares with, and of those that were read for its end.
-        for why in overview.ending.aside().into_iter().chain(overview.faults()) {
+        for why in copy.or_else(|| overview.ending.aside()).into_iter().chain(overview.faults()) {
             note!("{}: {why}", overview.ending.name);
         }
         self.outcome = self.outcome.and(Outcome::lossy(!overview.is_sound()));
