@@ -201,7 +201,7 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         manifest.log(done.of_manifest());
         existing.extend(done.exists.clone());
         made.extend(done.made.iter().flat_map(OutputFile::files).cloned());
-        done.tell(json.as_mut())
+        done.tell(json.as_mut(), logs)
     };
     side_by_side(
         &works,
@@ -402,7 +402,7 @@ impl Done {
         self.outcome.and(Outcome::lossy(!is_sound))
     }
 
-    fn tell(self, json: Option<&mut MadeJson>) -> Result<()> {
+    fn tell(self, json: Option<&mut MadeJson>, logs: usize) -> Result<()> {
         for remark in &self.remarks {
             note!("{remark}");
         }
@@ -412,7 +412,9 @@ impl Done {
             note!("{}: {why}", self.name);
         }
         let Some(json) = json else {
-            return self.made.iter().try_for_each(|made| output::line(&printable::word(&made.line())));
+            let from = if logs > 1 { format!(", from {}", self.name) } else { String::new() };
+            let line = |made: &OutputFile| output::line(&printable::word(&(made.line() + &from)));
+            return self.made.iter().try_for_each(line);
         };
         let whole = self.outcome() == Outcome::Done && !self.skipped;
         let state = self.soundness().name();
