@@ -174,6 +174,9 @@ struct PartJson {
     /// Component, from 1.
     place: u8,
     part: String,
+    /// As `hums box replaced` has it.
+    #[serde(skip)]
+    name: String,
     serial: String,
     /// `green`, `yellow`, `red`.
     status: &'static str,
@@ -238,6 +241,7 @@ impl PartJson {
         Self {
             place,
             part: crate::part::name(line.kind, line.number, &line.name),
+            name: crate::part::name(line.kind, line.number, ""),
             serial: line.serial.clone(),
             status: line.status,
             used_percent: finite(line.used_percent).filter(|_| limit.is_some()),
@@ -314,6 +318,11 @@ fn text(vehicle: &VehicleJson) -> String {
     let rules = vehicle.parts.iter().filter_map(|part| part.rule.as_deref()).collect::<Vec<_>>().join(", ");
     if !rules.is_empty() {
         let _ = writeln!(text, "  limits by {rules}");
+    }
+    if let Some(due) = vehicle.parts.iter().find(|part| part.status == "red") {
+        let command = format!("hums box replaced {} --serial SERIAL", due.name);
+        let _ =
+            writeln!(text, "  once replaced or serviced: {command} --link SRC, or --card DIR of the card");
     }
     text
 }

@@ -99,6 +99,7 @@ fn a_card_says_which_part_is_due_and_what_is_left_of_the_others() {
     let motor = &vehicle["parts"][1];
     let [run_h, left_h, flights] =
         ["run", "left", "left_flights"].map(|name| motor[name].as_f64().expect("a number"));
+    line("  once replaced or serviced: hums box replaced airframe --serial SERIAL --link SRC, or --card DIR");
     assert!((run_h + left_h - 10.0).abs() < 1e-6 && (flights - left_h / run_h * 2.0).abs() < 1.0, "{motor}");
     assert_eq!(motor["rule"], "CMP2_HOURS");
 }
