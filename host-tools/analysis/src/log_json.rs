@@ -9,6 +9,7 @@ use crate::ending::{BlocksJson, EndJson};
 use crate::logs;
 use crate::loss;
 use crate::names::{autopilot_name, check_name, type_name};
+use crate::printable::path;
 use crate::source::item::MessageCount;
 use crate::source::recording::Format;
 use crate::source::told::Finding;
@@ -42,6 +43,14 @@ impl ImageJson {
             not_looked_at: image.not_looked_at(),
         }
     }
+}
+
+/// An image for people, with this name.
+pub fn image_text(image: &logs::find::Image, name: &Path) -> String {
+    let scan = image.scanned.then(|| "the logs were found by looking at every block".to_owned());
+    let damage = image.damage.iter().map(|damage| format!("damaged: {damage}"));
+    let lines = damage.chain(scan).chain(image.lost_words()).chain(image.not_looked_at());
+    lines.fold(format!("Card {}", path(name)), |text, line| format!("{text}\n  {line}"))
 }
 
 /// The images of a run.

@@ -1,7 +1,8 @@
 //! The manifest of a reading: files read and made, by SHA-256; repairs and losses. Others can prove later that they have the
-//! same files, with `sha256sum`.
+//! same files, with `sha256sum`, which also reads the manifest for people.
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
@@ -13,11 +14,12 @@ use serde::Serialize;
 use crate::ending::Ending;
 use crate::files::{Inputs, Output, digest, settle};
 use crate::hex::hex;
-use crate::log_json::ImageJson;
+use crate::log_json::{ImageJson, image_text};
 use crate::logs::find::Image;
+use crate::logs::sessions::copy_words;
 use crate::output::{self, Schema};
 use crate::plural::count;
-use crate::printable::path as shown;
+use crate::printable::{path as shown, word};
 use crate::soundness::Soundness;
 use crate::utc::iso8601;
 
@@ -34,6 +36,9 @@ pub struct Manifest {
     inputs: Vec<FileJson>,
     /// The file systems of cards among them.
     images: Vec<ImageJson>,
+    /// In words.
+    #[serde(skip)]
+    cards: Vec<String>,
     /// Each file that was made.
     outputs: Vec<FileJson>,
     logs: Vec<LogJson>,
@@ -112,12 +117,15 @@ impl Manifest {
 
     /// Adds the file systems of cards, named from the `given` paths on.
     pub fn images(&mut self, images: &[Image], given: &[PathBuf]) {
-        let json = |image| ImageJson::of(image, &name_below(&image.path, given));
-        self.images.extend(images.iter().map(json));
+        for image in images {
+            let name = name_below(&image.path, given);
+            self.images.push(ImageJson::of(image, &name));
+            self.cards.push(image_text(image, &name));
+        }
     }
 
-    /// Hashes all files, tells people of them, and writes the manifest. Files are named from the `given` paths on.
-    /// Outputs may be folders.
+    /// Hashes all files, and writes the manifest: JSON if its name ends in `.json`, otherwise text. Files are named from
+    /// the `given` paths on. Outputs may be folders.
     ///
     /// # Errors
     /// A file cannot be read or written.
@@ -139,7 +147,8 @@ impl Manifest {
         }
         refuse.refuse(to)?;
         let mut file = Output::create(to, refuse)?;
-        let text = output::json_text(SCHEMA, &self)?;
+        let is_json = to.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+        let text = if is_json { output::json_text(SCHEMA, &self)? } else { self.text(to) };
         settle(file.write_all(text.as_bytes()), to)?;
         file.finish()?;
         output::aside(&format!(
@@ -149,6 +158,43 @@ impl Manifest {
             count(self.outputs.len() as u64, "file")
         ));
         Ok(())
+    }
+
+    fn text(&self, to: &Path) -> String {
+        let Self { program, made_utc, inputs, outputs, cards, logs, .. } = self;
+        let name = to.file_name().map(Path::new).map(shown).unwrap_or_default();
+        let mut text = format!(
+            "Made by {program} at {made_utc} by this computer's clock.\n\
+             To compare files with their SHA-256 below: sha256sum --check {name}\n"
+        );
+        for (title, files) in [("Files read", inputs), ("Files made", outputs)] {
+            if !files.is_empty() {
+                let _ = writeln!(text, "\n{title}");
+            }
+            for FileJson { file, sha256, .. } in files {
+                let _ = writeln!(text, "{sha256}  {file}");
+            }
+        }
+        text.push('\n');
+        for line in cards.iter().cloned().chain(logs.iter().flat_map(LogJson::lines)) {
+            let _ = writeln!(text, "{line}");
+        }
+        text
+    }
+}
+
+impl LogJson {
+    /// A sentence, and one for each fault.
+    fn lines(&self) -> Vec<String> {
+        let session = self.session.as_deref().map_or_else(String::new, |of| format!(" (session {of})"));
+        let state = match (&self.copy_of, self.lacks) {
+            (Some(of), _) => copy_words(of),
+            (None, "") => "nothing is missing or damaged".to_owned(),
+            (None, lacks) => lacks.to_owned(),
+        };
+        let line = format!("Log {}{session}: {}; {state}", word(&self.name), count(self.frames, "message"));
+        let faults = self.faults.iter().map(|fault| format!("  {}", word(fault)));
+        std::iter::once(line).chain(faults).collect()
     }
 }
 

@@ -77,7 +77,7 @@ pub struct Decode {
     /// Write the findings into a tlog, as texts of the box at their times, for programs that show texts
     #[arg(long)]
     pub findings: bool,
-    /// Write a manifest of the files read and made, as JSON: SHA-256, repairs, losses (docs/json.md)
+    /// Write a manifest of the files read and made: SHA-256, repairs, losses; as JSON if FILE ends in .json
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
     /// For srt: start of the video, seconds after the log's; negative if it is earlier
@@ -181,7 +181,7 @@ const INFO_EXAMPLES: &str = "Examples:
   hums info --json 00001_00.HUM
   hums info --list cards/ flight.tlog
   hums info --verify card.img
-  hums info --verify --manifest card.json card.img
+  hums info --verify --manifest card.txt card.img
 
 --list: a line a log, in the order in which they began: date, length, time in the air, size, worst finding.
 --verify: the file system's structures, each sector's checksum and number, each group's decoding, each frame's checksum, the order
@@ -202,7 +202,7 @@ pub struct Info {
     /// Verify HUMS logs and cards, and print each check: checksums, order, ends
     #[arg(long, conflicts_with_all = ["list", "session", "system"])]
     pub verify: bool,
-    /// As --verify, and write a manifest of the files read, as JSON: SHA-256, repairs, losses (docs/json.md)
+    /// As --verify, and write a manifest of the files read: SHA-256, repairs, losses; as JSON if FILE ends in .json
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
     /// Only this session, by the name that `hums info --list` prints

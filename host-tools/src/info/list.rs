@@ -8,7 +8,6 @@ use hums_core::health::Level;
 use serde::Serialize;
 
 use super::each::each;
-use super::text::image_text;
 use crate::check::grouped::grouped;
 use crate::check::problem::problems;
 use crate::cli;
@@ -22,7 +21,7 @@ use crate::source::recording::Format;
 use crate::summary::{BOX_COUNTS, Overview};
 use crate::table::{Table, left, right};
 use crate::utc::{clock, date_and_time, iso8601};
-use hums_analysis::log_json::{duration_s, images_json};
+use hums_analysis::log_json::{duration_s, image_text, images_json};
 use hums_analysis::order::{self, LogTime};
 
 const SCHEMA: Schema = Schema::first("hums-info-list");
@@ -34,7 +33,7 @@ pub(super) fn run(args: &cli::Info) -> Result<Outcome> {
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
     if list.is_none() {
         for image in found.images.iter().filter(|image| !image.damage.is_empty()) {
-            output::line(&image_text(image))?;
+            output::line(&image_text(image, &image.path))?;
         }
     }
     let (mut lines, mut elements, mut box_counts) = (Vec::new(), Vec::new(), false);

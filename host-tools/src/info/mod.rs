@@ -17,8 +17,8 @@ use crate::output::{self, JsonList, Schema};
 use crate::source::find::find_each;
 use crate::verify;
 use each::each;
-use hums_analysis::log_json::{LogJson, images_json};
-use text::{image_text, text};
+use hums_analysis::log_json::{LogJson, image_text, images_json};
+use text::text;
 
 const SCHEMA: Schema = Schema::first("hums-info");
 
@@ -41,7 +41,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     let mut list =
         args.json.then(|| JsonList::begin(SCHEMA, &images_json(&found.images), "logs")).transpose()?;
     if list.is_none() {
-        found.images.iter().try_for_each(|image| output::line(&image_text(image)))?;
+        found.images.iter().try_for_each(|image| output::line(&image_text(image, &image.path)))?;
     }
     let outcome = each(&found, wanted, |overview| {
         if let Some(list) = &mut list {

@@ -13,13 +13,12 @@ use super::{usage, wear};
 use crate::check::causes::causes;
 use crate::colour::{level, warning};
 use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
-use crate::logs;
 use crate::logs::naming::is_part;
 use crate::loss;
 use crate::names::{check_kind, check_name};
 use crate::part;
 use crate::plural::count;
-use crate::printable::{path, word};
+use crate::printable::word;
 use crate::source::item::{self, MessageCount};
 use crate::source::told::Finding;
 use crate::states::{Shown, Values, quantity, shown};
@@ -30,20 +29,6 @@ use hums_analysis::log_json::{duration_s, vehicle};
 
 /// Shown findings and gaps; `--json` and `hums decode` have the rest.
 const SHOWN_MAX: usize = 40;
-
-pub(super) fn image_text(image: &logs::find::Image) -> String {
-    let mut text = format!("Card {}", path(&image.path));
-    for damage in &image.damage {
-        let _ = write!(text, "\n  damaged: {damage}");
-    }
-    if image.scanned {
-        text.push_str("\n  the logs were found by looking at every block");
-    }
-    for words in image.lost_words().into_iter().chain(image.not_looked_at()) {
-        let _ = write!(text, "\n  {words}");
-    }
-    text
-}
 
 pub(super) fn text(log: &Overview) -> String {
     let mut text = String::new();

@@ -1,6 +1,7 @@
 //! `hums due`: what parts have run, and the hours of vehicles.
 
 use std::fs;
+use std::process::Command;
 
 use super::support::{attempt, contents, flight, json, recorded, records, run, text};
 
@@ -14,9 +15,15 @@ fn a_manifest_names_each_file_with_its_hash() {
     let image = fs::read(dir.path().join("card.img")).expect("an image");
     let hash = hums::hex::hex(&sha2::Sha256::digest(&image));
     let [input] = made["inputs"].as_array().expect("a list").as_slice() else { panic!("{made}") };
-    assert_eq!((&input["file"], &input["sha256"]), (&"card.img".into(), &hash.into()));
+    assert_eq!((&input["file"], &input["sha256"]), (&"card.img".into(), &hash.as_str().into()));
     assert_eq!((&made["logs"][0]["frames"], &made["logs"][0]["lacks"]), (&16_645.into(), &"".into()));
     run(dir.path(), "info --verify card.img --manifest made.json", 1);
+    run(dir.path(), "info --verify card.img --manifest made.txt", 0);
+    let text = fs::read_to_string(dir.path().join("made.txt")).expect("text");
+    assert!(text.contains(&format!("Files read\n{hash}  card.img\n")), "{text}");
+    assert!(text.contains("16645 messages; nothing is missing or damaged\n"), "{text}");
+    let check = Command::new("sha256sum").current_dir(dir.path()).args(["--check", "made.txt"]).output();
+    assert_eq!(String::from_utf8_lossy(&check.expect("coreutils").stdout), "card.img: OK\n");
     run(dir.path(), "info --verify card.img --manifest card.img", 2);
 }
 
@@ -92,6 +99,7 @@ fn a_card_says_which_part_is_due_and_what_is_left_of_the_others() {
         line("2 of 2 flights").starts_with("  DUE ") && line("2 of 2 flights").contains("due now"),
         "{told}"
     );
+    line("  once replaced or serviced: hums box replaced airframe --serial SERIAL --link SRC, or --card DIR");
     assert!(line("motor 3").contains("of 10 h in the air") && line("motor 3").contains(" flights"), "{told}");
     assert!(line("other").contains("no limit"), "{told}");
     let vehicle = json(&run(dir.path(), "due card.img --json", 4))["vehicles"][0].clone();
@@ -99,7 +107,6 @@ fn a_card_says_which_part_is_due_and_what_is_left_of_the_others() {
     let motor = &vehicle["parts"][1];
     let [run_h, left_h, flights] =
         ["run", "left", "left_flights"].map(|name| motor[name].as_f64().expect("a number"));
-    line("  once replaced or serviced: hums box replaced airframe --serial SERIAL --link SRC, or --card DIR");
     assert!((run_h + left_h - 10.0).abs() < 1e-6 && (flights - left_h / run_h * 2.0).abs() < 1.0, "{motor}");
     assert_eq!(motor["rule"], "CMP2_HOURS");
 }
