@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use hums_core::exposure;
-use hums_core::health::{Check, Said, Side, VOCABULARY, When, checks};
+use hums_core::health::{Check, Said, Side, VOCABULARY, When, Words, checks};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Millis;
 
@@ -150,17 +150,16 @@ fn every_check_is_documented_as_it_is() {
     }
 }
 
+fn finding(alarm: &str) -> String {
+    alarm.split('|').next().unwrap().replace('#', "*n*")
+}
+
 #[test]
 fn every_check_is_explained_as_people_are_told() {
-    let mut table = "| check | name | means | do | needs |\n|---|---|---|---|---|\n".to_owned();
-    for words in VOCABULARY {
-        let Said { check, name, part, .. } = words.said;
-        let part = if part.is_empty() { String::new() } else { format!(", by {part}") };
-        let _ = writeln!(
-            table,
-            "| {check} | {name}{part} | {} | {} | {} |",
-            words.meaning, words.action, words.needs
-        );
+    let mut table = "| check | finding | means | do | needs |\n|---|---|---|---|---|\n".to_owned();
+    for Words { said, meaning, action, needs, .. } in VOCABULARY {
+        let _ =
+            writeln!(table, "| {} | {} | {meaning} | {action} | {needs} |", said.check, finding(said.alarm));
     }
     assert_holds("check.md", "words", &table);
 }
@@ -185,7 +184,7 @@ fn every_text_of_a_check_is_in_the_runbook() {
         let value = words.said.around_value(check.unit.name());
         let value =
             value.map_or_else(String::new, |(before, after)| format!(": {before}*value*{unit}{after}"));
-        let alarm = alarm.split('|').next().unwrap().replace('#', "*n*");
+        let alarm = finding(alarm);
         let _ = writeln!(table, "| {alarm}{value} | {advice} | {} | {} |", words.meaning, words.action);
     }
     assert_holds("runbook.md", "texts", &table);

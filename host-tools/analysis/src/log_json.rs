@@ -303,7 +303,7 @@ fn exceedances(contents: &Contents) -> Vec<ExceedanceJson> {
     let json = |((check, instance), line): (&(String, u8), &crate::summary::ExceedanceLine)| ExceedanceJson {
         check: check.clone(),
         instance: *instance,
-        name: check_name(check, *instance),
+        name: check_name(check, &[*instance]),
         unit: line.unit.clone(),
         session: crossings(check, &line.session),
         lifetime: (!contents.checked_here).then(|| crossings(check, &line.lifetime)),

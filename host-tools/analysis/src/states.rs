@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use hums_core::health::check_named;
 
 use crate::names::{unit_name, vocabulary};
+use crate::source::told::Finding;
 use crate::summary::is_possible;
 
 /// Should be zero: a limit below one means "any", and is not shown.
@@ -71,6 +72,26 @@ impl Display for Values {
         let between = if self.onset.is_empty() || self.worst.is_empty() { "" } else { ", " };
         write!(formatter, "{}{between}{}", self.onset, self.worst)
     }
+}
+
+/// The state of a finding, or its values and limit: `3.4 V, at worst 3.3 V (limit 3.5 V)`. A state that only repeats the
+/// level is left out.
+pub fn measured(finding: &Finding) -> String {
+    let Finding { check, level, value, worst, limit, unit, .. } = finding;
+    let (words, limit) = match shown(check, *value, *limit) {
+        Shown::State(state) => {
+            (state.filter(|state| !state.ends_with(level.name())).unwrap_or_default().to_owned(), None)
+        }
+        Shown::Quantity(_, limit) => (Values::new(*value, *worst, unit).to_string(), limit),
+    };
+    let limit = limit.filter(|_| !words.is_empty());
+    words + &limit.map_or_else(String::new, |limit| format!(" (limit {})", quantity(limit, unit)))
+}
+
+/// A finding by its name, with [`measured`]: `battery 1 cell low, 3.4 V (limit 3.5 V)`.
+pub fn finding_words(finding: &Finding) -> String {
+    let parts = [finding.name(), measured(finding)];
+    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
 /// The state that a value of a check is; `None` for a check of a quantity.

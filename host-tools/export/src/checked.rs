@@ -7,9 +7,8 @@ use hums_core::health::Level;
 use super::row::{Cell, CellType, Row};
 use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
 use crate::check::problem::{Problem, problems};
-use crate::names::check_name;
 use crate::source::told::Finding;
-use crate::states::{Shown, quantity, shown};
+use crate::states;
 use crate::summary::Contents;
 
 /// Word for the monitor on board, as `checked_by` in `hums info --json`.
@@ -151,37 +150,8 @@ pub(crate) fn problems_of(contents: &Contents) -> Vec<Problem> {
     problems(&contents.findings, contents.checked_by() == "board", peaks)
 }
 
-/// A problem in words, as [`finding_words`].
-pub fn problem_words(problem: &Problem) -> String {
-    let Problem { check, instance, level, value, limit, unit, subsystem, at, .. } = problem;
-    finding_words(&Finding {
-        at: *at,
-        subsystem: *subsystem,
-        check: check.clone(),
-        instance: *instance,
-        level: *level,
-        previous: Level::Ok,
-        value: *value,
-        worst: None,
-        limit: *limit,
-        unit: unit.clone(),
-    })
-}
-
-/// A finding in words: `battery 1 cell voltage critical: 3.4 V (limit 3.5 V)`.
+/// A finding with its level: `critical: battery 1 cell low, 3.4 V (limit 3.5 V)`.
 pub fn finding_words(finding: &Finding) -> String {
-    let Finding { check, instance, level, value, limit, unit, .. } = finding;
-    let words = match shown(check, *value, *limit) {
-        // Its level again.
-        Shown::State(state) => {
-            let state = state.filter(|state| !state.ends_with(level.name()));
-            state.map(|state| format!(": {state}")).unwrap_or_default()
-        }
-        Shown::Quantity(value, limit) => {
-            let value = value.map(|value| format!(": {}", quantity(value, unit))).unwrap_or_default();
-            let limit = limit.map(|limit| format!(" (limit {})", quantity(limit, unit))).unwrap_or_default();
-            format!("{value}{limit}")
-        }
-    };
-    format!("{} {}{words}", check_name(check, *instance), level.name())
+    let level = if finding.is_bad() { format!("{}: ", finding.level.name()) } else { String::new() };
+    level + &states::finding_words(finding)
 }

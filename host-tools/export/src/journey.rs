@@ -100,7 +100,7 @@ impl Journey {
                 latitude_deg: point.latitude_deg,
                 longitude_deg: point.longitude_deg,
                 altitude_m: point.height_m.unwrap_or(0.0),
-                name: format!("{} {}", finding.check, finding.level.name()),
+                name: finding.name(),
                 words: finding_words(finding),
                 finding,
             })

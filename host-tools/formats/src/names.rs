@@ -22,15 +22,12 @@ pub fn vocabulary(check: &str) -> Option<&'static Words> {
     health::vocabulary(check).or_else(of_trends)
 }
 
-/// In outputs: `battery 1 cell voltage`. Texts for pilots differ.
-pub fn check_name(check: &str, instance: u8) -> String {
-    vocabulary(check)
-        .map_or_else(|| check.replace('_', " "), |words| words.said.name_of(instance).to_string())
-}
-
-/// A check without its part: `battery cell voltage`.
-pub fn check_kind(check: &str) -> &str {
-    vocabulary(check).map_or(check, |words| words.said.name)
+/// The fault that a check finds, in the words of radio texts: `battery 1, 2 cell low`; of any part, `battery cell low`.
+pub fn check_name(check: &str, instances: &[u8]) -> String {
+    let Some(words) = vocabulary(check) else { return check.replace('_', " ") };
+    let fault = words.said.alarm.split('|').next().unwrap_or_default();
+    let numbers: Vec<String> = instances.iter().map(|of| (u16::from(*of) + 1).to_string()).collect();
+    if numbers.is_empty() { fault.replacen(" #", "", 1) } else { fault.replacen('#', &numbers.join(", "), 1) }
 }
 
 /// A unit for people; logs have ASCII.

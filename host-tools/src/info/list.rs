@@ -181,7 +181,7 @@ fn found(log: &Overview) -> String {
             None => "not checked".to_owned(),
         };
     };
-    format!("{}: {}", level(worst.level), word(&check_name(&worst.check, worst.instance)))
+    format!("{}: {}", level(worst.level), word(&check_name(&worst.check, &[worst.instance])))
 }
 
 /// `None` if all is well.

@@ -15,13 +15,13 @@ use crate::colour::{level, warning};
 use crate::ending::{among_words, behind_words, copies_words, made_again_words, unprotected_words};
 use crate::logs::naming::is_part;
 use crate::loss;
-use crate::names::{check_kind, check_name};
+use crate::names::check_name;
 use crate::part;
 use crate::plural::count;
 use crate::printable::word;
 use crate::source::item::{self, MessageCount};
 use crate::source::told::Finding;
-use crate::states::{Shown, Values, quantity, shown};
+use crate::states::finding_words;
 use crate::summary::{LISTED_MAX, Overview};
 use crate::table::{Table, left, right};
 use crate::utc::{clock, iso8601_ms, moment};
@@ -194,30 +194,11 @@ fn silence(finding: &Finding) -> Option<&'static str> {
 }
 
 fn sentence(finding: &Finding, due: Option<&(String, Option<String>)>, cause: Option<&str>) -> String {
-    let Finding { subsystem, check, instance, previous, value, worst, limit, unit, .. } = finding;
-    let mut sentence = format!("{}: {}", subsystem.name(), check_name(check, *instance));
-    if let Some(due) = due {
-        let _ = write!(sentence, ": {}", part::due_words(due));
-    }
-    match shown(check, *value, *limit) {
-        Shown::State(state) => state.into_iter().for_each(|state| {
-            let _ = write!(sentence, ", {state}");
-        }),
-        Shown::Quantity(_, limit) => {
-            let values = Values::new(*value, *worst, unit).to_string();
-            let comma = if values.is_empty() { "" } else { ", " };
-            let limit = limit.map(|limit| format!(" (limit {})", quantity(limit, unit)));
-            let _ = write!(sentence, "{comma}{values}{}", limit.unwrap_or_default());
-        }
-    }
-    if finding.is_unjudged() {
-        let _ = write!(sentence, "; {}", Finding::UNJUDGED);
-    }
-    if let Some(cause) = cause {
-        let _ = write!(sentence, "; because of {}", check_kind(cause));
-    }
-    let _ = write!(sentence, "; was {} [{check}]", previous.name());
-    sentence
+    let due = due.map_or_else(String::new, |due| format!("; {}", part::due_words(due)));
+    let cause = cause.map_or_else(String::new, |cause| format!("; because of {}", check_name(cause, &[])));
+    let Finding { subsystem, check, previous, .. } = finding;
+    let (subsystem, previous) = (subsystem.name(), previous.name());
+    format!("{subsystem}: {}{due}{cause}; was {previous} [{check}]", finding_words(finding))
 }
 
 fn more(text: &mut String, count: u64, shown: usize) {
@@ -359,9 +340,9 @@ mod tests {
         };
         let sentence = |finding: Finding| sentence(&finding, None, None);
         let state = sentence(finding("autopilot_state", 6.0, 4.5, ""));
-        assert_eq!(state, "computer: autopilot failsafe, emergency; was ok [autopilot_state]");
+        assert_eq!(state, "computer: autopilot in failsafe, emergency; was ok [autopilot_state]");
         let charge = sentence(finding("batt_state", 1.0, 0.5, ""));
-        assert_eq!(charge, "computer: battery 1 charge state, low or unhealthy; was ok [batt_state]");
+        assert_eq!(charge, "computer: autopilot: battery 1 low, low or unhealthy; was ok [batt_state]");
         let load = sentence(finding("load", 97.0, 95.0, "%"));
         assert!(load.contains(", 97 % (limit 95 %); was ok"), "{load}");
     }
@@ -395,7 +376,7 @@ mod tests {
         let [_, silent, wrong, heard] = lines.as_slice() else { panic!("{text}") };
         assert_eq!(*silent, "1:24.0  stale     5 checks that were ok have no data");
         assert!(
-            wrong.starts_with("1:30.0  stale     structure: battery 1 cell voltage (limit 1);"),
+            wrong.starts_with("1:30.0  stale     structure: no data: battery 1 cell voltage; was"),
             "{wrong}"
         );
         assert_eq!(*heard, "1:35.0  ok        5 checks have data again, and are ok");
@@ -403,7 +384,7 @@ mod tests {
         log.contents.findings.truncate(3);
         let mut text = String::new();
         findings_text(&mut text, &log);
-        assert!(text.contains("structure: vibration") && text.contains("… and 8 more"), "{text}");
+        assert!(text.contains("structure: no data: vibration") && text.contains("… and 8 more"), "{text}");
     }
 
     #[test]
@@ -422,7 +403,7 @@ mod tests {
         };
         let ended = finding(f32::NAN);
         assert!(ended.is_unjudged() && !finding(4.0).is_unjudged());
-        let words = "power: battery 1 cell voltage; no longer judged (on the ground, disarmed, or no longer told); was critical [cell_voltage]";
+        let words = "power: no longer judged: battery 1 cell low; was critical [cell_voltage]";
         assert_eq!(sentence(&ended, None, None), words);
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn text(text: &mut String, log: &Overview) {
                 Shown::Quantity(peak, _) => peak.map_or_else(String::new, |peak| quantity(peak, &line.unit)),
             };
             table.row([
-                format!("  {}", word(&check_name(check, *instance))),
+                format!("  {}", word(&check_name(check, &[*instance]))),
                 of.to_owned(),
                 warnings.to_string(),
                 seconds(warning_tenths),

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::craft::{Craft, is_of_wire};
 use crate::counters::tells_flight;
-use crate::names::{check_kind, vocabulary};
+use crate::names::{check_name, vocabulary};
 use crate::page::note::CELLS_UNKNOWN;
 use crate::part;
 
@@ -242,7 +242,11 @@ fn reason(
         let alarms = craft.worries.values().filter_map(alarm);
         // One cause has its own order.
         return if let Some(cause) = alarm(finding).and_then(|effect| health::root_cause(&effect, alarms)) {
-            let words = format!("{}, because of: {}", without_advice(finding), check_kind(cause.check.name));
+            let words = format!(
+                "{}, because of: {}",
+                without_advice(finding),
+                check_name(cause.check.name, &[cause.instance])
+            );
             (words, action(cause.check.name))
         } else {
             let words = match craft.due(finding) {
@@ -338,7 +342,7 @@ mod tests {
         let land = action("cell_voltage");
         let words = "battery 1 cell low: 3.40 V, LAND NOW".to_owned();
         assert_eq!(reason(&craft, Subsystem::Power), (words, land));
-        let words = "autopilot in failsafe, because of: battery cell voltage".to_owned();
+        let words = "autopilot in failsafe, because of: battery 1 cell low".to_owned();
         assert_eq!(reason(&craft, Subsystem::Computer), (words, land));
         craft.worries.remove(&("cell_voltage", 0));
         let words = "autopilot in failsafe, WATCH IT".to_owned();

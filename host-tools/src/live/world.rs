@@ -476,7 +476,7 @@ mod tests {
         );
         let (notes, power) = told(true);
         assert!(!notes.contains("cells not known"), "the box may know them: {notes}");
-        assert!(notes.contains("\"on board\" \"battery 1 cell voltage\""), "{notes}");
+        assert!(notes.contains("\"on board\" \"battery 1 cell low"), "{notes}");
         assert!(power.contains("critical") && power.contains("battery 1 cell low: 3.40 V"), "{power}");
     }
 

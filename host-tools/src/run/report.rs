@@ -11,7 +11,6 @@ use serde::{Serialize, Serializer};
 use super::earlier::EarlierSessions;
 use crate::endpoint::Endpoint;
 use crate::logs;
-use crate::names::check_name;
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 use crate::plural::count;
@@ -214,7 +213,7 @@ impl RunReport {
         for finding in &self.findings {
             let level = if finding.is_unjudged() { "ended" } else { finding.level.name() };
             let (at, subsystem, check) = (moment(finding.at), finding.subsystem.name(), &finding.check);
-            let name = check_name(check, finding.instance);
+            let name = finding.name();
             let _ = writeln!(text, "finding  {at:>9}  {level:<8}  {subsystem}: {name} [{check}]");
         }
         if self.findings_left_out > 0 {

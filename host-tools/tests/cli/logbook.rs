@@ -66,7 +66,7 @@ fn totals_are_the_counters_on_board_and_a_card_that_is_there_twice_counts_once()
     assert!((hours * 3600.0 - of("flight_time_s")).abs() < 3.0, "{hours} h, {} s", of("flight_time_s"));
     let defects: Vec<&str> = rows.iter().filter_map(|row| row["defects"].as_str()).collect();
     assert_eq!(
-        defects.iter().filter(|words| words.contains("battery 1 cell voltage critical: 3.4 V")).count(),
+        defects.iter().filter(|words| words.contains("critical: battery 1 cell low: 3.4 V")).count(),
         1
     );
     assert!(
@@ -75,7 +75,7 @@ fn totals_are_the_counters_on_board_and_a_card_that_is_there_twice_counts_once()
     );
 
     let page = fs::read_to_string(dir.path().join("book.html")).expect("a page");
-    assert!(page.contains("size:A4") && page.contains("battery 1 cell voltage critical"), "{page}");
+    assert!(page.contains("size:A4") && page.contains("critical: battery 1 cell low"), "{page}");
     assert!(
         page.contains("Total in this logbook: 2 flights") && page.contains("Counters of the box"),
         "{page}"

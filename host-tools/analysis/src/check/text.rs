@@ -16,7 +16,7 @@ use super::judged::{Judged, JudgedBy};
 use super::problem::{IMPACT, Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
-use crate::names::{autopilot_name, type_name, vocabulary};
+use crate::names::{autopilot_name, check_name, type_name, vocabulary};
 use crate::part;
 use crate::plural::count;
 use crate::printable::word;
@@ -88,7 +88,7 @@ pub fn line(checked: &Checked) -> String {
     let mut names: Vec<String> = Vec::new();
     for group in grouped(&judged.problems) {
         for problem in group.members.iter().chain(group.effects.iter().flatten()) {
-            let name = kind_of_alarm(&problem.check);
+            let name = check_name(&problem.check, &[]);
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -188,7 +188,7 @@ impl Table {
         let mut checks: Vec<_> = self.checks.iter().collect();
         checks.sort_by_key(|(_, (critical, warning))| Reverse((*critical, *warning)));
         for (check, (critical, warning)) in &checks {
-            let name = format!("{} [{check}]", kind_of_alarm(check));
+            let name = format!("{} [{check}]", check_name(check, &[]));
             table.row([String::new(), critical.to_string(), warning.to_string(), name]);
         }
         if !checks.is_empty() {
@@ -451,22 +451,9 @@ fn worst_of<'a>(group: &[&'a Problem]) -> Option<&'a Problem> {
     group.iter().copied().reduce(|worst, one| if is_worse(one, worst) { one } else { worst })
 }
 
-/// A pilot's words: `battery 1 cell low`.
 fn alarm(group: &[&Problem]) -> String {
-    let Some(first) = group.first() else { return String::new() };
-    let numbers: Vec<String> =
-        group.iter().map(|problem| (u16::from(problem.instance) + 1).to_string()).collect();
-    words_of_alarm(&first.check).replacen('#', &numbers.join(", "), 1)
-}
-
-/// Any part: `battery cell low`.
-fn kind_of_alarm(check: &str) -> String {
-    words_of_alarm(check).replacen(" #", "", 1)
-}
-
-fn words_of_alarm(check: &str) -> &str {
-    let alarm = vocabulary(check).map_or(check, |words| words.said.alarm);
-    alarm.split_once('|').map_or(alarm, |(fault, _)| fault)
+    let instances: Vec<u8> = group.iter().map(|problem| problem.instance).collect();
+    group.first().map_or_else(String::new, |first| check_name(&first.check, &instances))
 }
 
 fn details(problem: &Problem, max: usize) -> String {
@@ -480,7 +467,8 @@ fn values(problem: &Problem) -> Option<(Values, Option<String>)> {
     Some((Values::new(*onset, worst, unit), limit.map(|limit| quantity(limit, unit))))
 }
 
-fn sentence(group: &[&Problem]) -> String {
+/// Problems of one check, as a sentence.
+pub fn sentence(group: &[&Problem]) -> String {
     let Some(first) = worst_of(group) else { return String::new() };
     let mut text = alarm(group);
     let (values, limit) = values(first).unzip();
@@ -506,10 +494,6 @@ fn sentence(group: &[&Problem]) -> String {
     text
 }
 
-fn name(check: &str) -> &str {
-    vocabulary(check).map_or(check, |words| words.said.name)
-}
-
 fn not_judged(text: &mut String, judged: &Judged, mention: NotJudged) {
     let checks = judged.checks();
     if judged.worst().is_none() || judged.not_judged.is_empty() {
@@ -527,10 +511,12 @@ fn not_judged(text: &mut String, judged: &Judged, mention: NotJudged) {
 
 /// Checks without data, by reason: a line each.
 pub fn reasons(judged: &Judged) -> String {
-    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for (check, why) in &judged.not_judged {
-        let check = &name(check);
+        let check = check_name(check, &[]);
         match reasons.iter_mut().find(|(reason, _)| reason == why) {
+            // Two checks may find one fault.
+            Some((_, checks)) if checks.contains(&check) => {}
             Some((_, checks)) => checks.push(check),
             None => reasons.push((why, vec![check])),
         }

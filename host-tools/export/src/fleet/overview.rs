@@ -311,7 +311,7 @@ impl Gathered {
                 continue;
             }
             let key = (problem.check.clone(), problem.instance);
-            let check = check_name(&problem.check, problem.instance);
+            let check = check_name(&problem.check, &[problem.instance]);
             let unit = unit_name(&problem.unit).to_owned();
             let number = |number: Option<f32>| number.unwrap_or(f32::NAN);
             let (state, value, limit) =
@@ -508,6 +508,6 @@ mod tests {
         assert_eq!((found.due.len(), found.due[0].part.as_str()), (2, "motor 1"));
         let finding = &found.findings[0];
         assert_eq!((found.findings.len(), finding.sessions, finding.day.as_str()), (2, 3, "2026-05-03"));
-        assert!(!finding.is_critical() && finding.problem.check == "battery 1 cell voltage", "{finding:?}");
+        assert!(!finding.is_critical() && finding.problem.check == "battery 1 cell low", "{finding:?}");
     }
 }

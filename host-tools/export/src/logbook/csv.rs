@@ -259,7 +259,7 @@ mod tests {
             take_off: Some(take_off.to_owned()),
             duration_s: 1800.0,
             from: Some(Spot { latitude_deg: 51.5, longitude_deg: -0.25 }),
-            defects: "battery 1 cell voltage critical: 3.4 V; more, \"and\" so on".to_owned(),
+            defects: "critical: battery 1 cell low: 3.4 V; more, \"and\" so on".to_owned(),
             ..LogbookEntry::default()
         }
     }

@@ -19,7 +19,8 @@ use hums_core::health::{Level, Subsystem};
 use hums_core::usage::UsageCounter;
 
 use crate::check::problem::Problem;
-use crate::checked::{problem_words, problems_of};
+use crate::check::text::sentence;
+use crate::checked::problems_of;
 use crate::files::{Inputs, says_directory};
 use crate::identity::{Known, RecordingContent, identity};
 use crate::logs::side_by_side::side_by_side;
@@ -310,7 +311,8 @@ fn entries(record: &str, known: &Known) -> Vec<LogbookEntry> {
         let (incidents, defects): (Vec<_>, Vec<_>) =
             mine.iter().partition(|problem| problem.subsystem == Subsystem::Mishap);
         let words = |problems: Vec<&&&Problem>| {
-            problems.iter().map(|problem| problem_words(problem)).collect::<Vec<_>>().join("; ")
+            let words = |of: &&&&Problem| format!("{}: {}", of.level.name(), sentence(&[of]));
+            problems.iter().map(words).collect::<Vec<_>>().join("; ")
         };
         (entry.incident, entry.defects) = (words(incidents), words(defects));
         entry

@@ -10,6 +10,7 @@ use hums_onboard::persist::STORE_NEW;
 
 use super::item::Gap;
 use crate::loss;
+use crate::names::{check_name, vocabulary};
 
 /// A record of the monitor's.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,12 +85,25 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// The words for a check that no longer applies.
-    pub const UNJUDGED: &str = "no longer judged (on the ground, disarmed, or no longer told)";
-
     /// Unjudged: after landing the check no longer applies, and is not known to be good.
     pub fn is_unjudged(&self) -> bool {
         self.level == Level::Ok && self.value.is_nan()
+    }
+
+    /// In the box's words: `battery 1 cell low`, `over: battery 1 cell low`, `no data: battery 1 cell voltage`.
+    pub fn name(&self) -> String {
+        let fault = || check_name(&self.check, &[self.instance]);
+        let value = || {
+            let words = vocabulary(&self.check);
+            words.map_or_else(fault, |words| words.said.name_of(self.instance).to_string())
+        };
+        match (self.level, self.previous) {
+            (Level::Stale, _) => format!("no data: {}", value()),
+            (Level::Ok, _) if self.is_unjudged() => format!("no longer judged: {}", fault()),
+            (Level::Ok, Level::Stale) => format!("data again: {}", value()),
+            (Level::Ok, _) => format!("over: {}", fault()),
+            _ => fault(),
+        }
     }
 
     /// Whether its level is a warning or critical.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::names::{check_name, unit_name, vocabulary};
 use crate::part;
 use crate::source::told;
-use crate::states::{Shown, Values, meaning, quantity, shown};
+use crate::states::{Shown, meaning, measured, shown};
 use crate::statustext::StatusText;
 
 const OURS: &str = "HUMS: ";
@@ -79,9 +79,7 @@ pub struct Cause {
 
 impl Cause {
     fn of(check: &str) -> Self {
-        let words =
-            vocabulary(check).map_or_else(|| check_name(check, 0), |known| known.said.name.to_owned());
-        Self { check: check.to_owned(), words }
+        Self { check: check.to_owned(), words: check_name(check, &[]) }
     }
 }
 
@@ -90,7 +88,7 @@ const AGAIN_S: f64 = 45.0;
 const OVER: &str = "over: ";
 const CAUSE: &str = "cause: ";
 
-fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
+fn told_check(words: &str) -> Option<(&'static str, u8)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).or_else(|| words.strip_prefix(CAUSE)).unwrap_or(words);
     let parts = |said: &Said| match instances(said.check) {
@@ -110,34 +108,18 @@ fn told_check(words: &str) -> Option<(&'static str, u8, &str)> {
                 .iter()
                 .find_map(|feeds| words.strip_prefix(said.alarm_of(part, *feeds).to_string().as_str())),
         }?;
-        (rest.is_empty() || rest.starts_with([':', ','])).then_some((said.check, part, rest))
+        (rest.is_empty() || rest.starts_with([':', ','])).then_some((rest.len(), (said.check, part)))
     });
     // The longest words that fit; of two scales of one fault the first.
-    told.reduce(|best, other| if other.2.len() < best.2.len() { other } else { best })
+    told.min_by_key(|(rest, _)| *rest).map(|(_, check)| check)
 }
 
 const FEEDS: [Feeds; 3] = [Feeds::Vehicle, Feeds::Avionics, Feeds::Payload];
-
-/// The state or the values of a finding, the limit, and the level before.
-fn measured(finding: &told::Finding) -> String {
-    let told::Finding { check, value, worst, limit, unit, previous, .. } = finding;
-    let (value, limit) = match shown(check, *value, *limit) {
-        Shown::State(state) => (state.unwrap_or_default().to_owned(), None),
-        Shown::Quantity(_, limit) => (Values::new(*value, *worst, unit).to_string(), limit),
-    };
-    let limit = limit.map_or_else(String::new, |limit| format!("limit {}", quantity(limit, unit)));
-    let parts = [value, limit, format!("was {}", previous.name())];
-    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
-}
 
 impl Note {
     /// A finding of a check, and the check that explains it.
     pub fn found(finding: &told::Finding, because: Option<&str>) -> Self {
         let known = vocabulary(&finding.check);
-        let mut words = check_name(&finding.check, finding.instance);
-        if finding.is_unjudged() {
-            words = format!("{words}: {}", told::Finding::UNJUDGED);
-        }
         let is_worry = finding.is_bad();
         let (state, value, limit) = match shown(&finding.check, finding.value, finding.limit) {
             Shown::State(state) => (state, None, None),
@@ -149,7 +131,7 @@ impl Note {
             level: finding.level.name(),
             from: "here".to_owned(),
             subsystem: finding.subsystem.name(),
-            words,
+            words: finding.name(),
             found: Some(FindingNote {
                 check: finding.check.clone(),
                 instance: finding.instance,
@@ -159,7 +141,9 @@ impl Note {
                 state,
                 limit,
                 unit: unit_name(&finding.unit).to_owned(),
-                measured: measured(finding),
+                measured: format!("{}, was {}", measured(finding), finding.previous.name())
+                    .trim_start_matches(", ")
+                    .to_owned(),
                 meaning: if is_worry { meaning(&finding.check) } else { "" },
                 action: known.filter(|_| is_worry).map_or("", |known| known.action),
                 because: because.map(Cause::of),
@@ -205,22 +189,17 @@ impl Note {
 
     fn on_board(text: &StatusText) -> Option<Self> {
         let words = text.words.trim_start_matches(OURS);
-        let (check, instance, rest) = told_check(words)?;
+        let (check, instance) = told_check(words)?;
         let known = vocabulary(check)?;
         let level = if words.starts_with(OVER) { "ok" } else { text.level() };
         let is_worry = matches!(level, "warning" | "critical");
-        let rest = rest.trim_start_matches([':', ',', ' ']);
-        let name = check_name(check, instance);
         Some(Self {
             at_s: text.at.as_secs_f64(),
             kind: "finding",
             level,
             from: "on board".to_owned(),
             subsystem: "",
-            words: match rest {
-                "" => name,
-                rest => format!("{name}: {rest}"),
-            },
+            words: words.to_owned(),
             found: Some(FindingNote {
                 check: check.to_owned(),
                 instance,
@@ -305,13 +284,11 @@ mod tests {
                 };
                 let text = summary::text(&finding);
                 let words = text.as_str().trim_start_matches(OURS);
-                let known = told_check(words).map(|(check, part, _)| (check, part));
+                let known = told_check(words);
                 let twin = twins.iter().find(|(twin, _)| *twin == check.name);
                 let name = twin.filter(|_| level != Level::Stale).map_or(check.name, |(_, of)| of);
-                let same_name = vocabulary(check.name).map(|words| words.said.name);
                 let is_it = known.is_some_and(|(told, part)| {
-                    part == instance
-                        && (told == name || vocabulary(told).map(|words| words.said.name) == same_name)
+                    part == instance && (told == name || check_name(told, &[]) == check_name(check.name, &[]))
                 });
                 assert!(is_it, "{words}: {known:?}");
             }
