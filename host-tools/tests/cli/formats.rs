@@ -295,6 +295,29 @@ fn a_gap_is_in_every_format() {
 }
 
 #[test]
+fn subtitles_begin_with_the_video_and_a_format_says_what_it_leaves_out() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let decode = |more: &str| {
+        let log = flight("ap_quad_guided.tlog");
+        let told =
+            hums(dir.path(), &format!("decode {} -o flight --force --format {more}", log.display()), 0);
+        assert!(told.contains("other messages are not in it"), "{more}: {told}");
+        String::from_utf8_lossy(&fs::read(dir.path().join("flight")).expect("written")).into_owned()
+    };
+    for format in ["ulog", "kml", "gpx"] {
+        decode(format);
+    }
+    let words = |subtitles: &str, number| {
+        subtitles.split("\n\n").nth(number).and_then(|cue| Some(cue.splitn(3, '\n').nth(2)?.to_owned()))
+    };
+    let (same, later, earlier) = (decode("srt"), decode("srt --offset 10"), decode("srt --offset -10"));
+    assert!(same.starts_with("1\n00:00:00,000 --> ") && later.starts_with("1\n00:00:00,000 --> "));
+    assert!(earlier.starts_with("1\n00:00:10,000 --> "), "{}", &earlier[..40]);
+    assert!(words(&same, 0) == words(&earlier, 0) && words(&same, 10) == words(&later, 0));
+    assert!(words(&later, 0).is_some_and(|later| later.contains("battery")));
+}
+
+#[test]
 fn several_logs_side_by_side_are_what_each_is_alone() {
     let dir = packed(&["px4_hil_quad_low.tlog", "ap_quad_guided.tlog"]);
     fs::copy(dir.path().join("px4_hil_quad_low.hum"), dir.path().join("zz_again.hum")).expect("copied");

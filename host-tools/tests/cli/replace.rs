@@ -407,6 +407,20 @@ fn recordings_are_once_in_a_fleet_however_often_their_folders_are_decoded() {
     assert_eq!(vehicles("named").into_iter().collect::<Vec<_>>(), ["vehicle-7-new"]);
 }
 
+#[test]
+fn a_session_whose_clock_is_wrong_by_years_is_told_with_its_date() {
+    const YEARS_US: u64 = 70 * 31_557_600_000_000;
+    let dir = tempfile::tempdir().expect("directory");
+    let log = fs::read(end_of("ap_quad_guided.tlog", dir.path())).expect("a recording");
+    let late = |(us, frame): (u64, &[u8])| [&(us + YEARS_US).to_be_bytes()[..], frame].concat();
+    let late: Vec<u8> = crate::support::records(&log).into_iter().flat_map(late).collect();
+    fs::write(dir.path().join("late.tlog"), late).expect("written");
+    let told = run(dir.path(), "decode late.tlog -o fleet --format parquet", 0).stderr;
+    let (told, dates) = (String::from_utf8_lossy(&told), contents(&dir.path().join("fleet/sessions")));
+    assert!(told.contains("its clock says 20") && told.contains("its tables have that date"), "{told}");
+    assert!(matches!(&dates[..], [(place, _)] if place.starts_with("date=209")), "{told}");
+}
+
 /// A folder of pages gets those that it lacks; `--force` writes all of them.
 #[test]
 fn pages_that_exist_are_skipped_and_the_others_are_written() {
