@@ -366,13 +366,6 @@ pub fn all() -> &'static [Board] {
     &ALL
 }
 
-/// One board of each family: the first one of each SPI that the card is on.
-pub fn families() -> impl Iterator<Item = &'static Board> {
-    let bus = |board: &Board| board.card.bus.as_ref().map(|bus| bus.spi);
-    let mut seen = BTreeSet::new();
-    all().iter().filter(move |board| seen.insert(bus(board)))
-}
-
 /// The board of this name. The error names all of them.
 pub fn find(name: &str) -> Result<&'static Board, String> {
     let names = || all().iter().map(|board| board.name.as_str()).collect::<Vec<_>>().join(", ");

@@ -64,11 +64,6 @@ fn fly(board: &Board) {
 }
 
 #[test]
-fn a_board_of_each_family_records_and_survives_the_loss_of_card_and_power() {
-    std::thread::scope(|scope| hums_boards::families().for_each(|board| drop(scope.spawn(|| fly(board)))));
-}
-
-#[test]
 #[ignore = "wants the images of all boards: `cargo xtask prove boards`"]
 fn each_board_records_and_survives_the_loss_of_card_and_power() {
     hums_boards::all().iter().for_each(fly);

@@ -8,7 +8,9 @@ use std::path::Path;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::Packet;
 
-use super::support::{attempt, end_of, flight, frames_of, hums, json, px4, recorded, records, run, text};
+use super::support::{
+    attempt, end_of, flight, frames_of, hums, json, piped, px4, recorded, records, run, text,
+};
 
 /// Checks of the place on a link, which other recordings lack.
 const OF_THE_WIRE: [&str; 2] = ["heartbeat", "frames_lost"];
@@ -415,7 +417,7 @@ fn standard_input_is_read_once() {
     }
     let bytes = fs::read(flight("px4_hil_quad_low.tlog")).expect("the recording");
     let length = bytes.len();
-    let output = super::support::hums().args(["info", "-"]).write_stdin(bytes).output().expect("it runs");
+    let output = piped(hums().args(["info", "-"]), &bytes);
     assert!(text(&output).contains(&format!(" in {length} bytes")), "{}", text(&output));
 }
 
@@ -730,12 +732,8 @@ fn what_another_vehicle_flew_teaches_nothing_and_is_said() {
     let words = "trends are not judged: the flights of --past are of another vehicle (system 1, quadrotor";
     assert!(told(ardupilot).contains(words), "{}", told(ardupilot));
     assert!(!told(px4).contains("another vehicle"), "{}", told(px4));
-    let piped = hums()
-        .current_dir(dir.path())
-        .args(["check", "--past", ardupilot, "-"])
-        .write_stdin(fs::read(dir.path().join(px4)).expect("there"))
-        .output()
-        .expect("it runs");
+    let bytes = fs::read(dir.path().join(px4)).expect("there");
+    let piped = piped(hums().current_dir(dir.path()).args(["check", "--past", ardupilot, "-"]), &bytes);
     assert!(text(&piped).contains(words), "{}", text(&piped));
     let alone = attempt(dir.path(), &format!("check {px4}"));
     assert_eq!(piped.status.code(), alone.status.code());

@@ -14,8 +14,8 @@ fn flight(name: &str) -> PathBuf {
 
 #[track_caller]
 fn hums(dir: &Path, line: &str, code: i32) -> String {
-    let mut command = assert_cmd::Command::cargo_bin("hums").expect("the program");
-    let output = command.current_dir(dir).args(line.split_whitespace()).output().expect("it runs");
+    let output =
+        super::support::hums().current_dir(dir).args(line.split_whitespace()).output().expect("it runs");
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(code), "hums {line}\n{error}");
     String::from_utf8_lossy(&output.stdout).into_owned() + &error

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::support::{attempt, contents, flight, hums, json, px4, recorded, run, text, until};
+use crate::support::{attempt, contents, flight, hums, json, piped, px4, recorded, run, text, until};
 
 fn is_begun(dir: &Path) -> bool {
     let mut names = fs::read_dir(dir).expect("a folder").map(|entry| entry.expect("an entry").file_name());
@@ -75,11 +75,8 @@ fn what_has_no_frame_changes_neither_card_nor_store_and_a_compressed_recording_i
     ] {
         for to in ["plain.raw.img --store store --overwrite-oldest", "new.img --store new --tap tap --gs gs"]
         {
-            let mut command = hums();
             let line = format!("sim {input} --sd {to}");
-            let ended =
-                command.current_dir(dir.path()).args(line.split(' ')).write_stdin(text.as_str()).output();
-            let ended = ended.expect("it runs");
+            let ended = piped(hums().current_dir(dir.path()).args(line.split(' ')), text.as_bytes());
             let said = String::from_utf8_lossy(&ended.stderr);
             assert_eq!(ended.status.code(), Some(1), "{line}: {said}");
             assert!(said.contains(why), "{line}: {said}");

@@ -390,9 +390,9 @@ fn what_is_no_log_is_told_apart() {
 fn a_reader_that_goes_away_ends_it_quietly() {
     let dir = tempfile::tempdir().expect("directory");
     packed(dir.path());
-    let program = assert_cmd::cargo::cargo_bin("hums");
+    let program = env!("CARGO_BIN_EXE_hums");
     for line in ["decode flight.hum -o - --format jsonl", "info flight.hum --json", "decode --help"] {
-        let mut child = std::process::Command::new(&program)
+        let mut child = std::process::Command::new(program)
             .current_dir(dir.path())
             .args(line.split(' '))
             .stdout(Stdio::piped())

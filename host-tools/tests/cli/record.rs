@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
 
-use crate::support::{attempt, end_of, flight, frames_of, hums, json, px4, run, text};
+use crate::support::{attempt, end_of, flight, frames_of, hums, json, piped, px4, run, text};
 
 #[test]
 fn the_tap_shows_what_the_uart_got() {
@@ -44,7 +44,7 @@ fn standard_input_and_output_and_raw_bytes_do_as_well() {
     let raw = frames_of(&px4()).concat();
     let mut command = hums();
     command.current_dir(dir.path()).args(["sim", "-", "--sd", "card.img", "--gs", "-"]);
-    let output = command.write_stdin(raw).output().expect("it runs");
+    let output = piped(&mut command, &raw);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(
         matches!(output.stdout.first(), Some(0xfd)),

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Write as _;
 use std::os::unix::fs::{FileExt as _, MetadataExt as _, symlink};
 use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
-use assert_cmd::Command;
 use tempfile::TempDir;
 
 pub(crate) fn flight(name: &str) -> PathBuf {
@@ -45,9 +45,20 @@ pub(crate) fn end_of(name: &str, folder: &Path) -> PathBuf {
 }
 
 pub(crate) fn hums() -> Command {
-    let mut command = Command::cargo_bin("hums").expect("the program");
-    command.timeout(std::time::Duration::from_mins(1));
+    let mut command = Command::new("timeout");
+    command.args(["60", env!("CARGO_BIN_EXE_hums")]);
     command
+}
+
+/// With these bytes on a pipe. It may end before it has read them all.
+pub(crate) fn piped(command: &mut Command, input: &[u8]) -> Output {
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it runs");
+    let mut stdin = child.stdin.take().expect("a pipe");
+    std::thread::scope(|scope| {
+        scope.spawn(move || stdin.write_all(input));
+        child.wait_with_output().expect("it ends")
+    })
 }
 
 /// The output; the exit code must be this one.

@@ -116,11 +116,8 @@ pub(super) const STEPS: [Step; 19] = [
 const BROWSERS: &[Need] = &[PythonVenv, Chromium, Firefox, BrowserTarget];
 const CHIP: &[Need] = &[FirmwareTarget, PythonVenv, Dosfstools];
 
-/// The default board's image last: cargo keeps it for the step `budgets`.
 fn build() -> Result<()> {
-    let mut boards: Vec<_> = hums_boards::families().collect();
-    boards.sort_by_key(|board| board.name == hums_boards::DEFAULT);
-    firmware::build_beside(boards, pc::build)
+    firmware::build_beside([firmware::default_board()], pc::build)
 }
 
 fn size() -> Result<()> {
