@@ -5,7 +5,7 @@ use std::io::Cursor;
 
 use hums::source::dataflash::{self, Form};
 use hums::source::input::Input;
-use hums::source::item::{Item, Rows, Want};
+use hums::source::item::{Item, Needs, Rows};
 
 /// The first byte chooses: odd is a text log. The rest is the file.
 pub fn check(data: &[u8]) {
@@ -19,7 +19,7 @@ pub fn check(data: &[u8]) {
     }
     let mut reader = dataflash::open(input, form).expect("nothing is read yet");
     let (mut last, mut unread) = (None, 0);
-    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
+    let want = Needs { observations: true, rows: Rows::All, ..Needs::default() };
     let summary = reader.read(want, &mut |at, item| {
         assert!(last.is_none_or(|last| last <= at), "time falls from {last:?} to {at:?}");
         last = Some(at);

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use hums::endpoint::Endpoint;
-use hums::source::item::{Rows, Want};
+use hums::source::item::{Needs, Rows};
 use hums::source::recording::LogPlace;
 use hums::source::{self, Timing};
 
@@ -41,7 +41,7 @@ fn stream(path: &Path, length: usize) {
 fn items(path: &Path, length: usize) {
     let Ok(recording) = LogPlace::file(path).open() else { return };
     let mut count = 0;
-    let want = Want { frames: true, observations: true, rows: Rows::All, ..Want::default() };
+    let want = Needs { frames: true, observations: true, rows: Rows::All, ..Needs::default() };
     let _ = recording.read(want, &mut |_, _| {
         count += 1;
         assert!(count <= ITEMS_PER_BYTE * length + 64, "no end");

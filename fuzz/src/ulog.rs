@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use hums::source::item::{Item, Reader as _, Rows, Want};
+use hums::source::item::{Item, Needs, Reader as _, Rows};
 use hums::source::ulog::Ulog;
 use hums_core::clock::Instant;
 
@@ -19,7 +19,7 @@ pub fn check(data: &[u8]) {
     let bytes = if data.starts_with(&HEADER[..7]) { data.to_vec() } else { [&HEADER[..], data].concat() };
     let mut last = Instant::ZERO;
     let mut tables = BTreeMap::new();
-    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
+    let want = Needs { observations: true, rows: Rows::All, ..Needs::default() };
     let _ = Ulog::new(bytes.as_slice()).read(want, &mut |at, item| {
         assert!(at >= last, "time falls from {last:?} to {at:?}");
         last = at;

@@ -33,7 +33,7 @@ use clap::{CommandFactory as _, Parser as _};
 
 use cli::{BoxAction, Cli, Command};
 use decode::fleet::overview;
-use decode::storage::{Address, Fetched};
+use decode::storage::{Address, LocalInputs};
 use outcome::Outcome;
 
 /// The first argument is the program's name.
@@ -92,7 +92,7 @@ fn fetched(given: &mut Command) -> anyhow::Result<Outcome> {
         _ => Vec::new(),
     };
     // Until the end of the command.
-    let _fetched = Fetched::inputs(inputs)?;
+    let _fetched = LocalInputs::inputs(inputs)?;
     command(given)
 }
 

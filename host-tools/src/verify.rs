@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use hums_blackbox::record::Lost;
+use hums_blackbox::record::LossKind;
 use serde::Serialize;
 
 use crate::cli;
@@ -444,9 +444,10 @@ fn newer(log: &Overview) -> String {
 
 /// Input in no log, so it does not count against it.
 fn came_damaged(contents: &Contents) -> Option<String> {
-    let of = |what: Lost| contents.losses.get(what.name()).map(|loss| loss.count).filter(|count| *count > 0);
-    let frames = of(Lost::DamagedFrames).map(|frames| count(frames, "damaged frame"));
-    let bytes = of(Lost::NotFrames).map(|bytes| format!("{} of no frame", count(bytes, "byte")));
+    let of =
+        |what: LossKind| contents.losses.get(what.name()).map(|loss| loss.count).filter(|count| *count > 0);
+    let frames = of(LossKind::DamagedFrames).map(|frames| count(frames, "damaged frame"));
+    let bytes = of(LossKind::NotFrames).map(|bytes| format!("{} of no frame", count(bytes, "byte")));
     let what = frames.into_iter().chain(bytes).collect::<Vec<_>>().join(" and ");
     (!what.is_empty()).then(|| {
         format!("besides {what} came over the line, before the recorder: no damage of the log (hums info says when)")

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use hums::source::item::{CellValue, Item, Row, Rows, Want};
+use hums::source::item::{CellValue, Item, Needs, Row, Rows};
 use hums::source::recording::LogPlace;
 use hums_tests::{flights, oracle};
 use serde_json::Value as Json;
@@ -52,7 +52,7 @@ fn every_field_of_every_message_of_an_autopilots_own_log_is_read_as_pymavlink_re
         messages += 1;
         values += expected.len();
     };
-    let want = Want { rows: Rows::All, ..Want::default() };
+    let want = Needs { rows: Rows::All, ..Needs::default() };
     recording
         .read(want, &mut |_, item| {
             if let Item::Row(row) = item {

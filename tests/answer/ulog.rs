@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use hums::source::item::{Cause, CellValue, Item, Row, Rows, Want};
+use hums::source::item::{Cause, CellValue, Item, Needs, Row, Rows};
 use hums::source::recording::LogPlace;
 use hums_tests::{flights, oracle};
 use serde_json::json;
@@ -24,7 +24,7 @@ fn every_field_of_a_px4_log_is_what_pyulog_reads() {
 fn write(log: &Path, folder: &Path) {
     let mut tables: BTreeMap<String, (Vec<String>, BufWriter<File>)> = BTreeMap::new();
     let (mut parameters, mut texts, mut dropouts) = (BTreeMap::new(), Vec::new(), Vec::new());
-    let want = Want { rows: Rows::All, ..Want::default() };
+    let want = Needs { rows: Rows::All, ..Needs::default() };
     let take = &mut |_, item: Item<'_>| {
         match item {
             Item::Row(Row { table, values: &[CellValue::Text(name), CellValue::Double(value)] })

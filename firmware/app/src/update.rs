@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use embedded_storage::nor_flash::NorFlash as _;
 use hums_onboard::ResetCause;
-use hums_onboard::update::Running;
+use hums_onboard::update::RunningImage;
 use hums_update::header::Header;
 use hums_update::map;
 use hums_update::message::Message;
@@ -44,8 +44,8 @@ fn flash(from: u32, bytes: usize) -> &'static [u8] {
 }
 
 /// This image.
-pub(crate) fn running() -> Running<'static> {
-    let running = Running {
+pub(crate) fn running() -> RunningImage<'static> {
+    let running = RunningImage {
         board: board::NAME,
         header: Header::read(flash(map::APPLICATION, hums_update::header::BYTES)),
         state: State::read(flash(map::STATE, map::STATE_BYTES)),
@@ -59,7 +59,7 @@ pub(crate) fn is_on_trial() -> bool {
 }
 
 /// Ends the trial. Without room or with flash that refuses it goes on.
-pub(crate) fn confirm(running: &Running<'static>) {
+pub(crate) fn confirm(running: &RunningImage<'static>) {
     let Some(header) = &running.header else { return };
     let bytes = Record::Confirmed(header.floor).bytes(header.id());
     let at = running.state.free as u32;

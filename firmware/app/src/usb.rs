@@ -1,6 +1,6 @@
 //! The USB device of both modes: its identity, and its driver with the guard against hostile hosts.
 
-use hums_usb::guard::{Guarded, Link, Port};
+use hums_usb::guard::{GuardedDriver, Link, Port};
 use hums_usb::scsi::SERIAL_BYTES;
 use hums_usb::{Config, PACKET_BYTES};
 
@@ -20,7 +20,7 @@ pub(crate) struct Identity {
 /// One packet of each endpoint from the host: control and class.
 pub(crate) type Packets = [u8; 2 * PACKET_BYTES];
 
-pub(crate) type Driver<'d> = Guarded<'d, board::UsbDriver<'d>>;
+pub(crate) type Driver<'d> = GuardedDriver<'d, board::UsbDriver<'d>>;
 
 pub(crate) fn driver<'d>(usb: board::Usb, packets: &'d mut Packets, link: &'d Link) -> Driver<'d> {
     let port = Port {
@@ -29,7 +29,7 @@ pub(crate) fn driver<'d>(usb: board::Usb, packets: &'d mut Packets, link: &'d Li
         has_bus_event: board::has_bus_event,
         now,
     };
-    Guarded::new(usb.driver(packets), link, port)
+    GuardedDriver::new(usb.driver(packets), link, port)
 }
 
 pub(crate) fn config(identity: Identity, serial: &[u8; SERIAL_BYTES]) -> Config<'_> {

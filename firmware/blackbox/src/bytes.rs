@@ -29,11 +29,11 @@ fn copy_piece<'f, 't, const N: usize>((from, to): (&'f [u8], &'t mut [u8])) -> (
 }
 
 /// Reads fields; beyond the end there are zeros and empty texts.
-pub(crate) struct Fields<'a> {
+pub(crate) struct ByteFields<'a> {
     rest: &'a [u8],
 }
 
-impl<'a> Fields<'a> {
+impl<'a> ByteFields<'a> {
     pub(crate) const fn new(bytes: &'a [u8]) -> Self {
         Self { rest: bytes }
     }

@@ -5,10 +5,10 @@
 //! from the session's first entry to its last. Each group begins with the value before it; each sector has the one
 //! after the last entry that it completes. So the value in a session's last sector covers all of it.
 
-use crate::codec::{Entry, Kind};
+use crate::codec::{CodedEntry, Kind};
 use crate::crc::{Crc32c, crc32c};
 
-pub(crate) fn value_of(entry: &Entry<'_>) -> u32 {
+pub(crate) fn value_of(entry: &CodedEntry<'_>) -> u32 {
     let kind = match entry.kind {
         Kind::Frame { verified } => u8::from(verified),
         Kind::Record => 2,

@@ -248,7 +248,7 @@ impl GroupDecoder {
             && let Some(chain) = &mut self.chain
         {
             let Decoded { kind, at_ms, .. } = self.decoded;
-            *chain = chain::after(*chain, chain::value_of(&codec::Entry { kind, at_ms, bytes }));
+            *chain = chain::after(*chain, chain::value_of(&codec::CodedEntry { kind, at_ms, bytes }));
         }
         match self.decoded.kind {
             Kind::Frame { verified } => Entry::Frame { at, bytes, verified },

@@ -8,7 +8,7 @@
 //!  22  u32: check of the session's entries before this group
 //! ```
 
-use crate::bytes::Fields;
+use crate::bytes::ByteFields;
 
 pub(crate) const PREAMBLE_BYTES: usize = 26;
 
@@ -40,7 +40,7 @@ impl Preamble {
 
     /// Reads the body of a group's first sector; `None` if that is too short.
     pub fn read(body: &[u8]) -> Option<Self> {
-        let mut fields = Fields::new(body.get(..PREAMBLE_BYTES)?);
+        let mut fields = ByteFields::new(body.get(..PREAMBLE_BYTES)?);
         let layouts = fields.u32();
         let mut start = [0; 8];
         start[..6].copy_from_slice(fields.bytes(6));

@@ -10,11 +10,11 @@ use hums_dialect::wire::FRAME_BYTES_MAX;
 
 use crate::bytes::copy_few;
 use crate::chain;
-use crate::codec::{CODED_BYTES_MAX, Entry, Frame, Kind, Model, Out};
+use crate::codec::{CODED_BYTES_MAX, CodedEntry, Frame, Kind, Model, Out};
 use crate::coder::{Encoder, FLUSH_MAX, LOOKAHEAD};
 use crate::layouts::{self, Layouts};
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
-use crate::record::{Mark, RECORD_BYTES_MAX, Record, Resting};
+use crate::record::{Mark, MarkReason, RECORD_BYTES_MAX, Record};
 use crate::sector::{BODY_BYTES, GROUP_SECTORS, Header, RECORDS_MAX, Sector};
 
 /// Maximum sectors that one entry completes: the last of the old group, and those of a longest entry with the
@@ -173,7 +173,7 @@ impl Writer {
     }
 
     /// Adds an end mark: the vehicle rests, and the log is whole up to here. Give storage [`Self::partial`] next.
-    pub fn mark(&mut self, at: Instant, why: Resting, sink: &mut impl SectorSink) -> Result<(), Full> {
+    pub fn mark(&mut self, at: Instant, why: MarkReason, sink: &mut impl SectorSink) -> Result<(), Full> {
         let mark = Mark { why, sector: self.header.number, frames: self.counters.frames as u32 };
         self.record(at, &Record::Mark(mark), sink)
     }
@@ -226,7 +226,7 @@ impl Writer {
             return Err(Full::NoRoom);
         }
         self.last_ms = self.last_ms.max(self.millis(at));
-        let entry = Entry { kind, at_ms: self.last_ms, bytes };
+        let entry = CodedEntry { kind, at_ms: self.last_ms, bytes };
         let value = chain::value_of(&entry);
         if !self.in_group {
             self.begin_group(entry.at_ms);
@@ -253,7 +253,13 @@ impl Writer {
     }
 
     /// `value`: in the chain; `false` (the model is spoilt, the stream is not): no room in the group, or too long a code.
-    fn append(&mut self, entry: &Entry<'_>, value: u32, plain: bool, sink: &mut impl SectorSink) -> bool {
+    fn append(
+        &mut self,
+        entry: &CodedEntry<'_>,
+        value: u32,
+        plain: bool,
+        sink: &mut impl SectorSink,
+    ) -> bool {
         let Some(len) = self.encode(entry, plain) else { return false };
         let mut done = self.add(0, len);
         while done < len {
@@ -276,7 +282,7 @@ impl Writer {
 
     // Apart from `append`, which is compiled with the sink's crate, and for size there.
     #[inline(never)]
-    fn encode(&mut self, entry: &Entry<'_>, plain: bool) -> Option<usize> {
+    fn encode(&mut self, entry: &CodedEntry<'_>, plain: bool) -> Option<usize> {
         let before = self.coder;
         self.scratch.clear();
         self.model.encode(entry, plain, &mut self.frame, &mut self.coder, &mut self.scratch);

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use hums_blackbox::record::{Mark, Note, Resting};
+use hums_blackbox::record::{Mark, MarkReason, Note};
 use hums_blackbox::{
     Cause, ENTRY_SECTORS_MAX, Full, Item, LogReader, Record, Sector, SectorSink, Summary, Writer,
 };
@@ -343,7 +343,7 @@ fn an_end_mark_says_how_many_frames_came_before_it_and_is_read_from_the_copy_in_
         if index % 100 != 99 {
             continue;
         }
-        writer.mark(Instant::from_millis(*at), Resting::Landed, &mut queue).expect("room");
+        writer.mark(Instant::from_millis(*at), MarkReason::Landed, &mut queue).expect("room");
         let mut sectors = queue.sectors.clone();
         let mut partial = Sector::zeroed();
         if writer.partial(&mut partial) {
@@ -369,7 +369,7 @@ fn an_end_mark_says_how_many_frames_came_before_it_and_is_read_from_the_copy_in_
         reader.end();
         take(&mut reader);
         let (Mark { why, sector, frames }, read) = last.expect("a mark");
-        assert_eq!((why, frames, read), (Resting::Landed, index as u32 + 1, index + 1));
+        assert_eq!((why, frames, read), (MarkReason::Landed, index as u32 + 1, index + 1));
         assert!(sector as usize + 1 >= queue.sectors.len(), "{sector}");
     }
 }

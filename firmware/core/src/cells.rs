@@ -66,10 +66,10 @@ const SETTINGS: usize = Setting::Capacity as usize + 1;
 const CELL_V: [(f32, f32); SETTINGS - 1] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75), (3.25, 3.8), (2.9, 3.7)];
 
 /// An autopilot's parameter for a battery: whether it is PX4's, its name, the battery, its meaning.
-pub type Known = (bool, &'static str, u8, Setting);
+pub type CellParameter = (bool, &'static str, u8, Setting);
 
 /// All of them.
-pub const KNOWN: [Known; 17] = [
+pub const KNOWN: [CellParameter; 17] = [
     (true, "BAT1_N_CELLS", 0, Setting::Count),
     (true, "BAT2_N_CELLS", 1, Setting::Count),
     (true, "BAT_N_CELLS", 0, Setting::Count),

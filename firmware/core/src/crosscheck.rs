@@ -23,7 +23,7 @@ use crate::mag_heading_residual::{self, CompassUse};
 use crate::motion::{IDLE_THROTTLE, throttle};
 use crate::observation::{Air, Gnss, Imu, Observation, Vibration, VibrationScale};
 use crate::pairs::{Kind, Pairs, SENSORS_MAX};
-use crate::rate_tracking::{self, RateSetpoint, Thrust};
+use crate::rate_tracking::{self, FullThrust, RateSetpoint};
 use crate::residual::{Comparison, Residuals};
 use crate::stuck::Repeats;
 use crate::time::{BootMs, FRESH, Millis, Stamp};
@@ -44,7 +44,7 @@ state! {
         pub(crate) heights: Heights,
         pub(crate) compass_use: CompassUse,
         rate_setpoint: RateSetpoint,
-        pub(crate) thrust: Thrust,
+        pub(crate) thrust: FullThrust,
         /// The level of vibration in the last message, m/s2: a shock is in one message, and the lower of two counts.
         vibration: f32,
         /// The first sensor's messages are `HIGHRES_IMU`: of the sensor that PX4 has selected, less the offset of its estimator, which moves
@@ -84,7 +84,7 @@ impl Crosschecks {
             Observation::Attitude(attitude) => {
                 rate_tracking::take_attitude(residuals, at, attitude, rate_setpoint);
             }
-            Observation::Wanted(wanted) => {
+            Observation::AttitudeSetpoint(wanted) => {
                 rate_tracking::take_setpoint(rate_setpoint, at, wanted.rates, vehicle);
             }
             Observation::SecondEstimate(second) => {

@@ -36,7 +36,7 @@ mod touchdown;
 mod witness;
 
 use crate::latest::Reading;
-use crate::mishap::{MishapChange, MishapKind, Place, Report};
+use crate::mishap::{Location, MishapChange, MishapKind, Report};
 use crate::motion::{Kinematics, MOVES_MPS, OFF, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
 use crate::params::Params;
@@ -198,7 +198,7 @@ state! {
         /// When it leaned by more than 45 degrees, or turned fast, last, while armed.
         tilted_at: Option<BootMs>,
         /// The position at which a mishap began, or ended.
-        place: Place,
+        place: Location,
     }
 }
 
@@ -394,7 +394,7 @@ impl Flight {
             return (!is_told).then_some(MishapChange::OnBench(kind));
         }
         self.stage = if kind == MishapKind::Impact { Stage::Impacted } else { Stage::Falling };
-        self.place = Place::of(now, vehicle);
+        self.place = Location::of(now, vehicle);
         if kind != MishapKind::Impact {
             self.touch_mps = 0.0;
         }
@@ -419,7 +419,7 @@ impl Flight {
             || (is_given_up && (!self.arming.is_on || is_silent || (stands >= 2 && stands >= flies)));
         if is_down {
             (self.stage, self.flies_since) = (Stage::Down, Stamp::NONE);
-            self.place = Place::of(now, vehicle);
+            self.place = Location::of(now, vehicle);
             return Some(MishapChange::Down);
         }
         let flies_on = self.arming.is_on && ((is_long && flies >= 2 && flies > stands) || is_given_up);
@@ -449,7 +449,7 @@ impl Flight {
         self.watch = None;
         (self.shock, self.touch_mps, self.still_since, self.flies_since) =
             (None, 0.0, Stamp::NONE, Stamp::NONE);
-        self.place = Place::default();
+        self.place = Location::default();
     }
 
     fn hold(&mut self, now: BootMs) -> Option<FlightEvent> {

@@ -42,14 +42,14 @@ impl MishapKind {
 
 /// A place that can be told: 1e-7 degrees, and metres above home.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// Latitude and longitude in 1e-7 degrees, north and east positive; `None` where it is not known.
     pub position: Option<(i32, i32)>,
     /// Above home.
     pub height_m: i16,
 }
 
-impl Place {
+impl Location {
     pub(crate) fn of(now: BootMs, vehicle: &Vehicle) -> Self {
         let e7 = |degrees: f64| (degrees * 1e7) as i32;
         let global = vehicle.global.get().and_then(|global| global.position);
@@ -79,7 +79,7 @@ pub struct Report {
     /// What happened.
     pub change: MishapChange,
     /// Where.
-    pub place: Place,
+    pub place: Location,
     /// How fast it touched, tenths of a metre a second.
     pub touch: u16,
 }

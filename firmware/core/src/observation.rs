@@ -232,7 +232,7 @@ state! {
     }
 
     /// The attitude that the autopilot demands, for its mission, its own loops or the pilot's sticks.
-    pub struct Wanted {
+    pub struct AttitudeSetpoint {
         /// Right wing down is positive.
         pub roll: Radians,
         /// Nose up is positive.
@@ -253,7 +253,7 @@ pub struct WantedRates {
     pub of: Option<[f32; 4]>,
 }
 
-impl Wanted {
+impl AttitudeSetpoint {
     /// Of the quaternion of a rotation from north, east, down to the body, its real part first; `None` where it is none.
     pub fn from_quaternion([w, x, y, z]: [f32; 4]) -> Option<Self> {
         let norm = w * w + x * x + y * y + z * z;
@@ -618,7 +618,7 @@ pub enum Observation {
     /// `AHRS2`
     SecondEstimate(SecondEstimate),
     /// `ATTITUDE_TARGET`, `NAV_CONTROLLER_OUTPUT`
-    Wanted(Wanted),
+    AttitudeSetpoint(AttitudeSetpoint),
     /// `POSITION_TARGET_LOCAL_NED`: the climb that the autopilot wants, up is positive.
     ClimbWanted(MetresPerSecond),
     /// `LOCAL_POSITION_NED`

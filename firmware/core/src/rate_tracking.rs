@@ -5,7 +5,7 @@
 //!    allowed: in fast turns a vehicle is late by much.
 //! 2. Rates about the axes of the attitude's setpoint are turned to the body's first. In a fast yaw a vehicle lags
 //!    that attitude by a quarter of a turn.
-//! 3. With full throttle a multicopter climbs, and a plane does not sink ([`Thrust`]).
+//! 3. With full throttle a multicopter climbs, and a plane does not sink ([`FullThrust`]).
 
 use crate::gates::LEANS_RAD;
 use crate::latest::{Latest, Reading};
@@ -58,13 +58,13 @@ pub(crate) fn take_attitude(to: &mut Residuals, at: BootMs, attitude: &Attitude,
 }
 
 state! {
-    pub(crate) struct Thrust {
+    pub(crate) struct FullThrust {
         full_since: Option<BootMs>,
         full_at: Option<BootMs>,
     }
 }
 
-impl Thrust {
+impl FullThrust {
     pub(crate) fn take(&mut self, at: BootMs, hud: &Hud, vehicle: &Vehicle, is_settled: bool) {
         let (Some(throttle), Some(climb_mps)) = (hud.throttle, climb_mps(at, vehicle)) else { return };
         let level = vehicle.attitude.get().is_none_or(|attitude| attitude.lean_rad() < LEANS_RAD);

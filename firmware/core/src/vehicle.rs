@@ -10,10 +10,10 @@ use crate::election::Election;
 use crate::inertial::Inertial;
 use crate::latest::Latest;
 use crate::observation::{
-    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc, EscGroup, Estimator,
-    Feeds, Generator, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu, LandedState, LocalPosition,
-    MOTORS_MAX, Observation, Processor, RadioControl, Rails, Source, SystemStatus, SystemTime,
-    TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, Wanted,
+    Air, Attitude, AttitudeSetpoint, Autopilot, AutopilotIdentity, Battery, CommandAck, Engine, Esc,
+    EscGroup, Estimator, Feeds, Generator, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu,
+    LandedState, LocalPosition, MOTORS_MAX, Observation, Processor, RadioControl, Rails, Source,
+    SystemStatus, SystemTime, TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState,
 };
 use crate::time::{BootMs, Millis, SILENT};
 use crate::units::{Amperes, Fraction, MetresPerSecond, Radians, Rpm, Volts};
@@ -311,7 +311,9 @@ impl Vehicle {
                 self.inertial.take_attitude(at, &attitude);
                 self.attitude.set(at, attitude);
             }
-            Observation::Wanted(Wanted { roll, pitch, .. }) if (roll.0 + pitch.0).is_finite() => {
+            Observation::AttitudeSetpoint(AttitudeSetpoint { roll, pitch, .. })
+                if (roll.0 + pitch.0).is_finite() =>
+            {
                 self.wanted.set(at, [roll, pitch]);
             }
             Observation::ClimbWanted(climb) => self.climb_wanted.set(at, climb),
@@ -342,7 +344,7 @@ impl Vehicle {
             Observation::Alert(alert) => self.alerts.tell(at, alert),
             Observation::Failing(causes) => self.alerts.take_failures(at, causes),
             Observation::MissionReached(item) => self.mission_reached.set(at, item),
-            Observation::Wanted(_)
+            Observation::AttitudeSetpoint(_)
             | Observation::SpeedSensors(_)
             | Observation::SecondEstimate(_)
             | Observation::Outputs(_)

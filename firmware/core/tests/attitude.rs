@@ -1,7 +1,7 @@
 //! Roll and pitch against their setpoints.
 
 use crate::common::{Quad, Run, Script};
-use hums_core::observation::{Observation, Wanted};
+use hums_core::observation::{AttitudeSetpoint, Observation};
 use hums_core::params::Params;
 use hums_core::units::Radians;
 
@@ -12,8 +12,15 @@ fn is_found(vehicle: &str, wanted: Option<f32>) -> bool {
         let mut quad = Quad::healthy();
         script.play(now_ms as i64, |said| assert!(quad.take(said), "{}", said.name()));
         let is_banked = (20_000..25_000).contains(&now_ms);
-        let roll = |roll| Wanted { roll: Radians(if is_banked { roll } else { 0.0 }), ..Wanted::default() };
-        wanted.map(|wanted| Observation::Wanted(roll(wanted))).into_iter().chain(quad.says(now_ms)).collect()
+        let roll = |roll| AttitudeSetpoint {
+            roll: Radians(if is_banked { roll } else { 0.0 }),
+            ..AttitudeSetpoint::default()
+        };
+        wanted
+            .map(|wanted| Observation::AttitudeSetpoint(roll(wanted)))
+            .into_iter()
+            .chain(quad.says(now_ms))
+            .collect()
     });
     assert!(run.of_check("pitch").next().is_none(), "{vehicle}");
     run.of_check("roll").next().is_some()
@@ -45,12 +52,12 @@ fn where_the_pilot_asks_for_rates_a_bank_says_nothing_by_itself() {
 
 #[test]
 fn a_quaternion_that_is_none_wants_nothing() {
-    assert_eq!(Wanted::from_quaternion([0.0; 4]), None);
-    assert_eq!(Wanted::from_quaternion([f32::NAN, 0.0, 0.0, 0.0]), None);
+    assert_eq!(AttitudeSetpoint::from_quaternion([0.0; 4]), None);
+    assert_eq!(AttitudeSetpoint::from_quaternion([f32::NAN, 0.0, 0.0, 0.0]), None);
     let half = core::f32::consts::FRAC_PI_8;
-    let rolled = Wanted::from_quaternion([half.cos(), half.sin(), 0.0, 0.0]).unwrap();
+    let rolled = AttitudeSetpoint::from_quaternion([half.cos(), half.sin(), 0.0, 0.0]).unwrap();
     assert!((rolled.roll.0 - 2.0 * half).abs() < 1e-5 && rolled.pitch.0.abs() < 1e-5, "{rolled:?}");
-    let pitched = Wanted::from_quaternion([half.cos(), 0.0, half.sin(), 0.0]).unwrap();
+    let pitched = AttitudeSetpoint::from_quaternion([half.cos(), 0.0, half.sin(), 0.0]).unwrap();
     assert!((pitched.pitch.0 - 2.0 * half).abs() < 1e-5 && pitched.roll.0.abs() < 1e-5, "{pitched:?}");
 }
 

@@ -7,8 +7,8 @@ use hums_core::Monitor;
 use hums_core::health::Finding;
 use hums_core::health::Level::{self, Critical, Warning};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation, Outputs,
-    SecondEstimate, VehicleKind, Wanted, WantedRates,
+    Air, Attitude, AttitudeSetpoint, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation,
+    Outputs, SecondEstimate, VehicleKind, WantedRates,
 };
 use hums_core::params::Params;
 use hums_core::status::LinkReading;
@@ -123,7 +123,10 @@ impl Fitted {
             let [roll, pitch] = self.wanted;
             let about = [roll, pitch, 0.0].map(RadiansPerSecond);
             let rates = Some(WantedRates { about, of: self.wanted_of });
-            said.push(Observation::Wanted(Wanted { rates, ..Wanted::default() }));
+            said.push(Observation::AttitudeSetpoint(AttitudeSetpoint {
+                rates,
+                ..AttitudeSetpoint::default()
+            }));
         }
         said.push(Observation::Attitude(Attitude {
             roll: Radians(self.quad.roll + self.attitude_noise * noise(now_ms, 74)),

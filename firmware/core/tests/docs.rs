@@ -116,9 +116,9 @@ fn row(check: &Check) -> String {
     let (_, input) = input.unwrap_or_else(|| panic!("{}: say in inputs.txt what it reads", check.name));
     let side = if check.limits.side == Side::Above { ">" } else { "<" };
     let when = match check.when {
-        When::Always => "always",
-        When::Armed => "armed",
-        When::InFlight => "in flight",
+        CheckPhase::Always => "always",
+        CheckPhase::Armed => "armed",
+        CheckPhase::InFlight => "in flight",
     };
     let [warning_debounce, critical_debounce] = check.debounce_ms.map(|ms| Millis::from_millis(ms.into()));
     let source = check.limits.critical.or(check.limits.warn).map_or("", |param| param.words().source);
@@ -169,7 +169,7 @@ fn every_text_of_a_check_is_in_the_runbook() {
     let mut table = "| HUMS: | if critical | what is so | what to do |\n|---|---|---|---|\n".to_owned();
     let mut told = Vec::new();
     for (words, check) in VOCABULARY.iter().zip(checks()) {
-        let Said { alarm, advice, .. } = words.said;
+        let RadioWords { alarm, advice, .. } = words.said;
         if told.contains(&alarm) {
             continue;
         }

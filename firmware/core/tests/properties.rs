@@ -7,11 +7,11 @@ use hums_core::Monitor;
 use hums_core::health::{EXPECTED, Level, Subsystem};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, AutopilotIdentity, Battery, CellVoltage, CommandAck, Engine, Esc, EscGroup,
-    Estimator, EstimatorScale, Feeds, Generator, GlobalPosition, Gnss, GnssIntegrity, Heartbeat, Hud, Imu,
-    LandedState, LocalPosition, MOTORS_MAX, Observation, Outputs, Processor, RadioControl, Rails,
-    SecondEstimate, Sensors, Source, SpeedSensor, SystemStatus, SystemTime, TelemetryRadio, VehicleKind,
-    Vibration, VibrationScale, VtolState, Wanted, WantedRates,
+    Air, Attitude, AttitudeSetpoint, Autopilot, AutopilotIdentity, Battery, CellVoltage, CommandAck, Engine,
+    Esc, EscGroup, Estimator, EstimatorScale, Feeds, Generator, GlobalPosition, Gnss, GnssIntegrity,
+    Heartbeat, Hud, Imu, LandedState, LocalPosition, MOTORS_MAX, Observation, Outputs, Processor,
+    RadioControl, Rails, SecondEstimate, Sensors, Source, SpeedSensor, SystemStatus, SystemTime,
+    TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, WantedRates,
 };
 use hums_core::params::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
@@ -120,7 +120,7 @@ impl Random {
             3 => Observation::Parameter(self.below(20) as u8, self.any()),
             4 => Observation::ClimbWanted(self.any()),
             5 => Observation::SecondEstimate(self.any()),
-            6 => Observation::Wanted(self.any()),
+            6 => Observation::AttitudeSetpoint(self.any()),
             7 => Observation::Shock(self.any()),
             _ => Observation::FlightInformation { flight: self.next(), takeoff_boot_ms: self.any() },
         }
@@ -280,7 +280,7 @@ any_of! {
     CommandAck { command result target }
     Source { system component }
     SecondEstimate { attitude position altitude }
-    Wanted { roll pitch rates }
+    AttitudeSetpoint { roll pitch rates }
     WantedRates { about of }
 }
 

@@ -53,51 +53,51 @@ const UNSUPPORTED: u8 = 3;
 const IN_PROGRESS: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum By {
+enum Senders {
     Both,
     Px4,
     ArduPilot,
 }
 
 /// Id, senders, Hz, bytes.
-type Wanted = (u32, By, u8, u8);
+type WantedMessage = (u32, Senders, u8, u8);
 
 /// Most important first.
-const WANTED: [Wanted; 34] = [
-    (ids::SYS_STATUS, By::Both, 5, 43),
-    (ids::ATTITUDE, By::Both, 10, 40),
-    (ids::GLOBAL_POSITION_INT, By::Both, 5, 40),
-    (ids::GPS_RAW_INT, By::Both, 5, 64),
-    (ids::BATTERY_STATUS, By::Both, 1, 66),
-    (ids::VFR_HUD, By::Both, 4, 32),
-    (ids::VIBRATION, By::Both, 5, 44),
-    (ids::SYSTEM_TIME, By::Both, 1, 24),
-    (ids::RC_CHANNELS, By::Both, 2, 54),
-    (ids::EXTENDED_SYS_STATE, By::Both, 2, 14),
-    (ids::SERVO_OUTPUT_RAW, By::Both, 5, 49),
-    (ids::ATTITUDE_TARGET, By::Both, 8, 49),
-    (ids::ESTIMATOR_STATUS, By::Px4, 5, 54),
-    (ids::ESC_STATUS, By::Px4, 5, 69),
-    (ids::ESC_INFO, By::Px4, 1, 58),
-    (ids::HIGHRES_IMU, By::Px4, 20, 75),
-    (ids::EKF_STATUS_REPORT, By::ArduPilot, 5, 34),
-    (ids::NAV_CONTROLLER_OUTPUT, By::ArduPilot, 2, 38),
-    (ids::POWER_STATUS, By::ArduPilot, 1, 18),
-    (ids::ESC_TELEMETRY_1_TO_4, By::ArduPilot, 5, 112), // The autopilot sends 5_TO_8 with it.
-    (ids::RAW_IMU, By::ArduPilot, 10, 41),
-    (ids::RPM, By::ArduPilot, 2, 20),
-    (ids::EFI_STATUS, By::ArduPilot, 2, 82),
-    (ids::GENERATOR_STATUS, By::ArduPilot, 2, 54),
-    (ids::MCU_STATUS, By::ArduPilot, 1, 22),
-    (ids::SCALED_PRESSURE, By::ArduPilot, 5, 28),
-    (ids::AHRS2, By::ArduPilot, 5, 36),
-    (ids::SCALED_IMU2, By::Both, 8, 36),
-    (ids::SCALED_IMU3, By::Both, 8, 36),
-    (ids::SCALED_PRESSURE2, By::Both, 5, 28),
-    (ids::SCALED_PRESSURE3, By::Both, 2, 28),
-    (ids::GPS2_RAW, By::Both, 1, 69),
-    (ids::POSITION_TARGET_LOCAL_NED, By::Both, 2, 63),
-    (ids::LOCAL_POSITION_NED, By::Both, 5, 40),
+const WANTED: [WantedMessage; 34] = [
+    (ids::SYS_STATUS, Senders::Both, 5, 43),
+    (ids::ATTITUDE, Senders::Both, 10, 40),
+    (ids::GLOBAL_POSITION_INT, Senders::Both, 5, 40),
+    (ids::GPS_RAW_INT, Senders::Both, 5, 64),
+    (ids::BATTERY_STATUS, Senders::Both, 1, 66),
+    (ids::VFR_HUD, Senders::Both, 4, 32),
+    (ids::VIBRATION, Senders::Both, 5, 44),
+    (ids::SYSTEM_TIME, Senders::Both, 1, 24),
+    (ids::RC_CHANNELS, Senders::Both, 2, 54),
+    (ids::EXTENDED_SYS_STATE, Senders::Both, 2, 14),
+    (ids::SERVO_OUTPUT_RAW, Senders::Both, 5, 49),
+    (ids::ATTITUDE_TARGET, Senders::Both, 8, 49),
+    (ids::ESTIMATOR_STATUS, Senders::Px4, 5, 54),
+    (ids::ESC_STATUS, Senders::Px4, 5, 69),
+    (ids::ESC_INFO, Senders::Px4, 1, 58),
+    (ids::HIGHRES_IMU, Senders::Px4, 20, 75),
+    (ids::EKF_STATUS_REPORT, Senders::ArduPilot, 5, 34),
+    (ids::NAV_CONTROLLER_OUTPUT, Senders::ArduPilot, 2, 38),
+    (ids::POWER_STATUS, Senders::ArduPilot, 1, 18),
+    (ids::ESC_TELEMETRY_1_TO_4, Senders::ArduPilot, 5, 112), // The autopilot sends 5_TO_8 with it.
+    (ids::RAW_IMU, Senders::ArduPilot, 10, 41),
+    (ids::RPM, Senders::ArduPilot, 2, 20),
+    (ids::EFI_STATUS, Senders::ArduPilot, 2, 82),
+    (ids::GENERATOR_STATUS, Senders::ArduPilot, 2, 54),
+    (ids::MCU_STATUS, Senders::ArduPilot, 1, 22),
+    (ids::SCALED_PRESSURE, Senders::ArduPilot, 5, 28),
+    (ids::AHRS2, Senders::ArduPilot, 5, 36),
+    (ids::SCALED_IMU2, Senders::Both, 8, 36),
+    (ids::SCALED_IMU3, Senders::Both, 8, 36),
+    (ids::SCALED_PRESSURE2, Senders::Both, 5, 28),
+    (ids::SCALED_PRESSURE3, Senders::Both, 2, 28),
+    (ids::GPS2_RAW, Senders::Both, 1, 69),
+    (ids::POSITION_TARGET_LOCAL_NED, Senders::Both, 2, 63),
+    (ids::LOCAL_POSITION_NED, Senders::Both, 5, 40),
 ];
 
 /// The messages that the box requests of this autopilot over a line of this rate, the most important first, with their
@@ -112,7 +112,7 @@ pub fn wanted(autopilot: Autopilot, baud: u32) -> impl Iterator<Item = (u32, f32
 const GROUPS: [(u8, u16); 7] = [(1, 4), (2, 2), (3, 2), (6, 4), (10, 8), (11, 4), (12, 2)];
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Has {
+enum Support {
     /// Unknown.
     #[default]
     Perhaps,
@@ -124,7 +124,7 @@ enum Has {
 #[derive(Clone, Copy, Debug, Default)]
 struct Message {
     seen: u8,
-    has: Has,
+    has: Support,
     patience: u8,
     wait: u8,
     due: bool,
@@ -133,13 +133,13 @@ struct Message {
 /// Pending request.
 #[derive(Clone, Copy, Debug)]
 struct PendingRequest {
-    what: What,
+    what: RequestSubject,
     at: Instant,
     tries: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum What {
+enum RequestSubject {
     /// A single message, to test whether the autopilot supports it.
     One(usize),
     Interval(usize),
@@ -174,7 +174,7 @@ impl Default for Asking {
 
 /// Current state of the vehicle.
 #[derive(Clone, Copy, Debug)]
-pub struct Known {
+pub struct KnownVehicle {
     /// The autopilot.
     pub source: Source,
     /// Its firmware.
@@ -190,7 +190,7 @@ pub struct Known {
 impl Asking {
     /// Before first contact.
     pub const fn new() -> Self {
-        const NONE: Message = Message { seen: 0, has: Has::Perhaps, patience: 0, wait: 0, due: false };
+        const NONE: Message = Message { seen: 0, has: Support::Perhaps, patience: 0, wait: 0, due: false };
         Self {
             vehicle: None,
             reboots: 0,
@@ -211,7 +211,7 @@ impl Asking {
     }
 
     /// Whether all parameters were requested, and each was answered or timed out.
-    pub fn has_parameters(&self, known: &Known) -> bool {
+    pub fn has_parameters(&self, known: &KnownVehicle) -> bool {
         known.autopilot != Autopilot::Other
             && self.of() == Some(known.source)
             && self.window == ROUND
@@ -222,7 +222,7 @@ impl Asking {
     pub fn seen(&mut self, id: u32) {
         if let Some(index) = WANTED.iter().position(|wanted| wanted.0 == id) {
             let message = &mut self.messages[index];
-            (message.seen, message.has) = (message.seen.saturating_add(1), Has::Yes);
+            (message.seen, message.has) = (message.seen.saturating_add(1), Support::Yes);
         }
     }
 
@@ -230,7 +230,7 @@ impl Asking {
     pub fn told(&mut self, name: &str) {
         if let Some(place) = cells::known(name) {
             self.parameters &= !(1 << place);
-            if self.asked.is_some_and(|asked| asked.what == What::Parameter(usize::from(place))) {
+            if self.asked.is_some_and(|asked| asked.what == RequestSubject::Parameter(usize::from(place))) {
                 (self.asked, self.deaf) = (None, 0);
             }
         }
@@ -240,25 +240,30 @@ impl Asking {
     pub fn answered(&mut self, command: u16, result: u8) {
         let Some(asked) = self.asked else { return };
         let (expected, message) = match asked.what {
-            What::One(index) => (REQUEST_MESSAGE, &mut self.messages[index]),
-            What::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
-            What::Identity => (REQUEST_MESSAGE, &mut self.identity),
-            What::Parameter(_) => return,
+            RequestSubject::One(index) => (REQUEST_MESSAGE, &mut self.messages[index]),
+            RequestSubject::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
+            RequestSubject::Identity => (REQUEST_MESSAGE, &mut self.identity),
+            RequestSubject::Parameter(_) => return,
         };
         if command != expected || result == IN_PROGRESS {
             return;
         }
         // An autopilot that does not know this command may know the other one.
-        let asks_one = matches!(asked.what, What::One(_));
+        let asks_one = matches!(asked.what, RequestSubject::One(_));
         let is_granted = matches!(result, ACCEPTED | TEMPORARILY) || (asks_one && result == UNSUPPORTED);
-        message.has = if is_granted { Has::Yes } else { Has::No };
+        message.has = if is_granted { Support::Yes } else { Support::No };
         message.due &= asks_one && is_granted;
         self.asked = None;
         self.deaf = 0;
     }
 
     /// Call at every tick. Passes at most one message to `send`, which returns whether it was sent.
-    pub fn tick(&mut self, now: Instant, known: Option<&Known>, send: &mut impl FnMut(&Packet) -> bool) {
+    pub fn tick(
+        &mut self,
+        now: Instant,
+        known: Option<&KnownVehicle>,
+        send: &mut impl FnMut(&Packet) -> bool,
+    ) {
         let Some(known) = known else { return };
         if self.vehicle != Some((known.source, known.autopilot)) || self.reboots != known.reboots {
             // A rebooted autopilot has forgotten all earlier requests.
@@ -275,7 +280,7 @@ impl Asking {
         self.ask(now, known, send);
     }
 
-    fn look(&mut self, known: &Known) {
+    fn look(&mut self, known: &KnownVehicle) {
         let stretch = stretch(known.autopilot, known.baud);
         let window_ms = self.window.as_millis() as u32;
         let mut missing = false;
@@ -288,7 +293,7 @@ impl Asking {
                 message.patience = 0;
                 message.wait = 0;
                 message.due = false;
-            } else if is_sent_by(wanted, known.autopilot) && message.has != Has::No {
+            } else if is_sent_by(wanted, known.autopilot) && message.has != Support::No {
                 message.due = message.wait == 0;
                 if message.due {
                     message.wait = (1_u8 << message.patience) - 1;
@@ -301,7 +306,7 @@ impl Asking {
         }
         if known.identified {
             self.identity.due = false;
-        } else if self.identity.wait == 0 && self.identity.has != Has::No {
+        } else if self.identity.wait == 0 && self.identity.has != Support::No {
             self.identity.due = true;
             self.identity.wait = (1 << self.identity.patience) - 1;
             self.identity.patience = (self.identity.patience + 1).min(PATIENCE_MAX);
@@ -313,7 +318,7 @@ impl Asking {
         }
     }
 
-    fn ask(&mut self, now: Instant, known: &Known, send: &mut impl FnMut(&Packet) -> bool) {
+    fn ask(&mut self, now: Instant, known: &KnownVehicle, send: &mut impl FnMut(&Packet) -> bool) {
         if let Some(asked) = self.asked {
             if now.since(asked.at) < ANSWER {
                 return;
@@ -327,12 +332,14 @@ impl Asking {
             }
             self.asked = None;
             match asked.what {
-                What::Parameter(place) => self.parameters &= !(1 << place),
-                What::One(index) => {
+                RequestSubject::Parameter(place) => self.parameters &= !(1 << place),
+                RequestSubject::One(index) => {
                     self.messages[index].due = false;
                     self.deaf = self.deaf.saturating_add(TRIES);
                 }
-                What::Interval(_) | What::Identity => self.deaf = self.deaf.saturating_add(TRIES),
+                RequestSubject::Interval(_) | RequestSubject::Identity => {
+                    self.deaf = self.deaf.saturating_add(TRIES)
+                }
             }
         }
         if let Some(group) = self.groups {
@@ -352,30 +359,30 @@ impl Asking {
         let Some(what) = self.next(known) else { return };
         if send(&packet(what, known)) {
             match what {
-                What::Identity => self.identity.due = false,
-                What::Interval(index) => self.messages[index].due = false,
-                What::One(_) | What::Parameter(_) => {}
+                RequestSubject::Identity => self.identity.due = false,
+                RequestSubject::Interval(index) => self.messages[index].due = false,
+                RequestSubject::One(_) | RequestSubject::Parameter(_) => {}
             }
             // An unanswered parameter request is repeated once.
-            let tries = if matches!(what, What::Parameter(_)) { TRIES - 1 } else { 1 };
+            let tries = if matches!(what, RequestSubject::Parameter(_)) { TRIES - 1 } else { 1 };
             self.asked = Some(PendingRequest { what, at: now, tries });
         }
     }
 
-    fn next(&self, known: &Known) -> Option<What> {
+    fn next(&self, known: &KnownVehicle) -> Option<RequestSubject> {
         let commands = || {
             if self.identity.due {
-                return Some(What::Identity);
+                return Some(RequestSubject::Identity);
             }
             let (index, message) = self.messages.iter().enumerate().find(|(_, message)| message.due)?;
-            let asks_one = known.autopilot == Autopilot::ArduPilot && message.has == Has::Perhaps;
-            Some(if asks_one { What::One(index) } else { What::Interval(index) })
+            let asks_one = known.autopilot == Autopilot::ArduPilot && message.has == Support::Perhaps;
+            Some(if asks_one { RequestSubject::One(index) } else { RequestSubject::Interval(index) })
         };
         let command = self.groups.is_none().then(commands).flatten();
-        command.or_else(|| self.parameter(known).map(What::Parameter))
+        command.or_else(|| self.parameter(known).map(RequestSubject::Parameter))
     }
 
-    fn parameter(&self, known: &Known) -> Option<usize> {
+    fn parameter(&self, known: &KnownVehicle) -> Option<usize> {
         let px4 = match known.autopilot {
             Autopilot::Px4 => true,
             Autopilot::ArduPilot => false,
@@ -386,15 +393,15 @@ impl Asking {
     }
 
     fn knows_no_intervals(&self) -> bool {
-        let both = self.messages.iter().zip(&WANTED).filter(|(_, wanted)| wanted.1 == By::Both);
-        both.filter(|(message, _)| message.has == Has::No).count() >= 3
+        let both = self.messages.iter().zip(&WANTED).filter(|(_, wanted)| wanted.1 == Senders::Both);
+        both.filter(|(message, _)| message.has == Support::No).count() >= 3
     }
 }
 
-const fn is_sent_by(wanted: &Wanted, autopilot: Autopilot) -> bool {
+const fn is_sent_by(wanted: &WantedMessage, autopilot: Autopilot) -> bool {
     matches!(
         (wanted.1, autopilot),
-        (By::Both, _) | (By::Px4, Autopilot::Px4) | (By::ArduPilot, Autopilot::ArduPilot)
+        (Senders::Both, _) | (Senders::Px4, Autopilot::Px4) | (Senders::ArduPilot, Autopilot::ArduPilot)
     )
 }
 
@@ -405,21 +412,21 @@ fn stretch(autopilot: Autopilot, baud: u32) -> u32 {
     bytes_per_s.div_ceil(carried).max(1)
 }
 
-fn packet(what: What, known: &Known) -> Packet {
+fn packet(what: RequestSubject, known: &KnownVehicle) -> Packet {
     let Source { system, component } = known.source;
     match what {
-        What::Interval(index) => {
+        RequestSubject::Interval(index) => {
             let (id, _, rate_hz, _) = WANTED[index];
             let interval_us = 1_000_000 / u32::from(rate_hz) * stretch(known.autopilot, known.baud);
             messages::command_long(SET_MESSAGE_INTERVAL, &[id as f32, interval_us as f32], system, component)
         }
-        What::One(index) => {
+        RequestSubject::One(index) => {
             messages::command_long(REQUEST_MESSAGE, &[WANTED[index].0 as f32], system, component)
         }
-        What::Identity => {
+        RequestSubject::Identity => {
             messages::command_long(REQUEST_MESSAGE, &[ids::AUTOPILOT_VERSION as f32], system, component)
         }
-        What::Parameter(place) => messages::param_request_read(KNOWN[place].1, system, component),
+        RequestSubject::Parameter(place) => messages::param_request_read(KNOWN[place].1, system, component),
     }
 }
 

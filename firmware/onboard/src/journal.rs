@@ -2,7 +2,7 @@
 
 use core::fmt::{Arguments, Write as _};
 
-use hums_blackbox::record::{Event, Loss, Lost, Parameter, Record, Resting};
+use hums_blackbox::record::{Event, Loss, LossKind, MarkReason, Parameter, Record};
 use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
 use hums_core::clock::Instant;
@@ -39,7 +39,7 @@ impl<'a> Journal<'a> {
     pub(crate) fn frame(&mut self, at: Instant, bytes: &[u8], verified: bool, sectors: &mut SectorsIn) {
         if self.writer.frame(at, bytes, verified, sectors).is_err() {
             self.refused += 1;
-            self.lose(at, Lost::QueueFull, 1);
+            self.lose(at, LossKind::QueueFull, 1);
         }
     }
 
@@ -47,13 +47,13 @@ impl<'a> Journal<'a> {
     pub(crate) fn record(&mut self, now: Instant, record: &Record<'_>, sectors: &mut SectorsIn) -> bool {
         let written = sectors.with_reserve(|sink| self.writer.record(now, record, sink)).is_ok();
         if !written {
-            self.lose(now, Lost::Records, 1);
+            self.lose(now, LossKind::Records, 1);
         }
         written
     }
 
     /// Without room never lost: it can be written later.
-    pub(crate) fn mark(&mut self, now: Instant, why: Resting, sectors: &mut SectorsIn) -> bool {
+    pub(crate) fn mark(&mut self, now: Instant, why: MarkReason, sectors: &mut SectorsIn) -> bool {
         sectors.with_reserve(|sink| self.writer.mark(now, why, sink)).is_ok()
     }
 
@@ -64,12 +64,12 @@ impl<'a> Journal<'a> {
         self.record(now, &Record::Event(Event { number: BY_HAND, text: text.as_str() }), sectors);
     }
 
-    pub(crate) fn lose(&mut self, now: Instant, what: Lost, count: u64) {
+    pub(crate) fn lose(&mut self, now: Instant, what: LossKind, count: u64) {
         self.lose_since(now, now, what, count);
     }
 
     /// May have begun at `since`.
-    pub(crate) fn lose_since(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
+    pub(crate) fn lose_since(&mut self, since: Instant, now: Instant, what: LossKind, count: u64) {
         self.losses.count(since, now, what, count);
     }
 

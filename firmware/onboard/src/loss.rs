@@ -1,14 +1,20 @@
 //! Losses waiting to be recorded: a loss is data too, with its count and its first and last moment.
 
-use hums_blackbox::record::{Loss, Lost};
+use hums_blackbox::record::{Loss, LossKind};
 use hums_core::clock::{Instant, Span};
 
 /// Losses of one kind, in one record.
 const WINDOW: Span = Span::from_secs(1);
 
 /// Possible in the pipeline.
-pub(crate) const KINDS: [Lost; 6] =
-    [Lost::UartOverrun, Lost::NotFrames, Lost::DamagedFrames, Lost::QueueFull, Lost::Card, Lost::Records];
+pub(crate) const KINDS: [LossKind; 6] = [
+    LossKind::UartOverrun,
+    LossKind::NotFrames,
+    LossKind::DamagedFrames,
+    LossKind::QueueFull,
+    LossKind::Card,
+    LossKind::Records,
+];
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Losses {
@@ -22,7 +28,7 @@ impl Losses {
 
     /// Noticed at `now`, begun at `since` at the earliest.
     #[inline(never)]
-    pub(crate) fn count(&mut self, since: Instant, now: Instant, what: Lost, count: u64) {
+    pub(crate) fn count(&mut self, since: Instant, now: Instant, what: LossKind, count: u64) {
         let Some(slot) = KINDS.iter().position(|kind| *kind == what).filter(|_| count > 0) else { return };
         let loss = self.open[slot].get_or_insert(Loss { what, count: 0, from: since, to: now });
         loss.count = loss.count.saturating_add(count);
@@ -50,8 +56,8 @@ mod tests {
     #[test]
     fn losses_of_a_second_are_one_record_and_wait_until_it_is_written() {
         let mut losses = Losses::new();
-        losses.count(Instant::from_millis(100), Instant::from_millis(200), Lost::NotFrames, 3);
-        losses.count(Instant::from_millis(900), Instant::from_millis(900), Lost::NotFrames, 4);
+        losses.count(Instant::from_millis(100), Instant::from_millis(200), LossKind::NotFrames, 3);
+        losses.count(Instant::from_millis(900), Instant::from_millis(900), LossKind::NotFrames, 4);
         let mut written = Vec::new();
         losses.flush(Instant::from_millis(1_000), false, |loss| {
             written.push(*loss);
@@ -64,6 +70,6 @@ mod tests {
             true
         });
         let (from, to) = (Instant::from_millis(100), Instant::from_millis(900));
-        assert_eq!(written, [Loss { what: Lost::NotFrames, count: 7, from, to }]);
+        assert_eq!(written, [Loss { what: LossKind::NotFrames, count: 7, from, to }]);
     }
 }

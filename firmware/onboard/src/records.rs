@@ -1,8 +1,8 @@
 //! The monitor's knowledge for the record: identity and time, usage, wear.
 
 use hums_blackbox::record::{
-    Boot, Clock, Component as ComponentRecord, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime, Moment, Parameter,
-    Record, USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord, Why,
+    Boot, Clock, Component as ComponentRecord, ComponentReason, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime,
+    Moment, Parameter, Record, USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord,
 };
 use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, ComponentFigures, Label, Status};
@@ -133,7 +133,8 @@ impl RecordedState {
         if moment != Moment::Periodic {
             life(now, moment, book, sectors);
             for place in 0..COMPONENTS_MAX {
-                let why = if moment == Moment::Start { Why::Start } else { Why::Status };
+                let why =
+                    if moment == Moment::Start { ComponentReason::Start } else { ComponentReason::Status };
                 component(now, place, why, book, sectors);
             }
         }
@@ -183,7 +184,13 @@ fn exceedances(
 }
 
 #[inline(never)]
-fn component(now: Instant, place: usize, why: Why, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
+fn component(
+    now: Instant,
+    place: usize,
+    why: ComponentReason,
+    book: &mut Logbook<'_>,
+    sectors: &mut SectorsIn,
+) {
     let Logbook { monitor, journal, .. } = book;
     let Some((figures, status)) = monitor.component_figures(place) else { return };
     let used_percent = monitor.component_used_percent(place);
@@ -205,10 +212,10 @@ pub(crate) fn replace_component(
     let used_percent = monitor.component_used_percent(place);
     let serial = Label::new(serial);
     let Some(old) = monitor.replace_component(place, serial) else { return false };
-    let record = component_record(&old, place, old.ran(), status, used_percent, Why::Replaced);
+    let record = component_record(&old, place, old.ran(), status, used_percent, ComponentReason::Replaced);
     let record = ComponentRecord { by, new_serial: serial.as_str(), ..record };
     journal.record(now, &Record::Component(record), sectors);
-    component(now, place, Why::Status, book, sectors);
+    component(now, place, ComponentReason::Status, book, sectors);
     true
 }
 
@@ -219,7 +226,7 @@ fn component_record(
     figures: ComponentFigures,
     status: Status,
     used_percent: Option<f32>,
-    why: Why,
+    why: ComponentReason,
 ) -> ComponentRecord<'_> {
     ComponentRecord {
         why,

@@ -4,7 +4,7 @@
 //! that stalls for 2.5 s.
 
 use hums_core::clock::{Instant, Span};
-use hums_recorder::{Buffers, CardDevice, CardStatus, NotYet, Recorder};
+use hums_recorder::{Buffers, CardDevice, CardStatus, Recorder, WaitReason};
 
 use crate::queues::SectorsOut;
 use crate::shelf::Server;
@@ -44,8 +44,8 @@ impl<'a, D: CardDevice> Storage<'a, D> {
                 self.recorder.idle();
                 Service::Idle
             }
-            Ok(_) | Err(NotYet::Searching) => Service::Wrote,
-            Err(NotYet::Later) => Service::NoCard,
+            Ok(_) | Err(WaitReason::Searching) => Service::Wrote,
+            Err(WaitReason::Later) => Service::NoCard,
         }
     }
 

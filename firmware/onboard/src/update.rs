@@ -14,7 +14,7 @@ use hums_update::message::Message;
 use hums_update::state::{State, Status};
 
 use crate::ResetCause;
-use crate::persist::Calm;
+use crate::persist::EraseMoment;
 
 /// Without a frame since power-on.
 const SILENT: Span = Span::from_secs(60);
@@ -68,7 +68,7 @@ impl UpdateStatus {
 
 /// The running image.
 #[derive(Clone, Debug)]
-pub struct Running<'a> {
+pub struct RunningImage<'a> {
     /// Its board.
     pub board: &'a str,
     /// Its header; `None` if the image runs without one.
@@ -77,7 +77,7 @@ pub struct Running<'a> {
     pub state: State,
 }
 
-impl Running<'_> {
+impl RunningImage<'_> {
     fn id(&self) -> u32 {
         self.header.as_ref().map_or(0, Header::id)
     }
@@ -105,7 +105,7 @@ impl UpdateSearch {
     pub fn look<D: CardDevice>(
         &mut self,
         recorder: &mut Recorder<'_, D>,
-        running: &Running<'_>,
+        running: &RunningImage<'_>,
         status: &UpdateStatus,
     ) {
         let Some(card) = recorder.card() else {
@@ -135,7 +135,7 @@ impl UpdateSearch {
 }
 
 /// `None` for the running image itself.
-fn judge(block: &[u8], bytes: u32, running: &Running<'_>) -> Option<UpdateOffer> {
+fn judge(block: &[u8], bytes: u32, running: &RunningImage<'_>) -> Option<UpdateOffer> {
     let Some(header) = Header::read(block) else { return Some(UpdateOffer::Refused(Refusal::Damaged)) };
     let id = header.id();
     let own = running.header.as_ref();
@@ -206,14 +206,17 @@ impl UpdateWatch {
         &self,
         now: Instant,
         status: &UpdateStatus,
-        calm: Calm,
+        calm: EraseMoment,
         frames: u32,
         on_trial: bool,
     ) -> bool {
         let is_silent =
             self.cause == ResetCause::PowerOn && frames == 0 && now.since(Instant::ZERO) >= SILENT;
         let is_offered = status.read() == Some(UpdateOffer::Offered) && !self.was_refused;
-        is_offered && !on_trial && !self.cause.may_be_in_flight() && (calm == Calm::Grounded || is_silent)
+        is_offered
+            && !on_trial
+            && !self.cause.may_be_in_flight()
+            && (calm == EraseMoment::Grounded || is_silent)
     }
 }
 
@@ -241,8 +244,8 @@ mod tests {
         Header { key: *b"\0\0\0\0\0\0\0\0", ..Header::new(board, "", Version(version), Version(1), &[0; 8]) }
     }
 
-    fn running() -> Running<'static> {
-        Running { board: "matek", header: Some(header("matek", 5)), state: State::read(&[0xFF; 64]) }
+    fn running() -> RunningImage<'static> {
+        RunningImage { board: "matek", header: Some(header("matek", 5)), state: State::read(&[0xFF; 64]) }
     }
 
     #[test]
@@ -274,7 +277,7 @@ mod tests {
         let (older, newer) = (key(4, NO_WISH), key(6, NO_WISH));
         let mut sector = vec![0xFF; 512];
         sector[..16].copy_from_slice(&Record::Confirmed(Version(0)).bytes(newer.id()));
-        let running = Running { state: State::read(&sector), ..running() };
+        let running = RunningImage { state: State::read(&sector), ..running() };
         for (header, wanted) in [
             (older, UpdateOffer::Refused(Refusal::TooOld)),
             (key(4, 1), UpdateOffer::Offered),
@@ -302,21 +305,21 @@ mod tests {
             )
         };
         let power = ResetCause::PowerOn;
-        assert!(!due(None, power, 100, Calm::Grounded, 9, false), "there is no file");
+        assert!(!due(None, power, 100, EraseMoment::Grounded, 9, false), "there is no file");
         status.set(Some(UpdateOffer::Offered));
         let refused = Some(Message::Refused(Refusal::BadSignature));
         for (message, cause, secs, calm, frames, trial, wanted) in [
-            (None, power, 12, Calm::Grounded, 9, false, true),
-            (None, power, 12, Calm::None, 9, false, false),
-            (None, power, 100, Calm::Silent, 9, false, false),
-            (None, power, 59, Calm::None, 0, false, false),
-            (None, power, 60, Calm::None, 0, false, true),
-            (None, ResetCause::Pin, 60, Calm::None, 0, false, false),
-            (None, ResetCause::Watchdog, 100, Calm::Grounded, 9, false, false),
-            (None, ResetCause::Software, 100, Calm::Grounded, 9, false, false),
-            (None, ResetCause::Update, 100, Calm::Grounded, 9, false, true),
-            (None, ResetCause::Update, 100, Calm::Grounded, 9, true, false),
-            (refused, ResetCause::Update, 100, Calm::Grounded, 9, false, false),
+            (None, power, 12, EraseMoment::Grounded, 9, false, true),
+            (None, power, 12, EraseMoment::None, 9, false, false),
+            (None, power, 100, EraseMoment::Silent, 9, false, false),
+            (None, power, 59, EraseMoment::None, 0, false, false),
+            (None, power, 60, EraseMoment::None, 0, false, true),
+            (None, ResetCause::Pin, 60, EraseMoment::None, 0, false, false),
+            (None, ResetCause::Watchdog, 100, EraseMoment::Grounded, 9, false, false),
+            (None, ResetCause::Software, 100, EraseMoment::Grounded, 9, false, false),
+            (None, ResetCause::Update, 100, EraseMoment::Grounded, 9, false, true),
+            (None, ResetCause::Update, 100, EraseMoment::Grounded, 9, true, false),
+            (refused, ResetCause::Update, 100, EraseMoment::Grounded, 9, false, false),
         ] {
             let is_due = due(message, cause, secs, calm, frames, trial);
             assert_eq!(is_due, wanted, "{message:?} {cause:?} {secs} s {calm:?} {frames} {trial}");
@@ -351,7 +354,7 @@ mod tests {
         let mut due = |found| {
             status.set(found);
             while watch.news(&status).is_some() {}
-            (watch.is_due(later, &status, Calm::Grounded, 9, false), watch.is_refused())
+            (watch.is_due(later, &status, EraseMoment::Grounded, 9, false), watch.is_refused())
         };
         for (found, wanted) in [
             (None, (false, true)),

@@ -34,7 +34,7 @@ mod volume;
 
 pub use card::{Card, CardError};
 pub use name::LogName;
-pub use recorder::{Buffers, NotYet, Recorder};
+pub use recorder::{Buffers, Recorder, WaitReason};
 pub use spi::SpiCard;
 pub use status::{CardState, CardStatus};
 
@@ -60,7 +60,7 @@ pub const BLOCK_BYTES: usize = 512;
 pub type Block = [u8; BLOCK_BYTES];
 
 /// Work while a card's driver waits. It returns whether the processor may sleep until the next interrupt.
-pub type Meanwhile<'a> = &'a mut dyn FnMut() -> bool;
+pub type WaitWork<'a> = &'a mut dyn FnMut() -> bool;
 
 /// A card: a device of blocks that can start over, as after it was pulled and put back.
 pub trait CardDevice {
@@ -75,7 +75,7 @@ pub trait CardDevice {
         &self,
         blocks: &mut [Block],
         start: u32,
-        _meanwhile: Meanwhile<'_>,
+        _meanwhile: WaitWork<'_>,
     ) -> Result<(), Self::Error> {
         self.read(blocks, start)
     }

@@ -40,7 +40,7 @@ const WRITE_TRIES: u32 = 8;
 
 /// Reasons to wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotYet {
+pub enum WaitReason {
     /// The search for room goes on: call again at once.
     Searching,
     /// No card can be written now: try again later.
@@ -49,7 +49,7 @@ pub enum NotYet {
 
 /// The segment in work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InWork {
+pub struct OpenSegment {
     /// Its name.
     pub name: LogName,
     /// The session number in the seal of its sectors.
@@ -113,19 +113,19 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
         }
     }
 
-    fn ready(&mut self, now: Instant) -> Result<(), NotYet> {
+    fn ready(&mut self, now: Instant) -> Result<(), WaitReason> {
         self.begin_service();
         if !self.socket.is_mounted() {
             if self.finished || now < self.retry_at {
-                return Err(NotYet::Later);
+                return Err(WaitReason::Later);
             }
             self.retry_at = now + RETRY;
             match self.socket.mount(self.status, self.buffers) {
                 Ok(true) => {}
-                Ok(false) => return Err(NotYet::Later),
+                Ok(false) => return Err(WaitReason::Later),
                 Err(error) => {
                     self.tell(&error);
-                    return Err(NotYet::Later);
+                    return Err(WaitReason::Later);
                 }
             }
             (self.segments.is_open, self.room_known) = (false, false);
@@ -140,7 +140,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     /// Writes waiting sectors: the first, and with the same command those that belong right behind it. Returns the
     /// number of finished ones, which are to be dropped. Without sectors it opens a session, so that the card's state
     /// is known early.
-    pub fn write(&mut self, now: Instant, waiting: &mut [Block]) -> Result<usize, NotYet> {
+    pub fn write(&mut self, now: Instant, waiting: &mut [Block]) -> Result<usize, WaitReason> {
         self.ready(now)?;
         let Some(first) = waiting.first().map(sector_of) else { return Ok(0) };
         self.await_group &= !first.starts_group();
@@ -157,7 +157,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
             self.count_retries();
             match written {
                 Ok(count) => return Ok(count),
-                Err(CardError::Searching) => return Err(NotYet::Searching),
+                Err(CardError::Searching) => return Err(WaitReason::Searching),
                 Err(error) => {
                     if !matches!(error, CardError::Full) {
                         self.status.count_write_errors(1);
@@ -223,10 +223,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     /// Finished part; data behind it is old.
-    pub fn in_work(&self) -> Option<InWork> {
+    pub fn in_work(&self) -> Option<OpenSegment> {
         let log = self.open_segment()?;
         let blocks = log.base.map_or(0, |_| self.buffers.parity.borrow().end());
-        Some(InWork { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
+        Some(OpenSegment { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }
 
     /// The card, for stored logs; `None` without one.
@@ -396,7 +396,7 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
 
     /// Gives the card up. The next one may be another one, on which only data from a group's start on is readable: an
     /// early group start loses least.
-    fn lose(&mut self, now: Instant, error: &CardError<D::Error>) -> NotYet {
+    fn lose(&mut self, now: Instant, error: &CardError<D::Error>) -> WaitReason {
         if !matches!(error, CardError::Searching) {
             self.status.want_group();
         }
@@ -404,14 +404,14 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     /// The consequence of an error for the waiting sectors. A card is given up unless it is being searched.
-    fn not_yet(&mut self, now: Instant, error: &CardError<D::Error>) -> NotYet {
+    fn not_yet(&mut self, now: Instant, error: &CardError<D::Error>) -> WaitReason {
         if matches!(error, CardError::Searching) {
-            return NotYet::Searching;
+            return WaitReason::Searching;
         }
         self.tell(error);
         self.retry_at = now + RETRY;
         self.socket.release();
-        NotYet::Later
+        WaitReason::Later
     }
 
     fn tell(&self, error: &CardError<D::Error>) {

@@ -9,12 +9,12 @@ use common::{MIB_BLOCKS, MemCard, held};
 use hums_blackbox::parity::{
     COLUMNS, Column, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block,
 };
-use hums_blackbox::record::{Before, PreviousEnd};
+use hums_blackbox::record::{PreviousEnd, PreviousSession};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::card::Card;
 use hums_recorder::recorder::ROW_BLOCKS;
-use hums_recorder::{BLOCK_BYTES, Block, CardDevice, CardState, CardStatus, LogName, NotYet, Recorder};
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice, CardState, CardStatus, LogName, Recorder, WaitReason};
 
 struct Sink(Vec<Sector>);
 
@@ -45,11 +45,15 @@ fn sectors(count: u32) -> Vec<Sector> {
     sink.0
 }
 
-fn put(recorder: &mut Recorder<'_, impl CardDevice>, now: Instant, sector: &Sector) -> Result<usize, NotYet> {
+fn put(
+    recorder: &mut Recorder<'_, impl CardDevice>,
+    now: Instant,
+    sector: &Sector,
+) -> Result<usize, WaitReason> {
     let mut waiting = [*sector.bytes()];
     loop {
         match recorder.write(now, &mut waiting) {
-            Err(NotYet::Searching) => {}
+            Err(WaitReason::Searching) => {}
             written => return written,
         }
     }
@@ -101,7 +105,7 @@ fn a_card_that_comes_back_goes_on_where_it_was() {
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
         device.broken.set((100..110).contains(&index) && now_ms < 5_000);
-        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Err(NotYet::Later) {
+        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Err(WaitReason::Later) {
             assert_ne!(status.read().state, CardState::Recording);
             now_ms += 100;
             device.broken.set(now_ms < 5_000);
@@ -124,7 +128,7 @@ fn a_segment_that_the_card_made_and_did_not_say_so_is_of_the_session() {
     let mut now_ms = 0;
     for (index, sector) in all.iter().enumerate() {
         device.broken.set(index == 100);
-        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Err(NotYet::Later) {
+        while put(&mut recorder, Instant::from_millis(now_ms), sector) == Err(WaitReason::Later) {
             device.broken.set(false);
             device.unsaid.set((now_ms < 2_500).then(|| unsaid.short()));
             now_ms += 100;
@@ -149,7 +153,7 @@ fn on_another_card_the_next_group_begins_a_session_and_the_rest_is_counted() {
         assert_eq!(put(&mut recorder, Instant::ZERO, sector), Ok(1));
     }
     first.broken.set(true);
-    assert_eq!(put(&mut recorder, Instant::from_millis(10), &all[100]), Err(NotYet::Later));
+    assert_eq!(put(&mut recorder, Instant::from_millis(10), &all[100]), Err(WaitReason::Later));
     *slot.0.borrow_mut() = second.clone();
     for sector in &all[100..] {
         assert_eq!(put(&mut recorder, Instant::from_millis(2_000), sector), Ok(1));
@@ -199,7 +203,7 @@ fn a_full_card_overwrites_its_oldest_log_and_keeps_the_newest() {
     // A card whose logs must stay.
     device.keeps_logs.set(true);
     let mut recorder = Recorder::new(device.clone(), &status, held(), sessions);
-    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(NotYet::Later));
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(WaitReason::Later));
     assert_eq!((status.read().state, names()), (CardState::Full, before));
 }
 
@@ -215,7 +219,7 @@ fn a_card_without_room_or_logs_is_told_full() {
     drop(card);
     device.blocks.borrow_mut().get_mut(&root).expect("the directory")[8..11].copy_from_slice(b"JPG");
     let mut recorder = Recorder::new(device.clone(), &status, held(), 1);
-    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(NotYet::Later));
+    assert_eq!(put(&mut recorder, Instant::ZERO, &sectors(10)[0]), Err(WaitReason::Later));
     assert_eq!(status.read().state, CardState::Full);
 }
 
@@ -426,7 +430,8 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let session = stored(&device)[0].2.session;
         let check = check_of(written.last().expect("it is not empty"));
         let sectors = written.len() as u32;
-        let expected = Before { found: PreviousEnd::Frames, number: 1, session, sectors, frames, check };
+        let expected =
+            PreviousSession { found: PreviousEnd::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
         assert_eq!(
             Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
@@ -612,7 +617,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
 }
 
-fn found_at_next_start(device: &MemCard) -> Before {
+fn found_at_next_start(device: &MemCard) -> PreviousSession {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 8);
@@ -696,7 +701,7 @@ fn a_command_to_format_is_not_for_a_card_that_is_mounted_by_then() {
     let formatted = std::mem::take(&mut *device.blocks.borrow_mut());
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 7);
-    assert_eq!(recorder.write(Instant::ZERO, &mut []), Err(NotYet::Later));
+    assert_eq!(recorder.write(Instant::ZERO, &mut []), Err(WaitReason::Later));
     assert!(status.read().state.wants_format(), "{:?}", status.read().state);
     status.want_format();
     *device.blocks.borrow_mut() = formatted;

@@ -29,4 +29,4 @@ mod store;
 mod tests;
 
 pub use key::{Key, NAME_BYTES_MAX, PARAM_BYTES_MAX, param, param_value};
-pub use store::{Error, Saved, Store, StoreCondition, VALUE_BYTES_MAX};
+pub use store::{Error, SaveResult, Store, StoreCondition, VALUE_BYTES_MAX};

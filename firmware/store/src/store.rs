@@ -31,7 +31,7 @@ impl<E> From<E> for Error<E> {
 
 /// Result of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Saved {
+pub enum SaveResult {
     /// The value was stored already.
     Unchanged,
     /// The value is stored.
@@ -164,14 +164,14 @@ impl<F: NorFlash> Store<F> {
     }
 
     /// After an error the old value is still stored.
-    pub fn save(&mut self, key: Key, value: &[u8]) -> Outcome<Saved, F> {
+    pub fn save(&mut self, key: Key, value: &[u8]) -> Outcome<SaveResult, F> {
         if value.len() > VALUE_BYTES_MAX {
             return Err(Error::TooLong);
         }
         if let Some(item) = self.find(key)?
             && self.current().holds(&item, value)?
         {
-            return Ok(Saved::Unchanged);
+            return Ok(SaveResult::Unchanged);
         }
         let bytes = ITEM_BYTES + value.len().next_multiple_of(WORD);
         if bytes > F::ERASE_SIZE - self.end {
@@ -186,7 +186,7 @@ impl<F: NorFlash> Store<F> {
         let at = self.end;
         self.end += bytes;
         self.current().append(at, key, value)?;
-        Ok(Saved::Written)
+        Ok(SaveResult::Written)
     }
 
     /// Free bytes of the active sector. An item takes 12 bytes and its value, rounded up to 4.

@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::{NorFlash as _, NorFlashErrorKind};
 
 use crate::sim::SimFlash;
-use crate::{Error, Key, Saved, Store, StoreCondition, VALUE_BYTES_MAX, param, param_value};
+use crate::{Error, Key, SaveResult, Store, StoreCondition, VALUE_BYTES_MAX, param, param_value};
 
 type Flash = SimFlash<16384>;
 
@@ -24,9 +24,9 @@ fn what_is_saved_is_there_at_the_next_start_and_starts_are_counted() {
         let (mut store, found) = mounted(&mut flash);
         assert_eq!((found, store.mounts()), (StoreCondition::Blank, Ok(1)));
         assert_eq!(value(&mut store, Key::item(1), &mut buffer), None);
-        assert_eq!(store.save(Key::item(1), &[1, 2, 3]), Ok(Saved::Written));
-        assert_eq!(store.save(Key::item(1), &[1, 2]), Ok(Saved::Written));
-        assert_eq!(store.save(Key::item(2), &[0xFF; VALUE_BYTES_MAX]), Ok(Saved::Written));
+        assert_eq!(store.save(Key::item(1), &[1, 2, 3]), Ok(SaveResult::Written));
+        assert_eq!(store.save(Key::item(1), &[1, 2]), Ok(SaveResult::Written));
+        assert_eq!(store.save(Key::item(2), &[0xFF; VALUE_BYTES_MAX]), Ok(SaveResult::Written));
         assert_eq!(store.save(Key::item(2), &[0; VALUE_BYTES_MAX + 1]), Err(Error::TooLong));
     }
     let (mut store, found) = mounted(&mut flash);
@@ -42,9 +42,9 @@ fn a_value_that_is_there_already_costs_nothing() {
     let (mut store, _) = mounted(&mut flash);
     store.save(Key::item(1), b"same").expect("room");
     let room = store.room();
-    assert_eq!(store.save(Key::item(1), b"same"), Ok(Saved::Unchanged));
+    assert_eq!(store.save(Key::item(1), b"same"), Ok(SaveResult::Unchanged));
     assert_eq!(store.room(), room);
-    assert_eq!(store.save(Key::item(1), b"other"), Ok(Saved::Written));
+    assert_eq!(store.save(Key::item(1), b"other"), Ok(SaveResult::Written));
     assert_eq!(store.room(), room - 20, "12 and 5 bytes are five words");
 }
 
@@ -83,10 +83,10 @@ fn a_save_that_needs_an_erase_waits_until_it_is_allowed_and_changes_nothing() {
     let mut buffer = [0; VALUE_BYTES_MAX];
     let last = [(number - 1).to_le_bytes(); 100].concat();
     assert_eq!(value(&mut store, Key::item(1), &mut buffer), Some(&last[..]));
-    assert_eq!(store.save(Key::item(2), b"still fits"), Ok(Saved::Written));
+    assert_eq!(store.save(Key::item(2), b"still fits"), Ok(SaveResult::Written));
     store.allow_erase(true);
-    assert_eq!(store.save(Key::item(1), b"new"), Ok(Saved::Written));
-    assert_eq!(store.save(Key::item(1), &[number as u8; 200]), Ok(Saved::Written));
+    assert_eq!(store.save(Key::item(1), b"new"), Ok(SaveResult::Written));
+    assert_eq!(store.save(Key::item(1), &[number as u8; 200]), Ok(SaveResult::Written));
     assert!(store.room() > 15_000);
     assert_eq!(flash.erases(), 3);
 }
@@ -136,7 +136,7 @@ fn more_than_fits_is_refused_and_what_is_there_stays() {
     let mut number = 0;
     let refused = loop {
         match store.save(Key::item(number), &[number; 512]) {
-            Ok(Saved::Written) => number += 1,
+            Ok(SaveResult::Written) => number += 1,
             outcome => break outcome,
         }
     };

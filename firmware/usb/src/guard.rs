@@ -137,21 +137,21 @@ impl Endpoints {
 }
 
 /// The guarded driver.
-pub struct Guarded<'d, D> {
+pub struct GuardedDriver<'d, D> {
     inner: D,
     link: &'d Link,
     port: Port,
     endpoints: Endpoints,
 }
 
-impl<'d, D> Guarded<'d, D> {
+impl<'d, D> GuardedDriver<'d, D> {
     /// Around the driver of this port.
     pub fn new(inner: D, link: &'d Link, port: Port) -> Self {
         Self { inner, link, port, endpoints: Endpoints::default() }
     }
 }
 
-impl<'d, D: driver::Driver<'d>> driver::Driver<'d> for Guarded<'d, D> {
+impl<'d, D: driver::Driver<'d>> driver::Driver<'d> for GuardedDriver<'d, D> {
     type EndpointOut = D::EndpointOut;
     type EndpointIn = D::EndpointIn;
     type ControlPipe = GuardedPipe<D::ControlPipe>;

@@ -16,7 +16,7 @@
 //! A card that comes back after it was gone is reported once as a unit attention, so that the host reads its file system anew.
 
 use hums_core::clock::Span;
-use hums_recorder::{BLOCK_BYTES, Block, CardDevice, Meanwhile, Trouble};
+use hums_recorder::{BLOCK_BYTES, Block, CardDevice, Trouble, WaitWork};
 
 use crate::server::{Ahead, Chunk};
 
@@ -138,7 +138,7 @@ impl<D: CardDevice> Disk<D> {
 
     /// Reads blocks of an accepted command into the chunk: up to `count`, up to the chunk's end, up to the first unreadable one.
     /// Returns their number. 0: the first one is unreadable.
-    pub fn read(&mut self, first: u32, count: u32, chunk: &mut Chunk<'_>, meanwhile: Meanwhile<'_>) -> u32 {
+    pub fn read(&mut self, first: u32, count: u32, chunk: &mut Chunk<'_>, meanwhile: WaitWork<'_>) -> u32 {
         let count = chunk.blocks.len().min(count as usize);
         let blocks = chunk.blocks.get_mut(..count).unwrap_or_default();
         let ahead = chunk.ahead.take().filter(|ahead| ahead.first == first);
@@ -152,7 +152,7 @@ impl<D: CardDevice> Disk<D> {
     }
 
     /// Reads the blocks behind the last ones, once. If the card does not give them, the next command for them tries it again.
-    pub fn read_ahead(&mut self, chunk: &mut Chunk<'_>, meanwhile: Meanwhile<'_>) {
+    pub fn read_ahead(&mut self, chunk: &mut Chunk<'_>, meanwhile: WaitWork<'_>) {
         let (Some(first), Slot::Card(blocks)) = (self.next.take(), self.slot) else { return };
         let count = chunk.blocks.len().min(blocks.saturating_sub(first) as usize);
         let blocks = chunk.blocks.get_mut(..count).unwrap_or_default();
@@ -167,7 +167,7 @@ impl<D: CardDevice> Disk<D> {
         &mut self,
         first: u32,
         blocks: &mut [Block],
-        meanwhile: Meanwhile<'_>,
+        meanwhile: WaitWork<'_>,
     ) -> Result<usize, Sense> {
         // A card that was put in within the command is another one.
         let Slot::Card(_) = self.slot else { return Err(Sense::NO_MEDIUM) };

@@ -13,7 +13,7 @@ use core::cell::Cell;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::{channel, zerocopy_channel};
 use hums_core::clock::Instant;
-use hums_recorder::{Block, CardDevice, Meanwhile};
+use hums_recorder::{Block, CardDevice, WaitWork};
 
 use crate::PACKET_BYTES;
 use crate::guard::Link;
@@ -114,7 +114,7 @@ impl<'a, 'b> Server<'a, 'b> {
     }
 
     /// Serves the disk until the host has ejected it, and has the status of that command.
-    pub fn run<C: CardDevice>(&mut self, disk: &mut Disk<C>, meanwhile: Meanwhile<'_>) {
+    pub fn run<C: CardDevice>(&mut self, disk: &mut Disk<C>, meanwhile: WaitWork<'_>) {
         while !disk.is_ejected() {
             let _ = self.command(disk, meanwhile);
         }
@@ -123,11 +123,7 @@ impl<'a, 'b> Server<'a, 'b> {
         }
     }
 
-    fn command<C: CardDevice>(
-        &mut self,
-        disk: &mut Disk<C>,
-        meanwhile: Meanwhile<'_>,
-    ) -> Result<(), Aborted> {
+    fn command<C: CardDevice>(&mut self, disk: &mut Disk<C>, meanwhile: WaitWork<'_>) -> Result<(), Aborted> {
         let (packet, bytes) = loop {
             if let Ok(packet) = self.lane.packets.try_receive() {
                 break packet;
@@ -168,7 +164,7 @@ impl<'a, 'b> Server<'a, 'b> {
 
     fn wait<T>(
         &mut self,
-        meanwhile: Meanwhile<'_>,
+        meanwhile: WaitWork<'_>,
         mut look: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<T, Aborted> {
         loop {

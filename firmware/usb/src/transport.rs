@@ -15,7 +15,7 @@
 //! A write is refused: case 3, 8, 9 or 11 to 13, with the status of a refused command. A refused command has no data. In place of
 //! a short packet BOT wants padding or a halted endpoint; Linux's gadget sends a short packet too if its controller cannot halt.
 
-use hums_recorder::{BLOCK_BYTES, CardDevice, Meanwhile};
+use hums_recorder::{BLOCK_BYTES, CardDevice, WaitWork};
 
 use crate::PACKET_BYTES;
 use crate::scsi::{Answer, Disk};
@@ -112,7 +112,7 @@ impl Transport {
         &mut self,
         disk: &mut Disk<D>,
         chunk: &mut Chunk<'_>,
-        meanwhile: Meanwhile<'_>,
+        meanwhile: WaitWork<'_>,
     ) -> Step {
         match self.stage {
             Stage::Reply(bytes) if bytes > 0 => {

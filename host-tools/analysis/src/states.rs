@@ -13,7 +13,7 @@ const COUNTS: [&str; 2] = ["card_errors", "record_lost"];
 
 /// A value for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shown {
+pub enum ShownValue {
     /// `None` if unknown; number and limit are not for people.
     State(Option<&'static str>),
     /// A quantity if known; limit if meaningful.
@@ -21,13 +21,13 @@ pub enum Shown {
 }
 
 /// The shown value and limit of a check.
-pub fn shown(check: &str, value: f32, limit: f32) -> Shown {
+pub fn shown(check: &str, value: f32, limit: f32) -> ShownValue {
     if check_named(check).is_some_and(|check| check.unit.is_flag()) {
-        return Shown::State(name(check, value));
+        return ShownValue::State(name(check, value));
     }
     let finite = |value: f32| value.is_finite().then_some(value);
     let says_nothing = COUNTS.contains(&check) && limit < 1.0;
-    Shown::Quantity(finite(value), finite(limit).filter(|_| !says_nothing))
+    ShownValue::Quantity(finite(value), finite(limit).filter(|_| !says_nothing))
 }
 
 /// A number as people read it: two decimals at most. A value that no sensor can have is not written out.
@@ -213,9 +213,9 @@ mod tests {
             let highest = limits.fold(0.0, f32::max).ceil() as u8;
             for value in 0..=highest {
                 let shown = shown(check.name, f32::from(value), 0.5);
-                assert!(matches!(shown, Shown::State(Some(_))), "{} {value}: {shown:?}", check.name);
+                assert!(matches!(shown, ShownValue::State(Some(_))), "{} {value}: {shown:?}", check.name);
             }
-            assert_eq!(shown(check.name, f32::NAN, 0.5), Shown::State(None));
+            assert_eq!(shown(check.name, f32::NAN, 0.5), ShownValue::State(None));
         }
     }
 
@@ -240,9 +240,9 @@ mod tests {
 
     #[test]
     fn a_limit_that_means_any_is_not_shown() {
-        assert_eq!(shown("card_errors", 3.0, 0.5), Shown::Quantity(Some(3.0), None));
-        assert_eq!(shown("card_errors", 12.0, 10.0), Shown::Quantity(Some(12.0), Some(10.0)));
-        assert_eq!(shown("ekf_test_ratio", 0.7, 0.5), Shown::Quantity(Some(0.7), Some(0.5)));
+        assert_eq!(shown("card_errors", 3.0, 0.5), ShownValue::Quantity(Some(3.0), None));
+        assert_eq!(shown("card_errors", 12.0, 10.0), ShownValue::Quantity(Some(12.0), Some(10.0)));
+        assert_eq!(shown("ekf_test_ratio", 0.7, 0.5), ShownValue::Quantity(Some(0.7), Some(0.5)));
     }
 
     #[test]

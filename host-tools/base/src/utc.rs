@@ -110,14 +110,14 @@ pub fn seconds_to_micros(seconds: f64) -> Option<u64> {
 
 /// A point in time on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum When {
+pub enum TimePoint {
     /// Microseconds of the log's own time, as its tables have it.
     Seconds(u64),
     /// Microseconds since 1970.
     Utc(u64),
 }
 
-impl std::str::FromStr for When {
+impl std::str::FromStr for TimePoint {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -169,14 +169,14 @@ mod tests {
 
     #[test]
     fn both_forms_of_a_time() {
-        assert_eq!("12.5".parse(), Ok(When::Seconds(12_500_000)));
-        assert_eq!("4:20.8".parse(), Ok(When::Seconds(260_800_000)));
-        assert_eq!("1:04:20".parse(), Ok(When::Seconds(3_860_000_000)));
-        assert_eq!("1970-01-01T00:00:01.5Z".parse(), Ok(When::Utc(1_500_000)));
-        assert_eq!("1970-01-01T02:00:00+02:00".parse(), Ok(When::Utc(0)));
+        assert_eq!("12.5".parse(), Ok(TimePoint::Seconds(12_500_000)));
+        assert_eq!("4:20.8".parse(), Ok(TimePoint::Seconds(260_800_000)));
+        assert_eq!("1:04:20".parse(), Ok(TimePoint::Seconds(3_860_000_000)));
+        assert_eq!("1970-01-01T00:00:01.5Z".parse(), Ok(TimePoint::Utc(1_500_000)));
+        assert_eq!("1970-01-01T02:00:00+02:00".parse(), Ok(TimePoint::Utc(0)));
         for text in ["", "yesterday", "-5", "1:60", "1:-5", "+1:00", "1:2:3:4", ":5", "1960-01-01T00:00:00Z"]
         {
-            assert!(text.parse::<When>().is_err(), "{text}");
+            assert!(text.parse::<TimePoint>().is_err(), "{text}");
         }
     }
 }

@@ -20,11 +20,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use hums_analysis::check::{self, text, text::NotJudged};
+use hums_analysis::check::{self, text, text::UnjudgedList};
 use hums_base::colour::shown;
 use hums_base::outcome::{Outcome, exit_code, usage};
 use hums_base::{output, printable};
-use hums_report::report::{self, What};
+use hums_report::report::{self, PageKind};
 use serde_json::json;
 
 fn main() -> ExitCode {
@@ -58,7 +58,7 @@ fn check(inputs: &[PathBuf]) -> Result<Outcome> {
     };
     check::run_showing(&request, |checked| {
         let plain = |text: &str| shown(&printable::lines(text), false).to_string();
-        let screen = plain(&text::screen(checked, NotJudged::Counted("")));
+        let screen = plain(&text::screen(checked, UnjudgedList::Counted("")));
         let reasons = plain(&text::reasons(&checked.judged));
         let line = json!({ "screen": screen, "state": text::state(checked), "reasons": reasons });
         output::json_line(&line.to_string())
@@ -78,7 +78,7 @@ fn report(inputs: &[PathBuf], output: &str, system: Option<u8>, session: Option<
         json: false,
     };
     report::run_into(&request, &mut |path, what, html, _| {
-        let log = if let What::Session(place) = what { Some(&place.title) } else { None };
+        let log = if let PageKind::Session(place) = what { Some(&place.title) } else { None };
         let page = path.file_name().map(|name| name.to_string_lossy());
         output::json_line(&json!({ "page": page, "log": log, "html": html }).to_string())
     })

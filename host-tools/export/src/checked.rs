@@ -5,7 +5,7 @@ use hums_core::clock::Instant;
 use hums_core::health::Level;
 
 use super::row::{Cell, CellType, Row};
-use crate::check::judged::{Judged, JudgedBy, TOO_LITTLE};
+use crate::check::judged::{JudgedBy, Judgement, TOO_LITTLE};
 use crate::check::problem::{Problem, problems};
 use crate::source::told::Finding;
 use crate::states;
@@ -30,12 +30,12 @@ pub struct Checked {
 
 impl Checked {
     /// From a judged recording; `None` if the monitor on board checked it.
-    pub fn new(judged: Judged) -> Option<Self> {
+    pub fn new(judged: Judgement) -> Option<Self> {
         if judged.by == JudgedBy::Board {
             return None;
         }
         let (by, verdict) = (if judged.worst().is_some() { HUMS } else { NOBODY }, judged.verdict());
-        let Judged { findings, findings_count: count, judged, not_judged, is_timeless, .. } = judged;
+        let Judgement { findings, findings_count: count, judged, not_judged, is_timeless, .. } = judged;
         let (judged, not_judged) = (judged.len() as u64, not_judged.len() as u64);
         Some(Self { by, verdict, findings, count, judged, not_judged, is_timeless })
     }
@@ -60,7 +60,7 @@ impl Checked {
         let (verdict, findings) = match part.filter(|_| self.by == HUMS) {
             None => (self.verdict, self.count),
             Some(is_wanted) => {
-                let mut part = OnBoard::default();
+                let mut part = FindingCount::default();
                 let wanted = self.findings.iter().filter(|finding| is_wanted(finding.at));
                 wanted.for_each(|finding| part.add(finding.level));
                 // That too little was judged is so of every part.
@@ -75,13 +75,13 @@ impl Checked {
 
 /// The findings of a log's own monitor, or of a part of a log, counted.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct OnBoard {
+pub struct FindingCount {
     count: u64,
     /// The worst level, by its number; a stopped input does not count.
     worst: u8,
 }
 
-impl OnBoard {
+impl FindingCount {
     /// One more.
     pub fn add(&mut self, level: Level) {
         self.count += 1;

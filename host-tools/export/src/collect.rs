@@ -4,12 +4,12 @@ use hums_blackbox::{Gap, Record};
 use hums_core::clock::Instant;
 use hums_link as link;
 
-use super::checked::OnBoard;
+use super::checked::FindingCount;
 use super::context::Context;
 use super::format::{Entry, GroupEncoder};
 use super::record::{gap_row, rows};
 use super::row::Row;
-use super::story::{Observed, Story, StoryEntry};
+use super::story::{Story, StoryEntry, WaitingObservation};
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::item::Item;
@@ -17,7 +17,7 @@ use crate::source::parts::ItemCollector;
 use crate::source::told::Finding;
 
 /// One group in each format.
-pub struct Collected<'a> {
+pub struct CollectedGroup<'a> {
     context: &'a Context,
     /// By format.
     pub parts: Vec<Box<dyn GroupEncoder>>,
@@ -28,12 +28,12 @@ pub struct Collected<'a> {
     /// Records written.
     pub records: u64,
     /// Findings of the log's own monitor, wanted or not.
-    pub on_board: OnBoard,
+    pub on_board: FindingCount,
     /// Rows of tables without room for their names.
     pub rows_left_out: u64,
 }
 
-impl<'a> Collected<'a> {
+impl<'a> CollectedGroup<'a> {
     /// Empty.
     pub fn new(context: &'a Context) -> Self {
         Self {
@@ -42,7 +42,7 @@ impl<'a> Collected<'a> {
             story: Story::default(),
             frames: 0,
             records: 0,
-            on_board: OnBoard::default(),
+            on_board: FindingCount::default(),
             rows_left_out: 0,
         }
     }
@@ -83,11 +83,11 @@ impl<'a> Collected<'a> {
     }
 }
 
-impl ItemCollector for Collected<'_> {
+impl ItemCollector for CollectedGroup<'_> {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         // Always: later items depend on the vehicle's earlier state.
         if let Item::Observation(source, observation) = item {
-            self.story.observed.push(Observed { at, source, observation: *observation });
+            self.story.observed.push(WaitingObservation { at, source, observation: *observation });
         }
         if !self.context.selection.has_time(at, &self.context.epochs) {
             return;

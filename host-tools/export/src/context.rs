@@ -8,7 +8,7 @@ use super::fleet::Fleet;
 use super::format::{self, Files, Format, GroupEncoder, Way};
 use super::formats::influx::Tags;
 use super::identity::{Identity, RecordingContent};
-use super::native::Tables;
+use super::native::NativeTables;
 use super::selection::Selection;
 use crate::files::Inputs;
 use crate::source::epochs::Epochs;
@@ -104,5 +104,5 @@ pub struct Context {
     /// It is judged while it is read.
     pub judges: bool,
     /// The tables of an autopilot's own log.
-    pub tables: Tables,
+    pub tables: NativeTables,
 }

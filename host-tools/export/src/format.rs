@@ -249,9 +249,9 @@ impl fmt::Debug for Format {
 }
 
 /// A single file, open.
-pub struct Single(Output);
+pub struct SingleFile(Output);
 
-impl Single {
+impl SingleFile {
     /// Opens it.
     pub fn open(context: &Context, path: &Path) -> Result<Self> {
         context.inputs.refuse(path)?;
@@ -291,7 +291,7 @@ impl Spool {
     }
 
     /// Adds all of it to a file.
-    pub fn copy(self, to: &mut Single) -> Result<()> {
+    pub fn copy(self, to: &mut SingleFile) -> Result<()> {
         let mut file = self.0.into_inner().context(NO_SPOOL)?;
         file.seek(SeekFrom::Start(0)).context(NO_SPOOL)?;
         let mut buffer = vec![0; 1 << 16];

@@ -24,9 +24,9 @@ const EVERY: Span = Span::from_millis(200);
 const SILENCE: Span = Span::from_secs(5);
 
 #[derive(Default)]
-pub(crate) struct Findings(pub(crate) Vec<Finding>);
+pub(crate) struct CollectedFindings(pub(crate) Vec<Finding>);
 
-impl GroupEncoder for Findings {
+impl GroupEncoder for CollectedFindings {
     fn finding(&mut self, _: &Context, finding: &Finding) {
         self.0.push(finding.clone());
     }
@@ -62,7 +62,7 @@ impl Journey {
     pub(crate) fn take(
         &mut self,
         context: &Context,
-        findings: Findings,
+        findings: CollectedFindings,
         story: &Story,
         mut each: impl FnMut(Instant, Fix, bool) -> Result<()>,
     ) -> Result<()> {

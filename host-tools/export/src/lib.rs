@@ -61,7 +61,7 @@ use hums_core::clock::Instant;
 
 use check::judge::{Judge, Limits};
 use checked::Checked;
-use collect::Collected;
+use collect::CollectedGroup;
 use context::{Context, Formats};
 use destination::Destination;
 use ending::Ending;
@@ -79,20 +79,20 @@ use logs::sessions::copy_words;
 use logs::side_by_side::side_by_side;
 use made::{LogJson, MadeJson, OutputFile};
 use manifest::{Manifest, ReadLog};
-use naming::Named;
+use naming::LogFileName;
 use outcome::{Outcome, or_skipped, usage as usage_error};
 use output::Schema;
 use plural::count;
 use selection::Selection;
 use source::epochs::Epochs;
 use source::find::{FoundRecordings, find, sessions_of};
-use source::item::{Gap, Item, RecordingSummary, Rows, Want};
+use source::item::{Gap, Item, Needs, RecordingSummary, Rows};
 use source::parts::{ItemCollector, PartReceiver};
 use source::recording::{Format, LogPlace};
 use storage::{Address, Upload};
 use story::StoryEntry;
 use summary::damaged_places;
-use utc::When;
+use utc::TimePoint;
 use works::{NamedLog, check_forms, without_frames, works};
 use write::Writers;
 
@@ -114,9 +114,9 @@ pub struct DecodeRequest {
     /// The formats to write.
     pub formats: Vec<&'static format::Format>,
     /// Entries before it are left out.
-    pub from: Option<When>,
+    pub from: Option<TimePoint>,
     /// Entries after it are left out.
-    pub to: Option<When>,
+    pub to: Option<TimePoint>,
     /// Each flight has files of its own.
     pub split: bool,
     /// Seconds from the log's beginning to the video's, for subtitles.
@@ -470,8 +470,8 @@ impl Task<'_> {
     fn decode(&self, work: &NamedLog<'_>, all: &[NamedLog<'_>]) -> Result<Done> {
         let log = work.log;
         let name = match &work.named {
-            Named::As(name, _) => name,
-            Named::Copy(of) => {
+            LogFileName::As(name, _) => name,
+            LogFileName::Copy(of) => {
                 let of = all.get(*of).map(|work| work.log.name.clone()).unwrap_or_default();
                 return Ok(Done { copy_of: Some(of.clone()), ..unwritten(log)? });
             }
@@ -601,8 +601,8 @@ impl Task<'_> {
             names => Rows::Named(names),
         };
         let observations = formats.about().any(|about| about.has_observations);
-        let want = Want { frames: true, observations, rows, ..Want::default() };
-        let new = || Collected::new(context);
+        let want = Needs { frames: true, observations, rows, ..Needs::default() };
+        let new = || CollectedGroup::new(context);
         let has_words = formats.has_words();
         let Some(log) = place.own().filter(|_| context.judges || has_words) else {
             return Ok((place.in_parts(want, new, &mut writers)?, writers, None));
@@ -639,7 +639,7 @@ fn flights(log: &LogPlace) -> Result<Vec<(Instant, Instant)>> {
 /// A log whose files are there already. It is read for its losses, which count as if it was written.
 fn unwritten(log: &LogPlace) -> Result<Done> {
     // As for its files: gaps show in messages of every kind.
-    let want = Want { frames: true, observations: true, ..Want::default() };
+    let want = Needs { frames: true, observations: true, ..Needs::default() };
     let mut gaps = Gaps(Soundness::Whole);
     let summary = log.in_parts(want, || Gaps(Soundness::Whole), &mut gaps)?;
     Ok(Done::read(log, summary, gaps.0))

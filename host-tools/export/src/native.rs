@@ -12,11 +12,11 @@ const NAMES_BYTES_MAX: usize = 4 << 20;
 
 /// The names of one log's tables, and of their columns with units; `None` if there was no room for them.
 #[derive(Debug, Default)]
-pub struct Tables(Mutex<BTreeMap<String, Option<Names>>>);
+pub struct NativeTables(Mutex<BTreeMap<String, Option<Names>>>);
 
 type Names = (&'static str, Vec<&'static str>);
 
-impl Tables {
+impl NativeTables {
     /// A row as cells; `None` if there was no room for the names of its table.
     pub fn row(&self, row: item::Row<'_>) -> Option<Row> {
         let item::Row { table, values } = row;

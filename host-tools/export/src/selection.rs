@@ -9,13 +9,13 @@ use hums_core::clock::Instant;
 use crate::DecodeRequest;
 use crate::outcome::usage;
 use crate::source::epochs::Epochs;
-use crate::utc::When;
+use crate::utc::TimePoint;
 
 /// Which entries are wanted.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
-    from: Option<When>,
-    to: Option<When>,
+    from: Option<TimePoint>,
+    to: Option<TimePoint>,
     ids: Vec<u32>,
     /// The names as they were given: those of other messages than MAVLink's.
     names: Vec<String>,
@@ -30,8 +30,8 @@ impl Selection {
         let other = |id: Result<u32>| id.or_else(|error| if native { Ok(u32::MAX) } else { Err(error) });
         let ids = ids.map(other).collect::<Result<_>>()?;
         let is_backwards = match (args.from, args.to) {
-            (Some(When::Seconds(from)), Some(When::Seconds(to)))
-            | (Some(When::Utc(from)), Some(When::Utc(to))) => from > to,
+            (Some(TimePoint::Seconds(from)), Some(TimePoint::Seconds(to)))
+            | (Some(TimePoint::Utc(from)), Some(TimePoint::Utc(to))) => from > to,
             _ => false,
         };
         if is_backwards {
@@ -42,7 +42,7 @@ impl Selection {
 
     /// The same, of this time only.
     pub fn within(&self, (from, to): (Instant, Instant)) -> Self {
-        let limit = |at: Instant| Some(When::Seconds(at.as_micros()));
+        let limit = |at: Instant| Some(TimePoint::Seconds(at.as_micros()));
         Self { from: limit(from), to: limit(to), ..self.clone() }
     }
 
@@ -63,7 +63,7 @@ impl Selection {
 
     /// A time in UTC selects nothing in a log without UTC: that is an error, not a guess.
     pub fn check_without_utc(&self, log: &str) -> Result<()> {
-        if [self.from, self.to].iter().any(|when| matches!(when, Some(When::Utc(_)))) {
+        if [self.from, self.to].iter().any(|when| matches!(when, Some(TimePoint::Utc(_)))) {
             return Err(usage(format!(
                 "{log}: the time of day is not known in this log; give --from and --to as seconds of its own time, as its tables have them"
             )));
@@ -96,10 +96,10 @@ impl Selection {
     }
 }
 
-fn compare(at: Instant, limit: When, epochs: &Epochs) -> Option<Ordering> {
+fn compare(at: Instant, limit: TimePoint, epochs: &Epochs) -> Option<Ordering> {
     match limit {
-        When::Seconds(limit) => Some(at.as_micros().cmp(&limit)),
-        When::Utc(limit) => Some(epochs.utc_us(at)?.cmp(&limit)),
+        TimePoint::Seconds(limit) => Some(at.as_micros().cmp(&limit)),
+        TimePoint::Utc(limit) => Some(epochs.utc_us(at)?.cmp(&limit)),
     }
 }
 

@@ -8,8 +8,8 @@ use anyhow::{Result, bail};
 use hums_analysis::soundness::Soundness;
 use hums_core::clock::Instant;
 
-use super::checked::{Checked, OnBoard};
-use super::collect::Collected;
+use super::checked::{Checked, FindingCount};
+use super::collect::CollectedGroup;
 use super::context::Context;
 use super::destination::Destination;
 use super::format::{AnyWriter, Files, Finished, Totals, Way};
@@ -27,7 +27,7 @@ pub struct Writers<'a> {
     said: Rc<RefCell<Vec<StoryEntry>>>,
     frames: u64,
     records: u64,
-    on_board: OnBoard,
+    on_board: FindingCount,
     rows_left_out: u64,
     /// The state of the recording, by its gaps.
     lacks: Soundness,
@@ -61,7 +61,7 @@ impl<'a> Writers<'a> {
             said: Rc::default(),
             frames: 0,
             records: 0,
-            on_board: OnBoard::default(),
+            on_board: FindingCount::default(),
             rows_left_out: 0,
             lacks: Soundness::Whole,
         })
@@ -84,7 +84,7 @@ impl<'a> Writers<'a> {
         if !context.formats.has_records() {
             return Ok(None);
         }
-        let mut collected = Collected::new(context);
+        let mut collected = CollectedGroup::new(context);
         for (finding, row) in checked.iter().flat_map(|checked| checked.findings()) {
             if context.selection.has_time(finding.at, &context.epochs) {
                 collected.rows(finding.at, &[row]);
@@ -100,7 +100,7 @@ impl<'a> Writers<'a> {
         Ok(checked.and_then(Checked::not_checked))
     }
 
-    fn put(&mut self, mut collected: Collected<'_>) -> Result<()> {
+    fn put(&mut self, mut collected: CollectedGroup<'_>) -> Result<()> {
         self.frames += collected.frames;
         self.records += collected.records;
         self.on_board.and(collected.on_board);
@@ -147,11 +147,11 @@ impl<'a> Writers<'a> {
     }
 }
 
-impl<'a> PartReceiver<Collected<'a>> for Writers<'a> {
+impl<'a> PartReceiver<CollectedGroup<'a>> for Writers<'a> {
     fn gap(&mut self, gap: &item::Gap) -> Result<()> {
         self.lacks = self.lacks.max(Soundness::of_gap(gap));
         let gap = &gap.to_own();
-        let mut collected = Collected::new(self.context);
+        let mut collected = CollectedGroup::new(self.context);
         collected.gap(gap);
         for writer in &mut self.files {
             writer.gap(self.context, gap)?;
@@ -159,7 +159,7 @@ impl<'a> PartReceiver<Collected<'a>> for Writers<'a> {
         self.put(collected)
     }
 
-    fn part(&mut self, collected: Collected<'a>) -> Result<()> {
+    fn part(&mut self, collected: CollectedGroup<'a>) -> Result<()> {
         self.put(collected)
     }
 }

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use hums_blackbox::record::{Before, PreviousEnd};
+use hums_blackbox::record::{PreviousEnd, PreviousSession};
 
 use crate::ending::{Ending, Proof, SessionBefore};
 use crate::logs::sessions::{Sessions, place};
@@ -79,7 +79,7 @@ impl<T: HasEnding> EndResolver<T> {
         }
     }
 
-    fn tell(&mut self, before: &Before, next: &mut Ending) {
+    fn tell(&mut self, before: &PreviousSession, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(HasEnding::ending).collect();
         // The last file was to be written anew, and held another session's sectors.
@@ -127,7 +127,7 @@ impl<T: HasEnding> EndResolver<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::logs::strangers::Strange;
+    use crate::logs::strangers::ForeignSectors;
 
     impl HasEnding for Ending {
         fn ending(&mut self) -> Option<&mut Self> {
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_last_file_that_was_to_be_written_anew_is_no_finding_once_the_next_start_found_it_so() {
-        let strange = vec![Strange { file: 1, hollow: true, sectors: 9, first: 0, session: 7 }];
+        let strange = vec![ForeignSectors { file: 1, hollow: true, sectors: 9, first: 0, session: 7 }];
         let mut log = Ending {
             name: "00006".to_owned(),
             files: vec!["00006_00.HUM".to_owned(), "00006_01.HUM".to_owned()],
@@ -166,7 +166,12 @@ mod tests {
         assert!(log.strange().join("").contains("9 sectors of 00006_01.HUM"), "{:?}", log.strange());
         let mut next = Ending { name: "00007".to_owned(), ..Ending::default() };
         next.summary.session = Some(9);
-        let before = Before { found: PreviousEnd::Frames, number: 6, session: 7, ..Before::default() };
+        let before = PreviousSession {
+            found: PreviousEnd::Frames,
+            number: 6,
+            session: 7,
+            ..PreviousSession::default()
+        };
         next.summary.marks.before = Some(before);
         let mut followed = EndResolver::new(Sessions::default());
         let mut done = followed.push(log);
@@ -181,13 +186,17 @@ mod tests {
         let ending = |damaged, number| {
             let mut log =
                 Ending { name: "00001".into(), files: vec!["00001_00.HUM".into()], ..Ending::default() };
-            log.summary.strange = vec![Strange { file: 0, hollow: true, sectors: 0, first: 0, session: 0 }];
+            log.summary.strange =
+                vec![ForeignSectors { file: 0, hollow: true, sectors: 0, first: 0, session: 0 }];
             let blocks = &mut log.summary.blocks;
             (blocks.blocks, blocks.empty, blocks.damaged) = (900 + damaged, 900, damaged);
             let mut next = Ending { name: "00002".into(), ..Ending::default() };
             next.summary.session = Some(9);
-            next.summary.marks.before =
-                Some(Before { found: PreviousEnd::Unreadable, number, ..Before::default() });
+            next.summary.marks.before = Some(PreviousSession {
+                found: PreviousEnd::Unreadable,
+                number,
+                ..PreviousSession::default()
+            });
             let mut followed = EndResolver::new(Sessions::default());
             let mut done = followed.push(log);
             done.extend(followed.push(next));

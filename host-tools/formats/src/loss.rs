@@ -1,6 +1,6 @@
 //! Recorded losses as counts and texts.
 
-use hums_blackbox::record::{Loss, Lost};
+use hums_blackbox::record::{Loss, LossKind};
 use hums_blackbox::{Cause, Gap};
 
 use crate::plural::count;
@@ -9,14 +9,14 @@ use crate::utc::moment;
 /// Noise was no frame, so it is no loss.
 pub fn lost(loss: &Loss) -> u64 {
     match loss.what {
-        Lost::NotFrames | Lost::DamagedFrames => 0,
-        Lost::UartOverrun
-        | Lost::QueueFull
-        | Lost::Card
-        | Lost::Records
-        | Lost::WrongChecksums
-        | Lost::DamagedPlaces
-        | Lost::Other => loss.count,
+        LossKind::NotFrames | LossKind::DamagedFrames => 0,
+        LossKind::UartOverrun
+        | LossKind::QueueFull
+        | LossKind::Card
+        | LossKind::Records
+        | LossKind::WrongChecksums
+        | LossKind::DamagedPlaces
+        | LossKind::Other => loss.count,
     }
 }
 
@@ -26,12 +26,15 @@ const CARD_LATE: &str = "the card took nothing for too long";
 /// The end of a sentence; `None` unless it concerns the recorder.
 pub fn words(loss: &Loss) -> Option<String> {
     let (one, why) = match loss.what {
-        Lost::NotFrames | Lost::DamagedFrames | Lost::WrongChecksums | Lost::DamagedPlaces => return None,
-        Lost::UartOverrun => ("byte", "came faster than the recorder took them"),
-        Lost::QueueFull => ("frame", CARD_LATE),
-        Lost::Card => ("sector", "could not be written to the card"),
-        Lost::Records => ("record", CARD_LATE),
-        Lost::Other => ("unit", "for a reason that this program does not know"),
+        LossKind::NotFrames
+        | LossKind::DamagedFrames
+        | LossKind::WrongChecksums
+        | LossKind::DamagedPlaces => return None,
+        LossKind::UartOverrun => ("byte", "came faster than the recorder took them"),
+        LossKind::QueueFull => ("frame", CARD_LATE),
+        LossKind::Card => ("sector", "could not be written to the card"),
+        LossKind::Records => ("record", CARD_LATE),
+        LossKind::Other => ("unit", "for a reason that this program does not know"),
     };
     let was = if loss.count == 1 { "was" } else { "were" };
     Some(format!("{} {was} not recorded: {why}", count(loss.count, one)))
@@ -63,9 +66,9 @@ pub const fn why(gap: &Gap) -> &'static str {
 /// The content of a loss record, with its time.
 pub fn told(loss: &Loss) -> String {
     let words = words(loss).unwrap_or_else(|| match loss.what {
-        Lost::NotFrames => format!("{} of no frame came over the line", count(loss.count, "byte")),
-        Lost::DamagedFrames => format!("{} came over the line", count(loss.count, "damaged frame")),
-        Lost::WrongChecksums => format!("{} with a wrong checksum came", count(loss.count, "frame")),
+        LossKind::NotFrames => format!("{} of no frame came over the line", count(loss.count, "byte")),
+        LossKind::DamagedFrames => format!("{} came over the line", count(loss.count, "damaged frame")),
+        LossKind::WrongChecksums => format!("{} with a wrong checksum came", count(loss.count, "frame")),
         _ => format!("{} of what was packed", count(loss.count, "damaged place")),
     });
     format!("{words}, between {} and {}", moment(loss.from), moment(loss.to))
@@ -80,8 +83,8 @@ mod tests {
     #[test]
     fn noise_is_nothing_that_the_recorder_lost() {
         let of = |what| lost(&Loss { what, count: 7, from: Instant::ZERO, to: Instant::ZERO });
-        assert_eq!([of(Lost::NotFrames), of(Lost::DamagedFrames)], [0, 0]);
-        assert_eq!([of(Lost::QueueFull), of(Lost::Card), of(Lost::Other)], [7, 7, 7]);
+        assert_eq!([of(LossKind::NotFrames), of(LossKind::DamagedFrames)], [0, 0]);
+        assert_eq!([of(LossKind::QueueFull), of(LossKind::Card), of(LossKind::Other)], [7, 7, 7]);
     }
 
     #[test]
@@ -107,9 +110,9 @@ mod tests {
     fn what_was_not_recorded_is_said_with_its_reason() {
         let of = |what, count| words(&Loss { what, count, from: Instant::ZERO, to: Instant::ZERO });
         assert_eq!(
-            of(Lost::QueueFull, 3_591).as_deref(),
+            of(LossKind::QueueFull, 3_591).as_deref(),
             Some("3591 frames were not recorded: the card took nothing for too long")
         );
-        assert_eq!(of(Lost::NotFrames, 7), None);
+        assert_eq!(of(LossKind::NotFrames, 7), None);
     }
 }

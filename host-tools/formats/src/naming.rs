@@ -104,7 +104,7 @@ impl Traits {
 
 /// The name of a log's files in one command.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Named {
+pub enum LogFileName {
     /// Name, and index within its session, from 1.
     As(String, u32),
     /// A copy of the log of this index.
@@ -122,9 +122,9 @@ pub struct Names {
 
 impl Names {
     /// Names the log of this index.
-    pub fn name(&mut self, index: usize, log: &LogPlace, traits: &Traits) -> Named {
+    pub fn name(&mut self, index: usize, log: &LogPlace, traits: &Traits) -> LogFileName {
         if let Some(first) = self.known.get(&(traits.session, traits.fingerprint)) {
-            return Named::Copy(*first);
+            return LogFileName::Copy(*first);
         }
         self.known.insert((traits.session, traits.fingerprint), index);
         // Without a session, the bytes name it, uniquely.
@@ -136,19 +136,19 @@ impl Names {
         let name = traits.name(log);
         let of_name = self.taken.entry(name.clone()).or_default();
         *of_name += 1;
-        Named::As(if *of_name > 1 { format!("{name}-{of_name}") } else { name }, nth)
+        LogFileName::As(if *of_name > 1 { format!("{name}-{of_name}") } else { name }, nth)
     }
 }
 
 /// Names one command's logs; copies have none.
-pub fn names(logs: &[(&LogPlace, Traits)], sessions: &Sessions) -> Vec<Named> {
+pub fn names(logs: &[(&LogPlace, Traits)], sessions: &Sessions) -> Vec<LogFileName> {
     let mut names = Names::default();
     let original = |log: &LogPlace| {
         let of = sessions.again(&log.name)?;
         logs.iter().position(|(other, _)| other.name == of)
     };
     let name = |(index, (log, traits)): (usize, &(&LogPlace, Traits))| match original(log) {
-        Some(of) => Named::Copy(of),
+        Some(of) => LogFileName::Copy(of),
         None => names.name(index, log, traits),
     };
     logs.iter().enumerate().map(name).collect()
@@ -304,10 +304,10 @@ mod tests {
         assert_eq!(
             named,
             [
-                Named::As("00001-s1a2b3c4d".to_owned(), 1),
-                Named::Copy(0),
-                Named::As("00001-s1a2b3c4d-2".to_owned(), 2),
-                Named::As("00002-box3f3f3f3f3f3f3f3f3f3f3f3f-s00000005".to_owned(), 1),
+                LogFileName::As("00001-s1a2b3c4d".to_owned(), 1),
+                LogFileName::Copy(0),
+                LogFileName::As("00001-s1a2b3c4d-2".to_owned(), 2),
+                LogFileName::As("00002-box3f3f3f3f3f3f3f3f3f3f3f3f-s00000005".to_owned(), 1),
             ]
         );
     }

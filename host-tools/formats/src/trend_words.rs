@@ -1,6 +1,6 @@
 //! Words of trends over flights, which no box judges.
 
-use hums_core::health::{Said, Scope, Words};
+use hums_core::health::{RadioWords, Scope, Words};
 
 /// Name for people, part, meaning, action, input.
 const fn words(
@@ -8,7 +8,7 @@ const fn words(
     [name, part, meaning, action, needs]: [&'static str; 5],
     alarm: &'static str,
 ) -> Words {
-    let said = Said { check, name, part, alarm, advice: "" };
+    let said = RadioWords { check, name, part, alarm, advice: "" };
     Words { said, meaning, action, needs, scope: Scope::Stored }
 }
 

@@ -12,7 +12,7 @@ use crate::decode::{DecodeRequest, logbook, share};
 use crate::endpoint::without_slash;
 use crate::report;
 use crate::report::tiles::Tiles;
-use crate::utc::When;
+use crate::utc::TimePoint;
 
 const DECODE_EXAMPLES: &str = "Examples:
   hums decode card.img --session 00001 -o 00001.tlog --format tlog
@@ -67,10 +67,10 @@ pub struct Decode {
     pub format: Vec<&'static Format>,
     /// First moment: seconds since power-on (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
     #[arg(long, value_name = "T")]
-    pub from: Option<When>,
+    pub from: Option<TimePoint>,
     /// Last moment, in the same forms as --from
     #[arg(long, value_name = "T")]
-    pub to: Option<When>,
+    pub to: Option<TimePoint>,
     /// Write separate files for each flight; the time on the ground between two is cut in its middle
     #[arg(long, value_enum, value_name = "WHAT", conflicts_with_all = ["from", "to"])]
     pub split: Option<Split>,

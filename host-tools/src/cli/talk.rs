@@ -9,7 +9,7 @@ use hums_core::health::Level;
 
 use crate::endpoint::Endpoint;
 use crate::names::vocabulary;
-use crate::utc::{When, parse_seconds};
+use crate::utc::{TimePoint, parse_seconds};
 
 const BOX_EXAMPLES: &str = "Examples:
   hums box pull --link serial:/dev/ttyUSB0:57600 -o logs
@@ -185,7 +185,7 @@ fn span(text: &str) -> Result<Span, String> {
 #[derive(Clone, Debug, PartialEq)]
 pub enum LogMoment {
     /// A time.
-    Time(When),
+    Time(TimePoint),
     /// The latest finding of this level, or a worse one.
     Level(Level),
     /// The latest finding of this check.

@@ -8,7 +8,7 @@ use hums_core::health::exceedance::Crossings;
 use crate::names::check_name;
 use crate::plural::count;
 use crate::printable::word;
-use crate::states::{Shown, quantity, shown};
+use crate::states::{ShownValue, quantity, shown};
 use crate::summary::Overview;
 use crate::table::{Table, left, right};
 use crate::utc::moment;
@@ -28,8 +28,10 @@ pub(super) fn text(text: &mut String, log: &Overview) {
             let Crossings { warnings, criticals, warning_tenths, critical_tenths, peak } = *crossings;
             let seconds = |tenths: u32| moment(Instant::from_millis(u64::from(tenths) * 100));
             let worst = match shown(check, peak, f32::NAN) {
-                Shown::State(state) => state.unwrap_or_default().to_owned(),
-                Shown::Quantity(peak, _) => peak.map_or_else(String::new, |peak| quantity(peak, &line.unit)),
+                ShownValue::State(state) => state.unwrap_or_default().to_owned(),
+                ShownValue::Quantity(peak, _) => {
+                    peak.map_or_else(String::new, |peak| quantity(peak, &line.unit))
+                }
             };
             table.row([
                 format!("  {}", word(&check_name(check, &[*instance]))),

@@ -45,7 +45,7 @@ pub struct SubsystemState {
 
 /// The health board.
 #[derive(Debug)]
-pub struct Board {
+pub struct HealthBoard {
     /// The whole vehicle's level, from the best source.
     pub overall: &'static str,
     /// Text for an unknown level: `was critical`, or why the vehicle is silent.
@@ -66,7 +66,7 @@ struct Known {
     last: &'static str,
 }
 
-impl Board {
+impl HealthBoard {
     /// The board of a vehicle. One pass over some hundred checks: it runs for every update.
     pub fn of(craft: &Craft, now: Instant) -> Self {
         let none = Known { level: Level::Stale, is_heard: false, good: 0, last: "" };
@@ -323,8 +323,8 @@ mod tests {
         craft
     }
 
-    fn parts(craft: &Craft, now_ms: u64) -> (Board, impl Fn(&Board, Subsystem) -> String) {
-        let board = Board::of(craft, Instant::from_millis(now_ms));
+    fn parts(craft: &Craft, now_ms: u64) -> (HealthBoard, impl Fn(&HealthBoard, Subsystem) -> String) {
+        let board = HealthBoard::of(craft, Instant::from_millis(now_ms));
         (board, |board, part| {
             let part = &board.parts[part as usize];
             format!("{}: {}", part.calm.unwrap_or(part.level), part.reason)

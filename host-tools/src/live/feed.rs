@@ -12,7 +12,7 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 use hums_link::framer::Framer;
 
-use super::hub::{Hub, Published};
+use super::hub::{Hub, PublishedState};
 use super::influx::Influx;
 use super::rate::{PUBLISH, Rate};
 use super::show::{self, HeadInputs, SourceJson};
@@ -215,7 +215,7 @@ impl Feed {
             influx: self.influx.as_mut().map(Influx::figures),
         };
         let (head, crafts) = show::all(&self.world, now, &around);
-        self.hub.publish(Published { epoch: 0, now, head, timeline: Arc::default(), crafts });
+        self.hub.publish(PublishedState { epoch: 0, now, head, timeline: Arc::default(), crafts });
     }
 }
 

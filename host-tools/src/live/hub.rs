@@ -15,7 +15,7 @@ const COMMANDS_MAX: usize = 64;
 
 /// The present state, as text made once for all pages.
 #[derive(Debug, Default)]
-pub struct Published {
+pub struct PublishedState {
     /// A new number means that time went back: take the histories again.
     pub epoch: u64,
     /// Pages see no later data.
@@ -45,7 +45,7 @@ pub enum PageCommand {
 #[derive(Debug)]
 pub struct Hub {
     /// With the number of the newest one.
-    state: Mutex<(u64, Arc<Published>)>,
+    state: Mutex<(u64, Arc<PublishedState>)>,
     changed: Condvar,
     histories: Mutex<Histories>,
     commands: SyncSender<PageCommand>,
@@ -61,7 +61,7 @@ impl Hub {
     }
 
     /// Replaces the state before.
-    pub fn publish(&self, published: Published) {
+    pub fn publish(&self, published: PublishedState) {
         let mut state = lock(&self.state);
         *state = (state.0 + 1, Arc::new(published));
         drop(state);
@@ -69,7 +69,7 @@ impl Hub {
     }
 
     /// The newest state with its number. Waits for it as long as `seen` (0 for none) is the newest one; `None` if the wait is over.
-    pub fn after(&self, seen: u64, wait: Duration) -> Option<(u64, Arc<Published>)> {
+    pub fn after(&self, seen: u64, wait: Duration) -> Option<(u64, Arc<PublishedState>)> {
         let newest = self.changed.wait_timeout_while(lock(&self.state), wait, |state| state.0 == seen);
         let (state, timeout) = newest.unwrap_or_else(PoisonError::into_inner);
         (!timeout.timed_out()).then(|| state.clone())

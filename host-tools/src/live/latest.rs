@@ -50,10 +50,10 @@ impl Default for Latest {
 }
 
 /// The page's name, and a motor's quantity.
-pub type OfMotor = (&'static str, fn(usize) -> Quantity);
+pub type MotorValue = (&'static str, fn(usize) -> Quantity);
 
 /// Shown values of an ESC.
-pub const ESC: [OfMotor; 6] = [
+pub const ESC: [MotorValue; 6] = [
     ("rpm", Quantity::EscRpm),
     ("volts", Quantity::EscVoltage),
     ("amperes", Quantity::EscCurrent),

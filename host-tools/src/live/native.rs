@@ -9,8 +9,8 @@ use std::thread;
 use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Source};
 
-use crate::page::more::{More, rows};
-use crate::source::item::{Item, Stop, Want};
+use crate::page::more::{RowValues, rows};
+use crate::source::item::{Item, Needs, Stop};
 use crate::source::recording::LogPlace;
 use crate::statustext::StatusText;
 
@@ -27,7 +27,7 @@ pub enum Entry {
     /// A parameter and its value.
     Parameter(String, f64),
     /// Further values for plots.
-    More(More),
+    More(RowValues),
     /// The log has a gap between these times.
     Gap(Instant, Instant),
 }
@@ -41,7 +41,7 @@ impl Entry {
                 Some(Self::Text(StatusText::whole(at, text.source, text.severity, text.words)))
             }
             Item::Parameter(parameter) => Some(Self::Parameter(parameter.name.to_owned(), parameter.value)),
-            Item::Row(ref row) => More::of(row).map(Self::More),
+            Item::Row(ref row) => RowValues::of(row).map(Self::More),
             Item::Gap(gap) => gap.from.zip(gap.to).map(|(from, to)| Self::Gap(from, to)),
             _ => None,
         }
@@ -49,8 +49,8 @@ impl Entry {
 }
 
 /// Parts to read.
-pub fn want() -> Want<'static> {
-    Want { observations: true, rows: rows(), ..Want::default() }
+pub fn want() -> Needs<'static> {
+    Needs { observations: true, rows: rows(), ..Needs::default() }
 }
 
 type Batch = Vec<(Instant, Entry)>;

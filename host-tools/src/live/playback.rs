@@ -10,13 +10,13 @@ use anyhow::{Context as _, Result};
 use hums_core::clock::{Instant, Span};
 use hums_link::Frame;
 
-use super::hub::{Hub, PageCommand, Published};
+use super::hub::{Hub, PageCommand, PublishedState};
 use super::influx::{Figures, Influx};
 use super::native::Native;
 use super::rate::{PUBLISH, Rate};
 use super::recording::{self, Content, OpenedInput};
 use super::show::{self, HeadInputs, SourceJson};
-use super::spool::{Spool, SpoolWriter, Spooled};
+use super::spool::{Spool, SpoolWriter, SpooledFrame};
 use super::told::{Limits, MonitorRecord};
 use super::world::World;
 use crate::interrupt;
@@ -83,7 +83,7 @@ impl LoadedRecording {
     fn follow(&mut self, world: &mut World, now: Instant, each: &mut Each<'_>) -> io::Result<()> {
         match &mut self.played {
             PlaybackSource::Frames(spool) => {
-                while let Some(Spooled { at, check, bytes }) = spool.next_until(now)? {
+                while let Some(SpooledFrame { at, check, bytes }) = spool.next_until(now)? {
                     tell(&self.told, &mut self.told_next, at, world);
                     if let Some(frame) = Frame::again(bytes, check) {
                         world.frame(at, &frame, None);
@@ -226,7 +226,7 @@ impl Player {
                 copies.push(Copy { at, offset, told: told.len(), world: world.clone() });
             }
             if let Some(frame) = frame {
-                writer.push(Spooled { at, check: frame.check(), bytes: frame.bytes() })?;
+                writer.push(SpooledFrame { at, check: frame.check(), bytes: frame.bytes() })?;
                 world.frame(at, frame, Some(&mut hub.histories()));
             } else if let Content::Entry(entry) = content {
                 world.entry(at, entry, Some(&mut hub.histories()));
@@ -238,7 +238,7 @@ impl Player {
                 shown = Wall::now();
                 let around = HeadInputs { source, epoch_us: None, frames_s: 0.0, influx: None };
                 let (head, _) = show::all(&World::new(Limits::default()), Instant::ZERO, &around);
-                hub.publish(Published { head, ..Published::default() });
+                hub.publish(PublishedState { head, ..PublishedState::default() });
             }
             Ok(!interrupt::requested())
         })?;
@@ -398,7 +398,7 @@ impl Player {
         };
         let (head, crafts) = show::all(world, now, &around);
         let timeline = Arc::clone(&self.timeline);
-        self.hub.publish(Published { epoch: self.epoch, now, head, timeline, crafts });
+        self.hub.publish(PublishedState { epoch: self.epoch, now, head, timeline, crafts });
     }
 }
 

@@ -14,7 +14,7 @@ use crate::endpoint::Endpoint;
 use crate::logs::groups::has_start;
 use crate::outcome::usage;
 use crate::source::find::find;
-use crate::source::item::{Item, Stop, Want};
+use crate::source::item::{Item, Needs, Stop};
 use crate::source::recording::{LogPlace, Recording};
 
 const LISTED_MAX: usize = 12;
@@ -97,15 +97,15 @@ pub enum Content<'a> {
 }
 
 /// Time, UTC of time zero if known, part read (0 to 1), item. `false` ends the reading.
-pub type Take<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
+pub type ItemReceiver<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
 
 /// Reads once; returns the evidence of a log's end.
-pub fn each(opened: &mut OpenedInput, take: &mut Take<'_>) -> Result<Option<Ending>> {
+pub fn each(opened: &mut OpenedInput, take: &mut ItemReceiver<'_>) -> Result<Option<Ending>> {
     let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;
     let want =
-        if opened.native.is_some() { native::want() } else { Want { frames: true, ..Want::default() } };
+        if opened.native.is_some() { native::want() } else { Needs { frames: true, ..Needs::default() } };
     let native = opened.native.is_some();
     let summary = recording.read(want, &mut |at, item| {
         let entry = if native { Entry::of(at, &item) } else { None };

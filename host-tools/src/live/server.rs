@@ -16,7 +16,7 @@ use serde::Deserialize;
 use super::assets;
 use super::guard::Guard;
 use super::http::{self, Request};
-use super::hub::{Hub, PageCommand, Published};
+use super::hub::{Hub, PageCommand, PublishedState};
 use crate::page::history::Cursor;
 use crate::page::json;
 
@@ -168,7 +168,7 @@ struct Page {
 
 impl Page {
     /// Each message is an event with one line of data: JSON as we write it has no line breaks.
-    fn news(&mut self, published: &Published, hub: &Hub) -> String {
+    fn news(&mut self, published: &PublishedState, hub: &Hub) -> String {
         if published.epoch != self.epoch {
             self.epoch = published.epoch;
             self.cursor = Cursor::default();

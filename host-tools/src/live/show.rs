@@ -7,7 +7,7 @@ use hums_core::component::COMPONENTS_MAX;
 use hums_core::usage::UsageCounter;
 use serde::Serialize;
 
-use super::board::{self, Board};
+use super::board::{self, HealthBoard};
 use super::companion::CompanionJson;
 use super::craft::Craft;
 use super::values::{Motors, Values};
@@ -79,7 +79,7 @@ pub struct HeadInputs<'a> {
 
 /// Source, time and vehicles; each vehicle by system id.
 pub fn all(world: &World, now: Instant, around: &HeadInputs<'_>) -> (String, Vec<(u8, String)>) {
-    let boards: Vec<_> = world.crafts.values().map(|craft| Board::of(craft, now)).collect();
+    let boards: Vec<_> = world.crafts.values().map(|craft| HealthBoard::of(craft, now)).collect();
     let crafts = || world.crafts.iter().zip(&boards);
     let vehicles = crafts().map(|((system, craft), board)| VehicleJson {
         system: *system,
@@ -164,7 +164,7 @@ struct ComponentJson {
     life: bool,
 }
 
-fn state(system: u8, craft: &Craft, board: &Board, now: Instant) -> String {
+fn state(system: u8, craft: &Craft, board: &HealthBoard, now: Instant) -> String {
     let vehicle = craft.monitor.vehicle();
     let heartbeat = vehicle.heartbeat.get().copied().unwrap_or_default();
     let px4 = heartbeat.autopilot == hums_core::observation::Autopilot::Px4;

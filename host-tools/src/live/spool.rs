@@ -27,7 +27,7 @@ pub struct Spool {
 
 /// One frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Spooled<'a> {
+pub struct SpooledFrame<'a> {
     /// When it came.
     pub at: Instant,
     /// Result of its checksum.
@@ -48,7 +48,7 @@ impl SpoolWriter {
     }
 
     /// Takes a frame.
-    pub fn push(&mut self, frame: Spooled<'_>) -> io::Result<()> {
+    pub fn push(&mut self, frame: SpooledFrame<'_>) -> io::Result<()> {
         let length = u16::try_from(frame.bytes.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
         self.file.write_all(&frame.at.as_micros().to_le_bytes())?;
         self.file.write_all(&[u8::from(frame.check == Check::Verified)])?;
@@ -74,7 +74,7 @@ impl Spool {
     }
 
     /// The next frame if it came by `until`; otherwise it stays the next.
-    pub fn next_until(&mut self, until: Instant) -> io::Result<Option<Spooled<'_>>> {
+    pub fn next_until(&mut self, until: Instant) -> io::Result<Option<SpooledFrame<'_>>> {
         let mut header = [0; HEADER_BYTES];
         match self.file.read_exact(&mut header) {
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
@@ -90,7 +90,7 @@ impl Spool {
         self.frame.resize(length, 0);
         self.file.read_exact(&mut self.frame)?;
         let check = if check == 1 { Check::Verified } else { Check::Unverified };
-        Ok(Some(Spooled { at, check, bytes: &self.frame }))
+        Ok(Some(SpooledFrame { at, check, bytes: &self.frame }))
     }
 }
 
@@ -106,7 +106,7 @@ mod tests {
             offsets.push(writer.offset());
             let bytes = vec![number; 10 + usize::from(number)];
             let at = Instant::from_millis(u64::from(number) * 10);
-            writer.push(Spooled { at, check: Check::Verified, bytes: &bytes }).expect("room");
+            writer.push(SpooledFrame { at, check: Check::Verified, bytes: &bytes }).expect("room");
         }
         let mut spool = writer.finish().expect("a file");
         let count = |spool: &mut Spool, until_ms| {

@@ -16,20 +16,20 @@ use crate::reference::Quantity;
 
 /// Value, milliseconds of age, 1 if stale.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown {
+pub struct PageValue {
     value: Scalar,
     age_ms: u64,
     stale: bool,
 }
 
-impl Shown {
+impl PageValue {
     fn new(now: Instant, at: Instant, value: Scalar, limit: Span) -> Self {
         let age = now.since(at);
         Self { value, age_ms: age.as_millis(), stale: age > limit }
     }
 }
 
-impl Serialize for Shown {
+impl Serialize for PageValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut tuple = serializer.serialize_tuple(3)?;
         match self.value {
@@ -120,7 +120,7 @@ impl<'a> Values<'a> {
         Self { craft, now }
     }
 
-    fn each(&self, mut each: impl FnMut(&'static str, Shown)) {
+    fn each(&self, mut each: impl FnMut(&'static str, PageValue)) {
         let (craft, now) = (self.craft, self.now);
         let vehicle = craft.monitor.vehicle();
         for (name, quantity, limit) in &QUANTITIES {
@@ -128,17 +128,17 @@ impl<'a> Values<'a> {
             if let Some((at, value)) = craft.latest.get(*quantity).filter(|_| is_known) {
                 let is_flown = *quantity == Quantity::FlightTime;
                 let value = if is_flown { Scalar::Double(craft.flown_s()) } else { value };
-                each(name, Shown::new(now, at, value, *limit));
+                each(name, PageValue::new(now, at, value, *limit));
             }
         }
         for (name, limit, value) in OF_VEHICLE {
             if let (Some(at), Some(value)) = value(vehicle) {
-                each(name, Shown::new(now, Instant::of(at, now), Scalar::Single(value), *limit));
+                each(name, PageValue::new(now, Instant::of(at, now), Scalar::Single(value), *limit));
             }
         }
         for (sensor, name) in craft.speed_sensors.iter().zip(["speed_sensor_0", "speed_sensor_1"]) {
             if let Some((at, rpm)) = sensor {
-                each(name, Shown::new(now, *at, Scalar::Single(*rpm), SLOW));
+                each(name, PageValue::new(now, *at, Scalar::Single(*rpm), SLOW));
             }
         }
     }
@@ -182,7 +182,7 @@ impl Serialize for Motor<'_> {
         let mut map = serializer.serialize_map(None)?;
         for (name, of) in ESC {
             if let Some((at, value)) = self.craft.latest.get(of(self.number)) {
-                map.serialize_entry(name, &Shown::new(self.now, at, value, SLOW))?;
+                map.serialize_entry(name, &PageValue::new(self.now, at, value, SLOW))?;
             }
         }
         map.end()
@@ -196,8 +196,8 @@ mod tests {
     #[test]
     fn a_value_is_as_short_as_it_was_sent_and_says_its_age() {
         let at = Instant::from_millis(1_000);
-        let shown = |now_ms, value| Shown::new(Instant::from_millis(now_ms), at, value, SLOW);
-        let json = |shown: Shown| serde_json::to_string(&shown).expect("JSON");
+        let shown = |now_ms, value| PageValue::new(Instant::from_millis(now_ms), at, value, SLOW);
+        let json = |shown: PageValue| serde_json::to_string(&shown).expect("JSON");
         assert_eq!(json(shown(1_200, Scalar::Single(15.3))), "[15.3,200,0]");
         assert_eq!(json(shown(7_001, Scalar::Single(f32::NAN))), "[null,6001,1]");
         assert_eq!(json(shown(1_000, Scalar::Double(47.397_922_9))), "[47.3979229,0,0]");

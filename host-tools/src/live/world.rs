@@ -15,7 +15,7 @@ use super::told::{Limits, MonitorRecord, parameter, place_of};
 use crate::check::SETTLE;
 use crate::mavlink::ids::PARAM_VALUE;
 use crate::page::history::History;
-use crate::page::more::More;
+use crate::page::more::RowValues;
 use crate::page::note::Note;
 use crate::source::told::Finding as BoxFinding;
 
@@ -189,7 +189,7 @@ impl World {
         }
     }
 
-    fn told_more(&self, at: Instant, more: &More, histories: Option<&mut Histories>) {
+    fn told_more(&self, at: Instant, more: &RowValues, histories: Option<&mut Histories>) {
         if let Some(histories) = histories {
             histories.entry(self.only()).or_default().more(at, more);
         }
@@ -310,7 +310,7 @@ mod tests {
     use hums_link::packet::Packet;
 
     use super::*;
-    use crate::live::board::Board;
+    use crate::live::board::HealthBoard;
     use crate::mavlink::ids::HEARTBEAT;
     use crate::page::history::Cursor;
 
@@ -466,7 +466,8 @@ mod tests {
                 .flatten()
                 .map(|note| format!("{} {}", note["from"], note["words"]))
                 .collect();
-            let board = serde_json::to_value(&Board::of(&world.crafts[&1], now).parts[0]).expect("JSON");
+            let board =
+                serde_json::to_value(&HealthBoard::of(&world.crafts[&1], now).parts[0]).expect("JSON");
             (notes.join("; "), format!("{}: {}", board["level"], board["reason"]))
         };
         let (notes, power) = told(false);

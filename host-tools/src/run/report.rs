@@ -88,7 +88,7 @@ pub struct RunReport {
 
 /// A run's logs.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct OnCard {
+pub struct CardLogs {
     /// Bytes of log.
     pub bytes: u64,
     /// A stretch of unknown length counts as one.
@@ -127,9 +127,9 @@ impl RunReport {
 
     /// Logs of this run, and those that it overwrote. Returns frames and bytes of the run's logs, and the recorder's
     /// last figures.
-    pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, OnCard)> {
+    pub fn read_card(&mut self, card: &Path, earlier: &EarlierSessions) -> Result<(u64, CardLogs)> {
         let mut frames = 0;
-        let mut on_card = OnCard::default();
+        let mut on_card = CardLogs::default();
         // The counters have the losses.
         let logs = logs::on_card(card);
         if !logs.is_empty() {

@@ -155,7 +155,7 @@ impl LogJson {
 
 #[cfg(test)]
 mod tests {
-    use hums_blackbox::record::{Loss, Lost, Stats};
+    use hums_blackbox::record::{Loss, LossKind, Stats};
 
     use super::*;
 
@@ -165,7 +165,7 @@ mod tests {
         let at = Instant::from_millis;
         log.take(at(0), &Record::Stats(Stats::default()), &rules, &mut kept);
         for ms in 1..=502 {
-            let loss = Loss { what: Lost::QueueFull, count: 1, from: at(ms), to: at(ms) };
+            let loss = Loss { what: LossKind::QueueFull, count: 1, from: at(ms), to: at(ms) };
             log.take(at(ms), &Record::Loss(loss), &rules, &mut kept);
         }
         let losses = &kept["HUMS_LOSS"];

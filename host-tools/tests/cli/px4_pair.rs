@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use hums::source::item::{Item, Rows, Want};
+use hums::source::item::{Item, Needs, Rows};
 use hums::source::recording::LogPlace;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
@@ -23,7 +23,7 @@ fn found(name: &str) -> Found {
     let recording = LogPlace::file(&path).open().expect("a recording");
     let mut monitor = Monitor::new(Params::default());
     let (mut next, mut boot_s, mut found) = (None::<Instant>, None, Vec::new());
-    let want = Want { frames: false, observations: true, rows: Rows::None, system: None };
+    let want = Needs { frames: false, observations: true, rows: Rows::None, system: None };
     let summary = recording.read(want, &mut |at, item| {
         let mut now = *next.get_or_insert(at);
         while now <= at {

@@ -2,7 +2,7 @@
 
 use crate::rig;
 
-use hums_blackbox::record::Resting;
+use hums_blackbox::record::MarkReason;
 use hums_recorder::CardState;
 use hums_sdcard::{Kind, MS, Medium, Model};
 use rig::{Rig, read};
@@ -57,7 +57,7 @@ fn a_mishap_is_on_the_card_within_200_ms_with_its_place_and_told() {
     let found = read(&medium);
     let event = found.events.iter().find(|(number, _)| *number == 15);
     assert_eq!(event.map(|(_, text)| text.as_str()), Some("mishap at 47.397742,8.545594 30 m"));
-    assert_eq!(found.marks, [Resting::Mishap]);
+    assert_eq!(found.marks, [MarkReason::Mishap]);
     rig.run_to(told.as_millis() + 1_000);
     for _ in 0..60 {
         say(&mut rig, 15.0, IN_AIR);

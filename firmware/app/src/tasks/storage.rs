@@ -8,7 +8,7 @@ use hums_core::clock::Instant;
 use hums_onboard::queues::SectorsOut;
 use hums_onboard::shelf::Server;
 use hums_onboard::storage::NO_CARD_RETRY;
-use hums_onboard::update::{Running, UpdateSearch};
+use hums_onboard::update::{RunningImage, UpdateSearch};
 use hums_onboard::{Service, Storage, StoreWriter, Task};
 use hums_recorder::Buffers;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -32,7 +32,7 @@ pub(crate) struct Body {
     sectors: SectorsOut<'static>,
     shelf: Server<'static>,
     store_writer: Saving,
-    running: Running<'static>,
+    running: RunningImage<'static>,
     search: UpdateSearch,
 }
 

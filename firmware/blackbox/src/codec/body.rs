@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use super::element::{Context, Distributions, ELEMENTS, Element, Elements, What};
+use super::element::{Context, Distributions, ELEMENTS, Element, ElementKind, Elements};
 use super::frame::Frame;
 use super::links::Registers;
 use super::recall::End;
@@ -172,9 +172,9 @@ impl Common {
     #[inline]
     fn last<'a>(&'a self, slot: &'a Slot, element: &Element, after: &[Element]) -> Option<Last<'a>> {
         Some(match element.what() {
-            What::Text => Last::Bytes(self.texts.last(element)?),
-            What::Instance => Last::Bytes(slot.key.instance.get(..element.size())?),
-            What::Wide | What::WideTime => {
+            ElementKind::Text => Last::Bytes(self.texts.last(element)?),
+            ElementKind::Instance => Last::Bytes(slot.key.instance.get(..element.size())?),
+            ElementKind::Wide | ElementKind::WideTime => {
                 Last::Number(u64::from(after.first()?.last) << 32 | u64::from(element.last))
             }
             _ => Last::Number(u64::from(element.last)),
@@ -193,7 +193,7 @@ impl Common {
     ) -> Option<()> {
         let place = frame.place(element.offset());
         match element.what() {
-            What::Float => {
+            ElementKind::Float => {
                 let last = element.last;
                 context.link = self.registers.consult(element.row());
                 let value = self.distributions.float(coder, element, word(place), context);
@@ -201,7 +201,7 @@ impl Common {
                 self.registers.publish(element);
                 put::<C>(place, u64::from(value), 4);
             }
-            What::Integer1 | What::Integer2 | What::Integer4 => {
+            ElementKind::Integer1 | ElementKind::Integer2 | ElementKind::Integer4 => {
                 let size = element.size();
                 let bits = word(place) & (u32::MAX >> (32 - 8 * size));
                 let linked = self.registers.consult_whole(element.row());
@@ -209,11 +209,11 @@ impl Common {
                 self.registers.publish(element);
                 put::<C>(place, u64::from(value), size);
             }
-            What::Millis | What::Micros => {
+            ElementKind::Millis | ElementKind::Micros => {
                 let (last, at_last) = (element.last, element.aux);
                 let value = self.distributions.time(coder, element, word(place), context);
                 let mut step_us = value.wrapping_sub(last);
-                if element.what() == What::Millis {
+                if element.what() == ElementKind::Millis {
                     self.clock_ms = value;
                     step_us = step_us.wrapping_mul(1_000);
                 }
@@ -221,20 +221,20 @@ impl Common {
                 self.registers.publish(element);
                 put::<C>(place, u64::from(value), 4);
             }
-            What::Wide | What::WideTime => {
+            ElementKind::Wide | ElementKind::WideTime => {
                 let (last, at_last) = (element.last, element.aux);
                 let value = u64::from_le_bytes(*place);
                 let value = self.distributions.wide(coder, element, after.first_mut()?, value, context);
-                if element.what() == What::WideTime {
+                if element.what() == ElementKind::WideTime {
                     self.advance(at_last.wrapping_add((value as u32).wrapping_sub(last)));
                 }
                 put::<C>(place, value, 8);
             }
-            What::Text => {
+            ElementKind::Text => {
                 let (start, end) = (element.offset(), usize::from(element.end));
                 self.texts.code(coder, element, frame.payload.get_mut(start..end)?)?;
             }
-            What::Instance | What::Upper => {}
+            ElementKind::Instance | ElementKind::Upper => {}
         }
         Some(())
     }

@@ -4,7 +4,7 @@ use hums_dialect::wire::PAYLOAD_BYTES_MAX;
 use hums_dialect::{Kind, Role};
 
 use super::body::Body;
-use super::element::{Element, What};
+use super::element::{Element, ElementKind};
 use super::links;
 use super::slots::{INSTANCE_BYTES, Key, Slot};
 use crate::layouts::{FieldLayout, Layout, LayoutIndex};
@@ -24,22 +24,22 @@ pub(super) fn instance_of(layout: Layout) -> Option<(usize, usize)> {
     None
 }
 
-fn elements_of(field: FieldLayout) -> (What, u8, u8) {
+fn elements_of(field: FieldLayout) -> (ElementKind, u8, u8) {
     let whole = |what| (what, 1, field.size() as u8);
     if field.role == Role::Instance && field.size() <= INSTANCE_BYTES {
-        return whole(What::Instance);
+        return whole(ElementKind::Instance);
     }
     let what = match (field.kind, field.role) {
-        (Kind::Char, _) => return whole(What::Text),
-        (Kind::U8 | Kind::I8, _) if field.count >= DATA_BYTES => return whole(What::Text),
-        (Kind::U8 | Kind::I8, _) => What::Integer1,
-        (Kind::U16 | Kind::I16, _) => What::Integer2,
-        (Kind::F32, _) => What::Float,
-        (Kind::U32 | Kind::I32, Role::Millis) => What::Millis,
-        (Kind::U32 | Kind::I32, Role::Micros) => What::Micros,
-        (Kind::U32 | Kind::I32, _) => What::Integer4,
-        (_, Role::Millis | Role::Micros) => What::WideTime,
-        _ => What::Wide,
+        (Kind::Char, _) => return whole(ElementKind::Text),
+        (Kind::U8 | Kind::I8, _) if field.count >= DATA_BYTES => return whole(ElementKind::Text),
+        (Kind::U8 | Kind::I8, _) => ElementKind::Integer1,
+        (Kind::U16 | Kind::I16, _) => ElementKind::Integer2,
+        (Kind::F32, _) => ElementKind::Float,
+        (Kind::U32 | Kind::I32, Role::Millis) => ElementKind::Millis,
+        (Kind::U32 | Kind::I32, Role::Micros) => ElementKind::Micros,
+        (Kind::U32 | Kind::I32, _) => ElementKind::Integer4,
+        (_, Role::Millis | Role::Micros) => ElementKind::WideTime,
+        _ => ElementKind::Wide,
     };
     (what, field.count, field.kind.size() as u8)
 }
@@ -77,12 +77,13 @@ impl Body {
             for _ in 0..count {
                 let row = links::row_of(id, end);
                 end += usize::from(size);
-                let detail = if matches!(what, What::Text | What::Instance) { size } else { row };
+                let detail =
+                    if matches!(what, ElementKind::Text | ElementKind::Instance) { size } else { row };
                 let mut element = Element::new(what, detail, end as u8);
-                if what == What::Integer2 || what == What::Integer4 {
+                if what == ElementKind::Integer2 || what == ElementKind::Integer4 {
                     element.exponent = u8::from(matches!(field.kind, Kind::I16 | Kind::I32));
                 }
-                let upper = Element::new(What::Upper, 0, end as u8);
+                let upper = Element::new(ElementKind::Upper, 0, end as u8);
                 for (place, element) in self.elements.list.iter_mut().skip(at).zip([element, upper]) {
                     *place = element;
                 }

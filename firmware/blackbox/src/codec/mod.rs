@@ -22,7 +22,7 @@ use recall::End;
 pub(crate) use recall::Recall;
 use records::Records;
 pub(crate) use slots::SLOTS;
-use slots::{INSTANCE_BYTES, Key, Length, Next, Slots};
+use slots::{INSTANCE_BYTES, Key, Length, NextEntry, Slots};
 
 use crate::coder::{Coder, Encoder, Reading, Scratch, Writing};
 use crate::distribution::Cdf;
@@ -41,7 +41,7 @@ pub(crate) enum Kind {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Entry<'a> {
+pub(crate) struct CodedEntry<'a> {
     pub(crate) kind: Kind,
     pub(crate) at_ms: u64,
     pub(crate) bytes: &'a [u8],
@@ -99,7 +99,7 @@ impl Model {
     /// `plain`: uncoded, because the model makes it too long.
     pub(crate) fn encode(
         &mut self,
-        entry: &Entry<'_>,
+        entry: &CodedEntry<'_>,
         plain: bool,
         frame: &mut Frame,
         encoder: &mut Encoder,
@@ -117,7 +117,7 @@ impl Model {
             }
             return;
         }
-        let next = if entry.kind == Kind::Record { Next::Record } else { Next::Plain };
+        let next = if entry.kind == Kind::Record { NextEntry::Record } else { NextEntry::Plain };
         self.slots.next(coder, next, false, self.headers.is_rough());
         let mut buffer = [0; ENTRY_BYTES_MAX];
         let len = entry.bytes.len().min(ENTRY_BYTES_MAX);
@@ -135,14 +135,14 @@ impl Model {
         buffer: &mut [u8; ENTRY_BYTES_MAX],
     ) -> Result<(Decoded, Option<usize>), Corrupt> {
         let rough = self.headers.is_rough();
-        let (next, expected) = self.slots.next(coder, Next::Plain, false, rough).ok_or(Corrupt)?;
-        if next == Next::Plain || next == Next::Record {
+        let (next, expected) = self.slots.next(coder, NextEntry::Plain, false, rough).ok_or(Corrupt)?;
+        if next == NextEntry::Plain || next == NextEntry::Record {
             let verified = Kind::Frame { verified: false };
-            let kind = if next == Next::Record { Kind::Record } else { verified };
+            let kind = if next == NextEntry::Record { Kind::Record } else { verified };
             let decoded = self.plain(coder, Decoded { kind, at_ms: 0, len: 0 }, buffer, false);
             return Ok((decoded.ok_or(Corrupt)?, None));
         }
-        let index = if let Next::Slot(slot) = next { usize::from(slot) } else { self.slots.used() };
+        let index = if let NextEntry::Slot(slot) = next { usize::from(slot) } else { self.slots.used() };
         let frame = frames.get_mut(index).ok_or(Corrupt)?;
         coder.recall.turn_to(index);
         let (verified, at_ms) =
@@ -151,17 +151,17 @@ impl Model {
     }
 
     #[inline]
-    fn is_expected(&self, next: Next, frame: &Frame, verified: bool) -> bool {
-        let Next::Slot(slot) = next else { return false };
+    fn is_expected(&self, next: NextEntry, frame: &Frame, verified: bool) -> bool {
+        let NextEntry::Slot(slot) = next else { return false };
         let Some(slot) = self.slots.list.get(usize::from(slot)) else { return false };
         let Some(sender) = self.slots.senders.get(usize::from(slot.key.sender)) else { return false };
         Headers::is_expected(slot, sender, frame, verified)
     }
 
     /// The slot of a frame; `None` if the model has no room for it.
-    fn route(&mut self, frame: &Frame) -> Option<(Next, Key)> {
+    fn route(&mut self, frame: &Frame) -> Option<(NextEntry, Key)> {
         if let Some(slot) = self.slots.find_guessed(frame).or_else(|| self.slots.find(frame)) {
-            return Some((Next::Slot(slot), NO_KEY));
+            return Some((NextEntry::Slot(slot), NO_KEY));
         }
         let sender = self.slots.sender(frame.system, frame.component)?;
         let mut key = Key { id: frame.id, v2: frame.v2, sender, instance: [0; INSTANCE_BYTES] };
@@ -169,7 +169,7 @@ impl Model {
         if let Some((offset, size)) = layout.and_then(describe::instance_of) {
             key.instance[..size].copy_from_slice(frame.payload.get(offset..offset + size)?);
         }
-        self.slots.has_room().then_some((Next::NewSlot, key))
+        self.slots.has_room().then_some((NextEntry::NewSlot, key))
     }
 
     fn plain<C: Coder>(
@@ -237,14 +237,14 @@ impl Model {
     fn frame<C: End>(
         &mut self,
         coder: &mut C,
-        (next, expected): (Next, bool),
+        (next, expected): (NextEntry, bool),
         key: Key,
         frame: &mut Frame,
         verified: bool,
         at_ms: u64,
     ) -> Option<(bool, u64)> {
         let index = match next {
-            Next::Slot(index) => index,
+            NextEntry::Slot(index) => index,
             _ => self.new_slot(coder, key)?,
         };
         self.slots.passed(index);

@@ -130,7 +130,7 @@ pub(crate) struct Sender {
 
 /// The next entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Next {
+pub(crate) enum NextEntry {
     Slot(u8),
     NewSlot,
     Plain,
@@ -297,18 +297,18 @@ impl Slots {
     pub(crate) fn next<C: Coder>(
         &mut self,
         coder: &mut C,
-        next: Next,
+        next: NextEntry,
         expected: bool,
         rough: bool,
-    ) -> Option<(Next, bool)> {
+    ) -> Option<(NextEntry, bool)> {
         let (first, second, context) = self.guesses;
         let mut symbol = match next {
-            Next::Slot(slot) if slot == first => FIRST_GUESS,
-            Next::Slot(slot) if slot == second => SECOND_GUESS,
-            Next::Slot(_) => OTHER_SLOT,
-            Next::NewSlot => NEW_SLOT,
-            Next::Plain => PLAIN,
-            Next::Record => RECORD,
+            NextEntry::Slot(slot) if slot == first => FIRST_GUESS,
+            NextEntry::Slot(slot) if slot == second => SECOND_GUESS,
+            NextEntry::Slot(_) => OTHER_SLOT,
+            NextEntry::NewSlot => NEW_SLOT,
+            NextEntry::Plain => PLAIN,
+            NextEntry::Record => RECORD,
         };
         if symbol <= OTHER_SLOT && !expected {
             symbol += UNEXPECTED;
@@ -320,17 +320,17 @@ impl Slots {
             FIRST_GUESS => first,
             SECOND_GUESS => second,
             OTHER_SLOT => {
-                let slot = if let Next::Slot(slot) = next { usize::from(slot) } else { 0 };
+                let slot = if let NextEntry::Slot(slot) = next { usize::from(slot) } else { 0 };
                 let high = coder.symbol(&mut self.high, slot >> 4);
                 let low = coder.symbol(self.low.get_mut(high)?, slot & 15);
                 (high << 4 | low) as u8
             }
-            NEW_SLOT if expected => return Some((Next::NewSlot, false)),
-            PLAIN if expected => return Some((Next::Plain, false)),
-            RECORD if expected => return Some((Next::Record, false)),
+            NEW_SLOT if expected => return Some((NextEntry::NewSlot, false)),
+            PLAIN if expected => return Some((NextEntry::Plain, false)),
+            RECORD if expected => return Some((NextEntry::Record, false)),
             _ => return None,
         };
-        (slot < self.used).then_some((Next::Slot(slot), expected))
+        (slot < self.used).then_some((NextEntry::Slot(slot), expected))
     }
 
     pub(crate) fn passed(&mut self, slot: u8) {

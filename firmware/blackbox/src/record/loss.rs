@@ -7,7 +7,7 @@ use super::stored::{Fields, Sink};
 /// The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
-pub enum Lost {
+pub enum LossKind {
     /// Bytes lost because the receive buffer overflowed.
     #[default]
     UartOverrun = 0,
@@ -29,7 +29,7 @@ pub enum Lost {
     Other = 255,
 }
 
-impl Lost {
+impl LossKind {
     /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
@@ -64,7 +64,7 @@ impl Lost {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Loss {
     /// Kind and cause.
-    pub what: Lost,
+    pub what: LossKind,
     /// Bytes, frames, sectors or records.
     pub count: u64,
     /// The first one.
@@ -80,7 +80,7 @@ impl Loss {
 
     pub(super) fn read(fields: &mut Fields<'_>) -> Self {
         Self {
-            what: Lost::from_number(fields.u8()),
+            what: LossKind::from_number(fields.u8()),
             from: fields.instant(),
             to: fields.instant(),
             count: fields.u64(),

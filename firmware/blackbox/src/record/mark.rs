@@ -4,7 +4,7 @@ use super::stored::{Fields, Sink};
 
 /// Why a mark was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resting {
+pub enum MarkReason {
     /// The vehicle was disarmed on the ground.
     Disarmed = 1,
     /// The vehicle landed.
@@ -13,7 +13,7 @@ pub enum Resting {
     Mishap = 3,
 }
 
-impl Resting {
+impl MarkReason {
     /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
@@ -40,7 +40,7 @@ impl Resting {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark {
     /// Why it was written.
-    pub why: Resting,
+    pub why: MarkReason,
     /// Sector in progress: the mark begins in it or in the next one.
     pub sector: u32,
     /// Frames of the session before the mark, modulo 2^32.
@@ -55,9 +55,9 @@ impl Mark {
     /// `None` for an unknown reason.
     pub(super) fn read(fields: &mut Fields<'_>) -> Option<Self> {
         let why = match fields.u8() {
-            1 => Resting::Disarmed,
-            2 => Resting::Landed,
-            3 => Resting::Mishap,
+            1 => MarkReason::Disarmed,
+            2 => MarkReason::Landed,
+            3 => MarkReason::Mishap,
             _ => return None,
         };
         Some(Self { why, sector: fields.u32(), frames: fields.u32() })

@@ -19,15 +19,15 @@ mod wear;
 use core::fmt;
 
 pub use crate::limits::{NAME_BYTES_MAX, RECORD_BYTES_MAX, TEXT_BYTES_MAX};
-pub use boot::{Before, Boot, Fault, PreviousEnd};
+pub use boot::{Boot, Fault, PreviousEnd, PreviousSession};
 pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
-pub use loss::{Loss, Lost, Stats};
-pub use mark::{Mark, Resting};
+pub use loss::{Loss, LossKind, Stats};
+pub use mark::{Mark, MarkReason};
 pub use snapshot::{Protection, Snapshot, SnapshotValues};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage};
 pub use vehicle::{Clock, Parameter, Vehicle};
-pub use wear::{Component, Exceedance, Why};
+pub use wear::{Component, ComponentReason, Exceedance};
 
 use stored::{Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
@@ -192,7 +192,7 @@ mod tests {
             reset_name: "pin",
             uid: *b"123456789012",
             boots: 99,
-            before: Before {
+            before: PreviousSession {
                 found: PreviousEnd::Frames,
                 number: 7,
                 session: 0xfeed,
@@ -201,7 +201,7 @@ mod tests {
                 check: 0xfedc_ba98,
             },
         }));
-        reads_back(Record::Mark(Mark { why: Resting::Landed, sector: 70_000, frames: u32::MAX }));
+        reads_back(Record::Mark(Mark { why: MarkReason::Landed, sector: 70_000, frames: u32::MAX }));
         reads_back(Record::Vehicle(Vehicle {
             system: 1,
             component: 1,
@@ -234,7 +234,7 @@ mod tests {
     fn what_was_counted_lost_and_worn_reads_back() {
         let (at, entries) = (AT, ENTRIES);
         reads_back(Record::Usage(Usage::new(Moment::End, &entries)));
-        reads_back(Record::Loss(Loss { what: Lost::QueueFull, count: 3, from: Instant::ZERO, to: at }));
+        reads_back(Record::Loss(Loss { what: LossKind::QueueFull, count: 3, from: Instant::ZERO, to: at }));
         reads_back(Record::Stats(Stats { frames_in: 1, gs_bytes: 12, ..Stats::default() }));
         reads_back(Record::Stats(Stats { frames_in: 1, cpu_permille: 20, ..Stats::default() }));
         let registers = core::array::from_fn(|index| index as u32);
@@ -260,7 +260,7 @@ mod tests {
             lifetime: crossings(70.25),
         }));
         reads_back(Record::Component(Component {
-            why: Why::Replaced,
+            why: ComponentReason::Replaced,
             place: 7,
             kind: ComponentKind::Propeller,
             number: 4,

@@ -3,7 +3,7 @@
 
 use hums_core::clock::Instant;
 
-use crate::bytes::Fields as Bytes;
+use crate::bytes::ByteFields;
 use crate::limits::{NAME_BYTES_MAX, TEXT_BYTES_MAX};
 
 /// Bytes of the head: kind; version, and in the upper four bits times; words; halves.
@@ -47,9 +47,9 @@ impl Shape {
 
 /// Numbers and bytes, each in order; zeros and empty texts beyond the end.
 pub(crate) struct Fields<'a> {
-    words: Bytes<'a>,
+    words: ByteFields<'a>,
     halves: &'a [u8],
-    bytes: Bytes<'a>,
+    bytes: ByteFields<'a>,
 }
 
 impl<'a> Fields<'a> {
@@ -65,9 +65,9 @@ impl<'a> Fields<'a> {
             stored.get(from.min(to)..to).unwrap_or_default()
         };
         let fields = Self {
-            words: Bytes::new(part(HEAD_BYTES, shape.halves_at())),
+            words: ByteFields::new(part(HEAD_BYTES, shape.halves_at())),
             halves: part(shape.halves_at(), shape.bytes_at()),
-            bytes: Bytes::new(part(shape.bytes_at(), usize::MAX)),
+            bytes: ByteFields::new(part(shape.bytes_at(), usize::MAX)),
         };
         (shape, fields)
     }

@@ -21,7 +21,7 @@ const ROLL: Check = Check {
     limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
     debounce_ms: [500, 300],
     // PX4's failure detector: FD_FAIL_R_TTRI, FD_FAIL_P_TTRI 0.3 s.
-    when: When::InFlight,
+    when: CheckPhase::InFlight,
     stale_s: STALE,
     read: |inputs, _| degrees(inputs, |attitude| attitude.roll, 0),
     ..PLAIN

@@ -39,7 +39,7 @@ pub enum Side {
 
 /// When a check applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum When {
+pub enum CheckPhase {
     /// Whenever its value is known.
     Always,
     /// While the motors may turn.
@@ -48,13 +48,13 @@ pub enum When {
     InFlight,
 }
 
-impl When {
+impl CheckPhase {
     pub(super) const ALL: [Self; 3] = [Self::Always, Self::Armed, Self::InFlight];
 }
 
 /// What an instance's number counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InstanceOf {
+pub enum InstanceKind {
     /// A single one, or parts without numbers: each instance is read.
     Vehicle,
     /// Motors that an ESC reports on.
@@ -73,7 +73,7 @@ pub enum InstanceOf {
     Pair,
 }
 
-impl InstanceOf {
+impl InstanceKind {
     /// The parts that are numbered; checks of the same parts with the same number are of the same one. `None` if numbers say nothing.
     pub(super) const fn thing(self) -> Option<Self> {
         match self {
@@ -85,7 +85,7 @@ impl InstanceOf {
     }
 }
 
-pub(super) struct Reported([u8; InstanceOf::Pair as usize + 1]);
+pub(super) struct Reported([u8; InstanceKind::Pair as usize + 1]);
 
 impl Reported {
     pub(super) fn of(inputs: &Inputs<'_>) -> Self {
@@ -97,13 +97,13 @@ impl Reported {
         let sensors = derived.crosschecks.sensors_known();
         let mut counts = [u8::MAX; _];
         for (kind, count) in [
-            (InstanceOf::Motor, known(motors)),
-            (InstanceOf::Output, if derived.motors.outputs.at.is_set() { u8::MAX } else { 0 }),
-            (InstanceOf::Supply, batteries.max(1)),
-            (InstanceOf::Battery, batteries),
-            (InstanceOf::Receiver, known(receivers)),
-            (InstanceOf::Sensor, sensors),
-            (InstanceOf::Pair, if derived.crosschecks.are_compared() { sensors } else { 0 }),
+            (InstanceKind::Motor, known(motors)),
+            (InstanceKind::Output, if derived.motors.outputs.at.is_set() { u8::MAX } else { 0 }),
+            (InstanceKind::Supply, batteries.max(1)),
+            (InstanceKind::Battery, batteries),
+            (InstanceKind::Receiver, known(receivers)),
+            (InstanceKind::Sensor, sensors),
+            (InstanceKind::Pair, if derived.crosschecks.are_compared() { sensors } else { 0 }),
         ] {
             counts[kind as usize] = count;
         }
@@ -184,7 +184,7 @@ impl Limits {
 }
 
 /// Reads the value of one of several.
-pub type Read = fn(&Inputs<'_>, u8) -> Option<Reading>;
+pub type ValueReader = fn(&Inputs<'_>, u8) -> Option<Reading>;
 
 /// One check.
 #[derive(Clone, Copy, Debug)]
@@ -202,7 +202,7 @@ pub struct Check {
     /// How long it must be bad before its warning is told, if that is longer, seconds.
     pub told_after_s: u8,
     /// When the check applies.
-    pub when: When,
+    pub when: CheckPhase,
     /// How old the value may be, seconds; `None` for values that are ages themselves.
     pub stale_s: Option<NonZeroU8>,
     /// How many there may be.
@@ -213,9 +213,9 @@ pub struct Check {
     /// Its place among causes.
     pub role: Role,
     /// What its instances are numbers of.
-    pub of: InstanceOf,
+    pub of: InstanceKind,
     /// Reads the value; `None` while it has never been measured.
-    pub read: Read,
+    pub read: ValueReader,
 }
 
 /// How long a value must be good before the level falls, so that a value at its limit does not flicker.
@@ -440,7 +440,7 @@ impl State {
         if check.subsystem == Subsystem::Mishap {
             return CLEAR;
         }
-        let most = if check.when == When::Always { CLEAR_MAX_ALWAYS } else { CLEAR_MAX };
+        let most = if check.when == CheckPhase::Always { CLEAR_MAX_ALWAYS } else { CLEAR_MAX };
         self.repeats.grown(CLEAR).min(most)
     }
 

@@ -29,7 +29,7 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_ms: [2_000, 0], stale_s: None, alarm_only: true, read: restarted),
     row!("autopilot_state" LOAD, above(_ StateCrit 0.0),
         role: Role::of(Group::Other, FAILSAFES | Group::Failsafe.bit()), unit: Unit::FLAG,
-        debounce_ms: [2_000, 500], when: When::Armed, alarm_only: true, read: state),
+        debounce_ms: [2_000, 500], when: CheckPhase::Armed, alarm_only: true, read: state),
     alert!(Processor Computer, Role::NONE),
     alert!(Logging Computer, Role::NONE),
     alert!(Fence Computer, Role::NONE),

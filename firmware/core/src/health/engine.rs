@@ -20,10 +20,10 @@ pub(super) const CHECKS: &[Check] = &[
     ENGINE,
     row!("exhaust_gas" ENGINE, above(EngEgtWarn EngEgtCrit 5.0),
         read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.exhaust?.0))),
-    row!("fuel_pressure" ENGINE, below(EngFuelWarn EngFuelCrit 5.0), unit: Unit::of("hPa"), when: When::Armed,
+    row!("fuel_pressure" ENGINE, below(EngFuelWarn EngFuelCrit 5.0), unit: Unit::of("hPa"), when: CheckPhase::Armed,
         read: |inputs, _| inputs.vehicle.engine.read(|engine| Some(engine.fuel_pressure?.0))),
     row!("generator_speed" ENGINE, below(GenSpeedWarn GenSpeedCrit GENERATOR_HYSTERESIS_RPM),
-        unit: Unit::of("rpm"), when: When::Armed, read: generator_rpm),
+        unit: Unit::of("rpm"), when: CheckPhase::Armed, read: generator_rpm),
     due!("engine_due" Engine),
 ];
 

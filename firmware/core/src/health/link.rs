@@ -17,7 +17,7 @@ const RADIO: Check = Check {
     unit: Unit::of(""),
     limits: Limits::below(Some(Param::RcRssiWarn), Some(Param::RcRssiCrit), 2.0),
     debounce_ms: [2_000, 1_000],
-    when: When::Armed,
+    when: CheckPhase::Armed,
     stale_s: STALE,
     read: |inputs, _| inputs.vehicle.rc.read(|rc| rc.rssi.map(f32::from)),
     ..HEARTBEAT
@@ -32,7 +32,7 @@ pub(super) const CHECKS: &[Check] = &[
     // Positions that come tell nothing about their quality.
     row!("position_silent" HEARTBEAT, above(PosAgeWarn _ 0.0),
         role: Role::of(Group::Other, Group::Silence.bit() | Group::FramesLost.bit() | RECEIVERS),
-        when: When::InFlight, alarm_only: true, read: position_age_s),
+        when: CheckPhase::InFlight, alarm_only: true, read: position_age_s),
     RADIO,
     row!("radio_rssi" RADIO, below(RadioRssiWarn _ 2.0), read: |inputs, _| {
         let weaker = |ends: [Option<u8>; 2]| ends.into_iter().flatten().min().map(f32::from);

@@ -17,7 +17,7 @@ pub(super) const CHECKS: &[Check] = &[
     alert!(Crash Mishap, Role::NONE),
 ];
 
-const fn sign(kind: MishapKind, unit: &str, read: Read) -> Check {
+const fn sign(kind: MishapKind, unit: &str, read: ValueReader) -> Check {
     let limits = Limits::above(None, Some(kind.limit()), 0.0);
     let (subsystem, unit) = (Subsystem::Mishap, Unit::of(unit));
     Check { name: kind.name(), subsystem, unit, limits, stale_s: STALE, read, ..PLAIN }

@@ -23,13 +23,15 @@ mod suppression;
 mod tables;
 mod vocabulary;
 
-pub use check::{CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, InstanceOf, Limits, Side, State, Unit, When};
+pub use check::{
+    CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, CheckPhase, InstanceKind, Limits, Side, State, Unit,
+};
 use check::{How, LevelChange, Reported};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
 pub use tables::{check_named, checks, instances};
-pub use vocabulary::{Said, Scope, VOCABULARY, Words, said, vocabulary};
+pub use vocabulary::{RadioWords, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
 use crate::params::Param;
@@ -256,8 +258,8 @@ impl Health {
 }
 
 struct Now {
-    /// Steps of checks, by [`When`] they apply.
-    hows: [How; When::ALL.len()],
+    /// Steps of checks, by [`CheckPhase`] they apply.
+    hows: [How; CheckPhase::ALL.len()],
 }
 
 impl Now {
@@ -270,11 +272,11 @@ impl Now {
         // A mishap goes on: all but those that always apply would only echo it.
         let quiet = flight.in_mishap() && !over;
         let latched = armed && inputs.params.get(Param::Latch) >= 0.5;
-        let hows = When::ALL.map(|when| {
+        let hows = CheckPhase::ALL.map(|when| {
             let applies = match when {
-                When::Always => return How { applies: true, quiet: false, latched },
-                When::Armed => armed,
-                When::InFlight => inputs.flight.airborne(),
+                CheckPhase::Always => return How { applies: true, quiet: false, latched },
+                CheckPhase::Armed => armed,
+                CheckPhase::InFlight => inputs.flight.airborne(),
             };
             How { applies: quiet || (!over && applies), quiet, latched }
         });

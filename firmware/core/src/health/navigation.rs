@@ -19,7 +19,7 @@ const ESTIMATOR: Check = Check {
     limits: Limits::above(Some(Param::EkfVarWarn), None, 0.05),
     // Two messages at 2 Hz. ArduPilot's failsafe waits for a second, and acts then.
     debounce_ms: [500, 1_000],
-    when: When::InFlight,
+    when: CheckPhase::InFlight,
     stale_s: STALE,
     read: |inputs, _| estimator(inputs, EstimatorScale::Variance, largest),
     ..PLAIN
@@ -30,7 +30,7 @@ const GNSS: Check = Check {
     limits: Limits::below(Some(Param::GpsSatsWarn), None, 0.0),
     debounce_ms: [2_000, 1_000],
     instances: RECEIVERS_MAX as u8,
-    of: InstanceOf::Receiver,
+    of: InstanceKind::Receiver,
     read: |inputs, receiver| {
         let enough = inputs.params.get(Param::GpsSatsWarn) + MARGIN;
         gnss(inputs, receiver, |gnss| {
@@ -48,7 +48,7 @@ const MISMATCH: Check = Check {
     // Never stale: sensors are compared only in conditions where that is valid.
     stale_s: None,
     instances: SENSORS_MAX as u8,
-    of: InstanceOf::Pair,
+    of: InstanceKind::Pair,
     read: |inputs, sensor| mismatch(inputs, Kind::Accelerometer, sensor),
     ..ESTIMATOR
 };
@@ -60,7 +60,7 @@ const STUCK: Check = Check {
     limits: Limits::above(Some(Param::StuckWarn), None, 0.0),
     debounce_ms: [0, 1_000],
     alarm_only: true,
-    of: InstanceOf::Sensor,
+    of: InstanceKind::Sensor,
     read: |inputs, sensor| stuck(inputs, Kind::Accelerometer, sensor),
     ..MISMATCH
 };
@@ -73,7 +73,7 @@ const SECOND: Check = Check {
     // A check that names the faulty sensor comes first.
     debounce_ms: [1_000, 1_000],
     instances: 1,
-    of: InstanceOf::Vehicle,
+    of: InstanceKind::Vehicle,
     read: |inputs, _| residual(inputs, Comparison::Ahrs2Tilt),
     ..MISMATCH
 };
@@ -106,19 +106,19 @@ pub(super) const CHECKS: &[Check] = &[
         debounce_ms: SMOOTHED, read: |inputs, sensor| mismatch(inputs, Kind::Gyro, sensor)),
     // What shakes the accelerometer shakes the gyro.
     row!("gyro_noise" MISMATCH, above(GyroNoiseWarn _ 0.05), role: Role::of(Group::GyroNoise, VIBRATION),
-        unit: Unit::of("rad/s"), debounce_ms: [2_000, 0], stale_s: STALE, instances: 1, of: InstanceOf::Vehicle,
+        unit: Unit::of("rad/s"), debounce_ms: [2_000, 0], stale_s: STALE, instances: 1, of: InstanceKind::Vehicle,
         read: |inputs, _| vibration(inputs, VibrationScale::Px4Metrics, |[_, rate, _]| rate)),
     // It goes by the attitude and a receiver too.
     row!("imu_gps" MISMATCH, above(ImuGpsWarn _ 0.3),
         role: Role::of(Group::ImuGnss, WRONG_RECEIVERS | INERTIAL | VIBRATION), instances: 1,
-        of: InstanceOf::Vehicle, read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now)),
+        of: InstanceKind::Vehicle, read: |inputs, _| inputs.derived.crosschecks.imu_gnss.residual(inputs.now)),
     row!("compass_mismatch" MISMATCH, above(MagMismWarn _ 5.0),
         role: Role::of(Group::CompassMismatch, Group::CompassFault.bit()), unit: Unit::of("%"),
         debounce_ms: SMOOTHED,
         read: |inputs, sensor| mismatch(inputs, Kind::Compass, sensor)),
     row!("compass_heading" MISMATCH, above(MagHeadWarn _ 3.0),
         role: Role::of(Group::CompassUse, COMPASS | TURNS), unit: Unit::of("deg"),
-        debounce_ms: SMOOTHED, instances: 1, of: InstanceOf::Vehicle,
+        debounce_ms: SMOOTHED, instances: 1, of: InstanceKind::Vehicle,
         read: |inputs, _| residual(inputs, Comparison::MagHeading)),
     row!("baro_mismatch" MISMATCH, above(BaroMismWarn _ 1.0),
         role: Role::of(Group::Sensor, Group::BaroFault.bit()), unit: Unit::of("m"),
@@ -126,14 +126,14 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, sensor| mismatch(inputs, Kind::Barometer, sensor)),
     row!("baro_height" MISMATCH, above(BaroGpsWarn _ 1.0),
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | RECEIVERS), unit: Unit::of("m"),
-        debounce_ms: [1_000, 1_000], instances: 1, of: InstanceOf::Sensor,
+        debounce_ms: [1_000, 1_000], instances: 1, of: InstanceKind::Sensor,
         read: |inputs, _| residual(inputs, Comparison::BaroGnss)),
     row!("baro_noise" MISMATCH, above(BaroNoiseWarn _ 0.5),
         role: Role::of(Group::Sensor, Group::BaroFault.bit() | Group::ImuGnss.bit()), unit: Unit::of("m"),
-        instances: 1, of: InstanceOf::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroNoise)),
+        instances: 1, of: InstanceKind::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroNoise)),
     row!("ekf_climb" MISMATCH, above(EkfClimbWarn EkfClimbCrit 1.0),
         role: Role::of(Group::EkfClimb, DISTURBANCES), unit: Unit::of("m/s"), debounce_ms: [500, 500],
-        instances: 1, of: InstanceOf::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroClimb)),
+        instances: 1, of: InstanceKind::Sensor, read: |inputs, _| residual(inputs, Comparison::BaroClimb)),
     SECOND,
     row!("ahrs2_height" SECOND, above(Ahrs2HgtWarn Ahrs2HgtCrit 1.0), unit: Unit::of("m"),
         read: |inputs, _| residual(inputs, Comparison::Ahrs2Height)),
@@ -149,7 +149,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor)),
     // It goes by how far the vehicle moved.
     row!("gps_stuck" STUCK, role: Role::of(Group::GnssFrozen, 0), instances: RECEIVERS_MAX as u8,
-        of: InstanceOf::Vehicle,
+        of: InstanceKind::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver)),
     Check { role: Role::of(Group::GnssQuality, Group::GnssLost.bit()), debounce_ms: RECEIVER_SAYS, ..GNSS },
     row!("gps_sats_fall" GNSS, above(GpsSatsFall _ 5.0),
@@ -168,7 +168,7 @@ pub(super) const CHECKS: &[Check] = &[
     // It goes by the barometer too.
     row!("gps_height" GNSS, above(GpsHeightWarn _ 1.0),
         role: Role::of(Group::GnssMotion, Group::GnssFrozen.bit()), unit: Unit::of("m"),
-        debounce_ms: [200, 1_000], stale_s: None, instances: 1, of: InstanceOf::Vehicle,
+        debounce_ms: [200, 1_000], stale_s: None, instances: 1, of: InstanceKind::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks.heights.receiver_leapt(inputs.now)),
     row!("gps_hdop" GNSS, above(GpsHdopWarn _ 0.1), role: Role::of(Group::GnssQuality, Group::GnssLost.bit()),
     read: |inputs, receiver| {
@@ -192,10 +192,10 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, receiver| gnss(inputs, receiver, |gnss| Some(f32::from(gnss.fix)))),
     // A receiver that mitigates jamming has a good fix.
     row!("gps_jamming" GNSS, above(_ GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
-        unit: Unit::FLAG, when: When::Always,
+        unit: Unit::FLAG, when: CheckPhase::Always,
         read: |inputs, receiver| integrity(inputs, receiver, |known| known.jamming)),
     row!("gps_spoofing" GNSS, above(GpsJamWarn GpsJamCrit 0.0), role: Role::of(Group::GnssLost, 0),
-        unit: Unit::FLAG, when: When::Always,
+        unit: Unit::FLAG, when: CheckPhase::Always,
         read: |inputs, receiver| integrity(inputs, receiver, |known| known.spoofing)),
     alert!(Gyro Navigation, Role::of(Group::GyroFault, 0)),
     alert!(Accelerometer Navigation, Role::of(Group::AccelFault, 0)),

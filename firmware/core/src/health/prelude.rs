@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU8;
 
-pub(super) use super::check::{Check, InstanceOf, Limits, Read, Unit, When};
+pub(super) use super::check::{Check, CheckPhase, InstanceKind, Limits, Unit, ValueReader};
 pub(super) use super::finding::{Orders, Subsystem};
 pub(super) use super::inputs::Inputs;
 pub(super) use super::suppression::{
@@ -26,12 +26,12 @@ pub(super) const PLAIN: Check = Check {
     limits: Limits::above(None, None, 0.0),
     debounce_ms: [0, 0],
     told_after_s: 0,
-    when: When::Always,
+    when: CheckPhase::Always,
     stale_s: None,
     instances: 1,
     alarm_only: false,
     role: Role::NONE,
-    of: InstanceOf::Vehicle,
+    of: InstanceKind::Vehicle,
     read: |_, _| None,
 };
 

@@ -10,9 +10,9 @@ const ESC: Check = Check {
     subsystem: Subsystem::Propulsion,
     unit: Unit::of("s"),
     limits: Limits::above(Some(Param::EscAgeWarn), Some(Param::EscAgeCrit), 0.0),
-    when: When::Armed,
+    when: CheckPhase::Armed,
     instances: MOTORS_MAX as u8,
-    of: InstanceOf::Motor,
+    of: InstanceKind::Motor,
     read: |inputs, motor| inputs.derived.esc_silence(inputs.now, motor),
     ..PLAIN
 };
@@ -21,47 +21,47 @@ const RATE: Check = Check {
     unit: Unit::of("deg/s"),
     limits: Limits::above(Some(Param::RateWarn), Some(Param::RateCrit), 5.0),
     debounce_ms: [200, 200],
-    when: When::InFlight,
+    when: CheckPhase::InFlight,
     instances: 1,
-    of: InstanceOf::Vehicle,
+    of: InstanceKind::Vehicle,
     ..ESC
 };
 
 pub(super) const CHECKS: &[Check] = &[
     Check { role: Role::of(Group::EscTelemetry, Group::Reboot.bit()), ..ESC },
     row!("esc_temperature" ESC, above(EscTempWarn EscTempCrit 3.0), unit: Unit::of("degC"),
-        debounce_ms: [1_000, 500], when: When::Always, stale_s: STALE_SLOW,
+        debounce_ms: [1_000, 500], when: CheckPhase::Always, stale_s: STALE_SLOW,
         read: |inputs, motor| state(inputs, motor, |esc| Some(esc.temperature?.0))),
     row!("esc_failure" ESC, above(EscFailWarn EscFailCrit 0.0), role: Role::of(Group::Drive, 0),
-        unit: Unit::FLAG, when: When::Always, stale_s: STALE_SLOW, alarm_only: true,
+        unit: Unit::FLAG, when: CheckPhase::Always, stale_s: STALE_SLOW, alarm_only: true,
         read: |inputs, motor| state(inputs, motor, |esc| esc.failures.map(failure_rank))),
     row!("esc_errors" ESC, above(EscErrWarn _ 2.0), unit: Unit::of("1/min"), debounce_ms: [1_000, 0],
         stale_s: STALE_SLOW,
         read: |inputs, motor| state(inputs, motor, |_| inputs.derived.motors.errors(motor))),
     row!("motor_loss" ESC, below(_ MotLossCrit 5.0), role: Role::of(Group::MotorLoss, 0), unit: Unit::of("%"),
-    debounce_ms: [0, 500], when: When::InFlight, read: |Inputs { now, vehicle, derived, .. }, motor| {
+    debounce_ms: [0, 500], when: CheckPhase::InFlight, read: |Inputs { now, vehicle, derived, .. }, motor| {
         derived.motors.share(*now, vehicle, motor)
     }),
     // Never stale: only steady flight says something, and ESCs that stop talking are `esc_silent`.
     row!("motor_imbalance" ESC, above(MotImbalWarn MotImbalCrit 2.0),
     role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
-    debounce_ms: [3_000, 1_000], when: When::InFlight,
+    debounce_ms: [3_000, 1_000], when: CheckPhase::InFlight,
     read: |Inputs { now, vehicle, flight, derived, .. }, motor| {
         derived.motors.imbalance(*now, vehicle, flight, motor)
     }),
     row!("motor_output" ESC, above(MotOutWarn MotOutCrit 5.0),
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::of("%"),
-        debounce_ms: [500, 1_000], when: When::InFlight, instances: JUDGED_MAX as u8,
-        of: InstanceOf::Output, read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent)),
+        debounce_ms: [500, 1_000], when: CheckPhase::InFlight, instances: JUDGED_MAX as u8,
+        of: InstanceKind::Output, read: |inputs, motor| verdict(inputs, motor, Verdict::excess_percent)),
     // A driven motor is not thereby good.
     row!("motor_off" ESC, above(AlertWarn AlertCrit 0.0),
         role: Role::of(Group::MotorOutput, Group::MotorLoss.bit()), unit: Unit::FLAG,
-        debounce_ms: [500, 1_000], when: When::InFlight, instances: JUDGED_MAX as u8,
-        of: InstanceOf::Output, alarm_only: true,
+        debounce_ms: [500, 1_000], when: CheckPhase::InFlight, instances: JUDGED_MAX as u8,
+        of: InstanceKind::Output, alarm_only: true,
         read: |inputs, motor| verdict(inputs, motor, |verdict| if verdict == Verdict::ShutOff { 2.0 } else { 0.0 })),
     row!("thrust_lost" ESC, above(ThrustWarn _ 0.0),
         role: Role::of(Group::Other, DRIVE | Group::EscTelemetry.bit() | RATES | Group::EkfClimb.bit()),
-        when: When::InFlight, instances: 1, of: InstanceOf::Vehicle,
+        when: CheckPhase::InFlight, instances: 1, of: InstanceKind::Vehicle,
         read: |inputs, _| inputs.derived.crosschecks.thrust.in_vain()),
     row!("roll_rate" RATE, role: Role::of(Group::RollRate, DRIVE | GYROS),
         read: |inputs, _| rate_off_deg_s(inputs, 0)),

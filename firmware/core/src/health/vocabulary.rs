@@ -1,6 +1,6 @@
 //! The meaning of each check in words: one table for every text, page and document.
 //!
-//! `alarm` and `advice` are the words of a radio text ([`Said`], the only ones that the firmware links). `meaning`
+//! `alarm` and `advice` are the words of a radio text ([`RadioWords`], the only ones that the firmware links). `meaning`
 //! describes the fault, and `action` the remedy: on the ground, before the next flight, unless it says otherwise.
 //! `needs` names the input, for reports of checks that had nothing to judge.
 
@@ -22,14 +22,14 @@ pub enum Scope {
     /// The monitor's own recorder.
     Recorder,
     /// The autopilot's own alerts. Silence cannot be judged.
-    Said,
+    Alerts,
     /// Earlier flights, or what the monitor on board has stored of parts that wear.
     Stored,
 }
 
 /// The words of a check in radio texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Said {
+pub struct RadioWords {
     /// The check: [`super::Check::name`].
     pub check: &'static str,
     /// Its name for people: the value, not the fault.
@@ -43,7 +43,7 @@ pub struct Said {
     pub advice: &'static str,
 }
 
-impl Said {
+impl RadioWords {
     /// The fault of one part, counted from 0: `battery 2 (payload) low`.
     pub fn alarm_of(&self, instance: u8, feeds: Feeds) -> impl fmt::Display {
         let (alarm, _) = self.alarm.split_once('|').unwrap_or((self.alarm, ""));
@@ -99,7 +99,7 @@ impl fmt::Display for Number {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
     /// The words in radio texts.
-    pub said: Said,
+    pub said: RadioWords,
     /// The meaning, as a sentence.
     pub meaning: &'static str,
     /// The remedy, as a sentence.
@@ -116,11 +116,11 @@ pub fn vocabulary(check: &str) -> Option<&'static Words> {
 }
 
 /// The words of a check in radio texts.
-pub fn said(check: &str) -> Option<Said> {
+pub fn said(check: &str) -> Option<RadioWords> {
     let is_of = |line: &&str| line.strip_prefix(check).is_some_and(|rest| rest.starts_with('\t'));
     let mut fields = SAID.split('\n').find(is_of)?.split('\t');
     let mut next = || fields.next();
-    Some(Said { check: next()?, name: next()?, part: next()?, alarm: next()?, advice: next()? })
+    Some(RadioWords { check: next()?, name: next()?, part: next()?, alarm: next()?, advice: next()? })
 }
 
 macro_rules! vocabulary {
@@ -132,7 +132,7 @@ macro_rules! vocabulary {
 
         /// Every check, in the order of the subsystems' tables.
         pub const VOCABULARY: &[Words] = &[$(Words {
-            said: Said { check: $check, name: $name, part: $part, alarm: $alarm, advice: $advice },
+            said: RadioWords { check: $check, name: $name, part: $part, alarm: $alarm, advice: $advice },
             meaning: $meaning,
             action: $action,
             needs: $needs,
@@ -167,7 +167,7 @@ vocabulary! {
     "battery_due" Stored "battery life", "", says "a battery's life used|~", "REPLACE IT", needs "battery registered with the monitor on board";
     "A battery has reached the end of its life."; "Replace it, then `hums box replaced PART`.";
 
-    "battery_alert" Said "autopilot's battery alert", "", says "autopilot warns: battery", "LAND", needs "texts, events or health flags of the autopilot";
+    "battery_alert" Alerts "autopilot's battery alert", "", says "autopilot warns: battery", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a battery or a supply was low or had failed.";
     "Read its messages of that time; check pack, power module and wiring.";
 
@@ -203,7 +203,7 @@ vocabulary! {
     "drive_due" Stored "life of motors, propellers, ESCs", "", says "motor/prop/ESC life used", "REPLACE IT", needs "motor, propeller or ESC registered with the monitor on board";
     "A motor, propeller or ESC has reached the end of its life."; "Replace it, then `hums box replaced PART`.";
 
-    "drive_alert" Said "autopilot's motor alert", "", says "autopilot warns: motor", "LAND NOW", needs "texts, events or health flags of the autopilot";
+    "drive_alert" Alerts "autopilot's motor alert", "", says "autopilot warns: motor", "LAND NOW", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a motor, propeller or ESC had failed or gave too little thrust.";
     "Do not fly until motors, propellers and ESCs are checked.";
 
@@ -236,7 +236,7 @@ vocabulary! {
     "airframe_due" Stored "airframe life", "", says "airframe life used", "SERVICE IT", needs "airframe registered with the monitor on board";
     "The airframe or a part of it is due for maintenance."; "Do the maintenance, then `hums box replaced PART`.";
 
-    "vibration_alert" Said "autopilot's vibration alert", "", says "autopilot warns: vibration", "LAND BY HAND", needs "texts, events or health flags of the autopilot";
+    "vibration_alert" Alerts "autopilot's vibration alert", "", says "autopilot warns: vibration", "LAND BY HAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that vibration or clipping disturbed it.";
     "Balance propellers and motors, and check the autopilot's mounting.";
 
@@ -317,30 +317,30 @@ vocabulary! {
     "gps_spoofing" Vehicle "GPS spoofing", "GPS", says "GPS # spoofed", "FLY MANUALLY", needs "jamming or spoofing state of a GPS receiver";
     "The receiver detected false signals: its position could be wrong."; "Do not depend on GPS there.";
 
-    "gyro_alert" Said "autopilot's gyro alert", "", says "autopilot warns: gyro", "LAND", needs "texts, events or health flags of the autopilot";
+    "gyro_alert" Alerts "autopilot's gyro alert", "", says "autopilot warns: gyro", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a gyro had failed or could not be trusted."; "Do not fly until the autopilot's gyros are checked.";
-    "accel_alert" Said "autopilot's accelerometer alert", "", says "autopilot warns: accelerometer", "LAND", needs "texts, events or health flags of the autopilot";
+    "accel_alert" Alerts "autopilot's accelerometer alert", "", says "autopilot warns: accelerometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an accelerometer had failed or could not be trusted.";
     "Do not fly until the autopilot's accelerometers are checked.";
-    "compass_alert" Said "autopilot's compass alert", "", says "autopilot warns: compass", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
+    "compass_alert" Alerts "autopilot's compass alert", "", says "autopilot warns: compass", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a compass had failed or could not be trusted.";
     "Check the compass, its wiring, its calibration and currents or magnets near it.";
-    "baro_alert" Said "autopilot's barometer alert", "", says "autopilot warns: barometer", "LAND", needs "texts, events or health flags of the autopilot";
+    "baro_alert" Alerts "autopilot's barometer alert", "", says "autopilot warns: barometer", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a barometer had failed or could not be trusted.";
     "Check the barometer, its cover and the airflow at it.";
-    "airspeed_alert" Said "autopilot's airspeed alert", "", says "autopilot warns: airspeed", "LAND", needs "texts, events or health flags of the autopilot";
+    "airspeed_alert" Alerts "autopilot's airspeed alert", "", says "autopilot warns: airspeed", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that an airspeed sensor had failed or could not be trusted.";
     "Check the pitot tube for water and dirt, its hoses and its calibration.";
-    "gnss_alert" Said "autopilot's GPS alert", "", says "autopilot warns: GPS", "FLY MANUALLY", needs "texts, events or health flags of the autopilot";
+    "gnss_alert" Alerts "autopilot's GPS alert", "", says "autopilot warns: GPS", "FLY MANUALLY", needs "texts, events or health flags of the autopilot";
     "The autopilot said that GPS was lost or not to be trusted: a glitch, jamming or spoofing.";
     "Check the antenna's view, wiring and sources of interference.";
-    "ranging_alert" Said "autopilot's rangefinder alert", "", says "autopilot warns: rangefinder", "LAND", needs "texts, events or health flags of the autopilot";
+    "ranging_alert" Alerts "autopilot's rangefinder alert", "", says "autopilot warns: rangefinder", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a rangefinder, optical flow, vision or proximity sensor had failed.";
     "Check that sensor and its wiring.";
-    "terrain_alert" Said "autopilot's terrain data alert", "", says "autopilot warns: terrain", "CLIMB", needs "texts, events or health flags of the autopilot";
+    "terrain_alert" Alerts "autopilot's terrain data alert", "", says "autopilot warns: terrain", "CLIMB", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it lacked the heights of the ground, or could hit it.";
     "Load terrain data before the flight; check the mission's heights.";
-    "ekf_alert" Said "autopilot's EKF alert", "", says "autopilot warns: EKF", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
+    "ekf_alert" Alerts "autopilot's EKF alert", "", says "autopilot warns: EKF", "LAND, MANUAL", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its EKF doubted or had lost attitude, velocity, position or height.";
     "Look at compass, GPS, barometer and vibration at that time.";
 
@@ -357,9 +357,9 @@ vocabulary! {
     "radio_margin" Vehicle "telemetry signal above noise", "", says "telemetry signal near noise", "", needs "telemetry radio status";
     "The telemetry radio's signal was hardly above the noise."; "Check antennas, range and sources of interference.";
 
-    "rc_alert" Said "autopilot's remote control alert", "", says "autopilot: remote control lost", "WATCH IT", needs "texts, events or health flags of the autopilot";
+    "rc_alert" Alerts "autopilot's remote control alert", "", says "autopilot: remote control lost", "WATCH IT", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the remote control was lost."; "Check transmitter, receiver, antennas and range.";
-    "gcs_alert" Said "autopilot's ground station alert", "", says "autopilot: ground station lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "gcs_alert" Alerts "autopilot's ground station alert", "", says "autopilot: ground station lost", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the ground station or a companion was lost."; "Check the telemetry link and its range.";
 
     "load" Vehicle "processor load", "", says "autopilot processor full", "LAND", needs "processor load";
@@ -370,16 +370,16 @@ vocabulary! {
     "The autopilot restarted."; "In flight: do not fly until the supply and the firmware are checked.";
     "autopilot_state" Vehicle "autopilot failsafe", "", says "autopilot in failsafe", "WATCH IT", needs "state of the autopilot";
     "The autopilot declared a failsafe or an emergency: it returns, lands or stops by itself."; "Read its messages of that time; mend the cause they name.";
-    "processor_alert" Said "autopilot's processor alert", "", says "autopilot warns: processor", "LAND", needs "texts, events or health flags of the autopilot";
+    "processor_alert" Alerts "autopilot's processor alert", "", says "autopilot warns: processor", "LAND", needs "texts, events or health flags of the autopilot";
     "The autopilot said that its processor or firmware had a problem.";
     "Keep its log and tell the firmware's makers; lower logging and stream rates.";
-    "logging_alert" Said "autopilot's log alert", "", says "autopilot does not log", "CHECK CARD", needs "texts, events or health flags of the autopilot";
+    "logging_alert" Alerts "autopilot's log alert", "", says "autopilot does not log", "CHECK CARD", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it could not write its own log."; "Check the autopilot's card.";
-    "fence_alert" Said "autopilot's geofence alert", "", says "geofence breached", "FLY BACK", needs "texts, events or health flags of the autopilot";
+    "fence_alert" Alerts "autopilot's geofence alert", "", says "geofence breached", "FLY BACK", needs "texts, events or health flags of the autopilot";
     "The autopilot said that the geofence was breached."; "Check the fence and the flight at that time.";
-    "failsafe_alert" Said "autopilot's failsafe alert", "", says "autopilot's failsafe acts", "WATCH IT", needs "texts, events or health flags of the autopilot";
+    "failsafe_alert" Alerts "autopilot's failsafe alert", "", says "autopilot's failsafe acts", "WATCH IT", needs "texts, events or health flags of the autopilot";
     "The autopilot said that a failsafe acted: it returns, lands or stops by itself."; "Read its messages of that time; mend the cause they name.";
-    "autopilot_alert" Said "autopilot's other alert", "", says "autopilot: severe message", "READ IT", needs "texts, events or health flags of the autopilot";
+    "autopilot_alert" Alerts "autopilot's other alert", "", says "autopilot: severe message", "READ IT", needs "texts, events or health flags of the autopilot";
     "The autopilot gave a severe message that no table here knows."; "Read its messages of that time.";
 
     "roll" Vehicle "roll angle", "", says "banks too far", "LEVEL OUT", needs "attitude of a vehicle on rotors";
@@ -387,7 +387,7 @@ vocabulary! {
     "pitch" Vehicle "pitch angle", "", says "pitches too far", "LEVEL OUT", needs "attitude of a vehicle on rotors";
     "The vehicle pitched further than it should."; "Look at the flight at that time: wind, a manoeuvre, or lost control.";
 
-    "attitude_alert" Said "autopilot's attitude alert", "", says "autopilot warns: attitude", "TAKE OVER", needs "texts, events or health flags of the autopilot";
+    "attitude_alert" Alerts "autopilot's attitude alert", "", says "autopilot warns: attitude", "TAKE OVER", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it had lost control of attitude or height.";
     "Do not fly until motors, propellers and sensors are checked.";
 
@@ -421,7 +421,7 @@ vocabulary! {
     "overturned" Vehicle "overturned", "", says "overturned", "DISARM IF DOWN", needs "attitude of a vehicle on rotors";
     "The vehicle turned over, or lay over, while its motors ran.";
     "Inspect the vehicle; check motor order, propellers and calibration.";
-    "crash_alert" Said "autopilot's crash alert", "", says "autopilot reports a crash", "DISARM IF DOWN", needs "texts, events or health flags of the autopilot";
+    "crash_alert" Alerts "autopilot's crash alert", "", says "autopilot reports a crash", "DISARM IF DOWN", needs "texts, events or health flags of the autopilot";
     "The autopilot said that it crashed, released its parachute or ended the flight.";
     "Do not fly until the whole vehicle is inspected.";
 }
@@ -443,7 +443,7 @@ mod tests {
     #[test]
     fn words_are_sentences_and_parts_are_named_where_there_are_several() {
         for words in VOCABULARY {
-            let Said { check, name, part, .. } = words.said;
+            let RadioWords { check, name, part, .. } = words.said;
             for sentence in [words.meaning, words.action] {
                 let first = sentence.chars().next().is_some_and(char::is_uppercase);
                 assert!(first && sentence.ends_with('.') && sentence.len() <= 100, "{check}: {sentence}");
@@ -459,7 +459,7 @@ mod tests {
     fn an_alarm_names_its_part_and_is_one_checks_alone_and_what_is_critical_has_advice() {
         let twins = ["vibration_px4", "cell_dev_lasting"];
         for (index, Words { said, .. }) in VOCABULARY.iter().enumerate() {
-            let Said { check, part, alarm, advice, .. } = *said;
+            let RadioWords { check, part, alarm, advice, .. } = *said;
             assert!(!alarm.is_empty() && alarm.is_ascii() && advice.is_ascii(), "{check}");
             assert_eq!(alarm.contains('#'), !part.is_empty(), "{check}: {alarm}");
             assert!(alarm.matches('#').count() <= 1, "{check}: {alarm}");

@@ -12,8 +12,8 @@ use hums_core::Monitor;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
 use hums_core::mishap::{MishapChange, MishapKind, Place, Report};
 use hums_core::observation::{
-    Air, Attitude, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source, TelemetryRadio,
-    Wanted,
+    Air, Attitude, AttitudeSetpoint, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source,
+    TelemetryRadio,
 };
 use hums_core::params::Params;
 use hums_core::time::BootMs;
@@ -187,9 +187,12 @@ fn fly_between(at_ms: u64, end_ms: u64, vehicle: &str, script: &str) -> Outcome 
                 let throttle = Some(Fraction(quad.throttle));
                 Observation::Hud(Hud { throttle, climb: Some(MetresPerSecond(climb_mps)), ..Hud::default() })
             });
-            let wanted = motion
-                .roll_wanted
-                .map(|roll| Observation::Wanted(Wanted { roll: Radians(roll), ..Wanted::default() }));
+            let wanted = motion.roll_wanted.map(|roll| {
+                Observation::AttitudeSetpoint(AttitudeSetpoint {
+                    roll: Radians(roll),
+                    ..AttitudeSetpoint::default()
+                })
+            });
             let own = own.into_iter().filter(|_| !motion.beats_only);
             observe(monitor, now_ms, AUTOPILOT, said.chain(hud).chain(wanted).chain(own));
         }

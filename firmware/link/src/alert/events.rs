@@ -18,7 +18,7 @@ const fn number(name: &str) -> u32 {
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Says {
+enum EventMeaning {
     /// A fixed one.
     Is(Meaning),
     /// A failsafe whose cause is this byte of the arguments (`failsafe_cause_t`).
@@ -29,13 +29,13 @@ enum Says {
 
 macro_rules! events {
     (fine: $($fine:ident)+; $($urgency:ident $cause:ident: $($name:ident)+;)*) => {
-        const EVENTS: &[(&str, Says)] = &[
-            ("sensor_failover", Says::Failover),
-            ("commander_failsafe_enter", Says::Failsafe(5)),
-            ("commander_failsafe_enter_hold", Says::Failsafe(7)),
-            ("commander_failsafe_enter_warn", Says::Failsafe(4)),
-            $($((stringify!($name), Says::Is(Meaning::Wrong(Alert::$urgency(Cause::$cause)))),)+)*
-            $((stringify!($fine), Says::Is(Meaning::Fine)),)+
+        const EVENTS: &[(&str, EventMeaning)] = &[
+            ("sensor_failover", EventMeaning::Failover),
+            ("commander_failsafe_enter", EventMeaning::Failsafe(5)),
+            ("commander_failsafe_enter_hold", EventMeaning::Failsafe(7)),
+            ("commander_failsafe_enter_warn", EventMeaning::Failsafe(4)),
+            $($((stringify!($name), EventMeaning::Is(Meaning::Wrong(Alert::$urgency(Cause::$cause)))),)+)*
+            $((stringify!($fine), EventMeaning::Is(Meaning::Fine)),)+
         ];
     };
 }
@@ -126,8 +126,8 @@ events! {
 }
 
 /// By number, computed when the firmware is built: the firmware holds no names.
-static NUMBERED: [(u32, Says); EVENTS.len()] = {
-    let mut numbered = [(0, Says::Is(Meaning::Fine)); EVENTS.len()];
+static NUMBERED: [(u32, EventMeaning); EVENTS.len()] = {
+    let mut numbered = [(0, EventMeaning::Is(Meaning::Fine)); EVENTS.len()];
     let mut row = 0;
     while row < EVENTS.len() {
         numbered[row] = (number(EVENTS[row].0), EVENTS[row].1);
@@ -145,15 +145,15 @@ pub(super) fn meaning(id: u32, arguments: &[u8]) -> Meaning {
     let argument = |at: u8| arguments.get(usize::from(at)).copied().unwrap_or_default();
     let Some((_, says)) = NUMBERED.iter().find(|(known, _)| *known == id) else { return Meaning::Unknown };
     Meaning::Wrong(match says {
-        Says::Is(meaning) => return *meaning,
-        Says::Failsafe(at) => match argument(*at) {
+        EventMeaning::Is(meaning) => return *meaning,
+        EventMeaning::Failsafe(at) => match argument(*at) {
             1 => Alert::warning(Cause::RemoteControl),
             2 => Alert::warning(Cause::GroundStation),
             3 | 6 => Alert::warning(Cause::Power),
             4 | 5 => Alert::critical(Cause::Power),
             _ => Alert::warning(Cause::Failsafe),
         },
-        Says::Failover => match argument(0) {
+        EventMeaning::Failover => match argument(0) {
             0 => Alert::warning(Cause::Accelerometer),
             1 => Alert::warning(Cause::Gyro),
             _ => Alert::warning(Cause::Compass),

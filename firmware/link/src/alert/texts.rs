@@ -10,7 +10,7 @@ use hums_core::cause::{Alert, Cause};
 use super::Meaning;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Where {
+enum TextScope {
     /// All.
     Everywhere,
     Severe,
@@ -20,24 +20,24 @@ enum Where {
 
 macro_rules! kind {
     (fine) => {
-        (Meaning::Fine, Where::Everywhere)
+        (Meaning::Fine, TextScope::Everywhere)
     };
     // Only a topic, which texts of failures have too.
     (mild) => {
-        (Meaning::Fine, Where::Sound)
+        (Meaning::Fine, TextScope::Sound)
     };
     // Only the name of a part, which mild texts have too.
     (broad $cause:ident) => {
-        (Meaning::Wrong(Alert::warning(Cause::$cause)), Where::Severe)
+        (Meaning::Wrong(Alert::warning(Cause::$cause)), TextScope::Severe)
     };
     ($urgency:ident $cause:ident) => {
-        (Meaning::Wrong(Alert::$urgency(Cause::$cause)), Where::Everywhere)
+        (Meaning::Wrong(Alert::$urgency(Cause::$cause)), TextScope::Everywhere)
     };
 }
 
 macro_rules! texts {
     ($($kind:tt: $($pattern:literal)+;)*) => {
-        const TEXTS: &[(&str, (Meaning, Where))] = &[$($(($pattern, kind! $kind),)+)*];
+        const TEXTS: &[(&str, (Meaning, TextScope))] = &[$($(($pattern, kind! $kind),)+)*];
     };
 }
 
@@ -166,10 +166,10 @@ const fn pairs(text: &[u8]) -> u64 {
 
 pub(super) fn meaning(text: &[u8], is_severe: bool) -> Meaning {
     let has = pairs(text);
-    let is_about = |pattern: &str, place: Where| match place {
-        Where::Everywhere => fits(pattern.as_bytes(), text),
-        Where::Severe => is_severe && fits(pattern.as_bytes(), text),
-        Where::Sound => {
+    let is_about = |pattern: &str, place: TextScope| match place {
+        TextScope::Everywhere => fits(pattern.as_bytes(), text),
+        TextScope::Severe => is_severe && fits(pattern.as_bytes(), text),
+        TextScope::Sound => {
             fits(pattern.as_bytes(), text)
                 && !FAILURES.iter().any(|word| find(text, word.as_bytes()).is_some())
         }

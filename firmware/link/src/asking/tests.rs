@@ -33,7 +33,7 @@ impl Script {
                 let count = |ms: u64| ms * u64::from(*hz) / 1_000;
                 (count(now_ms)..count(now_ms + 50)).for_each(|_| asking.seen(*id));
             }
-            let known = Known {
+            let known = KnownVehicle {
                 source: Source { system: 1, component: 1 },
                 autopilot: self.autopilot,
                 reboots: self.reboots,
@@ -122,7 +122,7 @@ fn both_autopilots_are_asked_for_the_landed_state_and_their_parameters_are_known
     for autopilot in [Autopilot::Px4, Autopilot::ArduPilot] {
         let mut script = Script::new(autopilot);
         let mut asking = Asking::new();
-        let known = Known {
+        let known = KnownVehicle {
             source: Source { system: 1, component: 1 },
             autopilot,
             reboots: 0,
@@ -136,7 +136,7 @@ fn both_autopilots_are_asked_for_the_landed_state_and_their_parameters_are_known
         assert_eq!(script.rate(245), Some(2));
         assert!(asking.has_parameters(&known), "none of them was answered: {autopilot:?}");
         let other = Source { system: 7, component: 1 };
-        assert!(!asking.has_parameters(&Known { source: other, ..known }));
+        assert!(!asking.has_parameters(&KnownVehicle { source: other, ..known }));
     }
 }
 

@@ -50,12 +50,12 @@ fn by_id(id: u32, payload: &[u8]) -> Option<Observation> {
         ids::MISSION_ITEM_REACHED => {
             Observation::MissionReached(read::<ap::MISSION_ITEM_REACHED_DATA>(payload, &[])?.seq)
         }
-        ids::NAV_CONTROLLER_OUTPUT => Observation::Wanted(motion::nav_controller_output(payload)?),
+        ids::NAV_CONTROLLER_OUTPUT => Observation::AttitudeSetpoint(motion::nav_controller_output(payload)?),
         ids::RC_CHANNELS => Observation::RadioControl(system::rc(payload)?),
         ids::VFR_HUD => Observation::Hud(motion::hud(payload)?),
         ids::COMMAND_ACK => Observation::CommandAck(system::command_ack(payload)),
         ids::AHRS2 => Observation::SecondEstimate(motion::second_estimate(payload)),
-        ids::ATTITUDE_TARGET => Observation::Wanted(motion::attitude_target(payload)?),
+        ids::ATTITUDE_TARGET => Observation::AttitudeSetpoint(motion::attitude_target(payload)?),
         ids::POSITION_TARGET_LOCAL_NED => Observation::ClimbWanted(motion::climb_wanted(payload)?),
         ids::HIGHRES_IMU => {
             let (imu, air) = motion::highres_imu(payload)?;

@@ -4,8 +4,8 @@ use core::num::NonZeroU32;
 use hums_dialect::ids;
 
 use hums_core::observation::{
-    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud, Imu, LocalPosition,
-    MOTORS_MAX, Outputs, SecondEstimate, Vibration, VibrationScale, Wanted, WantedRates,
+    Air, Attitude, AttitudeSetpoint, Estimator, EstimatorScale, GlobalPosition, Gnss, GnssIntegrity, Hud,
+    Imu, LocalPosition, MOTORS_MAX, Outputs, SecondEstimate, Vibration, VibrationScale, WantedRates,
 };
 use hums_core::units::{
     Celsius, Fraction, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians,
@@ -215,19 +215,19 @@ pub(super) fn second_estimate(payload: &[u8]) -> SecondEstimate {
 }
 
 /// `ArduPilot`: whole degrees in old versions.
-pub(super) fn nav_controller_output(payload: &[u8]) -> Option<Wanted> {
+pub(super) fn nav_controller_output(payload: &[u8]) -> Option<AttitudeSetpoint> {
     let [roll, pitch] = [0, 4].map(|at| Radians(float(payload, at).to_radians()));
-    (roll.0.is_finite() && pitch.0.is_finite()).then_some(Wanted { roll, pitch, rates: None })
+    (roll.0.is_finite() && pitch.0.is_finite()).then_some(AttitudeSetpoint { roll, pitch, rates: None })
 }
 
 /// `type_mask` names the ignored rates: roll 1, pitch 2, yaw 4.
-pub(super) fn attitude_target(payload: &[u8]) -> Option<Wanted> {
+pub(super) fn attitude_target(payload: &[u8]) -> Option<AttitudeSetpoint> {
     const RATES: u8 = 7;
     let of = [4, 8, 12, 16].map(|at| float(payload, at));
     let about = vector([20, 24, 28].map(|at| float(payload, at)));
     let about = about.filter(|_| Fields(payload).u8(36) & RATES == 0);
     let rates = about.map(|about| WantedRates { about: about.map(RadiansPerSecond), of: Some(of) });
-    Some(Wanted { rates, ..Wanted::from_quaternion(of)? })
+    Some(AttitudeSetpoint { rates, ..AttitudeSetpoint::from_quaternion(of)? })
 }
 
 /// `POSITION_TARGET_LOCAL_NED`: `type_mask` 32 means that the vertical speed is ignored.

@@ -45,7 +45,9 @@ fn a_vehicle_of_a_type_that_is_newer_than_our_list_is_a_vehicle() {
 #[test]
 fn the_wanted_attitude_is_told_in_degrees_and_as_a_quaternion() {
     let wanted = |said: Option<Observation>| match said {
-        Some(Observation::Wanted(wanted)) => Some([wanted.roll.0, wanted.pitch.0].map(f32::to_degrees)),
+        Some(Observation::AttitudeSetpoint(wanted)) => {
+            Some([wanted.roll.0, wanted.pitch.0].map(f32::to_degrees))
+        }
         _ => None,
     };
     let nav = ap::NAV_CONTROLLER_OUTPUT_DATA { nav_roll: -35.0, nav_pitch: 12.5, ..Default::default() };
@@ -70,7 +72,7 @@ fn wanted_rates_come_with_the_attitude_about_whose_axes_they_may_be() {
         ..Default::default()
     };
     let rates = |target: &ap::ATTITUDE_TARGET_DATA| match said(target) {
-        Some(Observation::Wanted(wanted)) => wanted.rates,
+        Some(Observation::AttitudeSetpoint(wanted)) => wanted.rates,
         _ => panic!(),
     };
     let told = rates(&target).expect("told");

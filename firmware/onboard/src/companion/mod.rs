@@ -20,7 +20,7 @@ use hums_blackbox::record::Boot;
 use hums_core::clock::{Instant, Span};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::{Monitor, protect};
-use hums_link::asking::{Asking, Known};
+use hums_link::asking::{Asking, KnownVehicle};
 use hums_link::encode::{COMPONENT, FRAME_BYTES_MAX};
 use hums_link::events::Events;
 use hums_link::frame::Frame;
@@ -415,7 +415,7 @@ impl Companion {
             if let Some(known) = known {
                 events.tick(now, known.source, &mut |packet| outlet.send(now, Class::Own, packet, &mut out));
             }
-            let is_vehicle = |known: &Known| Some(known.source) == monitor.vehicle().source;
+            let is_vehicle = |known: &KnownVehicle| Some(known.source) == monitor.vehicle().source;
             if known.filter(is_vehicle).is_some_and(|known| asking.has_parameters(&known)) {
                 monitor.parameters_asked();
             }
@@ -461,10 +461,10 @@ impl Companion {
 }
 
 /// The systems to ask: the vehicle, or, until it is settled, each autopilot on the port in turn.
-fn known(now: Instant, monitor: &Monitor) -> Option<Known> {
+fn known(now: Instant, monitor: &Monitor) -> Option<KnownVehicle> {
     let vehicle = monitor.vehicle();
     let (source, autopilot) = vehicle.asks(now.into())?;
-    Some(Known {
+    Some(KnownVehicle {
         source,
         autopilot,
         reboots: vehicle.reboots,

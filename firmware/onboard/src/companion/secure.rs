@@ -228,7 +228,7 @@ impl Secure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::persist::{Mailbox, Saved, StoreStatus};
+    use crate::persist::{Mailbox, SaveStep, StoreStatus};
     use hums_core::lifetime::ItemKey;
     use hums_store::sim::SimFlash;
 
@@ -270,7 +270,7 @@ mod tests {
             secure.changed(Trust::Signed);
             secure.times.time = second;
             secure.save(Instant::from_millis(second * 1_000), None, &mut handover);
-            while store_writer.service(false) == Saved::Took {
+            while store_writer.service(false) == SaveStep::Took {
                 scarce += u32::from(handover.room() == Room::Reserve);
             }
         }
@@ -278,12 +278,12 @@ mod tests {
         let landing = [(ItemKey::Exceedances, 505), (ItemKey::Session, 160), (ItemKey::Session, 160)];
         for (key, length) in landing {
             assert!(handover.put(Item::item(key.number()), &[1; 512][..length]));
-            assert_eq!(store_writer.service(false), Saved::Took, "{key:?}");
+            assert_eq!(store_writer.service(false), SaveStep::Took, "{key:?}");
         }
         assert_eq!(status.read().refused, 0);
         assert!(secure.times_due);
         assert!(store_writer.turn_ahead());
         secure.save(Instant::from_millis(86_400_000), None, &mut handover);
-        assert!(!secure.times_due && store_writer.service(false) == Saved::Took);
+        assert!(!secure.times_due && store_writer.service(false) == SaveStep::Took);
     }
 }

@@ -22,7 +22,7 @@ use crate::journal::{Arming, Logbook};
 use crate::notices::Notices;
 use crate::queues::SectorsIn;
 use crate::records;
-use crate::shelf::{LogRequest, Reader, What, Which};
+use crate::shelf::{LogRequest, Reader, RequestedLog, RequestedPart};
 
 /// Enough for all parameters, each in the longest line.
 const BYTES_MAX: u32 = 16 * 1024;
@@ -121,7 +121,11 @@ impl Settings {
     ) -> bool {
         let Some(ticket) = self.ticket else {
             let ticket = library.next_ticket();
-            if shelf.want(LogRequest { ticket, which: Which::Settings, what: What::Data(offset) }) {
+            if shelf.want(LogRequest {
+                ticket,
+                which: RequestedLog::Settings,
+                what: RequestedPart::Data(offset),
+            }) {
                 self.ticket = Some(ticket);
             }
             return false;

@@ -1,7 +1,7 @@
 //! The pipeline's own figures: input, losses, and the state of recording.
 
 use hums_blackbox::SECTOR_BYTES;
-use hums_blackbox::record::{Lost, Stats};
+use hums_blackbox::record::{LossKind, Stats};
 use hums_core::clock::{Instant, Span};
 use hums_core::status::{RecorderStatus, Recording};
 use hums_link::messages::{ComputerStatus, LinkStatus};
@@ -197,13 +197,13 @@ impl<'a> Figures<'a> {
         let blind_ms = self.port.blind_ms();
         let blind = blind_ms.wrapping_sub(core::mem::replace(&mut self.blind_ms_before, blind_ms));
         let since = Instant::from_millis(now.as_millis().saturating_sub(u64::from(blind)));
-        journal.lose_since(since, now, Lost::UartOverrun, u64::from(new.overrun));
-        journal.lose(now, Lost::NotFrames, u64::from(new.bytes_not_frames));
-        journal.lose(now, Lost::DamagedFrames, u64::from(new.damaged));
-        journal.lose(now, Lost::QueueFull, u64::from(new.frames_lost));
+        journal.lose_since(since, now, LossKind::UartOverrun, u64::from(new.overrun));
+        journal.lose(now, LossKind::NotFrames, u64::from(new.bytes_not_frames));
+        journal.lose(now, LossKind::DamagedFrames, u64::from(new.damaged));
+        journal.lose(now, LossKind::QueueFull, u64::from(new.frames_lost));
         let frames_lost = card.read().frames_lost;
         let before = core::mem::replace(&mut self.card_frames_lost_before, frames_lost);
-        journal.lose(now, Lost::Card, u64::from(frames_lost.wrapping_sub(before)));
+        journal.lose(now, LossKind::Card, u64::from(frames_lost.wrapping_sub(before)));
         self.queue_sectors_max = self.queue_sectors_max.max(sectors.deepest());
     }
 }

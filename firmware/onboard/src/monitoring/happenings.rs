@@ -1,6 +1,8 @@
 //! Events for the record.
 
-use hums_blackbox::record::{Event, Lost, Moment, Protection, Record, Resting, Snapshot, SnapshotValues};
+use hums_blackbox::record::{
+    Event, LossKind, MarkReason, Moment, Protection, Record, Snapshot, SnapshotValues,
+};
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::mishap::MishapChange;
@@ -59,14 +61,14 @@ pub(super) fn record(
             Happening::Armed | Happening::TakeOff | Happening::FlightResumed => marks.moves(),
             Happening::Landing => {
                 recorded.usage(now, Moment::End, book, sectors);
-                marks.rests(Resting::Landed);
+                marks.rests(MarkReason::Landed);
             }
-            Happening::Disarmed if !book.monitor.flight().airborne() => marks.rests(Resting::Disarmed),
+            Happening::Disarmed if !book.monitor.flight().airborne() => marks.rests(MarkReason::Disarmed),
             _ => {}
         }
     }
     let Logbook { monitor, journal, .. } = book;
-    journal.lose(now, Lost::Records, u64::from(monitor.take_happenings_lost()));
+    journal.lose(now, LossKind::Records, u64::from(monitor.take_happenings_lost()));
     while let Some(snapshot) = monitor.take_snapshot(now.into()) {
         let mut values = SnapshotValues::default();
         journal.record(now, &Record::Snapshot(Snapshot::new(now, &snapshot, &mut values)), sectors);
@@ -97,5 +99,5 @@ fn mishap(
     if !matches!(change, MishapChange::Began(_)) {
         notices.announce(Notice::Mishap(report));
     }
-    marks.at_once(Resting::Mishap);
+    marks.at_once(MarkReason::Mishap);
 }

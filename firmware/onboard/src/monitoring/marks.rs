@@ -6,7 +6,7 @@
 //! does not wait.
 
 use hums_blackbox::SectorSink as _;
-use hums_blackbox::record::Resting;
+use hums_blackbox::record::MarkReason;
 use hums_core::clock::{Instant, Span};
 
 use crate::journal::Journal;
@@ -17,7 +17,7 @@ const APART: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marks {
-    due: Option<Resting>,
+    due: Option<MarkReason>,
     at: Option<Instant>,
     unsent: bool,
 }
@@ -28,12 +28,12 @@ impl Marks {
     }
 
     /// The vehicle rests.
-    pub(super) const fn rests(&mut self, why: Resting) {
+    pub(super) const fn rests(&mut self, why: MarkReason) {
         self.due = Some(why);
     }
 
     /// Power may fail in the next moment: all data goes to the card at once.
-    pub(super) const fn at_once(&mut self, why: Resting) {
+    pub(super) const fn at_once(&mut self, why: MarkReason) {
         (self.due, self.at) = (Some(why), None);
     }
 

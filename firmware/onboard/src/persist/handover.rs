@@ -7,7 +7,7 @@ use hums_core::params::Params;
 use hums_store::{Key, param_value};
 
 use super::mailbox::MailboxIn;
-use super::status::{Calm, StoreReading, StoreState, StoreStatus};
+use super::status::{EraseMoment, StoreReading, StoreState, StoreStatus};
 
 /// The text if no earlier flights are known.
 pub const STORE_NEW: &str = "HUMS: the store is new, all counters begin";
@@ -56,11 +56,11 @@ impl<'a> Handover<'a> {
             self.active_at = now;
         }
         self.status.set_calm(if disarmed && now.since(self.frames_at) >= QUIET {
-            Calm::Silent
+            EraseMoment::Silent
         } else if now.since(self.active_at) >= GROUNDED {
-            Calm::Grounded
+            EraseMoment::Grounded
         } else {
-            Calm::None
+            EraseMoment::None
         });
         self.put_params(monitor.params_mut());
         self.put_items(now, monitor);

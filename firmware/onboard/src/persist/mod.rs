@@ -54,5 +54,5 @@ mod tests;
 
 pub use handover::{Handover, News, STORE_NEW};
 pub use mailbox::Mailbox;
-pub use status::{Calm, StoreState, StoreStatus};
-pub use store_writer::{Saved, StoreWriter};
+pub use status::{EraseMoment, StoreState, StoreStatus};
+pub use store_writer::{SaveStep, StoreWriter};

@@ -24,7 +24,7 @@ pub enum StoreState {
 /// The cost of an erase now, by the vehicle's state. An erase stops the processor for up to 0.5 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
-pub enum Calm {
+pub enum EraseMoment {
     /// The vehicle is armed, flies, or was disarmed a moment ago: no erase.
     #[default]
     None = 0,
@@ -77,7 +77,7 @@ impl StoreStatus {
             refused: AtomicU32::new(0),
             failed: AtomicU32::new(0),
             erased: AtomicU32::new(0),
-            calm: AtomicU8::new(Calm::None as u8),
+            calm: AtomicU8::new(EraseMoment::None as u8),
             reserve_only: AtomicBool::new(false),
         }
     }
@@ -102,15 +102,15 @@ impl StoreStatus {
     }
 
     /// Cost of an erase now, by the vehicle's state.
-    pub fn calm(&self) -> Calm {
+    pub fn calm(&self) -> EraseMoment {
         match self.calm.load(Ordering::Relaxed) {
-            1 => Calm::Grounded,
-            2 => Calm::Silent,
-            _ => Calm::None,
+            1 => EraseMoment::Grounded,
+            2 => EraseMoment::Silent,
+            _ => EraseMoment::None,
         }
     }
 
-    pub(crate) fn set_calm(&self, calm: Calm) {
+    pub(crate) fn set_calm(&self, calm: EraseMoment) {
         self.calm.store(calm as u8, Ordering::Relaxed);
     }
 

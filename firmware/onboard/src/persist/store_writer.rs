@@ -8,7 +8,7 @@ use hums_core::params::ParamError;
 use hums_store::{Error, Key, Store, StoreCondition, param};
 
 use super::mailbox::MailboxOut;
-use super::status::{Calm, StoreState, StoreStatus, count};
+use super::status::{EraseMoment, StoreState, StoreStatus, count};
 
 const AHEAD: (usize, usize) = (5, 8);
 /// A sector with a smaller free part is erased on the ground even while the autopilot talks.
@@ -22,7 +22,7 @@ const _: () = assert!(LANDING + SIGNED_MAX as usize * 40 <= RESERVE);
 
 /// The result of one call of [`StoreWriter::service`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Saved {
+pub enum SaveStep {
     /// An item was taken: another may wait.
     Took,
     /// There is nothing to do.
@@ -111,42 +111,42 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         self.store.as_mut().and_then(|store| store.mounts().ok()).unwrap_or(0)
     }
 
-    /// Saves one item. An erase is allowed by [`Calm`] (the table in [`super`]), or by `may_erase`.
-    pub fn service(&mut self, may_erase: bool) -> Saved {
+    /// Saves one item. An erase is allowed by [`EraseMoment`] (the table in [`super`]), or by `may_erase`.
+    pub fn service(&mut self, may_erase: bool) -> SaveStep {
         let calm = self.status.calm();
-        let erases = calm == Calm::Silent || (calm == Calm::Grounded && self.scarce);
-        self.turned &= calm != Calm::None;
+        let erases = calm == EraseMoment::Silent || (calm == EraseMoment::Grounded && self.scarce);
+        self.turned &= calm != EraseMoment::None;
         if erases && !self.turned {
             // Before the first save: the next flight then has room, and a save needs no erase of its own.
             self.turned = true;
-            if self.turn_ahead() && calm == Calm::Grounded {
+            if self.turn_ahead() && calm == EraseMoment::Grounded {
                 count(&self.status.erased);
             }
         }
         let Self { store, items, status, waits, .. } = self;
-        let Some((key, value)) = items.waiting() else { return Saved::Idle };
+        let Some((key, value)) = items.waiting() else { return SaveStep::Idle };
         let Some(store) = store else {
             items.release();
-            return Saved::Took;
+            return SaveStep::Took;
         };
         if *waits && !may_erase && !erases {
-            return Saved::Waits;
+            return SaveStep::Waits;
         }
-        store.allow_erase(may_erase || calm == Calm::Silent);
+        store.allow_erase(may_erase || calm == EraseMoment::Silent);
         let saved = store.save(key, value).or_else(|error| again(store, error, key, value));
         store.allow_erase(false);
         if matches!(saved, Err(Error::NotNow)) {
             if !core::mem::replace(waits, true) {
                 count(&status.refused);
             }
-            return Saved::Waits;
+            return SaveStep::Waits;
         }
         *waits = false;
         // After two failures its owner saves it again when it has changed.
         count(if saved.is_ok() { &status.saved } else { &status.failed });
         items.release();
         self.look_for_room();
-        Saved::Took
+        SaveStep::Took
     }
 
     /// More than the reserve.
@@ -164,7 +164,7 @@ fn again<F: NorFlash>(
     error: Error<F::Error>,
     key: Key,
     value: &[u8],
-) -> Result<hums_store::Saved, Error<F::Error>> {
+) -> Result<hums_store::SaveResult, Error<F::Error>> {
     if matches!(error, Error::Flash(_)) { store.save(key, value) } else { Err(error) }
 }
 

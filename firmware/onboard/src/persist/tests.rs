@@ -6,8 +6,8 @@ use hums_core::params::{Param, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_store::sim::SimFlash;
 
-use super::store_writer::{Saved, StoreWriter};
-use super::{Calm, Handover, Mailbox, StoreStatus};
+use super::store_writer::{SaveStep, StoreWriter};
+use super::{EraseMoment, Handover, Mailbox, StoreStatus};
 use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::lifetime::{ItemKey, Room};
@@ -38,7 +38,7 @@ fn end(monitor: &mut Monitor, handover: &mut Handover, store_writer: &mut StoreW
         if handover.finish(Instant::from_millis(60_000), monitor) {
             return;
         }
-        while store_writer.service(true) == Saved::Took {}
+        while store_writer.service(true) == SaveStep::Took {}
     }
     panic!("it never ends");
 }
@@ -68,10 +68,10 @@ fn what_is_due_reaches_the_flash_without_the_end_of_a_session() {
     let mut flash = Flash::blank();
     session(&mut flash, |monitor, handover, store_writer| {
         handover.step(Instant::from_millis(9_000), monitor, 0);
-        assert_eq!(store_writer.service(false), Saved::Idle, "nothing is due yet");
+        assert_eq!(store_writer.service(false), SaveStep::Idle, "nothing is due yet");
         for second in 10..20 {
             handover.step(Instant::from_millis(second * 1_000), monitor, 0);
-            while store_writer.service(false) == Saved::Took {}
+            while store_writer.service(false) == SaveStep::Took {}
         }
     });
     session(&mut flash, |monitor, _, _| assert_eq!(monitor.lifetime().boots, 2));
@@ -86,7 +86,7 @@ fn more_than_the_mailbox_holds_stays_with_its_owner_and_follows() {
         }
         handover.step(Instant::ZERO, monitor, 0);
         let mut taken = 0;
-        while store_writer.service(false) == Saved::Took {
+        while store_writer.service(false) == SaveStep::Took {
             taken += 1;
         }
         assert_eq!(taken, 1);
@@ -109,14 +109,20 @@ fn a_save_that_needs_an_erase_waits_is_told_once_and_is_done_when_it_may() {
             assert!(value < 4.0, "the sector is never full");
             monitor.params_mut().set("CELL_VOLT_WARN", value).expect("in range");
             handover.step(Instant::ZERO, monitor, 1);
-            waits = store_writer.service(false) == Saved::Waits;
+            waits = store_writer.service(false) == SaveStep::Waits;
         }
-        assert_eq!((store_writer.service(false), store_writer.service(false)), (Saved::Waits, Saved::Waits));
+        assert_eq!(
+            (store_writer.service(false), store_writer.service(false)),
+            (SaveStep::Waits, SaveStep::Waits)
+        );
         assert_eq!(store_writer.status.read().refused, 1);
         assert!(handover.news().is_some_and(|news| news.text.contains("nearly full")));
         assert!(handover.news().is_some_and(|news| news.text.contains("waits")));
         assert_eq!(handover.news(), None);
-        assert_eq!((store_writer.service(true), store_writer.service(true)), (Saved::Took, Saved::Idle));
+        assert_eq!(
+            (store_writer.service(true), store_writer.service(true)),
+            (SaveStep::Took, SaveStep::Idle)
+        );
         monitor.params_mut().set("CELL_VOLT_WARN", 4.25).expect("in range");
         end(monitor, handover, store_writer);
     });
@@ -150,7 +156,7 @@ fn fly(flash: &mut Flash, seconds: u64) -> Vec<u64> {
         let before = monitor.lifetime().totals.raw(UsageCounter::Flight);
         for second in 0..seconds {
             live(second, (20..seconds - 5).contains(&second), monitor, handover, second as u32);
-            while store_writer.service(false) == Saved::Took {}
+            while store_writer.service(false) == SaveStep::Took {}
             assert_eq!(store_writer.status.read().refused, 0, "nothing waits for an erase");
             copies.push((second, before, store_writer.status.read().saved));
         }
@@ -198,13 +204,13 @@ fn between_two_flights_room_is_made_for_the_next_one() {
         for flight in 0..6 {
             for _ in 0..3_600 {
                 live(second, true, monitor, handover, second as u32);
-                while store_writer.service(false) == Saved::Took {}
+                while store_writer.service(false) == SaveStep::Took {}
                 second += 1;
             }
             assert_eq!(store_writer.status.read().refused, 0, "flight {flight}");
             for _ in 0..20 {
                 live(second, false, monitor, handover, u32::MAX);
-                while store_writer.service(false) == Saved::Took {}
+                while store_writer.service(false) == SaveStep::Took {}
                 second += 1;
             }
             assert_eq!(store_writer.status.read().room, Room::Enough, "flight {flight}");
@@ -225,7 +231,7 @@ fn a_board_that_stays_on_beside_an_autopilot_that_never_falls_silent_keeps_its_c
                 handover.put(Key::item(33), &second.to_le_bytes().repeat(3));
             }
             let before = store_writer.status.read().erased;
-            while store_writer.service(false) == Saved::Took {}
+            while store_writer.service(false) == SaveStep::Took {}
             let now = store_writer.status.read();
             assert!(now.erased == before || !flies, "erased in flight");
             assert_eq!(now.refused, 0, "after {second} s something waits");
@@ -249,15 +255,20 @@ fn on_the_ground_nothing_is_erased_while_there_is_room_or_the_vehicle_was_just_d
     session(&mut flash, |monitor, handover, store_writer| {
         for second in 0..3_600 {
             live(second, false, monitor, handover, second as u32);
-            while store_writer.service(false) == Saved::Took {}
+            while store_writer.service(false) == SaveStep::Took {}
         }
-        assert_eq!((store_writer.status.read().erased, store_writer.status.calm()), (0, Calm::Grounded));
-        for (second, calm) in [(3_600, Calm::None), (3_601, Calm::None), (3_620, Calm::Grounded)] {
+        assert_eq!(
+            (store_writer.status.read().erased, store_writer.status.calm()),
+            (0, EraseMoment::Grounded)
+        );
+        for (second, calm) in
+            [(3_600, EraseMoment::None), (3_601, EraseMoment::None), (3_620, EraseMoment::Grounded)]
+        {
             live(second, second == 3_600, monitor, handover, second as u32);
             assert_eq!(store_writer.status.calm(), calm, "at {second} s");
         }
         live(3_626, false, monitor, handover, 3_620);
-        assert_eq!(store_writer.status.calm(), Calm::Silent);
+        assert_eq!(store_writer.status.calm(), EraseMoment::Silent);
     });
 }
 
@@ -302,7 +313,7 @@ fn without_a_store_all_goes_on_and_it_is_told() {
     assert!(handover.news().is_some_and(|news| news.text.contains("no store")));
     for second in 0..100 {
         handover.step(Instant::from_millis(second * 1_000), &mut monitor, 0);
-        while store_writer.service(false) == Saved::Took {}
+        while store_writer.service(false) == SaveStep::Took {}
     }
     assert!(handover.finish(Instant::from_millis(100_000), &mut monitor));
 }

@@ -22,7 +22,7 @@ impl LogId {
 
 /// The requested part of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum What {
+pub enum RequestedPart {
     /// Its length.
     Length,
     /// Bytes from an offset on.
@@ -35,7 +35,7 @@ pub enum What {
 
 /// A log, or the file of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Which {
+pub enum RequestedLog {
     /// By its place in the directory, from 0; erased ones left out.
     At(u16),
     /// By its name.
@@ -52,9 +52,9 @@ pub struct LogRequest {
     /// Tells answers from earlier ones.
     pub ticket: u16,
     /// The log.
-    pub which: Which,
+    pub which: RequestedLog,
     /// The part.
-    pub what: What,
+    pub what: RequestedPart,
 }
 
 /// Reasons for an answer without a log.

@@ -23,7 +23,7 @@ use hums_recorder::card::{LogEntry, Segment};
 use hums_recorder::{BLOCK_BYTES, Card, CardDevice, CardError, Recorder};
 
 use crate::queues::ring::{In, Out, Ring};
-pub use asked::{Answer, DATA_MAX, LogId, LogRequest, NoLog, What, Which};
+pub use asked::{Answer, DATA_MAX, LogId, LogRequest, NoLog, RequestedLog, RequestedPart};
 use on_card::{for_each_part, holds, in_work, measure};
 
 /// Requests at once.
@@ -42,7 +42,8 @@ pub struct Shelf {
 impl Shelf {
     /// Empty.
     pub(crate) const fn new() -> Self {
-        const NONE: LogRequest = LogRequest { ticket: 0, which: Which::At(0), what: What::Length };
+        const NONE: LogRequest =
+            LogRequest { ticket: 0, which: RequestedLog::At(0), what: RequestedPart::Length };
         Self {
             wants: Ring::new([NONE; WANTS]),
             answers: Ring::new([(Answer::none(0), heapless::Vec::new())]),
@@ -136,8 +137,11 @@ impl Server<'_> {
 
     #[cfg(test)]
     pub(crate) fn serve_text(&mut self, text: &[u8]) {
-        let Some(&mut LogRequest { ticket, which: Which::Settings, what: What::Data(offset) }) =
-            self.wants.waiting().first_mut()
+        let Some(&mut LogRequest {
+            ticket,
+            which: RequestedLog::Settings,
+            what: RequestedPart::Data(offset),
+        }) = self.wants.waiting().first_mut()
         else {
             return;
         };
@@ -158,7 +162,7 @@ impl Server<'_> {
             return true;
         }
         match self.wants.waiting().first().copied() {
-            Some(LogRequest { what: What::Erase, .. }) => {
+            Some(LogRequest { what: RequestedPart::Erase, .. }) => {
                 self.wants.release(1);
                 self.erases = Some(0);
                 true
@@ -171,7 +175,7 @@ impl Server<'_> {
     fn answer<D: CardDevice>(&mut self, recorder: &mut Recorder<'_, D>, want: &LogRequest) -> bool {
         let Some((to, data)) = self.answers.free() else { return false };
         self.wants.release(1);
-        if want.which != Which::Settings {
+        if want.which != RequestedLog::Settings {
             // One conversation at a time: a request for something else cancels a checksum.
             self.sum = None;
         }
@@ -180,21 +184,21 @@ impl Server<'_> {
         data.clear();
         if let (Some(card), Some(mut segment)) = (recorder.card(), log.segment) {
             match want.what {
-                What::Data(offset) => {
+                RequestedPart::Data(offset) => {
                     answer.offset = offset;
                     copy(card, &mut segment, &answer, data);
                 }
-                What::Checksum(bytes) => {
+                RequestedPart::Checksum(bytes) => {
                     let bytes = if bytes == 0 { answer.bytes } else { bytes.min(answer.bytes) };
                     let log = FoundLog { answer: Answer { offset: bytes, ..answer }, segment };
                     self.sum = Some(Sum { log, done: 0, so_far: 0 });
                 }
-                What::Length | What::Erase => {}
+                RequestedPart::Length | RequestedPart::Erase => {}
             }
             self.last = Some(FoundLog { answer, segment })
-                .filter(|found| want.which != Which::Settings && found.answer.found.is_ok());
+                .filter(|found| want.which != RequestedLog::Settings && found.answer.found.is_ok());
         }
-        if self.sum.is_some() && matches!(want.what, What::Checksum(_)) {
+        if self.sum.is_some() && matches!(want.what, RequestedPart::Checksum(_)) {
             return true;
         }
         *to = answer;
@@ -258,11 +262,11 @@ fn find<D: CardDevice>(
     (answer.count, answer.directory) = card.shown();
     let of_none = |why| Lookup { answer: answer.without(why), segment: None };
     let found = match want.which {
-        Which::Settings => {
+        RequestedLog::Settings => {
             let Some((segment, bytes)) = card.settings() else { return none };
             return Lookup { answer: Answer { found: Ok(()), bytes, ..none.answer }, segment: Some(segment) };
         }
-        Which::Same(log) => {
+        RequestedLog::Same(log) => {
             if let Some(FoundLog { answer, mut segment }) = last.filter(|last| last.answer.log == log)
                 && holds(card, &mut segment, &log) == Some(true)
             {
@@ -270,9 +274,9 @@ fn find<D: CardDevice>(
             }
             card.shown_log(log.name)
         }
-        Which::Named(name) => card.shown_log(name),
-        Which::At(place) if place >= answer.count => return of_none(NoLog::Absent),
-        Which::At(place) => at_place(card, place, listed),
+        RequestedLog::Named(name) => card.shown_log(name),
+        RequestedLog::At(place) if place >= answer.count => return of_none(NoLog::Absent),
+        RequestedLog::At(place) => at_place(card, place, listed),
     };
     let entry = match found {
         Ok(Some(entry)) => entry,
@@ -285,7 +289,7 @@ fn find<D: CardDevice>(
         None => measure(card, &mut segment, entry.name),
     };
     let Some((log, blocks)) = measured else { return of_none(NoLog::Unread) };
-    if matches!(want.which, Which::Same(wanted) if wanted != log) {
+    if matches!(want.which, RequestedLog::Same(wanted) if wanted != log) {
         return of_none(NoLog::Absent);
     }
     (answer.log, answer.bytes, answer.found) = (log, blocks * BLOCK_BYTES as u32, Ok(()));

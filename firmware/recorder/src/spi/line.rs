@@ -5,7 +5,7 @@ use hums_core::clock::{Instant, Span};
 use super::crc::{crc7, crc16};
 use super::error::SpiError;
 use super::port::{Port, PortFailed};
-use crate::Meanwhile;
+use crate::WaitWork;
 
 /// Maximum busy time of a card. The specification allows 250 to 500 ms (4.6.2.2); good cards have been seen to stand
 /// still for 2.5 s.
@@ -127,7 +127,7 @@ impl<P: Port> Line<P> {
         self.command(command, argument)
     }
 
-    pub(super) fn receive(&mut self, block: &mut [u8], meanwhile: Meanwhile<'_>) -> Result<(), SpiError> {
+    pub(super) fn receive(&mut self, block: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), SpiError> {
         let token = self.within(DATA_MAX, SpiError::NoData, |line| {
             meanwhile();
             Ok(Some(line.byte()?).filter(|token| *token != 0xFF))

@@ -20,7 +20,7 @@ mod registers;
 
 use core::cell::RefCell;
 
-use crate::{BLOCK_BYTES, Block, CardDevice, Meanwhile};
+use crate::{BLOCK_BYTES, Block, CardDevice, WaitWork};
 use hums_core::clock::{Instant, Span};
 
 pub use error::SpiError;
@@ -113,7 +113,7 @@ fn read<P: Port>(
     line: &mut Line<P>,
     address: u32,
     blocks: &mut [Block],
-    meanwhile: Meanwhile<'_>,
+    meanwhile: WaitWork<'_>,
 ) -> Result<(), SpiError> {
     if let [block] = blocks {
         line.must(READ, address)?;
@@ -163,7 +163,7 @@ impl<P: Port> CardDevice for SpiCard<P> {
         self.read_while(blocks, start, &mut || true)
     }
 
-    fn read_while(&self, blocks: &mut [Block], start: u32, meanwhile: Meanwhile<'_>) -> Result<(), SpiError> {
+    fn read_while(&self, blocks: &mut [Block], start: u32, meanwhile: WaitWork<'_>) -> Result<(), SpiError> {
         if blocks.is_empty() {
             return Ok(());
         }

@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 
-use crate::Meanwhile;
+use crate::WaitWork;
 
 /// Bytes between two calls of other work: 30 µs of a port that the processor moves.
 const PART_BYTES: usize = 32;
@@ -29,7 +29,7 @@ pub trait Port {
     fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed>;
 
     /// Receives bytes. `meanwhile` is called often.
-    fn receive(&mut self, bytes: &mut [u8], meanwhile: Meanwhile<'_>) -> Result<(), PortFailed> {
+    fn receive(&mut self, bytes: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), PortFailed> {
         bytes.fill(0xFF);
         bytes.chunks_mut(PART_BYTES).try_for_each(|part| {
             meanwhile();

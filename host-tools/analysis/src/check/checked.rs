@@ -1,6 +1,6 @@
 //! A recording and its judgement.
 
-use super::judged::Judged;
+use super::judged::Judgement;
 use crate::ending::Ending;
 use crate::outcome::Outcome;
 use crate::soundness::Soundness;
@@ -14,7 +14,7 @@ pub struct Checked {
     /// Format of the recording.
     pub format: Format,
     /// The judgement.
-    pub judged: Judged,
+    pub judged: Judgement,
     /// The evidence of its end, for a HUMS log.
     pub ending: Option<Ending>,
 }

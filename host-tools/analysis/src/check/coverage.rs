@@ -2,7 +2,7 @@
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{Check, Level, Scope, Side, VOCABULARY, When, checks, vocabulary};
+use hums_core::health::{Check, CheckPhase, Level, Scope, Side, VOCABULARY, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
 use hums_core::params::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
@@ -126,8 +126,8 @@ impl Recording<'_> {
         }
         match words.scope {
             // Without alerts neither good nor bad.
-            Scope::Said if is_found => return Verdict::Judged,
-            Scope::Said => return Verdict::NotMeant,
+            Scope::Alerts if is_found => return Verdict::Judged,
+            Scope::Alerts => return Verdict::NotMeant,
             Scope::ArduPilot if autopilot == Some(Autopilot::Px4) => return Verdict::NotMeant,
             Scope::Px4 if autopilot == Some(Autopilot::ArduPilot) => return Verdict::NotMeant,
             _ if autopilot.is_none() => return not("no heartbeat of an autopilot"),
@@ -160,13 +160,13 @@ impl Recording<'_> {
             return Verdict::Judged;
         }
         match check.when {
-            When::Armed | When::InFlight if self.armed == Span::ZERO => {
+            CheckPhase::Armed | CheckPhase::InFlight if self.armed == Span::ZERO => {
                 not(self.arming.unwrap_or("never armed"))
             }
-            When::InFlight if !self.flew && !tells_flight(self.monitor.vehicle()) => {
+            CheckPhase::InFlight if !self.flew && !tells_flight(self.monitor.vehicle()) => {
                 not("not known whether it was in the air")
             }
-            When::InFlight if !self.flew => not("never in the air"),
+            CheckPhase::InFlight if !self.flew => not("never in the air"),
             _ if seen.value => not("only for a moment in this recording"),
             _ if !had_fix && OF_A_FIX.contains(&check.name) => {
                 Verdict::NotJudged(self.why_no_fix(words.needs))

@@ -5,12 +5,12 @@ use serde::Serialize;
 
 use super::checked::Checked;
 use super::flights::Flight;
-use super::judged::{Judged, JudgedBy};
+use super::judged::{JudgedBy, Judgement};
 use super::problem::Problem;
 use super::text::firmware;
 use crate::log_json::{FindingJson, finite};
 use crate::names::{autopilot_name, type_name, vocabulary};
-use crate::source::item::{About, Gap};
+use crate::source::item::{FactSubject, Gap};
 use crate::states;
 use crate::utc::iso8601;
 
@@ -232,7 +232,7 @@ fn seconds(span: hums_core::clock::Span) -> f64 {
     span.as_micros() as f64 / 1e6
 }
 
-fn vehicle(judged: &Judged) -> Option<VehicleJson> {
+fn vehicle(judged: &Judgement) -> Option<VehicleJson> {
     let (source, heartbeat) = judged.vehicle().source.zip(judged.vehicle().heartbeat.get())?;
     let identity = judged.vehicle().identity.get();
     let fact = |about| judged.facts.get(&about).cloned();
@@ -242,8 +242,8 @@ fn vehicle(judged: &Judged) -> Option<VehicleJson> {
         autopilot: autopilot_name(heartbeat.autopilot_number),
         r#type: type_name(heartbeat.type_number),
         version: identity.and_then(|identity| firmware(identity.firmware)),
-        firmware: fact(About::Firmware),
-        hardware: fact(About::Hardware),
+        firmware: fact(FactSubject::Firmware),
+        hardware: fact(FactSubject::Hardware),
         uid: identity.filter(|identity| identity.uid != 0).map(|identity| format!("{:016x}", identity.uid)),
     })
 }

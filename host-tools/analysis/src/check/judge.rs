@@ -27,14 +27,14 @@ use super::clock::{Clock, SETTLE};
 use super::coverage::{Coverage, Recording};
 use super::details::{self, Details};
 use super::flights::{Flight, Flights, begin_in_air, is_in_air};
-use super::judged::{BoxAir, Holes, Judged, JudgedBy};
+use super::judged::{BoxAir, Holes, JudgedBy, Judgement};
 use super::link_loss::{LinkLoss, Verdict};
 use super::problem::{IMPACT, LISTED_MAX, Problems};
-use super::trends::{self, Episode, Flown};
+use super::trends::{self, Episode, FlightFigures};
 use crate::names::vocabulary;
 use crate::part;
 use crate::source::epochs::Epochs;
-use crate::source::item::{About, Cause as Why, Event, Fact, Gap, Item, Text};
+use crate::source::item::{Cause as Why, Event, Fact, FactSubject, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::repairs::Repairs;
 use crate::source::told::{Finding, MonitorRecord};
@@ -56,7 +56,7 @@ const DISARMED: &str = "disarmed_in_air";
 
 /// Place of reception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Heard {
+pub enum ReceptionPlace {
     /// Checks of the wire are not judged.
     #[default]
     Somewhere,
@@ -127,7 +127,7 @@ pub struct Judge {
     cells: Cells,
     flights: Flights,
     episodes: Vec<Episode>,
-    facts: BTreeMap<About, String>,
+    facts: BTreeMap<FactSubject, String>,
     details: Details,
     epochs: Epochs,
     gaps: Vec<Gap>,
@@ -140,7 +140,7 @@ pub struct Judge {
     joints: Vec<Instant>,
     /// No times from here on.
     no_times: Option<Instant>,
-    /// See [`Judged::box_air`].
+    /// See [`Judgement::box_air`].
     box_air: Option<BoxAir>,
 }
 
@@ -185,11 +185,11 @@ impl Judge {
 
     /// Received at this place.
     #[must_use]
-    pub fn heard(self, heard: Heard) -> Self {
-        Self { wire: (heard == Heard::OnTheWire).then(Sequences::new), ..self }
+    pub fn heard(self, heard: ReceptionPlace) -> Self {
+        Self { wire: (heard == ReceptionPlace::OnTheWire).then(Sequences::new), ..self }
     }
 
-    /// Flight from 0, as in [`Judged::flights`].
+    /// Flight from 0, as in [`Judgement::flights`].
     pub fn flight(&self) -> Option<usize> {
         self.flights.going_on()
     }
@@ -239,11 +239,14 @@ impl Judge {
                     self.link_loss.observe(steps, observation, self.monitor.vehicle());
                 }
             }
-            Item::Fact(Fact { about: About::Failsafes, words }) => {
+            Item::Fact(Fact { about: FactSubject::Failsafes, words }) => {
                 self.details.failsafes(words);
                 self.tell(details::FAILSAFE);
             }
-            Item::Fact(Fact { about: about @ (About::Emergency | About::ProcessorFault), words }) => {
+            Item::Fact(Fact {
+                about: about @ (FactSubject::Emergency | FactSubject::ProcessorFault),
+                words,
+            }) => {
                 self.reported(at, about, words);
             }
             Item::Fact(fact) => {
@@ -470,8 +473,8 @@ impl Judge {
     }
 
     /// An end at its report: motors stop, or the processor restarts.
-    fn reported(&mut self, at: Instant, about: About, words: &str) {
-        let is_emergency = about == About::Emergency;
+    fn reported(&mut self, at: Instant, about: FactSubject, words: &str) {
+        let is_emergency = about == FactSubject::Emergency;
         let what = if is_emergency { details::EMERGENCY } else { details::PROCESSOR_FAULT };
         self.advance(at);
         if self.here.is_open(what.0) {
@@ -561,7 +564,7 @@ impl Judge {
                 }
                 Happening::Landing => {
                     self.flights.landing();
-                    self.episodes.push(Episode::Flown(Box::new(Flown::of(now, true, &self.monitor))));
+                    self.episodes.push(Episode::Flown(Box::new(FlightFigures::of(now, true, &self.monitor))));
                 }
                 Happening::OtherVehicle => {
                     self.flights.break_off();
@@ -610,7 +613,7 @@ impl Judge {
 
     /// Guessed arming: a closed throttle does not disarm.
     fn distrust_disarming(&mut self) {
-        if self.facts.get(&About::Arming).is_some_and(|words| !words.is_empty()) {
+        if self.facts.get(&FactSubject::Arming).is_some_and(|words| !words.is_empty()) {
             self.here.drop_checks(|check| check == DISARMED);
             self.flights.forget_disarming();
         }
@@ -648,7 +651,7 @@ impl Judge {
     fn remarks(&mut self, by: JudgedBy, flights: &[Flight]) -> Vec<String> {
         let (of_cells, of_vehicles) =
             (self.cells.words(by, begin_in_air(flights)), self.details.remarks(self.system()));
-        let of_file = [About::Beginning, About::Unchecked].map(|about| self.facts.remove(&about));
+        let of_file = [FactSubject::Beginning, FactSubject::Unchecked].map(|about| self.facts.remove(&about));
         let remarks = joined(&self.joints).into_iter().chain(of_cells).chain(of_vehicles);
         remarks.chain(of_file.into_iter().flatten()).collect()
     }
@@ -661,13 +664,17 @@ impl Judge {
                 self.tick(self.last);
             }
             if self.monitor.flight().is_open() {
-                self.episodes.push(Episode::Flown(Box::new(Flown::of(self.last, false, &self.monitor))));
+                self.episodes.push(Episode::Flown(Box::new(FlightFigures::of(
+                    self.last,
+                    false,
+                    &self.monitor,
+                ))));
             }
         }
     }
 
     /// Ends the judging.
-    pub fn end(mut self) -> Judged {
+    pub fn end(mut self) -> Judgement {
         self.step_to_end();
         self.settle();
         let ends_in_air = self.ends_in_air();
@@ -705,12 +712,16 @@ impl Judge {
             is_of_link: self.format.is_of_link(),
             on_the_wire: self.wire.is_some(),
             armed,
-            arming: self.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty()),
+            arming: self
+                .facts
+                .get(&FactSubject::Arming)
+                .map(String::as_str)
+                .filter(|words| !words.is_empty()),
             flew: !flights.is_empty(),
             cells_unknown: self.cells.are_unknown(by),
             problems: &worst_first,
         });
-        let judged = Judged {
+        let judged = Judgement {
             by,
             monitor: self.monitor,
             facts: self.facts,

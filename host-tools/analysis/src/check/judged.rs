@@ -13,7 +13,7 @@ use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
 use super::trends::{Baselines, Episode, because};
 use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
-use crate::source::item::{About, Cause, Gap};
+use crate::source::item::{Cause, FactSubject, Gap};
 use crate::source::told::Finding;
 use crate::summary::{EndsInAir, JudgedChecks};
 
@@ -76,13 +76,13 @@ impl Holes {
 
 /// The judgement of a recording.
 #[derive(Clone, Debug)]
-pub struct Judged {
+pub struct Judgement {
     /// Who judged.
     pub by: JudgedBy,
     /// Vehicle, usage, exceedances at the end.
     pub monitor: Box<Monitor>,
     /// The last of each kind.
-    pub facts: BTreeMap<About, String>,
+    pub facts: BTreeMap<FactSubject, String>,
     /// UTC of each part of the recording.
     pub epochs: Epochs,
     /// First and last time.
@@ -127,7 +127,7 @@ pub struct Judged {
     pub is_timeless: bool,
 }
 
-impl Judged {
+impl Judgement {
     /// The vehicle, as it was known at the end.
     pub fn vehicle(&self) -> &Vehicle {
         self.monitor.vehicle()

@@ -41,11 +41,11 @@ use crate::progress;
 use crate::source::find::{find_each, sessions_of};
 use crate::source::recording::{Format, LogPlace};
 use checked::Checked;
-use judge::{Heard, Limits};
-use judged::Judged;
+use judge::{Limits, ReceptionPlace};
+use judged::Judgement;
 use overview::Read;
 use past::{Past, Series};
-use text::{NotJudged, Table};
+use text::{Table, UnjudgedList};
 
 /// The request of `hums check`.
 #[derive(Clone, Copy, Debug)]
@@ -69,8 +69,8 @@ pub struct Request<'a> {
 }
 
 impl Request<'_> {
-    const fn mention(&self) -> NotJudged {
-        if self.verbose { NotJudged::Listed } else { NotJudged::Counted(" (-v lists them)") }
+    const fn mention(&self) -> UnjudgedList {
+        if self.verbose { UnjudgedList::Listed } else { UnjudgedList::Counted(" (-v lists them)") }
     }
 }
 
@@ -154,7 +154,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
 }
 
 fn told(past: &Past, place: &LogPlace, shows: bool) -> Told {
-    let read = past.judge(place, Heard::Somewhere, shows).and_then(|read| {
+    let read = past.judge(place, ReceptionPlace::Somewhere, shows).and_then(|read| {
         overview::is_heard(place, read.judged.vehicle().source.is_some())?;
         Ok(checked(place, read))
     });
@@ -162,7 +162,7 @@ fn told(past: &Past, place: &LogPlace, shows: bool) -> Told {
 }
 
 /// A link's recording, once for each of several vehicles; empty for one. Of standard input, read once, one is judged.
-fn vehicles(place: &LogPlace, format: Format, judged: &Judged) -> Vec<LogPlace> {
+fn vehicles(place: &LogPlace, format: Format, judged: &Judgement) -> Vec<LogPlace> {
     let is_of_several = place.system.is_none() && format.is_of_link() && judged.systems.len() > 1;
     let is_apart = is_of_several && place.path().is_some();
     if is_apart { judged.systems.iter().map(|system| place.of_system(*system)).collect() } else { Vec::new() }
@@ -171,7 +171,8 @@ fn vehicles(place: &LogPlace, format: Format, judged: &Judged) -> Vec<LogPlace> 
 /// A recording, once for each of its vehicles: those that `hums check` judges. An unreadable recording is returned as it is.
 pub fn by_vehicle(place: &LogPlace) -> Vec<LogPlace> {
     let is_of_link = place.path().is_some() && place.open().is_ok_and(|open| open.format.is_of_link());
-    let read = is_of_link.then(|| overview::judge(place, &Limits::default(), Heard::Somewhere, false));
+    let read =
+        is_of_link.then(|| overview::judge(place, &Limits::default(), ReceptionPlace::Somewhere, false));
     let read = read.and_then(Result::ok);
     let all = read.map(|read| vehicles(place, read.format, &read.judged)).unwrap_or_default();
     if all.is_empty() { vec![place.clone()] } else { all }
@@ -198,7 +199,7 @@ impl HasEnding for Told {
 }
 
 /// Judges one recording, as `hums check` does.
-pub fn recording(place: &LogPlace, limits: &Limits, heard: Heard) -> Result<Checked> {
+pub fn recording(place: &LogPlace, limits: &Limits, heard: ReceptionPlace) -> Result<Checked> {
     overview::judge(place, limits, heard, false).map(|read| checked(place, read))
 }
 

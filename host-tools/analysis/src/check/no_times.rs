@@ -3,13 +3,13 @@
 use hums_core::clock::{Instant, Span};
 
 use super::clock::SETTLE;
-use super::judged::Judged;
+use super::judged::Judgement;
 use crate::source::item::Cause;
 
 /// No check is judged.
 const WHY: &str = "the recording has no times";
 
-impl Judged {
+impl Judgement {
     /// Removes results from there to the next joint, and those of an unknown vehicle.
     pub(super) fn what_is_known(
         self,

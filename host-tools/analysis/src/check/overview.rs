@@ -12,8 +12,8 @@ use hums_core::observation::Observation;
 use hums_core::usage::UsageCounter;
 
 use super::flights::Flight;
-use super::judge::{Heard, Judge, Limits};
-use super::judged::Judged;
+use super::judge::{Judge, Limits, ReceptionPlace};
+use super::judged::Judgement;
 use super::problem::{give_worst, problems};
 use crate::counters::is_told;
 use crate::ending::Ending;
@@ -23,7 +23,7 @@ use crate::logs::reader;
 use crate::names::counter_name;
 use crate::outcome::usage;
 use crate::progress;
-use crate::source::item::{Gap, Item, RecordingSummary, Take, Want};
+use crate::source::item::{Gap, Item, ItemReceiver, Needs, RecordingSummary};
 use crate::source::recording::{Format, LogPlace};
 use crate::summary::{Contents, ExceedanceLine, Overview};
 
@@ -37,29 +37,29 @@ const LOOK_EVERY: u32 = 4_096;
 pub(super) struct Read {
     pub(super) format: Format,
     /// The judgement.
-    pub(super) judged: Judged,
+    pub(super) judged: Judgement,
     pub(super) summary: RecordingSummary,
     /// Bytes of the file that were read.
     taken: u64,
 }
 
 /// `shows`: progress.
-pub(super) fn judge(place: &LogPlace, limits: &Limits, heard: Heard, shows: bool) -> Result<Read> {
+pub(super) fn judge(place: &LogPlace, limits: &Limits, heard: ReceptionPlace, shows: bool) -> Result<Read> {
     judge_telling(place, limits, heard, shows, &mut |_, _| Ok(()))
 }
 
 fn judge_telling(
     place: &LogPlace,
     limits: &Limits,
-    heard: Heard,
+    heard: ReceptionPlace,
     shows: bool,
-    take: &mut Take<'_>,
+    take: &mut ItemReceiver<'_>,
 ) -> Result<Read> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
     let (mut judge, mut items) = (Judge::new(limits, format).heard(heard), 0_u32);
-    let want = Want { observations: true, frames: heard == Heard::OnTheWire, ..Want::default() };
+    let want = Needs { observations: true, frames: heard == ReceptionPlace::OnTheWire, ..Needs::default() };
     let summary = recording.read(want, &mut |at, item| {
         judge.item(at, item);
         items = items.wrapping_add(1);
@@ -79,11 +79,14 @@ pub fn overview(place: &LogPlace) -> Result<Overview> {
 
 /// The same, and hands on the recording's content in order: one reading for both. Returns the judgement too, if the monitor
 /// here checked the recording.
-pub fn overview_telling(place: &LogPlace, take: &mut Take<'_>) -> Result<(Overview, Option<Judged>)> {
+pub fn overview_telling(
+    place: &LogPlace,
+    take: &mut ItemReceiver<'_>,
+) -> Result<(Overview, Option<Judgement>)> {
     read(place, Some(take))
 }
 
-fn read(place: &LogPlace, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+fn read(place: &LogPlace, take: Option<&mut ItemReceiver<'_>>) -> Result<(Overview, Option<Judgement>)> {
     match place.own() {
         Some(log) => read_own(place, log, take),
         None => read_other(place, take),
@@ -93,8 +96,8 @@ fn read(place: &LogPlace, take: Option<&mut Take<'_>>) -> Result<(Overview, Opti
 fn read_own(
     place: &LogPlace,
     log: &Log,
-    mut take: Option<&mut Take<'_>>,
-) -> Result<(Overview, Option<Judged>)> {
+    mut take: Option<&mut ItemReceiver<'_>>,
+) -> Result<(Overview, Option<Judgement>)> {
     let (limits, is_told) = (Limits::default(), take.is_some());
     // A monitor ran: not judged here.
     let has_start = has_start(log);
@@ -124,7 +127,7 @@ fn read_own(
     if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
         let judged = match here {
             Some(here) => here,
-            None => judge(place, &limits, Heard::Somewhere, true)?.judged,
+            None => judge(place, &limits, ReceptionPlace::Somewhere, true)?.judged,
         };
         if is_checked && breaks_off {
             give_worst(&mut overview.contents.findings, &judged.problems);
@@ -139,12 +142,15 @@ fn read_own(
     Ok((overview, kept))
 }
 
-fn read_other(place: &LogPlace, take: Option<&mut Take<'_>>) -> Result<(Overview, Option<Judged>)> {
+fn read_other(
+    place: &LogPlace,
+    take: Option<&mut ItemReceiver<'_>>,
+) -> Result<(Overview, Option<Judgement>)> {
     let (limits, is_told) = (Limits::default(), take.is_some());
     let mut nothing = |_, _: Item<'_>| Ok(());
     let take = take.unwrap_or(&mut nothing);
     let Read { format, judged, summary, taken } =
-        judge_telling(place, &limits, Heard::Somewhere, true, take)?;
+        judge_telling(place, &limits, ReceptionPlace::Somewhere, true, take)?;
     is_heard(place, judged.vehicle().source.is_some())?;
     let mut contents = Contents {
         messages: summary.messages,
@@ -191,7 +197,7 @@ pub(super) fn is_heard(place: &LogPlace, heard: bool) -> Result<()> {
     if !place.is_standard() {
         let mut all = place.clone();
         all.system = None;
-        all.open()?.read(Want { observations: true, ..Want::default() }, &mut |_, item| {
+        all.open()?.read(Needs { observations: true, ..Needs::default() }, &mut |_, item| {
             if let Item::Observation(source, Observation::Heartbeat(_)) = item {
                 systems.insert(source.system);
             }
@@ -204,14 +210,14 @@ pub(super) fn is_heard(place: &LogPlace, heard: bool) -> Result<()> {
 }
 
 /// Number of judged checks; removes counters without a source.
-fn look(contents: &mut Contents, judged: &Judged) {
+fn look(contents: &mut Contents, judged: &Judgement) {
     contents.judged = Some(judged.checks());
     let vehicle = judged.vehicle();
     contents.usage.retain(|name, _| is_told(name, vehicle));
 }
 
 /// Ends in the air, or armed: counters go on from the box's last store to the end.
-fn go_on(overview: &mut Overview, judged: &Judged) {
+fn go_on(overview: &mut Overview, judged: &Judgement) {
     let is_whole = overview.ending.summary.first_number == Some(0);
     let is_stored = overview.counted_until().is_some();
     let contents = &mut overview.contents;
@@ -229,7 +235,7 @@ fn go_on(overview: &mut Overview, judged: &Judged) {
 }
 
 /// The monitor's here.
-fn counters(judged: &Judged) -> Vec<(String, f64)> {
+fn counters(judged: &Judgement) -> Vec<(String, f64)> {
     // On the ground until its flight was seen.
     let begins_in_air = judged.begins_in_air();
     let monitor = &judged.monitor;
@@ -248,7 +254,7 @@ fn counters(judged: &Judged) -> Vec<(String, f64)> {
 }
 
 /// The monitor's here.
-fn fill(contents: &mut Contents, judged: Judged) {
+fn fill(contents: &mut Contents, judged: Judgement) {
     contents.unheard = judged.unheard();
     contents.judged = Some(judged.checks());
     contents.begins_in_air = judged.begins_in_air();
@@ -257,7 +263,7 @@ fn fill(contents: &mut Contents, judged: Judged) {
     contents.is_lossy = judged.is_lossy();
     let is_judged = judged.worst().is_some();
     let counters = counters(&judged);
-    let Judged { monitor, findings, findings_count, span, remarks, .. } = judged;
+    let Judgement { monitor, findings, findings_count, span, remarks, .. } = judged;
     contents.remarks = remarks;
     contents.vehicle = vehicle(&monitor);
     contents.checked_here = contents.vehicle.is_some() && is_judged;

@@ -6,7 +6,7 @@ mod writer;
 
 use super::judge::{Judge, Limits};
 use crate::source::dataflash::binary;
-use crate::source::item::Want;
+use crate::source::item::Needs;
 use crate::source::recording::Format;
 use writer::Writer;
 
@@ -27,7 +27,7 @@ fn fly(log: &mut Writer, tenths: std::ops::Range<u64>, silent: bool) {
 
 fn silences(log: &Writer) -> usize {
     let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
-    let want = Want { observations: true, ..Want::default() };
+    let want = Needs { observations: true, ..Needs::default() };
     binary(&log.bytes[..], want, &mut |at, item| {
         judge.item(at, item);
         Ok(())

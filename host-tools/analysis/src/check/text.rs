@@ -12,7 +12,7 @@ use hums_core::health::{Level, Side, Subsystem};
 use super::checked::Checked;
 use super::flights::{Flight, Mishap};
 use super::grouped::{Group, grouped, is_critical};
-use super::judged::{Judged, JudgedBy};
+use super::judged::{JudgedBy, Judgement};
 use super::problem::{IMPACT, Problem, side};
 use crate::colour::level as coloured;
 use crate::counters::tells_flight;
@@ -21,9 +21,9 @@ use crate::part;
 use crate::plural::count;
 use crate::printable::word;
 use crate::soundness::Soundness;
-use crate::source::item::{About, Cause, Gap};
+use crate::source::item::{Cause, FactSubject, Gap};
 use crate::source::recording::Format;
-use crate::states::{Shown, Values, meaning, quantity, shown};
+use crate::states::{ShownValue, Values, meaning, quantity, shown};
 use crate::summary::since_power_on;
 use crate::table::{self, left, right};
 use crate::utc::{clock, iso8601, moment};
@@ -38,7 +38,7 @@ const CRITICAL: &str = "CRITICAL";
 
 /// Mention of the checks without data.
 #[derive(Clone, Copy, Debug)]
-pub enum NotJudged {
+pub enum UnjudgedList {
     /// Each, with its reason.
     Listed,
     /// Their number, and where the list is.
@@ -46,11 +46,11 @@ pub enum NotJudged {
 }
 
 /// A log's answer.
-pub fn screen(checked: &Checked, mention: NotJudged) -> String {
+pub fn screen(checked: &Checked, mention: UnjudgedList) -> String {
     let judged = &checked.judged;
     let mut text = format!("{}: {}{}\n", word(&checked.name), word(&verdict(judged)), but(checked));
     let has_data = judged.worst().is_some() && judged.checks().judged > 0;
-    if has_data || judged.facts.contains_key(&About::Firmware) {
+    if has_data || judged.facts.contains_key(&FactSubject::Firmware) {
         let _ = writeln!(text, "  log      {}", checked.format.words());
         let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
         let _ = writeln!(text, "  when     {}", when(checked));
@@ -202,21 +202,21 @@ fn logs(number: u64) -> String {
     count(number, "log")
 }
 
-fn vehicle(judged: &Judged) -> String {
+fn vehicle(judged: &Judgement) -> String {
     let Some((source, heartbeat)) = judged.vehicle().source.zip(judged.vehicle().heartbeat.get()) else {
         let firmware = judged
             .facts
-            .get(&About::Firmware)
+            .get(&FactSubject::Firmware)
             .map(|firmware| format!("{firmware}, of which nothing was heard"));
         return firmware.or_else(|| judged.unheard()).unwrap_or_default();
     };
-    let told = judged.facts.get(&About::Firmware).cloned();
+    let told = judged.facts.get(&FactSubject::Firmware).cloned();
     let firmware = told.unwrap_or_else(|| {
         let version = judged.vehicle().identity.get().and_then(|identity| firmware(identity.firmware));
         format!("{} {}", autopilot_name(heartbeat.autopilot_number), version.unwrap_or_default())
     });
     let mut text = format!("{}, {}", type_name(heartbeat.type_number), firmware.trim_end());
-    if let Some(hardware) = judged.facts.get(&About::Hardware) {
+    if let Some(hardware) = judged.facts.get(&FactSubject::Hardware) {
         let _ = write!(text, ", {hardware}");
     }
     let _ = write!(text, ", system {}", source.system);
@@ -254,7 +254,7 @@ fn when(checked: &Checked) -> String {
 
 fn in_air(checked: &Checked) -> String {
     let judged = &checked.judged;
-    let told = judged.facts.get(&About::Arming).map(String::as_str).filter(|words| !words.is_empty());
+    let told = judged.facts.get(&FactSubject::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
     if judged.worst().is_none() {
         return "not known".to_owned();
@@ -330,7 +330,7 @@ fn not_seen(flights: &[Flight]) -> String {
 }
 
 /// A sentence: the worst finding, its time, its meaning for the next flight.
-pub fn verdict(judged: &Judged) -> String {
+pub fn verdict(judged: &Judgement) -> String {
     let counted = |level, one: &str| {
         let count = judged.problems.iter().filter(|problem| problem.level == level).count();
         (count > 0).then(|| self::count(count as u64, one))
@@ -361,7 +361,7 @@ pub fn verdict(judged: &Judged) -> String {
 }
 
 /// A crash first: it is what the flight is known for.
-fn headline(judged: &Judged) -> String {
+fn headline(judged: &Judgement) -> String {
     let groups = grouped(&judged.problems);
     let found = found(&groups);
     let mishap = judged.flights.iter().find_map(|flight| flight.mishap);
@@ -372,7 +372,7 @@ fn headline(judged: &Judged) -> String {
     let how =
         mishaps.find(|problem| !is_impact || problem.check == IMPACT).map_or_else(String::new, |problem| {
             let worst = match shown(&problem.check, problem.value, problem.limit) {
-                Shown::Quantity(Some(worst), _) => format!(" {}", quantity(worst, &problem.unit)),
+                ShownValue::Quantity(Some(worst), _) => format!(" {}", quantity(worst, &problem.unit)),
                 _ => String::new(),
             };
             format!(" ({}{worst})", alarm(&[problem]))
@@ -463,7 +463,7 @@ fn details(problem: &Problem, max: usize) -> String {
 
 fn values(problem: &Problem) -> Option<(Values, Option<String>)> {
     let Problem { check, onset, value, limit, unit, .. } = problem;
-    let Shown::Quantity(worst, limit) = shown(check, *value, *limit) else { return None };
+    let ShownValue::Quantity(worst, limit) = shown(check, *value, *limit) else { return None };
     Some((Values::new(*onset, worst, unit), limit.map(|limit| quantity(limit, unit))))
 }
 
@@ -501,9 +501,9 @@ fn not_judged(text: &mut String, judged: &Judged, mention: NotJudged) {
     }
     let count = format!("  not judged: {} of {} checks", checks.all - checks.judged, checks.all);
     let _ = match mention {
-        NotJudged::Counted(_) if checks.judged == 0 => Ok(()),
-        NotJudged::Counted(list) => writeln!(text, "{count}, which lack data in this log{list}"),
-        NotJudged::Listed => {
+        UnjudgedList::Counted(_) if checks.judged == 0 => Ok(()),
+        UnjudgedList::Counted(list) => writeln!(text, "{count}, which lack data in this log{list}"),
+        UnjudgedList::Listed => {
             writeln!(text, "{count}, and those that need a box or earlier flights\n{}", reasons(judged))
         }
     };
@@ -526,7 +526,7 @@ pub fn reasons(judged: &Judged) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-fn damage(text: &mut String, judged: &Judged) {
+fn damage(text: &mut String, judged: &Judgement) {
     let mut shown: Vec<&Gap> = judged.gaps.iter().filter(|gap| gap.cause != Cause::NotKept).collect();
     if shown.len() > LINES_MAX {
         shown.sort_by_key(|gap| how_bad(gap));

@@ -18,7 +18,7 @@
 //! Wear never improves hover or battery: a flight better beyond its reach begins a new baseline, because a part was changed.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::Why;
+use hums_blackbox::record::ComponentReason;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::component::ComponentKind;
@@ -54,7 +54,7 @@ pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
 
 pub(super) fn is_change(record: &Record<'_>) -> bool {
     match record {
-        Record::Component(part) => part.why == Why::Replaced && part.kind != ComponentKind::Card,
+        Record::Component(part) => part.why == ComponentReason::Replaced && part.kind != ComponentKind::Card,
         Record::Event(event) => event.text.starts_with(PARTS_CHANGED),
         _ => false,
     }
@@ -114,14 +114,14 @@ fn terms(quantity: Quantity) -> Terms {
 #[derive(Clone, Debug)]
 pub enum Episode {
     /// A flight.
-    Flown(Box<Flown>),
+    Flown(Box<FlightFigures>),
     /// Earlier flights are no measure.
     Changed,
 }
 
 /// One flight's.
 #[derive(Clone, Debug)]
-pub struct Flown {
+pub struct FlightFigures {
     /// Landing, or the recording's end.
     at: Instant,
     landed: bool,
@@ -130,7 +130,7 @@ pub struct Flown {
     is_linear_in_thrust: bool,
 }
 
-impl Flown {
+impl FlightFigures {
     /// A flight at the landing or the recording's end.
     pub fn of(at: Instant, landed: bool, monitor: &Monitor) -> Self {
         let autopilot = monitor.vehicle().heartbeat.get().map(|heartbeat| heartbeat.autopilot);
@@ -221,7 +221,7 @@ impl Baselines {
         (flights >= FLIGHTS_MIN).then_some(value)
     }
 
-    fn off(&self, quantity: Quantity, flown: &Flown) -> Option<f32> {
+    fn off(&self, quantity: Quantity, flown: &FlightFigures) -> Option<f32> {
         Some(flown.figure(quantity)? - self.known(quantity)?)
     }
 
@@ -234,7 +234,7 @@ impl Baselines {
 
     /// The bad way, percent of the baseline; a motor's share: of the others. 0 within an unchanged flight's reach. `None`
     /// without a baseline or a figure.
-    fn departure(&self, quantity: Quantity, flown: &Flown, params: &Params) -> Option<f32> {
+    fn departure(&self, quantity: Quantity, flown: &FlightFigures, params: &Params) -> Option<f32> {
         let off = self.off(quantity, flown)?;
         let Terms { bad, is_share, .. } = terms(quantity);
         let is_bad = match bad {
@@ -250,7 +250,7 @@ impl Baselines {
     }
 
     /// Percent; 0 if it is not, or has less thrust. `None` if unknown.
-    fn heavier(&self, flown: &Flown, params: &Params) -> Option<f32> {
+    fn heavier(&self, flown: &FlightFigures, params: &Params) -> Option<f32> {
         let throttle = self.departure(Quantity::HoverThrottle, flown, params)?;
         let ratio =
             |of: Quantity| Some(1.0 + self.off(of, flown)? / self.0[of.index()].value.max(of.grain()));
@@ -261,7 +261,7 @@ impl Baselines {
     }
 
     /// Nothing beyond the warning's limit; anew after an improvement.
-    fn learn(&mut self, flown: &Flown, params: &Params) {
+    fn learn(&mut self, flown: &FlightFigures, params: &Params) {
         let before = self.clone();
         for quantity in Quantity::all() {
             let Some(figure) = flown.figure(quantity) else { continue };
@@ -280,7 +280,7 @@ impl Baselines {
         }
     }
 
-    fn departures(&self, flown: &Flown, params: &Params) -> Vec<(Terms, f32)> {
+    fn departures(&self, flown: &FlightFigures, params: &Params) -> Vec<(Terms, f32)> {
         let heavier = self.heavier(flown, params);
         let mut all: Vec<(Terms, f32)> = Vec::new();
         for quantity in Quantity::all() {
@@ -302,7 +302,7 @@ impl Baselines {
     }
 
     /// Findings, and the checks with a figure; then learns.
-    pub fn judge(&mut self, flown: &Flown, params: &Params) -> (Vec<Finding>, Vec<&'static str>) {
+    pub fn judge(&mut self, flown: &FlightFigures, params: &Params) -> (Vec<Finding>, Vec<&'static str>) {
         let departures = self.departures(flown, params);
         let judged = departures.iter().map(|(terms, _)| terms.check).collect();
         let found = departures.into_iter().filter_map(|(terms, value)| {
@@ -345,16 +345,16 @@ mod tests {
         baselines
     }
 
-    fn flown(is_linear_in_thrust: bool, known: &[(Quantity, f32)]) -> Flown {
+    fn flown(is_linear_in_thrust: bool, known: &[(Quantity, f32)]) -> FlightFigures {
         let mut figures = [None; Quantity::COUNT];
         for (quantity, figure) in known {
             figures[quantity.index()] = Some(*figure);
         }
-        Flown { at: Instant::ZERO, landed: true, figures, is_linear_in_thrust }
+        FlightFigures { at: Instant::ZERO, landed: true, figures, is_linear_in_thrust }
     }
 
     /// Five flights at 0.4 throttle and 160 W, then one.
-    fn hovered(throttle: f32, power_w: f32, is_linear_in_thrust: bool) -> (Flown, Baselines) {
+    fn hovered(throttle: f32, power_w: f32, is_linear_in_thrust: bool) -> (FlightFigures, Baselines) {
         let quantities = [Quantity::HoverThrottle, Quantity::HoverPower];
         let past = learnt(5, &[(quantities[0], 0.4), (quantities[1], 160.0)]);
         (flown(is_linear_in_thrust, &[(quantities[0], throttle), (quantities[1], power_w)]), past)

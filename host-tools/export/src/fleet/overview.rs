@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use hums_analysis::counters::of_figure;
-use hums_analysis::states::{Shown, shown};
+use hums_analysis::states::{ShownValue, shown};
 use hums_core::figures::Quantity;
 use hums_core::usage::{CounterName, counter_name as meaning};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -44,9 +44,9 @@ pub struct Overview {
     /// In the order of their names.
     pub vehicles: Vec<Vehicle>,
     /// Parts that are due or soon due by their vehicle's last session, most used first.
-    pub due: Vec<Due>,
+    pub due: Vec<DuePart>,
     /// Worst first.
-    pub findings: Vec<Found>,
+    pub findings: Vec<VehicleProblem>,
     /// Findings that a page has no room for.
     pub findings_left_out: usize,
     /// Farthest first.
@@ -80,7 +80,7 @@ pub struct Vehicle {
 
 /// A part, as in the table's JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Due {
+pub struct DuePart {
     #[serde(default)]
     vehicle: String,
     part: String,
@@ -106,7 +106,7 @@ pub struct Problem {
 
 /// A problem of a vehicle in all of its sessions, as it was in the last one of the worst level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Found {
+pub struct VehicleProblem {
     vehicle: String,
     sessions: u64,
     session: String,
@@ -137,8 +137,8 @@ struct Gathered {
     flown: Vec<Flown>,
     last: Option<f64>,
     last_parts: Option<f64>,
-    due: Vec<Due>,
-    findings: BTreeMap<(String, u8), Found>,
+    due: Vec<DuePart>,
+    findings: BTreeMap<(String, u8), VehicleProblem>,
     figures: BTreeMap<usize, Vec<f64>>,
 }
 
@@ -289,11 +289,11 @@ impl Gathered {
             kind.trim().clone_into(&mut vehicle.kind);
             vehicle.firmware = said("firmware");
         }
-        let parts: Vec<Due> = list(row, "parts");
+        let parts: Vec<DuePart> = list(row, "parts");
         if !parts.is_empty() && at >= self.last_parts {
             self.last_parts = at;
             let due = parts.into_iter().filter(|part| part.status != "green");
-            self.due = due.map(|part| Due { vehicle: name.clone(), ..part }).collect();
+            self.due = due.map(|part| DuePart { vehicle: name.clone(), ..part }).collect();
         }
         self.add_problems(row, day, at);
         for (index, (name, _)) in figures.iter().enumerate() {
@@ -316,22 +316,22 @@ impl Gathered {
             let number = |number: Option<f32>| number.unwrap_or(f32::NAN);
             let (state, value, limit) =
                 match shown(&problem.check, number(problem.value), number(problem.limit)) {
-                    Shown::State(state) => (state, None, None),
-                    Shown::Quantity(value, limit) => (None, value, limit),
+                    ShownValue::State(state) => (state, None, None),
+                    ShownValue::Quantity(value, limit) => (None, value, limit),
                 };
             let problem = Problem { check, state, value, limit, unit, ..problem };
             let (vehicle, session, day) = (said("vehicle"), said("session"), day.to_owned());
-            let found = Found { vehicle, sessions: 0, session, day, at, problem };
+            let found = VehicleProblem { vehicle, sessions: 0, session, day, at, problem };
             let known = self.findings.entry(key.clone()).or_insert_with(|| found.clone());
             if (found.is_critical(), at) >= (known.is_critical(), known.at) {
-                *known = Found { sessions: known.sessions, ..found };
+                *known = VehicleProblem { sessions: known.sessions, ..found };
             }
             known.sessions += u64::from(counted.insert(key));
         }
     }
 }
 
-impl Found {
+impl VehicleProblem {
     fn is_critical(&self) -> bool {
         self.problem.level == "critical"
     }
@@ -357,7 +357,7 @@ impl Overview {
             fleet.due.extend(due);
             fleet.findings.extend(findings.into_values());
         }
-        let used = |part: &Due| part.used_percent.unwrap_or(0.0);
+        let used = |part: &DuePart| part.used_percent.unwrap_or(0.0);
         fleet.due.sort_by(|one, other| used(other).total_cmp(&used(one)));
         fleet.findings.sort_by_key(|found| (!found.is_critical(), Reverse(found.sessions)));
         fleet.findings_left_out = fleet.findings.len().saturating_sub(FINDINGS_MAX);

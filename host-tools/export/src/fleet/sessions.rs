@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::SESSIONS;
 use crate::check::grouped::{Group, grouped};
-use crate::checked::{Checked, OnBoard, problems_of};
+use crate::checked::{Checked, FindingCount, problems_of};
 use crate::context::Context;
 use crate::hex::hex;
 use crate::identity::RecordingContent;
@@ -140,7 +140,7 @@ fn health(context: &Context, about: &RecordingContent) -> Vec<(&'static str, Cel
     let contents = &about.overview.contents;
     let checked = context.checked.as_ref().map_or_else(
         || {
-            let mut on_board = OnBoard::default();
+            let mut on_board = FindingCount::default();
             contents.findings.iter().for_each(|finding| on_board.add(finding.level));
             on_board.row()
         },

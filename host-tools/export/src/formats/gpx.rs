@@ -6,14 +6,14 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::context::Context;
-use crate::format::{Files, Finished, FormatDetails, Single, Spool, Totals, Writer};
-use crate::journey::{Findings, Journey, push_element, utc};
+use crate::format::{Files, Finished, FormatDetails, SingleFile, Spool, Totals, Writer};
+use crate::journey::{CollectedFindings, Journey, push_element, utc};
 use crate::made::OutputFile;
 use crate::story::Story;
 
 /// Waypoints come before the track, and some are known last.
 pub(super) struct Gpx {
-    file: Single,
+    file: SingleFile,
     track: Spool,
     journey: Journey,
 }
@@ -24,13 +24,13 @@ impl Writer for Gpx {
         omits: "attitude, battery, motors, texts, parameters: all but the track and findings",
         ..FormatDetails::new("gpx", "The track with time, findings as waypoints, for maps", Files::One("gpx"))
     };
-    type Encoder = Findings;
+    type Encoder = CollectedFindings;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
-        Ok(Self { file: Single::open(context, path)?, track: Spool::new()?, journey: Journey::default() })
+        Ok(Self { file: SingleFile::open(context, path)?, track: Spool::new()?, journey: Journey::default() })
     }
 
-    fn part(&mut self, context: &Context, part: Findings, story: &Story) -> Result<()> {
+    fn part(&mut self, context: &Context, part: CollectedFindings, story: &Story) -> Result<()> {
         let mut out = String::new();
         let track = &mut self.track;
         self.journey.take(context, part, story, |at, fix, begins| {

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use hums_blackbox::record::{Clock, Loss, Lost, Note};
+use hums_blackbox::record::{Clock, Loss, LossKind, Note};
 use hums_blackbox::{Full, Record, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
 use hums_link::{Check, Framer};
@@ -21,7 +21,7 @@ use crate::outcome::{Outcome, usage};
 use crate::output;
 use crate::plural::count;
 use crate::printable;
-use crate::source::booted::Booted;
+use crate::source::booted::BootTimedSource;
 use crate::source::checksums::Checksums;
 use crate::source::own::JOINED;
 use crate::source::{self, Source, Timing};
@@ -52,7 +52,7 @@ fn run(args: &DecodeRequest) -> Result<Outcome> {
     let source = source::open(&input, Timing { line_rate: None })?;
     // Raw bytes have the autopilot's times, as in `check`.
     let mut source: Box<dyn Source> =
-        if source.has_records() { source } else { Box::new(Booted::new(source)) };
+        if source.has_records() { source } else { Box::new(BootTimedSource::new(source)) };
     let context = || cannot_write(&path);
     let read = || format!("{name}: cannot be read");
     // A pipe may wait for its first byte for ever, so no file is made before it.
@@ -254,7 +254,7 @@ impl<W: Write> Packer<W> {
             return Ok(());
         }
         let (from, to) = (Instant::from_micros(before_us), Instant::from_micros(at_us));
-        self.record(to, &Record::Loss(Loss { what: Lost::DamagedPlaces, count, from, to }))
+        self.record(to, &Record::Loss(Loss { what: LossKind::DamagedPlaces, count, from, to }))
     }
 
     fn finish(mut self, last_us: u64) -> Result<(Done, W)> {
@@ -262,7 +262,7 @@ impl<W: Write> Packer<W> {
         let bytes_not_frames = self.framer.counts().bytes_not_frames.saturating_sub(self.unknown_bytes);
         if bytes_not_frames > 0 {
             let loss = Loss {
-                what: Lost::NotFrames,
+                what: LossKind::NotFrames,
                 count: bytes_not_frames,
                 from: Instant::ZERO,
                 to: Instant::from_micros(last_us),
@@ -272,7 +272,7 @@ impl<W: Write> Packer<W> {
         let wrong_checksums = self.checksums.gap();
         if let Some(gap) = &wrong_checksums {
             let (from, to) = (gap.from.unwrap_or(Instant::ZERO), Instant::from_micros(last_us));
-            let (what, count) = (Lost::WrongChecksums, self.checksums.damaged());
+            let (what, count) = (LossKind::WrongChecksums, self.checksums.damaged());
             self.record(to, &Record::Loss(Loss { what, count, from, to }))?;
         }
         self.writer.finish(&mut self.finished);

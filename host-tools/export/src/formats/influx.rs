@@ -14,7 +14,9 @@ use hums_dialect::{Field, Kind};
 
 use crate::context::Context;
 use crate::field_names::free_name;
-use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Totals, Writer, lines_of};
+use crate::format::{
+    Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Totals, Writer, lines_of,
+};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::mavlink::frame::Frame;
@@ -357,7 +359,7 @@ impl Clock {
 }
 
 pub(super) struct Influx {
-    file: Single,
+    file: SingleFile,
     messages: Clock,
     quantities: Clock,
     reference: Reference,
@@ -393,7 +395,7 @@ impl Writer for Influx {
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self {
-            file: Single::open(context, path)?,
+            file: SingleFile::open(context, path)?,
             messages: Clock::default(),
             quantities: Clock::default(),
             reference: Reference::new(),

@@ -6,7 +6,9 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 
 use crate::context::Context;
-use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Totals, Writer, lines_of};
+use crate::format::{
+    Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Totals, Writer, lines_of,
+};
 use crate::hex::push_hex;
 use crate::made::OutputFile;
 use crate::names::message_name;
@@ -17,7 +19,7 @@ use crate::utc::{push_iso8601, push_seconds};
 
 /// The open file.
 pub(super) struct Jsonl {
-    file: Single,
+    file: SingleFile,
     objects: u64,
 }
 
@@ -73,7 +75,7 @@ impl Writer for Jsonl {
     type Encoder = Lines;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
-        Ok(Self { file: Single::open(context, path)?, objects: 0 })
+        Ok(Self { file: SingleFile::open(context, path)?, objects: 0 })
     }
 
     fn part(&mut self, _: &Context, part: Lines, _: &Story) -> Result<()> {

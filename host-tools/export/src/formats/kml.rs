@@ -7,8 +7,8 @@ use anyhow::Result;
 use hums_core::clock::Instant;
 
 use crate::context::Context;
-use crate::format::{Files, Finished, FormatDetails, Single, Totals, Writer};
-use crate::journey::{Findings, Journey, push_element, utc};
+use crate::format::{Files, Finished, FormatDetails, SingleFile, Totals, Writer};
+use crate::journey::{CollectedFindings, Journey, push_element, utc};
 use crate::made::OutputFile;
 use crate::motion::Fix;
 use crate::story::Story;
@@ -24,7 +24,7 @@ const STYLES: &str = "<Style id=\"track\"><LineStyle><color>ffff9000</color><wid
 
 /// The open file.
 pub(super) struct Kml {
-    file: Single,
+    file: SingleFile,
     journey: Journey,
     piece: Vec<(Instant, Fix)>,
 }
@@ -80,17 +80,17 @@ impl Writer for Kml {
             Files::One("kml"),
         )
     };
-    type Encoder = Findings;
+    type Encoder = CollectedFindings;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
-        let mut file = Single::open(context, path)?;
+        let mut file = SingleFile::open(context, path)?;
         let mut head = HEAD.to_owned();
         push_element(&mut head, "name", &context.session);
         file.write((head + "\n" + STYLES).as_bytes())?;
         Ok(Self { file, journey: Journey::default(), piece: Vec::new() })
     }
 
-    fn part(&mut self, context: &Context, part: Findings, story: &Story) -> Result<()> {
+    fn part(&mut self, context: &Context, part: CollectedFindings, story: &Story) -> Result<()> {
         let mut journey = std::mem::take(&mut self.journey);
         let taken = journey.take(context, part, story, |at, fix, begins| {
             if begins {

@@ -8,8 +8,8 @@ use hums_core::clock::Instant;
 
 use crate::checked::{Checked, finding_words};
 use crate::context::Context;
-use crate::format::{Files, Finished, FormatDetails, Single, Totals, Writer};
-use crate::journey::{Findings, utc};
+use crate::format::{Files, Finished, FormatDetails, SingleFile, Totals, Writer};
+use crate::journey::{CollectedFindings, utc};
 use crate::made::OutputFile;
 use crate::mavlink::values::Scalar;
 use crate::reference::{Quantity, Reference};
@@ -21,7 +21,7 @@ const SHOWN_US: i64 = 5 * SECOND_US;
 
 /// The open file.
 pub(super) struct Srt {
-    file: Single,
+    file: SingleFile,
     reference: Reference,
     /// The beginning of the video, microseconds of the log; known with the log's first observation.
     begin_us: Option<i64>,
@@ -93,17 +93,17 @@ impl Writer for Srt {
             Files::One("srt"),
         )
     };
-    type Encoder = Findings;
+    type Encoder = CollectedFindings;
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         // Those of this program are known before; those of a board come in order.
         let findings = context.checked.iter().flat_map(Checked::findings);
         let findings = findings.map(|(finding, _)| finding.clone()).collect();
-        let file = Single::open(context, path)?;
+        let file = SingleFile::open(context, path)?;
         Ok(Self { file, reference: Reference::new(), begin_us: None, next_us: 0, findings, cues: 0 })
     }
 
-    fn part(&mut self, context: &Context, part: Findings, story: &Story) -> Result<()> {
+    fn part(&mut self, context: &Context, part: CollectedFindings, story: &Story) -> Result<()> {
         if context.checked.is_none() {
             self.findings.extend(part.0);
         }

@@ -9,7 +9,7 @@ use hums_blackbox::{Cause, Gap};
 use crate::context::Context;
 use crate::files::{Output, appended, settle};
 use crate::findings::Texts;
-use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Totals, Writer};
 use crate::made::OutputFile;
 use crate::plural::count;
 use crate::record::gap_row;
@@ -17,8 +17,8 @@ use crate::story::Story;
 
 /// The open tlog.
 pub(super) struct Tlog {
-    file: Single,
-    gaps: Option<Single>,
+    file: SingleFile,
+    gaps: Option<SingleFile>,
     /// Gaps of a tlog that is not a file and so has no table beside it.
     gaps_left_out: u64,
     texts: Option<Texts>,
@@ -63,7 +63,7 @@ impl Writer for Tlog {
         let texts = Texts::of(context);
         let texts_count = texts.as_ref().map_or(0, Texts::count);
         let tlog =
-            Self { file: Single::open(context, path)?, gaps: None, gaps_left_out: 0, texts, texts_count };
+            Self { file: SingleFile::open(context, path)?, gaps: None, gaps_left_out: 0, texts, texts_count };
         if let Some(path) = tlog.gaps_path() {
             Output::check(&path, &context.inputs)?;
         }
@@ -89,7 +89,7 @@ impl Writer for Tlog {
         let first = self.gaps.is_none();
         let file = match &mut self.gaps {
             Some(file) => file,
-            none => none.insert(Single::open(context, &path)?),
+            none => none.insert(SingleFile::open(context, &path)?),
         };
         let mut line = Vec::new();
         if first {
@@ -127,7 +127,7 @@ impl Writer for Tlog {
         if let Some(mut texts) = self.texts.take() {
             self.file.write(&texts.rest())?;
         }
-        let gaps = self.gaps.map(Single::finish).transpose()?;
+        let gaps = self.gaps.map(SingleFile::finish).transpose()?;
         let (frames, findings) = ((totals.frames, "frame"), (self.texts_count, "finding"));
         let counts: &[_] = if self.texts_count > 0 { &[frames, findings] } else { &[frames] };
         finished.made.push(OutputFile::of(self.file.finish()?, "tlog", counts));

@@ -16,7 +16,7 @@ use hums_core::vehicle::Vehicle;
 
 use crate::checked::finding_words;
 use crate::context::Context;
-use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, Single, Spool, Totals, Writer};
+use crate::format::{Entry, Files, Finished, FormatDetails, GroupEncoder, SingleFile, Spool, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::ids::RC_CHANNELS;
 use crate::mavlink::values::{FieldValue, Scalar};
@@ -190,7 +190,7 @@ impl Fields {
 
 /// The open file. Parameters stand at its beginning, and are known last.
 pub(crate) struct Ulog {
-    file: Single,
+    file: SingleFile,
     data: Spool,
     motion: Motion,
     numbers: BTreeMap<(Topic, u8), u16>,
@@ -399,7 +399,7 @@ impl Writer for Ulog {
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         Ok(Self {
-            file: Single::open(context, path)?,
+            file: SingleFile::open(context, path)?,
             data: Spool::new()?,
             motion: Motion::default(),
             numbers: BTreeMap::new(),

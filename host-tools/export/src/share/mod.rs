@@ -29,9 +29,9 @@ use crate::output;
 use crate::plural::count;
 use crate::printable;
 use crate::source::find::find;
-use crate::source::item::{Item, Want};
+use crate::source::item::{Item, Needs};
 use crate::source::recording::LogPlace;
-use crate::story::{Observed, Story, StoryEntry};
+use crate::story::{Story, StoryEntry, WaitingObservation};
 use moved::{Moved, SHARED_UTC_US};
 use rules::{Rule, Rules};
 
@@ -152,7 +152,7 @@ impl Share {
     /// Returns whether the recording has damage.
     fn link(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
         let mut file = Single::open(context, &args.output)?;
-        let want = Want { frames: true, ..Want::default() };
+        let want = Needs { frames: true, ..Needs::default() };
         let (mut bytes, mut lossy) = (Vec::new(), false);
         let summary = place.open()?.read(want, &mut |at, item| {
             match item {
@@ -242,7 +242,7 @@ impl Share {
     fn own(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
         let mut file = Ulog::open(context, &args.output)?;
         let (mut story, mut lossy) = (Story::default(), false);
-        let want = Want { observations: true, ..Want::default() };
+        let want = Needs { observations: true, ..Needs::default() };
         place.open()?.read(want, &mut |at, item| {
             match &item {
                 Item::Observation(..) => self.see(OBSERVATIONS),
@@ -255,7 +255,7 @@ impl Share {
                     Some(observation) => {
                         self.kept += 1;
                         let source = Source { system: self.system(source.system), ..source };
-                        story.observed.push(Observed { at, source, observation });
+                        story.observed.push(WaitingObservation { at, source, observation });
                     }
                     None => self.remove(OBSERVATIONS),
                 },

@@ -75,7 +75,7 @@ fn assert_silent(copy: &[u8], secrets: &[Vec<u8>]) {
 fn observations(path: &Path) -> Vec<Observation> {
     let found = find(&[path.to_owned()], false).expect("a log");
     let mut observations = Vec::new();
-    let want = Want { observations: true, ..Want::default() };
+    let want = Needs { observations: true, ..Needs::default() };
     let read = found.places[0].open().expect("open").read(want, &mut |_, item| {
         if let Item::Observation(_, observation) = item {
             observations.push(*observation);

@@ -144,9 +144,9 @@ pub(crate) fn open(address: &Address) -> Result<Box<dyn Objects>> {
 
 /// Inputs on this computer, in place of those in object storage.
 #[derive(Debug, Default)]
-pub struct Fetched(Option<TempDir>);
+pub struct LocalInputs(Option<TempDir>);
 
-impl Fetched {
+impl LocalInputs {
     /// Fetches each input that is in object storage: an object, or all objects below a prefix. Messages show the address.
     ///
     /// # Errors

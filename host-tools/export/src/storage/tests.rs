@@ -163,6 +163,6 @@ fn a_list_leaves_out_folders_and_keys_that_are_no_paths() {
 #[test]
 fn a_program_without_object_storage_says_how_to_get_it() {
     let mut input = PathBuf::from("s3://fleet/flight.tlog");
-    let error = Fetched::inputs([&mut input]).expect_err("no client").to_string();
+    let error = LocalInputs::inputs([&mut input]).expect_err("no client").to_string();
     assert!(error.contains("--features object-storage"), "{error}");
 }

@@ -9,7 +9,7 @@ use super::proof::Proof;
 use crate::logs::naming::is_part;
 use crate::logs::reader::LogSummary;
 use crate::logs::segment_name;
-use crate::logs::strangers::Strange;
+use crate::logs::strangers::ForeignSectors;
 use crate::plural::count;
 
 const NAMED_MAX: usize = 3;
@@ -64,11 +64,12 @@ impl Ending {
 
     /// Files without a sector: made when the power failed, refused by the card, or out of its slot.
     fn empty(&self) -> Option<String> {
-        let is_usual = |strange: &Strange| {
+        let is_usual = |strange: &ForeignSectors| {
             let is_between = strange.file + 1 < self.files.len() && self.summary.gaps == 0;
             is_between || matches!(self.proof, Proof::NextStart(None))
         };
-        let is_told = |strange: &&Strange| strange.hollow && strange.sectors == 0 && !is_usual(strange);
+        let is_told =
+            |strange: &&ForeignSectors| strange.hollow && strange.sectors == 0 && !is_usual(strange);
         let mut told = self.summary.strange.iter().filter(is_told);
         let name = told.next().and_then(|strange| self.files.get(strange.file))?;
         let more = match told.count() {
@@ -79,9 +80,9 @@ impl Ending {
     }
 
     pub(super) fn others(&self) -> Vec<String> {
-        let is_told = |strange: &&Strange| strange.sectors > 0 && !self.is_begun_anew(strange);
+        let is_told = |strange: &&ForeignSectors| strange.sectors > 0 && !self.is_begun_anew(strange);
         let told: Vec<_> = self.summary.strange.iter().filter(is_told).collect();
-        let words = |strange: &&Strange| {
+        let words = |strange: &&ForeignSectors| {
             format!(
                 "{} of {} not of this log (the first at block {}, of session {:08x}): only this log is read",
                 count(strange.sectors, "sector"),
@@ -100,7 +101,7 @@ impl Ending {
 
     /// Whether the last file was about to be rewritten, and holds another session from its beginning on. Its
     /// first sector may be torn.
-    fn is_begun_anew(&self, strange: &Strange) -> bool {
+    fn is_begun_anew(&self, strange: &ForeignSectors) -> bool {
         let is_last = strange.file + 1 == self.files.len();
         strange.hollow && is_last && strange.first <= 1 && matches!(self.proof, Proof::NextStart(None))
     }
@@ -173,7 +174,8 @@ mod tests {
     #[test]
     fn sectors_of_another_log_are_counted_with_the_first_ones_place() {
         let words = |hollow, proof| {
-            let strange = vec![Strange { file: 0, hollow, sectors: 300, first: 1, session: 0x1a2b_3c4d }];
+            let strange =
+                vec![ForeignSectors { file: 0, hollow, sectors: 300, first: 1, session: 0x1a2b_3c4d }];
             let summary = LogSummary { session: Some(7), strange, ..LogSummary::default() };
             let names = ["00001_00.HUM".to_owned()];
             Ending { files: names.to_vec(), summary, proof, ..Ending::default() }.strange().join("; ")

@@ -149,7 +149,7 @@ impl Ending {
     pub fn confirm_begun_anew(&mut self, session: u32) -> bool {
         let last = self.files.len().saturating_sub(1);
         let strange = &mut self.summary.strange;
-        let is_it = |strange: &Strange| {
+        let is_it = |strange: &ForeignSectors| {
             strange.hollow && strange.file == last && last > 0 && strange.session == session
         };
         let before = strange.len();

@@ -1,6 +1,6 @@
 //! The proof of a log's end.
 
-use hums_blackbox::record::{Before, PreviousEnd, Resting};
+use hums_blackbox::record::{MarkReason, PreviousEnd, PreviousSession};
 use hums_core::clock::Instant;
 
 use crate::logs::reader::LogSummary;
@@ -16,7 +16,7 @@ pub enum Proof {
     /// the last data are then unknown.
     NextStart(Option<Instant>),
     /// It is whole to its last end mark.
-    Mark(Instant, Resting),
+    Mark(Instant, MarkReason),
     /// No end mark, or the vehicle was armed or took off after the last one.
     #[default]
     None,
@@ -44,7 +44,7 @@ pub enum Teller {
 
 impl Proof {
     /// Proof by the log, and by the next start's record if known.
-    pub fn of(summary: &LogSummary, next: Option<&Before>) -> Self {
+    pub fn of(summary: &LogSummary, next: Option<&PreviousSession>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
         let whole = sectors.saturating_sub(u32::from(summary.ends_partial));
@@ -124,7 +124,7 @@ impl Proof {
             },
             Self::None if summary.is_cut_by_image => "the image ends here, and the log in it".to_owned(),
             Self::None => {
-                let after = |(at, why): (Instant, Resting)| {
+                let after = |(at, why): (Instant, MarkReason)| {
                     format!(" (the last {} was at {})", why.words(), moment(at))
                 };
                 let after = summary.marks.last.map_or_else(String::new, after);
@@ -192,12 +192,12 @@ mod tests {
             frames_end: Some(3047),
             ..LogSummary::default()
         };
-        let next = |frames| Before {
+        let next = |frames| PreviousSession {
             found: PreviousEnd::Frames,
             session: 7,
             sectors: 26,
             frames,
-            ..Before::default()
+            ..PreviousSession::default()
         };
         let short = Proof::Short { sectors: 0, frames: Some(17), by: Teller::NextStart };
         assert_eq!(Proof::of(&summary, Some(&next(3064))), short);

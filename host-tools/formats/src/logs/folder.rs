@@ -36,7 +36,7 @@ struct Entries {
 
 /// Segments of one session are one log.
 pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
-    let (mut waiting, mut walked) = (vec![(root.to_owned(), 0)], Walked::default());
+    let (mut waiting, mut walked) = (vec![(root.to_owned(), 0)], WalkedFolders::default());
     while let Some((dir, depth)) = waiting.pop() {
         if !walked.is_new(&dir) {
             continue;
@@ -104,9 +104,9 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Re
 
 /// However links lead to them.
 #[derive(Default)]
-pub struct Walked(BTreeSet<FileId>);
+pub struct WalkedFolders(BTreeSet<FileId>);
 
-impl Walked {
+impl WalkedFolders {
     /// Whether a folder was not walked before.
     pub fn is_new(&mut self, dir: &Path) -> bool {
         FileId::of(dir).map_or(true, |id| self.0.insert(id))

@@ -6,7 +6,7 @@ use hums_blackbox::{Assembler, BlockCounts, GROUP_SECTORS, Step};
 use super::board::{HEADING_GROUPS, heading};
 use super::places::{BLOCK_BYTES, Log, LogBlocks};
 use super::repair::{Evidence, Repairs};
-use super::strangers::{Strange, Strangers};
+use super::strangers::{ForeignSectors, Strangers};
 
 /// Sectors in order, or a group's part without its beginning.
 pub type Group = Vec<Step>;
@@ -143,7 +143,7 @@ impl<'a> Groups<'a> {
     }
 
     /// Foreign sectors, once all is read.
-    pub fn strange(&self) -> Vec<Strange> {
+    pub fn strange(&self) -> Vec<ForeignSectors> {
         self.strangers.as_ref().map_or_else(Vec::new, Strangers::strange)
     }
 

@@ -21,7 +21,7 @@ pub enum Content {
     /// A partition table, or blocks to be searched.
     Image,
     /// A known but unreadable log.
-    Unread(Unread),
+    Unread(UnreadReason),
     /// A ground station's log or raw MAVLink.
     Mavlink,
     /// An empty file.
@@ -32,13 +32,13 @@ pub enum Content {
 
 /// Why a log is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unread {
+pub enum UnreadReason {
     Older(u8),
     Newer(u8),
     Sealed,
 }
 
-impl std::fmt::Display for Unread {
+impl std::fmt::Display for UnreadReason {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Older(version) => {
@@ -82,10 +82,10 @@ pub fn look(path: &Path) -> Result<Content> {
         match Header::read(&whole) {
             Ok(_) => log_blocks += 1,
             Err(NotASector::OtherVersion(version)) if version < VERSION => {
-                unread = Some(Unread::Older(version));
+                unread = Some(UnreadReason::Older(version));
             }
-            Err(NotASector::OtherVersion(version)) => unread = Some(Unread::Newer(version)),
-            Err(NotASector::Sealed) => unread = Some(Unread::Sealed),
+            Err(NotASector::OtherVersion(version)) => unread = Some(UnreadReason::Newer(version)),
+            Err(NotASector::Sealed) => unread = Some(UnreadReason::Sealed),
             Err(NotASector::Empty | NotASector::Erased | NotASector::Damaged) => {}
             Err(NotASector::Foreign) => other_blocks += 1,
         }

@@ -1,7 +1,7 @@
 //! Facts from a log's own records.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::{Before, PreviousEnd, Resting};
+use hums_blackbox::record::{MarkReason, PreviousEnd, PreviousSession};
 use hums_core::clock::Instant;
 
 use crate::loss::lost;
@@ -29,7 +29,7 @@ pub struct Marks {
     /// End marks with another count of frames.
     pub wrong: u64,
     /// The last one.
-    pub last: Option<(Instant, Resting)>,
+    pub last: Option<(Instant, MarkReason)>,
     /// Arming or take-off after the last mark.
     pub moved: Option<Instant>,
     /// The last take-off or landing is a take-off. A flight's counts are stored at the landing.
@@ -37,7 +37,7 @@ pub struct Marks {
     /// Lost frames and records, by the recorder.
     pub lost: u64,
     /// The log before, by the last boot record.
-    pub before: Option<Before>,
+    pub before: Option<PreviousSession>,
     /// Packed on a PC.
     pub packed: bool,
     /// Recorded by a box.

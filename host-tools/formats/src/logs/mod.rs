@@ -30,7 +30,7 @@ pub mod strangers;
 
 pub use card::{Card, is_card, on_card};
 pub use find::{Content, FoundLogs, find};
-pub use folder::{Walked, is_named_as_card, is_named_as_log, kind_of, passed_over};
+pub use folder::{WalkedFolders, is_named_as_card, is_named_as_log, kind_of, passed_over};
 pub use naming::segment_name;
 pub use places::{Log, Piece};
 

@@ -14,7 +14,7 @@ use super::in_order::{in_order, workers};
 pub use super::marks::Marks;
 use super::places::Log;
 pub use super::repair::Evidence;
-use super::strangers::Strange;
+use super::strangers::ForeignSectors;
 use crate::plural::count;
 
 const GROUPS_PER_WORKER: usize = 2;
@@ -102,7 +102,7 @@ pub struct LogSummary {
     /// Evidence from its parity.
     pub parity: Evidence,
     /// Strange sectors in its files.
-    pub strange: Vec<Strange>,
+    pub strange: Vec<ForeignSectors>,
     /// Missing files before its first one.
     pub files_gone: u32,
 }

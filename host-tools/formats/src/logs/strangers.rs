@@ -9,7 +9,7 @@ use hums_blackbox::{Header, SECTOR_BYTES};
 
 /// Foreign sectors in a file, or a file without any own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Strange {
+pub struct ForeignSectors {
     /// Index of the file.
     pub file: usize,
     /// No sector of the log.
@@ -29,8 +29,8 @@ pub(super) struct Strangers(Vec<File>);
 struct File {
     own: bool,
     /// All, and those that a recycled file cannot have.
-    others: Option<Strange>,
-    misplaced: Option<Strange>,
+    others: Option<ForeignSectors>,
+    misplaced: Option<ForeignSectors>,
 }
 
 impl Strangers {
@@ -47,17 +47,18 @@ impl Strangers {
     /// A foreign sector, if it is sound.
     pub(super) fn other(&mut self, index: usize, at: u64, block: &[u8; SECTOR_BYTES]) {
         let (Some(file), Ok(header)) = (self.0.get_mut(index), Header::read(block)) else { return };
-        let new = Strange { file: index, hollow: false, sectors: 0, first: at, session: header.session };
+        let new =
+            ForeignSectors { file: index, hollow: false, sectors: 0, first: at, session: header.session };
         file.others.get_or_insert(new).sectors += 1;
         if u64::from(header.number) + u64::from(header.partial) < at {
             file.misplaced.get_or_insert(new).sectors += 1;
         }
     }
 
-    pub(super) fn strange(&self) -> Vec<Strange> {
+    pub(super) fn strange(&self) -> Vec<ForeignSectors> {
         let strange = |(index, file): (usize, &File)| {
-            let none = Strange { file: index, hollow: true, sectors: 0, first: 0, session: 0 };
-            let others = Strange { hollow: true, ..file.others.unwrap_or(none) };
+            let none = ForeignSectors { file: index, hollow: true, sectors: 0, first: 0, session: 0 };
+            let others = ForeignSectors { hollow: true, ..file.others.unwrap_or(none) };
             if file.own { file.misplaced } else { Some(others) }
         };
         self.0.iter().enumerate().filter_map(strange).collect()

@@ -1,4 +1,4 @@
-//! Raw MAVLink in its autopilot's time: frames ([`BootTimes`]) and bytes ([`Booted`]).
+//! Raw MAVLink in its autopilot's time: frames ([`BootTimes`]) and bytes ([`BootTimedSource`]).
 
 use std::io;
 
@@ -74,7 +74,7 @@ fn extend(last_ms: u64, boot_ms: u32) -> u64 {
 const PORT_BAUD: u64 = 921_600;
 
 /// Whole frames at [`BootTimes`], and between two as on the fastest port.
-pub struct Booted<S> {
+pub struct BootTimedSource<S> {
     line: S,
     framer: Framer,
     times: BootTimes,
@@ -87,7 +87,7 @@ pub struct Booted<S> {
     is_cut: bool,
 }
 
-impl<S: Source> Booted<S> {
+impl<S: Source> BootTimedSource<S> {
     /// Wraps `line`, which has a line's times.
     pub fn new(line: S) -> Self {
         Self {
@@ -111,7 +111,7 @@ impl<S: Source> Booted<S> {
     }
 }
 
-impl<S: Source> Source for Booted<S> {
+impl<S: Source> Source for BootTimedSource<S> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         self.begins = false;
         while let Some(Chunk { at_us, bytes }) = self.line.next()? {
@@ -157,7 +157,7 @@ mod tests {
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::packet::Packet;
 
-    use super::super::paced::Paced;
+    use super::super::paced::PacedSource;
     use super::super::raw::Raw;
     use super::*;
 
@@ -185,7 +185,7 @@ mod tests {
         let frames: Vec<Vec<u8>> =
             (0..50).map(|second| encoder.frame(&mut buffer, &packet(second)).to_vec()).collect();
         let raw = [frames.concat(), vec![0xfd, 20, 0]].concat();
-        let mut source = Booted::new(Paced::new(Raw::new(&raw[..]), 115_200));
+        let mut source = BootTimedSource::new(PacedSource::new(Raw::new(&raw[..]), 115_200));
         let mut chunks = Vec::new();
         while let Some(chunk) = source.next().expect("memory") {
             chunks.push(chunk);

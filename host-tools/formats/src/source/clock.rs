@@ -37,7 +37,7 @@ pub struct Stamp {
 
 /// Times after a message in the file.
 #[derive(Clone, Debug, Default)]
-pub struct Ahead {
+pub struct LaterTimes {
     /// Up to [`super::doubt::ASKED`] of the requested ones.
     pub stamps: Vec<Stamp>,
     /// No times follow.
@@ -166,7 +166,11 @@ impl Clock {
     }
 
     /// At a jump `ahead` gives the next stamps that its argument accepts.
-    pub fn take(&mut self, stamp: Stamp, ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead) -> Reading {
+    pub fn take(
+        &mut self,
+        stamp: Stamp,
+        ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> LaterTimes,
+    ) -> Reading {
         self.take_beside(stamp, ahead, || None)
     }
 
@@ -175,7 +179,7 @@ impl Clock {
     pub fn take_beside(
         &mut self,
         stamp: Stamp,
-        ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> Ahead,
+        ahead: impl FnOnce(&dyn Fn(Stamp) -> bool) -> LaterTimes,
         passed: impl FnOnce() -> Option<u64>,
     ) -> Reading {
         if !self.timeline.is_jump(stamp.us) {
@@ -288,12 +292,12 @@ impl Clock {
 
 /// Number and first place.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Wrong {
+pub struct WrongTimes {
     count: u64,
     first: Option<(Instant, u64)>,
 }
 
-impl Wrong {
+impl WrongTimes {
     /// One more, at this byte of the recording.
     pub fn add(&mut self, at: Instant, place: u64) {
         self.count += 1;
@@ -329,7 +333,7 @@ mod tests {
         let mut worth = String::new();
         for (index, &stamp) in stamps.iter().enumerate() {
             let rest = stamps.get(index + 1..).unwrap_or_default();
-            let ahead = |asks: &dyn Fn(Stamp) -> bool| Ahead {
+            let ahead = |asks: &dyn Fn(Stamp) -> bool| LaterTimes {
                 stamps: rest.iter().copied().filter(|stamp| asks(*stamp)).take(24).collect(),
                 is_end: rest.len() <= 24,
             };

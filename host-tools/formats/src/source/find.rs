@@ -376,7 +376,7 @@ fn not_known(path: &Path, error: anyhow::Error) -> anyhow::Error {
 #[derive(Default)]
 struct Walk {
     paths: Vec<PathBuf>,
-    walked: logs::Walked,
+    walked: logs::WalkedFolders,
     /// No room.
     left_out: u64,
     /// HUMS logs and cards.

@@ -103,14 +103,14 @@ pub struct Event<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fact<'a> {
     /// The subject.
-    pub about: About,
+    pub about: FactSubject,
     /// Untrusted.
     pub words: &'a str,
 }
 
 /// The subject of a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum About {
+pub enum FactSubject {
     /// `ArduCopter V4.6.0 (3fc7011a)`.
     Firmware,
     /// The autopilot's hardware: `PX4_FMU_V5`.
@@ -350,7 +350,7 @@ impl Cause {
 
 /// A command's needs. A reader may leave out the rest to save time. Items without a switch are always handed on.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Want<'a> {
+pub struct Needs<'a> {
     /// [`Item::Frame`]
     pub frames: bool,
     /// [`Item::Observation`]
@@ -361,7 +361,7 @@ pub struct Want<'a> {
     pub system: Option<u8>,
 }
 
-impl Want<'_> {
+impl Needs<'_> {
     /// Another vehicle's autopilot.
     pub fn leaves_out(&self, source: Source) -> bool {
         source.component == AUTOPILOT && self.system.is_some_and(|system| system != source.system)
@@ -392,10 +392,15 @@ impl Rows<'_> {
 }
 
 /// An error ends the reading; [`Stop`] is not a failure.
-pub type Take<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
+pub type ItemReceiver<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
 
 /// A text or event after its alert, if observations are wanted.
-pub fn hand_said(at: Instant, item: Item<'_>, want_observations: bool, take: &mut Take<'_>) -> Result<()> {
+pub fn hand_said(
+    at: Instant,
+    item: Item<'_>,
+    want_observations: bool,
+    take: &mut ItemReceiver<'_>,
+) -> Result<()> {
     if let Item::Text(Text { source, alert: Some(alert), .. })
     | Item::Event(Event { source, alert: Some(alert), .. }) = item
         && want_observations
@@ -405,7 +410,7 @@ pub fn hand_said(at: Instant, item: Item<'_>, want_observations: bool, take: &mu
     take(at, item)
 }
 
-/// A [`Take`] has had enough.
+/// A [`ItemReceiver`] has had enough.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stop;
 
@@ -467,5 +472,5 @@ pub struct RecordingSummary {
 /// Reads one recording.
 pub trait Reader: Send {
     /// Reads it from its beginning to its end.
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary>;
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary>;
 }

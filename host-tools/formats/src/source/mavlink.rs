@@ -12,9 +12,9 @@ use super::checksums::Checksums;
 use super::counts::Counts;
 use super::daytime::Daytime;
 use super::input::Input;
-use super::item::{About, Cause, Fact, Gap, Item, Reader, RecordingSummary, Take, Want};
+use super::item::{Cause, Fact, FactSubject, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary};
 use super::pace::Pace;
-use super::paced::Paced;
+use super::paced::PacedSource;
 use super::raw::Raw;
 use super::said::Said;
 use super::stream::Source as _;
@@ -44,7 +44,7 @@ impl TlogReader {
 }
 
 impl Reader for TlogReader {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut times = Times::default();
         let mut checksums = Checksums::default();
@@ -102,7 +102,7 @@ impl Reader for TlogReader {
             take(times.now(), Item::Gap(&gap))?;
         }
         if let Some(words) = checksums.words() {
-            take(times.now(), Item::Fact(Fact { about: About::Unchecked, words: &words }))?;
+            take(times.now(), Item::Fact(Fact { about: FactSubject::Unchecked, words: &words }))?;
         }
         let summary = summary(counts);
         let frames = summary.messages.iter().map(|message| message.amount.count).sum();
@@ -123,7 +123,7 @@ struct Noise {
 }
 
 impl Noise {
-    fn tell(self, take: &mut Take<'_>) -> Result<()> {
+    fn tell(self, take: &mut ItemReceiver<'_>) -> Result<()> {
         let (cause, what) = if self.is_cut {
             (Cause::Cut, "a record that the end cuts off")
         } else {
@@ -136,25 +136,25 @@ impl Noise {
 
 /// A port's raw bytes, in the autopilot's time or a line's.
 pub struct RawReader {
-    bytes: Paced<Raw<Input>>,
+    bytes: PacedSource<Raw<Input>>,
 }
 
 impl RawReader {
     /// Reads from `input`, at `baud`.
     pub fn new(input: Input, baud: u32) -> Self {
-        Self { bytes: Paced::new(Raw::new(input), baud) }
+        Self { bytes: PacedSource::new(Raw::new(input), baud) }
     }
 }
 
 impl Reader for RawReader {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
         let mut line = Instant::ZERO;
         let (mut times, mut blocks) = (BootTimes::default(), BlockFinder::default());
         let (mut pace, mut bytes) = (Pace::default(), 0);
         let (mut daytime, mut strays) = (Daytime::default(), Strays::default());
         let now = std::cell::Cell::new(Instant::ZERO);
-        let mut each = |line, frame: hums_link::Frame<'_>, take: &mut Take<'_>| {
+        let mut each = |line, frame: hums_link::Frame<'_>, take: &mut ItemReceiver<'_>| {
             counts.add(frame.id(), true, frame.bytes().len());
             let (at, begins) = times.at(line, &frame);
             now.set(at);
@@ -254,13 +254,13 @@ impl Strays {
         }
     }
 
-    fn tell(self, now: Instant, others: u64, take: &mut Take<'_>) -> Result<()> {
+    fn tell(self, now: Instant, others: u64, take: &mut ItemReceiver<'_>) -> Result<()> {
         if self.words > 0 {
             let words = format!(
                 "{} at its beginning are words and no frame, as of an autopilot that boots: nothing is lost",
                 count(self.words, "byte")
             );
-            take(now, Item::Fact(Fact { about: About::Beginning, words: &words }))?;
+            take(now, Item::Fact(Fact { about: FactSubject::Beginning, words: &words }))?;
         }
         let noise = self.bytes.saturating_sub(self.words + others);
         if noise > 0 {

@@ -141,9 +141,11 @@ pub fn open(endpoint: &Endpoint, timing: Timing) -> Result<Box<dyn Source>> {
         },
         (sniff::InputKind::Tlog, None) if is_file => Box::new(tlog::Tlog::ahead(input)),
         (sniff::InputKind::Tlog, None) => Box::new(tlog::Tlog::new(input)),
-        (sniff::InputKind::Tlog, Some(baud)) => Box::new(paced::Paced::new(tlog::Tlog::new(input), baud)),
+        (sniff::InputKind::Tlog, Some(baud)) => {
+            Box::new(paced::PacedSource::new(tlog::Tlog::new(input), baud))
+        }
         (sniff::InputKind::Raw, baud) => {
-            Box::new(paced::Paced::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
+            Box::new(paced::PacedSource::new(raw::Raw::new(input), baud.unwrap_or(RAW_BAUD)))
         }
     };
     Ok(Box::new(compressed::Compressed::new(source, progress)))

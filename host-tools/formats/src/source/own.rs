@@ -1,7 +1,7 @@
 //! HUMS logs as the one stream, read by [`crate::logs::reader`].
 
 use anyhow::Result;
-use hums_blackbox::record::{Loss, Lost, Note, RECORD_BYTES_MAX};
+use hums_blackbox::record::{Loss, LossKind, Note, RECORD_BYTES_MAX};
 use hums_blackbox::{Cause as OwnCause, Entry, Gap as OwnGap, Record, SECTOR_BYTES};
 use hums_core::clock::Instant;
 use hums_core::observation::{Observation, Source};
@@ -10,7 +10,7 @@ use hums_link::{Check, Frame, observe};
 use super::checksums::wrong_checksums;
 use super::counts::Counts;
 use super::input::Progress;
-use super::item::{Cause, Gap, Item, Reader, RecordingSummary, Take, Want};
+use super::item::{Cause, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary};
 use super::parts::{ItemCollector, PartReceiver};
 use super::said::Said;
 use crate::ending::Ending;
@@ -45,12 +45,12 @@ impl OwnReader {
     /// Parts are groups; `seen` gets the bytes read.
     pub fn in_parts<C: ItemCollector>(
         &self,
-        want: Want<'_>,
+        want: Needs<'_>,
         new: impl Fn() -> C + Sync,
         deliver: &mut impl PartReceiver<C>,
         mut seen: impl FnMut(u64),
     ) -> Result<RecordingSummary> {
-        let Want { frames, observations, .. } = want;
+        let Needs { frames, observations, .. } = want;
         let new = || Part { frames, observations, counts: Counts::new(), not_frames: 0, collected: new() };
         let mut parts = Parts { deliver, counts: Counts::new(), not_frames: 0 };
         let summary = reader::read(&self.log, new, &mut parts, |blocks| seen(blocks * SECTOR_BYTES as u64))?;
@@ -73,13 +73,13 @@ impl OwnReader {
     /// Reads in parts; also hands on all items in order, as [`Reader::read`]: one reading for both.
     pub fn in_parts_and_order<C: ItemCollector>(
         &self,
-        want: Want<'_>,
+        want: Needs<'_>,
         new: impl Fn() -> C + Sync,
         deliver: &mut impl PartReceiver<C>,
-        take: &mut Take<'_>,
+        take: &mut ItemReceiver<'_>,
         seen: impl FnMut(u64),
     ) -> Result<RecordingSummary> {
-        let in_order = Want { observations: true, system: want.system, ..Want::default() };
+        let in_order = Needs { observations: true, system: want.system, ..Needs::default() };
         let new = || Both {
             frames: want.frames,
             collected: new(),
@@ -87,20 +87,20 @@ impl OwnReader {
         };
         let hand = Hand { want: in_order, take, said: Said::default(), lost: None };
         let mut both = HandBoth { deliver, hand };
-        let summary = self.in_parts(Want { frames: true, ..want }, new, &mut both, seen)?;
+        let summary = self.in_parts(Needs { frames: true, ..want }, new, &mut both, seen)?;
         both.hand.end()?;
         Ok(summary)
     }
 }
 
 impl Reader for OwnReader {
-    fn read(&mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
         if let Some(epoch) = epoch(&self.log)? {
             take(Instant::ZERO, Item::Epoch(epoch))?;
         }
         let mut hand = Hand { want, take, said: Said::default(), lost: None };
         let new = || Kept { frames: want.frames, observations: want.observations, ..Kept::default() };
-        let all = Want { frames: true, ..Want::default() };
+        let all = Needs { frames: true, ..Needs::default() };
         let summary = self.in_parts(all, new, &mut hand, |bytes| self.progress.set_taken(bytes))?;
         hand.end()?;
         Ok(summary)
@@ -250,8 +250,8 @@ impl<C, D: PartReceiver<C>> PartReceiver<Both<C>> for HandBoth<'_, '_, '_, D> {
 }
 
 struct Hand<'a, 'b> {
-    want: Want<'a>,
-    take: &'a mut Take<'b>,
+    want: Needs<'a>,
+    take: &'a mut ItemReceiver<'b>,
     said: Said,
     /// Losses until recording goes on: there is a record for each second.
     lost: Option<(Instant, Loss)>,
@@ -297,7 +297,7 @@ impl Hand<'_, '_> {
                 std::mem::take(&mut self.said).end(self.take)?;
                 (self.take)(at, Item::Joint)
             }
-            Record::Loss(loss @ Loss { what: Lost::WrongChecksums | Lost::DamagedPlaces, .. }) => {
+            Record::Loss(loss @ Loss { what: LossKind::WrongChecksums | LossKind::DamagedPlaces, .. }) => {
                 (self.take)(at, Item::Gap(&of_packed(loss)))
             }
             Record::Loss(loss) if loss::words(loss).is_some() => match &mut self.lost {
@@ -334,7 +334,7 @@ impl Hand<'_, '_> {
 fn of_packed(loss: &Loss) -> Gap {
     let (words, to) = match loss.what {
         // Over the whole recording.
-        Lost::WrongChecksums => (wrong_checksums(loss.count), Some(loss.to)),
+        LossKind::WrongChecksums => (wrong_checksums(loss.count), Some(loss.to)),
         _ => (format!("{} in the recording that was packed", count(loss.count, "damaged place")), None),
     };
     Gap { to, ..Gap::new(Some(loss.from), Cause::Lost, words) }

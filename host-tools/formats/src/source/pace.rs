@@ -14,7 +14,7 @@
 
 use hums_core::clock::{Instant, Span};
 
-use super::clock::Wrong;
+use super::clock::WrongTimes;
 use super::item::{Cause, Gap};
 
 /// Bytes a second: the fastest logs, of all inertial samples, have a quarter of it.
@@ -121,7 +121,7 @@ impl Pace {
 
     /// Once all has been read: single wrong times, and the clock. If the clock never ran, the single wrong
     /// times are unknown.
-    pub fn gaps(&self, wrong: &Wrong) -> impl Iterator<Item = Gap> + use<> {
+    pub fn gaps(&self, wrong: &WrongTimes) -> impl Iterator<Item = Gap> + use<> {
         let never_ran = self.stands.is_some() && self.first == self.last;
         wrong.gap().filter(|_| !never_ran).into_iter().chain(self.gap())
     }

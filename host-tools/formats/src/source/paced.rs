@@ -12,21 +12,21 @@ const BITS_PER_BYTE: u64 = 10;
 const SLICE_BYTES: usize = 32;
 
 /// The bytes of another source, paced.
-pub struct Paced<S> {
+pub struct PacedSource<S> {
     inner: S,
     baud: u64,
     waiting: VecDeque<u8>,
     sent: u64,
 }
 
-impl<S: Source> Paced<S> {
+impl<S: Source> PacedSource<S> {
     /// Bytes with the times of a line at `baud` (at least 1).
     pub fn new(inner: S, baud: u32) -> Self {
         Self { inner, baud: u64::from(baud.max(1)), waiting: VecDeque::new(), sent: 0 }
     }
 }
 
-impl<S: Source> Source for Paced<S> {
+impl<S: Source> Source for PacedSource<S> {
     fn next(&mut self) -> io::Result<Option<Chunk>> {
         while self.waiting.len() < SLICE_BYTES {
             match self.inner.next()? {
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn ten_bits_a_byte() {
-        let mut source = Paced::new(Raw::new(&[7u8; 11_520][..]), 115_200);
+        let mut source = PacedSource::new(Raw::new(&[7u8; 11_520][..]), 115_200);
         let (mut bytes, mut last) = (0, 0);
         while let Some(chunk) = source.next().expect("memory") {
             assert!(chunk.at_us >= last, "time fell");

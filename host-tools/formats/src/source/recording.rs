@@ -10,7 +10,7 @@ use hums_core::clock::Instant;
 
 use super::format::{Detected, KNOWN, LOOK_BYTES, detect, hint};
 use super::input::{Input, Progress};
-use super::item::{Cause, Gap, Item, Reader, RecordingSummary, Stop, Take, Want};
+use super::item::{Cause, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary, Stop};
 use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::parts::{ItemCollector, PART_BYTES, PART_ITEMS, PartReceiver};
@@ -31,7 +31,7 @@ pub struct LogPlace {
     pub title: String,
     /// Name for files made of it, unique within one call: the file's, or a session's as in `hums info`.
     pub name: String,
-    /// System id of the only wanted vehicle ([`Want::system`]).
+    /// System id of the only wanted vehicle ([`Needs::system`]).
     pub system: Option<u8>,
     source: From,
 }
@@ -139,13 +139,13 @@ impl LogPlace {
     pub fn in_parts_and_order<C: ItemCollector>(
         &self,
         log: &Log,
-        want: Want<'_>,
+        want: Needs<'_>,
         new: impl Fn() -> C + Sync,
         deliver: &mut impl PartReceiver<C>,
-        take: &mut Take<'_>,
+        take: &mut ItemReceiver<'_>,
     ) -> Result<RecordingSummary> {
         let bar = progress::bytes(Some(log.bytes()), &self.title);
-        let want = Want { system: self.system, ..want };
+        let want = Needs { system: self.system, ..want };
         let reader = OwnReader::new(log.clone());
         let summary = reader.in_parts_and_order(want, new, deliver, take, |bytes| bar.set_position(bytes));
         bar.finish_and_clear();
@@ -155,7 +155,7 @@ impl LogPlace {
     /// `new` makes a part's collector, `deliver` gets them in order.
     pub fn in_parts<C: ItemCollector>(
         &self,
-        want: Want<'_>,
+        want: Needs<'_>,
         new: impl Fn() -> C + Sync,
         deliver: &mut impl PartReceiver<C>,
     ) -> Result<RecordingSummary> {
@@ -245,8 +245,8 @@ impl Recording {
     }
 
     /// Reads until the end, or until `take` returns [`Stop`].
-    pub fn read(mut self, want: Want<'_>, take: &mut Take<'_>) -> Result<RecordingSummary> {
-        let want = Want { system: self.system, ..want };
+    pub fn read(mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+        let want = Needs { system: self.system, ..want };
         let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());
         let mut follow = |at: Instant, item: Item<'_>| {
             last = last.max(at);
@@ -332,7 +332,7 @@ pub(super) mod tests {
         assert_eq!(format_of(&[&messages[..], &HEARTBEAT].concat()), Some(Format::DataFlash));
         let mut gaps = Vec::new();
         let recording = Recording::new(Input::new(Cursor::new(messages)).expect("memory"), "cut.bin");
-        let summary = recording.expect("a log").read(Want::default(), &mut |_, item| {
+        let summary = recording.expect("a log").read(Needs::default(), &mut |_, item| {
             if let Item::Gap(gap) = item {
                 gaps.push((gap.cause, gap.place));
             }

@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 
 use hums_core::clock::{Instant, Span};
-use hums_core::observation::{Attitude, Autopilot, GlobalPosition, Observation, Source, Wanted};
+use hums_core::observation::{Attitude, AttitudeSetpoint, Autopilot, GlobalPosition, Observation, Source};
 use hums_core::units::Radians;
 
 /// Older values are not compared.
@@ -57,7 +57,9 @@ impl Repairs {
                 return Observation::GlobalPosition(teller.mend_climb(at, global));
             }
             Observation::Attitude(attitude) => teller.note_lead(at, &attitude),
-            Observation::Wanted(wanted) => return Observation::Wanted(teller.mend_wanted(at, wanted)),
+            Observation::AttitudeSetpoint(wanted) => {
+                return Observation::AttitudeSetpoint(teller.mend_wanted(at, wanted));
+            }
             _ => {}
         }
         *observation
@@ -100,10 +102,10 @@ impl Teller {
         self.led_at.is_some_and(|at| now.since(at) <= LEADS_FOR)
     }
 
-    fn mend_wanted(&mut self, at: Instant, wanted: Wanted) -> Wanted {
+    fn mend_wanted(&mut self, at: Instant, wanted: AttitudeSetpoint) -> AttitudeSetpoint {
         self.wanted = Some((at, [wanted.roll.0, wanted.pitch.0]));
         let not_known = Radians(f32::NAN);
-        if self.leads(at) { wanted } else { Wanted { roll: not_known, pitch: not_known, ..wanted } }
+        if self.leads(at) { wanted } else { AttitudeSetpoint { roll: not_known, pitch: not_known, ..wanted } }
     }
 }
 
@@ -170,9 +172,9 @@ mod tests {
                 let (roll, rates) = (Radians(0.3), Some([rate, 0.0, 0.0].map(RadiansPerSecond)));
                 let attitude = Attitude { roll, rates, ..Attitude::default() };
                 repairs.mend(now, AUTOPILOT, &Observation::Attitude(attitude));
-                let wanted = Wanted { roll: Radians(0.3 + apart), ..Wanted::default() };
-                let said = repairs.mend(now, AUTOPILOT, &Observation::Wanted(wanted));
-                is_known = matches!(said, Observation::Wanted(wanted) if wanted.roll.0.is_finite());
+                let wanted = AttitudeSetpoint { roll: Radians(0.3 + apart), ..AttitudeSetpoint::default() };
+                let said = repairs.mend(now, AUTOPILOT, &Observation::AttitudeSetpoint(wanted));
+                is_known = matches!(said, Observation::AttitudeSetpoint(wanted) if wanted.roll.0.is_finite());
             }
             assert_eq!(is_known, known, "{apart} rad at {rate} rad/s, up to {tenth}");
         }

@@ -1,7 +1,7 @@
 //! A HUMS log's records besides frames.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::{FindingRecord, Lost, Why};
+use hums_blackbox::record::{ComponentReason, FindingRecord, LossKind};
 use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
 use hums_core::health::{self, Level, Subsystem};
@@ -155,7 +155,7 @@ impl MonitorRecord {
                 (component.kind, component.number) = (recorded.kind, recorded.number);
                 component.replaced = recorded.replaced.try_into().unwrap_or(u16::MAX);
                 component.name = Label::new(recorded.name);
-                if recorded.why == Why::Replaced {
+                if recorded.why == ComponentReason::Replaced {
                     component.serial = Label::new(recorded.new_serial);
                 } else {
                     component.serial = Label::new(recorded.serial);
@@ -170,7 +170,7 @@ impl MonitorRecord {
                 value: exceedance.session.peak,
             }),
             Record::Loss(loss) => {
-                let frames = if loss.what == Lost::QueueFull { loss.count } else { 0 };
+                let frames = if loss.what == LossKind::QueueFull { loss.count } else { 0 };
                 loss::words(loss).map(|_| Self::Missing { from: loss.from, to: loss.to, frames })
             }
             Record::Note(note) if note.text == CELLS_UNKNOWN => Some(Self::CellsUnknown),

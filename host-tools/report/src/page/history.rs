@@ -21,7 +21,7 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::frames::{Frames, Sign};
 use super::modes;
-use super::more::{self, More};
+use super::more::{self, RowValues};
 use super::note::Note;
 use super::parameters::{ParameterJson, Parameters};
 use super::plots::{self, Line, Plot};
@@ -177,10 +177,10 @@ impl History {
     }
 
     /// Takes values other than observations from a row of an autopilot's own log.
-    pub fn more(&mut self, at: Instant, more: &More) {
+    pub fn more(&mut self, at: Instant, more: &RowValues) {
         match more {
-            More::Values(values) => self.samples.values(at, values),
-            More::Default(default) => self.parameters.learn_default(default),
+            RowValues::Values(values) => self.samples.values(at, values),
+            RowValues::Default(default) => self.parameters.learn_default(default),
         }
     }
 
@@ -342,7 +342,7 @@ impl History {
             let limits = params
                 .map(|params| plots::limits(plot, self.autopilot, params, self.cells))
                 .unwrap_or_default();
-            let plots::About { group, title, unit, decimals, .. } = about;
+            let plots::PlotProperties { group, title, unit, decimals, .. } = about;
             let (id, title) = (format!("{plot:?}"), title.to_owned());
             all.push((plot, PlotJson { id, group, title, unit, decimals, limits, lines: vec![named] }));
         }

@@ -129,7 +129,7 @@ fn plots(store: &Store<Quantity>, flights: &[MergedFlight<'_>]) -> Vec<PlotJson>
             json.lines.push(named);
             continue;
         }
-        let plots::About { group, title, unit, decimals, name } = about(quantity);
+        let plots::PlotProperties { group, title, unit, decimals, name } = about(quantity);
         let line = name(quantity.1);
         let title = if title == line { line } else { format!("{title}: {line}") };
         let limits = limits(quantity, flights);
@@ -139,7 +139,7 @@ fn plots(store: &Store<Quantity>, flights: &[MergedFlight<'_>]) -> Vec<PlotJson>
     all.into_iter().map(|(_, json)| json).collect()
 }
 
-fn about((plot, _, of_px4): Quantity) -> plots::About {
+fn about((plot, _, of_px4): Quantity) -> plots::PlotProperties {
     plots::about(plot, if of_px4 { Autopilot::Px4 } else { Autopilot::ArduPilot })
 }
 

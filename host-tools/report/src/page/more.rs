@@ -189,14 +189,14 @@ fn of_row(row: &Row<'_>, put: &mut ValueSink<'_>) {
 
 /// Values in a row that are not observations.
 #[derive(Clone, Debug, PartialEq)]
-pub enum More {
+pub enum RowValues {
     /// Values of plots.
     Values(Box<[(Line, f32)]>),
     /// The default of a parameter.
     Default(Default),
 }
 
-impl More {
+impl RowValues {
     /// Such values in a row; `None` without any.
     pub fn of(row: &Row<'_>) -> Option<Self> {
         if let Some(default) = default_of(row) {

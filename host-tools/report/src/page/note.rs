@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
-use hums_core::health::{Finding, Said, VOCABULARY, instances};
+use hums_core::health::{Finding, RadioWords, VOCABULARY, instances};
 use hums_core::observation::{Feeds, MOTORS_MAX};
 use hums_formats::trend_words::WORDS;
 use hums_link::encode::COMPONENT;
@@ -91,7 +91,7 @@ const CAUSE: &str = "cause: ";
 fn told_check(words: &str) -> Option<(&'static str, u8)> {
     let silent = words.strip_prefix("no data: ");
     let words = words.strip_prefix(OVER).or_else(|| words.strip_prefix(CAUSE)).unwrap_or(words);
-    let parts = |said: &Said| match instances(said.check) {
+    let parts = |said: &RadioWords| match instances(said.check) {
         // A trend that a box judged itself.
         0 if said.part.is_empty() => 1,
         0 => MOTORS_MAX as u8,
@@ -122,8 +122,8 @@ impl Note {
         let known = vocabulary(&finding.check);
         let is_worry = finding.is_bad();
         let (state, value, limit) = match shown(&finding.check, finding.value, finding.limit) {
-            Shown::State(state) => (state, None, None),
-            Shown::Quantity(value, limit) => (None, value, limit),
+            ShownValue::State(state) => (state, None, None),
+            ShownValue::Quantity(value, limit) => (None, value, limit),
         };
         Self {
             at_s: finding.at.as_secs_f64(),

@@ -96,7 +96,7 @@ pub enum Plot {
 
 /// Properties of a plot for the page.
 #[derive(Clone, Copy, Debug)]
-pub struct About {
+pub struct PlotProperties {
     /// The section of the page.
     pub group: &'static str,
     /// Its name.
@@ -152,7 +152,7 @@ fn receiver(line: u8) -> String {
 }
 
 /// The properties of a plot, for this autopilot.
-pub fn about(plot: Plot, autopilot: Autopilot) -> About {
+pub fn about(plot: Plot, autopilot: Autopilot) -> PlotProperties {
     let px4 = autopilot == Autopilot::Px4;
     let axes: fn(u8) -> String = if px4 {
         |line| named(&["Coning", "Gyro, high frequency", "Accelerometer, high frequency", LIMIT], line)
@@ -218,7 +218,7 @@ pub fn about(plot: Plot, autopilot: Autopilot) -> About {
         }
         Plot::Load => ("Computer", "Processor load", "%", 1, |_| "Load".into()),
     };
-    About { group, title, unit, decimals, name }
+    PlotProperties { group, title, unit, decimals, name }
 }
 
 /// The line of vibration without an axis: the limit above which it counts as risen.

@@ -97,7 +97,7 @@ impl Samples {
                 }
                 push(Plot::Altitude, 3, told(second.altitude));
             }
-            Observation::Wanted(wanted) => {
+            Observation::AttitudeSetpoint(wanted) => {
                 push(Plot::Attitude, 2, Some(wanted.roll.0.to_degrees()));
                 push(Plot::Attitude, 3, Some(wanted.pitch.0.to_degrees()));
                 for (axis, rate) in (3..).zip(wanted.rates.into_iter().flat_map(|rates| rates.about)) {

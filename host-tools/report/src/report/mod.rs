@@ -33,7 +33,7 @@ use crate::followed::{EndResolver, HELD_MAX};
 use crate::logs::sessions::copy_words;
 use crate::logs::side_by_side::side_by_side;
 use crate::logs::{Log, segment_name};
-use crate::naming::{Named, Names, Traits, without_made};
+use crate::naming::{LogFileName, Names, Traits, without_made};
 use crate::outcome::{Outcome, or_skipped, usage};
 use crate::output::{self, Schema};
 use crate::plural::count;
@@ -83,7 +83,7 @@ pub struct Request<'a> {
 }
 
 /// Takes a page: its path, its kind, its text. The inputs are not to be overwritten.
-pub type PageSink<'a> = dyn FnMut(&Path, &What<'_>, &str, &Inputs) -> Result<()> + 'a;
+pub type PageSink<'a> = dyn FnMut(&Path, &PageKind<'_>, &str, &Inputs) -> Result<()> + 'a;
 
 /// Runs `hums report`.
 pub fn run(args: &Request<'_>) -> Result<Outcome> {
@@ -210,7 +210,7 @@ impl Making<'_> {
             let original = overview.ending.again.as_deref();
             let original = original.and_then(|of| self.places.iter().position(|place| place.name == of));
             let named = match original.filter(|of| self.wanted.sessions.contains(of)) {
-                Some(of) => Named::Copy(of),
+                Some(of) => LogFileName::Copy(of),
                 None => self.names.entry(place.system).or_default().name(index, place, &traits),
             };
             match named {
@@ -269,13 +269,13 @@ impl Making<'_> {
             index,
             replay.history.last_parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
         ));
-        self.write(path, &html, &What::Session(place), self.inputs)?;
+        self.write(path, &html, &PageKind::Session(place), self.inputs)?;
         self.rows.push(index::Row::new(file.clone(), overview, &replay));
         self.pages.insert(index, file);
         Ok(())
     }
 
-    fn last_flight(&mut self, this: &trend::Session) -> Result<Option<page::Before>> {
+    fn last_flight(&mut self, this: &trend::Session) -> Result<Option<page::PreviousRecording>> {
         let is_before = |other: &trend::Session| {
             let is_later = this.start_utc().zip(other.start_utc()).is_some_and(|(this, other)| other > this);
             other.airframe.is_some() && other.airframe == this.airframe && !is_later
@@ -292,10 +292,10 @@ impl Making<'_> {
             Some((known, values)) if known == index => values,
             _ => replay::parameters(place)?,
         };
-        Ok((!values.is_empty()).then(|| page::Before { name: place.name.clone(), values }))
+        Ok((!values.is_empty()).then(|| page::PreviousRecording { name: place.name.clone(), values }))
     }
 
-    fn write(&mut self, path: &Path, html: &str, what: &What<'_>, inputs: &Inputs) -> Result<()> {
+    fn write(&mut self, path: &Path, html: &str, what: &PageKind<'_>, inputs: &Inputs) -> Result<()> {
         (self.put)(path, what, html, inputs)?;
         let made = PageJson { path: path.to_owned(), session: what.session(), bytes: html.len() as u64 };
         if !self.json {
@@ -313,7 +313,7 @@ impl Making<'_> {
             let pages =
                 index::Pages { pages: std::mem::take(&mut self.rows), comparisons, ..Default::default() };
             let pages = pages.with(self.table.take().unwrap_or_default(), folder);
-            let what = What::Table(pages.pages.len());
+            let what = PageKind::Table(pages.pages.len());
             let path = folder.join(index::FILE);
             self.write(&path, &pages.html(), &what, &inputs)?;
         }
@@ -360,7 +360,7 @@ impl Making<'_> {
             } else {
                 self.wanted.output.clone()
             };
-            self.write(&path, &html, &What::Comparison, &self.inputs_of_table())?;
+            self.write(&path, &html, &PageKind::Comparison, &self.inputs_of_table())?;
             comparisons.push((airframe, file));
         }
         if comparisons.is_empty() && !self.wanted.directory {
@@ -391,7 +391,7 @@ fn without_folders(overview: &Overview) -> Overview {
 
 /// The kind of a page.
 #[derive(Clone, Copy, Debug)]
-pub enum What<'a> {
+pub enum PageKind<'a> {
     /// Of this recording.
     Session(&'a LogPlace),
     /// The table of this many pages.
@@ -400,13 +400,13 @@ pub enum What<'a> {
     Comparison,
 }
 
-impl What<'_> {
+impl PageKind<'_> {
     fn session(&self) -> Option<String> {
         if let Self::Session(place) = self { Some(place.name.clone()) } else { None }
     }
 }
 
-impl Display for What<'_> {
+impl Display for PageKind<'_> {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Session(place) => write!(formatter, "session {}", word(&place.name)),

@@ -8,7 +8,7 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use super::flights::Flight;
-use super::replay::{Missing, Replay};
+use super::replay::{MissingPart, Replay};
 use super::tiles::Tiles;
 use super::trend::Trend;
 use crate::counters::{self, Counters};
@@ -29,7 +29,7 @@ struct Data<'a> {
     flight: Option<HistoryPart>,
     flights: &'a [Flight],
     /// The gaps.
-    missing: &'a [Missing],
+    missing: &'a [MissingPart],
     /// Number of checks with a critical problem, and with a warning.
     critical: usize,
     warning: usize,
@@ -54,12 +54,12 @@ struct Data<'a> {
     spectra: &'a [SpectrumJson],
     trend: &'a Trend,
     /// The flight before of the same airframe.
-    before: Option<&'a Before>,
+    before: Option<&'a PreviousRecording>,
 }
 
 /// The recording before of the same airframe.
 #[derive(Debug, Serialize)]
-pub struct Before {
+pub struct PreviousRecording {
     /// Its name.
     pub name: String,
     /// The autopilot's parameters as they were at its end.
@@ -110,7 +110,7 @@ pub fn html(
     log: &Overview,
     replay: &Replay,
     trend: &Trend,
-    before: Option<&Before>,
+    before: Option<&PreviousRecording>,
     tiles: Option<&Tiles>,
 ) -> String {
     let data = Data {

@@ -12,16 +12,16 @@ use serde::Serialize;
 use super::flights::{Extents, Flight};
 use crate::check::causes::causes;
 use crate::check::judge::{Judge, Limits};
-use crate::check::judged::Judged;
+use crate::check::judged::Judgement;
 use crate::check::text::verdict;
 use crate::counters::tells_flight;
 use crate::page::history::History;
-use crate::page::more::{More, NAMES as MORE};
+use crate::page::more::{NAMES as MORE, RowValues};
 use crate::page::note::Note;
 use crate::page::parameters::Parameters;
 use crate::page::spectrum::{ROWS, Spectra, SpectrumJson};
 use crate::reference::Reference;
-use crate::source::item::{Cause, Item, Rows, Text, Want};
+use crate::source::item::{Cause, Item, Needs, Rows, Text};
 use crate::source::recording::LogPlace;
 use crate::statustext;
 use crate::summary::{EndsInAir, JudgedChecks, Overview};
@@ -34,7 +34,7 @@ const TEXTS_MAX: usize = 1_000;
 
 /// A part of the flight that is not in the record.
 #[derive(Debug, Serialize)]
-pub struct Missing {
+pub struct MissingPart {
     /// Start, if known.
     from_s: Option<f64>,
     /// The content and its reason.
@@ -57,7 +57,7 @@ pub struct Replay {
     /// The vehicle's last state, if its last flight goes on at the end.
     pub ends_in_air: Option<EndsInAir>,
     /// The gaps, with their places.
-    pub missing: Vec<Missing>,
+    pub missing: Vec<MissingPart>,
     /// Number of checks with a critical problem, and with a warning.
     pub found: (usize, usize),
     /// Spectra of its inertial sensor.
@@ -73,7 +73,7 @@ pub struct Replay {
 /// The autopilot's parameters as they were at the end of a recording.
 pub fn parameters(place: &LogPlace) -> Result<Vec<(String, f64)>> {
     let mut parameters = Parameters::default();
-    place.open()?.read(Want::default(), &mut |at, item| {
+    place.open()?.read(Needs::default(), &mut |at, item| {
         if let Item::Parameter(parameter) = item {
             parameters.take(at, parameter.name, parameter.value);
         }
@@ -86,7 +86,7 @@ impl Replay {
     /// Reads a recording with this overview.
     pub fn of(place: &LogPlace, overview: &Overview) -> Result<Self> {
         let mut replay = Self::default();
-        let want = Want { frames: true, observations: true, rows: Rows::Named(&NAMES), ..Want::default() };
+        let want = Needs { frames: true, observations: true, rows: Rows::Named(&NAMES), ..Needs::default() };
         let mut spectra = Spectra::default();
         let recording = place.open()?;
         let mut judge = Judge::new(&Limits::default(), recording.format);
@@ -127,7 +127,7 @@ impl Replay {
         Ok(replay)
     }
 
-    fn gaps(&mut self, judged: &Judged) {
+    fn gaps(&mut self, judged: &Judgement) {
         for gap in &judged.gaps {
             let span = gap.from.or(gap.to).zip(gap.to.or(gap.from));
             // A gap of unknown length is a place, and so is a count over much of the recording. A gap without
@@ -136,7 +136,7 @@ impl Replay {
             self.history.gap(span.map(|(from, to)| (from, if is_empty { to } else { from })));
             if gap.cause != Cause::NotKept && !gap.is_noise() {
                 let from_s = gap.from.map(Instant::as_secs_f64);
-                self.missing.push(Missing { from_s, words: gap.words.clone() });
+                self.missing.push(MissingPart { from_s, words: gap.words.clone() });
             }
         }
     }
@@ -148,7 +148,7 @@ impl Replay {
             Item::Text(text) => self.keep(at, text),
             Item::Parameter(parameter) => self.history.parameter(at, parameter.name, parameter.value),
             Item::Row(row) => {
-                if let Some(more) = More::of(&row) {
+                if let Some(more) = RowValues::of(&row) {
                     self.history.more(at, &more);
                 }
             }

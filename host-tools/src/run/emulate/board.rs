@@ -54,7 +54,7 @@ struct Line {
 }
 
 /// The board.
-pub(super) struct Board {
+pub(super) struct EmulatedBoard {
     wiring: Wiring,
     chip: Chip,
     medium: Medium,
@@ -92,7 +92,7 @@ pub(super) struct Traffic {
     pub(super) gs_bytes: u64,
 }
 
-impl Board {
+impl EmulatedBoard {
     /// Power comes a moment before the first byte.
     pub(super) fn new(
         (wired, image): (&hums_boards::Board, Image),
@@ -254,7 +254,7 @@ impl Wiring {
     }
 }
 
-impl run::Machine for Board {
+impl run::Machine for EmulatedBoard {
     fn arrive(&mut self, chunk: &Chunk) -> Result<bool> {
         while let Some(at_us) = self.reboots.pop_front_if(|at_us| *at_us <= chunk.at_us) {
             self.lose_power(at_us)?;

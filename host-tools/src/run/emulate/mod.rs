@@ -7,11 +7,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
-use board::{Board, Traffic};
+use board::{EmulatedBoard, Traffic};
 use hums_sdcard::Medium;
 use stm32f405_model::image::Image;
 
-use super::report::{OnCard, RunReport};
+use super::report::{CardLogs, RunReport};
 use super::{Prepared, check_request, check_standard_output, check_store, drive, finish, prepare};
 use crate::card::image::is_card;
 use crate::cli;
@@ -34,7 +34,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     let unread = || format!("{}: cannot be read", run.sd.display());
     let (is_card, medium) = (is_card(&card).with_context(unread)?, Medium::load(&card).with_context(unread)?);
     let table = medium.get(0);
-    let mut board = Board::new(
+    let mut board = EmulatedBoard::new(
         (wired, image),
         entropy,
         &medium,
@@ -70,7 +70,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     finish(run, &arrivals, &ground, &report)
 }
 
-fn tell(report: &mut RunReport, traffic: &Traffic, frames: u64, on_card: &OnCard) {
+fn tell(report: &mut RunReport, traffic: &Traffic, frames: u64, on_card: &CardLogs) {
     report.frames_in = traffic.frames_in;
     report.frames_logged = frames.min(traffic.frames_in);
     report.frames_lost = report.frames_in - report.frames_logged;

@@ -9,7 +9,7 @@ use hums_blackbox::record::Boot;
 use hums_core::clock::{Instant, Span};
 use hums_link::request::Port;
 use hums_onboard::monitoring::TICK;
-use hums_onboard::persist::Saved;
+use hums_onboard::persist::SaveStep;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX};
 use hums_onboard::uplink::{self, Uplink};
 use hums_onboard::{Handover, Monitoring, PortStatus, Reception, ResetCause, Service, Storage, StoreWriter};
@@ -258,7 +258,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
     }
 
     fn keep(&mut self, may_erase: bool) {
-        while !self.is_dead() && self.store_writer.service(may_erase) == Saved::Took {}
+        while !self.is_dead() && self.store_writer.service(may_erase) == SaveStep::Took {}
     }
 
     fn note(&mut self) {

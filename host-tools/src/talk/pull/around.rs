@@ -31,7 +31,7 @@ use crate::outcome::{Outcome, exists};
 use crate::plural::count;
 use crate::source::told::Finding;
 use crate::summary::Overview;
-use crate::utc::{When, date_and_time, moment};
+use crate::utc::{TimePoint, date_and_time, moment};
 
 /// Backwards from an unreadable one, for a group's beginning.
 const STEPS_BACK_MAX: u32 = 2 * GROUP_SECTORS as u32;
@@ -57,8 +57,8 @@ pub(super) fn pull(
     let mut log = RemoteLog::new(ftp, files, output)?;
     let (mut found, mut searched) = (None, Outcome::Done);
     let at = match what {
-        LogMoment::Time(When::Seconds(micros)) => Instant::from_micros(*micros),
-        LogMoment::Time(When::Utc(utc_us)) => {
+        LogMoment::Time(TimePoint::Seconds(micros)) => Instant::from_micros(*micros),
+        LogMoment::Time(TimePoint::Utc(utc_us)) => {
             let power_on_us = log.power_on_us()?;
             let micros = utc_us.checked_sub(power_on_us);
             Instant::from_micros(micros.with_context(|| {

@@ -2,7 +2,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 
-use hums_blackbox::record::{Clock, FindingRecord, Mark, Note, Resting};
+use hums_blackbox::record::{Clock, FindingRecord, Mark, MarkReason, Note};
 use hums_blackbox::{Header, Record, SECTOR_BYTES, Sector, SectorSink, Writer};
 use hums_core::clock::Instant;
 use hums_core::health::{Level, Subsystem};
@@ -628,7 +628,7 @@ fn an_end_that_is_not_proved_is_told_and_the_log_is_not_called_whole() {
         record(Record::Note(Note { severity: 6, text: &text }));
         if tenth == 1_000 {
             let sector = writer.counters().sectors as u32;
-            let mark = Record::Mark(Mark { why: Resting::Disarmed, sector, frames: 0 });
+            let mark = Record::Mark(Mark { why: MarkReason::Disarmed, sector, frames: 0 });
             writer.record(at, &mark, &mut memory).expect("there is room");
         }
     }

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use hums_blackbox::record::{Boot, Record, Resting};
+use hums_blackbox::record::{Boot, MarkReason, Record};
 use hums_blackbox::{Gap, Item, LogReader, Writer};
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
@@ -60,7 +60,7 @@ pub struct Found {
     pub segments: usize,
     /// Events' numbers and texts, and reasons of end marks.
     pub events: Vec<(u8, String)>,
-    pub marks: Vec<Resting>,
+    pub marks: Vec<MarkReason>,
     /// Checks of snapshots, and whether each is from after the finding.
     pub snapshots: Vec<(String, bool)>,
 }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use hums::check::causes::causes as causes_of;
 use hums::check::flights::Flight;
-use hums::check::judge::{Heard, Limits};
-use hums::check::judged::Judged;
+use hums::check::judge::{Limits, ReceptionPlace};
+use hums::check::judged::Judgement;
 use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
 use hums::source::recording::LogPlace;
@@ -75,7 +75,7 @@ pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Leve
 /// Judges one flight.
 pub(super) fn judge(place: &LogPlace, label: Option<&Label>) -> Result<Outcome> {
     // Labelled flights come from a telemetry port.
-    let heard = if label.is_some() { Heard::OnTheWire } else { Heard::Somewhere };
+    let heard = if label.is_some() { ReceptionPlace::OnTheWire } else { ReceptionPlace::Somewhere };
     let past = label.map_or(&[][..], |label| &label.past);
     let mut judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
     if !past.is_empty() {
@@ -89,7 +89,7 @@ fn learn(past: &[PathBuf]) -> Result<Baselines> {
     hums::check::past::learn(&Limits::default(), &places)
 }
 
-fn of(judged: &Judged, name: &str, label: Option<&Label>) -> Outcome {
+fn of(judged: &Judgement, name: &str, label: Option<&Label>) -> Outcome {
     let recorded_s = judged.span.map_or(0.0, |(_, last)| last.as_secs_f64());
     let alarms = alarms(judged);
     let heard = heard(&judged.findings);
@@ -136,11 +136,11 @@ const fn rank(level: Level) -> u8 {
     }
 }
 
-pub(super) fn rises(judged: &Judged) -> impl Iterator<Item = &Finding> {
+pub(super) fn rises(judged: &Judgement) -> impl Iterator<Item = &Finding> {
     judged.findings.iter().filter(|finding| rank(finding.level) > rank(finding.previous))
 }
 
-fn alarms(judged: &Judged) -> Vec<Alarm> {
+fn alarms(judged: &Judgement) -> Vec<Alarm> {
     let alarm = |of: &Finding| Alarm { check: of.check.clone(), level: of.level, at_s: of.at.as_secs_f64() };
     rises(judged).map(alarm).collect()
 }
@@ -192,7 +192,7 @@ fn truth(label: &Label) -> Option<Counts> {
 }
 
 /// The odometer's counts.
-fn counted(judged: &Judged) -> Counts {
+fn counted(judged: &Judgement) -> Counts {
     let mut counts = Counts::default();
     judged.monitor.for_each_counter(|number, value| match counter_name(number).as_str() {
         "flights" => counts.flights = value as u64,

@@ -13,7 +13,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
 use hums_core::clock::{Instant, Span};
-use hums_recorder::Meanwhile;
+use hums_recorder::WaitWork;
 use hums_recorder::spi::{Clock, Port, PortFailed};
 
 use super::time;
@@ -87,7 +87,7 @@ impl Port for SpiPort {
         Ok(())
     }
 
-    fn receive(&mut self, bytes: &mut [u8], meanwhile: Meanwhile<'_>) -> Result<(), PortFailed> {
+    fn receive(&mut self, bytes: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), PortFailed> {
         bytes.fill(0xFF);
         if by_dma(bytes) { wait(self.bus.transfer_in_place(bytes), meanwhile) } else { self.exchange(bytes) }
     }
@@ -121,7 +121,7 @@ fn by_dma(bytes: &[u8]) -> bool {
 
 fn wait(
     transfer: impl Future<Output = Result<(), Error>>,
-    meanwhile: Meanwhile<'_>,
+    meanwhile: WaitWork<'_>,
 ) -> Result<(), PortFailed> {
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());

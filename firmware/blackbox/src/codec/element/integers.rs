@@ -2,7 +2,7 @@
 
 use super::classes::{INTEGER_1, INTEGER_2, INTEGER_4};
 use super::rest::{integer_class, integer_rest};
-use super::{Distributions, Element, What};
+use super::{Distributions, Element, ElementKind};
 use crate::coder::Coder;
 
 /// Predictions from the last value: unchanged, with the last step, with half of it. Then two from the linked
@@ -21,8 +21,8 @@ impl Distributions {
         linked: Option<u32>,
     ) -> u32 {
         let (spare, kind) = match element.what() {
-            What::Integer1 => (24, INTEGER_1),
-            What::Integer2 => (16, INTEGER_2),
+            ElementKind::Integer1 => (24, INTEGER_1),
+            ElementKind::Integer2 => (16, INTEGER_2),
             _ => (0, INTEGER_4),
         };
         let fold = |difference: u32| ((difference << spare) as i32) >> spare;

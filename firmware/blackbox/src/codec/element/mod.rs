@@ -23,7 +23,7 @@ const QUIET: u8 = 0x38;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub(crate) enum What {
+pub(crate) enum ElementKind {
     /// 1, 2 or 4 bytes.
     Integer1,
     Integer2,
@@ -42,7 +42,7 @@ pub(crate) enum What {
     Instance,
 }
 
-impl What {
+impl ElementKind {
     /// The kind of an element. A bit flip in memory may give an unknown kind. Such an element is not coded, because a
     /// jump by it could go anywhere.
     #[inline]
@@ -79,7 +79,7 @@ pub(crate) struct Element {
     /// Its own distribution, and the one for its other mode; 0: none yet.
     block: u16,
     other: u16,
-    /// A [`What`].
+    /// A [`ElementKind`].
     kind: u8,
     /// For a text or instance its bytes; for a number its row in the table of links.
     detail: u8,
@@ -109,7 +109,7 @@ impl Element {
         costs: Costs::UNSET,
         block: 0,
         other: 0,
-        kind: What::Integer1 as u8,
+        kind: ElementKind::Integer1 as u8,
         detail: 0,
         end: 0,
         decimal: 0,
@@ -117,7 +117,7 @@ impl Element {
         quiet: 0,
     };
 
-    pub(crate) const fn new(what: What, detail: u8, end: u8) -> Self {
+    pub(crate) const fn new(what: ElementKind, detail: u8, end: u8) -> Self {
         Self {
             last: 0,
             step: 0,
@@ -135,8 +135,8 @@ impl Element {
     }
 
     #[inline]
-    pub(crate) const fn what(&self) -> What {
-        What::of(self.kind)
+    pub(crate) const fn what(&self) -> ElementKind {
+        ElementKind::of(self.kind)
     }
 
     #[inline]
@@ -166,7 +166,7 @@ impl Element {
         /// By kind; 0 for kinds of variable size.
         const BYTES: [u8; 11] = [1, 2, 4, 4, 4, 4, 8, 8, 0, 0, 0];
         match self.what() {
-            What::Text | What::Instance => self.detail as usize,
+            ElementKind::Text | ElementKind::Instance => self.detail as usize,
             what => BYTES[what as usize] as usize,
         }
     }
@@ -190,9 +190,9 @@ impl Element {
 
     pub(crate) fn number(&self) -> f32 {
         match (self.what(), self.exponent) {
-            (What::Float, _) => f32::from_bits(self.last),
-            (What::Integer2, 1) => f32::from(self.last as i16),
-            (What::Integer4, 1) => self.last as i32 as f32,
+            (ElementKind::Float, _) => f32::from_bits(self.last),
+            (ElementKind::Integer2, 1) => f32::from(self.last as i16),
+            (ElementKind::Integer4, 1) => self.last as i32 as f32,
             _ => self.last as f32,
         }
     }
@@ -265,7 +265,7 @@ mod tests {
     fn whatever_memory_holds_is_a_kind() {
         for kind in 0..=u8::MAX {
             let element = Element { kind, ..Element::UNSET };
-            let expected = if kind < 11 { kind } else { What::Upper as u8 };
+            let expected = if kind < 11 { kind } else { ElementKind::Upper as u8 };
             assert_eq!((element.what() as u8, element.size() <= 8), (expected, true));
         }
     }

@@ -2,7 +2,7 @@
 
 use super::classes::TIME;
 use super::rest::{ESCAPE, integer_class, integer_rest};
-use super::{Context, Distributions, Element, What};
+use super::{Context, Distributions, Element, ElementKind};
 use crate::coder::Coder;
 
 /// Predictions of a time:
@@ -29,7 +29,7 @@ impl Distributions {
         let mut guesses = [last; SAME_CLOCK + 1];
         guesses[LINEAR] = last.wrapping_add(element.step as u32);
         let elapsed_us = context.clock_us.wrapping_sub(element.aux);
-        (guesses[BY_ARRIVAL], guesses[BY_CLOCK]) = if element.what() == What::Millis {
+        (guesses[BY_ARRIVAL], guesses[BY_CLOCK]) = if element.what() == ElementKind::Millis {
             (last.wrapping_add(context.elapsed_ms), last.wrapping_add(thousandth(elapsed_us)))
         } else {
             let arrival = context.elapsed_ms.wrapping_mul(1_000);
@@ -64,7 +64,7 @@ impl Distributions {
         context: &Context,
     ) -> u64 {
         let last = u64::from(upper.last) << 32 | u64::from(element.last);
-        let timed = element.what() == What::WideTime;
+        let timed = element.what() == ElementKind::WideTime;
         let mut guesses = [last; BY_CLOCK + 1];
         guesses[LINEAR] = last.wrapping_add_signed(i64::from(element.step));
         if timed {

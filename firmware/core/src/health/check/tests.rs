@@ -9,12 +9,12 @@ const CHECK: Check = Check {
     unit: Unit::of("deg"),
     limits: Limits::above(Some(Param::TiltWarn), Some(Param::TiltCrit), 5.0),
     debounce_ms: [500, 200],
-    when: When::Always,
+    when: CheckPhase::Always,
     stale_s: NonZeroU8::new(1),
     instances: 1,
     alarm_only: false,
     role: Role::NONE,
-    of: InstanceOf::Vehicle,
+    of: InstanceKind::Vehicle,
     read: |_, _| None,
 };
 
@@ -123,7 +123,7 @@ fn a_change_tells_its_value_and_the_limit_it_crossed() {
 }
 
 /// Times of the changes are relative to their period.
-fn again(when: When, times: u64, period_ms: u64, after: impl Fn(u64) -> String) -> Vec<(u64, Level)> {
+fn again(when: CheckPhase, times: u64, period_ms: u64, after: impl Fn(u64) -> String) -> Vec<(u64, Level)> {
     let script: Vec<String> =
         (0..times).map(|time| format!("{} 50, {}", time * period_ms, after(time * period_ms))).collect();
     let script = format!("{}, {}", script.join(", "), times * period_ms);
@@ -141,24 +141,24 @@ fn again(when: When, times: u64, period_ms: u64, after: impl Fn(u64) -> String) 
 #[test]
 fn a_value_that_goes_up_and_down_is_told_a_few_times_and_not_each_time() {
     let good = |from_ms: u64| format!("{} 10", from_ms + 2_000);
-    for when in [When::InFlight, When::Always] {
+    for when in [CheckPhase::InFlight, CheckPhase::Always] {
         let warnings = again(when, 30, 10_000, good);
         assert_eq!(warnings.iter().filter(|(_, level)| *level == Level::Warning).count(), 2);
     }
     let falls = |changes: Vec<(u64, Level)>| -> Vec<u64> {
         changes.into_iter().filter(|(_, level)| *level == Level::Ok).map(|(ms, _)| ms).collect()
     };
-    let times = falls(again(When::InFlight, 4, 150_000, good));
+    let times = falls(again(CheckPhase::InFlight, 4, 150_000, good));
     assert_eq!(times, [4_000, 18_000, 130_000, 130_000], "2 s, 16 s, and then 128 s");
     let landed = |from_ms: u64| format!("{} 10, {} off", from_ms + 2_000, from_ms + 19_000);
-    assert_eq!(falls(again(When::InFlight, 4, 20_000, landed)), [4_000; 4]);
+    assert_eq!(falls(again(CheckPhase::InFlight, 4, 20_000, landed)), [4_000; 4]);
 }
 
 #[test]
 fn a_bad_value_of_a_slow_stream_is_told_twice_and_then_stays() {
     let script: Vec<String> = (0..20).map(|message| format!("{} =50", message * 3_000)).collect();
     let script = script.join(", ") + ", 60000";
-    let told = changes(&Check { when: When::InFlight, ..CHECK }, &script, 0);
+    let told = changes(&Check { when: CheckPhase::InFlight, ..CHECK }, &script, 0);
     assert_eq!(told, "1050 stale, 3500 warning, 4050 stale, 6500 warning | warning");
 }
 

@@ -8,8 +8,8 @@
 use hums_link::messages;
 use hums_link::request::Reply;
 
-use super::step::{Out, Step};
-use crate::shelf::{Answer, LogId, NoLog, What, Which};
+use super::step::{LibraryOutput, LibraryStep};
+use crate::shelf::{Answer, LogId, NoLog, RequestedLog, RequestedPart};
 
 const DATA_BYTES: usize = 90;
 
@@ -40,11 +40,13 @@ impl Places {
         self.download = None;
     }
 
-    fn wanted(&self, id: u16, offset: u32) -> Option<Which> {
-        let place = Which::At(id.saturating_sub(1));
+    fn wanted(&self, id: u16, offset: u32) -> Option<RequestedLog> {
+        let place = RequestedLog::At(id.saturating_sub(1));
         match self.download.filter(|download| download.id == id) {
-            Some(download) if offset > 0 => download.log.map(Which::Same),
-            Some(Download { log: Some(log), listed, .. }) if listed == self.listed => Some(Which::Same(log)),
+            Some(download) if offset > 0 => download.log.map(RequestedLog::Same),
+            Some(Download { log: Some(log), listed, .. }) if listed == self.listed => {
+                Some(RequestedLog::Same(log))
+            }
             _ => Some(place),
         }
     }
@@ -63,8 +65,12 @@ impl Places {
     }
 
     /// Reports a refusal once, until there is a list or a download again: a client may repeat its request for ever.
-    fn refuse(&mut self) -> Step {
-        if core::mem::replace(&mut self.told, true) { Step::Done } else { Step::End(Reply::LogsChanged) }
+    fn refuse(&mut self) -> LibraryStep {
+        if core::mem::replace(&mut self.told, true) {
+            LibraryStep::Done
+        } else {
+            LibraryStep::End(Reply::LogsChanged)
+        }
     }
 }
 
@@ -81,16 +87,21 @@ impl List {
         Self { next: first.saturating_sub(1), last: last.saturating_sub(1), lacks: false }
     }
 
-    pub(super) const fn want(&self) -> (Which, What) {
-        (Which::At(self.next), What::Length)
+    pub(super) const fn want(&self) -> (RequestedLog, RequestedPart) {
+        (RequestedLog::At(self.next), RequestedPart::Length)
     }
 
-    const fn end(&self) -> Step {
-        if self.lacks { Step::End(Reply::LogsUnread) } else { Step::Done }
+    const fn end(&self) -> LibraryStep {
+        if self.lacks { LibraryStep::End(Reply::LogsUnread) } else { LibraryStep::Done }
     }
 
     /// `LOG_ENTRY`
-    pub(super) fn step(&mut self, answer: &Answer, places: &mut Places, out: &mut Out<'_, '_, '_>) -> Step {
+    pub(super) fn step(
+        &mut self,
+        answer: &Answer,
+        places: &mut Places,
+        out: &mut LibraryOutput<'_, '_, '_>,
+    ) -> LibraryStep {
         let count = answer.count;
         if answer.found == Err(NoLog::Unread) {
             self.lacks = true;
@@ -108,14 +119,14 @@ impl List {
             return if count == 0 { out.say(&none, self.end()) } else { self.end() };
         }
         let is_last = self.next >= self.last || self.next + 1 >= count;
-        let then = if is_last { self.end() } else { Step::Next };
+        let then = if is_last { self.end() } else { LibraryStep::Next };
         let step = match answer.found {
             Ok(()) => out
                 .say(&messages::log_entry(self.next + 1, count, count, answer.bytes, answer.utc_secs), then),
             // Its length is unknown.
             Err(_) => then,
         };
-        if step == Step::Next {
+        if step == LibraryStep::Next {
             self.next += 1;
         }
         step
@@ -125,7 +136,7 @@ impl List {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Data {
     id: u16,
-    which: Which,
+    which: RequestedLog,
     offset: u32,
     end: u32,
 }
@@ -137,8 +148,8 @@ impl Data {
         Some(Self { id, which, offset, end: offset.saturating_add(count) })
     }
 
-    pub(super) const fn want(&self) -> (Which, What) {
-        (self.which, What::Data(self.offset))
+    pub(super) const fn want(&self) -> (RequestedLog, RequestedPart) {
+        (self.which, RequestedPart::Data(self.offset))
     }
 
     /// `LOG_DATA`
@@ -146,33 +157,33 @@ impl Data {
         &mut self,
         (answer, data): (&Answer, &[u8]),
         places: &mut Places,
-        out: &mut Out<'_, '_, '_>,
-    ) -> Step {
+        out: &mut LibraryOutput<'_, '_, '_>,
+    ) -> LibraryStep {
         match self.which {
             // The card cannot read it now. The client asks again.
-            _ if answer.found == Err(NoLog::Unread) => return Step::Done,
-            Which::Same(_) if answer.found.is_err() => {
+            _ if answer.found == Err(NoLog::Unread) => return LibraryStep::Done,
+            RequestedLog::Same(_) if answer.found.is_err() => {
                 places.lose(self.id);
-                return Step::End(Reply::LogGone);
+                return LibraryStep::End(Reply::LogGone);
             }
-            Which::Same(_) => {}
+            RequestedLog::Same(_) => {}
             _ if !places.is_listed(self.offset, answer.directory) => return places.refuse(),
             _ if answer.found.is_err() => {
-                return out.say(&messages::log_data(self.id, self.offset, &[]), Step::Done);
+                return out.say(&messages::log_data(self.id, self.offset, &[]), LibraryStep::Done);
             }
             _ => {
                 places.bind(self.id, answer.log);
-                self.which = Which::Same(answer.log);
+                self.which = RequestedLog::Same(answer.log);
             }
         }
         if data.is_empty() && self.offset < answer.bytes {
             // As above.
-            return Step::Done;
+            return LibraryStep::Done;
         }
         self.send(answer, data, out)
     }
 
-    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut Out<'_, '_, '_>) -> Step {
+    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut LibraryOutput<'_, '_, '_>) -> LibraryStep {
         // Sent before the port was full.
         let mut rest = data.get(self.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
         loop {
@@ -180,13 +191,13 @@ impl Data {
             let piece = rest.get(..wanted).unwrap_or(rest);
             // Short, but the log goes on: the next answer has the rest.
             if piece.len() < wanted && self.offset.saturating_add(piece.len() as u32) < answer.bytes {
-                return Step::Next;
+                return LibraryStep::Next;
             }
             let is_last =
                 piece.len() < DATA_BYTES || self.offset.saturating_add(DATA_BYTES as u32) >= self.end;
             let packet = messages::log_data(self.id, self.offset, piece);
-            match out.say(&packet, if is_last { Step::Done } else { Step::Next }) {
-                Step::Next => {
+            match out.say(&packet, if is_last { LibraryStep::Done } else { LibraryStep::Next }) {
+                LibraryStep::Next => {
                     self.offset = self.offset.saturating_add(piece.len() as u32);
                     rest = rest.get(piece.len()..).unwrap_or_default();
                 }
@@ -210,24 +221,24 @@ mod tests {
     fn a_download_goes_on_with_its_log_whatever_stands_at_its_place() {
         let mut places = Places::new();
         places.listed = Some(7);
-        assert_eq!(places.wanted(3, 0), Some(Which::At(2)), "a beginning is looked up");
+        assert_eq!(places.wanted(3, 0), Some(RequestedLog::At(2)), "a beginning is looked up");
         assert!(places.is_listed(0, 7) && !places.is_listed(0, 8));
         places.bind(3, log(42));
-        assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
-        assert_eq!(places.wanted(3, 0), Some(Which::Same(log(42))), "the first piece was lost");
+        assert_eq!(places.wanted(3, 90), Some(RequestedLog::Same(log(42))));
+        assert_eq!(places.wanted(3, 0), Some(RequestedLog::Same(log(42))), "the first piece was lost");
         places.listed = Some(9);
-        assert_eq!(places.wanted(3, 90), Some(Which::Same(log(42))));
-        assert_eq!(places.wanted(3, 0), Some(Which::At(2)));
+        assert_eq!(places.wanted(3, 90), Some(RequestedLog::Same(log(42))));
+        assert_eq!(places.wanted(3, 0), Some(RequestedLog::At(2)));
         places.lose(3);
         assert_eq!(places.wanted(3, 90), None);
-        assert_eq!(places.wanted(3, 0), Some(Which::At(2)));
+        assert_eq!(places.wanted(3, 0), Some(RequestedLog::At(2)));
     }
 
     #[test]
     fn what_was_never_listed_may_be_begun_but_not_gone_on_with() {
         let mut places = Places::new();
         assert!(places.is_listed(0, 7) && !places.is_listed(90, 7));
-        assert_eq!(places.refuse(), Step::End(Reply::LogsChanged));
-        assert_eq!(places.refuse(), Step::Done, "it is told once");
+        assert_eq!(places.refuse(), LibraryStep::End(Reply::LogsChanged));
+        assert_eq!(places.refuse(), LibraryStep::Done, "it is told once");
     }
 }

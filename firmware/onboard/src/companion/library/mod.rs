@@ -19,10 +19,10 @@ use hums_link::request::{Port, Reply, Request};
 
 use self::file::Open;
 use self::log::Places;
-use self::step::{Out, Step};
+use self::step::{LibraryOutput, LibraryStep};
 use super::limiter::Asker;
 use super::ways::Ways;
-use crate::shelf::{Answered, LogRequest, What, Which};
+use crate::shelf::{Answered, LogRequest, RequestedLog, RequestedPart};
 
 /// Answers looked at in one call. The port's budget limits them too.
 const LOOKS_MAX: usize = 64;
@@ -52,7 +52,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn want(&self) -> Option<(Which, What)> {
+    fn want(&self) -> Option<(RequestedLog, RequestedPart)> {
         match self {
             Self::List(list) => Some(list.want()),
             Self::Data(data) => Some(data.want()),
@@ -108,8 +108,11 @@ impl Library {
     pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();
-            self.erases =
-                !ways.queues.shelf.want(LogRequest { ticket, which: Which::At(0), what: What::Erase });
+            self.erases = !ways.queues.shelf.want(LogRequest {
+                ticket,
+                which: RequestedLog::At(0),
+                what: RequestedPart::Erase,
+            });
         }
         self.job = self.job.filter(|job| ways.queues.is_open(job.asker.port));
         for _ in 0..LOOKS_MAX {
@@ -121,25 +124,29 @@ impl Library {
                 Some(want) => Some(self.answered(want, ways)?),
                 None => None,
             };
-            let mut out = Out { now, asker: job.asker, ways };
+            let mut out = LibraryOutput { now, asker: job.asker, ways };
             let step = self.step(&mut job, answered.as_ref(), &mut out);
-            let goes_on = matches!(step, Step::Wait | Step::Next);
+            let goes_on = matches!(step, LibraryStep::Wait | LibraryStep::Next);
             self.job = goes_on.then_some(job);
-            if step == Step::Wait {
+            if step == LibraryStep::Wait {
                 return None;
             }
             self.asked = false;
             if answered.is_some() {
                 ways.queues.shelf.release();
             }
-            if let Step::End(reply) = step {
+            if let LibraryStep::End(reply) = step {
                 return Some((job.asker.port, reply));
             }
         }
         None
     }
 
-    fn answered(&mut self, (which, what): (Which, What), ways: &mut Ways) -> Option<Answered> {
+    fn answered(
+        &mut self,
+        (which, what): (RequestedLog, RequestedPart),
+        ways: &mut Ways,
+    ) -> Option<Answered> {
         let seen = ways.queues.shelf.answer(self.ticket).cloned();
         if seen.is_none() && !self.asked {
             let ticket = self.next_ticket();
@@ -148,13 +155,18 @@ impl Library {
         seen
     }
 
-    fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut Out<'_, '_, '_>) -> Step {
+    fn step(
+        &mut self,
+        job: &mut Job,
+        answered: Option<&Answered>,
+        out: &mut LibraryOutput<'_, '_, '_>,
+    ) -> LibraryStep {
         let answer = answered.map(|(answer, data)| (answer, data.as_slice()));
         match (&mut job.kind, answer) {
             (Kind::List(list), Some((answer, _))) => list.step(answer, &mut self.places, out),
             (Kind::Data(data), Some(answer)) => data.step(answer, &mut self.places, out),
             (Kind::File(file), answer) => file.step(answer, &mut self.open, out),
-            (Kind::List(_) | Kind::Data(_), None) => Step::Done,
+            (Kind::List(_) | Kind::Data(_), None) => LibraryStep::Done,
         }
     }
 }

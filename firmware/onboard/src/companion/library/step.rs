@@ -10,7 +10,7 @@ use super::super::limiter::Asker;
 use super::super::ways::Ways;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Step {
+pub(super) enum LibraryStep {
     Wait,
     Next,
     /// All is sent.
@@ -23,18 +23,18 @@ const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
 /// Worth a message.
 const FTP_DATA_MIN: usize = 20;
 
-pub(super) struct Out<'o, 'w, 'q> {
+pub(super) struct LibraryOutput<'o, 'w, 'q> {
     pub(super) now: Instant,
     pub(super) asker: Asker,
     pub(super) ways: &'o mut Ways<'w, 'q>,
 }
 
-impl Out<'_, '_, '_> {
-    pub(super) fn say(&mut self, packet: &Packet, then: Step) -> Step {
-        if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { Step::Wait }
+impl LibraryOutput<'_, '_, '_> {
+    pub(super) fn say(&mut self, packet: &Packet, then: LibraryStep) -> LibraryStep {
+        if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { LibraryStep::Wait }
     }
 
-    pub(super) fn file(&mut self, payload: &[u8], then: Step) -> Step {
+    pub(super) fn file(&mut self, payload: &[u8], then: LibraryStep) -> LibraryStep {
         let (system, component) = self.asker.by;
         self.say(&messages::file_transfer(system, component, payload), then)
     }

@@ -7,7 +7,7 @@ use hums_core::observation::{
 use hums_core::units::{Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Radians, RadiansPerSecond};
 
 use super::super::judge::{Judge, Limits};
-use super::super::judged::Judged;
+use super::super::judged::Judgement;
 use crate::source::item::{Cause, Gap, Item};
 use crate::source::recording::Format;
 use common::{AUTOPILOT, Quad};
@@ -59,7 +59,7 @@ fn judge(
     (autopilot, kind, type_number): (Autopilot, VehicleKind, u8),
     (begin_ms, lost): (u64, Span),
     script: impl Fn(u64, &mut State),
-) -> Judged {
+) -> Judgement {
     let mode = if autopilot == Autopilot::Px4 { 0x0404_0000 } else { 3 };
     let (landed, vtol) = (Some(LandedState::InAir), VtolState::Hover);
     let hover = Quad { mode, autopilot, kind, type_number, landed, vtol, ..Quad::healthy() };
@@ -126,7 +126,7 @@ fn judge(
 }
 
 /// Mishaps; flights, landings, mishaps in a radio gap.
-fn told(judged: &Judged) -> (Vec<&str>, [usize; 3]) {
+fn told(judged: &Judgement) -> (Vec<&str>, [usize; 3]) {
     let mishaps = judged.problems.iter().filter(|problem| problem.is_mishap());
     let count =
         |is: fn(&super::super::flights::Flight) -> bool| judged.flights.iter().filter(|one| is(one)).count();

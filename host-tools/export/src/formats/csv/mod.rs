@@ -19,13 +19,13 @@ use crate::story::Story;
 use crate::table::Table;
 use crate::text::{push_csv_cells, push_integer};
 use crate::utc::{push_iso8601, push_seconds};
-use tables::{Tables, UNKNOWN_TABLES_MAX};
+use tables::{CsvTables, UNKNOWN_TABLES_MAX};
 use unknown::UnknownLines;
 
 /// The open tables.
 pub(super) struct Csv {
     dir: PathBuf,
-    tables: Tables,
+    tables: CsvTables,
 }
 
 #[derive(Default)]
@@ -106,7 +106,7 @@ impl Writer for Csv {
 
     fn open(context: &Context, path: &Path) -> Result<Self> {
         let folder = Folder::create(path, &context.inputs, &context.session)?;
-        Ok(Self { dir: path.to_owned(), tables: Tables::new(folder) })
+        Ok(Self { dir: path.to_owned(), tables: CsvTables::new(folder) })
     }
 
     fn part(&mut self, _: &Context, part: Lines, _: &Story) -> Result<()> {

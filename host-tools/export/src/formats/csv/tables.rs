@@ -16,7 +16,7 @@ const OPEN_MAX: usize = 256;
 /// Ids without a definition that have a table of their own at most. The first ones have it; all others share one.
 pub(crate) const UNKNOWN_TABLES_MAX: usize = 512;
 
-pub(crate) struct Tables {
+pub(crate) struct CsvTables {
     folder: Folder,
     unknown: BTreeSet<u32>,
     open: BTreeMap<Table, BufWriter<FolderFile>>,
@@ -25,7 +25,7 @@ pub(crate) struct Tables {
     headers: BTreeMap<&'static str, Vec<&'static str>>,
 }
 
-impl Tables {
+impl CsvTables {
     pub(crate) fn new(folder: Folder) -> Self {
         Self {
             folder,

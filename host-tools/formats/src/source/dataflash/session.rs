@@ -18,10 +18,10 @@ use super::observe::{self, Craft, Handlers, Out, Say, Standing, State};
 use super::stamp::receiver_us;
 use super::table::{self, Tables};
 use crate::plural::count;
-use crate::source::clock::Wrong;
+use crate::source::clock::WrongTimes;
 use crate::source::item::{
-    About, Amount, Cause, Event, Fact, Gap, Item, MessageCount, Mode, Parameter, RecordingSummary, Row, Rows,
-    Table, Take, Text, Want, hand_said,
+    Amount, Cause, Event, Fact, FactSubject, Gap, Item, ItemReceiver, MessageCount, Mode, Needs, Parameter,
+    RecordingSummary, Row, Rows, Table, Text, hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -160,7 +160,7 @@ fn define(formats: &mut Formats, kind: u8, body: Body<'_>) -> Option<Defined> {
 }
 
 pub(super) struct Session<'w> {
-    want: Want<'w>,
+    want: Needs<'w>,
     formats: Formats,
     state: State,
     clock: Clock,
@@ -175,7 +175,7 @@ pub(super) struct Session<'w> {
     rows_refused: bool,
     /// Changes without a certain time: from the next certain one on.
     later: Option<Standing>,
-    wrong: Wrong,
+    wrong: WrongTimes,
     pace: Pace,
     unpaced: u64,
     timed: bool,
@@ -183,7 +183,7 @@ pub(super) struct Session<'w> {
 }
 
 impl<'w> Session<'w> {
-    pub(super) fn new(first: First, want: Want<'w>) -> Self {
+    pub(super) fn new(first: First, want: Needs<'w>) -> Self {
         let mut clock = Clock::default();
         if let Some(begins_us) = first.begins_us {
             clock.begin(begins_us);
@@ -202,7 +202,7 @@ impl<'w> Session<'w> {
             firmware: first.banner.unwrap_or_default(),
             rows_refused: false,
             later: None,
-            wrong: Wrong::default(),
+            wrong: WrongTimes::default(),
             pace: Pace::default(),
             unpaced: 0,
             timed: false,
@@ -220,7 +220,7 @@ impl<'w> Session<'w> {
     }
 
     /// All earlier state is void.
-    pub(super) fn begin_another(&mut self, first: First, take: &mut Take<'_>) -> Result<()> {
+    pub(super) fn begin_another(&mut self, first: First, take: &mut ItemReceiver<'_>) -> Result<()> {
         self.count_by_name();
         let First { formats, state, begins_us, banner, .. } = first;
         self.formats = formats.begun_again();
@@ -246,11 +246,11 @@ impl<'w> Session<'w> {
         }
     }
 
-    pub(super) fn tell_banner(&mut self, take: &mut Take<'_>) -> Result<()> {
+    pub(super) fn tell_banner(&mut self, take: &mut ItemReceiver<'_>) -> Result<()> {
         if self.firmware.is_empty() {
             return Ok(());
         }
-        take(self.clock.now(), Item::Fact(Fact { about: About::Firmware, words: &self.firmware }))
+        take(self.clock.now(), Item::Fact(Fact { about: FactSubject::Firmware, words: &self.firmware }))
     }
 
     pub(super) fn formats(&self) -> &Formats {
@@ -268,7 +268,7 @@ impl<'w> Session<'w> {
         place: u64,
         bytes: u64,
         ahead: Ahead<'_>,
-        take: &mut Take<'_>,
+        take: &mut ItemReceiver<'_>,
     ) -> Result<()> {
         let index = usize::from(kind);
         self.unpaced += bytes;
@@ -315,7 +315,7 @@ impl<'w> Session<'w> {
         format.role != Role::Other || observed || rows
     }
 
-    fn define(&mut self, kind: u8, body: Body<'_>, place: u64, take: &mut Take<'_>) -> Result<()> {
+    fn define(&mut self, kind: u8, body: Body<'_>, place: u64, take: &mut ItemReceiver<'_>) -> Result<()> {
         if self.formats.get(kind).is_none_or(|format| format.role == Role::Other) {
             return Ok(());
         }
@@ -332,7 +332,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    fn tell_odd(&mut self, kind: u8, place: u64, take: &mut Take<'_>) -> Result<()> {
+    fn tell_odd(&mut self, kind: u8, place: u64, take: &mut ItemReceiver<'_>) -> Result<()> {
         match self.formats.take_odd(kind) {
             Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),
             None => Ok(()),
@@ -355,7 +355,7 @@ impl<'w> Session<'w> {
         (kind, body): (u8, Body<'_>),
         place: u64,
         ahead: Ahead<'_>,
-        take: &mut Take<'_>,
+        take: &mut ItemReceiver<'_>,
     ) -> Result<()> {
         let Self {
             want, formats, state, clock, handlers, epoch, firmware, later, wrong, pace, unpaced, ..
@@ -430,7 +430,7 @@ impl<'w> Session<'w> {
         result
     }
 
-    fn row(&mut self, kind: u8, body: Body<'_>, take: &mut Take<'_>) -> Result<()> {
+    fn row(&mut self, kind: u8, body: Body<'_>, take: &mut ItemReceiver<'_>) -> Result<()> {
         if matches!(self.want.rows, Rows::None) {
             return Ok(());
         }
@@ -458,7 +458,7 @@ impl<'w> Session<'w> {
     }
 
     /// Reports once, after too many definitions.
-    fn refuse_rows(&mut self, kind: u8, take: &mut Take<'_>) -> Result<()> {
+    fn refuse_rows(&mut self, kind: u8, take: &mut ItemReceiver<'_>) -> Result<()> {
         if std::mem::replace(&mut self.rows_refused, true) {
             return Ok(());
         }
@@ -474,14 +474,14 @@ impl<'w> Session<'w> {
         place: Option<u64>,
         bytes: u64,
         words: String,
-        take: &mut Take<'_>,
+        take: &mut ItemReceiver<'_>,
     ) -> Result<()> {
         let now = self.clock.now();
         let from = Some(now).filter(|_| self.clock.has_begun());
         take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words, own: None }))
     }
 
-    pub(super) fn end(mut self, take: &mut Take<'_>) -> Result<RecordingSummary> {
+    pub(super) fn end(mut self, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
         if let Some((_, words)) = self.state.open_text.take() {
             let alert = alert::of_text(None, words.as_bytes());
             take(self.clock.now(), Item::Text(Text { source: SOURCE, severity: 6, words: &words, alert }))?;
@@ -525,7 +525,7 @@ struct Said<'a, 't> {
     craft: Craft,
     epoch: &'a mut Epoch,
     firmware: &'a mut String,
-    take: &'a mut Take<'t>,
+    take: &'a mut ItemReceiver<'t>,
 }
 
 impl Said<'_, '_> {
@@ -539,15 +539,15 @@ impl Said<'_, '_> {
             Say::Event(number, severity, words, alert) => {
                 Item::Event(Event { source: SOURCE, number, severity, words, alert })
             }
-            Say::Arming(words) => Item::Fact(Fact { about: About::Arming, words }),
-            Say::Failsafes(words) => Item::Fact(Fact { about: About::Failsafes, words }),
-            Say::Emergency(words) => Item::Fact(Fact { about: About::Emergency, words }),
-            Say::ProcessorFault(words) => Item::Fact(Fact { about: About::ProcessorFault, words }),
-            Say::Frame(words) => Item::Fact(Fact { about: About::Frame, words }),
+            Say::Arming(words) => Item::Fact(Fact { about: FactSubject::Arming, words }),
+            Say::Failsafes(words) => Item::Fact(Fact { about: FactSubject::Failsafes, words }),
+            Say::Emergency(words) => Item::Fact(Fact { about: FactSubject::Emergency, words }),
+            Say::ProcessorFault(words) => Item::Fact(Fact { about: FactSubject::ProcessorFault, words }),
+            Say::Frame(words) => Item::Fact(Fact { about: FactSubject::Frame, words }),
             Say::Firmware(words) if words == self.firmware => return Ok(()),
             Say::Firmware(words) => {
                 words.clone_into(self.firmware);
-                Item::Fact(Fact { about: About::Firmware, words })
+                Item::Fact(Fact { about: FactSubject::Firmware, words })
             }
             Say::Utc(utc_us) => match self.epoch.take(utc_us.saturating_sub(self.at.as_micros())) {
                 Some(epoch_us) => Item::Epoch(epoch_us),

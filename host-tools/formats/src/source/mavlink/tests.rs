@@ -20,7 +20,7 @@ fn told(tenths: &[u64]) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
 fn told_of(bytes: Vec<u8>) -> (Vec<(Cause, Option<u64>)>, usize, u64) {
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let (mut gaps, mut restarts, mut last) = (Vec::new(), 0, Instant::ZERO);
-    let summary = reader.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
+    let summary = reader.read(Needs { frames: true, ..Needs::default() }, &mut |at, item| {
         match item {
             Item::Gap(gap) => gaps.push((gap.cause, gap.place)),
             Item::Restart => restarts += 1,
@@ -120,7 +120,7 @@ fn clock_of_tenths(times: &[(u64, u64)]) -> (String, u64) {
     let bytes: Vec<u8> = times.iter().flat_map(record).collect();
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let (mut told, mut last) = (String::new(), Instant::ZERO);
-    let read = reader.read(Want { frames: true, ..Want::default() }, &mut |at, item| {
+    let read = reader.read(Needs { frames: true, ..Needs::default() }, &mut |at, item| {
         last = at;
         match item {
             Item::Gap(_) => told += "gap ",
@@ -174,7 +174,7 @@ fn a_frame_with_a_wrong_checksum_is_damage_and_one_of_an_unknown_message_cannot_
     }
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let mut said = Vec::new();
-    let read = reader.read(Want::default(), &mut |_, item| {
+    let read = reader.read(Needs::default(), &mut |_, item| {
         match item {
             Item::Gap(gap) => said.push(format!("{:?} {:?} {}", gap.cause, gap.place, gap.words)),
             Item::Fact(fact) => said.push(format!("{:?} {}", fact.about, fact.words)),
@@ -209,7 +209,7 @@ fn records_of_two_lengths(records: u32) -> Vec<Vec<u8>> {
 fn frames_and_gaps(bytes: Vec<u8>) -> (usize, Vec<(Cause, Option<u64>)>) {
     let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
     let (mut frames, mut gaps) = (0, Vec::new());
-    let read = reader.read(Want { frames: true, ..Want::default() }, &mut |_, item| {
+    let read = reader.read(Needs { frames: true, ..Needs::default() }, &mut |_, item| {
         match item {
             Item::Frame(_) => frames += 1,
             Item::Gap(gap) => gaps.push((gap.cause, gap.place)),
@@ -268,7 +268,7 @@ fn read(component: u8, boot_ms: &[u32]) -> (Vec<u64>, usize) {
     let bytes: Vec<u8> = boot_ms.iter().flat_map(frame).collect();
     let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
     let (mut times, mut restarts) = (Vec::new(), 0);
-    let want = Want { frames: true, ..Want::default() };
+    let want = Needs { frames: true, ..Needs::default() };
     let mut take = |at: Instant, item: Item<'_>| {
         times.extend(matches!(item, Item::Frame(_)).then(|| at.as_millis()));
         restarts += usize::from(matches!(item, Item::Restart));
@@ -291,7 +291,7 @@ fn raw_frames_come_when_the_autopilots_messages_say_and_where_none_does_when_a_l
 fn told_raw(bytes: Vec<u8>) -> Vec<String> {
     let mut reader = RawReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"), 115_200);
     let mut told = Vec::new();
-    let read = reader.read(Want::default(), &mut |_, item| {
+    let read = reader.read(Needs::default(), &mut |_, item| {
         match item {
             Item::Gap(gap) => told.push(format!("{:?} {:?} {}", gap.cause, gap.place, gap.words)),
             Item::Restart => told.push("restart".to_owned()),
@@ -414,7 +414,7 @@ fn of_several_vehicles_one_is_read_where_it_is_asked_for_and_who_is_no_autopilot
         }
         let mut reader = TlogReader::new(Input::new(std::io::Cursor::new(bytes)).expect("memory"));
         let mut heard = [0; 256];
-        let want = Want { frames: true, observations: true, system, ..Want::default() };
+        let want = Needs { frames: true, observations: true, system, ..Needs::default() };
         let read = reader.read(want, &mut |_, item| {
             match item {
                 Item::Frame(frame) => heard[usize::from(frame.system())] += 1,

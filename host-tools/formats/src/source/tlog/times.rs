@@ -8,7 +8,7 @@ use super::records::{Records, UTC_US_MIN};
 use crate::mavlink::frame::{Check, Peek, peek};
 use crate::plural::count;
 use crate::source::boot::{JOINT_US, Joints, boot_ms_of};
-use crate::source::clock::{Ahead, Clock, Reading, Rules, Stamp, Wrong};
+use crate::source::clock::{Clock, LaterTimes, Reading, Rules, Stamp, WrongTimes};
 use crate::source::doubt::Ends;
 use crate::source::item::{Cause, Gap};
 use crate::source::pace::{Pace, SLOWER};
@@ -115,7 +115,7 @@ pub struct JudgedTime {
 pub struct Times {
     clock: Clock,
     joints: Joints,
-    wrong: Wrong,
+    wrong: WrongTimes,
     now: Instant,
     records: u64,
     beside: Beside,
@@ -127,7 +127,7 @@ impl Default for Times {
         Self {
             clock: Clock::new(RULES),
             joints: Joints::default(),
-            wrong: Wrong::default(),
+            wrong: WrongTimes::default(),
             now: Instant::ZERO,
             records: 0,
             beside: Beside::default(),
@@ -172,7 +172,7 @@ impl Times {
         let stamp = |us| Stamp { us, series: 0 };
         let ahead = |_: &dyn Fn(Stamp) -> bool| {
             let (times, is_end) = after.times_after();
-            Ahead { stamps: times.into_iter().map(stamp).collect(), is_end }
+            LaterTimes { stamps: times.into_iter().map(stamp).collect(), is_end }
         };
         let (joints, stands) = (self.joints, self.beside.stands);
         // Counted while the clock stood still.

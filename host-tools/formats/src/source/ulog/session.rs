@@ -19,10 +19,10 @@ use super::rows;
 use super::times;
 use super::topics::Subscriptions;
 use super::window::Window;
-use crate::source::clock::{self, Clock, Reading, Stamp, Wrong};
+use crate::source::clock::{self, Clock, Reading, Stamp, WrongTimes};
 use crate::source::item::{
-    About, Cause, CellValue, Column, ColumnType, Event, Fact, Gap, Item, Mode, Parameter, RecordingSummary,
-    Row, Rows, Table, Take, Text, Want, hand_said,
+    Cause, CellValue, Column, ColumnType, Event, Fact, FactSubject, Gap, Item, ItemReceiver, Mode, Needs,
+    Parameter, RecordingSummary, Row, Rows, Table, Text, hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -44,8 +44,8 @@ const WORDS_BYTES_MAX: usize = 256;
 
 pub(super) fn read<R: Read>(
     window: &mut Window<R>,
-    want: Want<'_>,
-    take: &mut Take<'_>,
+    want: Needs<'_>,
+    take: &mut ItemReceiver<'_>,
 ) -> Result<RecordingSummary> {
     window.fill(FILE_HEADER_BYTES);
     let Some((version, time_us)) = beginning(window.rest()) else {
@@ -109,8 +109,8 @@ fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: b
 }
 
 struct Session<'a, 'b> {
-    want: Want<'a>,
-    take: &'a mut Take<'b>,
+    want: Needs<'a>,
+    take: &'a mut ItemReceiver<'b>,
     formats: Formats,
     subscriptions: Subscriptions,
     clock: Clock,
@@ -126,7 +126,7 @@ struct Session<'a, 'b> {
     strays: (u64, u64),
     /// A topic and a logged string may repeat it.
     last_words: String,
-    wrong: Wrong,
+    wrong: WrongTimes,
     asked_left: usize,
     pace: Pace,
 }
@@ -144,7 +144,7 @@ const KEPT: [&str; 8] = [
 ];
 
 impl<'a, 'b> Session<'a, 'b> {
-    fn new(want: Want<'a>, take: &'a mut Take<'b>) -> Self {
+    fn new(want: Needs<'a>, take: &'a mut ItemReceiver<'b>) -> Self {
         Self {
             want,
             take,
@@ -160,7 +160,7 @@ impl<'a, 'b> Session<'a, 'b> {
             base: 0,
             strays: (0, 0),
             last_words: String::new(),
-            wrong: Wrong::default(),
+            wrong: WrongTimes::default(),
             asked_left: times::ASKED_BYTES,
             pace: Pace::default(),
         }
@@ -312,7 +312,7 @@ impl<'a, 'b> Session<'a, 'b> {
             let first = text.unwrap_or_default().lines().find(|line| !line.trim().is_empty());
             let first = first.map_or_else(String::new, |line| format!(": {}", line.trim()));
             let words = format!("the autopilot's processor had a hard fault{first}");
-            self.tell(Item::Fact(Fact { about: About::ProcessorFault, words: &words }))?;
+            self.tell(Item::Fact(Fact { about: FactSubject::ProcessorFault, words: &words }))?;
         }
         let Some(table) = self.own.information.clone() else { return Ok(()) };
         let number = value.number().map_or(CellValue::Unknown, CellValue::Double);
@@ -466,7 +466,7 @@ impl<'a, 'b> Session<'a, 'b> {
             }
             Report::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
             Report::Failsafes(words) => {
-                self.tell(Item::Fact(Fact { about: About::Failsafes, words: &words }))
+                self.tell(Item::Fact(Fact { about: FactSubject::Failsafes, words: &words }))
             }
             Report::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
         }
@@ -548,17 +548,17 @@ impl<'a, 'b> Session<'a, 'b> {
         let commit = known("ver_sw").and_then(|commit| commit.get(..8)).map(|commit| format!(" ({commit})"));
         if release != 0 || commit.is_some() {
             let version = if release == 0 { String::new() } else { format!(" v{}", version(release)) };
-            facts.push((About::Firmware, format!("{name}{version}{}", commit.unwrap_or_default())));
+            facts.push((FactSubject::Firmware, format!("{name}{version}{}", commit.unwrap_or_default())));
         }
         if let Some(hardware) = known("ver_hw") {
             let kind = known("ver_hw_subtype").map_or_else(String::new, |kind| format!(" {kind}"));
-            facts.push((About::Hardware, format!("{hardware}{kind}")));
+            facts.push((FactSubject::Hardware, format!("{hardware}{kind}")));
         }
         if let Some(kind) = known("log_type") {
-            facts.push((About::Recorder, format!("PX4's logger, a log of kind {kind}")));
+            facts.push((FactSubject::Recorder, format!("PX4's logger, a log of kind {kind}")));
         }
         if let Some(replayed) = known("replay") {
-            facts.push((About::Recorder, format!("PX4's replay of {replayed}")));
+            facts.push((FactSubject::Recorder, format!("PX4's replay of {replayed}")));
         }
         facts.iter().try_for_each(|(about, words)| self.tell(Item::Fact(Fact { about: *about, words })))
     }

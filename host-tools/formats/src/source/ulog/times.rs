@@ -5,7 +5,7 @@ use std::io::Read;
 use super::message::{DataAfter, Found, MESSAGE_BYTES_MAX, Message, Parser, data_after};
 use super::topics::Subscriptions;
 use super::window::Window;
-use crate::source::clock::{Ahead, BEGINNING_ASKED, Rules, Stamp};
+use crate::source::clock::{BEGINNING_ASKED, LaterTimes, Rules, Stamp};
 use crate::source::doubt::{ASKED, Ends};
 
 /// Since the autopilot's boot. A log begins with old values, and drops out for a second or two.
@@ -38,9 +38,9 @@ pub(super) fn ahead(
     after: &[u8],
     left: &mut usize,
     asks: &dyn Fn(Stamp) -> bool,
-) -> Ahead {
+) -> LaterTimes {
     if *left == 0 {
-        return Ahead::default();
+        return LaterTimes::default();
     }
     let fits = |id: u16, bytes: usize| subscriptions.fits(id, bytes);
     let parser = Parser { fits: &fits };
@@ -51,7 +51,7 @@ pub(super) fn ahead(
         && let Some(rest) = after.get(at..).filter(|rest| !rest.is_empty())
     {
         match parser.look(rest) {
-            Found::Message(Message::Beginning { .. }, _) => return Ahead { stamps, is_end: true },
+            Found::Message(Message::Beginning { .. }, _) => return LaterTimes { stamps, is_end: true },
             Found::Message(message, bytes) => {
                 if let Message::Data { id, data } = message {
                     let told = subscriptions.time(id, data).filter(|us| *us > 0).map(|us| stamp(id, us));
@@ -71,7 +71,7 @@ pub(super) fn ahead(
     }
     *left = left.saturating_sub(at);
     let nothing = after.len() - last >= NOTHING_BYTES;
-    Ahead { is_end: stamps.len() < ASKED && messages < MESSAGES_MAX && (is_all || nothing), stamps }
+    LaterTimes { is_end: stamps.len() < ASKED && messages < MESSAGES_MAX && (is_all || nothing), stamps }
 }
 
 /// Enough for the log's start. Each topic of PX4 begins with its time.

@@ -4,8 +4,9 @@ use std::num::NonZeroU32;
 
 use hums_core::clock::{Span, UTC_MICROS};
 use hums_core::observation::{
-    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu, LocalPosition, MOTORS_MAX,
-    Observation, Outputs, SecondEstimate, SystemTime, Vibration, VibrationScale, Wanted, WantedRates,
+    Air, Attitude, AttitudeSetpoint, Estimator, EstimatorScale, GlobalPosition, Gnss, Hud, Imu,
+    LocalPosition, MOTORS_MAX, Observation, Outputs, SecondEstimate, SystemTime, Vibration, VibrationScale,
+    WantedRates,
 };
 use hums_core::units::{
     Celsius, Fraction, GRAVITY, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position,
@@ -77,7 +78,7 @@ fn attitude(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     {
         let [roll, pitch] = [roll, pitch].map(|degrees| Radians(degrees.to_radians()));
         let rates = known.map(|known| WantedRates { about: known.wanted, of: None });
-        out.observe(&Observation::Wanted(Wanted { roll, pitch, rates }));
+        out.observe(&Observation::AttitudeSetpoint(AttitudeSetpoint { roll, pitch, rates }));
     }
     let rates = known.map(|known| known.flown);
     out.observe(&Observation::Attitude(Attitude { roll, pitch, yaw, rates, boot_ms: boot_ms(given) }));

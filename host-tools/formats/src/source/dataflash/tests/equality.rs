@@ -13,7 +13,7 @@ use hums_core::params::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_onboard::monitoring::TICK;
 
-use crate::source::item::{Item, Want};
+use crate::source::item::{Item, Needs};
 use crate::source::recording::LogPlace;
 
 /// Check, instance, level, seconds since the autopilot's power-on.
@@ -52,7 +52,7 @@ fn findings(name: &str) -> (Vec<Change>, f64) {
         monitor.observe(at.into(), source, observation);
         Ok(())
     };
-    recording.read(Want { observations: true, ..Want::default() }, &mut take).expect("readable");
+    recording.read(Needs { observations: true, ..Needs::default() }, &mut take).expect("readable");
     (changes, begins_s)
 }
 

@@ -81,7 +81,7 @@ fn a_file_that_redefines_for_ever_takes_no_memory() {
         log.format(160, "X", "QB", &columns);
         log.raw(160, &[&u64::from(round).to_le_bytes(), &[1]]);
     }
-    let want = super::Want { rows: super::Rows::All, ..super::Want::default() };
+    let want = super::Needs { rows: super::Rows::All, ..super::Needs::default() };
     let mut names = std::collections::BTreeSet::new();
     let mut rows = 0;
     let summary = super::binary(&log.bytes[..], want, &mut |_, item| {

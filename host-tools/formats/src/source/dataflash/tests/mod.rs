@@ -82,7 +82,7 @@ impl Seen {
 
 fn read(bytes: &[u8]) -> Result<(Seen, RecordingSummary)> {
     let form = detect(bytes).unwrap_or(Form::Binary);
-    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
+    let want = Needs { observations: true, rows: Rows::All, ..Needs::default() };
     let mut seen = Seen::default();
     let mut take = |at: Instant, item: Item<'_>| {
         seen.take(at, item);
@@ -324,7 +324,7 @@ fn the_attitude_that_is_wanted_stands_beside_the_one_that_is() {
     }
     let seen = seen(&log.bytes);
     let wanted = seen.find(|seen| match seen {
-        Observation::Wanted(wanted) => {
+        Observation::AttitudeSetpoint(wanted) => {
             Some([wanted.roll.0, wanted.pitch.0].map(|angle| angle.to_degrees().round()))
         }
         _ => None,

@@ -114,7 +114,7 @@ fn body_rates_and_those_that_are_wanted_are_in_degrees_since_3_4_and_in_hundredt
         let degrees = |rate: hums_core::units::RadiansPerSecond| rate.0.to_degrees().round();
         let seen = seen(log.as_bytes());
         let wanted = seen.find(|observation| match observation {
-            Observation::Wanted(wanted) => Some(wanted.rates.map(|rates| rates.about.map(degrees))),
+            Observation::AttitudeSetpoint(wanted) => Some(wanted.rates.map(|rates| rates.about.map(degrees))),
             _ => None,
         });
         let flown = seen.find(|observation| match observation {

@@ -1,8 +1,8 @@
 //! Motion, and the estimator's confidence.
 
 use hums_core::observation::{
-    Air, Attitude, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition, MOTORS_MAX,
-    Observation, Outputs, Vibration, VibrationScale, Wanted, WantedRates,
+    Air, Attitude, AttitudeSetpoint, Estimator, EstimatorScale, GlobalPosition, Hud, Imu, LocalPosition,
+    MOTORS_MAX, Observation, Outputs, Vibration, VibrationScale, WantedRates,
 };
 use hums_core::units::{
     Celsius, Fraction, GRAVITY, Gauss, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position,
@@ -201,14 +201,14 @@ const RATES_AGE_US: u64 = 500_000;
 fn attitude_setpoint(px4: &mut Px4, sample: &Sample<'_>) {
     let angles = || {
         let [roll, pitch] = [sample.fields.finite(1)?, sample.fields.finite(2)?].map(Radians);
-        Some(Wanted { roll, pitch, rates: None })
+        Some(AttitudeSetpoint { roll, pitch, rates: None })
     };
-    let wanted = sample.fields.vector::<4>(0).and_then(Wanted::from_quaternion).or_else(angles);
+    let wanted = sample.fields.vector::<4>(0).and_then(AttitudeSetpoint::from_quaternion).or_else(angles);
     if let Some(wanted) = wanted {
         let fresh = |(us, _): &(u64, _)| sample.recorded_us.abs_diff(*us) <= RATES_AGE_US;
         let rates = px4.motion.rates_wanted.filter(fresh);
         let rates = rates.map(|(_, about)| WantedRates { about, of: None });
-        px4.observe(Observation::Wanted(Wanted { rates, ..wanted }));
+        px4.observe(Observation::AttitudeSetpoint(AttitudeSetpoint { rates, ..wanted }));
     }
 }
 

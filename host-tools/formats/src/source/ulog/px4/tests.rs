@@ -208,7 +208,7 @@ fn the_wanted_attitude_is_a_quaternion_and_before_v1_6_two_angles() {
         let format = format!("vehicle_attitude_setpoint:uint64_t timestamp;{fields}");
         let log = Writer::new(SECOND).format(&format).subscribe(0, 0, "vehicle_attitude_setpoint");
         let log = log.data(0, 2 * SECOND, &floats(&values));
-        let wanted = observations(&read(&log.bytes), "Wanted(");
+        let wanted = observations(&read(&log.bytes), "AttitudeSetpoint(");
         assert!(wanted.len() == 1 && wanted[0].contains("roll: Radians(1.57"), "{fields} {wanted:?}");
     }
 }
@@ -223,7 +223,7 @@ fn the_wanted_rates_go_with_the_wanted_attitude() {
     let log = log.data(1, 2 * SECOND, &floats(&[0.5, -0.25, 0.0]));
     let log = log.data(0, 2 * SECOND, &floats(&[1.0, 0.0, 0.0, 0.0]));
     let log = log.data(0, 3 * SECOND, &floats(&[1.0, 0.0, 0.0, 0.0]));
-    let wanted = observations(&read(&log.bytes), "Wanted(");
+    let wanted = observations(&read(&log.bytes), "AttitudeSetpoint(");
     assert!(
         wanted[0].contains("about: [RadiansPerSecond(0.5), RadiansPerSecond(-0.25), RadiansPerSecond(0.0)]"),
         "{wanted:?}"

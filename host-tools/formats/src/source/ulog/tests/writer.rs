@@ -2,7 +2,7 @@
 
 use hums_core::clock::Instant;
 
-use crate::source::item::{CellValue, Gap, Item, Reader, RecordingSummary, Rows, Want};
+use crate::source::item::{CellValue, Gap, Item, Needs, Reader, RecordingSummary, Rows};
 use crate::source::ulog::Ulog;
 
 #[derive(Clone)]
@@ -103,7 +103,7 @@ pub(in crate::source::ulog) fn read(bytes: &[u8]) -> Read {
 pub(in crate::source::ulog) fn try_read(bytes: &[u8]) -> anyhow::Result<Read> {
     let mut read = Read::default();
     let mut last = Instant::ZERO;
-    let want = Want { observations: true, rows: Rows::All, ..Want::default() };
+    let want = Needs { observations: true, rows: Rows::All, ..Needs::default() };
     let summary = Ulog::new(bytes).read(want, &mut |at, item| {
         assert!(at >= last, "time falls from {last:?} to {at:?}");
         last = at;
