@@ -7,6 +7,7 @@ use hums_core::clock::Instant;
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::Frame;
 use hums_link::framer::Framer;
+use hums_link::mav_cmd::PREFLIGHT_REBOOT_SHUTDOWN;
 use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::signing::{Clock, Key, Seal};
@@ -21,8 +22,6 @@ use stm32f405_model::time::{MS, Ps, SECOND};
 
 use super::bench;
 
-/// `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`
-const RESTART: u16 = 246;
 /// `base_mode` of a heartbeat.
 const DISARMED: u8 = 0x51;
 /// The same with `MAV_MODE_FLAG_SAFETY_ARMED`.
@@ -51,7 +50,7 @@ fn on_the_ground() -> Rig {
 
 fn command(rig: &mut Rig, action: f32) {
     let mut out = [0; FRAME_BYTES_MAX];
-    let packet = messages::command_long(RESTART, &[action], 1, COMPONENT);
+    let packet = messages::command_long(PREFLIGHT_REBOOT_SHUTDOWN, &[action], 1, COMPONENT);
     let frame = Encoder::of(255, 190).frame(&mut out, &packet).to_vec();
     let now = rig.machine.now();
     rig.machine.send(usart(&rig.wired.radio), &frame, now, 57_600.0);

@@ -590,6 +590,21 @@ state! {
     }
 }
 
+impl CommandAck {
+    /// `MAV_RESULT_ACCEPTED`
+    pub const ACCEPTED: u8 = 0;
+    /// `MAV_RESULT_TEMPORARILY_REJECTED`: a later command may be accepted.
+    pub const TEMPORARILY_REJECTED: u8 = 1;
+    /// `MAV_RESULT_DENIED`
+    pub const DENIED: u8 = 2;
+    /// `MAV_RESULT_UNSUPPORTED`
+    pub const UNSUPPORTED: u8 = 3;
+    /// `MAV_RESULT_FAILED`
+    pub const FAILED: u8 = 4;
+    /// `MAV_RESULT_IN_PROGRESS`: another answer follows.
+    pub const IN_PROGRESS: u8 = 5;
+}
+
 /// One message's worth of knowledge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Observation {

@@ -63,12 +63,6 @@ const APPROACH_M: f32 = 40.0;
 const LANDING_LASTS: Millis = Millis::from_secs(15);
 /// A mode change is the autopilot's own if a sign of that comes within this time, before or after.
 const SIGN: Millis = Millis::from_secs(2);
-/// `MAV_RESULT_ACCEPTED`
-const ACCEPTED: u8 = 0;
-/// `MAV_RESULT_TEMPORARILY_REJECTED`: asked again.
-const TEMPORARILY_REJECTED: u8 = 1;
-/// `MAV_RESULT_IN_PROGRESS`: the answer is to come.
-const IN_PROGRESS: u8 = 5;
 
 numbered! {
     /// A requested action. The numbers are those of `PROT_ACTION`, and are stored.
@@ -352,7 +346,8 @@ impl Protect {
         let State::Asking { attempt, at, .. } = self.state else { return None };
         vehicle.command_ack.at().filter(|answered_at| attempt > 0 && !at.is_after(*answered_at))?;
         let ack = vehicle.command_ack.get().filter(|ack| is_ours(ack, vehicle, self.action))?;
-        Some(ack.result).filter(|result| *result != TEMPORARILY_REJECTED || attempt == ATTEMPTS_MAX)
+        Some(ack.result)
+            .filter(|result| *result != CommandAck::TEMPORARILY_REJECTED || attempt == ATTEMPTS_MAX)
     }
 
     fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
@@ -395,8 +390,8 @@ impl Protect {
         let at = situation.now;
         let next = match result {
             // What follows is waited for from here on.
-            IN_PROGRESS => return (State::Asking { attempt, at, progress: true }, None),
-            ACCEPTED => State::OnItsWay(Way::Accepted, at),
+            CommandAck::IN_PROGRESS => return (State::Asking { attempt, at, progress: true }, None),
+            CommandAck::ACCEPTED => State::OnItsWay(Way::Accepted, at),
             _ if self.action == Action::Return && hovers(situation) => {
                 State::Asking { attempt: 0, at, progress: false }
             }

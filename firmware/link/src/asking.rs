@@ -21,9 +21,10 @@
 
 use hums_core::cells::{self, KNOWN};
 use hums_core::clock::{Instant, Span};
-use hums_core::observation::{Autopilot, Source};
+use hums_core::observation::{Autopilot, CommandAck, Source};
 use hums_dialect::ids;
 
+use crate::mav_cmd::{REQUEST_MESSAGE, SET_MESSAGE_INTERVAL};
 use crate::messages;
 use crate::packet::Packet;
 
@@ -38,19 +39,6 @@ const TRIES: u8 = 3;
 const DEAF: u8 = 6;
 /// Most doublings of the interval: 10 s, 20 s ... 10.5 min.
 const PATIENCE_MAX: u8 = 6;
-
-/// `MAV_CMD_SET_MESSAGE_INTERVAL`
-pub const SET_MESSAGE_INTERVAL: u16 = 511;
-/// `MAV_CMD_REQUEST_MESSAGE`
-pub const REQUEST_MESSAGE: u16 = 512;
-/// A `MAV_RESULT`.
-const ACCEPTED: u8 = 0;
-/// As above.
-const TEMPORARILY: u8 = 1;
-/// As above.
-const UNSUPPORTED: u8 = 3;
-/// As above.
-const IN_PROGRESS: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Senders {
@@ -245,12 +233,13 @@ impl Asking {
             RequestSubject::Identity => (REQUEST_MESSAGE, &mut self.identity),
             RequestSubject::Parameter(_) => return,
         };
-        if command != expected || result == IN_PROGRESS {
+        if command != expected || result == CommandAck::IN_PROGRESS {
             return;
         }
         // An autopilot that does not know this command may know the other one.
         let asks_one = matches!(asked.what, RequestSubject::One(_));
-        let is_granted = matches!(result, ACCEPTED | TEMPORARILY) || (asks_one && result == UNSUPPORTED);
+        let is_granted = matches!(result, CommandAck::ACCEPTED | CommandAck::TEMPORARILY_REJECTED)
+            || (asks_one && result == CommandAck::UNSUPPORTED);
         message.has = if is_granted { Support::Yes } else { Support::No };
         message.due &= asks_one && is_granted;
         self.asked = None;

@@ -9,6 +9,7 @@ pub mod frame;
 pub mod framer;
 pub mod ftp;
 pub mod long_text;
+pub mod mav_cmd;
 pub mod messages;
 mod observe;
 pub mod outlet;

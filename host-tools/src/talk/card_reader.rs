@@ -3,6 +3,8 @@
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
+use hums_core::observation::CommandAck;
+use hums_link::mav_cmd::{PREFLIGHT_REBOOT_SHUTDOWN, REBOOT_TO_MASS_STORAGE};
 use serde::Serialize;
 
 use super::{Client, accepted};
@@ -10,10 +12,7 @@ use crate::cli;
 use crate::outcome::Outcome;
 use crate::output::{self, Schema};
 
-/// `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`
-const RESTART: u16 = 246;
-/// `REBOOT_SHUTDOWN_ACTION_REBOOT_TO_MASS_STORAGE`
-const MASS_STORAGE: f32 = 5.0;
+const MASS_STORAGE: f32 = REBOOT_TO_MASS_STORAGE as f32;
 const ANSWER: Duration = Duration::from_millis(400);
 /// The board restarts half a second after its answer, which may be lost.
 const TRIES: usize = 3;
@@ -45,9 +44,9 @@ pub fn run(args: &cli::CardReader) -> Result<Outcome> {
 }
 
 fn tell(client: &mut Client) -> Result<()> {
-    let answer = client.command(RESTART, &[MASS_STORAGE], ANSWER, TRIES)?;
+    let answer = client.command(PREFLIGHT_REBOOT_SHUTDOWN, &[MASS_STORAGE], ANSWER, TRIES)?;
     match answer.context("no answer; if the PC has no new disk, send the command again")? {
-        3 => bail!("the firmware has no card reader; flash the one of this version"),
+        CommandAck::UNSUPPORTED => bail!("the firmware has no card reader; flash the one of this version"),
         result => accepted(result, "GS_SIGN needs a signed command; give --key FILE"),
     }
 }
@@ -65,17 +64,23 @@ mod tests {
         let mut asked = 0;
         let mut client = found(&[1], move |frame| {
             let fields = Fields(frame.payload());
-            if (frame.id(), fields.u16(28), fields.f32(0).to_bits()) != (76, RESTART, MASS_STORAGE.to_bits())
+            if (frame.id(), fields.u16(28), fields.f32(0).to_bits())
+                != (76, PREFLIGHT_REBOOT_SHUTDOWN, MASS_STORAGE.to_bits())
             {
                 return Vec::new();
             }
             asked += 1;
-            if asked == 1 { Vec::new() } else { vec![(1, command_ack(RESTART, 0, 255, 190))] }
+            if asked == 1 {
+                Vec::new()
+            } else {
+                vec![(1, command_ack(PREFLIGHT_REBOOT_SHUTDOWN, 0, 255, 190))]
+            }
         });
         tell(&mut client).expect("accepted");
         let refusals = [(1, "armed"), (2, "GS_SIGN"), (3, "no card reader"), (9, "MAV_RESULT 9")];
         for (result, wanted) in refusals {
-            let mut client = found(&[1], move |_| vec![(1, command_ack(RESTART, result, 255, 190))]);
+            let mut client =
+                found(&[1], move |_| vec![(1, command_ack(PREFLIGHT_REBOOT_SHUTDOWN, result, 255, 190))]);
             let error = tell(&mut client).expect_err("refused").to_string();
             assert!(error.contains(wanted), "{error}");
         }

@@ -3,18 +3,18 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
+use hums_core::observation::CommandAck;
 use hums_link::Frame;
+use hums_link::mav_cmd::STORAGE_FORMAT;
 use hums_link::packet::Fields;
 use serde::Serialize;
 
-use super::{Client, IN_PROGRESS, accepted, result_of};
+use super::{Client, accepted, result_of};
 use crate::cli;
 use crate::mavlink::ids::STATUSTEXT;
 use crate::outcome::{Outcome, usage};
 use crate::output::{self, Schema};
 
-/// `MAV_CMD_STORAGE_FORMAT`
-const FORMAT: u16 = 526;
 const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// 512 GB take two minutes, 1 TB four.
@@ -60,13 +60,13 @@ impl Answer {
             let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT);
             text?.strip_prefix("HUMS: card: ").map(str::to_owned)
         };
-        result_of(frame, FORMAT).map(Self::Result).or_else(|| state().map(Self::Card))
+        result_of(frame, STORAGE_FORMAT).map(Self::Result).or_else(|| state().map(Self::Card))
     }
 }
 
 fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()> {
     let system = client.system();
-    let answer = client.command(FORMAT, &[1.0, 1.0], ANSWER, TRIES)?;
+    let answer = client.command(STORAGE_FORMAT, &[1.0, 1.0], ANSWER, TRIES)?;
     let mut result = answer.context("no answer; check the link, or flash the firmware of this version")?;
     check(result)?;
     let minutes = LIMIT.as_secs() / 60;
@@ -78,7 +78,7 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
         // Any frame proves its presence.
         match client.until(end.min(Instant::now() + silence), |frame| Some(Answer::read(frame)))? {
             // After the acceptance: of the repeated command.
-            Some(Some(Answer::Result(next))) if result == IN_PROGRESS => {
+            Some(Some(Answer::Result(next))) if result == CommandAck::IN_PROGRESS => {
                 check(next)?;
                 result = next;
             }
@@ -100,8 +100,10 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
 
 fn check(result: u8) -> Result<()> {
     match result {
-        3 => bail!("the firmware does not know the command; flash the one of this version"),
-        4 => bail!("there is no card to format; insert one"),
+        CommandAck::UNSUPPORTED => {
+            bail!("the firmware does not know the command; flash the one of this version")
+        }
+        CommandAck::FAILED => bail!("there is no card to format; insert one"),
         result => accepted(
             result,
             "its card works, is full of other files, or GS_SIGN needs a signed command; format such a card on a PC, or give --key FILE",
@@ -123,7 +125,7 @@ mod tests {
     }
 
     fn ack(result: u8, station: u8) -> (u8, hums_link::packet::Packet) {
-        (1, command_ack(FORMAT, result, station, 190))
+        (1, command_ack(STORAGE_FORMAT, result, station, 190))
     }
 
     fn recording(system: u8) -> (u8, hums_link::packet::Packet) {

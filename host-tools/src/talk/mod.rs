@@ -16,7 +16,9 @@ use std::path::Path;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, anyhow, bail};
+use hums_core::observation::CommandAck;
 use hums_link::encode::{COMPONENT, Encoder, FRAME_BYTES_MAX};
+use hums_link::mav_cmd::REQUEST_MESSAGE;
 use hums_link::packet::{Fields, Packet};
 use hums_link::signing::{Clock, Key, Seal, stamp};
 use hums_link::{Check, Frame, Framer, messages};
@@ -30,11 +32,6 @@ use crate::logs::board::Board;
 use crate::mavlink::ids::{AUTOPILOT_VERSION, COMMAND_ACK, HEARTBEAT};
 use crate::outcome::usage;
 
-/// `MAV_RESULT`
-const ACCEPTED: u8 = 0;
-const IN_PROGRESS: u8 = 5;
-/// `MAV_CMD_REQUEST_MESSAGE`
-const REQUEST_MESSAGE: u16 = 512;
 /// Offset of `uid2` in `AUTOPILOT_VERSION`.
 const UID_AT: usize = 60;
 /// A ground station's.
@@ -315,14 +312,14 @@ fn result_of(frame: &Frame<'_>, command: u16) -> Option<u8> {
     (is_it && is_for_us(fields.u8(8), fields.u8(9))).then(|| fields.u8(2))
 }
 
-/// Accepts [`ACCEPTED`] and [`IN_PROGRESS`]. `denied`: the reasons of a denial.
+/// An error for a command that was not accepted. `denied`: the reasons of a denial.
 fn accepted(result: u8, denied: &str) -> Result<()> {
     match result {
-        ACCEPTED | IN_PROGRESS => Ok(()),
-        1 => bail!(
+        CommandAck::ACCEPTED | CommandAck::IN_PROGRESS => Ok(()),
+        CommandAck::TEMPORARILY_REJECTED => bail!(
             "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
         ),
-        2 => bail!("the board refused: {denied}"),
+        CommandAck::DENIED => bail!("the board refused: {denied}"),
         result => bail!("the board refused (MAV_RESULT {result})"),
     }
 }

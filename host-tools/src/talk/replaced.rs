@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use hums_core::component::{COMPONENTS_MAX, ComponentKind, LABEL_BYTES};
+use hums_link::mav_cmd::USER_1_REPLACED;
 use hums_link::param_line::{self, Line};
 use serde::Serialize;
 
@@ -19,8 +20,6 @@ use crate::output::{self, Schema};
 use crate::part;
 use crate::source::find::find;
 
-/// `MAV_CMD_USER_1`
-const REPLACED: u16 = 31_010;
 const ANSWER: Duration = Duration::from_secs(2);
 /// Tries: with a serial number a repeated command replaces the part once.
 const TRIES: usize = 3;
@@ -120,7 +119,7 @@ fn tell(client: &mut Client, place: usize, serial: &str) -> Result<()> {
     };
     let mut values = vec![place as f32];
     values.extend(serial.as_bytes().chunks(CHARACTERS).map(number));
-    let answer = client.command(REPLACED, &values, ANSWER, TRIES)?;
+    let answer = client.command(USER_1_REPLACED, &values, ANSWER, TRIES)?;
     let answer = answer.context("no answer; check the link, or flash the firmware of this version");
     let denied = "there is no such component, or GS_SIGN needs a signed command; give --key FILE";
     answer.and_then(|result| accepted(result, denied)).with_context(|| format!("system {}", client.system()))
@@ -184,7 +183,7 @@ mod tests {
                 // Component 3; "A-4" and "711" in 24 bits.
                 let told = [0, 4, 8, 12].map(|at| fields.f32(at) as u32);
                 let is_it = told == [3, 4_271_412, 3_617_073, 0];
-                return vec![(1, command_ack(REPLACED, if is_it { 0 } else { 3 }, 255, 190))];
+                return vec![(1, command_ack(USER_1_REPLACED, if is_it { 0 } else { 3 }, 255, 190))];
             }
             let name = fields.text(4, 16).filter(|_| frame.id() == PARAM_REQUEST_READ);
             let Some(name) = name else { return Vec::new() };

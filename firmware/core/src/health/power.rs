@@ -50,6 +50,7 @@ pub(super) const CHECKS: &[Check] = &[
     row!("batt_state" BATTERY, above(BatStateWarn BatStateCrit 0.0),
     role: Role::of(Group::BatteryState, Group::Battery.bit()), unit: Unit::FLAG, when: CheckPhase::Armed,
     of: InstanceKind::Battery, read: |inputs, battery| {
+        // `MAV_BATTERY_CHARGE_STATE`: ok, charging; low, unhealthy; critical, emergency, failed.
         of(inputs, battery, |battery| match battery.charge {
             1 | 7 => Some(0.0),
             2 | 6 => Some(1.0),

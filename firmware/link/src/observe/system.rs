@@ -26,15 +26,20 @@ pub(super) fn heartbeat(payload: &[u8]) -> Option<Heartbeat> {
     if autopilot_number == AUTOPILOT_INVALID {
         return None;
     }
+    // `MAV_TYPE`
     let kind = match type_number {
+        // Quadrotor, coaxial, helicopter, and rotors by 6, 8, 3, 12 and 10.
         2 | 3 | 4 | 13 | 14 | 15 | 29 | 35 => VehicleKind::Rotorcraft,
+        // Fixed wing, flapping wing, kite, parafoil.
         1 | 16 | 17 | 28 => VehicleKind::Plane,
         19..=25 => VehicleKind::Vtol,
+        // Rover, boat, submarine.
         10..=12 => VehicleKind::Surface,
         // Antenna tracker, GCS, companion, gimbal, ADS-B, camera, charging station, FLARM, servo, ODID and so on.
         5 | 6 | 18 | 26 | 27 | 30 | 31 | 32 | 33 | 34 | 36..=42 => return None,
         _ => VehicleKind::Other,
     };
+    // `MAV_AUTOPILOT`
     let autopilot = match autopilot_number {
         3 => Autopilot::ArduPilot,
         12 => Autopilot::Px4,

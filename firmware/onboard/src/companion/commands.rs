@@ -16,8 +16,14 @@ use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::component::Label;
 use hums_core::health::{self, Level};
-use hums_core::observation::Feeds;
+use hums_core::observation::{CommandAck, Feeds};
 use hums_core::params::TABLE;
+use hums_link::ids;
+use hums_link::mav_cmd::{
+    LOGGING_START, LOGGING_STOP, PREFLIGHT_REBOOT_SHUTDOWN, REBOOT_TO_MASS_STORAGE,
+    REQUEST_AUTOPILOT_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL_VERSION, RUN_PREARM_CHECKS,
+    STORAGE_FORMAT, USER_1_REPLACED, USER_2_CANCEL,
+};
 use hums_link::messages;
 use hums_link::packet::Packet;
 use hums_link::request::{Port, Replies, Reply};
@@ -32,28 +38,8 @@ use crate::monitoring::PARTS_CHANGED;
 use crate::queues::SectorsIn;
 use crate::records;
 
-const PROTOCOL: u16 = 519;
-const CAPABILITIES: u16 = 520;
-/// `MAV_CMD_REQUEST_MESSAGE`
-pub(crate) const MESSAGE: u16 = 512;
-const PREFLIGHT: u16 = 401;
-const RESTART: u16 = 246;
-/// `REBOOT_SHUTDOWN_ACTION_REBOOT_TO_MASS_STORAGE`, as ArduPilot has it.
-const MASS_STORAGE: u32 = 5;
 /// From the command to the end of the log: time for our answer.
 const ANSWERED: Span = Span::from_millis(500);
-const RECORD: u16 = 2510;
-const STOP: u16 = 2511;
-const FORMAT: u16 = 526;
-const REPLACED: u16 = 31_010;
-const CANCEL: u16 = 31_011;
-/// `MAV_RESULT`
-pub(crate) const ACCEPTED: u8 = 0;
-const TEMPORARILY_REJECTED: u8 = 1;
-/// Also of `MAV_RESULT`.
-pub(crate) const DENIED: u8 = 2;
-const UNSUPPORTED: u8 = 3;
-const FAILED: u8 = 4;
 
 fn characters(params: &[f32; 7]) -> [u8; 18] {
     let mut text = [0; 18];
@@ -65,7 +51,10 @@ fn characters(params: &[f32; 7]) -> [u8; 18] {
 
 /// Changes nothing.
 pub(crate) const fn only_asks(command: u16) -> bool {
-    matches!(command, MESSAGE | PROTOCOL | CAPABILITIES | PREFLIGHT)
+    matches!(
+        command,
+        REQUEST_MESSAGE | REQUEST_PROTOCOL_VERSION | REQUEST_AUTOPILOT_CAPABILITIES | RUN_PREARM_CHECKS
+    )
 }
 
 #[derive(Clone, Debug)]
@@ -112,30 +101,48 @@ impl Commands {
     ) -> u8 {
         let mut reply = |reply| {
             self.replies.push(asker.port, reply);
-            ACCEPTED
+            CommandAck::ACCEPTED
         };
         match (command, params[0] as u32) {
-            (CAPABILITIES, _) | (MESSAGE, 148) => reply(Reply::Version),
-            (PROTOCOL, _) | (MESSAGE, 300) => reply(Reply::Protocol),
-            (MESSAGE, 0) => reply(Reply::Heartbeat),
-            (MESSAGE, 397) => reply(Reply::Metadata),
-            (PREFLIGHT, _) => {
+            (REQUEST_AUTOPILOT_CAPABILITIES, _) | (REQUEST_MESSAGE, ids::AUTOPILOT_VERSION) => {
+                reply(Reply::Version)
+            }
+            (REQUEST_PROTOCOL_VERSION, _) | (REQUEST_MESSAGE, ids::PROTOCOL_VERSION) => {
+                reply(Reply::Protocol)
+            }
+            (REQUEST_MESSAGE, ids::HEARTBEAT) => reply(Reply::Heartbeat),
+            (REQUEST_MESSAGE, ids::COMPONENT_METADATA) => reply(Reply::Metadata),
+            (RUN_PREARM_CHECKS, _) => {
                 reply(Reply::Preflight);
-                if preflight(book.monitor).is_none() { ACCEPTED } else { FAILED }
+                if preflight(book.monitor).is_none() { CommandAck::ACCEPTED } else { CommandAck::FAILED }
             }
             // The storage number and a confirmation: a command sent by mistake has neither.
-            (FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
+            (STORAGE_FORMAT, storage) if storage > 1 || params[1].to_bits() != 1.0_f32.to_bits() => {
+                CommandAck::DENIED
+            }
             // Likewise: the ground station's button without numbers must not reset the baselines.
-            (REPLACED, 0) if params[0].to_bits() != 0 || params[1].to_bits() != 1.0_f32.to_bits() => DENIED,
+            (USER_1_REPLACED, 0) if params[0].to_bits() != 0 || params[1].to_bits() != 1.0_f32.to_bits() => {
+                CommandAck::DENIED
+            }
             // Other restarts are the autopilot's.
-            (RESTART, action) if action != MASS_STORAGE => UNSUPPORTED,
-            (RECORD | STOP | FORMAT | REPLACED | CANCEL | RESTART, number) => {
+            (PREFLIGHT_REBOOT_SHUTDOWN, action) if action != REBOOT_TO_MASS_STORAGE => {
+                CommandAck::UNSUPPORTED
+            }
+            (
+                LOGGING_START
+                | LOGGING_STOP
+                | STORAGE_FORMAT
+                | USER_1_REPLACED
+                | USER_2_CANCEL
+                | PREFLIGHT_REBOOT_SHUTDOWN,
+                number,
+            ) => {
                 if !self.allows(now, asker.port) {
-                    return TEMPORARILY_REJECTED;
+                    return CommandAck::TEMPORARILY_REJECTED;
                 }
                 self.act(now, asker, (command, number, &params), book, sectors)
             }
-            _ => UNSUPPORTED,
+            _ => CommandAck::UNSUPPORTED,
         }
     }
 
@@ -149,26 +156,30 @@ impl Commands {
     ) -> u8 {
         let by = asker.by;
         match command {
-            CANCEL => {
+            USER_2_CANCEL => {
                 let cancelled = book.monitor.cancel_protection();
                 book.journal.by_hand(now, format_args!("cancel by {}/{}", by.0, by.1), sectors);
-                if cancelled { ACCEPTED } else { FAILED }
+                if cancelled { CommandAck::ACCEPTED } else { CommandAck::FAILED }
             }
-            STOP | FORMAT | REPLACED | RESTART if book.may_fly(now) => TEMPORARILY_REJECTED,
-            FORMAT => format(now, by, book, sectors),
-            RESTART => {
+            LOGGING_STOP | STORAGE_FORMAT | USER_1_REPLACED | PREFLIGHT_REBOOT_SHUTDOWN
+                if book.may_fly(now) =>
+            {
+                CommandAck::TEMPORARILY_REJECTED
+            }
+            STORAGE_FORMAT => format(now, by, book, sectors),
+            PREFLIGHT_REBOOT_SHUTDOWN => {
                 if self.card_reader_asked.is_none() {
                     self.card_reader_asked = Some(now);
                     book.journal.by_hand(now, format_args!("card reader by {}/{}", by.0, by.1), sectors);
                     self.replies.push(asker.port, Reply::CardReader);
                 }
-                ACCEPTED
+                CommandAck::ACCEPTED
             }
-            REPLACED if number == 0 => {
+            USER_1_REPLACED if number == 0 => {
                 book.journal.by_hand(now, format_args!("{PARTS_CHANGED} by {}/{}", by.0, by.1), sectors);
-                ACCEPTED
+                CommandAck::ACCEPTED
             }
-            REPLACED => {
+            USER_1_REPLACED => {
                 let place = (number as usize).wrapping_sub(1);
                 // The component's record names the sender.
                 let serial = characters(params);
@@ -177,14 +188,14 @@ impl Commands {
                     (Label::new(serial), book.monitor.components().get(place).map(|part| part.serial));
                 let is_done = new != Label::default() && known == Some(new);
                 if is_done || records::replace_component(now, place, serial, by, book, sectors) {
-                    ACCEPTED
+                    CommandAck::ACCEPTED
                 } else {
-                    DENIED
+                    CommandAck::DENIED
                 }
             }
             _ => {
-                self.stop_or_record(now, command == STOP, asker, &mut book.journal, sectors);
-                ACCEPTED
+                self.stop_or_record(now, command == LOGGING_STOP, asker, &mut book.journal, sectors);
+                CommandAck::ACCEPTED
             }
         }
     }
@@ -220,11 +231,11 @@ fn format(now: Instant, by: By, book: &mut Logbook<'_>, sectors: &mut SectorsIn)
     match state {
         _ if may => {
             book.card.want_format();
-            ACCEPTED
+            CommandAck::ACCEPTED
         }
-        CardState::Formatting => ACCEPTED,
-        CardState::Recording | CardState::Finished | CardState::Full => DENIED,
-        _ => FAILED,
+        CardState::Formatting => CommandAck::ACCEPTED,
+        CardState::Recording | CardState::Finished | CardState::Full => CommandAck::DENIED,
+        _ => CommandAck::FAILED,
     }
 }
 

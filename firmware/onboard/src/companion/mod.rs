@@ -18,19 +18,20 @@ mod ways;
 use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::record::Boot;
 use hums_core::clock::{Instant, Span};
+use hums_core::observation::CommandAck;
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, KnownVehicle};
 use hums_link::encode::{COMPONENT, FRAME_BYTES_MAX};
 use hums_link::events::Events;
 use hums_link::frame::Frame;
-use hums_link::ids;
 use hums_link::messages;
 use hums_link::outlet::{self, Class, Outlet};
 use hums_link::packet::Fields;
 use hums_link::request::{self, AddressedRequest, Port, Reply, Request};
 use hums_link::signing::{Key, SIGNATURE_BYTES, Seal};
 use hums_link::summary::{self, Forwards, Summary};
+use hums_link::{ids, mav_cmd};
 
 use crate::journal::{Journal, Logbook};
 use crate::notices::Notices;
@@ -248,16 +249,18 @@ impl Companion {
                 self.commands.replies.push(port, Reply::Param(param as u16));
             }
             // Broadcasts to all components are left to the autopilot, unless they are requests for messages.
-            Request::Command(command, params) if asked.target.1 != 0 || command == commands::MESSAGE => {
+            Request::Command(command, params)
+                if asked.target.1 != 0 || command == mav_cmd::REQUEST_MESSAGE =>
+            {
                 let result = match trust {
-                    Trust::Refused => commands::DENIED,
+                    Trust::Refused => CommandAck::DENIED,
                     _ => self.commands.command(now, asker, command, params, book, sectors),
                 };
-                if result == commands::ACCEPTED && !commands::only_asks(command) {
+                if result == CommandAck::ACCEPTED && !commands::only_asks(command) {
                     self.secure.changed(trust);
                 }
                 let is_broadcast = asked.target.1 == 0;
-                if !is_broadcast || result == commands::ACCEPTED {
+                if !is_broadcast || result == CommandAck::ACCEPTED {
                     self.commands.replies.push(port, Reply::Ack(command, result, asker.by));
                 }
             }

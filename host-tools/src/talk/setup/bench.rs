@@ -7,6 +7,7 @@ use hums_analysis::log_json::duration_s;
 use hums_boards::Board;
 use hums_core::observation::Autopilot;
 use hums_link::asking::wanted;
+use hums_link::mav_cmd::RUN_PREARM_CHECKS;
 use hums_link::messages;
 use hums_link::packet::Fields;
 
@@ -21,8 +22,6 @@ use crate::summary::Overview;
 use crate::talk::{Client, pull};
 use crate::utc::date_and_time;
 
-/// `MAV_CMD_RUN_PREARM_CHECKS`
-const PREARM: u16 = 401;
 const ANSWER: Duration = Duration::from_secs(3);
 const HEAD_SECTORS: u32 = 8;
 /// The checks of every vehicle need them; of the last two one autopilot has one.
@@ -57,7 +56,7 @@ pub(super) fn own(own: &BoxSettings, link: &str) -> CheckLine {
 pub(super) fn prearm(client: &mut Client) -> Result<CheckLine> {
     const READY: &str = "HUMS: ready";
     let (system, component) = client.target();
-    let packet = messages::command_long(PREARM, &[], system, component);
+    let packet = messages::command_long(RUN_PREARM_CHECKS, &[], system, component);
     let text = client.ask(&packet, ANSWER, TRIES, |frame| {
         let text = Fields(frame.payload()).text(1, 50).filter(|_| frame.id() == STATUSTEXT)?;
         (text.starts_with(READY) || text.starts_with("HUMS: not ready")).then(|| text.to_owned())

@@ -155,6 +155,7 @@ fn arm(state: &mut State, given: &Given<'_>, _: &mut Out<'_>) {
 
 fn event(state: &mut State, given: &Given<'_>, out: &mut Out<'_>) {
     let Some(number) = given.byte(0) else { return };
+    // `LogEvent` (`AP_Logger.h`): armed, disarmed, auto-armed, land complete, not landed.
     match number {
         10 => {
             state.arm_again(given.at);
