@@ -7,7 +7,7 @@ use std::path::Path;
 use hums::card::{Faults, SimCard};
 use hums::run::sim::power_on;
 use hums::source::Chunk;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_sdcard::Medium;
 use hums_tests::chip::{self, record};
 use hums_tests::fat;

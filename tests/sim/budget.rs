@@ -9,7 +9,7 @@ use hums::endpoint::Endpoint;
 use hums::run::sim::both_ports::{BoardSetup, Outcome, Side, run};
 use hums::source::{self, Chunk, Timing};
 use hums_core::health::Level;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::packet::{Fields, Packet};
 use hums_link::{Check, Frame};

@@ -186,7 +186,7 @@ fn mavproxy_lists_sets_downloads_and_signs() {
     let said = oracle::mavproxy(board.port, &folder);
     assert_eq!(said["detected"], "Detected vehicle 1:191", "{said}");
     let count = said["received"].as_str().and_then(|count| count.parse().ok());
-    assert_eq!(count, Some(hums_core::params::TABLE.len()), "{said}");
+    assert_eq!(count, Some(hums_core::parameters::TABLE.len()), "{said}");
     assert_eq!((&said["shown"], &said["set"]), (&"5000.0".into(), &"33.0".into()), "{said}");
     assert_eq!(said["refused"], "33.0", "{said}");
     assert_eq!(said["logs"], "2", "{said}");

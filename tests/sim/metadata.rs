@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hums_core::params::Param;
+use hums_core::parameters::Param;
 use hums_core_tests::{DECIMAL_PLACES, group, short};
 use hums_link::ftp;
 use hums_tests::flights::root;

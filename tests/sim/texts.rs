@@ -8,7 +8,7 @@ use hums::endpoint::Endpoint;
 use hums::run::sim::both_ports::{BoardSetup, Side, run};
 use hums::source::{self, Chunk, Timing};
 use hums_core::health::{self, Level, Subsystem};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame};
 use hums_tests::flights::{self, OWN, own, root};

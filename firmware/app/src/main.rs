@@ -31,7 +31,7 @@ mod watch;
 use hums_blackbox::Writer;
 use hums_blackbox::record::{Boot, PreviousSession};
 use hums_core::Monitor;
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_onboard::persist::mailbox::MailboxOut;
 use hums_onboard::queues::{Ends, Queues, UplinkIn};
 use hums_onboard::{Handover, Mailbox, Monitoring, ResetCause, StoreWriter};

@@ -7,7 +7,7 @@
 use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::health::finding::Subsystem;
 use crate::observation::MOTORS_MAX;
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::usage::{UsageCounter, Wear};
 
 /// Components at most.

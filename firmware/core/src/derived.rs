@@ -1,7 +1,7 @@
 //! Quantities derived from several messages: cell voltage, silence of an ESC against its own rhythm, imbalance of
 //! motors in steady flight, recent clips, load factor.
 
-use crate::cells::Cells;
+use crate::battery_cells::Cells;
 use crate::crosscheck::Crosschecks;
 use crate::flight::{Flight, FlightEvent};
 use crate::gates;
@@ -9,7 +9,7 @@ use crate::latest::{Latest, Reading};
 use crate::motion::MOTION_AGE;
 use crate::motors::Motors;
 use crate::observation::{Battery, Imu, Observation, Vibration};
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::status::RecorderStatus;
 use crate::time::{BootMs, Millis, Stamp};
 use crate::trend::Resistance;
@@ -176,7 +176,7 @@ impl Derived {
         self.write_errors.take(now, recorder.write_errors);
     }
 
-    /// Cells of a battery: set, reported, or found ([`crate::cells`]). 0 where that is not known.
+    /// Cells of a battery: set, reported, or found ([`crate::battery_cells`]). 0 where that is not known.
     pub(crate) fn cell_count(&self, vehicle: &Vehicle, battery: usize, params: &Params) -> u8 {
         let set = params.get(Param::BatCells) as u8;
         if set > 0 && self.cells.fits(battery, set) {

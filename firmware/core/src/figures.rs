@@ -10,12 +10,12 @@
 //! voltage itself (`MOT_BAT_VOLT_MAX`), the voltage is left out. Hover power is given at sea level: the power for the
 //! same lift goes with the inverse root of density.
 
-use crate::charge::Charge;
+use crate::battery_charge::Charge;
 use crate::derived::{Derived, pack_v};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::health::Inputs;
 use crate::observation::MOTORS_MAX;
-use crate::params::Params;
+use crate::parameters::Params;
 use crate::power_draw::drawn;
 use crate::residual::KNOWN_SAMPLES;
 use crate::time::{BootMs, Millis, PAUSE, Stamp};

@@ -39,7 +39,7 @@ use crate::latest::Reading;
 use crate::mishap::{Location, MishapChange, MishapKind, Report};
 use crate::motion::{Kinematics, MOVES_MPS, OFF, STILL_MPS, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::VehicleKind;
-use crate::params::Params;
+use crate::parameters::Params;
 use crate::pressure::Pressure;
 use crate::thrust::{Power, Thrust};
 use crate::time::{BootMs, Millis, SILENT, Stamp};

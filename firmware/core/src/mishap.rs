@@ -5,7 +5,7 @@ use core::fmt::Write as _;
 use heapless::String;
 
 use crate::motion::height_m;
-use crate::params::Param;
+use crate::parameters::Param;
 use crate::time::BootMs;
 use crate::vehicle::Vehicle;
 

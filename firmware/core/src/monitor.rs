@@ -6,7 +6,7 @@ mod stored;
 use core::mem::MaybeUninit;
 
 use crate::apart::{apart, place};
-use crate::cells;
+use crate::battery_cells;
 use crate::component::{COMPONENTS_MAX, Component, ComponentKind};
 use crate::derived::Derived;
 use crate::exposure::Exposure;
@@ -18,7 +18,7 @@ use crate::health::{Finding, Health, Inputs, Subsystem};
 use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::observation::{Feeds, Observation, Source};
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::protect::{Protect, Request, Situation};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
@@ -290,7 +290,7 @@ impl Monitor {
                 happenings.push(Happening::CellsUnknown);
             }
             let keeps = match count {
-                0 if unknown && come && *kept > 0 => *kept | cells::DOUBTED,
+                0 if unknown && come && *kept > 0 => *kept | battery_cells::DOUBTED,
                 0 => *kept,
                 _ => count,
             };
@@ -303,7 +303,7 @@ impl Monitor {
 
     /// A parameter of the autopilot in a recording, by its name; others than those of batteries are ignored.
     pub fn learn_parameter(&mut self, name: &str, value: f32) {
-        if let Some(place) = cells::known(name) {
+        if let Some(place) = battery_cells::known(name) {
             self.derived.cells.take_setting(place, value);
         }
     }

@@ -678,7 +678,7 @@ pub enum Observation {
     Alert(Alert),
     /// The failures in a `HIGH_LATENCY2`.
     Failing(Causes),
-    /// `PARAM_VALUE` of a parameter that is in [`crate::cells::KNOWN`], by its place there, and its value.
+    /// `PARAM_VALUE` of a parameter that is in [`crate::battery_cells::KNOWN`], by its place there, and its value.
     Parameter(u8, f32),
     /// `FLIGHT_INFORMATION`: the number of the flight and its take-off, milliseconds since boot (0 not yet).
     FlightInformation {

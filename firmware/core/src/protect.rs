@@ -40,7 +40,7 @@ use crate::motion;
 use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::time::{BootMs, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 

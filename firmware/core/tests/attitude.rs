@@ -2,7 +2,7 @@
 
 use crate::common::{Quad, Run, Script};
 use hums_core::observation::{AttitudeSetpoint, Observation};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::Radians;
 
 fn is_found(vehicle: &str, wanted: Option<f32>) -> bool {

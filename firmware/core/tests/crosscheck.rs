@@ -10,7 +10,7 @@ use hums_core::observation::{
     Air, Attitude, AttitudeSetpoint, Autopilot, Estimator, EstimatorScale, Imu, MOTORS_MAX, Observation,
     Outputs, SecondEstimate, VehicleKind, WantedRates,
 };
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::BootMs;
 use hums_core::units::{

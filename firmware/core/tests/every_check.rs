@@ -8,7 +8,7 @@ use hums_core::observation::{
     Attitude, Autopilot, Battery, CellVoltage, Engine, Esc, EscGroup, EstimatorScale, Generator, Gnss,
     Heartbeat, Observation, Processor, RadioControl, Rails, TelemetryRadio, VehicleKind,
 };
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::Recording;
 use hums_core::time::Millis;
 use hums_core::units::{Amperes, Celsius, Fraction, Hectopascals, Metres, Radians, Rpm, Volts};
@@ -153,7 +153,7 @@ const FAULTS: &[(&str, u8, Level, Fault)] = &[
     ("card_room", 0, Level::Warning, |quad, _| quad.recorder.room = Some(0.05)),
 ];
 
-/// Checks with scripts of their own: silence, restarts and rates in `scripted_faults.rs`, resistance in `cells.rs`,
+/// Checks with scripts of their own: silence, restarts and rates in `scripted_faults.rs`, resistance in `battery_cells.rs`,
 /// mishaps in `mishap.rs`, departures from usual levels in `crosscheck.rs`.
 const ELSEWHERE: &str = "\
     ahrs2_tilt ahrs2_height ahrs2_position gps_sats_fall gps_hdop_rise compass_heading gps_height \

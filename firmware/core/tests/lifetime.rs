@@ -10,7 +10,7 @@ use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::observation::{
     AutopilotIdentity, Battery, Esc, EscGroup, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
 };
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::BootMs;
 use hums_core::units::{Amperes, Metres, MetresPerSecond, Rpm, Volts};

@@ -3,7 +3,7 @@
 //! One program in a package of its own, compiled without optimisation together with the monitor.
 
 mod attitude;
-mod cells;
+mod battery_cells;
 mod common;
 mod crosscheck;
 mod docs;

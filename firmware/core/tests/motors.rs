@@ -4,7 +4,7 @@
 use crate::common::{AUTOPILOT, Quad, Run, Script, observe, rows};
 use hums_core::health::{Finding, Level};
 use hums_core::observation::{Attitude, Autopilot, Esc, EscGroup, Observation, Outputs};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::{Amperes, Celsius, Radians, RadiansPerSecond, Rpm};
 
 /// A minute of flight; the findings about motors. Words besides the vehicle's: `rpm` and `amp` of each ESC, `yaw`, its rate; `out`, the

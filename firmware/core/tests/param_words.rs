@@ -3,7 +3,7 @@
 use core::fmt;
 
 use hums_core::health::{Check, Side, checks, vocabulary};
-use hums_core::params::Param;
+use hums_core::parameters::Param;
 
 /// Decimal places that a quantity is shown with.
 pub const DECIMAL_PLACES: u8 = 3;

@@ -13,7 +13,7 @@ use hums_core::observation::{
     RadioControl, Rails, SecondEstimate, Sensors, Source, SpeedSensor, SystemStatus, SystemTime,
     TelemetryRadio, VehicleKind, Vibration, VibrationScale, VtolState, WantedRates,
 };
-use hums_core::params::{Params, TABLE};
+use hums_core::parameters::{Params, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
 use hums_core::time::{BootMs, Millis};
 use hums_core::units::{

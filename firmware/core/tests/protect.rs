@@ -5,7 +5,7 @@ use hums_core::Monitor;
 use hums_core::cause::{Alert, Cause};
 use hums_core::happening::Happening;
 use hums_core::observation::{Battery, CommandAck, Feeds, Imu, Observation, Source};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::protect::{Action, Request, Stage, Step};
 use hums_core::time::BootMs;
 use hums_core::units::{Fraction, MetresPerSecond2, RadiansPerSecond};

@@ -7,7 +7,7 @@ use crate::common::{Run, Script, params};
 use hums_core::cause::{Alert, Cause};
 use hums_core::health::{Finding, Level, Subsystem};
 use hums_core::observation::{EstimatorScale, Observation, Sensors, SystemTime};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::Celsius;
 use hums_core::usage::UsageCounter;
 

@@ -3,7 +3,7 @@
 
 use crate::common::{Quad, Run, Script, rows};
 use hums_core::observation::{Air, Hud, Imu, Observation};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::{Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, RadiansPerSecond};
 use hums_core::usage::UsageCounter;
 

@@ -5,7 +5,7 @@ use crate::common::{AUTOPILOT, Quad, Run, Script, observe, params};
 use hums_core::happening::Happening;
 use hums_core::lifetime::{Airframe, Item as _, ItemKey, Lifetime};
 use hums_core::observation::{AutopilotIdentity, Esc, EscGroup, Heartbeat, Observation, Source, VehicleKind};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::Rpm;
 use hums_core::usage::UsageCounter;
 

@@ -19,7 +19,7 @@
 //! # Bandwidth
 //! The requested messages take at most [`SHARE`] percent of the port's line. All intervals are stretched to fit.
 
-use hums_core::cells::{self, KNOWN};
+use hums_core::battery_cells::{self, KNOWN};
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::{Autopilot, CommandAck, Source};
 use hums_dialect::ids;
@@ -216,7 +216,7 @@ impl Asking {
 
     /// A received value.
     pub fn told(&mut self, name: &str) {
-        if let Some(place) = cells::known(name) {
+        if let Some(place) = battery_cells::known(name) {
             self.parameters &= !(1 << place);
             if self.asked.is_some_and(|asked| asked.what == RequestSubject::Parameter(usize::from(place))) {
                 (self.asked, self.deaf) = (None, 0);

@@ -15,7 +15,7 @@ use hums_core::clock::{Instant, Span};
 use hums_core::health::Subsystem;
 use hums_core::health::{self, Finding, Health, Level, Orders};
 use hums_core::observation::{Feeds, Source};
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_core::usage::UsageCounter;
 use hums_dialect::wire::SIGNATURE_BYTES;
 

@@ -10,7 +10,7 @@ use common::{Recording, flight};
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Finding, Level};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::{RecorderStatus, Recording as Card};
 use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;

@@ -5,7 +5,7 @@ use hums_core::clock;
 use hums_core::component::{COMPONENTS_MAX, Label};
 use hums_core::health::Level;
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room};
-use hums_core::params::{Params, TABLE};
+use hums_core::parameters::{Params, TABLE};
 use hums_core::snapshot::{COLUMNS_MAX, SAMPLES};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::BootMs;

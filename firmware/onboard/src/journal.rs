@@ -6,7 +6,7 @@ use hums_blackbox::record::{Event, Loss, LossKind, MarkReason, Parameter, Record
 use hums_blackbox::{Counters, Sector, SectorSink as _, Writer};
 use hums_core::Monitor;
 use hums_core::clock::Instant;
-use hums_core::params::Param;
+use hums_core::parameters::Param;
 use hums_core::time::Millis;
 use hums_link::statustext::Text;
 use hums_recorder::status::CardStatus;

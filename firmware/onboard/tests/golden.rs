@@ -14,7 +14,7 @@ use flate2::read::GzDecoder;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::observation::Observation;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_link::LongTexts;
 use hums_link::frame::{Check, Frame};

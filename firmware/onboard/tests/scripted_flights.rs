@@ -9,7 +9,7 @@ use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::happening::Happening;
 use hums_core::health::{Finding, Level};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::protect::{Request, Stage};
 use hums_core::status::{RecorderStatus, Recording};
 use hums_link::frame::Frame;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use hums_core::params::{Param, ParamError, ParamSpec, Params};
+use hums_core::parameters::{Param, ParamError, ParamSpec, Params};
 use hums_link::param_line::{self, Line};
 
 use crate::files::read_short;

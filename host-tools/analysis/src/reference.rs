@@ -8,7 +8,7 @@
 use hums_core::clock::Instant;
 use hums_core::flight::Flight;
 use hums_core::observation::{Esc, Observation, Source};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::time::{self, Millis};
 use hums_core::units::{MetresPerSecond, MetresPerSecond2};
 use hums_core::vehicle::{Motor, Vehicle};

@@ -291,7 +291,7 @@ fn rank(level: Level) -> u8 {
 mod tests {
     use hums_core::health::Orders;
     use hums_core::observation::{Feeds, Heartbeat, Observation, Source};
-    use hums_core::params::Params;
+    use hums_core::parameters::Params;
     use hums_core::status::{LinkReading, RecorderStatus};
 
     use super::*;

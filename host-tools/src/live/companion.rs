@@ -129,7 +129,7 @@ impl Companion {
 #[cfg(test)]
 mod tests {
     use hums_core::Monitor;
-    use hums_core::params::Params;
+    use hums_core::parameters::Params;
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::{messages, packet, summary};
 

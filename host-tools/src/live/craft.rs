@@ -13,7 +13,7 @@ use hums_core::happening::Happening;
 use hums_core::health::exceedance::Exceedance;
 use hums_core::health::{Finding, Level, Orders, Scope, Subsystem, VOCABULARY, check_named};
 use hums_core::observation::{Autopilot, Feeds, Observation, Source};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::{RecorderStatus, Recording};
 use hums_core::usage::UsageCounter;
 use hums_link::sequence::Sequences;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hums_core::params::{ParamSpec, Params};
+use hums_core::parameters::{ParamSpec, Params};
 use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
 use hums_link::{Check, Frame};

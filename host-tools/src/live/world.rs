@@ -563,7 +563,8 @@ mod tests {
 
     #[test]
     fn the_boxs_parameters_on_the_link_are_its_vehicles_but_those_that_the_user_gave_stay() {
-        let spec = hums_core::params::TABLE.iter().find(|spec| spec.name == "CMP1_FLIGHTS").expect("it is");
+        let spec =
+            hums_core::parameters::TABLE.iter().find(|spec| spec.name == "CMP1_FLIGHTS").expect("it is");
         let (mut world, mut histories) = (World::new(Limits::new(&[(spec, 7.0)])), Histories::new());
         for system in [1, 2] {
             hear(&mut world, &mut histories, Instant::from_millis(1), &heartbeat(system));

@@ -19,7 +19,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use hums_core::params::ParamSpec;
+use hums_core::parameters::ParamSpec;
 
 use crate::card::image;
 use crate::card::{Faults, SimCard};

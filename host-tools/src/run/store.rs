@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use anyhow::{Context, Result, anyhow, bail};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use hums_core::params::ParamSpec;
+use hums_core::parameters::ParamSpec;
 use hums_store::sim::{SimFlash, is_store};
 use hums_store::{Key, Store, StoreCondition, param_value};
 

@@ -11,7 +11,7 @@ use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::health::Level;
 use hums_core::observation::Observation;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
 use hums_onboard::monitoring::TICK;
 

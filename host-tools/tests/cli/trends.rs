@@ -11,7 +11,7 @@ use hums_core::clock;
 use hums_core::figures::Quantity;
 use hums_core::health::Level;
 use hums_core::observation::{Observation, Outputs};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::LinkReading;
 use hums_core::time::BootMs;
 use hums_core::units::{Amperes, Rpm, Volts};

@@ -10,7 +10,7 @@ use hums::card::image::{ReadOnlyImage, open_or_make};
 use hums::card::{Faults, SimCard};
 use hums::logs::fat::{Volume, Walk};
 use hums::run::sim::{PowerOn, power_on};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_recorder::layout::Layout;
 use tempfile::TempDir;
 

@@ -8,7 +8,7 @@ use hums::card::Faults;
 use hums::logs::on_card;
 use hums::run::sim::power_on;
 use hums::source::Chunk;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 
 use super::card::Card;
 use super::figures::{Figures, Labels};

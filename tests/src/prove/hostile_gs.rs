@@ -9,7 +9,7 @@ use hums::rng::Rng;
 use hums::run::sim::both_ports::{BoardSetup, Outcome, Side, run as power_on};
 use hums::source::Chunk;
 use hums_core::clock::Instant;
-use hums_core::params::{Param, Params, TABLE};
+use hums_core::parameters::{Param, Params, TABLE};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::{Check, Frame};
 use hums_link::packet::Packet;

@@ -16,7 +16,7 @@ use hums::logs::fat::CardFile;
 use hums::logs::{Log, on_card};
 use hums::run::sim::power_on;
 use hums_blackbox::Cause;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use rayon::prelude::*;
 
 use super::card::{BLOCK, Card};

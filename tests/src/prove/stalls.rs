@@ -5,7 +5,7 @@ use hums::card::Faults;
 use hums::card::faults::Stall;
 use hums::run::sim::power_on;
 use hums_blackbox::record::Stats;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use rayon::prelude::*;
 
 use super::card::Card;

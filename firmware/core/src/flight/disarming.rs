@@ -7,7 +7,7 @@ use super::witness::on_rotors;
 use super::{Flight, STILL};
 use crate::mishap::MishapKind;
 use crate::motion::{STILL_MPS, WINGS_MPS, WindowMax, climb_mps, ground_speed_mps};
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::time::{BootMs, Millis, PAUSE};
 use crate::vehicle::Vehicle;
 

@@ -10,7 +10,7 @@ use crate::mishap::MishapKind;
 use crate::modes::{has_pilots_throttle, is_made_to_turn, is_thrown};
 use crate::motion::{STILL_MPS, TILTED_RAD, climb_mps, ground_speed_mps, height_m, throttle};
 use crate::observation::{Attitude, EstimatorScale, Imu, Observation, VehicleKind};
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::thrust::{FULL, Power};
 use crate::time::{BootMs, FRESH, Millis, PAUSE, Stamp};
 use crate::units::{GRAVITY, MetresPerSecond2, RadiansPerSecond, norm};

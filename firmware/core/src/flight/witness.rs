@@ -19,7 +19,7 @@ use crate::motion::{
     throttle,
 };
 use crate::observation::LandedState;
-use crate::params::Params;
+use crate::parameters::Params;
 use crate::pressure::NOISE_M;
 use crate::thrust::Power;
 use crate::time::{BootMs, Millis, PAUSE, SILENT};

@@ -24,7 +24,7 @@ use super::inputs::Inputs;
 use super::suppression::Role;
 use crate::bytes::fnv1a;
 use crate::latest::Reading;
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::time::{BootMs, Millis, Stamp};
 use crate::vehicle::known;
 

@@ -4,7 +4,7 @@ use super::finding::Subsystem;
 use crate::derived::Derived;
 use crate::flight::Flight;
 use crate::latest::Reading;
-use crate::params::Params;
+use crate::parameters::Params;
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::BootMs;
 use crate::vehicle::Vehicle;

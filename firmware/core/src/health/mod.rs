@@ -34,7 +34,7 @@ pub use tables::{check_named, checks, instances};
 pub use vocabulary::{RadioWords, Scope, VOCABULARY, Words, said, vocabulary};
 
 use crate::latest::Reading;
-use crate::params::Param;
+use crate::parameters::Param;
 use crate::time::{BootMs, Millis, SILENT};
 use alarms::{ALARMS_MAX, Alarms, Standing};
 use exceedance::Exceedances;

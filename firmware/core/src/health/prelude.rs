@@ -12,7 +12,7 @@ pub(super) use super::suppression::{
 pub(super) use crate::cause::Cause;
 pub(super) use crate::latest::{Latest, Reading};
 use crate::observation::VibrationScale;
-pub(super) use crate::params::Param;
+pub(super) use crate::parameters::Param;
 
 /// Most streams come at 1 Hz or more even over a radio; some batteries at 0.5 Hz.
 pub(super) const STALE: Option<NonZeroU8> = NonZeroU8::new(5);
@@ -39,7 +39,7 @@ pub(super) const PLAIN: Check = Check {
 /// of a warning, of a critical level (`_`: none), and the hysteresis.
 macro_rules! row {
     (@limit _) => { None };
-    (@limit $param:ident) => { Some($crate::params::Param::$param) };
+    (@limit $param:ident) => { Some($crate::parameters::Param::$param) };
     ($name:literal $like:expr, $side:ident($warning:tt $critical:tt $hysteresis:expr) $(, $field:ident: $value:expr)*) => {
         Check {
             name: $name,

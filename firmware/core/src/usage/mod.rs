@@ -15,7 +15,7 @@ use crate::health::Inputs;
 use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;
-use crate::params::{Param, Params};
+use crate::parameters::{Param, Params};
 use crate::power_draw::{Drawn, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{BootMs, Millis, PAUSE, SILENT};

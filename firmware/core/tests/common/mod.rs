@@ -20,7 +20,7 @@ use hums_core::observation::{
     GnssIntegrity, Heartbeat, Hud, Imu, LandedState, Observation, Sensors, Source, SystemStatus, SystemTime,
     VehicleKind, Vibration, VtolState,
 };
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::protect::Request;
 use hums_core::status::{LinkReading, RecorderStatus, Recording};
 use hums_core::time::BootMs;

@@ -15,7 +15,7 @@ use hums_core::observation::{
     Air, Attitude, AttitudeSetpoint, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source,
     TelemetryRadio,
 };
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::time::BootMs;
 use hums_core::units::{
     Fraction, Hectopascals, Metres, MetresPerSecond, MetresPerSecond2, Position, Radians, RadiansPerSecond,

@@ -1,7 +1,7 @@
 //! The autopilot itself, its links, its words.
 
+use hums_core::battery_cells;
 use hums_core::cause::{Alert, Causes};
-use hums_core::cells;
 use hums_core::observation::{
     Autopilot, AutopilotIdentity, CommandAck, Heartbeat, LandedState, Observation, Processor, RadioControl,
     Sensors, Source, SystemStatus, SystemTime, TelemetryRadio, VehicleKind, VtolState,
@@ -127,7 +127,7 @@ pub(super) fn flight_information(payload: &[u8]) -> Option<Observation> {
 /// is as small as a small integer's bits read as a float.
 pub(super) fn parameter(payload: &[u8]) -> Option<Observation> {
     let fields = Fields(payload);
-    let place = cells::known(fields.text(8, 16)?)?;
+    let place = battery_cells::known(fields.text(8, 16)?)?;
     let value = f32::from_bits(fields.u32(0));
     let bits = value.to_bits();
     let value = if (1..1 << 16).contains(&bits) { bits as f32 } else { value };

@@ -336,7 +336,7 @@ fn a_parameter_of_the_batteries_is_read_in_either_autopilots_coding() {
         payload[24] = kind;
         by_id(22, &payload)
     };
-    let place = |name| hums_core::cells::known(name).expect("known");
+    let place = |name| hums_core::battery_cells::known(name).expect("known");
     let low = Some(Observation::Parameter(place("BATT_LOW_VOLT"), 21.6));
     assert_eq!(value("BATT_LOW_VOLT", 21.6, 9), low);
     // PX4 sends an INT32's bits, ArduPilot its value.

@@ -17,7 +17,7 @@ use hums_core::clock::{Instant, Span};
 use hums_core::component::Label;
 use hums_core::health::{self, Level};
 use hums_core::observation::{CommandAck, Feeds};
-use hums_core::params::TABLE;
+use hums_core::parameters::TABLE;
 use hums_link::ids;
 use hums_link::mav_cmd::{
     LOGGING_START, LOGGING_STOP, PREFLIGHT_REBOOT_SHUTDOWN, REBOOT_TO_MASS_STORAGE,

@@ -19,7 +19,7 @@ use embedded_storage::nor_flash::NorFlash;
 use hums_blackbox::record::Boot;
 use hums_core::clock::{Instant, Span};
 use hums_core::observation::CommandAck;
-use hums_core::params::{Param, Params, TABLE};
+use hums_core::parameters::{Param, Params, TABLE};
 use hums_core::{Monitor, protect};
 use hums_link::asking::{Asking, KnownVehicle};
 use hums_link::encode::{COMPONENT, FRAME_BYTES_MAX};
@@ -398,7 +398,8 @@ impl Companion {
         if let Some(source) = monitor.vehicle().source {
             outlet.encoder.set_system(source.system);
             usb.encoder.set_system(source.system);
-            // Before our system is known, the autopilot gets no heartbeat.
+            // Before the vehicle's first heartbeat its system id is not known. With GS_PATH 2 the summary sends one at once, as
+            // system 1.
             if heartbeat_at.is_none_or(|at| now.since(at) >= HEARTBEAT)
                 && outlet.send(now, Class::Own, &summary::heartbeat(monitor), &mut out)
             {

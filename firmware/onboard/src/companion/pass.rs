@@ -15,7 +15,7 @@
 
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
-use hums_core::params::Param;
+use hums_core::parameters::Param;
 use hums_link::encode::COMPONENT;
 use hums_link::frame::{Check, Frame};
 use hums_link::ids;

@@ -29,7 +29,7 @@ use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::lifetime::Room;
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_link::frame::Frame;
 use hums_link::outlet::Outlet;
 use hums_link::request::Port;

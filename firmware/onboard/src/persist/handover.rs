@@ -3,7 +3,7 @@
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::lifetime::{ITEM_BYTES_MAX, Room};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_store::{Key, param_value};
 
 use super::mailbox::MailboxIn;

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlash;
 use hums_core::Monitor;
 use hums_core::health::exceedance::Exceedances;
 use hums_core::lifetime::{ITEM_BYTES_MAX, ItemKey, Room, Session};
-use hums_core::params::ParamError;
+use hums_core::parameters::ParamError;
 use hums_store::{Error, Key, Store, StoreCondition, param};
 
 use super::mailbox::MailboxOut;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use hums_core::params::{Param, TABLE};
+use hums_core::parameters::{Param, TABLE};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_store::sim::SimFlash;
 
@@ -14,7 +14,7 @@ use hums_core::lifetime::{ItemKey, Room};
 use hums_core::observation::{
     Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VehicleKind, VtolState,
 };
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::{Amperes, Celsius, Rpm, Volts};
 use hums_core::usage::UsageCounter;
 use hums_store::{Key, Store, param_value};

@@ -4,7 +4,7 @@ use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Check, CheckPhase, Level, Scope, Side, VOCABULARY, checks, vocabulary};
 use hums_core::observation::{Autopilot, Gnss, Heartbeat};
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_formats::trend_words::WORDS;
 

@@ -7,7 +7,7 @@ use hums_core::cause::{Alert, Cause, Causes, Urgency};
 use hums_core::clock::{Instant, Span};
 use hums_core::health::{Check, Level, checks};
 use hums_core::observation::{AutopilotIdentity, Estimator, Gnss, Heartbeat, Source, SystemStatus};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::units::Position;
 use hums_core::vehicle::BATTERIES_MAX;
 

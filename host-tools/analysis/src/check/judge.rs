@@ -15,7 +15,7 @@ use hums_core::happening::Happening;
 use hums_core::health::{Level, Scope};
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m};
 use hums_core::observation::{Estimator, LandedState, Observation, Source, SystemStatus, VehicleKind};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::usage::UsageCounter;
 use hums_core::vehicle::Vehicle;
@@ -74,7 +74,7 @@ pub struct Limits {
 
 impl Limits {
     /// The user's limits; others are defaults, or a HUMS log's.
-    pub fn new(given: &[(&'static hums_core::params::ParamSpec, f32)]) -> Self {
+    pub fn new(given: &[(&'static hums_core::parameters::ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
             // Checked when read.

@@ -21,7 +21,7 @@ use hums_core::health::{Level, checks};
 use hums_core::modes::has_pilots_throttle;
 use hums_core::motion::{climb_mps, ground_speed_mps, height_m, throttle};
 use hums_core::observation::{Air, Attitude, Imu, LandedState, Observation, VehicleKind};
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_core::time::{BootMs, Millis};
 use hums_core::vehicle::Vehicle;
 

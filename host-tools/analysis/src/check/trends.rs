@@ -25,7 +25,7 @@ use hums_core::component::ComponentKind;
 use hums_core::figures::Quantity;
 use hums_core::health::{Level, Subsystem};
 use hums_core::observation::Autopilot;
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_onboard::monitoring::PARTS_CHANGED;
 
 use super::problem::Problem;

@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 use hums_core::clock::{Instant, Span};
 use hums_core::flight::{Flight, Phase};
 use hums_core::observation::{Autopilot, Observation, Source};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_link::{Check, Frame};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};

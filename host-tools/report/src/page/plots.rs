@@ -3,7 +3,7 @@
 //! A plot has one unit, and a line one source: two sensors are two lines.
 
 use hums_core::observation::{Autopilot, CELLS_MAX};
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 
 /// The plots, in the order of the page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

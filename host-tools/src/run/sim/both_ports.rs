@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Result, anyhow};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_store::{Key, Store};
 
 use super::outside::{Memory, Outside};

@@ -16,7 +16,7 @@ use std::time::Instant as WallClock;
 
 use anyhow::{Context, Result, bail};
 use hums_blackbox::record::{Boot, Stats};
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_onboard::ResetCause;
 use hums_recorder::status::CardReading;
 use outside::{Memory, Outside};

@@ -6,7 +6,7 @@ use anyhow::Result;
 use hums_blackbox::Writer;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_onboard::queues::Queues;
 use hums_onboard::{Mailbox, PortStatus, StoreStatus};
 use hums_recorder::status::CardReading;

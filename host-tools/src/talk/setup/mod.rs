@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result};
 use hums_boards::{Board, Wire};
-use hums_core::params::Param as BoxParam;
+use hums_core::parameters::Param as BoxParam;
 use hums_link::encode::COMPONENT;
 use hums_link::packet::Fields;
 use serde::Serialize;

@@ -9,7 +9,7 @@ use hums_blackbox::{Gap, Item, LogReader, Writer};
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::health::Level;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_link::frame::{Check, Frame};
 use hums_link::request::Port;
 use hums_onboard::queues::{Ends, FRAME_BYTES_MAX, Queues};

@@ -20,7 +20,7 @@ use hums::run::sim::power_on;
 use hums::summary::Overview;
 use hums::verify::{Verdict, verdict};
 use hums_blackbox::Header;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_recorder::status::CardState;
 use rayon::prelude::*;
 

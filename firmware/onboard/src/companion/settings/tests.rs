@@ -5,7 +5,7 @@ use hums_blackbox::record::Boot;
 use hums_core::Monitor;
 use hums_core::clock::{Instant, Span};
 use hums_core::component::{Component, ComponentFigures, ComponentKind, Label};
-use hums_core::params::{Param, Params};
+use hums_core::parameters::{Param, Params};
 use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
 use hums_link::frame::Frame;
 use hums_link::packet::Packet;

@@ -6,7 +6,7 @@ use hums_core::health::{Level, VOCABULARY, Words};
 use hums_core::observation::{
     Attitude, Autopilot, Battery, Esc, EscGroup, Heartbeat, LandedState, Observation, Source, VtolState,
 };
-use hums_core::params::Param;
+use hums_core::parameters::Param;
 use hums_core::units::{Fraction, Rpm, Volts};
 use hums_formats::trend_words::WORDS;
 
@@ -193,7 +193,7 @@ fn cells_that_nothing_tells_in_the_air_are_said_and_no_check_of_their_voltage_co
             half_seconds(&mut judge, from_ms, from_ms + 1_000, true, LandedState::InAir);
             judge.item(Instant::from_millis(from_ms + 600), Item::Observation(AUTOPILOT, &battery(0.5)));
             if named && second == 1 {
-                let place = hums_core::cells::known("BATT_LOW_VOLT").expect("it is");
+                let place = hums_core::battery_cells::known("BATT_LOW_VOLT").expect("it is");
                 let told = Observation::Parameter(place, 10.8);
                 judge.item(Instant::from_millis(from_ms + 700), Item::Observation(AUTOPILOT, &told));
             }

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use hums_blackbox::record::Stats;
 use hums_core::clock::Span;
-use hums_core::params::Params;
+use hums_core::parameters::Params;
 use hums_onboard::port::PortReading;
 use hums_onboard::queues::Ends;
 use hums_recorder::CardState;

@@ -7,7 +7,7 @@
 
 use crate::derived::Derived;
 use crate::latest::Latest;
-use crate::params::Params;
+use crate::parameters::Params;
 use crate::units::Amperes;
 use crate::vehicle::Vehicle;
 

@@ -37,7 +37,7 @@ fn fly(monitor: &Monitor, script: &str) -> Run {
                 (quad.system.voltage, quad.system.current) = (Some(Volts(volts)), Some(Amperes(amperes)));
             }
             name => {
-                let place = hums_core::cells::known(name).unwrap();
+                let place = hums_core::battery_cells::known(name).unwrap();
                 more.push(Observation::Parameter(place, said.number()));
             }
         });
