@@ -45,9 +45,9 @@ impl Address {
     pub fn resolve(&self) -> Result<SocketAddr> {
         (self.host.as_str(), self.port)
             .to_socket_addrs()
-            .with_context(|| format!("{self}: no such host"))?
+            .with_context(|| format!("{self}: there is no such host; check its name and the network"))?
             .next()
-            .with_context(|| format!("{self}: the name has no address"))
+            .with_context(|| format!("{self}: the name has no address; give the address itself"))
     }
 }
 

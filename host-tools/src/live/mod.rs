@@ -75,7 +75,7 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
         open(page);
     }
     // Ctrl-C and SIGTERM end the follower; the server and its pages end with the program.
-    let influx = follower.join().map_err(|_| anyhow!("the thread that follows the vehicle has failed"))??;
+    let influx = follower.join().map_err(|_| anyhow!("the reading of the vehicle failed by a fault of hums; start it again, and please report it"))??;
     Ok(influx.map_or(Outcome::Done, finish))
 }
 
@@ -127,7 +127,7 @@ fn follow(
         let player = Player::new(&name, limits.clone(), hub, commands, influx);
         thread.spawn(move || player.run(opened))
     };
-    started.context("no thread")
+    started.context("a thread cannot be started; close other programs")
 }
 
 fn database(args: &cli::Live) -> Result<Option<Influx>> {

@@ -184,7 +184,7 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     }
     let flights: u64 = book.values().map(|aircraft| aircraft.totals().flights as u64).sum();
     if book.is_empty() {
-        bail!("no flight was found, so nothing was written");
+        bail!("no flight was found, so nothing was written; `hums check` says what is in each log");
     }
     for (form, path) in forms {
         match form {

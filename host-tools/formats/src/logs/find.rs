@@ -17,7 +17,7 @@ use crate::files::{is_seekable, why_unread};
 /// With `salvage` every block of an image is searched, and its file system ignored. An input without a log is
 /// an error.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundLogs> {
-    search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there", input.display()))
+    search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there; name a card, its image, or a folder of .HUM files", input.display()))
 }
 
 /// One folder, which may have no log.
@@ -82,7 +82,7 @@ fn named_file(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
     match look(path)? {
         Content::Log => found.log(whole_file(path)?),
         Content::Image => image(path, salvage, found)?,
-        Content::Empty => bail!("{}: is empty", path.display()),
+        Content::Empty => bail!("{}: is empty; copy it from its card again", path.display()),
         Content::Unread(unread) => bail!("{}: {unread}", path.display()),
         Content::Mavlink => bail!(
             "{}: is a recording of MAVLink, not a log of HUMS; `hums decode --format hum` makes it one, `hums sim` records it",

@@ -230,7 +230,7 @@ impl Recording {
                 bail!("{name}: {words}");
             }
             if start.is_empty() {
-                bail!("{name}: is empty");
+                bail!("{name}: is empty; copy it again");
             }
             bail!("{name}: is neither a log of HUMS, a card or its image, nor {KNOWN}");
         };

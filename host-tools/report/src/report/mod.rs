@@ -447,7 +447,7 @@ struct Wanted {
 fn wanted(args: &Request<'_>, output: &Path, found: &FoundRecordings) -> Result<Wanted> {
     let logs = &found.places;
     let Some(last) = logs.len().checked_sub(1) else {
-        bail!("no log was found, so there is nothing to report")
+        bail!("no log was found, so there is nothing to report; name a log, a card or a folder")
     };
     let directory = says_directory(output);
     let sessions = match args.session {

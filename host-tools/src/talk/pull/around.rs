@@ -114,7 +114,7 @@ pub(in crate::talk) fn newest<T>(
     if files.is_empty() {
         return Ok(None);
     }
-    let folder = tempfile::tempdir().context("a folder for temporary files")?;
+    let folder = tempfile::tempdir().context("a temporary folder cannot be made; TMPDIR names another place for it")?;
     let mut log = RemoteLog::new(&mut ftp, &files, folder.path())?;
     let count = log.count();
     let last = log.group_before(count)?.start;
@@ -244,7 +244,7 @@ impl<'a> RemoteLog<'a> {
     /// Opens it; with the place in it.
     fn file_at(&mut self, place: u32) -> Result<(&mut Ftp, &mut PartialFile, u32)> {
         let index = self.files.partition_point(|file| file.first <= place).saturating_sub(1);
-        let file = self.files.get_mut(index).context("a place beyond the log")?;
+        let file = self.files.get_mut(index).context("the log ends before this place; call again")?;
         if self.open.replace(index) != Some(index) {
             let length = self.ftp.open(&file.name)?;
             if length / SECTOR < file.sectors {
@@ -262,7 +262,7 @@ impl<'a> RemoteLog<'a> {
                 file.partial = Some(PartialFile::begin(&whole, file.sectors, &heading.sectors)?);
             }
         }
-        let partial = file.partial.as_mut().context("a file that is not open")?;
+        let partial = file.partial.as_mut().context("the file is not open on the board; call again")?;
         Ok((&mut *self.ftp, partial, place - file.first))
     }
 

@@ -134,7 +134,7 @@ pub fn run(args: &cli::Setup) -> Result<Outcome> {
         None => Vec::new(),
     };
     if args.set {
-        let file = args.undo.as_deref().context("--undo FILE is missing")?;
+        let file = args.undo.as_deref().context("--set needs --undo FILE, for the former values")?;
         settings::change(&mut client, &mut settings, file)?;
     }
     if !args.json {

@@ -215,15 +215,15 @@ fn set(client: &mut Client, name: &str, kind: u8, wanted: f64) -> Result<()> {
     let kept = params::set(client, name, sent(autopilot, kind, wanted), kind)?;
     let kept = value(autopilot, &kept);
     if (kept - wanted).abs() > wanted.abs() * 1e-6 {
-        bail!("the autopilot refused {wanted} and keeps {kept}");
+        bail!("the autopilot refused {wanted} and keeps {kept}; see its documentation for the range");
     }
     Ok(())
 }
 
 pub(super) fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
-    let wrong = |number: usize| usage(format!("{}: line {number} is no NAME,VALUE", file.display()));
+    let wrong = |number: usize| usage(format!("{}: line {number} is no NAME,VALUE; correct it", file.display()));
     let bytes = read_short(file, UNDO_BYTES_MAX).context("--restore")?;
-    let text = String::from_utf8(bytes).map_err(|_| usage(format!("{}: is no text", file.display())))?;
+    let text = String::from_utf8(bytes).map_err(|_| usage(format!("{}: is not a text file; name the file of --undo", file.display())))?;
     let mut values = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         match param_line::read(line) {
@@ -243,7 +243,7 @@ pub(super) fn restore(client: &mut Client, values: &[(String, f64)]) -> Result<O
     let mut failed = Vec::new();
     for (name, wanted) in values {
         let done = params::ask(client, name, TRIES).and_then(|param| {
-            let param = param.context("the autopilot does not answer")?;
+            let param = param.context("the autopilot does not answer; check the link")?;
             set(client, name, param.kind, *wanted)
         });
         match done {

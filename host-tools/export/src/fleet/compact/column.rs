@@ -46,7 +46,7 @@ impl Input {
         let fields = metadata.file_metadata().schema().get_fields().to_vec();
         let is_ours = fields.iter().zip(NAMES).filter(|(field, name)| field.name() == *name).count() == 2;
         if !is_ours || fields.len() != metadata.file_metadata().schema_descr().num_columns() {
-            bail!("{}: has not the columns of a table of hums", path.display());
+            bail!("{}: has not the columns of a table of hums; move it out of the folder", path.display());
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let part = name.split('.').nth(1).and_then(|part| part.parse().ok()).unwrap_or(1);
@@ -54,7 +54,7 @@ impl Input {
         input.segments = input.find_segments(part).with_context(context)?;
         let own = session_of(&name);
         if own.is_some_and(|own| input.segments.iter().any(|segment| segment.session != own)) {
-            bail!("{}: has rows of another session", path.display());
+            bail!("{}: has rows of another session; move it away, and decode that session again", path.display());
         }
         Ok(input)
     }
@@ -65,7 +65,7 @@ impl Input {
             let rows = NAMES_AT_ONCE.min(self.rows() - from);
             let read = |column| read(std::slice::from_ref(self), &[(0, from, rows)], column);
             let (Column::Texts(vehicles), Column::Texts(sessions)) = (read(0)?, read(1)?) else {
-                bail!("the names of vehicles and sessions are no texts");
+                bail!("the columns vehicle and session are not texts; move it out of the folder");
             };
             for (row, (vehicle, session)) in vehicles.present.iter().zip(&sessions.present).enumerate() {
                 match segments.last_mut() {
@@ -144,7 +144,7 @@ pub(super) enum Column {
 pub(super) fn read(inputs: &[Input], rows: &[Rows], column: usize) -> Result<Column> {
     let mut all = None;
     for (index, from, count) in rows {
-        let Some(input) = inputs.get(*index) else { bail!("a file is missing") };
+        let Some(input) = inputs.get(*index) else { bail!("a file of the tables is missing; decode its session again") };
         let context = || format!("{}: cannot be read", input.path.display());
         let file = File::open(&input.path).with_context(context)?;
         let reader = SerializedFileReader::new(file).with_context(context)?;
@@ -165,10 +165,10 @@ pub(super) fn read(inputs: &[Input], rows: &[Rows], column: usize) -> Result<Col
             }
         }
         if left > 0 {
-            bail!("{}: has {left} rows less than it says", input.path.display());
+            bail!("{}: ends {left} rows early; decode its session again", input.path.display());
         }
     }
-    all.context("a column has no rows")
+    all.context("no file has rows of this column; decode the sessions again")
 }
 
 fn append(all: &mut Option<Column>, reader: ColumnReader, skip: usize, rows: usize) -> Result<()> {
@@ -176,7 +176,7 @@ fn append(all: &mut Option<Column>, reader: ColumnReader, skip: usize, rows: usi
         ($kind:ident, $reader:expr) => {
             match all.get_or_insert_with(|| Column::$kind(Values::default())) {
                 Column::$kind(values) => values.append($reader, skip, rows),
-                _ => bail!("a column has another type in another file"),
+                _ => bail!("a column has another type than in other files; decode its session again"),
             }
         };
     }
@@ -187,14 +187,14 @@ fn append(all: &mut Option<Column>, reader: ColumnReader, skip: usize, rows: usi
         ColumnReader::FloatColumnReader(reader) => append!(Singles, reader),
         ColumnReader::DoubleColumnReader(reader) => append!(Doubles, reader),
         ColumnReader::ByteArrayColumnReader(reader) => append!(Texts, reader),
-        _ => bail!("a column has a type that tables of hums do not have"),
+        _ => bail!("a column has a type that tables of hums do not have; move it out of the folder"),
     }
 }
 
 impl<T: DataType> Values<T> {
     fn append(&mut self, mut reader: ColumnReaderImpl<T>, skip: usize, rows: usize) -> Result<()> {
         if skip > 0 && reader.skip_records(skip)? != skip {
-            bail!("a column ends early");
+            bail!("a column ends early; decode its session again");
         }
         let mut left = rows;
         while left > 0 {
@@ -202,7 +202,7 @@ impl<T: DataType> Values<T> {
             let (read, ..) =
                 reader.read_records(left, Some(definition), Some(repetition), &mut self.present)?;
             if read == 0 {
-                bail!("a column ends early");
+                bail!("a column ends early; decode its session again");
             }
             left -= read;
         }
@@ -242,7 +242,7 @@ impl<T: DataType> Values<T> {
         encodings: &[Encoding],
         properties: WriterPropertiesBuilder,
     ) -> Result<WriterPropertiesBuilder> {
-        let field = schema.get_fields().get(column).context("a column is missing")?;
+        let field = schema.get_fields().get(column).context("a column is missing; decode its session again")?;
         let one = Type::group_type_builder("hums").with_fields(vec![field.clone()]).build()?;
         let one = Arc::new(one);
         let path = path_of(field);
