@@ -172,7 +172,9 @@ fn around_table(text: &str) -> Result<[&str; 3]> {
     let place = |mark: &str| text.find(mark).with_context(|| format!("{TABLE_FILE} has no {mark}"));
     let (from, to) = (place(TABLE[0])? + TABLE[0].len(), place(TABLE[1])?);
     let parts = (text.get(..from), text.get(from..to), text.get(to..));
-    let (Some(before), Some(table), Some(after)) = parts else { bail!("{TABLE_FILE}: the table ends first") };
+    let (Some(before), Some(table), Some(after)) = parts else {
+        bail!("{TABLE_FILE}: the table has no end mark; add it")
+    };
     Ok([before, table, after])
 }
 

@@ -45,8 +45,10 @@ pub(crate) fn check_built(program: &Path, image: &Path) -> Result<()> {
 
 fn compare(report: &Value, budgets: &Budgets) -> Result<Vec<Row>> {
     let number = |key: &str| report[key].as_f64().filter(|&number| number > 0.0);
-    let frames = number("frames_in").context("no frames")?;
-    let stages = report["cycles"].as_object().context("the firmware does not count cycles")?;
+    let frames = number("frames_in").context("the run counted no frames; run hums sim --firmware by hand")?;
+    let stages = report["cycles"]
+        .as_object()
+        .context("the firmware does not count cycles; build it from this version")?;
     let all: f64 = stages.values().filter_map(Value::as_f64).sum();
     let mut rows = Vec::new();
     for (name, budget) in &budgets.cycles {
@@ -55,7 +57,9 @@ fn compare(report: &Value, budgets: &Budgets) -> Result<Vec<Row>> {
             None if name == "total" => Some(all),
             None => None,
         };
-        let count = count.with_context(|| format!("budgets.toml: there is no stage {name}"))?;
+        let count = count.with_context(|| {
+            format!("budgets.toml: there is no stage {name}; add or remove [cycles.{name}]")
+        })?;
         let what = format!("{name} a frame");
         let reason = format!("{} when it was set; {}", budget.taken, budget.reason);
         rows.push(row(&what, "cycles", count / frames, budget.per_frame_max, &reason));
@@ -63,21 +67,29 @@ fn compare(report: &Value, budgets: &Budgets) -> Result<Vec<Row>> {
     if let Some((name, _)) = STAGES.iter().find(|(name, _)| !budgets.cycles.contains_key(*name)) {
         bail!("budgets.toml has no [cycles.{name}]");
     }
-    let percent = number("busy_percent_max").context("the load is not known")?;
+    let percent = number("busy_percent_max")
+        .context("the run has no load of the processor; run hums sim --firmware by hand")?;
     let what = format!("worst second at {:.0} kB/s", BYTES_PER_S / 1e3);
     rows.push(row(&what, "% of 168 MHz", percent, budgets.load.percent_max, &budgets.load.reason));
 
-    let measured =
-        report["stack_by_urgency"].as_object().context("the firmware does not measure its stack")?;
+    let measured = report["stack_by_urgency"]
+        .as_object()
+        .context("the firmware does not measure its stack; build it from this version")?;
     for (name, budget) in &budgets.stack {
         let deepest = measured.get(name).and_then(Value::as_f64);
-        let deepest = deepest.with_context(|| format!("budgets.toml: there is no urgency {name}"))?;
+        let deepest = deepest.with_context(|| {
+            format!("budgets.toml: there is no urgency {name}; correct its [stack] section")
+        })?;
         rows.push(row(&format!("stack {name}"), "bytes", deepest, budget.bytes_max as f64, &budget.reason));
     }
-    let held = number("stack_bytes").context("the firmware does not say how much stack it has")?;
+    let held = number("stack_bytes")
+        .context("the firmware does not name the size of its stack; build it from this version")?;
     let reason = "the stack, which all urgencies one on top of the other must fit";
     rows.push(row("stack nested, by the limits", "bytes", budgets.stack_bytes() as f64, held, reason));
-    let start = measured.get("start").and_then(Value::as_f64).context("nothing is known of the start")?;
+    let start = measured
+        .get("start")
+        .and_then(Value::as_f64)
+        .context("the run has no time of the start; run hums sim --firmware by hand")?;
     rows.push(row("stack start", "bytes", start, held, "the stack: no task runs yet"));
     Ok(rows)
 }

@@ -100,7 +100,8 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
 
     println!("\n$ hums check {}", repo::shown(&card));
     shortened(&verdict).for_each(|line| println!("{line}"));
-    let run: serde_json::Value = serde_json::from_str(&json).context("what hums --json printed")?;
+    let run: serde_json::Value =
+        serde_json::from_str(&json).context("the output of hums --json is not JSON")?;
     let figure = |key: &str| run.get(key).map_or_else(|| "?".to_owned(), ToString::to_string);
     let by = if image.is_some() {
         "the firmware's image on a model of its chip"
@@ -122,7 +123,7 @@ fn fly(options: &Options, image: Option<&Path>, built: Duration) -> Result<()> {
         println!("{label:<12} {}", repo::shown(path));
     }
     if run.get("frames_lost").and_then(serde_json::Value::as_u64) != Some(0) {
-        bail!("frames were lost");
+        bail!("the simulated box lost frames; the report above has the times");
     }
     let program = repo::shown(&hums::program());
     println!("try next     {program} YOUR_LOG");
@@ -142,14 +143,15 @@ fn shortened(verdict: &str) -> impl Iterator<Item = &str> {
 /// Returns its figures.
 fn record(pipeline: Shell, flight: &Path, card: &Path, gs: &Path) -> Result<String> {
     let paths = [flight.as_os_str(), "--sd".as_ref(), card.as_os_str()];
-    done(pipeline.arg("--json").args(paths).arg("--gs").arg(gs)).context("the recording failed")
+    done(pipeline.arg("--json").args(paths).arg("--gs").arg(gs))
+        .context("hums sim --firmware failed; its messages are above")
 }
 
 /// Losses, or an end in the air, are no failure.
 fn done(command: Shell) -> Result<String> {
     match command.output_and_code()? {
         (text, 0 | DONE_WITH_LOSSES) => Ok(text),
-        (_, code) => bail!("exit code {code}"),
+        (_, code) => bail!("hums ended with exit code {code}; its messages are above"),
     }
 }
 

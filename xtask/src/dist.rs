@@ -284,7 +284,10 @@ fn without_std() -> Result<()> {
 /// By deny.toml. Advisories need a network and appear at any time: no failure.
 fn dependencies() -> Result<()> {
     let deny = || Shell::cargo().args(["deny", "--log-level", "warn"]);
-    deny().args(["check", "bans", "licenses", "sources"]).run().context("dependencies against deny.toml")?;
+    deny()
+        .args(["check", "bans", "licenses", "sources"])
+        .run()
+        .context("cargo deny refuses a dependency; its messages are above, its rules in deny.toml")?;
     if deny().args(["fetch", "db"]).ask().is_none() {
         eprintln!(
             "note: advisories about dependencies were not looked at, because their database cannot be fetched"

@@ -49,7 +49,7 @@ pub(crate) fn image_of(board: &Board) -> PathBuf {
 pub(crate) fn flags(tree: &Path) -> Result<OsString> {
     let cargo_home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let cargo_home = cargo_home.or_else(|| Some(env::home_dir()?.join(".cargo")));
-    let cargo_home = cargo_home.context("neither CARGO_HOME nor a home folder is known")?;
+    let cargo_home = cargo_home.context("there is no home folder; set CARGO_HOME")?;
     let mut flags = OsString::new();
     // The last one that fits counts. A registry's long folder name is in each place of a panic.
     let sources = fs::read_dir(cargo_home.join("registry/src")).into_iter().flatten();
@@ -137,7 +137,8 @@ pub(crate) fn files(
     key: Option<&SecretKey>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let name = format!("hums-{}", board.name);
-    let mut added = image::pieces(&programs.resident).with_context(|| format!("{name}: resident program"))?;
+    let mut added = image::pieces(&programs.resident)
+        .with_context(|| format!("{name}: the resident program cannot be built"))?;
     let application = image::pieces(&programs.application).with_context(|| name.clone())?;
     let update = update::file(board, &application, commit, key).with_context(|| name.clone())?;
     // Not signed: another id, so an image that a cable loads has no trial behind it.

@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<()> {
     let embassy = match arguments {
         [] => None,
         [folder] => Some(PathBuf::from(folder).join("examples/stm32f4/src/bin")),
-        _ => bail!("prove foreign [EMBASSY]: one folder, a checkout of embassy's repository"),
+        _ => bail!("prove foreign takes at most one argument: a checkout of embassy's repository"),
     };
     setup::require(&[Need::Linker, Need::FirmwareTarget])?;
     let programs = folder().join("programs");
@@ -108,7 +108,7 @@ fn fetch(package: &Package) -> Result<PathBuf> {
         .iter()
         .find(|one| one.name.as_str() == *name && one.version.to_string() == *version);
     let from = found.with_context(|| format!("cargo does not find {name} {version}"))?.manifest_path.parent();
-    let from = from.context("a manifest is in a folder")?.as_std_path();
+    let from = from.context("the manifest has no folder")?.as_std_path();
     let to = folder().join("sources").join(format!("{name}-{version}"));
     empty(&to)?;
     Shell::new("cp").arg("-R").arg(from.join(".")).arg(&to).run()?;

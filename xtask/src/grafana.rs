@@ -15,7 +15,8 @@ pub(crate) fn write() -> Result<()> {
     for name in ["flight.json", "health.json"] {
         let description = serde_json::from_slice(&fs::read(folder.join(name))?).context(name)?;
         for database in resolve::DATABASES {
-            let dashboard = resolve::resolve(&description, database).context("a dashboard is an object")?;
+            let dashboard = resolve::resolve(&description, database)
+                .context("the dashboard is not a JSON object; mend the file")?;
             let path = folder.join(database.0).join(name);
             fs::write(&path, serde_json::to_string_pretty(&dashboard)?)?;
             println!("{}", repo::shown(&path));

@@ -17,14 +17,18 @@ pub(crate) struct Piece {
 }
 
 pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
-    let header = FileHeader32::<Endianness>::parse(elf).context("no ELF file")?;
+    let header = FileHeader32::<Endianness>::parse(elf)
+        .context("the file is no ELF file; build the firmware again")?;
     let endian = header.endian()?;
     let mut pieces = Vec::new();
     for segment in header.program_headers(endian, elf)? {
         if segment.p_type(endian) != PT_LOAD || segment.p_filesz(endian) == 0 {
             continue;
         }
-        let bytes = segment.data(endian, elf).ok().context("a segment is longer than the file")?;
+        let bytes = segment
+            .data(endian, elf)
+            .ok()
+            .context("the ELF file ends within a segment; build the firmware again")?;
         pieces.push(Piece { address: segment.p_paddr(endian), bytes: bytes.to_vec() });
     }
     joined(pieces)
@@ -33,10 +37,13 @@ pub(crate) fn pieces(elf: &[u8]) -> Result<Vec<Piece>> {
 /// The ELF file with these pieces beside its own. Debuggers and the chip's model load them; symbols stay.
 pub(crate) fn with_pieces(elf: &[u8], pieces: &[Piece]) -> Result<Vec<u8>> {
     const ENTRY_BYTES: usize = 32;
-    let header = FileHeader32::<Endianness>::parse(elf).context("no ELF file")?;
+    let header = FileHeader32::<Endianness>::parse(elf)
+        .context("the file is no ELF file; build the firmware again")?;
     let endian = header.endian()?;
     let (from, count) = (header.e_phoff(endian) as usize, usize::from(header.e_phnum(endian)));
-    let table = elf.get(from..from + count * ENTRY_BYTES).context("the program headers end early")?;
+    let table = elf
+        .get(from..from + count * ENTRY_BYTES)
+        .context("the ELF file ends within its headers; build the firmware again")?;
     let mut file = elf.to_vec();
     let mut entries = table.to_vec();
     for Piece { address, bytes } in pieces {
@@ -70,7 +77,7 @@ fn joined(mut pieces: Vec<Piece>) -> Result<Vec<Piece>> {
         }
         match joined.last_mut() {
             Some(before) if before.address + before.bytes.len() as u32 > piece.address => {
-                bail!("two segments lie at {:#010x}", piece.address)
+                bail!("two segments of the image lie at {:#010x}: see memory.x", piece.address)
             }
             Some(before) if before.address + before.bytes.len() as u32 == piece.address => {
                 before.bytes.extend(piece.bytes);

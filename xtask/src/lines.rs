@@ -16,7 +16,8 @@ pub(crate) fn check() -> Result<()> {
     for (folder, limit) in Budgets::read()?.lines {
         let (mut code, mut tests) = (0, 0);
         let files = Shell::new("git").args(["ls-files", &folder]).within(repo::root()).ask();
-        let files = files.with_context(|| format!("git knows no files of {folder}"))?;
+        let files = files
+            .with_context(|| format!("git knows no files of {folder}; correct the folder in budgets.toml"))?;
         for file in files.lines() {
             if Path::new(file).extension().is_none_or(|extension| extension != "rs") {
                 continue;

@@ -71,13 +71,18 @@ pub(crate) fn install(list: &str) -> Result<()> {
     let list = repo::root().join(FOLDER).join(list);
     let pip =
         Shell::new(python()).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]);
-    pip.arg(&list).run().with_context(|| format!("{}: is there a network?", list.display()))
+    pip.arg(&list)
+        .run()
+        .with_context(|| format!("{} cannot be downloaded: is there a network?", list.display()))
 }
 
 fn definitions() -> Result<PathBuf> {
     let metadata = MetadataCommand::new().current_dir(repo::root()).exec()?;
     let package = metadata.packages.iter().find(|package| package.name.as_str() == "mavlink");
-    let package = package.context("the workspace does not depend on the mavlink crate")?;
-    let folder = package.manifest_path.parent().context("the mavlink crate has no folder")?;
+    let package = package.context("Cargo.lock has no mavlink crate, whose definitions are needed")?;
+    let folder = package
+        .manifest_path
+        .parent()
+        .context("cargo names no folder of the mavlink crate; run cargo fetch")?;
     Ok(folder.join("mavlink/message_definitions/v1.0/all.xml").into())
 }

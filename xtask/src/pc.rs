@@ -77,12 +77,17 @@ fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<Te
     for Artifact { package_id, target, profile, executable, .. } in artifacts {
         let (Some(path), true) = (executable, profile.test) else { continue };
         let package = metadata.packages.iter().find(|package| package.id == package_id);
-        let package = package.with_context(|| format!("cargo built {package_id}, which it does not know"))?;
+        let package = package
+            .with_context(|| format!("cargo metadata has no package {package_id}; run cargo clean"))?;
         programs.push(TestProgram {
             package: package.name.to_string(),
             name: target.name,
             is_integration: target.kind.contains(&TargetKind::Test),
-            folder: package.manifest_path.parent().context("a package has a folder")?.into(),
+            folder: package
+                .manifest_path
+                .parent()
+                .context("a package of the workspace has no folder")?
+                .into(),
             path: path.into(),
         });
     }
@@ -90,7 +95,7 @@ fn test_programs(artifacts: Vec<Artifact>, metadata: &Metadata) -> Result<Vec<Te
 }
 
 fn programs() -> Result<&'static [TestProgram]> {
-    PROGRAMS.get().map(Vec::as_slice).context("the tests are not built")
+    PROGRAMS.get().map(Vec::as_slice).context("the tests were not built; cargo's messages are above")
 }
 
 pub(crate) fn unit_tests() -> Result<()> {
@@ -102,7 +107,7 @@ pub(crate) fn unit_tests() -> Result<()> {
 
 pub(crate) fn end_to_end(arguments: &[&str]) -> Result<()> {
     let program = programs()?.iter().find(|one| one.is_integration && one.package == END_TO_END);
-    run(program.with_context(|| format!("{END_TO_END} has no tests"))?, arguments)
+    run(program.with_context(|| format!("cargo built no tests of {END_TO_END}"))?, arguments)
 }
 
 pub(crate) fn check_format() -> Result<()> {

@@ -28,7 +28,9 @@ pub(crate) fn file(
     }
     let mut image = image::flat(pieces);
     image.resize(image.len().next_multiple_of(4), 0xFF);
-    let version = |text: &str| Version::parse(text).with_context(|| format!("{text} is no version"));
+    let version = |text: &str| {
+        Version::parse(text).with_context(|| format!("{text} is no version: give MAJOR.MINOR.PATCH"))
+    };
     let (now, floor) = (version(env!("CARGO_PKG_VERSION"))?, version(FLOOR)?);
     let mut header = Header::new(&board.name, commit, now, floor, &image);
     if let Some(key) = key {
@@ -36,7 +38,7 @@ pub(crate) fn file(
     }
     let file = [&header.bytes()[..], &image].concat();
     if Header::read(&file).as_ref() != Some(&header) || file.len() > map::APPLICATION_BYTES {
-        bail!("the application does not fit its region");
+        bail!("the application does not fit its region: see memory.x");
     }
     Ok(file)
 }
@@ -65,7 +67,7 @@ fn read_key(path: &Path) -> Result<SecretKey> {
     let byte = |at: usize| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
     let seed: Option<Vec<u8>> = (0..digits.len()).step_by(2).map(byte).collect();
     let pair = seed.and_then(|seed| KeyPair::try_from_seed(Seed::from_slice(&seed).ok()?).ok());
-    let pair = pair.with_context(|| format!("{}: wants 64 hexadecimal digits", path.display()))?;
+    let pair = pair.with_context(|| format!("{}: needs 64 hexadecimal digits", path.display()))?;
     Ok(pair.sk)
 }
 

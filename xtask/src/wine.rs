@@ -28,7 +28,7 @@ pub(crate) struct Wine {
 
 impl Wine {
     pub(crate) fn start() -> Result<Self> {
-        let program = find_wine().context("there is no Wine")?;
+        let program = find_wine().context("Wine is not installed; install it, or leave this step out")?;
         let wine = Self { program, prefix: repo::target().join("wine") };
         fs::create_dir_all(&wine.prefix)?;
         wine.shell(&wine.program).args(["wineboot", "--init"]).run()?;

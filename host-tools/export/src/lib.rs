@@ -221,7 +221,9 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
         manifest.write(args.program, to, &roots, &read, &made, &task.inputs)?;
     }
     if !written {
-        bail!("no data match the selection, so nothing was written; `hums info LOG` lists times and messages");
+        bail!(
+            "no data match the selection, so nothing was written; `hums info LOG` lists times and messages"
+        );
     }
     Ok(outcome)
 }

@@ -75,7 +75,9 @@ pub fn run(args: &cli::Live) -> Result<Outcome> {
         open(page);
     }
     // Ctrl-C and SIGTERM end the follower; the server and its pages end with the program.
-    let influx = follower.join().map_err(|_| anyhow!("the reading of the vehicle failed by a fault of hums; start it again, and please report it"))??;
+    let influx = follower.join().map_err(|_| {
+        anyhow!("the reading of the vehicle failed by a fault of hums; start it again, and please report it")
+    })??;
     Ok(influx.map_or(Outcome::Done, finish))
 }
 

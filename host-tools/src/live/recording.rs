@@ -70,7 +70,9 @@ pub fn open(endpoint: &Endpoint, session: Option<&str>) -> Result<OpenedInput> {
 fn chosen(path: &Path, session: Option<&str>) -> Result<LogPlace> {
     let mut found = find(&[path.to_owned()], false)?;
     let names: Vec<String> = found.places.iter().map(|place| place.name.clone()).collect();
-    let Some(newest) = names.last() else { bail!("{}: there is no log in it; name a log, a card or a recording", path.display()) };
+    let Some(newest) = names.last() else {
+        bail!("{}: there is no log in it; name a log, a card or a recording", path.display())
+    };
     let index = session.map(|name| found.session(name)).transpose()?.unwrap_or(names.len() - 1);
     if session.is_none() && names.len() > 1 {
         note!("{newest} is played, the newest; --session NAME plays another: {}", listed(&names));

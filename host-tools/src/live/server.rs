@@ -72,7 +72,10 @@ pub fn start(listener: TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
             });
         }
     };
-    Builder::new().name("server".to_owned()).spawn(accept).context("--listen: a thread cannot be started; close other programs")?;
+    Builder::new()
+        .name("server".to_owned())
+        .spawn(accept)
+        .context("--listen: a thread cannot be started; close other programs")?;
     Ok(())
 }
 

@@ -257,7 +257,11 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
         let value = client.ask(&packet, ANSWER, TRIES, wanted)?;
         values.insert(
             index,
-            value.with_context(|| format!("system {system}: parameter {index} of {count}: no answer; check the link, and call again"))?,
+            value.with_context(|| {
+                format!(
+                    "system {system}: parameter {index} of {count}: no answer; check the link, and call again"
+                )
+            })?,
         );
     }
     wrong.extend(strange_names(&values));

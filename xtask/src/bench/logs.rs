@@ -86,7 +86,7 @@ fn plain(log: &Path) -> Result<PathBuf> {
     }
     let path = work_folder()?.join(log.file_stem().unwrap_or_default());
     let status = Command::new("gzip").arg("-dc").arg(log).stdout(File::create(&path)?).status();
-    if !status.context("gzip cannot be started")?.success() {
+    if !status.context("gzip cannot be started; `cargo xtask setup` installs it")?.success() {
         bail!("{}: gzip cannot unpack it", log.display());
     }
     Ok(path)

@@ -91,7 +91,7 @@ fn sizes(flights: &[PathBuf]) -> Result<()> {
         .args(["run", "--quiet", "--release", "-p", "hums-blackbox", "--example", "sizes", "--"])
         .args(flights)
         .run()
-        .context("a size misses its target, or xz is missing");
+        .context("a size misses its target, or xz is missing; the lines above say which");
     sizes_of_sessions(flights).and(logs)
 }
 
@@ -107,11 +107,14 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
         let sim = ["sim", "--json", "--speed", "max"];
         let (json, _) =
             Shell::new(&program).args(sim).arg(flight).arg("--sd").arg(&card).output_and_code()?;
-        let report: Value = serde_json::from_str(&json).context("the report of hums sim")?;
-        let bytes =
-            report["bytes_logged"].as_f64().filter(|&bytes| bytes > 0.0).context("nothing was logged")?;
+        let report: Value = serde_json::from_str(&json)
+            .context("the report of hums sim is not JSON; run it by hand with --json")?;
+        let bytes = report["bytes_logged"]
+            .as_f64()
+            .filter(|&bytes| bytes > 0.0)
+            .context("the run logged nothing; run hums sim by hand")?;
         let xz = Command::new("xz").arg("-9ec").arg(flight).stdout(File::create(&packed)?).status();
-        xz.context("xz cannot be started")?;
+        xz.context("xz cannot be started; install xz-utils")?;
         let (tlog, xz) = (fs::metadata(flight)?.len() as f64, fs::metadata(&packed)?.len() as f64);
         let (ratio, against_xz) = (tlog / bytes, xz / bytes);
         println!("{:22} {tlog:9} {xz:9} {bytes:9} {ratio:7.3} {against_xz:7.3}", name(flight));
@@ -123,7 +126,7 @@ fn sizes_of_sessions(flights: &[PathBuf]) -> Result<()> {
     println!("geometric mean: {ratio:.3} times smaller than the tlog (asked: {SMALLER_MIN})");
     println!("                {against_xz:.3} times smaller than xz -9e (asked: {SMALLER_THAN_XZ_MIN})");
     if ratio < SMALLER_MIN || against_xz < SMALLER_THAN_XZ_MIN {
-        bail!("a mean of whole sessions is below what is asked");
+        bail!("the mean of whole sessions misses its target; the table above has the sizes");
     }
     Ok(())
 }
@@ -211,5 +214,6 @@ pub(crate) fn record_at_full_rate(program: &Path, image: &Path, flight: &Path) -
         .args(["--line-rate", BAUD, "--card-size", "4096", "--sd"])
         .arg(&card)
         .output_and_code()?;
-    serde_json::from_str(&json).context("the report of hums sim --firmware")
+    serde_json::from_str(&json)
+        .context("the report of hums sim --firmware is not JSON; run it by hand with --json")
 }

@@ -50,7 +50,10 @@ fn package<'a>(file: &Path, packages: &'a [Package]) -> Option<&'a str> {
 }
 
 fn git(arguments: &[&str]) -> Result<String> {
-    Shell::new("git").args(arguments).ask().with_context(|| format!("git {} failed", arguments.join(" ")))
+    Shell::new("git")
+        .args(arguments)
+        .ask()
+        .with_context(|| format!("git {} failed: is this a git checkout?", arguments.join(" ")))
 }
 
 #[cfg(test)]

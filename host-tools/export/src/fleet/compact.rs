@@ -228,7 +228,9 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
         let expected: usize = inputs.iter().map(Input::rows).sum();
         let written = SerializedFileReader::new(File::open(&path)?)?.metadata().file_metadata().num_rows();
         if rows != expected || written != expected as i64 {
-            bail!("{place}: only {written} of {expected} rows were written, so the old files stay; try again");
+            bail!(
+                "{place}: only {written} of {expected} rows were written, so the old files stay; try again"
+            );
         }
         sum = (sum.0 + 1, sum.1 + fs::metadata(&path)?.len());
     }

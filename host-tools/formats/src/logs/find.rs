@@ -17,7 +17,12 @@ use crate::files::{is_seekable, why_unread};
 /// With `salvage` every block of an image is searched, and its file system ignored. An input without a log is
 /// an error.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundLogs> {
-    search(inputs, salvage, |input| bail!("{}: no log of HUMS is in there; name a card, its image, or a folder of .HUM files", input.display()))
+    search(inputs, salvage, |input| {
+        bail!(
+            "{}: no log of HUMS is in there; name a card, its image, or a folder of .HUM files",
+            input.display()
+        )
+    })
 }
 
 /// One folder, which may have no log.

@@ -44,7 +44,9 @@ pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
         .max_redirects_will_error(false);
     let agent: Agent = config.build().into();
     let thread = std::thread::Builder::new().name("influx".to_owned());
-    thread.spawn(move || write_all(&agent, &target, &queue)).context("--influx: a thread cannot be started; close other programs")
+    thread
+        .spawn(move || write_all(&agent, &target, &queue))
+        .context("--influx: a thread cannot be started; close other programs")
 }
 
 fn write_all(agent: &Agent, target: &Target, queue: &Queue) {

@@ -48,7 +48,8 @@ pub fn run(run: &cli::Sim) -> Result<Outcome> {
     if let Some(step) = run.faults.cut_store_after {
         flash.cut_after(step, run.faults.seed);
     }
-    let card = card(image, &run.faults).with_context(|| format!("{}: cannot be read as a card; name another image", run.sd.display()))?;
+    let card = card(image, &run.faults)
+        .with_context(|| format!("{}: cannot be read as a card; name another image", run.sd.display()))?;
     let card = card.keeping_logs(!run.overwrite_oldest);
     let mut world = World {
         card: &card,

@@ -114,7 +114,8 @@ pub(in crate::talk) fn newest<T>(
     if files.is_empty() {
         return Ok(None);
     }
-    let folder = tempfile::tempdir().context("a temporary folder cannot be made; TMPDIR names another place for it")?;
+    let folder = tempfile::tempdir()
+        .context("a temporary folder cannot be made; TMPDIR names another place for it")?;
     let mut log = RemoteLog::new(&mut ftp, &files, folder.path())?;
     let count = log.count();
     let last = log.group_before(count)?.start;

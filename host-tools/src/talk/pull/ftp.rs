@@ -167,12 +167,17 @@ impl Ftp {
             let text = String::from_utf8_lossy(&answer.data).into_owned();
             skipped += text.split('\0').filter(|entry| entry.starts_with('S')).count();
             for entry in text.split('\0').filter_map(|entry| entry.strip_prefix('F')) {
-                let (name, bytes) = entry.split_once('\t').context("the board's list has a file without a length; call again")?;
+                let (name, bytes) = entry
+                    .split_once('\t')
+                    .context("the board's list has a file without a length; call again")?;
                 // A plain file name in our directory.
                 if name.contains(['/', '\\']) || name.starts_with('.') {
                     bail!("the board's list has an invalid file name, {name:?}; read the card itself");
                 }
-                logs.push((name.to_owned(), bytes.parse().context("the board's list has a length that is no number; call again")?));
+                logs.push((
+                    name.to_owned(),
+                    bytes.parse().context("the board's list has a length that is no number; call again")?,
+                ));
             }
             if answer.opcode != ACK || logs.len() + skipped == before {
                 bail!("the board's directory cannot be read; call again, or read the card itself");

@@ -221,9 +221,11 @@ fn set(client: &mut Client, name: &str, kind: u8, wanted: f64) -> Result<()> {
 }
 
 pub(super) fn values_of(file: &Path) -> Result<Vec<(String, f64)>> {
-    let wrong = |number: usize| usage(format!("{}: line {number} is no NAME,VALUE; correct it", file.display()));
+    let wrong =
+        |number: usize| usage(format!("{}: line {number} is no NAME,VALUE; correct it", file.display()));
     let bytes = read_short(file, UNDO_BYTES_MAX).context("--restore")?;
-    let text = String::from_utf8(bytes).map_err(|_| usage(format!("{}: is not a text file; name the file of --undo", file.display())))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| usage(format!("{}: is not a text file; name the file of --undo", file.display())))?;
     let mut values = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         match param_line::read(line) {

@@ -54,7 +54,10 @@ impl Input {
         input.segments = input.find_segments(part).with_context(context)?;
         let own = session_of(&name);
         if own.is_some_and(|own| input.segments.iter().any(|segment| segment.session != own)) {
-            bail!("{}: has rows of another session; move it away, and decode that session again", path.display());
+            bail!(
+                "{}: has rows of another session; move it away, and decode that session again",
+                path.display()
+            );
         }
         Ok(input)
     }
@@ -144,7 +147,9 @@ pub(super) enum Column {
 pub(super) fn read(inputs: &[Input], rows: &[Rows], column: usize) -> Result<Column> {
     let mut all = None;
     for (index, from, count) in rows {
-        let Some(input) = inputs.get(*index) else { bail!("a file of the tables is missing; decode its session again") };
+        let Some(input) = inputs.get(*index) else {
+            bail!("a file of the tables is missing; decode its session again")
+        };
         let context = || format!("{}: cannot be read", input.path.display());
         let file = File::open(&input.path).with_context(context)?;
         let reader = SerializedFileReader::new(file).with_context(context)?;
@@ -242,7 +247,8 @@ impl<T: DataType> Values<T> {
         encodings: &[Encoding],
         properties: WriterPropertiesBuilder,
     ) -> Result<WriterPropertiesBuilder> {
-        let field = schema.get_fields().get(column).context("a column is missing; decode its session again")?;
+        let field =
+            schema.get_fields().get(column).context("a column is missing; decode its session again")?;
         let one = Type::group_type_builder("hums").with_fields(vec![field.clone()]).build()?;
         let one = Arc::new(one);
         let path = path_of(field);
