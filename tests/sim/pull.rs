@@ -121,10 +121,10 @@ fn two_cards_are_never_made_into_one_log() {
         spoiled
     };
     for (spoiled, words) in [
-        (flipped(600), "differs from the board's log of the same session"),
-        (flipped(whole.len() / 2), "differs from the board's log"),
-        ([&whole[..], &[0; 5]].concat(), "is the board's log with 5 bytes more, and stays"),
-        (fs::read(&others).unwrap()[..10_000].to_vec(), "differs from the board's log"),
+        (flipped(600), "differs from the box's log of the same session"),
+        (flipped(whole.len() / 2), "differs from the box's log"),
+        ([&whole[..], &[0; 5]].concat(), "is the box's log with 5 bytes more, and stays"),
+        (fs::read(&others).unwrap()[..10_000].to_vec(), "differs from the box's log"),
     ] {
         fs::write(&log, &spoiled).unwrap();
         let told = pull(&first, &output, &[LOG]).expect_code(&[1]).stderr;
@@ -321,7 +321,7 @@ fn a_board_that_computes_no_checksum_is_read_whole_and_what_its_sectors_say_coun
         hums(["box", "pull", "--link", &address, "--system", "1", LOG, "-o", output.to_str().unwrap()])
     };
     let told = pull().expect_code(&[0]).stderr;
-    assert!(told.contains("the board's firmware computes no checksum"), "{told}");
+    assert!(told.contains("the box's firmware computes no checksum"), "{told}");
     let log = pulled_log(&output, NUMBER);
     assert_on_card(&log, &card);
     let part = log.with_file_name(format!(".{}.pull.hums-part", log.file_name().unwrap().to_str().unwrap()));

@@ -31,7 +31,7 @@ pub struct Check {
     /// Recordings, logs, cards, images, or directories with such; `-` is standard input
     #[arg(required = true, value_name = "LOG", value_parser = input())]
     pub inputs: Vec<PathBuf>,
-    /// Limits other than the defaults: a parameter file, as a ground station writes it
+    /// Limits in place of the defaults: a parameter file, as a ground station writes it
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
     /// Earlier flights of the same vehicle without faults, three or more: the baseline of trends. May be given several times

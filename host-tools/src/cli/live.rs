@@ -26,13 +26,13 @@ pub struct Live {
     /// A link (udpin:, udpout:, tcp:, serial:), a recording (tlog or raw MAVLink, `-`), or a log (file, image, folder)
     #[arg(value_name = "SRC")]
     pub input: Endpoint,
-    /// Of several sessions this one, by the name that `hums info --list` prints; otherwise the newest
+    /// Play this session, by the name that `hums info --list` prints; without it the newest
     #[arg(long, value_name = "NAME")]
     pub session: Option<String>,
-    /// Where the page is served; port 0 is any free one
+    /// Address of the page on this PC; port 0 is any free one
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
     pub listen: String,
-    /// The page's token instead of one that is made; then asked for on 127.0.0.1 too
+    /// Token that the page asks for, in place of a random one; then it is needed on 127.0.0.1 too
     #[arg(long, value_name = "TOKEN")]
     pub listen_token: Option<String>,
     /// Set these limits before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
@@ -47,13 +47,13 @@ pub struct Live {
     /// Also write every message to this database, as `hums decode --format influx` would: http://ADDR:PORT
     #[arg(long, value_name = "URL", help_heading = "Database")]
     pub influx: Option<String>,
-    /// Its token (1.x: USER:PASSWORD); otherwise what `HUMS_INFLUX_TOKEN` in the environment says
+    /// Token of the database of --influx (1.x: USER:PASSWORD); without it `HUMS_INFLUX_TOKEN` in the environment
     #[arg(long, value_name = "T", help_heading = "Database")]
     pub token: Option<String>,
-    /// Its organisation, which InfluxDB 2 and 3 have; InfluxDB 1.x and VictoriaMetrics have none
+    /// Organisation in the database of --influx; InfluxDB 1.x and VictoriaMetrics have none
     #[arg(long, value_name = "O", help_heading = "Database")]
     pub org: Option<String>,
-    /// Its bucket or database
+    /// Bucket or database for the messages of --influx
     #[arg(long, value_name = "B", default_value = "hums", help_heading = "Database")]
     pub bucket: String,
 }

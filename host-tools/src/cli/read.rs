@@ -62,13 +62,13 @@ pub struct Decode {
     /// The file or directory to write, or an address in object storage (docs/fleet.md)
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// Formats, separated by commas
+    /// Formats of the output, separated by commas
     #[arg(long, value_parser = format(), value_delimiter = ',', required = true)]
     pub format: Vec<&'static Format>,
     /// First moment: seconds since power-on (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
     #[arg(long, value_name = "T")]
     pub from: Option<TimePoint>,
-    /// Last moment, in the same forms as --from
+    /// Last moment: seconds since power-on (260.8), minutes (4:20.8), or UTC (2026-11-21T10:13:42Z)
     #[arg(long, value_name = "T")]
     pub to: Option<TimePoint>,
     /// Write separate files for each flight; the time on the ground between two is cut in its middle
@@ -320,7 +320,7 @@ pub struct Report {
     /// Logs, card images, recordings of any kind that `hums check` reads, or directories with such
     #[arg(required = true, value_name = "LOG|IMAGE|DIR", value_parser = input())]
     pub inputs: Vec<PathBuf>,
-    /// The page to write, or a directory for a page a session; otherwise beside the input, with its name
+    /// The page to write, or a directory for a page a session; without it a page beside the input
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Only this session, by the name that `hums info --list` prints
@@ -332,7 +332,7 @@ pub struct Report {
     /// MAVLink system id of the vehicle, if a recording has several
     #[arg(long, value_name = "ID")]
     pub system: Option<u8>,
-    /// Show map tiles of this server under the track: an address with {z}, {x} and {y}; a page asks no server without it
+    /// Show map tiles of this server under the track: an address with {z}, {x} and {y}; without it a page asks no server
     #[arg(long, value_name = "URL")]
     pub map: Option<Tiles>,
     /// Overwrite outputs that exist

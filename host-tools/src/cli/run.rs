@@ -30,7 +30,7 @@ pub struct Sim {
     /// Where the autopilot's bytes come from: a file (tlog or raw MAVLink, also as .gz), `-`, udpin:, udpout:, tcp: or serial:
     #[arg(value_name = "SRC")]
     pub input: Endpoint,
-    /// The SD card image (MBR + FAT32); made, 256 MiB and sparse, when missing
+    /// The SD card image (MBR + FAT32); a missing one is made, of 256 MiB and sparse
     #[arg(long, value_name = "IMAGE")]
     pub sd: PathBuf,
     /// Output for the ground station; a UDP, TCP or serial link also receives its messages
@@ -45,7 +45,7 @@ pub struct Sim {
     /// Set these parameters before the start: `NAME VALUE` or `NAME,VALUE` lines, or a QGroundControl file
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
-    /// As fast as possible on a virtual clock (repeatable), or in real time; live inputs are always real
+    /// Speed of time: `max` on a virtual clock (repeatable), or real time; live inputs are always real
     #[arg(long, value_enum)]
     pub speed: Option<Speed>,
     /// Overwrite the oldest sessions if the card is full, as on a vehicle
@@ -57,8 +57,7 @@ pub struct Sim {
     /// Run this firmware image (ELF, DFU or raw) on a model of its board's chip, instead of the pipeline on this PC
     #[arg(long, value_name = "IMAGE", conflicts_with_all = ["cut_after_writes", "cut_store_after", "stall", "card_out", "write_error"])]
     pub firmware: Option<PathBuf>,
-    /// With --firmware: measure what the stages of the pipeline cost the processor and the stack: `cycles`, `stack_by_urgency`
-    /// and `busy_percent_max` in the JSON, modelled
+    /// With --firmware: measure cycles, stack and load of each stage on the model (in the output of --json)
     #[arg(long)]
     pub costs: bool,
     /// Print the result as one JSON object (docs/json.md)
@@ -88,19 +87,19 @@ pub struct FaultFlags {
     /// Cut the power at the N-th word that is written to the store, or sector that is erased there; the run ends there
     #[arg(long, value_name = "N", overrides_with = "cut_store_after")]
     pub cut_store_after: Option<u64>,
-    /// The card answers nothing for MS milliseconds from T seconds on
+    /// Let the card not answer for MS milliseconds from T seconds on
     #[arg(long, value_name = "MS@T")]
     pub stall: Vec<Stall>,
-    /// The card is out of its slot from T to T seconds
+    /// Take the card out of its slot from T to T seconds
     #[arg(long, value_name = "T..T")]
     pub card_out: Vec<CardOut>,
-    /// Each block write fails with this probability
+    /// Let each block write fail with this probability
     #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "write_error")]
     pub write_error: Option<f64>,
     /// Size of a new card image, MiB
     #[arg(long, value_name = "MIB", overrides_with = "card_size")]
     pub card_size: Option<u64>,
-    /// Each byte from the autopilot is damaged with this probability
+    /// Damage each byte from the autopilot with this probability
     #[arg(long, value_name = "P", value_parser = faults::probability, overrides_with = "noise")]
     pub noise: Option<f64>,
     /// Ignore the recorded times: feed the bytes back to back at this rate

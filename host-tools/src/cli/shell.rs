@@ -16,7 +16,7 @@ from ~/.config/fish/completions/hums.fish, PowerShell from a line in $PROFILE.";
 #[derive(Args, Clone, Debug)]
 #[command(after_help = COMPLETIONS_EXAMPLES)]
 pub struct Completions {
-    /// The shell
+    /// The shell that will read the script
     #[arg(value_enum, value_name = "SHELL")]
     pub shell: Shell,
 }
@@ -31,7 +31,7 @@ const MAN_EXAMPLES: &str = "Examples:
 #[derive(Args, Clone, Debug)]
 #[command(after_help = MAN_EXAMPLES)]
 pub struct Man {
-    /// The command; without it the page of the whole program
+    /// Command of hums; without it the page of the whole program
     #[arg(value_name = "COMMAND")]
     pub command: Vec<String>,
 }

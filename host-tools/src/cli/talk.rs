@@ -33,21 +33,21 @@ pub struct BoxArgs {
 /// What to do with the box.
 #[derive(Clone, Debug, Subcommand)]
 pub enum BoxAction {
-    /// Download the board's logs over MAVLink
+    /// Download the box's logs over MAVLink
     Pull(Pull),
-    /// List, read or set the board's parameters over MAVLink
+    /// List, read or set the box's parameters over MAVLink
     Params(Params),
     /// Report a replaced part to the box, over a link or by a file on its card
     Replaced(Replaced),
-    /// Show the board's card to a PC as a read-only USB disk
+    /// Show the box's card to a PC as a read-only USB disk
     CardReader(CardReader),
     /// Check an update of the firmware and copy it to the card
     Update(Update),
-    /// Format the board's card, if the board cannot record on it
+    /// Format the box's card, if the box cannot record on it
     FormatCard(FormatCard),
     /// Lead through wiring and the autopilot's settings, and say what is missing before a flight
     Setup(Setup),
-    /// Write a file for the maintainers about a box, without where and who
+    /// Write a file about a box for the maintainers, without places and names
     Report(BoxReport),
 }
 
@@ -68,10 +68,10 @@ pub struct Params {
     pub action: ParamsAction,
 }
 
-/// Where the board is.
+/// Where the box is.
 #[derive(Args, Clone, Debug)]
 pub struct Link {
-    /// Link to the board: udpin:, udpout:, tcp: or serial:
+    /// Link to the box: udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub link: Endpoint,
     /// Sign messages with the key in this file: 64 hexadecimal digits, or a passphrase (as in Mission Planner)
@@ -85,9 +85,9 @@ pub struct Link {
 /// What to do with parameters.
 #[derive(Clone, Debug, Subcommand)]
 pub enum ParamsAction {
-    /// List all parameters, in the board's order
+    /// List all parameters, in the box's order
     List {
-        /// The address of the board.
+        /// The address of the box.
         #[command(flatten)]
         at: Link,
         /// Print the result as one JSON object (docs/json.md)
@@ -96,37 +96,37 @@ pub enum ParamsAction {
     },
     /// Read some parameters
     Get {
-        /// Names, for instance `GS_BUDGET`
+        /// Names of parameters, for instance `GS_BUDGET`
         #[arg(required = true, value_name = "NAME")]
         names: Vec<String>,
-        /// The address of the board.
+        /// The address of the box.
         #[command(flatten)]
         at: Link,
         /// Print the result as one JSON object (docs/json.md)
         #[arg(long)]
         json: bool,
     },
-    /// Send the board the signing key of --key, over the port that the parameter `SIGN_PORT` trusts
+    /// Send the box the signing key of --key, over the port that the parameter `SIGN_PORT` trusts
     Sign {
-        /// The address of the board.
+        /// The address of the box.
         #[command(flatten)]
         at: Link,
-        /// Remove the key
+        /// Remove the box's signing key
         #[arg(long)]
         remove: bool,
         /// Print the result as one JSON object (docs/json.md)
         #[arg(long)]
         json: bool,
     },
-    /// Set a parameter; fails if the board keeps another value
+    /// Set a parameter; fails if the box keeps another value
     Set {
-        /// The name
+        /// Name of the parameter
         #[arg(value_name = "NAME")]
         name: String,
-        /// The value; rounded to single precision, with a message
+        /// Value of the parameter; rounded to single precision, with a message
         #[arg(value_name = "VALUE", allow_negative_numbers = true)]
         value: f64,
-        /// The address of the board.
+        /// The address of the box.
         #[command(flatten)]
         at: Link,
         /// Print the result as one JSON object (docs/json.md)
@@ -144,7 +144,7 @@ const PULL_EXAMPLES: &str = "Examples:
 
 Names of files say whose log it is: 00001-box3f0042000d51373435363338-s1a2b3c4d_00.HUM. One that is there already is left if it
 is the same by its checksum, and checked as a new one is. A download that was cut off (.NAME.pull.hums-part) goes on
-where it stopped, once the board has confirmed that what is there is the beginning of its log. With --around a part of a log comes, NAME.part.HUM, which every command reads and calls a part;
+where it stopped, once the box has confirmed that what is there is the beginning of its log. With --around a part of a log comes, NAME.part.HUM, which every command reads and calls a part;
 one that exists is not overwritten. Exit code 3: a log came as it is on the card, and has damage there;
 with --around, something of the moment, or of what was searched for the finding, could not be read: the words say what.";
 
@@ -152,23 +152,22 @@ with --around, something of the moment, or of what was searched for the finding,
 #[derive(Args, Clone, Debug)]
 #[command(after_help = PULL_EXAMPLES)]
 pub struct Pull {
-    /// The address of the board.
+    /// The address of the box.
     #[command(flatten)]
     pub at: Link,
     /// The directory for the logs; made when missing
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Names of log files on the board; without names all of them
+    /// Names of log files on the box; without names all of them
     #[arg(value_name = "NAME")]
     pub names: Vec<String>,
     /// Only the newest N logs, each with all of its files
     #[arg(long, value_name = "N", conflicts_with = "around")]
     pub last: Option<usize>,
-    /// Only the part of the newest log around a time (4:20 after power-on, or UTC), or around the latest finding: `critical`,
-    /// `warning` (or worse), or the name of a check (`motor_loss`)
+    /// Only the newest log's part around a time (4:20, or UTC) or the latest finding (`critical`, `warning`, a check)
     #[arg(long, value_name = "TIME|FINDING")]
     pub around: Option<LogMoment>,
-    /// With --around: from S seconds before it to S seconds after it
+    /// With --around: seconds before and after that moment
     #[arg(long, value_name = "S", default_value = "30", value_parser = span, requires = "around")]
     pub span: Span,
     /// Print the result as one JSON object (docs/json.md)
@@ -227,16 +226,16 @@ pub struct Replaced {
     /// The kind of part: airframe, battery, motor, propeller, esc, card, engine, other
     #[arg(value_name = "PART", value_parser = kind)]
     pub part: ComponentKind,
-    /// Which one of its kind, from 1, as `CMPn_NUMBER` has it
+    /// Number of the part among those of its kind, from 1 (`CMPn_NUMBER`)
     #[arg(value_name = "N", default_value_t = 0)]
     pub number: u8,
     /// The serial number of the new part
     #[arg(long, value_name = "S")]
     pub serial: Option<String>,
-    /// Link to the board: udpin:, udpout:, tcp: or serial:
+    /// Link to the box: udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub link: Option<Endpoint>,
-    /// Sign messages with the key in this file
+    /// Sign messages with the key in this file: 64 hexadecimal digits, or a passphrase (as in Mission Planner)
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
     /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link
@@ -261,14 +260,14 @@ fn kind(text: &str) -> Result<ComponentKind, String> {
 const FORMAT_EXAMPLES: &str = "Examples:
   hums box format-card --yes --link serial:/dev/ttyUSB0:57600
 
-Only a card that the board cannot use as it is (exFAT, no partition table, another file system, a damaged one), and
+Only a card that the box cannot use as it is (exFAT, no partition table, another file system, a damaged one), and
 only while the vehicle is disarmed.";
 
 /// `hums box format-card`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = FORMAT_EXAMPLES)]
 pub struct FormatCard {
-    /// The address of the board.
+    /// The address of the box.
     #[command(flatten)]
     pub at: Link,
     /// Confirm that all files on the card are erased
@@ -283,14 +282,14 @@ const CARD_READER_EXAMPLES: &str = "Examples:
   hums box card-reader --link serial:/dev/ttyUSB0:57600
   hums box card-reader --link udpin:0.0.0.0:14550
 
-Only while the vehicle is disarmed. The board ends its log and restarts as a USB disk that cannot be written. It records again
+Only while the vehicle is disarmed. The box ends its log and restarts as a USB disk that cannot be written. It records again
 after the disk is ejected, after power is switched, and after 10 minutes without a PC.";
 
 /// `hums box card-reader`
 #[derive(Args, Clone, Debug)]
 #[command(after_help = CARD_READER_EXAMPLES)]
 pub struct CardReader {
-    /// The address of the board.
+    /// The address of the box.
     #[command(flatten)]
     pub at: Link,
     /// Print the result as one JSON object (docs/json.md)
@@ -311,10 +310,10 @@ what is missing (exit code 4).";
 #[derive(Args, Clone, Debug)]
 #[command(after_help = SETUP_EXAMPLES)]
 pub struct Setup {
-    /// The address of the board.
+    /// The address of the box.
     #[command(flatten)]
     pub at: Link,
-    /// Show the pads of this board, and check that the image is for it (docs/boards.md)
+    /// Name of the box's board: show its pads, and check that the image is for it (docs/boards.md)
     #[arg(long, value_name = "NAME")]
     pub board: Option<String>,
     /// The autopilot's telemetry port with the box: `TELEM n` of PX4 (1 to 4), `SERIALn` of ArduPilot
@@ -344,13 +343,13 @@ wrote the newest log HUMS.OLD. The box installs it on the ground (docs/update.md
 #[derive(Args, Clone, Debug)]
 #[command(after_help = UPDATE_EXAMPLES)]
 pub struct Update {
-    /// The update file of a release for this board
+    /// The update file, `hums-BOARD.upd`, of a release for the box's board
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
     /// Root folder of the box's card, mounted on this PC
     #[arg(long, value_name = "DIR")]
     pub card: PathBuf,
-    /// Also an older version than the one that wrote the newest log, or one that was replaced
+    /// Accept an update that is older than the newest log's version, or that was replaced
     #[arg(long)]
     pub older: bool,
     /// Print the result as one JSON object (docs/json.md)
@@ -373,7 +372,7 @@ pub struct BoxReport {
     /// A card, an image or logs of the box
     #[arg(value_name = "PATH")]
     pub inputs: Vec<PathBuf>,
-    /// Where the board is: udpin:, udpout:, tcp: or serial:
+    /// Link to the box: udpin:, udpout:, tcp: or serial:
     #[arg(long, value_name = "SRC")]
     pub link: Option<Endpoint>,
     /// MAVLink system id of the vehicle. Needed only if several vehicles are on the link

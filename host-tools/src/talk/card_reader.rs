@@ -1,4 +1,4 @@
-//! `hums box card-reader`: the board restarts as a USB card reader.
+//! `hums box card-reader`: the box restarts as a USB card reader.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::output::{self, Schema};
 
 const MASS_STORAGE: f32 = REBOOT_TO_MASS_STORAGE as f32;
 const ANSWER: Duration = Duration::from_millis(400);
-/// The board restarts half a second after its answer, which may be lost.
+/// The box restarts half a second after its answer, which may be lost.
 const TRIES: usize = 3;
 
 const SCHEMA: Schema = Schema::first("hums-card-reader");

@@ -19,7 +19,7 @@ const ANSWER: Duration = Duration::from_millis(700);
 const TRIES: usize = 8;
 /// 512 GB take two minutes, 1 TB four.
 const LIMIT: Duration = Duration::from_mins(5);
-/// Silence of any message: the board is gone.
+/// Silence of any message: the box is gone.
 const SILENCE: Duration = Duration::from_secs(15);
 
 const SCHEMA: Schema = Schema::first("hums-format");
@@ -35,7 +35,7 @@ struct FormattedJson {
 /// Runs `hums box format-card`.
 pub fn run(args: &cli::FormatCard) -> Result<Outcome> {
     if !args.yes {
-        return Err(usage("this erases all files on the board's card; add --yes to confirm"));
+        return Err(usage("this erases all files on the box's card; add --yes to confirm"));
     }
     let mut client = Client::connect_alone(&args.at)?;
     let system = client.system();
@@ -84,11 +84,11 @@ fn format(client: &mut Client, silence: Duration, limit: Duration) -> Result<()>
             }
             Some(Some(Answer::Card(state))) if state == "recording" => return Ok(()),
             Some(Some(Answer::Card(state))) if !state.starts_with("is being") => {
-                bail!("the card was not formatted; the board reports: {state}")
+                bail!("the card was not formatted; the box reports: {state}")
             }
             Some(_) => {}
             None if Instant::now() < end => bail!(
-                "the board has sent nothing for {} s, so the result is not known; check its power, and try again",
+                "the box has sent nothing for {} s, so the result is not known; check its power, and try again",
                 silence.as_secs()
             ),
             None => bail!(
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn an_answer_to_another_station_is_none_to_us() {
         let refused = end(5_000, 5_000, || vec![ack(0, 77), ack(2, 255), recording(1)]);
-        assert!(refused.expect_err("it was refused").to_string().contains("the board refused"));
+        assert!(refused.expect_err("it was refused").to_string().contains("the box refused"));
     }
 
     #[test]

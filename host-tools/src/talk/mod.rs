@@ -38,9 +38,9 @@ const UID_AT: usize = 60;
 const SYSTEM: u8 = 255;
 /// `MAV_COMP_ID_MISSIONPLANNER`
 const OUR_COMPONENT: u8 = 190;
-/// Timeout for the board's first message.
+/// Timeout for the box's first message.
 const CONNECT: Duration = Duration::from_secs(15);
-/// Time for further boards: two heartbeats of each, since a radio may lose one.
+/// Time for further boxes: two heartbeats of each, since a radio may lose one.
 const LISTEN: Duration = Duration::from_millis(2_200);
 /// Radios and UDP peers learn from them where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
@@ -50,7 +50,7 @@ const KEY_FILE_BYTES_MAX: u64 = 4096;
 /// Unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;
 
-/// A conversation with one board.
+/// A conversation with one box.
 pub struct Client {
     duplex: Duplex,
     framer: Framer,
@@ -66,12 +66,12 @@ pub struct Client {
 }
 
 impl Client {
-    /// Finds the board of `--system`, or the only one on the link, and prints which.
+    /// Finds the box of `--system`, or the only one on the link, and prints which.
     ///
     /// # Errors
-    /// No board; several without `--system` (usage error).
+    /// No box; several without `--system` (usage error).
     pub fn connect(link: &Link) -> Result<Self> {
-        // No wait for other boards.
+        // No wait for other boxes.
         Self::connect_to(link, &[COMPONENT])
     }
 
@@ -80,7 +80,7 @@ impl Client {
         Self::find_on(link, components, if link.system.is_some() { Duration::ZERO } else { LISTEN })
     }
 
-    /// A connection for a command that cannot be undone: looks for further boards even with `--system`.
+    /// A connection for a command that cannot be undone: looks for further boxes even with `--system`.
     pub fn connect_alone(link: &Link) -> Result<Self> {
         Self::find_on(link, &[COMPONENT], LISTEN)
     }
@@ -130,8 +130,7 @@ impl Client {
         };
         if ids.len() > 1 {
             bail!(
-                "{} boards, by their unique ids, say that they are of system {system}, and which one would answer nobody knows; give \
-                 their vehicles different system ids, or switch all but one off",
+                "{} boxes answer as system {system}; give their vehicles different system ids, or switch all but one off",
                 ids.len()
             );
         }
@@ -158,12 +157,12 @@ impl Client {
         Ok(heard)
     }
 
-    /// The board's system id.
+    /// The box's system id.
     pub const fn system(&self) -> u8 {
         self.system
     }
 
-    /// System and component that is spoken to: the board, unless [`Self::turn_to`] named another one.
+    /// System and component that is spoken to: the box, unless [`Self::turn_to`] named another one.
     pub const fn target(&self) -> (u8, u8) {
         (self.system, self.component)
     }
@@ -194,7 +193,7 @@ impl Client {
         self.next(end, |frame| if frame.system() == system { look(frame) } else { None })
     }
 
-    /// As [`Self::until`], of all boards.
+    /// As [`Self::until`], of all boxes.
     fn next<T>(&mut self, end: Instant, mut look: impl FnMut(&Frame<'_>) -> Option<T>) -> Result<Option<T>> {
         loop {
             while let Some(bytes) = self.frames.pop_front() {
@@ -319,8 +318,8 @@ fn accepted(result: u8, denied: &str) -> Result<()> {
         CommandAck::TEMPORARILY_REJECTED => bail!(
             "refused for now: the vehicle is armed, or too many requests came at once; disarm, and try again"
         ),
-        CommandAck::DENIED => bail!("the board refused: {denied}"),
-        result => bail!("the board refused (MAV_RESULT {result})"),
+        CommandAck::DENIED => bail!("the box refused: {denied}"),
+        result => bail!("the box refused (MAV_RESULT {result})"),
     }
 }
 

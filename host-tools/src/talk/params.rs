@@ -27,7 +27,7 @@ const TRIES: usize = 8;
 const STALE_MAX: usize = 2;
 /// `MAV_PARAM_TYPE_REAL32`
 const REAL32: u8 = 9;
-/// More parameters than a board has.
+/// More parameters than a box has.
 const COUNT_MAX: u16 = 4_096;
 
 /// `PARAM_VALUE`
@@ -81,7 +81,7 @@ pub fn run(args: &cli::Params) -> Result<Outcome> {
             let system = client.system();
             let kept = set(&mut client, name, wanted, REAL32)?;
             if kept.value.to_bits() != wanted.to_bits() {
-                bail!("system {system}: {name}: the board refused {wanted} and keeps {}", kept.value);
+                bail!("system {system}: {name}: the box refused {wanted} and keeps {}", kept.value);
             }
             show(system, [kept], *json)?;
         }
@@ -131,7 +131,7 @@ fn single(wanted: f64) -> Result<(f32, bool)> {
     Ok((value, wanted.is_finite() && value.to_string().parse() != Ok(wanted)))
 }
 
-/// Sends or removes the key; returns the board's system. The board answers with a text.
+/// Sends or removes the key; returns the box's system. The box answers with a text.
 fn sign(at: &Link, remove: bool) -> Result<u8> {
     let path = at.key.as_deref();
     let key = match path {
@@ -139,7 +139,7 @@ fn sign(at: &Link, remove: bool) -> Result<u8> {
         None if remove => Key([0; KEY_BYTES]),
         None => return Err(usage("params sign: no key is given; add --key FILE")),
     };
-    // Unsigned: the board trusts this port.
+    // Unsigned: the box trusts this port.
     let mut client = Client::connect(&Link { key: None, ..at.clone() })?;
     let key = if remove { Key([0; KEY_BYTES]) } else { key };
     let (system, component) = client.target();
@@ -152,7 +152,7 @@ fn sign(at: &Link, remove: bool) -> Result<u8> {
     })?;
     said.with_context(|| {
         format!(
-            "system {system}: the board does not take the key; set SIGN_PORT to this port (docs/companion.md)"
+            "system {system}: the box does not take the key; set SIGN_PORT to this port (docs/companion.md)"
         )
     })?;
     Ok(system)
@@ -223,17 +223,17 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
     let count = said.min(COUNT_MAX);
     let mut wrong = Vec::new();
     if said != count {
-        wrong.push(format!("the board says that it has {said} parameters; {count} of them are here"));
+        wrong.push(format!("the box says that it has {said} parameters; {count} of them are here"));
     }
     if count == 0 {
-        wrong.push(format!("the board says that it has no parameters, and sends {}", shown(&first.name)));
+        wrong.push(format!("the box says that it has no parameters, and sends {}", shown(&first.name)));
         return Ok((vec![first], wrong));
     }
     let mut values: BTreeMap<u16, Param> = BTreeMap::new();
     let mut next = Some(first);
     while let Some(value) = next {
         if value.count != said && wrong.is_empty() {
-            wrong.push(format!("the board says that it has {said} parameters, and {}", value.count));
+            wrong.push(format!("the box says that it has {said} parameters, and {}", value.count));
         }
         // Without a place: another program's request by name.
         if value.index < count {
@@ -362,6 +362,6 @@ mod tests {
             assert_eq!((value.to_bits(), told), (f32::to_bits(kept), is_rounded), "{wanted}");
         }
         assert!(single(1e39).expect_err("too much").is::<crate::outcome::Usage>());
-        assert!(!single(f64::NAN).expect("for the board to refuse").1);
+        assert!(!single(f64::NAN).expect("for the box to refuse").1);
     }
 }

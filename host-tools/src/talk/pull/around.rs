@@ -1,7 +1,7 @@
 //! `hums box pull --around`: over a slow radio the minute of a crash first.
 //!
 //! The files of a log count as one row of sectors. Groups begin with their times: each sector read halves the search. Whole
-//! groups around the moment come into partial files, as long as the board's, with zeros for other sectors. They end in
+//! groups around the moment come into partial files, as long as the box's, with zeros for other sectors. They end in
 //! `.part.HUM`, which every reader reports.
 
 use std::collections::BTreeSet;
@@ -148,7 +148,7 @@ fn check_recorded(at: Instant, overview: &Overview, is_to_end: bool) -> Result<(
         moment(at) + &utc_us.map_or_else(String::new, |utc_us| format!(" ({} UTC)", date_and_time(utc_us)))
     };
     if at < first && summary.first_number != Some(0) {
-        bail!("the board's files of this log begin at {}; for another log name its files", utc(first));
+        bail!("the box's files of this log begin at {}; for another log name its files", utc(first));
     }
     if at > last && is_to_end {
         bail!("the log ends at {}; for another log name its files", utc(last));
@@ -194,7 +194,7 @@ struct RemoteLog<'a> {
     ftp: &'a mut Ftp,
     output: &'a Path,
     files: Vec<RemoteFile>,
-    /// Open on the board.
+    /// Open on the box.
     open: Option<usize>,
     /// No readable sector of the log.
     unread: BTreeSet<u32>,
@@ -227,13 +227,13 @@ impl<'a> RemoteLog<'a> {
                 continue;
             }
             if *bytes > FILE_BYTES_MAX {
-                bail!("{name}: no recorder makes a file of {bytes} bytes, as the board's directory says");
+                bail!("{name}: no recorder makes a file of {bytes} bytes, as the box's directory says");
             }
             let (name, first, sectors) = (name.clone(), log.count(), bytes / SECTOR);
             log.files.push(RemoteFile { name, first, sectors, partial: None });
         }
         if log.files.is_empty() {
-            bail!("the board has no log with data; record one first");
+            bail!("the box has no log with data; record one first");
         }
         Ok(log)
     }
@@ -249,7 +249,7 @@ impl<'a> RemoteLog<'a> {
         if self.open.replace(index) != Some(index) {
             let length = self.ftp.open(&file.name)?;
             if length / SECTOR < file.sectors {
-                bail!("{}: is shorter than the board's directory says; call again", file.name);
+                bail!("{}: is shorter than the box's directory says; call again", file.name);
             }
             if file.partial.is_none() {
                 let heading = heading_of(self.ftp, &file.name, length)?;
@@ -263,7 +263,7 @@ impl<'a> RemoteLog<'a> {
                 file.partial = Some(PartialFile::begin(&whole, file.sectors, &heading.sectors)?);
             }
         }
-        let partial = file.partial.as_mut().context("the file is not open on the board; call again")?;
+        let partial = file.partial.as_mut().context("the file is not open on the box; call again")?;
         Ok((&mut *self.ftp, partial, place - file.first))
     }
 

@@ -109,7 +109,7 @@ fn heading_by(name: &str, length: u32, mut sector_at: impl FnMut(u32) -> Result<
     Ok(Heading { name: format!("{of}_{:02}.HUM", segment.segment), session, sectors })
 }
 
-/// These bytes of the board's log that is open.
+/// These bytes of the box's log that is open.
 pub(super) fn bytes_of(ftp: &mut Ftp, start: u32, wanted: u32) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     while bytes.len() < wanted as usize {

@@ -97,9 +97,7 @@ pub(super) struct NoSuchLog;
 
 impl std::fmt::Display for NoSuchLog {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(
-            "the board no longer has this log: its card made room for later flights, or is another one",
-        )
+        f.write_str("the box no longer has this log: its card made room for later flights, or is another one")
     }
 }
 
@@ -110,7 +108,7 @@ fn refused(answer: &Answer, what: &str) -> Error {
         return NoSuchLog.into();
     }
     let why = answer.data.first().map_or_else(String::new, |error| format!(" (MAVLink FTP error {error})"));
-    anyhow!("the board refuses {what} of this log{why}; call again")
+    anyhow!("the box refuses {what} of this log{why}; call again")
 }
 
 pub(super) struct Ftp {
@@ -152,7 +150,7 @@ impl Ftp {
                 return Ok(answer);
             }
         }
-        Err(silence("the board does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?"))
+        Err(silence("the box does not answer over MAVLink FTP; is GS_BUDGET less than 500 B/s?"))
     }
 
     /// Names and lengths, also the number of those that the card did not give.
@@ -169,21 +167,21 @@ impl Ftp {
             for entry in text.split('\0').filter_map(|entry| entry.strip_prefix('F')) {
                 let (name, bytes) = entry
                     .split_once('\t')
-                    .context("the board's list has a file without a length; call again")?;
+                    .context("the box's list has a file without a length; call again")?;
                 // A plain file name in our directory.
                 if name.contains(['/', '\\']) || name.starts_with('.') {
-                    bail!("the board's list has an invalid file name, {name:?}; read the card itself");
+                    bail!("the box's list has an invalid file name, {name:?}; read the card itself");
                 }
                 logs.push((
                     name.to_owned(),
-                    bytes.parse().context("the board's list has a length that is no number; call again")?,
+                    bytes.parse().context("the box's list has a length that is no number; call again")?,
                 ));
             }
             if answer.opcode != ACK || logs.len() + skipped == before {
-                bail!("the board's directory cannot be read; call again, or read the card itself");
+                bail!("the box's directory cannot be read; call again, or read the card itself");
             }
             if logs.len() + skipped > LOGS_MAX {
-                bail!("the board lists more than {LOGS_MAX} logs, which no card has; read the card itself");
+                bail!("the box lists more than {LOGS_MAX} logs, which no card has; read the card itself");
             }
         }
     }
@@ -249,7 +247,7 @@ impl Ftp {
                 take(&data)?;
             }
             if have == before && came {
-                bail!("the board repeats bytes that it has sent; call again");
+                bail!("the box repeats bytes that it has sent; call again");
             }
         }
         Ok(())
@@ -293,7 +291,7 @@ impl Ftp {
             return Err(refused(&answer, "bytes"));
         }
         if answer.opcode != ACK || answer.offset != offset || answer.data.is_empty() {
-            bail!("the board gives no bytes at {offset}; call again");
+            bail!("the box gives no bytes at {offset}; call again");
         }
         // Never over the next piece.
         answer.data.truncate(usize::from(size));

@@ -66,13 +66,13 @@ fn bring(client: Client, args: &cli::Pull) -> Result<Outcome> {
     logs.sort();
     if skipped > 0 {
         note!(
-            "the board could not read {}, whose names are not known; call again, or read the card itself",
+            "the box could not read {}, whose names are not known; call again, or read the card itself",
             count(skipped, "more log")
         );
     }
     if let Some(missing) = args.names.iter().find(|name| logs.iter().all(|(log, _)| log != *name)) {
         let names: Vec<&str> = logs.iter().map(|(log, _)| log.as_str()).collect();
-        bail!("{missing}: the board lists no such log now; it has {}", names.join(", "));
+        bail!("{missing}: the box lists no such log now; it has {}", names.join(", "));
     }
     // Others are not missing.
     let listed = Outcome::lossy(skipped > 0 && args.names.is_empty());
@@ -213,8 +213,8 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     }
     if have > 0 {
         let who = match likeness {
-            Likeness::SameEnds => "whose first and last 512 agree with the board's log",
-            Likeness::Same | Likeness::Other => "which the board confirms by their checksum",
+            Likeness::SameEnds => "whose first and last 512 agree with the box's log",
+            Likeness::Same | Likeness::Other => "which the box confirms by their checksum",
         };
         note!("{name}: goes on after {have} bytes, {who}");
     }
@@ -223,7 +223,7 @@ fn pull(ftp: &mut Ftp, name: &str, output: &Path) -> Result<Option<(PathBuf, boo
     Ok(Some((path, true)))
 }
 
-/// Downloads until it equals the board's; counts are bytes here and in all.
+/// Downloads until it equals the box's; counts are bytes here and in all.
 fn complete(
     ftp: &mut Ftp,
     name: &str,
@@ -234,13 +234,13 @@ fn complete(
     fetch(ftp, name, file, have, length)?;
     if !is_whole(ftp, name, file, length)? {
         file.begin_anew()?;
-        note!("{name}: the download differs from the board's log; it starts again");
+        note!("{name}: the download differs from the box's log; it starts again");
         length = ftp.open(name)?.min(length);
         check_same(heading, &heading_of(ftp, name, length)?)?;
         fetch(ftp, name, file, 0, length)?;
         if !is_whole(ftp, name, file, length)? {
             bail!(
-                "two downloads differ from the board's log, so its card may be failing; read the card itself ({} has the last download)",
+                "two downloads differ from the box's log, so its card may be failing; read the card itself ({} has the last download)",
                 file.part().display()
             );
         }
@@ -259,7 +259,7 @@ fn check_same(first: &Heading, now: &Heading) -> Result<()> {
             now.name
         ),
         (_, None) => {
-            bail!("the board can no longer read its beginning, so it may be another log; call again")
+            bail!("the box can no longer read its beginning, so it may be another log; call again")
         }
     }
 }
@@ -284,7 +284,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
     }
     match compare(ftp, name, path, bytes.min(length))? {
         Likeness::Same | Likeness::SameEnds if about.len() > u64::from(length) => bail!(
-            "{} is the board's log with {} more, and stays; move it away, or name another directory with -o",
+            "{} is the box's log with {} more, and stays; move it away, or name another directory with -o",
             path.display(),
             count(about.len() - u64::from(length), "byte")
         ),
@@ -293,7 +293,7 @@ fn there(ftp: &mut Ftp, name: &str, path: &Path, length: u32) -> Result<LocalCop
         // Not proved: downloaded again, and replaced once complete.
         Likeness::SameEnds => Ok(LocalCopy::Nothing),
         Likeness::Other => bail!(
-            "{} differs from the board's log of the same session, and stays. Check it with `hums info --verify`; then move it away, or name another directory with -o",
+            "{} differs from the box's log of the same session, and stays. Check it with `hums info --verify`; then move it away, or name another directory with -o",
             path.display()
         ),
     }
@@ -308,7 +308,7 @@ fn begun(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<(u
         return Ok((bytes, likeness));
     }
     file.begin_anew()?;
-    note!("{name}: the unfinished download differs from the board's log; it starts again");
+    note!("{name}: the unfinished download differs from the box's log; it starts again");
     Ok((0, likeness))
 }
 
@@ -326,14 +326,14 @@ fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -
     brought.with_context(|| format!("after {done} of {length} bytes"))
 }
 
-/// Equals the board's.
+/// Equals the box's.
 fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<bool> {
     let flushed = file.flush();
     settle(flushed, file.path())?;
     let likeness = compare(ftp, name, file.part(), length)?;
     if likeness == Likeness::SameEnds {
         note!(
-            "{name}: the board's firmware computes no checksum: only its sectors' own checks say that it is whole"
+            "{name}: the box's firmware computes no checksum: only its sectors' own checks say that it is whole"
         );
     }
     Ok(likeness != Likeness::Other)

@@ -498,7 +498,7 @@ fn a_board_that_contradicts_itself_is_told() {
     assert_eq!(brought_of(board_of(named(log.clone()), emptied), &[]).expect("told"), Outcome::Losses);
     let told =
         brought_of(board_of(named(log), emptied), &["--around", "0:01"]).expect_err("nothing").to_string();
-    assert!(told.contains("is shorter than the board's directory says"), "{told}");
+    assert!(told.contains("is shorter than the box's directory says"), "{told}");
     let long = named(vec![0; 2 * SEGMENT_BYTES_MAX as usize + 1]);
     let told = brought(&long, &["--around", "0:01"]).expect_err("no recorder's").root_cause().to_string();
     assert!(told.contains("no recorder makes a file of 16777217 bytes"), "{told}");
@@ -545,8 +545,8 @@ fn a_refusal_says_no_more_than_is_known() {
     let dir = tempfile::tempdir().expect("a folder");
     let log = recorded(7, 30);
     for (error, words) in [
-        (10, "the board no longer has this log: its card made room for later flights, or is another one"),
-        (1, "the board refuses the checksum of this log (MAVLink FTP error 1); call again"),
+        (10, "the box no longer has this log: its card made room for later flights, or is another one"),
+        (1, "the box refuses the checksum of this log (MAVLink FTP error 1); call again"),
     ] {
         let refuse = move |_: &mut Files, opcode| (opcode == 14).then_some(error);
         let mut ftp = Ftp::new(board_of(named(log.clone()), refuse)).expect("it answers");
@@ -676,7 +676,7 @@ fn what_no_file_of_a_session_has_is_told_of_a_moment_and_of_a_search() {
     let cut = changed(&|files| files[at].1.truncate(SECTOR_BYTES));
     let first = changed(&|files| drop(files.drain(..=at)));
     let early = brought(&first, &["--around", "600"]).expect_err("it is before them").to_string();
-    assert!(early.contains("the board's files of this log begin at"), "{early}");
+    assert!(early.contains("the box's files of this log begin at"), "{early}");
     for files in [&absent, &empty, &cut, &first] {
         assert!(files.len() == first.len() || moment(files, 600) == Outcome::Losses);
         assert_eq!(moment(files, 1_400), Outcome::Done, "nothing of that moment is missing");
@@ -708,7 +708,7 @@ fn one_log_that_cannot_come_keeps_no_other_from_coming() {
     fs::create_dir(&two).expect("a folder stands where a log is to be");
     let board = || board_of(files.clone(), |_, _| None);
     let told = brought_into(dir.path(), board(), &[]).expect_err("one differs");
-    assert!(format!("{told:#}").contains("differs from the board's log of the same session"), "{told:#}");
+    assert!(format!("{told:#}").contains("differs from the box's log of the same session"), "{told:#}");
     assert_eq!(fs::read(&one).expect("there"), changed);
     assert!(two.is_dir());
     assert_eq!(fs::read(&three).expect("it came"), files[2].1);
