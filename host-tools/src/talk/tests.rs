@@ -34,7 +34,7 @@ fn two_boards_of_one_system_are_told_by_their_unique_ids() {
     };
     for wanted in [None, Some(7)] {
         let refused = find([1, 2], wanted, 50).expect_err("which one?").to_string();
-        assert!(refused.starts_with("2 boxes") && refused.contains("of system 7"), "{refused}");
+        assert!(refused.starts_with("2 boxes") && refused.contains("as system 7"), "{refused}");
     }
     // One board on two paths. With a system id and no time to wait, the box is taken at once.
     assert_eq!(find([3, 3], None, 50).expect("one box"), (7, COMPONENT));
