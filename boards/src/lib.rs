@@ -164,7 +164,7 @@ pub struct Hold {
     pub pull_up: BTreeMap<Pin, String>,
 }
 
-/// For the owner.
+/// Words for the owner of a board: price, supply, hazards.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Owner {

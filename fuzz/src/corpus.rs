@@ -5,7 +5,7 @@ use hums_recorder::LogName;
 
 use crate::{dataflash, page, ulog};
 
-/// Each with its target and its name.
+/// The corpus: target, name and bytes of each input.
 pub fn inputs() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     let entries = entries();
     let log = page::log(&entries);

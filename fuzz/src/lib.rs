@@ -47,7 +47,7 @@ pub struct Target {
     pub check: fn(&[u8]),
 }
 
-/// All of them.
+/// The targets.
 pub const TARGETS: &[Target] = &[
     Target { name: "card", bytes_max: 4_096, rounds: 1_000, check: card::check },
     Target { name: "dataflash", bytes_max: 8_192, rounds: 500, check: dataflash::check },

@@ -80,7 +80,7 @@ pub(crate) fn pulled_log(folder: &Path, number: &str) -> PathBuf {
     all[0].clone()
 }
 
-/// All of them, of several boxes and cards.
+/// The downloaded logs of several boxes and cards.
 pub(crate) fn pulled_logs(folder: &Path, number: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().file_name());
     let names = entries.map(|name| name.into_string().unwrap());

@@ -116,7 +116,7 @@ impl Live {
         self.end_by("TERM", limit)
     }
 
-    /// Where it listens.
+    /// The address of the server.
     pub fn host(&self) -> &str {
         self.address.trim_start_matches("http://").trim_end_matches('/')
     }

@@ -284,7 +284,7 @@ pub fn manifest(files: &[PathBuf]) -> Manifest {
     Manifest::parse(&manifest_text(files))
 }
 
-/// The same as a file.
+/// The manifest as a file.
 pub fn manifest_text(files: &[PathBuf]) -> String {
     ask("manifest.py", files)
 }

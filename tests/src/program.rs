@@ -133,7 +133,7 @@ impl Recording {
         recording.expect_code(if is_damaged { &[3] } else { &[0] })
     }
 
-    /// One of these exit codes.
+    /// Expects one of these exit codes.
     #[track_caller]
     #[must_use]
     pub fn expect_code(self, codes: &[i32]) -> Self {
@@ -157,7 +157,7 @@ impl Recording {
             .unwrap_or_else(|error| panic!("--json printed no JSON ({error}): {text:?}"))
     }
 
-    /// One of its numbers.
+    /// A number of the JSON.
     pub fn number(&self, name: &str) -> u64 {
         self.json()[name].as_u64().unwrap_or_else(|| panic!("--json has no number {name}: {}", self.json()))
     }

@@ -23,7 +23,7 @@ pub(crate) const APPLICATION: &str = "hums-app";
 pub(crate) const RESIDENT: &str = "hums-resident";
 pub(crate) const CHIP: &str = "hums-stm32f4";
 
-/// Every change is tried for it.
+/// The board that each change is tried with.
 pub(crate) fn default_board() -> &'static Board {
     hums_boards::find(hums_boards::DEFAULT).expect("the default board has a file")
 }
@@ -108,7 +108,7 @@ pub(crate) struct Programs {
 }
 
 impl Programs {
-    /// From the build's folder.
+    /// Reads the programs of a build's folder.
     pub(crate) fn read(target: &Path) -> Result<Self> {
         let read = |name: &str| {
             let path = target.join(FIRMWARE_TARGET).join("firmware").join(name);

@@ -38,7 +38,7 @@ struct TestProgram {
     path: PathBuf,
 }
 
-/// Those that [`build`] built.
+/// The programs that [`build`] built.
 static PROGRAMS: OnceLock<Vec<TestProgram>> = OnceLock::new();
 
 /// `hums`, campaigns and tests by one call; a warning is an error. Examples are only linted.

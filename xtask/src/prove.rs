@@ -80,7 +80,7 @@ fn storage(arguments: &[String]) -> Result<()> {
     campaigns(arguments).env("HUMS_BIN", hums::program()).env("HUMS_PYTHON", oracle::python()).run()
 }
 
-/// Some or all.
+/// Proves some or all boards.
 fn chip(boards: &[&'static Board], names: &[String]) -> Result<()> {
     let needs = [Need::Linker, Need::FirmwareTarget, Need::PythonVenv, Need::Dosfstools];
     setup::require(&needs)?;

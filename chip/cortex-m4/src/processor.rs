@@ -12,7 +12,7 @@ use crate::systick::SysTick;
 /// Instructions of the trace.
 pub const TRACED: usize = 32;
 
-/// Why the processor stopped.
+/// The reason of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Can go on: limit reached, or the bus asked for attention.

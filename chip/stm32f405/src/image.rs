@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::memory::{CCM, FLASH, SRAM};
 
-/// Why a file cannot be flashed.
+/// The reason that a file cannot be flashed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// Bytes present, bytes expected.

@@ -147,13 +147,13 @@ pub const OTG_PINS: (u8, [Pin; 2]) = (10, [pin('A', 11), pin('A', 12)]);
 
 /// The interrupt of a port.
 pub const USART: [u16; 6] = [37, 38, 39, 52, 53, 71];
-/// Of a bus.
+/// Interrupts of the SPI buses.
 pub const SPI: [u16; 3] = [35, 36, 51];
-/// Of a timer.
+/// Interrupts of the timers.
 pub const TIM: [u16; 5] = [28, 29, 30, 50, 43];
-/// Of a controller's streams.
+/// Interrupts of each DMA controller's streams.
 pub const DMA: [[u16; 8]; 2] = [[11, 12, 13, 14, 15, 16, 17, 47], [56, 57, 58, 59, 60, 68, 69, 70]];
-/// Of groups of lines of EXTI.
+/// Interrupts of EXTI, with their lines.
 pub const EXTI: [(u32, u16); 10] = [
     (1, 6),
     (1 << 1, 7),

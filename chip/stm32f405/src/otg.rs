@@ -63,7 +63,7 @@ const OUT_DONE: u32 = 3;
 const SETUP_DONE: u32 = 4;
 const SETUP_DATA: u32 = 6;
 
-/// What the host does next.
+/// The next action of the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Nothing for this long; the bus stays awake.

@@ -42,7 +42,7 @@ pub(crate) fn fault([cfsr, hfsr, mmfar, bfar]: [u32; 4], at: u32) -> String {
     format!("a fault of the processor: {}", words.join(", "))
 }
 
-/// Why and where.
+/// Reason and place of a stop.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Why.

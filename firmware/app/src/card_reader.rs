@@ -32,7 +32,7 @@ use crate::usb::{self, Identity, Packets};
 use crate::{fault, update, watch};
 
 const HOST_MAX: Span = Span::from_secs(600);
-/// After an eject the host still fetches its status.
+/// Time after an eject, in which the host fetches its status.
 const PARTING: Span = Span::from_secs(1);
 /// `SysTick` feeds the watchdog for this many turns without the loop: 10 s, of which the card's driver has 8.
 const LOOP_TURNS_MAX: u32 = 100;

@@ -264,7 +264,7 @@ fn text<const BYTES: usize>(text: &str) -> String<BYTES> {
 }
 
 impl Note {
-    /// Before [`Self::keep`].
+    /// Keeps the registers of a fault; [`Self::keep`] follows.
     fn keep_registers(&self, registers: Registers) {
         for (kept, value) in self.registers.iter().zip(registers) {
             kept.store(value, Ordering::Relaxed);

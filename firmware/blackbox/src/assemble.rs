@@ -15,7 +15,7 @@ use crate::sector::{Header, NotASector, SECTOR_BYTES, Sector, VERSION};
 /// Sectors of the largest page that a card may put in the wrong place: 16 KiB.
 pub const PAGE_SECTORS: usize = 32;
 
-/// One more decides.
+/// Sectors that wait for their order: a page, and the sector after it, which decides.
 const AHEAD_MAX: usize = PAGE_SECTORS + 1;
 
 /// Counts of blocks of 512 bytes.
@@ -110,12 +110,12 @@ pub struct Assembler {
 }
 
 impl Assembler {
-    /// For the session of the first sound sector.
+    /// An assembler for the session of the first sound sector.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// For this session only.
+    /// An assembler for this session only.
     pub fn for_session(session: u32) -> Self {
         Self { session: Some(session), ..Self::default() }
     }

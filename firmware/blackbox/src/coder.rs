@@ -116,7 +116,7 @@ pub(crate) trait Coder {
     /// A symbol below 16.
     fn symbol(&mut self, cdf: &mut Cdf, symbol: usize) -> usize;
 
-    /// The same, as likely as half-way between two distributions.
+    /// A symbol below 16, by the mean of two distributions.
     fn symbol_between(&mut self, one: &mut Cdf, other: &mut Cdf, symbol: usize) -> usize;
 
     /// A number of up to 16 bits, each as likely as any.

@@ -44,7 +44,7 @@ pub enum Item<'a> {
     End(Summary),
 }
 
-/// Why a part is unreadable.
+/// The reason that a part is unreadable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
     /// Missing sectors: never written, overwritten or lost.

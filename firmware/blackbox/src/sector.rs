@@ -182,7 +182,7 @@ pub struct Header {
     pub check: u32,
 }
 
-/// Why a block is rejected.
+/// The reason that a block is no sector of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotASector {
     /// All zeros: space that was set aside and not written yet.

@@ -68,7 +68,7 @@ const CELL_V: [(f32, f32); SETTINGS - 1] = [(0.0, 0.0), (4.08, 4.4), (2.7, 3.75)
 /// An autopilot's parameter for a battery: whether it is PX4's, its name, the battery, its meaning.
 pub type CellParameter = (bool, &'static str, u8, Setting);
 
-/// All of them.
+/// The known parameters.
 pub const KNOWN: [CellParameter; 17] = [
     (true, "BAT1_N_CELLS", 0, Setting::Count),
     (true, "BAT2_N_CELLS", 1, Setting::Count),

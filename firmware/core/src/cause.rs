@@ -75,7 +75,7 @@ impl Alert {
         Self { cause, urgency: Urgency::Warning }
     }
 
-    /// It is over.
+    /// The end of an alert.
     pub const fn over(cause: Cause) -> Self {
         Self { cause, urgency: Urgency::Over }
     }

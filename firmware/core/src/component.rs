@@ -258,7 +258,7 @@ impl Component {
         self.base
     }
 
-    /// The same component with these figures.
+    /// This component with other figures.
     pub const fn having_run(self, ran: ComponentFigures) -> Self {
         Self { base: ran, ..self }
     }

@@ -20,7 +20,7 @@ pub(crate) const LEVEL: u16 = 1 << 4;
 pub(crate) const ROTORS: u16 = 1 << 5;
 /// A rotorcraft or a plane: one set of axes. A tail-sitter has two.
 pub(crate) const ONE_FRAME: u16 = 1 << 6;
-/// It flies on rotors now, a VTOL too.
+/// The vehicle flies on rotors; so may a VTOL.
 pub(crate) const HOVERS: u16 = 1 << 7;
 /// One set of actuators controls it: the two of a VTOL share the work in a transition.
 pub(crate) const ONE_CONTROL: u16 = 1 << 8;
@@ -42,7 +42,7 @@ state! {
 }
 
 impl Gates {
-    /// These are open.
+    /// Gates of which these are open.
     #[cfg(test)]
     pub(crate) fn open(open: u16) -> Self {
         Self { open, ..Self::default() }

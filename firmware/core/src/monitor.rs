@@ -371,7 +371,7 @@ impl Monitor {
         &self.vehicle
     }
 
-    /// On the ground or in the air.
+    /// The state of the flight.
     pub const fn flight(&self) -> &Flight {
         &self.flight
     }
@@ -426,7 +426,7 @@ impl Monitor {
         }
     }
 
-    /// The same of the airframe's life.
+    /// Calls `each` with every counter of the airframe's life.
     pub fn for_each_counter_of_life(&self, mut each: impl FnMut(u8, f64)) {
         self.lifetime().totals.for_each(&mut each);
         self.exposure

@@ -22,7 +22,7 @@ pub const ESC_GROUP: usize = 4;
 /// Our own component id on the vehicle's system: `MAV_COMP_ID_ONBOARD_COMPUTER`.
 pub const OUR_COMPONENT: u8 = 191;
 
-/// Who said it: MAVLink system and component id.
+/// The sender of a message: MAVLink system and component id.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Source {
     /// System id: the vehicle.
@@ -31,7 +31,7 @@ pub struct Source {
     pub component: u8,
 }
 
-/// Which autopilot firmware speaks.
+/// The firmware of an autopilot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Autopilot {
     /// `MAV_AUTOPILOT_ARDUPILOTMEGA`
@@ -111,7 +111,7 @@ state! {
 }
 
 impl Sensors {
-    /// Of the three fields of `SYS_STATUS`.
+    /// Sensors by the three fields of `SYS_STATUS`.
     pub const fn of(present: u32, enabled: u32, health: u32) -> Self {
         let bad = enabled & !health;
         Self { unhealthy: bad & present, lost: bad & !present, healthy: present & health }
@@ -380,7 +380,7 @@ impl CellVoltage {
         NonZeroU16::new(millivolts).map(Self)
     }
 
-    /// The same in volts.
+    /// The voltage in volts.
     pub fn volts(self) -> Volts {
         Volts(f32::from(self.0.get()) / 1e3)
     }
@@ -407,7 +407,7 @@ impl Battery {
     }
 }
 
-/// Which scale an estimator's figures are on.
+/// The scale of an estimator's figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EstimatorScale {
     /// ArduPilot: variances, its failsafe acts at 0.8 on two of them.
@@ -434,7 +434,7 @@ pub struct Estimator {
     pub flags: u16,
 }
 
-/// Which scale a vibration figure is on.
+/// The scale of a vibration figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VibrationScale {
     /// ArduPilot: standard deviation of acceleration a body axis, m/s2.
@@ -569,7 +569,7 @@ state! {
         pub temperature: Option<Celsius>,
     }
 
-    /// Which autopilot it is: `AUTOPILOT_VERSION`.
+    /// The identity of an autopilot: `AUTOPILOT_VERSION`.
     #[derive(Eq)]
     pub struct AutopilotIdentity {
         /// Flight firmware version, major, minor, patch, type from the top byte down.
@@ -605,7 +605,7 @@ impl CommandAck {
     pub const IN_PROGRESS: u8 = 5;
 }
 
-/// One message's worth of knowledge.
+/// The knowledge in one message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Observation {
     /// `HEARTBEAT` of an autopilot.

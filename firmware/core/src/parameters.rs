@@ -325,7 +325,7 @@ impl Params {
     }
 }
 
-/// Why a parameter was not set.
+/// The reason that a parameter was not set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParamError {
     /// No parameter has this name.

@@ -87,7 +87,7 @@ impl Action {
 }
 
 numbered! {
-    /// What happened. The numbers are stored.
+    /// A stage of a protective action. The numbers are stored.
     pub enum Stage {
         /// The action follows in `detail` seconds.
         Announced = 1 "announced",
@@ -184,7 +184,7 @@ enum State {
     Done,
 }
 
-/// By which sign the autopilot returns or lands.
+/// The sign that the autopilot returns or lands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Accepted,

@@ -120,7 +120,7 @@ pub(crate) enum Comparison {
 
 impl Comparison {
     const COUNT: usize = Self::PitchRate as usize + 1;
-    /// Of each receiver.
+    /// The residual of satellites of each receiver.
     pub(crate) const SATELLITES: [Self; RECEIVERS_MAX] = [Self::Satellites0, Self::Satellites1];
     pub(crate) const HDOP: [Self; RECEIVERS_MAX] = [Self::Hdop0, Self::Hdop1];
     pub(crate) const RATES: [Self; 2] = [Self::RollRate, Self::PitchRate];

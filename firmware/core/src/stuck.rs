@@ -25,12 +25,12 @@ const REPEATS_MIN: u8 = 3;
 /// What lasts so many times what is usual is none of it.
 const TIMES: u32 = 4;
 
-/// What trembled is silent once it has repeated one value for so long, ms, and for so many times what is usual.
+/// A value that trembled is stuck after one repeated value for this time, ms, and for [`SILENT_TIMES`] its usual time.
 const SILENT_MS: u32 = 10_000;
 /// Longer is not counted, ms: what repeats for so long is stuck, whatever it did before.
 const LASTS_MAX_MS: u32 = 60_000;
 const SILENT_TIMES: u32 = 20;
-/// Each so long, ms, it must have moved again.
+/// Time in which a moving vehicle must move again, ms.
 const MOVES_MS: f32 = 3_000.0;
 
 /// A vehicle that moves by so much changes the values of its sensors: m up or down and over ground, rad about any axis.

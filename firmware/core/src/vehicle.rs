@@ -188,7 +188,7 @@ impl Vehicle {
         *self = Self { source: chosen, changes, election: self.election, ..Self::default() };
     }
 
-    /// What kind of vehicle it is.
+    /// The kind of the vehicle.
     pub fn kind(&self) -> VehicleKind {
         match self.heartbeat.get().map_or(VehicleKind::Other, |heartbeat| heartbeat.kind) {
             // `ArduPlane` calls itself a plane with rotors too (Q_ENABLE), but where Q_MAV_TYPE says more. Only what has both tells
@@ -247,7 +247,7 @@ impl Vehicle {
         self.election.asks(now, self.source?)
     }
 
-    /// For how long this has been the vehicle.
+    /// The time since this vehicle was chosen.
     pub fn known_for(&self, now: BootMs) -> Millis {
         self.election.lasts(now)
     }

@@ -57,7 +57,7 @@ impl Random {
         T::any(self)
     }
 
-    /// Mostly one that there is.
+    /// An instance, mostly of a part that exists.
     fn instance(&mut self) -> u8 {
         self.pick(&[0, 0, 1, 2, 255])
     }

@@ -74,7 +74,7 @@ impl Encoder {
         out.get(..len).unwrap_or_default()
     }
 
-    /// The same, signed.
+    /// Writes a signed frame.
     pub fn frame_signed<'a>(
         &mut self,
         out: &'a mut [u8; FRAME_BYTES_MAX],

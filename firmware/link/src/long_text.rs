@@ -48,7 +48,7 @@ pub(crate) fn alert_of_text(payload: &[u8]) -> Option<Alert> {
     if is_whole { alert::of_text(Some(part.severity), part.words) } else { None }
 }
 
-/// Lacks its last part.
+/// A text that lacks its last part.
 #[derive(Clone, Debug)]
 struct Open {
     at: time::BootMs,

@@ -159,7 +159,7 @@ impl Telling {
             && health::is_with_mishap(waits.at, told.at)
     }
 
-    /// It went.
+    /// Notes a finding that was sent.
     pub(crate) fn told(&mut self, now: Instant, finding: &Finding) {
         let is_mishap = finding.subsystem == Subsystem::Mishap;
         let ordering = number(finding.ordering());

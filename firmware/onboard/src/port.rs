@@ -73,7 +73,7 @@ impl PortStatus {
         self.queue_bytes_max.store(bytes, Ordering::Relaxed);
     }
 
-    /// Each is valid by itself, perhaps of another moment.
+    /// The values; each may be of another moment.
     pub fn read(&self) -> PortReading {
         PortReading {
             bytes: self.bytes.load(Ordering::Relaxed),

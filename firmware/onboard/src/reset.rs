@@ -1,6 +1,6 @@
 //! Causes of a start.
 
-/// Why the firmware started.
+/// The reason of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power came.

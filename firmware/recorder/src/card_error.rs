@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::layout::LayoutError;
 
-/// Why a card operation failed.
+/// The reason that a card operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CardError<E> {
     /// The card failed or was pulled.

@@ -20,7 +20,7 @@ const ENTRIES: u32 = 128;
 pub const BLOCKS_MIN: u32 =
     PARTITION_START + RESERVED_BLOCKS + FAT32_CLUSTERS_MIN.div_ceil(ENTRIES - 1) + FAT32_CLUSTERS_MIN;
 
-/// Why a card was not formatted.
+/// The reason that a card was not formatted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FormatError<E> {
     /// The card did not take a block.

@@ -64,7 +64,7 @@ pub type WaitWork<'a> = &'a mut dyn FnMut() -> bool;
 
 /// A card: a device of blocks that can start over, as after it was pulled and put back.
 pub trait CardDevice {
-    /// Why an access failed.
+    /// The reason that an access failed.
     type Error: core::fmt::Debug;
 
     /// Blocks in a row, from this one on.

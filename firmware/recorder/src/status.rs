@@ -181,7 +181,7 @@ impl CardStatus {
         }
     }
 
-    /// Each is valid by itself, perhaps of another moment.
+    /// The values; each may be of another moment.
     pub fn read(&self) -> CardReading {
         CardReading {
             state: CardState::from_number(self.state.load(Ordering::Relaxed)),

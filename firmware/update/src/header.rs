@@ -46,7 +46,7 @@ const CHECKED: usize = BYTES - 4;
 pub struct Version(pub u32);
 
 impl Version {
-    /// Of `major.minor.patch`; `None` for another text.
+    /// Reads `major.minor.patch`; `None` for another text.
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split('.');
         let mut part = |max: u32| parts.next()?.parse::<u32>().ok().filter(|part| *part <= max);
@@ -246,7 +246,7 @@ impl Check {
         self.state.absorb(part);
     }
 
-    /// After the last part.
+    /// Compares the sum after the last part.
     pub fn finish(self) -> Result<(), Refusal> {
         if self.left == 0 && self.state.verify().is_ok() { Ok(()) } else { Err(Refusal::BadSignature) }
     }

@@ -3,7 +3,7 @@
 
 use crate::header::Refusal;
 
-/// What one program has for the other.
+/// A message of one program to the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Message {
     /// Install the update file.
@@ -36,7 +36,7 @@ impl Message {
         [MARK, kind, 0, sum(kind)]
     }
 
-    /// Of these words; `None` for any others.
+    /// Reads these words; `None` for any others.
     pub fn of(words: [u32; 4]) -> Option<Self> {
         let [mark, kind, none, check] = words;
         if mark != MARK || none != 0 || check != sum(kind) {

@@ -95,7 +95,7 @@ pub struct State {
 }
 
 impl State {
-    /// Of the sector's bytes.
+    /// Reads the sector's bytes.
     pub fn read(sector: &[u8]) -> Self {
         let mut state = Self { last: NONE, ended: [NONE; ENDED_MAX], floor: Version(0), free: 0 };
         for (index, bytes) in sector.as_chunks::<RECORD_BYTES>().0.iter().enumerate() {

@@ -30,7 +30,7 @@ pub struct Control<'d> {
 }
 
 impl<'d> Control<'d> {
-    /// Of the class that shares this state.
+    /// The transport of the class with this state.
     pub const fn new(link: &'d Link) -> Self {
         Self { interface: None, link }
     }

@@ -20,7 +20,7 @@ use crate::guard::Link;
 use crate::scsi::Disk;
 use crate::transport::{Step, Transport};
 
-/// One is sent, one is read, one waits.
+/// Chunks: one is sent, one is read, one waits.
 const CHUNKS: usize = 3;
 
 /// Bytes for the host, in memory of blocks.

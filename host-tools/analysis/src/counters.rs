@@ -22,7 +22,7 @@ pub struct Counters {
     pub remark: Option<&'static str>,
 }
 
-/// One of the vehicle.
+/// A counter of the vehicle.
 #[derive(Debug, Serialize)]
 pub struct CounterLine {
     /// For people.
@@ -62,7 +62,7 @@ pub struct Ranges {
     pub bands: Vec<Band>,
 }
 
-/// From, to (`null` for an open range), seconds.
+/// A range: from, to (`null` if open), seconds in it.
 pub type Band = (Option<f32>, Option<f32>, f64);
 
 /// A message of the vehicle has the quantity: otherwise zero means unknown. Motors, ranges and the past never show a
@@ -163,7 +163,7 @@ pub fn of_figure(quantity: Quantity) -> (String, &'static str, u8) {
 const FLIGHTS: &str = UsageCounter::Flights.name();
 const BEGUN_BEFORE: &str = "it was in the air at its start: that flight is counted in the log before";
 
-/// By meaning; unknown ones keep their names.
+/// Groups counters by meaning; unknown ones keep their names.
 pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Counters {
     let mut all = Counters::default();
     let number = |counter: UsageCounter| session.get(counter.name()).copied().unwrap_or(0.0);

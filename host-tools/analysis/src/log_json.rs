@@ -222,7 +222,7 @@ pub struct FindingJson {
 }
 
 impl FindingJson {
-    /// Of a finding at this UTC, microseconds since 1970.
+    /// The JSON of a finding at this UTC, microseconds since 1970.
     pub fn new(finding: &Finding, utc_us: Option<u64>) -> Self {
         Self {
             subsystem: finding.subsystem.name(),

@@ -32,7 +32,7 @@ pub struct LogTime {
 }
 
 impl LogTime {
-    /// By the log's records.
+    /// The place of a log, by its records.
     pub fn of(log: &Overview) -> Self {
         let summary = &log.ending.summary;
         let boot = log.contents.boot.as_ref().filter(|_| log.format.is_none());

@@ -23,7 +23,7 @@ pub enum Soundness {
 }
 
 impl Soundness {
-    /// Of a log of ours.
+    /// The soundness of a HUMS log.
     pub fn of(ending: &Ending) -> Self {
         let (summary, is_counted) = (&ending.summary, ending.aside().is_none());
         match () {
@@ -36,7 +36,7 @@ impl Soundness {
         }
     }
 
-    /// Of a recording of another program with this gap.
+    /// The soundness of another program's recording with this gap.
     pub fn of_gap(gap: &Gap) -> Self {
         match gap.cause {
             cause if cause.is_damage() => Self::Damaged,
@@ -46,7 +46,7 @@ impl Soundness {
         }
     }
 
-    /// In JSON: `whole`, `repaired` (nothing is lost), `not_proved`, `lacks`.
+    /// The name in JSON: `whole`, `repaired` (nothing is lost), `not_proved`, `lacks`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Whole => "whole",

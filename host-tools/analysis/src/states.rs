@@ -57,7 +57,7 @@ pub struct Values {
 }
 
 impl Values {
-    /// Of these numbers, which may be NaN.
+    /// Values of these numbers, which may be NaN.
     pub fn new(onset: f32, worst: Option<f32>, unit: &str) -> Self {
         let known = |value: &f32| value.is_finite();
         let words = |value: f32| quantity(value, unit);

@@ -38,7 +38,7 @@ pub const LISTED_MAX: usize = 10_000;
 /// Life and session counters.
 const STORED_WITH: Span = Span::from_secs(5);
 
-/// After the store, reported.
+/// Counters may come later than the log's start by this time.
 const COUNTED_LATE: Span = Span::from_secs(1);
 
 /// Four times the possible ones.

@@ -105,7 +105,7 @@ pub fn json(schema: Schema, value: &impl Serialize) -> Result<()> {
     json_line(&serde_json::to_string_pretty(&Named { schema, value })?)
 }
 
-/// The same as the text of a file.
+/// The JSON as the text of a file.
 pub fn json_text(schema: Schema, value: &impl Serialize) -> Result<String> {
     Ok(format!("{}\n", serde_json::to_string_pretty(&Named { schema, value })?))
 }

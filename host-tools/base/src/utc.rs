@@ -22,14 +22,14 @@ pub fn push_iso8601(out: &mut Vec<u8>, utc_us: u64) {
     out.push(b'Z');
 }
 
-/// The same as a `String`.
+/// ISO 8601, as a `String`.
 pub fn iso8601(utc_us: u64) -> String {
     let mut out = Vec::with_capacity(27);
     push_iso8601(&mut out, utc_us);
     String::from_utf8_lossy(&out).into_owned()
 }
 
-/// To the second, for people: `2026-11-21 10:13:42`.
+/// A time to the second, for people: `2026-11-21 10:13:42`.
 pub fn date_and_time(utc_us: u64) -> String {
     iso8601(utc_us).chars().take(19).map(|c| if c == 'T' { ' ' } else { c }).collect()
 }
@@ -86,7 +86,7 @@ fn civil(days: u64) -> (u64, u64, u64) {
     (year_of_era + era * 400 + u64::from(month <= 2), month, day)
 }
 
-/// In microseconds, as [`moment`] writes it: `4:20.8`, `1:04:20`.
+/// Microseconds of a text as [`moment`] writes it: `4:20.8`, `1:04:20`.
 fn parse_moment(text: &str) -> Option<u64> {
     let (before, seconds) = text.rsplit_once(':')?;
     let (hours, minutes) = before.split_once(':').unwrap_or(("0", before));

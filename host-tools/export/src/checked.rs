@@ -82,7 +82,7 @@ pub struct FindingCount {
 }
 
 impl FindingCount {
-    /// One more.
+    /// Counts a finding of this level.
     pub fn add(&mut self, level: Level) {
         self.count += 1;
         if level != Level::Stale {
@@ -90,7 +90,7 @@ impl FindingCount {
         }
     }
 
-    /// Those of the next group.
+    /// Adds the count of the next group.
     pub fn and(&mut self, next: Self) {
         self.count += next.count;
         self.worst = self.worst.max(next.worst);

@@ -22,13 +22,13 @@ pub struct Formats {
 }
 
 impl Formats {
-    /// Those of `asked`, in the order of the table.
+    /// The formats of `asked`, in the order of the table.
     pub fn new(asked: &[&'static Format], split: bool) -> Self {
         let is_asked = |format: &&Format| asked.iter().any(|asked| asked.about.name == format.about.name);
         Self { formats: super::formats::FORMATS.iter().filter(is_asked).collect(), split }
     }
 
-    /// Those for a log without MAVLink frames.
+    /// The formats that a log without MAVLink frames can have.
     #[must_use]
     pub fn without_frames(&self) -> Self {
         let formats = self.formats.iter().copied().filter(|format| !format.about.is_of_frames);
@@ -40,7 +40,7 @@ impl Formats {
         self.formats.iter().map(|format| &format.about)
     }
 
-    /// Those that are made in parts.
+    /// The formats that are made in parts.
     pub fn ways(&self) -> impl Iterator<Item = (&'static format::FormatDetails, &'static Way)> {
         self.formats.iter().map(|format| (&format.about, &format.way))
     }

@@ -57,7 +57,7 @@ pub struct FormatDetails {
 }
 
 impl FormatDetails {
-    /// Of frames and rows, and not a recording.
+    /// A format of frames and rows, not a recording.
     pub const fn new(name: &'static str, help: &'static str, files: Files) -> Self {
         Self {
             name,
@@ -232,7 +232,7 @@ pub enum Way {
 }
 
 impl Format {
-    /// Of this writer.
+    /// The format of this writer.
     pub const fn of<W: Writer>() -> Self {
         let part = || -> Box<dyn GroupEncoder> { Box::new(W::Encoder::default()) };
         let open = |context: &Context, path: &Path| -> Result<Box<dyn AnyWriter>> {

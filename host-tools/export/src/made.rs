@@ -68,7 +68,7 @@ impl OutputFile {
         if self.files.is_empty() { std::slice::from_ref(&self.path) } else { &self.files }
     }
 
-    /// For people.
+    /// The made files as a line for people.
     pub fn line(&self) -> String {
         format!("{}: {}", self.path.display(), self.words)
     }

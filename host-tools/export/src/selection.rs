@@ -11,7 +11,7 @@ use crate::outcome::usage;
 use crate::source::epochs::Epochs;
 use crate::utc::TimePoint;
 
-/// Which entries are wanted.
+/// The selected entries.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
     from: Option<TimePoint>,
@@ -40,7 +40,7 @@ impl Selection {
         Ok(Self { from: args.from, to: args.to, ids, names: args.messages.clone() })
     }
 
-    /// The same, of this time only.
+    /// The selection within this time.
     pub fn within(&self, (from, to): (Instant, Instant)) -> Self {
         let limit = |at: Instant| Some(TimePoint::Seconds(at.as_micros()));
         Self { from: limit(from), to: limit(to), ..self.clone() }

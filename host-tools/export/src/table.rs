@@ -3,7 +3,7 @@
 use crate::mavlink::frame::Frame;
 use crate::names::message_name;
 
-/// One of them.
+/// A table of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Table {
     /// Frames of one message that we have the definition of.

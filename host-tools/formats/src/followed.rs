@@ -29,7 +29,7 @@ pub struct EndResolver<T> {
 }
 
 impl<T: HasEnding> EndResolver<T> {
-    /// For logs whose first sectors were read.
+    /// For logs with known sessions.
     pub const fn new(sessions: Sessions) -> Self {
         Self { held: VecDeque::new(), sessions }
     }

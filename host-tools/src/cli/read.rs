@@ -104,7 +104,7 @@ pub struct Decode {
     pub json: bool,
 }
 
-/// Where a log is cut into several files.
+/// The place of a cut into several files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Split {
     /// Between its flights

@@ -205,7 +205,7 @@ fn is_silent(craft: &Craft, now: Instant) -> bool {
     now.since(craft.heard) > SILENT
 }
 
-/// Some checks begin with arming or flight.
+/// Whether a subsystem waits: some checks begin with arming or flight.
 fn waits(craft: &Craft, subsystem: Subsystem) -> bool {
     let later = |when: When| match when {
         When::Always => false,

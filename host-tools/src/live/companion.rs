@@ -108,7 +108,7 @@ impl Companion {
         levels.get(subsystem as usize).copied()
     }
 
-    /// In the page's form; `None` without one.
+    /// The companion for the page; `None` without one.
     pub fn json(&self, now: Instant) -> Option<CompanionJson> {
         let heard = self.heard.filter(|_| self.named)?;
         let names = |levels: [Level; Subsystem::ALL.len()]| levels.into_iter().map(Level::name).collect();

@@ -162,7 +162,7 @@ impl Feed {
         got
     }
 
-    /// Each update is consistent.
+    /// Publishes one consistent state.
     fn pass(&mut self, now: Instant) {
         self.looked = now;
         let Self { hub, world, influx, epoch_us, .. } = self;

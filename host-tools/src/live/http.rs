@@ -9,7 +9,7 @@ use httparse::{EMPTY_HEADER, Status};
 
 /// Of a request with its body: a browser's head has about 700 bytes.
 const REQUEST_BYTES_MAX: usize = 8 * 1024;
-/// Of its head; a browser sends about 15.
+/// Fields of a request's head; a browser sends about 15.
 const FIELDS_MAX: usize = 64;
 
 /// Our scripts and styles, no inline code, no frame around the page.

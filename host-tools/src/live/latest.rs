@@ -11,7 +11,7 @@ pub const MOTION: Span = Span::from_millis(2_500);
 /// Other quantities, every two seconds.
 pub const SLOW: Span = Span::from_millis(6_000);
 
-/// One for the vehicle, with the page's names.
+/// Quantities of a vehicle, with the page's names.
 pub const QUANTITIES: [(&str, Quantity, Span); 23] = [
     ("flight_time", Quantity::FlightTime, SLOW),
     ("battery_percent", Quantity::BatteryPercent, SLOW),

@@ -64,7 +64,7 @@ pub struct Native {
 }
 
 impl Native {
-    /// From its beginning.
+    /// A log, read from its beginning.
     pub fn new(place: LogPlace) -> Self {
         Self { place, batches: None, waiting: VecDeque::new() }
     }

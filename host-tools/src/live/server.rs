@@ -37,7 +37,7 @@ struct Server {
     pages: Arc<AtomicUsize>,
 }
 
-/// One of a limited number. Freed when dropped.
+/// A place of a limited number, free again when dropped.
 struct Permit(Arc<AtomicUsize>);
 
 impl Permit {

@@ -18,7 +18,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// These are given, in this order.
+    /// Limits with these given values, in this order.
     pub fn new(given: &[(&'static ParamSpec, f32)]) -> Self {
         let mut limits = Self::default();
         for (spec, value) in given {
@@ -41,7 +41,7 @@ impl Limits {
         }
     }
 
-    /// The same for all vehicles that come.
+    /// As [`Self::take`], for all vehicles that come.
     pub fn learn(&mut self, name: &str, value: f32) {
         let mut params = self.params;
         self.take(&mut params, name, value);

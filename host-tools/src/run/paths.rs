@@ -49,7 +49,7 @@ pub(super) fn inputs(run: &Sim) -> Result<Inputs> {
     Ok(inputs)
 }
 
-/// One may not be there yet.
+/// Whether two paths are one file, which may not exist yet.
 fn is_same(one: &Path, other: &Path) -> bool {
     match [one, other].map(FileId::of) {
         [Ok(one), Ok(other)] => one == other,

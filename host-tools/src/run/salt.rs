@@ -8,7 +8,7 @@ use crate::cli::Sim;
 use crate::endpoint::Endpoint;
 use crate::files::{add_ends, short};
 
-/// By input, parameters and faults; random for live input.
+/// A run's random number: by input, parameters and faults; random for live input.
 pub(super) fn salt(run: &Sim, arrivals: &mut Arrivals) -> Result<u32> {
     let mut hash = Sha256::new();
     hash.update(format!("{:?}", run.faults));

@@ -47,19 +47,19 @@ impl Plan {
         self
     }
 
-    /// Only until this moment.
+    /// Ends the fault at this moment.
     pub const fn until(mut self, ns: u64) -> Self {
         self.until_ns = ns;
         self
     }
 
-    /// Not the first times that it could strike.
+    /// Skips the first times that the fault could strike.
     pub const fn skip(mut self, skip: u32) -> Self {
         self.skip = skip;
         self
     }
 
-    /// At most this many times.
+    /// Limits the number of faults.
     pub const fn times(mut self, times: u32) -> Self {
         self.times = times;
         self

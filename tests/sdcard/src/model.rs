@@ -62,13 +62,13 @@ impl Model {
         }
     }
 
-    /// The same with a fault.
+    /// The card with a fault.
     pub fn with(mut self, plan: Plan) -> Self {
         self.plans.push(plan);
         self
     }
 
-    /// The same without faults.
+    /// The card without faults.
     pub fn healed(&self) -> Self {
         Self { plans: Vec::new(), ..self.clone() }
     }

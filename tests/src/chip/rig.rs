@@ -64,7 +64,7 @@ impl Rig {
         Self::with(image, parts, frames, Vec::new())
     }
 
-    /// The same with a card that has these faults.
+    /// A rig whose card has these faults.
     pub fn with(image: &Image, parts: Board, frames: Vec<Vec<u8>>, plans: Vec<Plan>) -> Self {
         let (machine, slot, medium) = board_with(image.clone(), parts, plans);
         let (wired, sent, led) = (wired(image), Vec::new(), Vec::new());
@@ -194,7 +194,7 @@ pub fn heartbeat(sequence: u8) -> Vec<u8> {
     heartbeat_in(0x51, sequence)
 }
 
-/// The same in this `base_mode`.
+/// A heartbeat with this `base_mode`.
 pub fn heartbeat_in(base_mode: u8, sequence: u8) -> Vec<u8> {
     let mut frame = frame(0, &[0, 0, 0, 0, 2, 3, base_mode, 3, 3], 50, sequence);
     // From the autopilot's own component.

@@ -55,7 +55,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds of damage.
     pub(super) const ALL: [Self; 12] = [
         Self::Cut,
         Self::CutAtSector,

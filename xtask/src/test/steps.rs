@@ -68,7 +68,7 @@ pub(super) enum Stage {
 }
 
 impl Stage {
-    /// Those after the build.
+    /// The stages after the build.
     pub(super) const BESIDE: [Self; 3] = [Self::Lint, Self::Compute, Self::Wait];
 }
 

@@ -27,7 +27,7 @@ use crate::watch;
 
 /// Ticks of one half of the LED's blinking while the card records: 0.5 s.
 const BLINK_RECORDING: u32 = 10;
-/// The same while it does not: 0.1 s.
+/// Blinks while nothing is recorded: 0.1 s.
 const BLINK_TROUBLE: u32 = 2;
 
 /// Longest time from the end of the record to the restart in card-reader mode. A card may stall for 2.5 s.

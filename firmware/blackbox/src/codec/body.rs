@@ -102,7 +102,7 @@ impl Body {
         Some(end)
     }
 
-    /// One bit for all of them.
+    /// Codes elements that all keep their values: one bit.
     #[inline(never)]
     fn calm<C: Coder>(&mut self, coder: &mut C, slot: &mut Slot, frame: &mut Frame) -> Option<bool> {
         let same = C::WRITES && self.stays(slot, frame)?;

@@ -4,7 +4,7 @@ use hums_core::clock::Instant;
 
 use super::stored::{Fields, Sink};
 
-/// The numbers are stored.
+/// The kind of a loss. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum LossKind {

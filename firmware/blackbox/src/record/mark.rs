@@ -2,7 +2,7 @@
 
 use super::stored::{Fields, Sink};
 
-/// Why a mark was written.
+/// The reason of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkReason {
     /// The vehicle was disarmed on the ground.

@@ -60,7 +60,7 @@ impl<'a> Exceedance<'a> {
     }
 }
 
-/// The numbers are stored.
+/// The reason of a component's record. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum ComponentReason {

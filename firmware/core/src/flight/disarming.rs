@@ -14,9 +14,9 @@ use crate::vehicle::Vehicle;
 const WATCH: Millis = Millis::from_secs(3);
 /// A disarmed vehicle that sinks so fast sinks through the air, m/s.
 pub(super) const FALLING_MPS: f32 = 2.5;
-/// One that is lower by so much fell, m.
+/// A disarmed vehicle that is lower by this height fell, m.
 const FALLEN_M: f32 = 2.0;
-/// A terminated one falls so fast some seconds later, by the air pressure alone, m/s.
+/// The sink of a terminated vehicle some seconds later, by the air pressure alone, m/s.
 const DROPS_MPS: f32 = 10.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -28,7 +28,7 @@ use crate::parameters::{Param, Params};
 use crate::time::{BootMs, Millis, Stamp};
 use crate::vehicle::known;
 
-/// Which side of its limits is the bad one.
+/// The bad side of a check's limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Values above the limit are bad.
@@ -37,7 +37,7 @@ pub enum Side {
     Below,
 }
 
-/// When a check applies.
+/// The phase of a flight in which a check applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CheckPhase {
     /// Whenever its value is known.
@@ -52,7 +52,7 @@ impl CheckPhase {
     pub(super) const ALL: [Self; 3] = [Self::Always, Self::Armed, Self::InFlight];
 }
 
-/// What an instance's number counts.
+/// The parts that an instance's number counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstanceKind {
     /// A single one, or parts without numbers: each instance is read.

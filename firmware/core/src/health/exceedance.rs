@@ -195,7 +195,7 @@ impl Exceedances {
         self.left_out
     }
 
-    /// They were another airframe's.
+    /// Forgets the exceedances of the life: they are another airframe's.
     pub(crate) fn forget_life(&mut self) {
         for place in &mut self.entries {
             match place {

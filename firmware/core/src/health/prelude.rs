@@ -52,7 +52,7 @@ macro_rules! row {
 }
 pub(super) use row;
 
-/// What the autopilot itself reports.
+/// A check of the autopilot's own alerts.
 pub(super) const ALERT: Check = Check {
     limits: Limits::above(Some(Param::AlertWarn), Some(Param::AlertCrit), 0.0),
     // Silence tells nothing about health.

@@ -77,7 +77,7 @@ impl ItemKey {
 }
 
 state! {
-    /// Which airframe it is.
+    /// The identity of an airframe.
     #[derive(Eq)]
     pub struct Airframe {
         /// MAVLink system id; 0 unknown.

@@ -61,7 +61,7 @@ impl Saving {
         self.due |= self.changed;
     }
 
-    /// The same one until it is [`Self::saved`].
+    /// The next item to save; it stays the next one until it is [`Self::saved`].
     pub(crate) fn due(&mut self, now: BootMs, armed: bool, room: Room) -> Option<ItemKey> {
         if room == Room::Enough {
             if !self.next.is_after(now) {

@@ -39,7 +39,7 @@ pub struct News {
 }
 
 impl<'a> Handover<'a> {
-    /// After [`StoreWriter::load`](super::StoreWriter::load), since parameters then equal their stored values.
+    /// Call after [`StoreWriter::load`](super::StoreWriter::load): parameters then equal their stored values.
     pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
         monitor.params_mut().all_saved();
         let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };

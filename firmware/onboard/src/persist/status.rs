@@ -82,7 +82,7 @@ impl StoreStatus {
         }
     }
 
-    /// Each is valid by itself.
+    /// The values, each valid by itself.
     pub fn read(&self) -> StoreReading {
         StoreReading {
             state: match self.state.load(Ordering::Relaxed) {

@@ -97,7 +97,7 @@ const fn is_later(number: u32, than: u32) -> bool {
     ahead > 0 && ahead < 1 << 31
 }
 
-/// One by one.
+/// Reads the blocks of a log one by one.
 struct Reader<'r, 'a, D: CardDevice> {
     card: &'r Card<'a, D>,
     segment: &'r mut Segment,

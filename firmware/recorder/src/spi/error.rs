@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::Trouble;
 
-/// Why an access failed.
+/// The reason that an access failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpiError {
     /// The board's bus failed.

@@ -113,7 +113,7 @@ impl Host {
         Self { disk: Disk::new(card.clone(), SERIAL), card, chunks: Chunk::of(memory), tag: 0 }
     }
 
-    /// In the least time that a person needs.
+    /// Changes the card in the least time that a person needs.
     pub(crate) fn change_card(&mut self) {
         self.card.now.set(self.card.now.get() + Span::from_millis(101));
         self.card.edition.set(self.card.edition.get() + 1);

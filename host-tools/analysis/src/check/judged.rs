@@ -20,7 +20,7 @@ use crate::summary::{EndsInAir, JudgedChecks};
 /// Verdict: little data.
 pub const TOO_LITTLE: &str = "too_little";
 
-/// Who judged.
+/// The judge of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JudgedBy {
     /// Findings are in the log.

@@ -18,7 +18,7 @@ pub(super) const IMPACT: &str = "impact";
 /// Stillness before a box finds an impact.
 const LIES_STILL: Span = Span::from_secs(1);
 
-/// There are 32 sensors.
+/// Details of a problem: there are 32 sensors.
 const DETAILS_MAX: usize = 32;
 
 /// One check and part, at a warning or worse.
@@ -256,7 +256,7 @@ impl Problems {
         })
     }
 
-    /// While it is wrong.
+    /// The start of this check's open problem.
     pub(super) fn open_since(&self, check: &str) -> Option<Instant> {
         self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))
     }

@@ -119,7 +119,7 @@ pub enum Episode {
     Changed,
 }
 
-/// One flight's.
+/// Figures of a flight.
 #[derive(Clone, Debug)]
 pub struct FlightFigures {
     /// Landing, or the recording's end.

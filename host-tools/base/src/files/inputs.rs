@@ -21,12 +21,12 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// None: of a command that reads no file.
+    /// The inputs of a command that reads no file.
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// These files and folders.
+    /// Inputs from files and folders.
     pub fn of<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Self {
         let mut inputs = Self::none();
         paths.into_iter().for_each(|path| inputs.add(path.as_ref()));

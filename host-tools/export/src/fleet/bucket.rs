@@ -419,7 +419,7 @@ impl Moment {
         Self(Instant::now(), SystemTime::now())
     }
 
-    /// One of both clocks stands while a computer sleeps.
+    /// Time since then, by the faster clock: one of both stands while a computer sleeps.
     fn elapsed(self) -> Duration {
         self.0.elapsed().max(self.1.elapsed().unwrap_or_default())
     }

@@ -172,7 +172,7 @@ fn once(mut flown: Vec<Flown>) -> Vec<Flown> {
     kept
 }
 
-/// Of a vehicle, by the number of the figure.
+/// Medians of a vehicle, by the number of the figure.
 type Medians = BTreeMap<usize, f64>;
 
 fn figures() -> Vec<(String, Quantity)> {

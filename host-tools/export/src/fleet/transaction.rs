@@ -222,7 +222,7 @@ impl Synced {
     }
 }
 
-/// Each step may have been done before.
+/// Applies a change; each of its steps may have been done before.
 fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     let files = folder.join(FILES);
     let replaced = fs::read_to_string(folder.join(REPLACED))?;

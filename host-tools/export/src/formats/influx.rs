@@ -42,7 +42,7 @@ pub struct Tags {
 }
 
 impl Tags {
-    /// Of a session of a vehicle.
+    /// The tags of a vehicle's session.
     pub fn new(session: &str, vehicle: &str) -> Self {
         Self { session: tag_value(session), vehicle: tag_value(vehicle) }
     }

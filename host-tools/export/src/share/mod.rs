@@ -47,7 +47,7 @@ const PARAMETERS: &str = "parameters";
 pub struct TextRules(Rules);
 
 impl TextRules {
-    /// All of them.
+    /// The rules of all messages.
     pub fn new() -> Self {
         Self(Rules::new())
     }

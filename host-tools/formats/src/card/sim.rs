@@ -19,7 +19,7 @@ const ABSENT_US: u64 = 10_000;
 
 const PURPOSE: u64 = 2;
 
-/// Why an operation failed.
+/// The reason that an operation failed.
 #[derive(Debug)]
 pub enum CardError {
     /// The power is off: all operations fail.

@@ -101,7 +101,7 @@ pub struct BlocksJson {
 }
 
 impl BlocksJson {
-    /// These counts.
+    /// The JSON of these counts.
     pub const fn new(counts: &BlockCounts) -> Self {
         Self {
             blocks: counts.blocks,

@@ -40,7 +40,7 @@ pub fn is_card(path: &Path) -> Result<bool> {
     Ok(layout(&ReadOnlyImage::new(File::open(path)?)?).is_ok())
 }
 
-/// By the card's file system; empty without one.
+/// The logs by the card's file system; none without one.
 pub fn on_card(path: &Path) -> Vec<Log> {
     Card::of(path).map_or_else(Vec::new, |card| card.logs)
 }

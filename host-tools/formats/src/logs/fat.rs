@@ -20,7 +20,7 @@ const ENTRY_BYTES: usize = 32;
 const DEPTH_MAX: usize = 8;
 /// FAT32's own limit.
 const ENTRIES_MAX: usize = 65_536;
-/// One full directory's; the recorder uses one.
+/// Files of one full directory; the recorder uses one.
 const FILES_MAX: usize = ENTRIES_MAX;
 /// Of all segments together. The recorder allocates a segment in a few runs.
 const EXTENTS_MAX: usize = 1 << 20;

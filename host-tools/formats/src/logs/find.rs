@@ -25,7 +25,7 @@ pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundLogs> {
     })
 }
 
-/// One folder, which may have no log.
+/// Finds logs in a folder, which may have none.
 pub fn find_in(folder: &Path, salvage: bool) -> Result<FoundLogs> {
     search(&[folder.to_owned()], salvage, |_| Ok(()))
 }
@@ -103,7 +103,7 @@ fn named_file(path: &Path, salvage: bool, found: &mut FoundLogs) -> Result<()> {
 /// Segments by folder; whether each is whole or a part.
 type Segments = BTreeMap<PathBuf, Vec<(bool, SegmentName, Log)>>;
 
-/// However it is spelled.
+/// The folder of a file, in one spelling.
 fn folder_of(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())

@@ -102,7 +102,7 @@ pub(super) fn directory(root: &Path, salvage: bool, found: &mut FoundLogs) -> Re
     Ok(())
 }
 
-/// However links lead to them.
+/// Folders that were walked, by their identity: links may lead to one twice.
 #[derive(Default)]
 pub struct WalkedFolders(BTreeSet<FileId>);
 
@@ -168,7 +168,7 @@ impl Entries {
     }
 }
 
-/// By the name, compressed or not.
+/// Whether a file has the name of a log, compressed or not.
 pub fn is_named_as_log(path: &Path) -> bool {
     is_named(path, &[".hum"])
 }

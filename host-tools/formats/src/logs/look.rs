@@ -30,7 +30,7 @@ pub enum Content {
     Other,
 }
 
-/// Why a log is not read.
+/// The reason that a log is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnreadReason {
     Older(u8),

@@ -112,7 +112,7 @@ pub fn name_after<'a>(input: &Path, names: impl Iterator<Item = &'a mut String>)
     }
 }
 
-/// Of equal names the later ones get a number.
+/// Gives a number to each name that occurred before.
 pub fn make_unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     let mut seen: BTreeMap<String, u32> = BTreeMap::new();
     for name in names {

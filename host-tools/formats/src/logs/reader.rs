@@ -31,7 +31,7 @@ pub trait EntryCollector: Send {
     /// Bytes of memory, roughly. Beyond [`PART_BYTES`] it is handed on, and another one goes on.
     fn held_bytes(&self) -> usize;
 
-    /// Then `frame` gets well-formed frames, which is cheaper.
+    /// Whether `frame` gets well-formed frames in place of `entry`, which is cheaper.
     fn only_counts(&self) -> bool {
         false
     }
@@ -108,7 +108,7 @@ pub struct LogSummary {
 }
 
 impl LogSummary {
-    /// Begins a phrase that goes on with `missing`.
+    /// The beginning of a phrase that goes on with `missing`.
     pub fn missing_words(&self) -> String {
         match (self.gaps_uncounted, self.frames_missing) {
             (0, number) => count(number, "frame"),

@@ -8,7 +8,7 @@ use hums_blackbox::Header;
 use super::fingerprint::{Fingerprint, fingerprint};
 use super::places::{Log, Piece};
 
-/// One read.
+/// Blocks of one read.
 const LOOK_BLOCKS: usize = 128;
 
 /// The numbers of each session, by card.

@@ -24,7 +24,7 @@ pub(super) fn boot_ms(frame: &hums_link::Frame<'_>) -> Option<u32> {
     boot_ms_of(frame.id(), frame.component(), frame.payload())
 }
 
-/// The same of a frame by its parts.
+/// [`boot_ms`] of a frame by its parts.
 pub(super) fn boot_ms_of(id: u32, component: u8, payload: &[u8]) -> Option<u32> {
     let offset = match id {
         2 => 8,

@@ -31,7 +31,7 @@ pub struct Checksums {
 }
 
 impl Checksums {
-    /// Begins a record.
+    /// Notes the begin of a record.
     pub fn begin(&mut self, at: Instant, place: u64, bytes: &[u8]) {
         let Peek::Frame(frame) = peek(bytes) else { return };
         (self.waits, self.length) = (Some(frame.message().is_some()), frame.bytes.len());

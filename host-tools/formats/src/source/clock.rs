@@ -290,7 +290,7 @@ impl Clock {
     }
 }
 
-/// Number and first place.
+/// Messages with a wrong time: their number, and the first one's place.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WrongTimes {
     count: u64,
@@ -298,7 +298,7 @@ pub struct WrongTimes {
 }
 
 impl WrongTimes {
-    /// One more, at this byte of the recording.
+    /// Counts a message at this byte of the recording.
     pub fn add(&mut self, at: Instant, place: u64) {
         self.count += 1;
         self.first.get_or_insert((at, place));

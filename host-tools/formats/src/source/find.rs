@@ -306,7 +306,7 @@ pub fn besides(folder: &Path, own: &logs::FoundLogs) -> Result<(Vec<String>, boo
     Ok((words, walk.unknown > 0))
 }
 
-/// Which session each number of the cards holds.
+/// The session of each number on the cards.
 pub fn sessions_of(places: &[LogPlace]) -> Sessions {
     Sessions::of(places.iter().filter_map(|place| Some((place.name.as_str(), place.own()?))))
 }

@@ -312,7 +312,7 @@ impl Gap {
     }
 }
 
-/// Why something is missing.
+/// The cause of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
     /// The file is damaged here.

@@ -77,7 +77,7 @@ pub use recording::RAW_BAUD;
 /// The way back to a source that receives.
 pub type Way = Box<dyn Write + Send>;
 
-/// Which times count.
+/// The source of a recording's times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     /// Back to back at this rate, baud, whatever the recorded times.

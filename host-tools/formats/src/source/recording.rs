@@ -206,7 +206,7 @@ pub(super) fn of_one_vehicle(title: &str) -> anyhow::Error {
     ))
 }
 
-/// Open at its beginning.
+/// A recording, open at its beginning.
 pub struct Recording {
     /// Its format.
     pub format: Format,

@@ -15,7 +15,7 @@ use hums_core::units::Radians;
 
 /// Older values are not compared.
 const FRESH: Span = Span::from_secs(1);
-/// Equal for this long while turning: no setpoint.
+/// A setpoint that equals the attitude for this time while turning is none.
 const LEADS_FOR: Span = Span::from_secs(5);
 /// 0.6 degrees, which is more than rounding.
 const COPY_RAD: f32 = 0.01;

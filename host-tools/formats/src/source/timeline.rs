@@ -38,7 +38,7 @@ impl Timeline {
         Self { last: None, restarts: 0 }
     }
 
-    /// Any first time is the stream's zero.
+    /// A timeline with its first time as zero.
     pub const fn from_first(first_us: u64) -> Self {
         Self { last: Some((first_us, 0)), restarts: 0 }
     }

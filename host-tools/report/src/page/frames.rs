@@ -6,7 +6,7 @@ use hums_core::observation::Source;
 use super::plots::Plot;
 use crate::series::Store;
 
-/// Who sent a frame, and its number.
+/// Sender and number of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Sign {
     /// When it came.

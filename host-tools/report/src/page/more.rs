@@ -197,7 +197,7 @@ pub enum RowValues {
 }
 
 impl RowValues {
-    /// Such values in a row; `None` without any.
+    /// The values of a row; `None` without any.
     pub fn of(row: &Row<'_>) -> Option<Self> {
         if let Some(default) = default_of(row) {
             return Some(Self::Default(default));

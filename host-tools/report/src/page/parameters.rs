@@ -22,7 +22,7 @@ pub struct Parameters {
     newest: Option<Instant>,
 }
 
-/// One as the page takes it.
+/// A parameter for the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterJson {
     name: String,

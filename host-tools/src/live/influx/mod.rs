@@ -170,7 +170,7 @@ impl Influx {
         }
     }
 
-    /// In parts that a database takes.
+    /// Hands on points in parts that a database takes.
     fn give_settled(&self, settled: Option<&Batch>) {
         let mut part = Batch::default();
         for line in settled.into_iter().flat_map(|all| all.text.split_inclusive(|byte| *byte == b'\n')) {

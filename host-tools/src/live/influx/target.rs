@@ -23,7 +23,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// From the flags.
+    /// The database of the flags.
     pub fn new(url: &str, token: Option<&str>, org: Option<&str>, bucket: &str) -> Result<Self> {
         let base = url.trim_end_matches('/');
         if base.starts_with("https://") {

@@ -212,7 +212,7 @@ impl EmulatedBoard {
         Some((self.chip.resets.iter().filter(own).count() as u64, (*at as f64 - LEAD as f64) / SECOND as f64))
     }
 
-    /// In percent, modelled.
+    /// The processor's load in the worst second, percent, modelled.
     pub(super) const fn busy_percent_max(&self) -> f64 {
         self.load.worst
     }

@@ -69,7 +69,7 @@ pub(super) fn heading_of(ftp: &mut Ftp, name: &str, length: u32) -> Result<Headi
     heading_by(name, length, |at| bytes_of(ftp, at, SECTOR))
 }
 
-/// The same for a downloaded file on this PC.
+/// The heading of a downloaded file on this PC.
 pub(super) fn heading_here(path: &Path, name: &str, length: u32) -> Result<Heading> {
     let unread = || format!("{}: cannot be read", path.display());
     let mut file = File::open(path).with_context(unread)?;

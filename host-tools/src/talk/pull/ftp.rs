@@ -207,7 +207,7 @@ impl Ftp {
         }
     }
 
-    /// In order, piece by piece.
+    /// Downloads bytes in order, piece by piece.
     pub(super) fn bring(
         &mut self,
         from: u32,

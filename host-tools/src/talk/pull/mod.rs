@@ -326,7 +326,7 @@ fn fetch(ftp: &mut Ftp, name: &str, file: &mut Output, have: u32, length: u32) -
     brought.with_context(|| format!("after {done} of {length} bytes"))
 }
 
-/// Equals the box's.
+/// Whether the download equals the box's log.
 fn is_whole(ftp: &mut Ftp, name: &str, file: &mut Output, length: u32) -> Result<bool> {
     let flushed = file.flush();
     settle(flushed, file.path())?;

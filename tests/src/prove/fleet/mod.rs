@@ -49,7 +49,7 @@ pub struct Fleet {
 impl Fleet {
     /// All of it.
     pub const LONG: Self = Self { sessions: 20_000, days: 20, seconds: 20, compared: 200, is_short: false };
-    /// For `cargo xtask test`.
+    /// The short form, for `cargo xtask test`.
     pub const SHORT: Self = Self { sessions: 60, days: 1, seconds: 1, compared: 3, is_short: true };
 
     /// From `--short` and `--runs N`.

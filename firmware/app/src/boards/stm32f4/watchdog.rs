@@ -12,7 +12,7 @@ pub(super) fn start() {
 pub(crate) struct Watchdog(());
 
 impl Watchdog {
-    /// It runs already.
+    /// The watchdog, which the resident program started.
     pub(crate) const fn new() -> Self {
         Self(())
     }

@@ -9,7 +9,7 @@ use super::super::tests::{TABLES, add_to, all_rows, session};
 use super::*;
 use crate::storage::tests::{Kind, Memory};
 
-/// Of one thread at a time.
+/// Wait between two threads.
 const SHORT: Duration = Duration::from_millis(5);
 const NUMBERS: [u64; 2] = [0, 2];
 const DAY: Option<&str> = Some("2026-05-01");

@@ -405,7 +405,7 @@ impl TableRows {
         Self::new(sender.into_iter().chain(fields), true)
     }
 
-    /// Of rows like this one.
+    /// Columns for rows like this one.
     pub(super) fn of_rows(first: &Row) -> Self {
         Self::new(first.cells.iter().map(|(name, cell)| Column::of_cell(name, cell.cell_type())), false)
     }

@@ -40,7 +40,7 @@ impl<'a> Message<'a> {
         self.any_number(column).filter(|number| number.is_finite())
     }
 
-    /// The same, be it finite or not.
+    /// The number of a column, finite or not.
     pub(super) fn any_number(&self, column: usize) -> Option<f64> {
         let field = self.field(column)?;
         match self.body {

@@ -92,7 +92,7 @@ impl Beside {
     }
 }
 
-/// Begins with a record.
+/// A beginning with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begins {
     /// It was set.
@@ -214,7 +214,7 @@ impl Times {
             .chain(self.no_times().or_else(|| self.pace.gap()))
     }
 
-    /// None of the frames has a possible time.
+    /// The gap of a recording without a possible time.
     pub fn none_of(&self, frames: u64) -> Option<Gap> {
         let words = format!(
             "{} without a time that can be one: nothing in the log can be judged",

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use crate::source::item::CellValue;
 
-/// In one log. PX4 has some 250.
+/// Formats in one log. PX4 has some 250.
 const FORMATS_MAX: usize = 1_024;
 /// PX4's are some 60 KiB.
 const TEXT_BYTES_MAX: usize = 1 << 20;
@@ -161,7 +161,7 @@ impl Default for Formats {
 }
 
 impl Formats {
-    /// The same one again is harmless.
+    /// Takes a definition; its repetition is harmless.
     pub(super) fn define(&mut self, text: &[u8]) -> Result<(), FormatError> {
         let (name, fields) = parse(text).ok_or(FormatError::Malformed)?;
         if let Some(known) = self.written.get(name) {

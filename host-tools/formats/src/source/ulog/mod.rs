@@ -38,7 +38,7 @@ use super::input::Input;
 use super::item::{ItemReceiver, Needs, Reader, RecordingSummary};
 use window::Window;
 
-/// Such a log by the first bytes.
+/// Whether these first bytes are of a ULog.
 pub fn detect(start: &[u8]) -> bool {
     start.starts_with(&message::MAGIC)
 }

@@ -58,7 +58,7 @@ impl Arming {
         }
     }
 
-    /// It was armed before the first message.
+    /// Begins with a vehicle that was armed before the first message.
     pub(super) const fn begin_armed(&mut self) {
         (self.armed, self.first_told) = (Some(true), Some(true));
     }
@@ -68,7 +68,7 @@ impl Arming {
         self.armed = Some(armed);
     }
 
-    /// By motion, until a message reports arming.
+    /// Takes motion as a sign of arming, until a message reports it.
     pub(super) fn evidence(&mut self, at: Instant, runs: bool) {
         if self.first_told.is_some() {
             return;

@@ -76,7 +76,7 @@ impl RateUnit {
     }
 }
 
-/// Where messages about arming are.
+/// The messages that report arming.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ToldArming {
     /// Nowhere, as far as the file is known.
@@ -256,7 +256,7 @@ impl State {
         self.arming.armed() == Some(true)
     }
 
-    /// The same vehicle; earlier state is void.
+    /// Forgets the state of the same vehicle.
     pub(in crate::source::dataflash) fn restart(&mut self) {
         let mut facts = self.facts();
         if facts.told_arming != ToldArming::Nowhere {

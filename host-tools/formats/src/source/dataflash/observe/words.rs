@@ -127,7 +127,7 @@ pub(super) fn name_and_version(words: &str) -> Option<(&str, &str)> {
 const MODES: &str = include_str!("modes.txt");
 const EVENTS: &str = include_str!("events.txt");
 
-/// Number and words.
+/// A line's number and words.
 fn numbered(line: &'static str) -> Option<(u32, &'static str)> {
     let (number, words) = line.split_once(' ')?;
     Some((number.parse().ok()?, words))

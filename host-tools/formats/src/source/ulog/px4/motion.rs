@@ -139,7 +139,7 @@ fn other_imu(px4: &mut Px4, sample: &Sample<'_>) {
     }
 }
 
-/// In hPa until v1.13, in Pa since.
+/// Air data of a second barometer, in hPa until v1.13, in Pa since.
 fn other_air(px4: &mut Px4, sample: &Sample<'_>) {
     const HPA_MAX: f32 = 2_000.0;
     let pressure = sample.fields.finite(0).filter(|pressure| *pressure > 0.0);
@@ -155,7 +155,7 @@ fn outputs(px4: &mut Px4, sample: &Sample<'_>) {
     px4.observe(Observation::Outputs(Outputs { port: sample.instance, pulses }));
 }
 
-/// For a log without `sensor_combined`.
+/// Acceleration for a log without `sensor_combined`.
 fn acceleration(px4: &mut Px4, sample: &Sample<'_>) {
     if !px4.motion.combined && is_due(px4, sample) {
         inertial(px4, 0, sample.fields.vector(0), px4.motion.rate);
@@ -285,7 +285,7 @@ fn airspeed_validated(px4: &mut Px4, sample: &Sample<'_>) {
     px4.motion.airspeed = sample.fields.finite(0).or_else(|| sample.fields.finite(1));
 }
 
-/// Before v1.10.
+/// The air speed's topic before v1.10.
 fn airspeed(px4: &mut Px4, sample: &Sample<'_>) {
     if !px4.motion.airspeed_validated {
         px4.motion.airspeed = sample.fields.finite(0);
