@@ -19,7 +19,6 @@ const FLIGHT: &str = "tests/flights/ap_quad_faults.tlog";
 /// Lines of the verdict: with the demo's other output 25 lines.
 const VERDICT_LINES_MAX: usize = 12;
 
-/// All done, with losses.
 const DONE_WITH_LOSSES: i32 = 3;
 
 #[derive(Debug, clap::Args)]

@@ -165,7 +165,6 @@ impl Exceptions {
         value & (0xFFu16 << (8 - self.priority_bits)) as u8
     }
 
-    /// Its group.
     pub(crate) fn grouped(&self, priority: i16) -> i16 {
         if priority < 0 { priority } else { priority & !((2 << self.group) - 1) }
     }

@@ -72,7 +72,6 @@ impl SysTick {
         if self.reload == 0 { 0 } else { ((period - (ticks - first) % period) % period) as u32 }
     }
 
-    /// That interrupts.
     pub(crate) fn next_interrupt(&self) -> Option<u64> {
         if !self.enabled || !self.interrupts || self.reload == 0 && (self.value == 0 || self.told > 0) {
             return None;

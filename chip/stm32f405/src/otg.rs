@@ -443,7 +443,6 @@ impl Otg {
         (self.fifos[number] >> 16).saturating_sub(self.sending[number].len() as u32)
     }
 
-    /// Interrupts of an endpoint that count.
     fn endpoint_interrupts(&self) -> u32 {
         let to_host = |number: usize| {
             let empty = if self.sending[number].is_empty() { TXFE } else { 0 };

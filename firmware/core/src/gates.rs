@@ -16,7 +16,6 @@ pub(crate) const CLEAR: u16 = 1 << 2;
 pub(crate) const STILL: u16 = 1 << 3;
 /// It climbs or sinks slower than 2 m/s and leans less than 34 degrees, as far as that is known. It may be fast.
 pub(crate) const LEVEL: u16 = 1 << 4;
-/// A rotorcraft.
 pub(crate) const ROTORS: u16 = 1 << 5;
 /// A rotorcraft or a plane: one set of axes. A tail-sitter has two.
 pub(crate) const ONE_FRAME: u16 = 1 << 6;
@@ -52,7 +51,6 @@ impl Gates {
         self.open & all == all
     }
 
-    /// One step.
     pub(crate) fn step(&mut self, now: BootMs, vehicle: &Vehicle, flight: &Flight) {
         let receiver = &vehicle.gnss[0];
         let exact = receiver.within(now, PAUSE).is_some_and(Gnss::is_exact);

@@ -135,7 +135,6 @@ impl Verdict {
 }
 
 state! {
-    /// One output.
     struct Output {
         /// Command against the average of all, percent.
         share: AdaptiveBaseline,

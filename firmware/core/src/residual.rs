@@ -49,7 +49,6 @@ enum Learn {
     Nothing,
     /// Its mean: a slow drift would widen its range as it goes.
     Level,
-    /// Its range.
     Range,
 }
 
@@ -120,7 +119,6 @@ pub(crate) enum Comparison {
 
 impl Comparison {
     const COUNT: usize = Self::PitchRate as usize + 1;
-    /// The residual of satellites of each receiver.
     pub(crate) const SATELLITES: [Self; RECEIVERS_MAX] = [Self::Satellites0, Self::Satellites1];
     pub(crate) const HDOP: [Self; RECEIVERS_MAX] = [Self::Hdop0, Self::Hdop1];
     pub(crate) const RATES: [Self; 2] = [Self::RollRate, Self::PitchRate];

@@ -118,7 +118,6 @@ struct Message {
     due: bool,
 }
 
-/// Pending request.
 #[derive(Clone, Copy, Debug)]
 struct PendingRequest {
     what: RequestSubject,

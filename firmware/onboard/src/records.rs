@@ -219,7 +219,6 @@ pub(crate) fn replace_component(
     true
 }
 
-/// A component's record.
 fn component_record(
     of: &Component,
     place: usize,

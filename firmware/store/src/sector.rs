@@ -28,7 +28,6 @@ pub(crate) const ITEM_BYTES: usize = 3 * WORD;
 pub(crate) const ERASED: u32 = u32::MAX;
 /// "HST2". Change it with the layout.
 pub(crate) const MAGIC: u32 = u32::from_be_bytes(*b"HST2");
-/// "done"
 const COMPLETE: u32 = u32::from_be_bytes(*b"done");
 
 const GENERATION_AT: usize = WORD;

@@ -212,7 +212,6 @@ mod tests {
         // The same log twice, and a later log of the power-on.
         let whole = [log(1, 1, 10), log(3, 3, 5), log(1, 1, 10), LogTime { power_on: None, ..log(5, 2, 20) }];
         assert_eq!(sorted(&whole).iter().map(|(at, _)| *at).collect::<Vec<_>>(), [0, 2, 3, 1]);
-        // One log without a count.
         let unknown = [log(1, 3, 10), LogTime { count: None, ..log(2, 1, 20) }, log(3, 2, 30)];
         assert_eq!(sorted(&unknown), [(0, Some(10)), (1, Some(20)), (2, Some(30))]);
     }

@@ -63,7 +63,7 @@ impl Checked {
                 let mut part = FindingCount::default();
                 let wanted = self.findings.iter().filter(|finding| is_wanted(finding.at));
                 wanted.for_each(|finding| part.add(finding.level));
-                // That too little was judged is so of every part.
+                // A log with too little judged has too little in every part.
                 let is_judged = part.verdict() != Level::Ok.name() || self.verdict != TOO_LITTLE;
                 (if is_judged { part.verdict() } else { TOO_LITTLE }, part.count)
             }

@@ -351,7 +351,6 @@ struct Done {
     exists: Option<String>,
     /// The files written.
     made: Vec<OutputFile>,
-    /// Remarks on it.
     remarks: Vec<String>,
 }
 

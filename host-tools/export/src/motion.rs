@@ -38,7 +38,6 @@ impl Motion {
         own
     }
 
-    /// The vehicle.
     pub(crate) const fn vehicle(&self) -> &Vehicle {
         &self.vehicle
     }

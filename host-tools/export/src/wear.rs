@@ -103,7 +103,6 @@ pub(super) fn component(component: &Component<'_>) -> Row {
     Row::new("HUMS_COMPONENT", cells)
 }
 
-/// Rows of a snapshot, one for each value.
 pub(super) fn snapshot(snapshot: &Snapshot<'_>) -> Vec<Row> {
     let row = |(at, quantity, value): (_, Option<&str>, _)| {
         let cells = vec![

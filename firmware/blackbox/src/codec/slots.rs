@@ -128,7 +128,6 @@ pub(crate) struct Sender {
     pub(crate) signature_time: u64,
 }
 
-/// The next entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NextEntry {
     Slot(u8),

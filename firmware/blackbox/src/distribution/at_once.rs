@@ -80,7 +80,6 @@ mod sse2 {
         shifts
     }
 
-    /// The gains of places and uses, by way and symbol.
     static ALL_GAINS: [[[u16; SYMBOLS]; SYMBOLS]; WAYS] = all_gains();
 
     const fn all_gains() -> [[[u16; SYMBOLS]; SYMBOLS]; WAYS] {

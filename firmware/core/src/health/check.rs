@@ -276,7 +276,6 @@ impl Repeats {
 
 #[derive(Clone, Copy)]
 pub(super) struct How {
-    /// It applies.
     pub(super) applies: bool,
     /// It would only echo a mishap: its level stays as it is.
     pub(super) quiet: bool,

@@ -36,7 +36,6 @@ const LOOK_EVERY: u32 = 4_096;
 /// Read and judged.
 pub(super) struct Read {
     pub(super) format: Format,
-    /// The judgement.
     pub(super) judged: Judgement,
     pub(super) summary: RecordingSummary,
     /// Bytes of the file that were read.

@@ -276,7 +276,6 @@ impl Problems {
         }
     }
 
-    /// Due parts.
     pub(super) fn name_parts(&mut self, due: impl Fn(Subsystem) -> Option<(String, Option<String>)>) {
         for OpenProblem { problem, .. } in self.open.values_mut().filter(|of| part::is_due(&of.problem.check))
         {

@@ -23,7 +23,6 @@ pub(super) struct Jsonl {
     objects: u64,
 }
 
-/// Lines of it.
 #[derive(Default)]
 pub(super) struct Lines(Vec<u8>);
 

@@ -44,7 +44,6 @@ pub(super) struct FieldRule {
     pub(super) rule: Option<Rule>,
 }
 
-/// All rules.
 pub(super) struct Rules {
     messages: BTreeMap<u32, Vec<FieldRule>>,
     keep: Vec<&'static str>,

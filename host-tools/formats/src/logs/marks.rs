@@ -12,7 +12,6 @@ pub const TAKE_OFF: u8 = 3;
 /// Number of the event.
 pub const LANDING: u8 = 4;
 pub(super) const CARD_OUT: u8 = 7;
-/// The card refused blocks.
 pub(super) const REFUSED: &str = "card_errors";
 /// Event: started in the air.
 pub const RESUMED: u8 = 14;

@@ -140,7 +140,6 @@ mod tests {
     const SECOND: f64 = 1e6;
     const ENDS: Ends = Ends { steady_us: 1_000_000, seldom_us: 3_600_000_000 };
 
-    /// Seconds.
     fn is_wrong(before: Option<f64>, seconds: &[f64], steady: bool, is_end: bool) -> bool {
         let us = |seconds: f64| (seconds * SECOND).round() as u64;
         let times: Vec<Time> =

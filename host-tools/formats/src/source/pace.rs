@@ -28,7 +28,6 @@ pub const SLOWER: u64 = 100;
 const WITNESSED: Span = Span::from_secs(10);
 /// The other clock was set.
 const APART: Span = Span::from_secs(60);
-/// Falls, ...
 const FALLS: u32 = 8;
 /// ... with less than this between: backwards.
 const BETWEEN: Span = Span::from_secs(5);
@@ -158,7 +157,6 @@ mod tests {
         assert!(!is_told(50, 10_000_000), "2 MB/s");
         let mut pace = Pace::default();
         for second in 0..100 {
-            // A second each.
             (0..1_000).for_each(|_| pace.at(at(second * 1_000_000), 0, 100));
         }
         assert!(pace.gap().is_none());

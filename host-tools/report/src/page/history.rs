@@ -350,7 +350,6 @@ impl History {
     }
 }
 
-/// A line's name.
 fn name((plot, line): Line) -> String {
     // Room for the longest: it is made ten times a second for each line.
     let mut name = String::with_capacity(24);

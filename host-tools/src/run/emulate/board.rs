@@ -53,7 +53,6 @@ struct Line {
     free: Ps,
 }
 
-/// The board.
 pub(super) struct EmulatedBoard {
     wiring: Wiring,
     chip: Chip,

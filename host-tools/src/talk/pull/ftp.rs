@@ -41,7 +41,6 @@ const END_OF_FILE: u8 = 6;
 const UNKNOWN_COMMAND: u8 = 7;
 const FILE_NOT_FOUND: u8 = 10;
 
-/// An answer.
 struct Answer {
     sequence: u16,
     opcode: u8,

@@ -64,7 +64,6 @@ struct Wiring {
     pad: String,
 }
 
-/// A line of the bench check.
 #[derive(Debug, Serialize)]
 struct CheckLine {
     /// `box`, `settings`, `image`, `card`, `clock`, `messages`, `checks`.

@@ -97,7 +97,6 @@ pub(crate) fn line(baudrate: u32) -> usart::Config {
 /// A pin of the debug port becomes the LED's only so long after the start, so that a probe can connect before.
 const PROBE_TIME: Duration = Duration::from_secs(1);
 
-/// The LED.
 pub(crate) struct Led {
     pin: Flex<'static>,
     lit: Level,

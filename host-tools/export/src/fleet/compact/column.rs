@@ -295,7 +295,6 @@ fn path_of(field: &Type) -> ColumnPath {
 }
 
 impl Column {
-    /// Writes the column.
     pub(super) fn write(&self, writer: &mut SerializedColumnWriter<'_>) -> Result<()> {
         match self {
             Self::Flags(values) => values.write(writer),

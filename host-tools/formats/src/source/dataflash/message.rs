@@ -6,7 +6,6 @@ use hums_core::half;
 
 use super::format::{Field, FieldKind, Format, TimeField};
 
-/// A message.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Message<'a> {
     format: &'a Format,
@@ -26,7 +25,6 @@ impl<'a> Message<'a> {
         Self { format, body }
     }
 
-    /// Its format.
     pub(super) const fn format(&self) -> &'a Format {
         self.format
     }

@@ -47,7 +47,6 @@ impl<'a> Fields<'a> {
         self.element(field, 0)
     }
 
-    /// Finite.
     pub(super) fn finite(&self, field: usize) -> Option<f32> {
         self.get(field).map(|value| value as f32).filter(|value| value.is_finite())
     }
@@ -57,7 +56,6 @@ impl<'a> Fields<'a> {
         self.get(field).filter(|value| *value >= 0.0).map(|value| value as u64)
     }
 
-    /// A byte.
     pub(super) fn byte(&self, field: usize) -> Option<u8> {
         self.count(field).and_then(|value| u8::try_from(value).ok())
     }
@@ -77,7 +75,6 @@ impl<'a> Fields<'a> {
         Some(vector)
     }
 
-    /// Words.
     pub(super) fn words(&self, field: usize) -> Option<&'a str> {
         let slot = (*self.slots.get(field)?)?;
         let at = slot.offset as usize;

@@ -79,7 +79,6 @@ impl<'a> Keyed<'a> {
         number.value(self.value)?.number()
     }
 
-    /// Words.
     pub(super) fn words(&self) -> Option<&'a str> {
         (self.number == Some(Number::Char)).then(|| words(self.value))
     }

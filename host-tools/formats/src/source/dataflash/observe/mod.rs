@@ -38,7 +38,6 @@ pub(super) fn has_handler(name: &str) -> bool {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolved {
-    /// The handler.
     pub(super) handler: &'static Handler,
     slots: Slots,
     base: u8,

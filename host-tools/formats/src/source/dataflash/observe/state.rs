@@ -29,7 +29,6 @@ impl<T> Default for Dated<T> {
 }
 
 impl<T: Copy> Dated<T> {
-    /// Sets it.
     pub(super) fn set(&mut self, at: Instant, value: T) {
         self.0 = Some((at, value));
     }
