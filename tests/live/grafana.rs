@@ -101,7 +101,6 @@ fn grafanas_own_model_takes_every_member_of_the_dashboards() {
     let count: usize = all.iter().map(|(_, dashboard)| panels(dashboard).len()).sum();
     assert_eq!(said["panels"], count);
 
-    // Each slip is reported.
     let (_, whole) = dashboards(FLUX).swap_remove(0);
     let place = panels(&whole).iter().position(|panel| panel["type"] == "stat").unwrap();
     let slips: [(&str, Value); 6] = [

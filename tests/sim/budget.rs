@@ -158,7 +158,7 @@ fn a_critical_finding_is_out_within_fifty_milliseconds_however_busy_the_port_is(
             .filter(|finding| finding.level == Level::Critical)
             .map(|finding| finding.at.as_micros())
             .collect();
-        // An explained finding has none.
+        // An explained finding has no text.
         assert!(texts.len() <= critical.len(), "{}", recording.display());
         assert_eq!(texts.is_empty(), critical.is_empty(), "{}", recording.display());
         let (mut worst_begin, mut worst_end) = (0, 0);

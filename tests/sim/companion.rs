@@ -94,7 +94,6 @@ fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_af
         assert_eq!(sealed["good"], sealed["signed"], "{said}");
         assert_eq!([&sealed["unsigned"], &sealed["wrong"], &sealed["bad"]], [0, 0, 0], "{said}");
         assert_eq!((&sealed["rises"], &said["unsigned_list"]), (&true.into(), &true.into()), "{said}");
-        // MAV_RESULT 2: denied.
         assert_eq!((&said["unsigned_set"], &said["unsigned_command"]), (&stays.into(), &2.into()), "{said}");
         assert_eq!((&said["signed_set"], &said["signed_command"]), (&21.0.into(), &true.into()), "{said}");
         assert_eq!(said["wrong_key"], serde_json::json!([23.0]), "{said}");
@@ -103,7 +102,6 @@ fn once_there_is_a_key_only_what_is_signed_with_it_and_new_does_anything_also_af
     }
     // At least the two unsigned ones, in each session.
     assert!(statistic(&dir, "requests_refused").into_iter().all(|refused| refused >= 2), "not recorded");
-    // In any form.
     let card = fs::read(dir.path().join("card.img")).unwrap();
     let key: Vec<u8> = (1..33).collect();
     assert!(!card.windows(key.len()).any(|bytes| bytes == key), "the key is on the card");

@@ -248,7 +248,6 @@ fn a_file_that_is_no_store_or_cannot_be_read_is_refused_and_stays() {
     let dir = tempfile::tempdir().unwrap();
     let store = dir.path().join("store.bin");
     let mut spoiled = vec![0x5A; 32_768];
-    // Refused and left unchanged.
     fs::write(&store, &spoiled).unwrap();
     let outcome = fly(&store, &[]).expect_code(&[1]).outcome;
     assert!(outcome.stderr.contains("is no store, though it has the length of one"), "{}", outcome.stderr);

@@ -113,7 +113,7 @@ fn two_cards_are_never_made_into_one_log() {
         assert!(made.join(format!("{name}.tlog")).exists(), "{name}");
     }
 
-    // A changed bit, added bytes: the file may be evidence.
+    // A file with a changed bit or added bytes may be evidence.
     let whole = fs::read(&log).unwrap();
     let flipped = |at: usize| {
         let mut spoiled = whole.clone();

@@ -62,7 +62,6 @@ fn a_raw_device_is_read_like_its_image_by_each_command_and_never_written() {
         format!("decode --format hum {tlog} -o {device}"),
         format!("report {tlog} -o {device}"),
         format!("sim {tlog} --sd {device}"),
-        // Before any wait.
         format!("sim udpin:127.0.0.1:14559 --sd {device}"),
         format!("sim {tlog} --sd {}/card.img --gs {device}", out.path().display()),
         format!("sim {tlog} --sd {}/card.img --tap {device}", out.path().display()),

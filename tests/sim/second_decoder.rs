@@ -105,7 +105,6 @@ fn recordings_of_each_kind_read_the_same() {
         assert_eq!(frames as u64, recording.number("frames_logged"), "{flight}");
         assert!(frames > 2_000 && records > 20, "{flight}: {frames} frames, {records} records");
         if path == own(OWN[0]) {
-            // Ours reports it.
             let mut bytes = fs::read(log).unwrap();
             for sector in [12, 65] {
                 bytes[512 * sector..][..8 * 512].fill(0xff);

@@ -39,7 +39,6 @@ fn listen(recording: &Path) -> (Vec<Said>, Vec<f64>) {
     let board = BoardSetup { card: &card, params: &params, key: None };
     let endpoint: Endpoint = recording.display().to_string().parse().unwrap();
     let mut source = source::open(&endpoint, Timing { line_rate: None }).unwrap();
-    // Without input too.
     let (mut chunks, mut now_us) = (Vec::new(), 0);
     while let Some(chunk) = source.next().unwrap() {
         while now_us < chunk.at_us {

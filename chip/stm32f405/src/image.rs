@@ -145,7 +145,6 @@ fn elf(file: &[u8]) -> Result<Image, Refused> {
         let at = headers + number * size;
         let (kind, offset, address, bytes) =
             (numbers.word(at)?, numbers.word(at + 4)?, numbers.word(at + 12)?, numbers.word(at + 16)?);
-        // Data begin in the flash.
         if kind == 1 && bytes > 0 {
             image.pieces.push((address, numbers.bytes(offset as usize, bytes as usize)?.to_vec()));
         }
@@ -170,7 +169,6 @@ fn symbols(numbers: &Numbers) -> Result<Vec<Symbol>, Refused> {
         let names = numbers.word(headers + link * size + 16)? as usize;
         for entry in (from..from + bytes).step_by(16) {
             let kind = numbers.bytes(entry + 12, 1)?[0] & 0xF;
-            // Functions and objects.
             if kind != 1 && kind != 2 {
                 continue;
             }

@@ -38,7 +38,7 @@ const DMAT: u32 = 1 << 7;
 pub struct Counts {
     /// Characters received.
     pub received: u64,
-    /// Lost: the one before was not fetched.
+    /// Bytes lost, because the byte before was not fetched.
     pub overruns: u64,
     /// Low stop bits.
     pub framing: u64,

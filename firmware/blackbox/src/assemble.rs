@@ -15,7 +15,7 @@ use crate::sector::{Header, NotASector, SECTOR_BYTES, Sector, VERSION};
 /// Sectors of the largest page that a card may put in the wrong place: 16 KiB.
 pub const PAGE_SECTORS: usize = 32;
 
-/// Sectors that wait for their order: a page, and the sector after it, which decides.
+/// A page, and one sector more, which decides.
 const AHEAD_MAX: usize = PAGE_SECTORS + 1;
 
 /// Counts of blocks of 512 bytes.

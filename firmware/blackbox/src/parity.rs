@@ -184,7 +184,7 @@ impl Column {
     /// Rebuilds the sectors of these numbers as far as possible. They must be all lost sectors of the column.
     pub fn solve(mut self, lost: &[u32]) -> [Option<Sector>; 2] {
         let mut found = [None, None];
-        // One that a sum has lost alone is made of it, and may leave the other sum with one.
+        // A sum that lacks one sector rebuilds it. Then the other sum may lack only one, too.
         for _ in 0..lost.len().min(2) {
             for held in 0..self.sums.len() {
                 let Some((place, number)) = self.alone(held, lost, &found) else { continue };

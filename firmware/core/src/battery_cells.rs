@@ -194,7 +194,7 @@ impl Cells {
             _ => resting,
         };
         let is_sure = left.is_power_of_two() && (said || rested);
-        // In the air a cell may have any voltage: only a count from before is believed.
+        // In the air a cell may have any voltage, so only an earlier count is believed.
         let is_likely = if rested { highest_v >= f32::from(before) * CELL_CONFIRMED_V } else { !doubted };
         let confirmed = before > 0 && left >> before & 1 == 1 && is_likely;
         if let Some(pack) = self.packs.get_mut(battery) {

@@ -43,7 +43,7 @@ state! {
         heard: Option<BootMs>,
         /// When it was heard again after a silence, or a plane had no throttle last.
         resumed: BootMs,
-        /// The longest pause of late between two observations, s.
+        /// The longest recent pause between two observations, s.
         pause_s: f32,
         /// Receivers that have had a 3D fix since power-on.
         pub(crate) had_fix: [bool; RECEIVERS_MAX],

@@ -209,7 +209,7 @@ mod tests {
             (&[(100, &[(OTHER, 1_000)]), (5_000, &[(OTHER, 1_000), (OURS, 100)])], OURS, false),
             (&[(15_000, &[(OURS, 500)]), (120_000, &[(OURS, 1_000), (OTHER, 100)])], OURS, true),
             (&[(20_000, &[(OURS, 100)]), (49_000, &[(OTHER, 100)])], OURS, true),
-            // Its system id was changed.
+            // The vehicle's system id was changed.
             (&[(20_000, &[(OURS, 100)]), (51_000, &[(OTHER, 100)])], OTHER, false),
             (&[(20_000, &[(OURS, 100), (OTHER, 1_000)]), (300_000, &[(OTHER, 1_000)])], OURS, true),
             (&[FORWARDED], OTHER, false),

@@ -191,7 +191,7 @@ impl Vehicle {
     /// The kind of the vehicle.
     pub fn kind(&self) -> VehicleKind {
         match self.heartbeat.get().map_or(VehicleKind::Other, |heartbeat| heartbeat.kind) {
-            // `ArduPlane` calls itself a plane with rotors too (Q_ENABLE), but where Q_MAV_TYPE says more. Only what has both tells
+            // With rotors too (Q_ENABLE) `ArduPlane` calls itself a plane, unless Q_MAV_TYPE says more. Only such a vehicle reports
             // which of them it flies on.
             VehicleKind::Plane if self.vtol != VtolState::Unknown => VehicleKind::Vtol,
             kind => kind,

@@ -120,7 +120,6 @@ proptest! {
         let mut monitor = Monitor::new(params(&settings));
         for (number, stored) in &items {
             if let Some(key) = ItemKey::from_number(number % 25) {
-                // Either is right.
                 let mut stored = stored.clone();
                 if let Some(version) = stored.first_mut() {
                     *version = (*version).max(1);

@@ -121,7 +121,7 @@ pub fn decide(flash: &mut impl Flash, board: &str, cause: Cause) -> Decision {
                 let _ = append(flash, Record::Failed, id);
                 return failed;
             }
-            // It would never end its trial.
+            // The image could never end its trial.
             if state.free + RECORD_BYTES > flash.read(Region::State).len() {
                 return failed;
             }

@@ -104,7 +104,7 @@ impl<'d, D: Driver<'d>> MassStorage<'d, D> {
             from_host.wait_enabled().await;
             link.abort.reset();
             lane.abort(&mut chunks);
-            // The host sends none before the status of its request.
+            // The host sends no packet before the status of its request.
             let mut packet = [0; PACKET_BYTES];
             let _ = poll_once(from_host.read(&mut packet));
             // The abort first: the rest of an aborted command must not reach an endpoint that was emptied.

@@ -268,7 +268,7 @@ impl<P: driver::ControlPipe> GuardedPipe<P> {
     fn poll_setup(&mut self, context: &mut Context<'_>) -> Poll<[u8; 8]> {
         let setup = pin!(self.inner.setup()).poll(context);
         if setup.is_ready() {
-            // The host wants no more of the transfer before.
+            // The host has ended the transfer before.
             (self.port.drop_control_packet)();
         }
         setup

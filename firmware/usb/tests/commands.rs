@@ -164,7 +164,6 @@ fn the_next_blocks_are_read_while_the_host_thinks_and_count_for_a_moment() {
     reads(&mut host, 204, 8);
     host.change_card();
     reads(&mut host, 208, 8);
-    // At the card's end.
     reads(&mut host, 994, 6);
     reads(&mut host, 992, 8);
     reads(&mut host, 996, 0);

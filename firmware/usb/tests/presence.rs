@@ -25,6 +25,5 @@ fn time_without_a_host_counts_from_its_last_frame() {
     assert_eq!(absent(frames.clone().take(50).map(|frame| (false, frame))), 50 * LOOK);
     let pulled = frames.clone().take(20).chain([7; 30]).map(|frame| (true, frame));
     assert_eq!(absent(pulled.clone()), 29 * LOOK);
-    // The host is back.
     assert_eq!(absent(pulled.chain([(true, 8)])), 0);
 }

@@ -215,7 +215,6 @@ fn more(text: &mut String, count: u64, shown: usize) {
 fn gaps_text(text: &mut String, log: &Overview) {
     let (summary, contents) = (&log.ending.summary, &log.contents);
     let is_part = log.ending.files.iter().any(|file| is_part(Path::new(file)));
-    // Only in HUMS logs.
     let own = log.format.is_none();
     if summary.gaps + summary.losses + summary.blocks.damaged == 0 {
         text.push_str("  gaps     none\n");

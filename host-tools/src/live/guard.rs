@@ -111,7 +111,6 @@ mod tests {
             "127.0.0.1.evil.example",
             "",
             "localhost.evil.example:8080",
-            // Two of them.
             "localhost:8080, evil.example",
         ] {
             assert!(!guard.knows_host(Some(bad)), "{bad}");

@@ -45,7 +45,7 @@ const LISTEN: Duration = Duration::from_millis(2_200);
 /// Radios and UDP peers learn from them where to answer.
 const PRESENCE: Duration = Duration::from_secs(1);
 const READ: Duration = Duration::from_millis(20);
-/// A passphrase has a line.
+/// Size of a key file, which has one line.
 const KEY_FILE_BYTES_MAX: u64 = 4096;
 /// Unlike a ground station's first, so that each counts its own time.
 const LINK: u8 = 17;

@@ -208,7 +208,7 @@ mod tests {
             (1, None, None),
             (2, Some(ran(1)), Some(1)),
             (2, Some(ran(2)), Some(1)),
-            // It failed: the box runs the first one.
+            // The update failed: the box runs the first one.
             (3, Some(other), Some(1)),
             (4, None, Some(1)),
             (5, Some(Newest { version: "0.2.0".into(), ..ran(4) }), Some(1)),

@@ -589,7 +589,6 @@ fn one_wrong_time_changes_no_other_time_of_what_is_packed() {
     let dir = tempfile::tempdir().expect("directory");
     faults(dir.path());
     let log = fs::read(dir.path().join("faults.tlog")).expect("the recording");
-    // One bit: 19 hours.
     fs::write(
         dir.path().join("wrong.tlog"),
         with_times(&log, |index, us| if index == 999 { us ^ 1 << 36 } else { us }),

@@ -29,7 +29,6 @@ fn a_mere_copy_is_told_and_its_flight_counted_once() {
     for name in ["Copy of 00001_00.HUM", "00001_00 (1).HUM", "flight.hum"] {
         fs::copy(&log, dir.path().join("copied").join(name)).expect("copied");
     }
-    // The same card three times.
     fs::copy(dir.path().join("card.img"), dir.path().join("again.img")).expect("copied");
     for (inputs, out) in [("copied", "a"), ("card.img again.img copied", "b")] {
         let (decode, report) = (format!("-o {out}/ --format csv"), format!("-o {out}-pages/"));

@@ -72,7 +72,6 @@ fn what_parity_contradicts_is_told_by_every_command() {
         (said.contains("FAILED  parity "), said.contains("1 sector had to be made again from parity"))
     };
     assert_eq!(verified(&whole), (false, false));
-    // An altered sector.
     let sealed = |block: &mut [u8; BLOCK]| {
         let mut sector = Sector::from_bytes(*block);
         sector.seal(sector.session());

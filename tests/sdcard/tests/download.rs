@@ -28,7 +28,7 @@ fn model(medium: &Medium) -> Model {
 
 /// A session of this many seconds, and one more; power cuts end both.
 fn with_two_sessions(mib: u32, seconds: u64) -> Medium {
-    // The size gives the volume's number, and that the mark that separates sessions of equal names.
+    // The size gives the volume's number, by which the mark separates sessions of equal names.
     let medium = Medium::formatted(mib * MIB);
     for _ in 0..2 {
         let mut rig = Rig::new(model(&medium));

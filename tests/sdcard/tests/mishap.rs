@@ -52,7 +52,6 @@ fn a_mishap_is_on_the_card_within_200_ms_with_its_place_and_told() {
         assert!(rig.slot.now_ns() / MS < 17_000, "not told: {:?}", rig.texts);
     }
     let told = rig.texts.iter().find(|(_, text)| text.starts_with(FOUND)).expect("told").0;
-    // The power goes.
     rig.run_to(told.as_millis() + 200);
     let found = read(&medium);
     let event = found.events.iter().find(|(number, _)| *number == 15);

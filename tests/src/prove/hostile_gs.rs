@@ -376,7 +376,6 @@ impl Hostile {
                 let key = self.random_bytes(32);
                 at_target(Packet::new(256).u64(0, self.rng.next_u64()).bytes(10, &key), 8)
             }
-            // Also under another identity.
             12 | 13 => {
                 let id = self.below(512) as u32;
                 let size = self.below(255) as usize;

@@ -376,7 +376,6 @@ impl Subject {
 
     fn judge(&self, damage: &Damage, tally: &mut Tally) -> Result<()> {
         if damage.bytes == self.bytes {
-            // Exchanged with itself.
             tally.damages -= 1;
             return Ok(());
         }

@@ -151,7 +151,6 @@ fn masks() {
     print!("  faultmask {} primask {}\n\0", mrs!("faultmask"), mrs!("primask"));
     msr!("faultmask", 0);
     msr!("primask", 0);
-    // A return clears FAULTMASK.
     on(17, |_, _| unsafe { asm!("cpsid f") });
     pend(17);
     print!("  faultmask {}\n\0", mrs!("faultmask"));

@@ -31,7 +31,6 @@ pub fn faults() {
     call(0x4000_0001);
     call(0xE000_E001);
     call(0x2000_0000);
-    // The FPU off.
     put(0xE000_ED88, 0);
     unsafe { asm!("vmov {0}, s1", out(reg) _) };
     put(0xE000_ED88, 0x00F0_0000);

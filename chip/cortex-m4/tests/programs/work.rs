@@ -46,7 +46,6 @@ stop:
     bkpt #0xAB
     b .
 
-    // A handler that changes all that it may.
     .thumb_func
 clobber:
     mrs r0, ipsr

@@ -40,7 +40,6 @@ pub(crate) fn rtic_serial_dma_rx_idle(machine: &mut Machine) -> Outcome {
         let memory = machine.memory(SRAM, 32 * 1024);
         places.push(memory.windows(sent.len()).position(|bytes| bytes == sent));
     }
-    // Two buffers of 100 bytes.
     let [Some(a), Some(b), Some(c)] = places[..] else {
         return Err(format!("texts are in memory at {places:?}").into());
     };

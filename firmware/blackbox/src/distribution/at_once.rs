@@ -209,7 +209,6 @@ mod tests {
             a.adapt(symbol);
             b.adapt(symbol);
             if round % 300 == 0 {
-                // The two differ.
                 (b, d) = (Cdf::FLAT, Cdf::FLAT);
             }
         }

@@ -147,7 +147,7 @@ pub(super) const CHECKS: &[Check] = &[
         read: |inputs, sensor| stuck(inputs, Kind::Compass, sensor)),
     row!("baro_stuck" STUCK, role: Role::of(Group::BaroFault, 0),
         read: |inputs, sensor| stuck(inputs, Kind::Barometer, sensor)),
-    // It goes by how far the vehicle moved.
+    // The time depends on the vehicle's movement.
     row!("gps_stuck" STUCK, role: Role::of(Group::GnssFrozen, 0), instances: RECEIVERS_MAX as u8,
         of: InstanceKind::Vehicle,
         read: |inputs, receiver| inputs.derived.crosschecks.repeats.receiver_stuck(inputs.now, receiver)),

@@ -29,7 +29,7 @@ pub(super) enum Group {
     Reboot,
     Battery,
     BatteryState,
-    /// What else an autopilot has a failsafe for.
+    /// Another cause of an autopilot's failsafe.
     FailsafeCause,
     /// ESC telemetry. It is a wire: it explains no attitude, no mishap and no act of the autopilot.
     EscTelemetry,

@@ -6,7 +6,7 @@ pub enum SessionBefore {
     /// No boot record names one.
     #[default]
     NotNamed,
-    /// It was read too.
+    /// The other log was read too.
     There,
     /// A session not among the inputs; old logs make room for new ones.
     NotLookedFor(u32),

@@ -107,7 +107,6 @@ mod tests {
         assert_eq!(told(&noise(90_000), &[]), [(Some(0), 90_000)]);
         assert_eq!(told(&noise(90_016), &[45_024]), []);
         assert_eq!(told(&[vec![1; 64], vec![0; 600], vec![1; 64]].concat(), &[]), [(Some(64), 600)]);
-        // Reported once.
         let both = [vec![0xff; 100_000], noise(70_000)].concat();
         assert_eq!(told(&both, &[]), [(Some(0), 100_000), (Some(0), 70_000)]);
     }

@@ -16,7 +16,6 @@ macro_rules! modules {
 modules! {
     // Any page.
     "badge" "canvas" "colours" "dom" "elements" "flight" "layout" "map" "notes" "parameters" "plot" "plots" "text" "tiles" "timeline" "view"
-    // The whole one.
     "data" "recorder" "report" "spectrum" "summary" "trend" "usage"
     // The table of a folder's pages, the comparison of flights, and a fleet.
     "index" "compare" "fleet" "sorted"

@@ -364,7 +364,7 @@ impl<'a> RemoteLog<'a> {
         Outcome::lossy(!self.unread.is_empty())
     }
 
-    /// The missing ones; and reads them.
+    /// Downloads and reads the missing sectors.
     fn bring(&mut self, places: Range<u32>) -> Result<Overview> {
         let mut place = places.start;
         while place < places.end {

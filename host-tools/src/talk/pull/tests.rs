@@ -137,11 +137,9 @@ fn a_log_begins_anew_when_the_card_loses_some_of_it_and_is_not_mixed_with_anothe
         } else {
             let told = pulled.expect_err("it is another one").to_string();
             assert!(told.contains("replaced it during the download"), "{told}");
-            // Deleted.
             assert_eq!(names_in(&output), Vec::<String>::new());
         }
     }
-    // From its first byte on.
     let output = dir.path().join("early");
     fs::create_dir(&output).expect("made");
     let mut ftp = board(log.clone(), other.clone(), 8 * 3 + 1);
@@ -203,7 +201,7 @@ fn a_part_has_sectors_of_one_session_also_where_the_log_is_exchanged_while_it_is
     assert_eq!(part.len(), log.len());
     let mut others = 0;
     for (ours, theirs) in part.chunks(SECTOR_BYTES).zip(log.chunks(SECTOR_BYTES)) {
-        // Half of each, which fails its check.
+        // Half of each sector, which fails its check.
         let is_sector = Header::read(ours.first_chunk().expect("a sector")).is_ok();
         assert!(ours == theirs || !is_sector);
         others += u32::from(!is_sector && ours.iter().any(|byte| *byte != 0));
@@ -430,7 +428,6 @@ fn a_file_that_begins_in_the_middle_of_a_group_is_read_with_the_one_before_it() 
     };
     let middle = (group_at(&log, 200).start + 9) * SECTOR_BYTES;
     for (cut, at_it) in [(cut, "399"), (middle, "200")] {
-        // Around the change of files.
         for at in ["20", at_it, "399"] {
             let dir = tempfile::tempdir().expect("a folder");
             let board = board_of(files(cut), |_, _| None);
@@ -680,7 +677,6 @@ fn what_no_file_of_a_session_has_is_told_of_a_moment_and_of_a_search() {
     for files in [&absent, &empty, &cut, &first] {
         assert!(files.len() == first.len() || moment(files, 600) == Outcome::Losses);
         assert_eq!(moment(files, 1_400), Outcome::Done, "nothing of that moment is missing");
-        // Of any time.
         let has_empty = files.iter().any(|(_, bytes)| bytes.is_empty());
         let expected = if has_empty { Outcome::Losses } else { Outcome::Done };
         assert_eq!(search(files), expected, "nor what comes after the latest one");

@@ -227,7 +227,6 @@ impl Subject {
         for (index, file) in session.files.iter().enumerate() {
             for block in blocks_of(file) {
                 let Ok(header) = Header::read(&session.block_before(block)) else { continue };
-                // Of an overwritten session.
                 if *sealed_as.entry(index).or_insert(header.session) == header.session {
                     kept.insert(block, Kept { session: header.session, file: index });
                 }

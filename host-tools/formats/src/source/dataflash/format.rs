@@ -483,7 +483,6 @@ mod tests {
         assert!(odd.contains("12 bytes") && odd.contains("13"), "{odd}");
         assert_eq!((formats.lengths.told[130], formats.lengths.fields[130]), (12, 13));
         assert_eq!(formats.take_odd(130), None, "once");
-        // Too short for a header.
         formats.define(Format::new(131, 0, "IMU", b"Qf", "TimeUS,GyrX"));
         assert_eq!((formats.lengths.told[131], formats.lengths.fields[131]), (15, 0));
     }

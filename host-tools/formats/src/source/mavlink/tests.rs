@@ -54,7 +54,6 @@ fn records_that_are_far_apart_have_right_times_and_a_wrong_one_at_the_end_is_see
         }
         let times: Vec<u64> = (0..60).map(|record| 1_000 + record * apart).collect();
         let end = 59 * apart;
-        // In twos, too.
         let twos: Vec<u64> = times.iter().flat_map(|time| [*time, time + 1]).collect();
         assert_eq!(told(&twos), (vec![], 0, end + 1), "{apart}");
         for wrong in [1_000 + end + 3 * apart, 100] {
@@ -152,7 +151,6 @@ fn what_passed_is_told_by_the_autopilot_where_the_ground_stations_clock_is_set()
     let part = |recorded: u64, from: u64, to: u64| (from..to).map(move |boot| (recorded + boot, boot));
     for (set, forward_told) in [(15, false), (50, false), (150, true), (6_000, true), (400_000, true)] {
         let forward: Vec<_> = part(9_000, 1_000, 1_500).chain(part(9_000 + set, 1_500, 2_000)).collect();
-        // As long as ten seconds.
         let told = if forward_told { ("restart ", 999) } else { ("", 999 + set) };
         assert_eq!(clock_of_tenths(&forward), (told.0.to_owned(), told.1), "{set}");
         let back: Vec<_> = part(900_000 + set, 1_000, 1_500).chain(part(900_000, 1_500, 2_000)).collect();

@@ -31,7 +31,6 @@ impl Pipeline<'_, '_> {
         }
         self.now = self.now.max(self.busy_until);
         self.storage.finish();
-        // At its pace.
         self.now = self.now.max(self.gs_at);
         for _ in 0..1000 {
             self.send_gs()?;

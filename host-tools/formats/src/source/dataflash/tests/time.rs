@@ -172,7 +172,6 @@ fn columns_without_names_are_damage_where_messages_of_them_come() {
 
 #[test]
 fn a_clock_that_does_not_run_from_some_place_on_is_told() {
-    // Four minutes.
     let of = |time: &dyn Fn(u64) -> u64| {
         let mut log = begun();
         for tick in 0..32_000_u64 {
