@@ -135,12 +135,12 @@ pub(crate) trait Coder {
     }
 }
 
-pub(crate) struct Writing<'a, const N: usize> {
+pub(crate) struct SymbolWriter<'a, const N: usize> {
     pub(crate) encoder: &'a mut Encoder,
     pub(crate) out: &'a mut Scratch<N>,
 }
 
-impl<const N: usize> Coder for Writing<'_, N> {
+impl<const N: usize> Coder for SymbolWriter<'_, N> {
     const WRITES: bool = true;
 
     #[inline(never)]
@@ -176,13 +176,13 @@ impl<const N: usize> Coder for Writing<'_, N> {
     }
 }
 
-pub(crate) struct Reading<'a, R> {
+pub(crate) struct SymbolReader<'a, R> {
     pub(crate) decoder: &'a mut Decoder,
     pub(crate) input: &'a [u8],
     pub(crate) recall: &'a mut R,
 }
 
-impl<R> Coder for Reading<'_, R> {
+impl<R> Coder for SymbolReader<'_, R> {
     const WRITES: bool = false;
 
     #[expect(clippy::inline_always, reason = "the reader's hottest path: a call more costs a tenth of it")]
@@ -326,7 +326,7 @@ mod tests {
             let (mut encoder, mut out) = (Encoder::new(), Scratch::<2_048>::new());
             let mut cdf = Cdf::FLAT;
             let value = |index: u32| index.wrapping_mul(2_654_435_761);
-            let mut writing = Writing { encoder: &mut encoder, out: &mut out };
+            let mut writing = SymbolWriter { encoder: &mut encoder, out: &mut out };
             for index in 0..count {
                 writing.symbol(&mut cdf, (value(index) >> 28) as usize);
                 let mask = ((1_u64 << (index % 33)) - 1) as u32;
@@ -338,7 +338,7 @@ mod tests {
             bytes.extend_from_slice(&end[..len]);
             let mut cdf = Cdf::FLAT;
             let mut decoder = Decoder::new(&bytes, 0);
-            let mut reading = Reading { decoder: &mut decoder, input: &bytes, recall: &mut () };
+            let mut reading = SymbolReader { decoder: &mut decoder, input: &bytes, recall: &mut () };
             for index in 0..count {
                 assert_eq!(reading.symbol(&mut cdf, 0), (value(index) >> 28) as usize);
                 let bits = index % 33;

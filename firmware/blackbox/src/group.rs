@@ -3,8 +3,8 @@
 use hums_core::clock::Instant;
 
 use crate::chain;
-use crate::codec::{self, Decoded, Frame, Kind, Model, Recall, SLOTS};
-use crate::coder::{Decoder, LOOKAHEAD, Reading};
+use crate::codec::{self, DecodedEntry, Frame, Kind, Model, Recall, SLOTS};
+use crate::coder::{Decoder, LOOKAHEAD, SymbolReader};
 use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
 use crate::preamble::{PREAMBLE_BYTES, Preamble};
@@ -98,7 +98,7 @@ pub struct GroupDecoder {
     /// The table of the group before, and its hash.
     layouts: Option<(u32, Layouts)>,
     entry: [u8; ENTRY_BYTES_MAX],
-    decoded: Decoded,
+    decoded: DecodedEntry,
     apart: Option<usize>,
 }
 
@@ -127,7 +127,7 @@ impl GroupDecoder {
             preamble: Preamble::default(),
             layouts: None,
             entry: [0; ENTRY_BYTES_MAX],
-            decoded: Decoded { kind: Kind::Record, at_ms: 0, len: 0 },
+            decoded: DecodedEntry { kind: Kind::Record, at_ms: 0, len: 0 },
             apart: None,
         }
     }
@@ -198,7 +198,7 @@ impl GroupDecoder {
         if let Err(error) = self.advance()? {
             return Some(Err(error));
         }
-        let Decoded { kind, at_ms, len: bytes } = self.decoded;
+        let DecodedEntry { kind, at_ms, len: bytes } = self.decoded;
         let frame = self.apart.and_then(|index| self.last_frames.get(index));
         if let (Kind::Frame { verified }, Some(id)) = (kind, frame.and_then(Frame::known_id)) {
             return Some(Ok(Outline::Frame { at: Instant::from_millis(at_ms), id, bytes, verified }));
@@ -222,7 +222,7 @@ impl GroupDecoder {
         }
         self.due -= 1;
         let input = self.input.get(..self.filled).unwrap_or_default();
-        let mut coder = Reading { decoder: &mut self.decoder, input, recall: &mut self.recall };
+        let mut coder = SymbolReader { decoder: &mut self.decoder, input, recall: &mut self.recall };
         match self.model.decode(&mut coder, &mut self.last_frames, &mut self.entry) {
             // Reading on beyond the end is only right where the stream ends.
             Ok((decoded, apart)) if self.decoder.position() <= input.len() + LOOKAHEAD => {
@@ -247,7 +247,7 @@ impl GroupDecoder {
         if core::mem::take(&mut self.is_unchecked)
             && let Some(chain) = &mut self.chain
         {
-            let Decoded { kind, at_ms, .. } = self.decoded;
+            let DecodedEntry { kind, at_ms, .. } = self.decoded;
             *chain = chain::after(*chain, chain::value_of(&codec::CodedEntry { kind, at_ms, bytes }));
         }
         match self.decoded.kind {

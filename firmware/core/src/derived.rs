@@ -47,22 +47,22 @@ state! {
         pause_s: f32,
         /// Receivers that have had a 3D fix since power-on.
         pub(crate) had_fix: [bool; RECEIVERS_MAX],
-        clips: Lately,
+        clips: RecentCount,
         clips_known: bool,
         /// Frames that our own recording lost, and block writes that the card refused.
-        pub(crate) frames_lost: Lately,
-        pub(crate) write_errors: Lately,
+        pub(crate) frames_lost: RecentCount,
+        pub(crate) write_errors: RecentCount,
     }
 
     /// A count of the last ten seconds, of one that only rises.
-    pub(crate) struct Lately {
+    pub(crate) struct RecentCount {
         count: u32,
         before: u32,
         rose_at: Stamp,
     }
 }
 
-impl Lately {
+impl RecentCount {
     fn take(&mut self, now: BootMs, count: u64) {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
         if count > self.count {
@@ -168,7 +168,7 @@ impl Derived {
         // Clips before this flight, or before the autopilot's restart, are not of this flight.
         if event.is_some() || clips < self.clips.count || !self.clips_known {
             self.clips_known = vehicle.vibration.get().is_some();
-            self.clips = Lately { count: clips, before: clips, ..Lately::default() };
+            self.clips = RecentCount { count: clips, before: clips, ..RecentCount::default() };
         }
         self.clips.take(now, clips.into());
         self.motors.step();

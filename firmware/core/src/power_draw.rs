@@ -7,7 +7,7 @@ use crate::vehicle::{BATTERIES_MAX, Vehicle};
 /// Voltage of the first battery (or the autopilot's figure if none reports itself), and discharge current and power
 /// of all batteries. Without a battery current: the sum of all ESCs (PX4 in simulation).
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Drawn {
+pub(crate) struct PowerDraw {
     pub(crate) voltage_v: Option<f32>,
     pub(crate) current_a: Option<f32>,
     pub(crate) power_w: f32,
@@ -15,8 +15,8 @@ pub(crate) struct Drawn {
     pub(crate) each_a: [f32; BATTERIES_MAX],
 }
 
-pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> Drawn {
-    let mut drawn = Drawn::default();
+pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> PowerDraw {
+    let mut drawn = PowerDraw::default();
     for battery in 0..BATTERIES_MAX {
         if let Some(supply) = vehicle.supply(battery).filter(|supply| now.since(supply.at) <= SILENT) {
             drawn.each_a[battery] = drawn.add(supply.voltage, supply.current);
@@ -34,7 +34,7 @@ pub(crate) fn drawn(now: BootMs, vehicle: &Vehicle) -> Drawn {
     drawn
 }
 
-impl Drawn {
+impl PowerDraw {
     /// The discharge current, A. Garbage is left out: the sums are permanent.
     fn add(&mut self, voltage: Option<Volts>, current: Option<Amperes>) -> f32 {
         let voltage_v = voltage.and_then(Volts::sane).filter(|volts| *volts >= 0.0);

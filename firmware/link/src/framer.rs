@@ -26,7 +26,7 @@ use hums_dialect::crc;
 use hums_dialect::wire::{FRAME_BYTES_MAX, START_V1, START_V2};
 
 use crate::frame::{self, Frame, Header, NoHeader};
-use crate::seen::{Extra, VerifiedMessages};
+use crate::seen::{ExtraState, VerifiedMessages};
 
 const BUFFER: usize = FRAME_BYTES_MAX + ROOM_MIN;
 /// Least length of [`Framer::room`]: 2 ms of a line at 921,600 baud.
@@ -207,8 +207,8 @@ impl Framer {
         if held.len() < len {
             return if idle { Verdict::Skip(1) } else { Verdict::Wait(len) };
         }
-        let known = Known::of(&header);
-        if let Known::Fits { index, crc_extra } = known {
+        let known = KnownMessage::of(&header);
+        if let KnownMessage::Fits { index, crc_extra } = known {
             let Some((computed, sent)) = frame::checksums(&header, held) else { return Verdict::Skip(1) };
             if crc::step(computed, crc_extra) == sent {
                 self.seen.verified(header.system, usize::from(index));
@@ -221,12 +221,12 @@ impl Framer {
         self.judge_unknown(&header, known, idle)
     }
 
-    fn judge_unknown(&mut self, header: &Header, known: Known, idle: bool) -> Verdict {
+    fn judge_unknown(&mut self, header: &Header, known: KnownMessage, idle: bool) -> Verdict {
         let held = &self.buffer[self.start..self.end];
         let len = header.frame_len();
         // The cheap check comes first: behind a false start in noise there is seldom a start byte.
         let learned = self.seen.extra(header.system, header.id);
-        if !matches!(learned, Extra::Confirmed(_)) {
+        if !matches!(learned, ExtraState::Confirmed(_)) {
             match held.get(len) {
                 Some(&next) if is_start(next) => {}
                 Some(_) => return self.not_a_frame(known, len),
@@ -237,18 +237,18 @@ impl Framer {
         let Some(credit) = self.credit.checked_sub(len as u32) else { return Verdict::Skip(1) };
         self.credit = credit;
         let Some((computed, sent)) = frame::checksums(header, held) else { return Verdict::Skip(1) };
-        if let Known::Misfits { index, crc_extra } = known
+        if let KnownMessage::Misfits { index, crc_extra } = known
             && crc::step(computed, crc_extra) == sent
         {
             return Verdict::Frame(*header, Some(index));
         }
         let Some(extra) = crc::extra_of(computed, sent) else { return self.damaged(len) };
         let accepted = match learned {
-            Extra::Confirmed(confirmed) if confirmed != extra => return self.damaged(len),
-            Extra::Full => return self.damaged(len),
-            Extra::Confirmed(_) => true,
-            Extra::Once(once) if once == extra => true,
-            Extra::Once(_) | Extra::None => self.after_frame && !holds_a_known_frame(&held[..len]),
+            ExtraState::Confirmed(confirmed) if confirmed != extra => return self.damaged(len),
+            ExtraState::Full => return self.damaged(len),
+            ExtraState::Confirmed(_) => true,
+            ExtraState::Once(once) if once == extra => true,
+            ExtraState::Once(_) | ExtraState::None => self.after_frame && !holds_a_known_frame(&held[..len]),
         };
         self.seen.learn(header.system, header.id, extra);
         if !accepted {
@@ -259,8 +259,8 @@ impl Framer {
 
     /// A wrong checksum without other evidence of a frame: damage if id and length match a known message, otherwise a false
     /// start.
-    fn not_a_frame(&mut self, known: Known, len: usize) -> Verdict {
-        if matches!(known, Known::Fits { .. }) { self.damaged(len) } else { Verdict::Skip(1) }
+    fn not_a_frame(&mut self, known: KnownMessage, len: usize) -> Verdict {
+        if matches!(known, KnownMessage::Fits { .. }) { self.damaged(len) } else { Verdict::Skip(1) }
     }
 
     fn damaged(&mut self, len: usize) -> Verdict {
@@ -284,7 +284,7 @@ const fn is_start(byte: u8) -> bool {
 }
 
 #[derive(Clone, Copy)]
-enum Known {
+enum KnownMessage {
     /// There is a message of this id, and the payload may have this length.
     Fits { index: u16, crc_extra: u8 },
     /// The id is known, but no encoder makes this length.
@@ -293,7 +293,7 @@ enum Known {
     No,
 }
 
-impl Known {
+impl KnownMessage {
     fn of(header: &Header) -> Self {
         let Some(index) = hums_dialect::index(header.id) else { return Self::No };
         let message = &hums_dialect::messages()[usize::from(index)];
@@ -310,7 +310,7 @@ fn holds_a_known_frame(candidate: &[u8]) -> bool {
     (1..candidate.len()).any(|at| {
         let bytes = &candidate[at..];
         let Ok(header) = Header::read(bytes) else { return false };
-        let Known::Fits { crc_extra, .. } = Known::of(&header) else { return false };
+        let KnownMessage::Fits { crc_extra, .. } = KnownMessage::of(&header) else { return false };
         bytes.len() >= header.frame_len()
             && frame::checksums(&header, bytes)
                 .is_some_and(|(computed, sent)| crc::step(computed, crc_extra) == sent)

@@ -11,7 +11,7 @@ const EXTRAS: usize = 64;
 const FREE: u32 = u32::MAX;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Extra {
+pub(crate) enum ExtraState {
     /// Never seen.
     None,
     Once(u8),
@@ -64,12 +64,12 @@ impl VerifiedMessages {
         self.verified[place].get(index / 32).is_none_or(|word| word & (1 << (index % 32)) != 0)
     }
 
-    pub(crate) fn extra(&self, system: u8, id: u32) -> Extra {
+    pub(crate) fn extra(&self, system: u8, id: u32) -> ExtraState {
         match self.keys.iter().position(|&key| key == key_of(system, id)) {
-            Some(at) if self.confirmed & (1 << at) != 0 => Extra::Confirmed(self.extras[at]),
-            Some(at) => Extra::Once(self.extras[at]),
-            None if self.place_for_new().is_some() => Extra::None,
-            None => Extra::Full,
+            Some(at) if self.confirmed & (1 << at) != 0 => ExtraState::Confirmed(self.extras[at]),
+            Some(at) => ExtraState::Once(self.extras[at]),
+            None if self.place_for_new().is_some() => ExtraState::None,
+            None => ExtraState::Full,
         }
     }
 
@@ -127,14 +127,14 @@ mod tests {
     #[test]
     fn an_extra_is_confirmed_by_its_second_sight() {
         let mut seen = VerifiedMessages::new();
-        assert_eq!(seen.extra(1, 50_000), Extra::None);
+        assert_eq!(seen.extra(1, 50_000), ExtraState::None);
         seen.learn(1, 50_000, 3);
-        assert_eq!(seen.extra(1, 50_000), Extra::Once(3));
+        assert_eq!(seen.extra(1, 50_000), ExtraState::Once(3));
         seen.learn(1, 50_000, 4);
-        assert_eq!(seen.extra(1, 50_000), Extra::Once(4));
+        assert_eq!(seen.extra(1, 50_000), ExtraState::Once(4));
         seen.learn(1, 50_000, 4);
-        assert_eq!(seen.extra(1, 50_000), Extra::Confirmed(4));
-        assert_eq!(seen.extra(2, 50_000), Extra::None);
+        assert_eq!(seen.extra(1, 50_000), ExtraState::Confirmed(4));
+        assert_eq!(seen.extra(2, 50_000), ExtraState::None);
     }
 
     #[test]
@@ -143,9 +143,15 @@ mod tests {
         seen.learn(1, 50_000, 3);
         seen.learn(1, 50_001, 5);
         seen.learn(1, 50_001, 5);
-        assert_eq!((seen.extra(1, 50_000), seen.extra(1, 50_001)), (Extra::Once(3), Extra::Confirmed(5)));
+        assert_eq!(
+            (seen.extra(1, 50_000), seen.extra(1, 50_001)),
+            (ExtraState::Once(3), ExtraState::Confirmed(5))
+        );
         seen.learn(1, 50_001, 6);
-        assert_eq!((seen.extra(1, 50_000), seen.extra(1, 50_001)), (Extra::Once(3), Extra::Once(6)));
+        assert_eq!(
+            (seen.extra(1, 50_000), seen.extra(1, 50_001)),
+            (ExtraState::Once(3), ExtraState::Once(6))
+        );
     }
 
     #[test]
@@ -155,10 +161,10 @@ mod tests {
             seen.learn(1, 60_000 + id, 1);
             seen.learn(1, 60_000 + id, 1);
         }
-        assert_eq!(seen.extra(1, 70_000), Extra::Full);
+        assert_eq!(seen.extra(1, 70_000), ExtraState::Full);
         seen.learn(1, 70_000, 1);
-        assert_eq!(seen.extra(1, 70_000), Extra::Full);
-        assert_eq!(seen.extra(1, 60_000), Extra::Confirmed(1));
+        assert_eq!(seen.extra(1, 70_000), ExtraState::Full);
+        assert_eq!(seen.extra(1, 60_000), ExtraState::Confirmed(1));
     }
 
     #[test]
@@ -168,6 +174,6 @@ mod tests {
             seen.learn(1, 60_000 + id, 1);
         }
         seen.learn(1, 70_000, 1);
-        assert_eq!(seen.extra(1, 70_000), Extra::Once(1));
+        assert_eq!(seen.extra(1, 70_000), ExtraState::Once(1));
     }
 }

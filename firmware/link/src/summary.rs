@@ -24,7 +24,7 @@ use crate::messages::{self, ComputerStatus};
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
 use crate::statustext::{Severity, TEXT_BYTES_MAX, Text};
-use crate::telling::{self, Fate, Telling, order};
+use crate::telling::{self, SendDecision, SentFindings, order};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
@@ -155,7 +155,7 @@ pub struct Summary {
     /// The most urgent first, then by age.
     waiting: heapless::Vec<Finding, WAITING_MAX>,
     dropped: u32,
-    telling: Telling,
+    telling: SentFindings,
     heartbeat_at: Option<Instant>,
 }
 
@@ -175,7 +175,7 @@ impl Summary {
             next_value: 0,
             waiting: heapless::Vec::new(),
             dropped: 0,
-            telling: Telling::new(),
+            telling: SentFindings::new(),
             heartbeat_at: None,
         }
     }
@@ -288,17 +288,17 @@ impl Summary {
             };
             let fate = match health {
                 _ if is_critical => self.telling.fate(now, finding, None),
-                Some(health) if is_explained(health) => Fate::Never,
+                Some(health) if is_explained(health) => SendDecision::Never,
                 Some(health) if is_so(health) => self.telling.fate(now, finding, Some(health)),
-                _ => Fate::Later,
+                _ => SendDecision::Later,
             };
             match fate {
-                Fate::Now => {}
-                Fate::Later => {
+                SendDecision::Now => {}
+                SendDecision::Later => {
                     place += 1;
                     continue;
                 }
-                Fate::Never => {
+                SendDecision::Never => {
                     self.waiting.remove(place);
                     continue;
                 }
@@ -323,7 +323,7 @@ impl Summary {
                 self.telling.names(&cause);
                 self.waiting.retain(|waits| (waits.check, waits.instance) != (cause.check, cause.instance));
             }
-            self.waiting.retain(|waits| !Telling::is_consequence(&told, waits));
+            self.waiting.retain(|waits| !SentFindings::is_consequence(&told, waits));
             place = 0;
         }
     }

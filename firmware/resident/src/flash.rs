@@ -4,10 +4,10 @@ use core::ptr;
 use core::slice;
 
 use crate::board;
-use hums_stm32f4::flash::{self, Refused};
+use hums_stm32f4::flash::{self, FlashRefusal};
 use hums_stm32f4::watchdog;
 use hums_update::map;
-use hums_update::resident::{self, FlashFailed, Region};
+use hums_update::resident::{self, FlashFailure, Region};
 
 pub(crate) struct Flash(());
 
@@ -35,19 +35,19 @@ impl resident::Flash for Flash {
         map::SECTOR_BYTES
     }
 
-    fn program(&mut self, region: Region, offset: usize, word: u32) -> Result<(), FlashFailed> {
+    fn program(&mut self, region: Region, offset: usize, word: u32) -> Result<(), FlashFailure> {
         let (from, bytes, _) = place(region);
         if offset + 4 > bytes || !offset.is_multiple_of(4) {
-            return Err(FlashFailed);
+            return Err(FlashFailure);
         }
         // SAFETY: an aligned word of the region, which is borrowed alone.
-        unsafe { flash::write(from as usize + offset, [word]) }.map_err(|Refused| FlashFailed)
+        unsafe { flash::write(from as usize + offset, [word]) }.map_err(|FlashRefusal| FlashFailure)
     }
 
-    fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailed> {
+    fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailure> {
         let (_, _, first) = place(region);
         // SAFETY: a sector of the region, which is borrowed alone.
-        unsafe { flash::erase(first + sector as u8) }.map_err(|Refused| FlashFailed)
+        unsafe { flash::erase(first + sector as u8) }.map_err(|FlashRefusal| FlashFailure)
     }
 
     fn progress(&mut self) {

@@ -19,7 +19,7 @@ use hums_core::clock::Span;
 use hums_recorder::SpiCard;
 use hums_stm32f4::supply;
 use hums_stm32f4::watchdog::{self, Divider};
-use hums_update::resident::{Decision, Job, Next, Resident, decide};
+use hums_update::resident::{Decision, Job, Resident, WorkResult, decide};
 use hums_update::{keys, map};
 
 /// Of the watchdog: 128 ms by the divider at 32 kHz.
@@ -63,8 +63,8 @@ fn serve(mut job: Job) -> ! {
     loop {
         let mut resident = Resident { flash: &mut flash, card: &card, board: board::NAME, keys: keys::ALL };
         match resident.work(job) {
-            Next::Restart(message) => chip::restart(message),
-            Next::Wait(next) => job = next,
+            WorkResult::Restart(message) => chip::restart(message),
+            WorkResult::Wait(next) => job = next,
         }
         let end = chip::now() + LOOK_EVERY;
         while chip::now() < end {

@@ -1,7 +1,7 @@
 //! The card's port, without interrupts and DMA: an SPI of the chip, or pins that the processor moves.
 
 use hums_core::clock::Instant;
-use hums_recorder::spi::{self, Clock, PortFailed};
+use hums_recorder::spi::{self, Clock, PortFailure};
 use hums_stm32f4::pins::{Bus, Speed};
 use stm32_metapac::spi::Spi;
 use stm32_metapac::spi::vals::Br;
@@ -40,14 +40,14 @@ impl Port {
         port
     }
 
-    fn byte(&self, sent: u8) -> Result<u8, PortFailed> {
+    fn byte(&self, sent: u8) -> Result<u8, PortFailure> {
         if let Some(bus) = &self.bus {
             return Ok(bus.byte(sent));
         }
-        let spi = registers().ok_or(PortFailed)?;
+        let spi = registers().ok_or(PortFailure)?;
         spi.dr().write(|w| w.set_dr(u16::from(sent)));
         let came = (0..TRIES_MAX).any(|_| spi.sr().read().rxne());
-        if came { Ok(spi.dr().read().dr() as u8) } else { Err(PortFailed) }
+        if came { Ok(spi.dr().read().dr() as u8) } else { Err(PortFailure) }
     }
 }
 
@@ -65,14 +65,14 @@ impl spi::Port for Port {
         CS.set(!selected);
     }
 
-    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailure> {
         bytes.iter_mut().try_for_each(|byte| {
             *byte = self.byte(*byte)?;
             Ok(())
         })
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailure> {
         bytes.iter().try_for_each(|byte| self.byte(*byte).map(drop))
     }
 

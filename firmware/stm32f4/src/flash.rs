@@ -19,13 +19,13 @@ const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
 /// The flash refused a word or an erase, or the supply is too low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Refused;
+pub struct FlashRefusal;
 
 /// Writes words, the first one at this address. Bits go from one to zero.
 ///
 /// # Safety
 /// The words are aligned words of the flash, and no reference to them is alive.
-pub unsafe fn write(at: usize, words: impl IntoIterator<Item = u32>) -> Result<(), Refused> {
+pub unsafe fn write(at: usize, words: impl IntoIterator<Item = u32>) -> Result<(), FlashRefusal> {
     unlocked(|| {
         words.into_iter().enumerate().try_for_each(|(index, word)| {
             FLASH.cr().write(|w| {
@@ -43,7 +43,7 @@ pub unsafe fn write(at: usize, words: impl IntoIterator<Item = u32>) -> Result<(
 ///
 /// # Safety
 /// No reference to the sector is alive.
-pub unsafe fn erase(sector: u8) -> Result<(), Refused> {
+pub unsafe fn erase(sector: u8) -> Result<(), FlashRefusal> {
     unlocked(|| {
         FLASH.cr().write(|w| {
             w.set_psize(Psize::PSIZE32);
@@ -58,9 +58,9 @@ pub unsafe fn erase(sector: u8) -> Result<(), Refused> {
 
 /// Runs `work` with the flash control unlocked, earlier errors cleared and the data cache off; the cache is empty afterwards. The
 /// cache would keep erased data (RM0090, 3.5.2).
-fn unlocked(work: impl FnOnce() -> Result<(), Refused>) -> Result<(), Refused> {
+fn unlocked(work: impl FnOnce() -> Result<(), FlashRefusal>) -> Result<(), FlashRefusal> {
     if supply::is_low() {
-        return Err(Refused);
+        return Err(FlashRefusal);
     }
     while FLASH.sr().read().bsy() {}
     let is_cached = FLASH.acr().read().dcen();
@@ -79,14 +79,14 @@ fn unlocked(work: impl FnOnce() -> Result<(), Refused>) -> Result<(), Refused> {
     outcome
 }
 
-fn finish() -> Result<(), Refused> {
+fn finish() -> Result<(), FlashRefusal> {
     cortex_m::asm::dsb();
     while FLASH.sr().read().bsy() {}
     let status = FLASH.sr().read();
     FLASH.cr().write(|_| {});
     if status.operr() || status.wrperr() || status.pgaerr() || status.pgperr() || status.pgserr() {
         forget_errors();
-        return Err(Refused);
+        return Err(FlashRefusal);
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use hums_recorder::{BLOCK_BYTES, Block, CardDevice};
 use crate::header::{BYTES, Header, Refusal, Version};
 use crate::message::Message;
 use crate::resident::{CRASHES_MAX, STARTS_MAX, append, application};
-use crate::resident::{Cause, Decision, Flash, FlashFailed, Job, Next, Region, Resident, decide};
+use crate::resident::{Cause, Decision, Flash, FlashFailure, Job, Region, Resident, WorkResult, decide};
 use crate::state::{Record, State, Status};
 use crate::{PREVIOUS, UPDATE};
 
@@ -93,7 +93,7 @@ impl Flash for Nor {
         SECTOR_BYTES
     }
 
-    fn program(&mut self, region: Region, offset: usize, word: u32) -> Result<(), FlashFailed> {
+    fn program(&mut self, region: Region, offset: usize, word: u32) -> Result<(), FlashFailure> {
         let cut = is_cut();
         for (index, bits) in word.to_le_bytes().into_iter().enumerate() {
             let kept = if cut { self.random() } else { 0 };
@@ -103,10 +103,10 @@ impl Flash for Nor {
         if cut {
             std::panic::panic_any(PowerCut);
         }
-        if self.refuses { Err(FlashFailed) } else { Ok(()) }
+        if self.refuses { Err(FlashFailure) } else { Ok(()) }
     }
 
-    fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailed> {
+    fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailure> {
         NOW.set(NOW.get() + SERVICE_SECS);
         let cut = is_cut();
         let bytes = if region == Region::State { STATE_BYTES } else { SECTOR_BYTES };
@@ -117,7 +117,7 @@ impl Flash for Nor {
         if cut {
             std::panic::panic_any(PowerCut);
         }
-        if self.refuses { Err(FlashFailed) } else { Ok(()) }
+        if self.refuses { Err(FlashFailure) } else { Ok(()) }
     }
 
     fn progress(&mut self) {}
@@ -287,8 +287,8 @@ fn start(nor: &mut Nor, disk: &Disk, mut cause: Cause, told: &mut Vec<Message>) 
             Decision::Work(job) => {
                 let mut resident = Resident { flash: nor, card: disk, board: BOARD, keys: &[[9; 32], key] };
                 match resident.work(job) {
-                    Next::Restart(message) => told.push(message),
-                    Next::Wait(_) => return Runs::Waits,
+                    WorkResult::Restart(message) => told.push(message),
+                    WorkResult::Wait(_) => return Runs::Waits,
                 }
             }
         }

@@ -25,7 +25,7 @@ const ROOM: usize = (STARTS_MAX as usize + 6) * RECORD_BYTES;
 
 /// The flash refused a word or an erase, or the supply is too low for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FlashFailed;
+pub struct FlashFailure;
 
 /// A part of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,10 +45,10 @@ pub trait Flash {
     fn sector_bytes(&self) -> usize;
 
     /// Programs an aligned word. Bits go from one to zero.
-    fn program(&mut self, region: Region, offset: usize, word: u32) -> Result<(), FlashFailed>;
+    fn program(&mut self, region: Region, offset: usize, word: u32) -> Result<(), FlashFailure>;
 
     /// Sets all bits of a sector to one.
-    fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailed>;
+    fn erase(&mut self, region: Region, sector: usize) -> Result<(), FlashFailure>;
 
     /// Called for each block of work, for the LED and the watchdog.
     fn progress(&mut self);
@@ -93,7 +93,7 @@ pub enum Job {
 
 /// The result of [`Resident::work`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Next {
+pub enum WorkResult {
     /// Reset, with this message for the application.
     Restart(Message),
     /// Wait for a card, then do this work.
@@ -133,16 +133,16 @@ pub fn decide(flash: &mut impl Flash, board: &str, cause: Cause) -> Decision {
 }
 
 /// Appends a record to the state.
-pub fn append(flash: &mut impl Flash, record: Record, id: u32) -> Result<(), FlashFailed> {
+pub fn append(flash: &mut impl Flash, record: Record, id: u32) -> Result<(), FlashFailure> {
     let at = State::read(flash.read(Region::State)).free;
     if at + RECORD_BYTES > flash.read(Region::State).len() {
-        return Err(FlashFailed);
+        return Err(FlashFailure);
     }
     let bytes = record.bytes(id);
     for (index, word) in bytes.as_chunks::<4>().0.iter().enumerate() {
         flash.program(Region::State, at + 4 * index, u32::from_le_bytes(*word))?;
     }
-    if flash.read(Region::State)[at..].starts_with(&bytes) { Ok(()) } else { Err(FlashFailed) }
+    if flash.read(Region::State)[at..].starts_with(&bytes) { Ok(()) } else { Err(FlashFailure) }
 }
 
 /// The resident program at work.
@@ -159,7 +159,7 @@ pub struct Resident<'a, F, D> {
 
 impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
     /// Does a job, once.
-    pub fn work(&mut self, job: Job) -> Next {
+    pub fn work(&mut self, job: Job) -> WorkResult {
         let state = State::read(self.flash.read(Region::State));
         let done = match job {
             Job::Asked => self.install(UPDATE, &|id| !state.has_failed(id)).map(|()| Message::Installed),
@@ -173,17 +173,17 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
                 .map(|()| Message::Installed),
         };
         match (done, job) {
-            (Ok(message), _) => Next::Restart(message),
-            (Err(_), _) if application(self.flash, self.board).is_none() => Next::Wait(Job::Restore),
-            (Err(why), Job::Asked) => Next::Restart(Message::Refused(why)),
+            (Ok(message), _) => WorkResult::Restart(message),
+            (Err(_), _) if application(self.flash, self.board).is_none() => WorkResult::Wait(Job::Restore),
+            (Err(why), Job::Asked) => WorkResult::Restart(Message::Refused(why)),
             // A crashing recorder is better than none.
             (Err(_), Job::Replace { failed }) => {
                 match self.make_room().and_then(|()| append(self.flash, Record::Trial, failed)) {
-                    Ok(()) => Next::Restart(Message::Retried),
-                    Err(FlashFailed) => Next::Wait(job),
+                    Ok(()) => WorkResult::Restart(Message::Retried),
+                    Err(FlashFailure) => WorkResult::Wait(job),
                 }
             }
-            (Err(_), Job::Restore) => Next::Wait(job),
+            (Err(_), Job::Restore) => WorkResult::Wait(job),
         }
     }
 
@@ -230,7 +230,7 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
 
     /// From here on the application is not complete, until the last word.
     fn program(&mut self, header: &Header, key: &[u8; 32], name: &Name) -> Result<(), Refusal> {
-        let flash = |_: FlashFailed| Refusal::Flash;
+        let flash = |_: FlashFailure| Refusal::Flash;
         let id = header.id();
         let before = application(self.flash, self.board).map(|header| header.id());
         let state = State::read(self.flash.read(Region::State));
@@ -281,7 +281,7 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
     }
 
     /// Makes the application's header none.
-    fn clear(&mut self) -> Result<(), FlashFailed> {
+    fn clear(&mut self) -> Result<(), FlashFailure> {
         match first_word(self.flash.read(Region::Application)) {
             0 | u32::MAX => Ok(()),
             _ => self.flash.program(Region::Application, 0, 0),
@@ -290,7 +290,7 @@ impl<'a, F: Flash, D: CardDevice> Resident<'a, F, D> {
 
     /// Erases a state without room, and keeps the floor. Power that goes in this erase loses the floor: the one of the running
     /// image counts then.
-    fn make_room(&mut self) -> Result<(), FlashFailed> {
+    fn make_room(&mut self) -> Result<(), FlashFailure> {
         let State { free, .. } = State::read(self.flash.read(Region::State));
         if free + ROOM <= self.flash.read(Region::State).len() {
             return Ok(());

@@ -33,7 +33,7 @@ const TO_HOST: u8 = 0x80;
 
 /// The packet is no command wrapper, or one for another unit. Only a reset by the host ends this state (BOT, 6.6.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Invalid;
+pub struct InvalidPacket;
 
 /// The next action on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,12 +75,13 @@ pub struct Transport {
 
 impl Transport {
     /// Begins the command of a packet.
-    pub fn begin<D: CardDevice>(packet: &[u8], disk: &mut Disk<D>) -> Result<Self, Invalid> {
-        let wrapper: &[u8; WRAPPER_BYTES] = packet.try_into().map_err(|_| Invalid)?;
+    pub fn begin<D: CardDevice>(packet: &[u8], disk: &mut Disk<D>) -> Result<Self, InvalidPacket> {
+        let wrapper: &[u8; WRAPPER_BYTES] = packet.try_into().map_err(|_| InvalidPacket)?;
         let [s0, s1, s2, s3, t0, t1, t2, t3, e0, e1, e2, e3, flags, unit, length, block @ ..] = *wrapper;
-        let block = block.get(..usize::from(length)).filter(|block| !block.is_empty()).ok_or(Invalid)?;
+        let block =
+            block.get(..usize::from(length)).filter(|block| !block.is_empty()).ok_or(InvalidPacket)?;
         if [s0, s1, s2, s3] != COMMAND_SIGNATURE || flags & !TO_HOST != 0 || unit != 0 {
-            return Err(Invalid);
+            return Err(InvalidPacket);
         }
         const { assert!(WRAPPER_BYTES == 15 + BLOCK_MAX) };
         let expected = u32::from_le_bytes([e0, e1, e2, e3]);

@@ -1,6 +1,6 @@
 //! The thirteen cases of BOT 6.7, and invalid wrappers.
 
-use hums_usb::transport::Invalid;
+use hums_usb::transport::InvalidPacket;
 
 use super::common::{Host, IN, OUT, content, read_10, wrapper};
 
@@ -91,6 +91,6 @@ fn a_packet_that_is_no_wrapper_is_invalid() {
     bad.extend([change(0, b'u'), change(3, 0), change(12, 1), change(12, 0xC0)]);
     bad.extend([change(13, 1), change(13, 0x10), change(14, 0), change(14, 17), change(14, 0xFF)]);
     for packet in bad {
-        assert_eq!(host.packet(&packet), Err(Invalid), "{packet:x?}");
+        assert_eq!(host.packet(&packet), Err(InvalidPacket), "{packet:x?}");
     }
 }

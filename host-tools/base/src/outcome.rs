@@ -69,20 +69,20 @@ impl StdError for ReaderGone {}
 
 /// An output exists, and was not overwritten.
 #[derive(Debug)]
-pub struct Exists(String);
+pub struct ExistingOutput(String);
 
-impl fmt::Display for Exists {
+impl fmt::Display for ExistingOutput {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
     }
 }
 
-impl StdError for Exists {}
+impl StdError for ExistingOutput {}
 
 /// The error of an output that exists; `has_force` if the command has a flag `--force`.
 pub fn exists(path: &Path, has_force: bool) -> anyhow::Error {
     let force = if has_force { ", or say --force, which overwrites it" } else { "" };
-    Exists(format!(
+    ExistingOutput(format!(
         "{}: exists, and was not overwritten; name another output, move it away{force}",
         path.display()
     ))
@@ -93,7 +93,7 @@ pub fn exists(path: &Path, has_force: bool) -> anyhow::Error {
 pub fn or_skipped<T>(result: anyhow::Result<T>) -> anyhow::Result<Result<T, String>> {
     match result {
         Ok(done) => Ok(Ok(done)),
-        Err(error) if error.is::<Exists>() => Ok(Err(format!("{error:#}"))),
+        Err(error) if error.is::<ExistingOutput>() => Ok(Err(format!("{error:#}"))),
         Err(error) => Err(error),
     }
 }

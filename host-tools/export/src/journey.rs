@@ -47,7 +47,7 @@ pub(crate) struct Journey {
     pub(crate) fixes: u64,
 }
 
-pub(crate) struct Placed<'a> {
+pub(crate) struct PlacedFinding<'a> {
     pub(crate) at: Instant,
     pub(crate) latitude_deg: f64,
     pub(crate) longitude_deg: f64,
@@ -90,12 +90,12 @@ impl Journey {
         Ok(())
     }
 
-    pub(crate) fn placed(&self) -> impl Iterator<Item = Placed<'_>> {
+    pub(crate) fn placed(&self) -> impl Iterator<Item = PlacedFinding<'_>> {
         let points = self.track.points();
         self.findings.iter().filter_map(move |finding| {
             let after = points.partition_point(|point| point.at <= finding.at);
             let point = points.get(after.saturating_sub(1))?;
-            Some(Placed {
+            Some(PlacedFinding {
                 at: finding.at,
                 latitude_deg: point.latitude_deg,
                 longitude_deg: point.longitude_deg,

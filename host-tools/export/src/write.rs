@@ -14,7 +14,7 @@ use super::context::Context;
 use super::destination::Destination;
 use super::format::{AnyWriter, Files, Finished, Totals, Way};
 use super::story::StoryEntry;
-use crate::outcome::Exists;
+use crate::outcome::ExistingOutput;
 use crate::plural::count;
 use crate::source::item;
 use crate::source::parts::PartReceiver;
@@ -35,7 +35,7 @@ pub struct Writers<'a> {
 
 impl<'a> Writers<'a> {
     /// Opens the files that are always written; a table is opened for its first row. `fleet` is the folder of the tables of
-    /// all sessions. The error is no [`Exists`] if only some of the outputs exist: the log must not be skipped.
+    /// all sessions. The error is no [`ExistingOutput`] if only some of the outputs exist: the log must not be skipped.
     pub fn new(context: &'a Context, destination: &Destination, fleet: &Path) -> Result<Self> {
         let (mut files, mut existing) = (Vec::new(), None);
         for (about, way) in context.formats.ways() {
@@ -46,7 +46,7 @@ impl<'a> Writers<'a> {
             };
             match open(context, &path) {
                 Ok(file) => files.push(file),
-                Err(error) if error.is::<Exists>() => existing = Some(error),
+                Err(error) if error.is::<ExistingOutput>() => existing = Some(error),
                 Err(error) => return Err(error),
             }
         }

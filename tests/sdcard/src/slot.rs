@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use hums_core::clock::Instant;
-use hums_recorder::spi::{Clock, Port, PortFailed};
+use hums_recorder::spi::{Clock, Port, PortFailure};
 
 use crate::card::SdCard;
 use crate::model::Model;
@@ -212,7 +212,7 @@ impl Port for SimPort {
         self.slot.0.borrow_mut().select(selected);
     }
 
-    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailure> {
         let mut inner = self.slot.0.borrow_mut();
         for byte in bytes {
             *byte = inner.exchange(*byte);
@@ -220,7 +220,7 @@ impl Port for SimPort {
         Ok(())
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailure> {
         let mut inner = self.slot.0.borrow_mut();
         for byte in bytes {
             inner.exchange(*byte);

@@ -24,7 +24,7 @@ use records::Records;
 pub(crate) use slots::SLOTS;
 use slots::{INSTANCE_BYTES, Key, Length, NextEntry, Slots};
 
-use crate::coder::{Coder, Encoder, Reading, Scratch, Writing};
+use crate::coder::{Coder, Encoder, Scratch, SymbolReader, SymbolWriter};
 use crate::distribution::Cdf;
 use crate::layouts::Layouts;
 use crate::limits::ENTRY_BYTES_MAX;
@@ -48,7 +48,7 @@ pub(crate) struct CodedEntry<'a> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Decoded {
+pub(crate) struct DecodedEntry {
     pub(crate) kind: Kind,
     pub(crate) at_ms: u64,
     pub(crate) len: usize,
@@ -105,7 +105,7 @@ impl Model {
         encoder: &mut Encoder,
         out: &mut Out,
     ) {
-        let coder = &mut Writing { encoder, out };
+        let coder = &mut SymbolWriter { encoder, out };
         if let Kind::Frame { verified } = entry.kind
             && !plain
             && frame.parse(entry.bytes).is_some()
@@ -122,7 +122,7 @@ impl Model {
         let mut buffer = [0; ENTRY_BYTES_MAX];
         let len = entry.bytes.len().min(ENTRY_BYTES_MAX);
         buffer[..len].copy_from_slice(&entry.bytes[..len]);
-        let decoded = Decoded { kind: entry.kind, at_ms: entry.at_ms, len };
+        let decoded = DecodedEntry { kind: entry.kind, at_ms: entry.at_ms, len };
         self.plain(coder, decoded, &mut buffer, plain);
     }
 
@@ -130,16 +130,16 @@ impl Model {
     /// `frames` is returned.
     pub(crate) fn decode(
         &mut self,
-        coder: &mut Reading<'_, Recall>,
+        coder: &mut SymbolReader<'_, Recall>,
         frames: &mut [Frame; SLOTS],
         buffer: &mut [u8; ENTRY_BYTES_MAX],
-    ) -> Result<(Decoded, Option<usize>), Corrupt> {
+    ) -> Result<(DecodedEntry, Option<usize>), Corrupt> {
         let rough = self.headers.is_rough();
         let (next, expected) = self.slots.next(coder, NextEntry::Plain, false, rough).ok_or(Corrupt)?;
         if next == NextEntry::Plain || next == NextEntry::Record {
             let verified = Kind::Frame { verified: false };
             let kind = if next == NextEntry::Record { Kind::Record } else { verified };
-            let decoded = self.plain(coder, Decoded { kind, at_ms: 0, len: 0 }, buffer, false);
+            let decoded = self.plain(coder, DecodedEntry { kind, at_ms: 0, len: 0 }, buffer, false);
             return Ok((decoded.ok_or(Corrupt)?, None));
         }
         let index = if let NextEntry::Slot(slot) = next { usize::from(slot) } else { self.slots.used() };
@@ -147,7 +147,7 @@ impl Model {
         coder.recall.turn_to(index);
         let (verified, at_ms) =
             self.frame(coder, (next, expected), NO_KEY, frame, false, 0).ok_or(Corrupt)?;
-        Ok((Decoded { kind: Kind::Frame { verified }, at_ms, len: frame.bytes() }, Some(index)))
+        Ok((DecodedEntry { kind: Kind::Frame { verified }, at_ms, len: frame.bytes() }, Some(index)))
     }
 
     #[inline]
@@ -175,15 +175,15 @@ impl Model {
     fn plain<C: Coder>(
         &mut self,
         coder: &mut C,
-        entry: Decoded,
+        entry: DecodedEntry,
         buffer: &mut [u8; ENTRY_BYTES_MAX],
         raw: bool,
-    ) -> Option<Decoded> {
+    ) -> Option<DecodedEntry> {
         let at_ms = self.time(coder, None, entry.at_ms)?;
         let Kind::Frame { verified } = entry.kind else {
             let text = &mut self.body.common.texts.model;
             let len = self.records.code(coder, text, at_ms, (buffer, entry.len), raw)?;
-            return Some(Decoded { kind: Kind::Record, at_ms, len });
+            return Some(DecodedEntry { kind: Kind::Record, at_ms, len });
         };
         let raw = coder.bits16(u32::from(raw), 1) != 0;
         let kind = Kind::Frame { verified: coder.bits16(u32::from(verified), 1) != 0 };
@@ -198,7 +198,7 @@ impl Model {
             };
             before = u32::from(*place);
         }
-        Some(Decoded { kind, at_ms, len })
+        Some(DecodedEntry { kind, at_ms, len })
     }
 
     fn time<C: Coder>(&mut self, coder: &mut C, slot: Option<u8>, at_ms: u64) -> Option<u64> {

@@ -2,7 +2,7 @@
 //! most frames the quiet elements are unchanged, and need not be written again.
 
 use super::slots::SLOTS;
-use crate::coder::{Coder, Reading, Writing};
+use crate::coder::{Coder, SymbolReader, SymbolWriter};
 
 /// No payload, and so no limit.
 const NONE: u16 = u16::MAX;
@@ -42,19 +42,19 @@ impl Recall {
 }
 
 pub(super) trait End: Coder {
-    fn reading(&mut self) -> Option<Reading<'_, Recall>>;
+    fn reading(&mut self) -> Option<SymbolReader<'_, Recall>>;
 }
 
-impl<const N: usize> End for Writing<'_, N> {
+impl<const N: usize> End for SymbolWriter<'_, N> {
     #[inline]
-    fn reading(&mut self) -> Option<Reading<'_, Recall>> {
+    fn reading(&mut self) -> Option<SymbolReader<'_, Recall>> {
         None
     }
 }
 
-impl End for Reading<'_, Recall> {
+impl End for SymbolReader<'_, Recall> {
     #[inline]
-    fn reading(&mut self) -> Option<Reading<'_, Recall>> {
-        Some(Reading { decoder: self.decoder, input: self.input, recall: self.recall })
+    fn reading(&mut self) -> Option<SymbolReader<'_, Recall>> {
+        Some(SymbolReader { decoder: self.decoder, input: self.input, recall: self.recall })
     }
 }

@@ -13,7 +13,7 @@ pub(super) const ALARMS_MAX: usize = 32;
 pub(super) const OUTLIVES: Millis = Millis::from_secs(8);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Standing {
+pub(super) struct OpenAlarm {
     slot: u16,
     level: Level,
     since: BootMs,
@@ -22,7 +22,7 @@ pub(super) struct Standing {
     cause_ended: Option<BootMs>,
 }
 
-impl Standing {
+impl OpenAlarm {
     pub(super) fn alarm(&self) -> Option<Alarm> {
         Alarm::at(self.slot, self.level, self.since)
     }
@@ -31,7 +31,7 @@ impl Standing {
 state! {
     /// All of them.
     pub(super) struct Alarms {
-        standing: [Option<Standing>; ALARMS_MAX] = [None; ALARMS_MAX],
+        standing: [Option<OpenAlarm>; ALARMS_MAX] = [None; ALARMS_MAX],
         /// The states that are stale because of a silent link, a bit each.
         silenced: [u32; STATES.div_ceil(32)] = [0; STATES.div_ceil(32)],
         /// The state whose alarm explains these, and when that ended.
@@ -41,7 +41,7 @@ state! {
 }
 
 impl Alarms {
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Standing> + Clone {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &OpenAlarm> + Clone {
         self.standing.iter().flatten()
     }
 
@@ -60,19 +60,19 @@ impl Alarms {
         }
         self.set_silenced(slot, false);
         let of = |slot: Option<u16>| {
-            move |place: &Option<Standing>| place.as_ref().map(|known| known.slot) == slot
+            move |place: &Option<OpenAlarm>| place.as_ref().map(|known| known.slot) == slot
         };
         let mut places = self.standing.iter();
         let place = places.clone().position(of(Some(slot))).or_else(|| places.position(of(None)));
         let Some(place) = place.and_then(|place| self.standing.get_mut(place)) else { return };
         *place = match *place {
             _ if !is_alarm => None,
-            Some(known) if (level as u8) < known.level as u8 => Some(Standing { level, ..known }),
-            _ => Some(Standing { slot, level, since: now, cause: None, cause_ended: None }),
+            Some(known) if (level as u8) < known.level as u8 => Some(OpenAlarm { level, ..known }),
+            _ => Some(OpenAlarm { slot, level, since: now, cause: None, cause_ended: None }),
         };
     }
 
-    pub(super) fn of(&self, slot: u16) -> Option<&Standing> {
+    pub(super) fn of(&self, slot: u16) -> Option<&OpenAlarm> {
         self.iter().find(|known| known.slot == slot)
     }
 

@@ -275,7 +275,7 @@ impl Repeats {
 }
 
 #[derive(Clone, Copy)]
-pub(super) struct How {
+pub(super) struct CheckStep {
     pub(super) applies: bool,
     /// It would only echo a mishap: its level stays as it is.
     pub(super) quiet: bool,

@@ -26,7 +26,7 @@ mod vocabulary;
 pub use check::{
     CLEAR, CLEAR_MAX, CLEAR_MAX_ALWAYS, Check, CheckPhase, InstanceKind, Limits, Side, State, Unit,
 };
-use check::{How, LevelChange, Reported};
+use check::{CheckStep, LevelChange, Reported};
 pub use finding::{Finding, Level, Orders, Subsystem};
 pub use inputs::Inputs;
 pub use suppression::{Alarm, Role, explains, is_of_mishap, is_with_mishap, root_cause};
@@ -36,7 +36,7 @@ pub use vocabulary::{RadioWords, Scope, VOCABULARY, Words, said, vocabulary};
 use crate::latest::Reading;
 use crate::parameters::Param;
 use crate::time::{BootMs, Millis, SILENT};
-use alarms::{ALARMS_MAX, Alarms, Standing};
+use alarms::{ALARMS_MAX, Alarms, OpenAlarm};
 use exceedance::Exceedances;
 use tables::{STATES, check_of, slot_of, slots};
 
@@ -116,7 +116,7 @@ impl Health {
         (place, check, instance, slot): (u16, &'static Check, u8, usize),
         inputs: &Inputs<'_>,
         reading: Option<Reading>,
-        How { applies, latched, .. }: How,
+        CheckStep { applies, latched, .. }: CheckStep,
         exceedances: &mut Exceedances,
     ) -> Option<Finding> {
         let state = self.states.get_mut(slot)?;
@@ -184,7 +184,7 @@ impl Health {
     }
 
     fn standing(&self) -> impl Iterator<Item = Alarm> {
-        self.alarms.iter().filter_map(Standing::alarm)
+        self.alarms.iter().filter_map(OpenAlarm::alarm)
     }
 
     fn outlives(&self, slot: u16, inputs: &Inputs<'_>) -> Option<Finding> {
@@ -259,7 +259,7 @@ impl Health {
 
 struct Now {
     /// Steps of checks, by [`CheckPhase`] they apply.
-    hows: [How; CheckPhase::ALL.len()],
+    hows: [CheckStep; CheckPhase::ALL.len()],
 }
 
 impl Now {
@@ -274,19 +274,19 @@ impl Now {
         let latched = armed && inputs.params.get(Param::Latch) >= 0.5;
         let hows = CheckPhase::ALL.map(|when| {
             let applies = match when {
-                CheckPhase::Always => return How { applies: true, quiet: false, latched },
+                CheckPhase::Always => return CheckStep { applies: true, quiet: false, latched },
                 CheckPhase::Armed => armed,
                 CheckPhase::InFlight => inputs.flight.airborne(),
             };
-            How { applies: quiet || (!over && applies), quiet, latched }
+            CheckStep { applies: quiet || (!over && applies), quiet, latched }
         });
         Self { hows }
     }
 
     /// A mishap's level falls even where levels are latched: it explains what others say only while it goes on.
-    const fn how(&self, check: &Check) -> How {
+    const fn how(&self, check: &Check) -> CheckStep {
         let how = self.hows[check.when as usize];
-        How { latched: how.latched && !matches!(check.subsystem, Subsystem::Mishap), ..how }
+        CheckStep { latched: how.latched && !matches!(check.subsystem, Subsystem::Mishap), ..how }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::motion::ground_speed_mps;
 use crate::motors::turns;
 use crate::observation::Observation;
 use crate::parameters::{Param, Params};
-use crate::power_draw::{Drawn, drawn};
+use crate::power_draw::{PowerDraw, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{BootMs, Millis, PAUSE, SILENT};
 use crate::units::{Metres, Rpm};
@@ -82,7 +82,7 @@ impl Usage {
     }
 
     fn take_battery(&mut self, at: BootMs, vehicle: &Vehicle) {
-        let Drawn { voltage_v, current_a, .. } = drawn(at, vehicle);
+        let PowerDraw { voltage_v, current_a, .. } = drawn(at, vehicle);
         if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
             self.totals.extend(UsageCounter::VoltageMin, f64::from(voltage_v));
         }

@@ -488,7 +488,7 @@ fn what_another_one_explains_is_not_told_nor_that_it_is_over() {
 
 #[test]
 fn that_a_check_no_longer_applies_is_not_told_as_good() {
-    let mut telling = Telling::new();
+    let mut telling = SentFindings::new();
     let critical = Finding { previous: Level::Warning, ..finding(Level::Critical) };
     let good = Finding { previous: Level::Critical, value: 40.0, ..finding(Level::Ok) };
     let landed = Finding { value: f32::NAN, ..good };

@@ -32,7 +32,7 @@ use hums_link::summary;
 use hums_recorder::CardState;
 
 use super::library::builtin::{self, BuiltinFile};
-use super::limiter::{Asker, Limiter};
+use super::limiter::{Limiter, Requester};
 use crate::journal::{By, Journal, Logbook};
 use crate::monitoring::PARTS_CHANGED;
 use crate::queues::SectorsIn;
@@ -93,7 +93,7 @@ impl Commands {
     pub(crate) fn command(
         &mut self,
         now: Instant,
-        asker: Asker,
+        asker: Requester,
         command: u16,
         params: [f32; 7],
         book: &mut Logbook<'_>,
@@ -149,7 +149,7 @@ impl Commands {
     fn act(
         &mut self,
         now: Instant,
-        asker: Asker,
+        asker: Requester,
         (command, number, params): (u16, u32, &[f32; 7]),
         book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
@@ -206,7 +206,7 @@ impl Commands {
         &mut self,
         now: Instant,
         stop: bool,
-        Asker { port, by }: Asker,
+        Requester { port, by }: Requester,
         journal: &mut Journal<'_>,
         sectors: &mut SectorsIn,
     ) {

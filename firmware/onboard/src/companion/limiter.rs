@@ -6,7 +6,7 @@ use hums_link::request::Port;
 use crate::journal::By;
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Asker {
+pub(crate) struct Requester {
     pub(crate) port: Port,
     pub(crate) by: By,
 }

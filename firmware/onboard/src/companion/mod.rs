@@ -39,11 +39,11 @@ use crate::persist::{Handover, StoreWriter};
 use crate::queues::{GsIn, SectorsIn, SummaryRoute};
 use commands::Commands;
 use library::Library;
-use limiter::Asker;
-use pass::Pass;
-use secure::{Secure, Trust};
+use limiter::Requester;
+use pass::BackChannel;
+use secure::{RequestSigning, Trust};
 use settings::Settings;
-use ways::Ways;
+use ways::PortOutlets;
 
 /// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
 /// autopilot carries it, and for the longest frame.
@@ -53,7 +53,7 @@ const USB_BUDGET: u32 = 20_000;
 /// Interval of heartbeats to the autopilot, which routes messages only to known systems.
 const HEARTBEAT: Span = Span::from_secs(1);
 /// The monitor itself: no answer is expected.
-const NOBODY: Asker = Asker { port: Port::Gs, by: (0, 0) };
+const NOBODY: Requester = Requester { port: Port::Gs, by: (0, 0) };
 
 #[derive(Clone, Debug)]
 pub(crate) struct Companion {
@@ -64,9 +64,9 @@ pub(crate) struct Companion {
     commands: Commands,
     heartbeat_at: Option<Instant>,
     library: Library,
-    secure: Secure,
+    secure: RequestSigning,
     protect: Option<protect::Request>,
-    pass: Pass,
+    pass: BackChannel,
     settings: Settings,
 }
 
@@ -84,9 +84,9 @@ impl Companion {
             commands: Commands::new(),
             heartbeat_at: None,
             library: Library::new(),
-            secure: Secure::new(),
+            secure: RequestSigning::new(),
             protect: None,
-            pass: Pass::new(),
+            pass: BackChannel::new(),
             settings: Settings::new(),
         }
     }
@@ -166,7 +166,7 @@ impl Companion {
     ) {
         self.asked(now, port, frame, book, sectors);
         let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.pass.up(now, port, frame, book.monitor, &mut Ways { outlets, queues: gs });
+        self.pass.up(now, port, frame, book.monitor, &mut PortOutlets { outlets, queues: gs });
     }
 
     /// An answer to us, a request, or data.
@@ -209,7 +209,7 @@ impl Companion {
         gs: &mut GsIn,
     ) {
         let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.pass.down(now, frame, book.monitor, &mut Ways { outlets, queues: gs });
+        self.pass.down(now, frame, book.monitor, &mut PortOutlets { outlets, queues: gs });
     }
 
     fn asked(
@@ -225,7 +225,7 @@ impl Companion {
         if !messages::concerns_us(asked.target, system) {
             return;
         }
-        let asker = Asker { port, by: (frame.system(), frame.component()) };
+        let asker = Requester { port, by: (frame.system(), frame.component()) };
         if asker.by == (system, COMPONENT) {
             return;
         }
@@ -272,7 +272,7 @@ impl Companion {
     fn asked_for_data(
         &mut self,
         now: Instant,
-        asker: Asker,
+        asker: Requester,
         trust: Trust,
         asked: &AddressedRequest<'_>,
         book: &mut Logbook<'_>,
@@ -301,7 +301,7 @@ impl Companion {
     fn erase(
         &mut self,
         now: Instant,
-        Asker { port, by }: Asker,
+        Requester { port, by }: Requester,
         trust: Trust,
         book: &mut Logbook<'_>,
         sectors: &mut SectorsIn,
@@ -322,7 +322,7 @@ impl Companion {
     fn key_brought(
         &mut self,
         now: Instant,
-        Asker { port, by }: Asker,
+        Requester { port, by }: Requester,
         key: Key,
         stamp: u64,
         book: &mut Logbook<'_>,
@@ -435,7 +435,7 @@ impl Companion {
         gs: &mut GsIn,
     ) {
         let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        let mut ways = Ways { outlets, queues: gs };
+        let mut ways = PortOutlets { outlets, queues: gs };
         let replies = &mut self.commands.replies;
         for _ in 0..replies.len() {
             let Some((port, reply)) = replies.first() else { break };
@@ -499,7 +499,7 @@ mod tests {
             let (mut companion, mut summary) = (Companion::new(&params), Summary::new(&params));
             let bulk = Packet::new(ids::LOG_DATA).bytes(0, &vec![1; bytes - 12][..]);
             let outlets = [&mut summary.outlet, &mut companion.outlet, &mut companion.usb];
-            let mut ways = Ways { outlets, queues: &mut gs_in };
+            let mut ways = PortOutlets { outlets, queues: &mut gs_in };
             let taken = (0..99).take_while(|_| ways.send(NOW, Port::Usb, Class::Bulk, &bulk)).count();
             assert!(taken >= 2, "{taken} of {bytes} bytes");
             let mut out = [0; FRAME_BYTES_MAX];

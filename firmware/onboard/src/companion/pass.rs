@@ -22,7 +22,7 @@ use hums_link::ids;
 use hums_link::outlet::Class;
 use hums_link::request::Port;
 
-use super::ways::Ways;
+use super::ways::PortOutlets;
 use crate::queues::SummaryRoute;
 
 const RADIO: [u32; 2] = [ids::RADIO, ids::RADIO_STATUS];
@@ -44,12 +44,12 @@ const ANSWERS: [u32; 13] = [
 const UNKNOWN: Span = Span::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Pass {
+pub(crate) struct BackChannel {
     pub(super) lost: u32,
     unknown_at: Option<Instant>,
 }
 
-impl Pass {
+impl BackChannel {
     pub(crate) const fn new() -> Self {
         Self { lost: 0, unknown_at: None }
     }
@@ -60,7 +60,7 @@ impl Pass {
         port: Port,
         frame: &Frame<'_>,
         monitor: &Monitor,
-        ways: &mut Ways,
+        ways: &mut PortOutlets,
     ) {
         let Some(vehicle) = monitor.vehicle().source else { return };
         let of = (frame.system(), frame.component());
@@ -76,7 +76,13 @@ impl Pass {
         self.lost = self.lost.saturating_add(u32::from(!sent));
     }
 
-    pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Ways) {
+    pub(crate) fn down(
+        &mut self,
+        now: Instant,
+        frame: &Frame<'_>,
+        monitor: &Monitor,
+        ways: &mut PortOutlets,
+    ) {
         let to = [Port::Gs, Port::Usb].map(|port| Some(port).filter(|port| is_on(*port, monitor, ways)));
         if to == [None; 2] || frame.id() == ids::SETUP_SIGNING {
             return;
@@ -102,7 +108,7 @@ impl Pass {
     }
 }
 
-fn is_on(port: Port, monitor: &Monitor, ways: &Ways) -> bool {
+fn is_on(port: Port, monitor: &Monitor, ways: &PortOutlets) -> bool {
     let is_used =
         if port == Port::Gs { ways.queues.route() == SummaryRoute::Port } else { ways.queues.is_open(port) };
     is_used && monitor.params().get(Param::GsPass) > 0.5

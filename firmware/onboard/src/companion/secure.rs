@@ -74,7 +74,7 @@ pub(crate) enum Trust {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Secure {
+pub(crate) struct RequestSigning {
     signing: Signing,
     times: Times,
     key_due: bool,
@@ -88,7 +88,7 @@ pub(crate) struct Secure {
     pub(super) refused: u32,
 }
 
-impl Secure {
+impl RequestSigning {
     pub(crate) const fn new() -> Self {
         Self {
             signing: Signing::new(),
@@ -242,7 +242,7 @@ mod tests {
         let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));
         let mut handover = Handover::new(items_in, &status, &mut monitor);
-        let mut secure = Secure::new();
+        let mut secure = RequestSigning::new();
         assert!(secure.save(Instant::ZERO, None, &mut handover), "there is no key");
         secure.set_key(Instant::ZERO, Key([7; KEY_BYTES]), 1);
         let all = [0; 3].map(|_| {
@@ -263,7 +263,7 @@ mod tests {
         let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));
         let mut handover = Handover::new(items_in, &status, &mut monitor);
-        let mut secure = Secure::new();
+        let mut secure = RequestSigning::new();
         secure.set_key(Instant::ZERO, Key([7; KEY_BYTES]), 1);
         let mut scarce = 0;
         for second in 1..86_400 {

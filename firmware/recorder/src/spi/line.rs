@@ -4,7 +4,7 @@ use hums_core::clock::{Instant, Span};
 
 use super::crc::{crc7, crc16};
 use super::error::SpiError;
-use super::port::{Port, PortFailed};
+use super::port::{Port, PortFailure};
 use crate::WaitWork;
 
 /// Maximum busy time of a card. The specification allows 250 to 500 ms (4.6.2.2); good cards have been seen to stand
@@ -32,8 +32,8 @@ pub(super) struct Line<P> {
     pub(super) busy_times: u8,
 }
 
-impl From<PortFailed> for SpiError {
-    fn from(_: PortFailed) -> Self {
+impl From<PortFailure> for SpiError {
+    fn from(_: PortFailure) -> Self {
         Self::Port
     }
 }

@@ -25,7 +25,7 @@ use hums_core::clock::{Instant, Span};
 
 pub use error::SpiError;
 pub use line::BUSY_MAX;
-pub use port::{Clock, Port, PortFailed};
+pub use port::{Clock, Port, PortFailure};
 
 use crate::Trouble;
 use identify::Identity;

@@ -18,7 +18,7 @@ pub enum Clock {
 
 /// The bus failed by itself: a fault of the board, not of the card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PortFailed;
+pub struct PortFailure;
 
 /// A board's SPI port to a card: mode 0, most significant bit first, input pulled up.
 pub trait Port {
@@ -26,10 +26,10 @@ pub trait Port {
     fn select(&mut self, selected: bool);
 
     /// Replaces bytes by the received ones.
-    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed>;
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailure>;
 
     /// Receives bytes. `meanwhile` is called often.
-    fn receive(&mut self, bytes: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), PortFailed> {
+    fn receive(&mut self, bytes: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), PortFailure> {
         bytes.fill(0xFF);
         bytes.chunks_mut(PART_BYTES).try_for_each(|part| {
             meanwhile();
@@ -38,7 +38,7 @@ pub trait Port {
     }
 
     /// Drops received bytes.
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed>;
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailure>;
 
     /// Sets the bus's speed.
     fn set_clock(&mut self, clock: Clock);

@@ -8,7 +8,7 @@ use hums_recorder::{BLOCK_BYTES, Block, CardDevice, Trouble};
 use hums_usb::PACKET_BYTES;
 use hums_usb::scsi::{Disk, Sense};
 use hums_usb::server::Chunk;
-use hums_usb::transport::{Invalid, STATUS_BYTES, Step, Transport};
+use hums_usb::transport::{InvalidPacket, STATUS_BYTES, Step, Transport};
 
 pub(crate) const BLOCKS: u32 = 1_000;
 pub(crate) const SERIAL: [u8; 24] = *b"0123456789ABCDEF01234567";
@@ -124,7 +124,7 @@ impl Host {
         self.packet(&wrapper(self.tag, expected, flags, block)).expect("a valid wrapper")
     }
 
-    pub(crate) fn packet(&mut self, packet: &[u8]) -> Result<Got, Invalid> {
+    pub(crate) fn packet(&mut self, packet: &[u8]) -> Result<Got, InvalidPacket> {
         let mut transport = Transport::begin(packet, &mut self.disk)?;
         let expected = u32::from_le_bytes(packet[8..12].try_into().unwrap());
         let (mut data, mut taken, mut is_open) = (Vec::new(), 0, true);

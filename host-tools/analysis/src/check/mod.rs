@@ -44,7 +44,7 @@ use checked::Checked;
 use judge::{Limits, ReceptionPlace};
 use judged::Judgement;
 use overview::Read;
-use past::{Past, Series};
+use past::{EarlierFlights, Series};
 use text::{Table, UnjudgedList};
 
 /// The request of `hums check`.
@@ -81,7 +81,7 @@ pub fn run(args: &Request<'_>) -> Result<Outcome> {
 
 /// `show` gets each log before it is printed.
 pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<()>) -> Result<Outcome> {
-    let past = Past::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
+    let past = EarlierFlights::of(Limits::new(&params::read(args.params)?), args.past, args.system)?;
     let found = find_each(args.inputs, args.salvage)?.of_system(args.system)?;
     let wanted = found.name_of(args.session)?;
     found.tell();
@@ -153,7 +153,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
     }
 }
 
-fn told(past: &Past, place: &LogPlace, shows: bool) -> Told {
+fn told(past: &EarlierFlights, place: &LogPlace, shows: bool) -> Told {
     let read = past.judge(place, ReceptionPlace::Somewhere, shows).and_then(|read| {
         overview::is_heard(place, read.judged.vehicle().source.is_some())?;
         Ok(checked(place, read))

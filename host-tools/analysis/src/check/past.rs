@@ -17,13 +17,13 @@ use crate::source::find::find;
 use crate::source::recording::{Format, LogPlace};
 
 /// Limits, and a vehicle's earlier flights.
-pub(super) struct Past {
+pub(super) struct EarlierFlights {
     limits: Limits,
     /// The vehicle's baselines, if there are earlier flights.
     taught: Option<(Baselines, Option<Vehicle>)>,
 }
 
-impl Past {
+impl EarlierFlights {
     /// With baselines of earlier flights.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ pub(super) struct Series {
 }
 
 impl Series {
-    pub(super) const fn after(past: &Past) -> Self {
+    pub(super) const fn after(past: &EarlierFlights) -> Self {
         Self { past_is_given: past.taught.is_some(), vehicles: Vec::new() }
     }
 

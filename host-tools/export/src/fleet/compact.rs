@@ -139,7 +139,7 @@ fn of_partition(root: &Path, tables: &[String], partition: &str) -> Result<Sum> 
 }
 
 /// New files of a date and bucket, which do not count yet.
-pub(super) struct Merged {
+pub(super) struct MergedFiles {
     pub(super) transaction: Transaction,
     pub(super) replaced: BTreeSet<String>,
     sessions: Vec<String>,
@@ -147,7 +147,7 @@ pub(super) struct Merged {
 }
 
 /// `None` without a session that has files of its own.
-pub(super) fn merged(root: &Path, tables: &[String], partition: &str) -> Result<Option<Merged>> {
+pub(super) fn merged(root: &Path, tables: &[String], partition: &str) -> Result<Option<MergedFiles>> {
     let (mut work, mut new) = (Vec::new(), BTreeSet::new());
     for table in tables {
         let folder = root.join(table).join(partition);
@@ -201,7 +201,7 @@ pub(super) fn merged(root: &Path, tables: &[String], partition: &str) -> Result<
             Ok(())
         },
     )?;
-    Ok(Some(Merged { transaction, replaced, sessions: new.into_iter().collect(), sum }))
+    Ok(Some(MergedFiles { transaction, replaced, sessions: new.into_iter().collect(), sum }))
 }
 
 /// Writes one file for each set of columns. Returns the number of files and their bytes.

@@ -127,7 +127,7 @@ pub(crate) struct Transaction {
 }
 
 /// A change with all of its new files on the disk.
-pub(crate) struct Synced {
+pub(crate) struct SyncedChange {
     root: PathBuf,
     part: TempDir,
     places: Vec<String>,
@@ -157,18 +157,18 @@ impl Transaction {
 
     /// All files are there and closed: they go to the disk. A change that counts must have them after a power cut.
     /// Other changes may be made meanwhile.
-    pub(crate) fn sync(self) -> Result<Synced> {
+    pub(crate) fn sync(self) -> Result<SyncedChange> {
         let places = self.places()?;
         let Self { root, part } = self;
         let folder = part.path().join(FILES);
         let mut next = places.iter();
         let sync = |place: &String| File::open(folder.join(place)).and_then(|file| file.sync_all());
         in_order(SYNCS_AT_ONCE, places.len(), || Ok(next.next()), sync, |synced| settle(synced, &root))?;
-        Ok(Synced { root, part, places })
+        Ok(SyncedChange { root, part, places })
     }
 }
 
-impl Synced {
+impl SyncedChange {
     /// The change counts from here on, and is carried out. `replaced` are the places of files that go, `compacted` the
     /// sessions that are in a file of several. Returns the paths of the new files.
     pub(crate) fn commit(

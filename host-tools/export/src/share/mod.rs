@@ -32,7 +32,7 @@ use crate::source::find::find;
 use crate::source::item::{Item, Needs};
 use crate::source::recording::LogPlace;
 use crate::story::{Story, StoryEntry, WaitingObservation};
-use moved::{Moved, SHARED_UTC_US};
+use moved::{Displacement, SHARED_UTC_US};
 use rules::{Rule, Rules};
 
 const PART_ITEMS: usize = 4_096;
@@ -108,7 +108,7 @@ pub fn run(args: &ShareRequest) -> Result<Outcome> {
 
 struct Share {
     rules: Rules,
-    moved: Moved,
+    moved: Displacement,
     /// Removed messages, fields, parameters and texts, with their numbers.
     removed: BTreeMap<String, u64>,
     /// All messages, parameters and texts by the same names.
@@ -122,7 +122,7 @@ impl Share {
     fn new() -> Self {
         Self {
             rules: Rules::new(),
-            moved: Moved::default(),
+            moved: Displacement::default(),
             removed: BTreeMap::new(),
             seen: BTreeMap::new(),
             removed_others: 0,

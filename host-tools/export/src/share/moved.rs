@@ -19,14 +19,14 @@ const SET_US: u64 = 3_600_000_000;
 const UTC_MIN_US: u64 = 100_000_000_000_000;
 
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Moved {
+pub(super) struct Displacement {
     place: Option<(f64, f64)>,
     altitude_m: Option<f64>,
     pressure_hpa: Option<f64>,
     utc_us: Option<u64>,
 }
 
-impl Moved {
+impl Displacement {
     /// The first place is the beginning. Zero is no place.
     pub(super) fn begin(&mut self, latitude_deg: f64, longitude_deg: f64) {
         if latitude_deg != 0.0

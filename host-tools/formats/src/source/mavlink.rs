@@ -16,7 +16,7 @@ use super::item::{Cause, Fact, FactSubject, Gap, Item, ItemReceiver, Needs, Read
 use super::pace::Pace;
 use super::paced::PacedSource;
 use super::raw::Raw;
-use super::said::Said;
+use super::said::FrameReports;
 use super::stream::Source as _;
 use super::tlog::records::{Record, Records, TIME_BYTES};
 use super::tlog::times::{Begins, Times};
@@ -45,7 +45,7 @@ impl TlogReader {
 
 impl Reader for TlogReader {
     fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
-        let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
+        let (mut framer, mut said, mut counts) = (Framer::new(), FrameReports::default(), Counts::new());
         let mut times = Times::default();
         let mut checksums = Checksums::default();
         let (mut place, mut noise) = (0_u64, None::<Noise>);
@@ -62,7 +62,7 @@ impl Reader for TlogReader {
                         Some(Begins::Recording) => {
                             // All earlier state is void.
                             said.end(take)?;
-                            (framer, said) = (Framer::new(), Said::default());
+                            (framer, said) = (Framer::new(), FrameReports::default());
                             take(times.now(), Item::Joint)?;
                         }
                         Some(Begins::Clock) => take(times.now(), Item::Restart)?,
@@ -148,7 +148,7 @@ impl RawReader {
 
 impl Reader for RawReader {
     fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
-        let (mut framer, mut said, mut counts) = (Framer::new(), Said::default(), Counts::new());
+        let (mut framer, mut said, mut counts) = (Framer::new(), FrameReports::default(), Counts::new());
         let mut line = Instant::ZERO;
         let (mut times, mut blocks) = (BootTimes::default(), BlockFinder::default());
         let (mut pace, mut bytes) = (Pace::default(), 0);
@@ -161,7 +161,7 @@ impl Reader for RawReader {
             match begins {
                 Some(Begins::Recording) => {
                     said.end(take)?;
-                    said = Said::default();
+                    said = FrameReports::default();
                     pace.begin_another();
                     take(at, Item::Joint)?;
                 }

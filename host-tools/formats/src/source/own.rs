@@ -12,7 +12,7 @@ use super::counts::Counts;
 use super::input::Progress;
 use super::item::{Cause, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary};
 use super::parts::{ItemCollector, PartReceiver};
-use super::said::Said;
+use super::said::FrameReports;
 use crate::ending::Ending;
 use crate::logs::Log;
 use crate::logs::reader::{self, epoch};
@@ -83,10 +83,10 @@ impl OwnReader {
         let new = || Both {
             frames: want.frames,
             collected: new(),
-            kept: Kept { observations: true, ..Kept::default() },
+            kept: KeptItems { observations: true, ..KeptItems::default() },
         };
-        let hand = Hand { want: in_order, take, said: Said::default(), lost: None };
-        let mut both = HandBoth { deliver, hand };
+        let hand = ItemForwarder { want: in_order, take, said: FrameReports::default(), lost: None };
+        let mut both = BothForwarder { deliver, hand };
         let summary = self.in_parts(Needs { frames: true, ..want }, new, &mut both, seen)?;
         both.hand.end()?;
         Ok(summary)
@@ -98,8 +98,9 @@ impl Reader for OwnReader {
         if let Some(epoch) = epoch(&self.log)? {
             take(Instant::ZERO, Item::Epoch(epoch))?;
         }
-        let mut hand = Hand { want, take, said: Said::default(), lost: None };
-        let new = || Kept { frames: want.frames, observations: want.observations, ..Kept::default() };
+        let mut hand = ItemForwarder { want, take, said: FrameReports::default(), lost: None };
+        let new =
+            || KeptItems { frames: want.frames, observations: want.observations, ..KeptItems::default() };
         let all = Needs { frames: true, ..Needs::default() };
         let summary = self.in_parts(all, new, &mut hand, |bytes| self.progress.set_taken(bytes))?;
         hand.end()?;
@@ -169,7 +170,7 @@ impl<C, D: PartReceiver<C>> reader::GroupReceiver<Part<C>> for Parts<'_, D> {
 }
 
 #[derive(Default)]
-struct Kept {
+struct KeptItems {
     frames: bool,
     observations: bool,
     items: Vec<(Instant, Stored)>,
@@ -184,7 +185,7 @@ enum Stored {
     Record(usize),
 }
 
-impl ItemCollector for Kept {
+impl ItemCollector for KeptItems {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         match item {
             Item::Frame(frame) => {
@@ -216,7 +217,7 @@ impl ItemCollector for Kept {
 struct Both<C> {
     frames: bool,
     collected: C,
-    kept: Kept,
+    kept: KeptItems,
 }
 
 impl<C: ItemCollector> ItemCollector for Both<C> {
@@ -232,12 +233,12 @@ impl<C: ItemCollector> ItemCollector for Both<C> {
     }
 }
 
-struct HandBoth<'a, 'b, 'c, D> {
+struct BothForwarder<'a, 'b, 'c, D> {
     deliver: &'c mut D,
-    hand: Hand<'a, 'b>,
+    hand: ItemForwarder<'a, 'b>,
 }
 
-impl<C, D: PartReceiver<C>> PartReceiver<Both<C>> for HandBoth<'_, '_, '_, D> {
+impl<C, D: PartReceiver<C>> PartReceiver<Both<C>> for BothForwarder<'_, '_, '_, D> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         self.hand.gap(gap)?;
         self.deliver.gap(gap)
@@ -249,21 +250,21 @@ impl<C, D: PartReceiver<C>> PartReceiver<Both<C>> for HandBoth<'_, '_, '_, D> {
     }
 }
 
-struct Hand<'a, 'b> {
+struct ItemForwarder<'a, 'b> {
     want: Needs<'a>,
     take: &'a mut ItemReceiver<'b>,
-    said: Said,
+    said: FrameReports,
     /// Losses until recording goes on: there is a record for each second.
     lost: Option<(Instant, Loss)>,
 }
 
-impl PartReceiver<Kept> for Hand<'_, '_> {
+impl PartReceiver<KeptItems> for ItemForwarder<'_, '_> {
     fn gap(&mut self, gap: &Gap) -> Result<()> {
         self.tell_lost()?;
         (self.take)(gap.from.unwrap_or(Instant::ZERO), Item::Gap(gap))
     }
 
-    fn part(&mut self, part: Kept) -> Result<()> {
+    fn part(&mut self, part: KeptItems) -> Result<()> {
         let mut start = 0;
         let mut bytes = |end| part.bytes.get(std::mem::replace(&mut start, end)..end).unwrap_or_default();
         for (at, stored) in &part.items {
@@ -286,7 +287,7 @@ impl PartReceiver<Kept> for Hand<'_, '_> {
     }
 }
 
-impl Hand<'_, '_> {
+impl ItemForwarder<'_, '_> {
     fn record(&mut self, at: Instant, record: &Record<'_>) -> Result<()> {
         (self.take)(at, Item::Record(record))?;
         if let Some((last, _)) = &mut self.lost {

@@ -15,14 +15,14 @@ use crate::mavlink::ids::{EVENT, PARAM_VALUE, STATUSTEXT};
 use crate::statustext::{self, Texts};
 
 #[derive(Debug, Default)]
-pub(super) struct Said {
+pub(super) struct FrameReports {
     texts: Texts,
     long_texts: LongTexts,
     /// Decides how parameters are coded.
     autopilot: Autopilot,
 }
 
-impl Said {
+impl FrameReports {
     pub(super) fn frame(
         &mut self,
         at: Instant,
@@ -142,7 +142,7 @@ mod tests {
         let (mut encoder, mut buffer) = (Encoder::of(1, component), [0; FRAME_BYTES_MAX]);
         let bytes = encoder.frame(&mut buffer, &messages::status_text(Severity::Info, words));
         let frame = Frame::parse(bytes).expect("a frame of ours");
-        let (mut said, mut firmware) = (Said::default(), None);
+        let (mut said, mut firmware) = (FrameReports::default(), None);
         let mut take = |_: Instant, item: Item<'_>| {
             if let Item::Fact(Fact { about: FactSubject::Firmware, words }) = item {
                 firmware = Some(words.to_owned());

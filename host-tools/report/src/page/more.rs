@@ -193,7 +193,7 @@ pub enum RowValues {
     /// Values of plots.
     Values(Box<[(Line, f32)]>),
     /// The default of a parameter.
-    Default(Default),
+    Default(ParameterDefault),
 }
 
 impl RowValues {
@@ -211,7 +211,7 @@ impl RowValues {
 /// The default of a parameter. There may be two: an airframe configuration's default comes before the
 /// system's.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Default {
+pub struct ParameterDefault {
     /// The parameter.
     pub name: String,
     /// Its default.
@@ -222,7 +222,7 @@ pub struct Default {
 
 /// The default in a row: `PARM` of `ArduPilot` has one since 4.3, and PX4's `ULog` has those that are
 /// overridden.
-fn default_of(row: &Row<'_>) -> Option<Default> {
+fn default_of(row: &Row<'_>) -> Option<ParameterDefault> {
     let (name, value, is_of_airframe) = match row.table.name.as_str() {
         "PARM" => ("Name", "Default", false),
         "default_parameters" => ("name", "value", flag(row, "configuration")),
@@ -230,7 +230,7 @@ fn default_of(row: &Row<'_>) -> Option<Default> {
     };
     let Some(CellValue::Text(name)) = value_of(row, name) else { return None };
     let value = value_of(row, value).and_then(double).filter(|value| value.is_finite())?;
-    Some(Default { name: (*name).to_owned(), value, is_of_airframe })
+    Some(ParameterDefault { name: (*name).to_owned(), value, is_of_airframe })
 }
 
 fn value_of<'a, 'b>(row: &'a Row<'b>, name: &str) -> Option<&'a CellValue<'b>> {

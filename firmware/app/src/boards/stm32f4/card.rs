@@ -14,7 +14,7 @@ use embassy_stm32::spi::{Error, Spi, mode::Master};
 use embassy_stm32::time::Hertz;
 use hums_core::clock::{Instant, Span};
 use hums_recorder::WaitWork;
-use hums_recorder::spi::{Clock, Port, PortFailed};
+use hums_recorder::spi::{Clock, Port, PortFailure};
 
 use super::time;
 use crate::costs::{Stage, measure};
@@ -76,27 +76,27 @@ impl Port for SpiPort {
         self.select.set_level(if selected { Level::Low } else { Level::High });
     }
 
-    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailure> {
         self.pause.before();
         if by_dma(bytes) {
             wait(self.bus.transfer_in_place(bytes), &mut || true)?;
         } else {
-            self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailed)?;
+            self.bus.blocking_transfer_in_place(bytes).map_err(|_| PortFailure)?;
         }
         self.pause.after(bytes);
         Ok(())
     }
 
-    fn receive(&mut self, bytes: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), PortFailed> {
+    fn receive(&mut self, bytes: &mut [u8], meanwhile: WaitWork<'_>) -> Result<(), PortFailure> {
         bytes.fill(0xFF);
         if by_dma(bytes) { wait(self.bus.transfer_in_place(bytes), meanwhile) } else { self.exchange(bytes) }
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailure> {
         if by_dma(bytes) {
             wait(self.bus.write(bytes), &mut || true)
         } else {
-            self.bus.blocking_write(bytes).map_err(|_| PortFailed)
+            self.bus.blocking_write(bytes).map_err(|_| PortFailure)
         }
     }
 
@@ -122,7 +122,7 @@ fn by_dma(bytes: &[u8]) -> bool {
 fn wait(
     transfer: impl Future<Output = Result<(), Error>>,
     meanwhile: WaitWork<'_>,
-) -> Result<(), PortFailed> {
+) -> Result<(), PortFailure> {
     let mut transfer = pin!(transfer);
     let mut context = Context::from_waker(Waker::noop());
     let done =
@@ -137,5 +137,5 @@ fn wait(
                 polled
             })
         });
-    done.and_then(Result::ok).ok_or(PortFailed)
+    done.and_then(Result::ok).ok_or(PortFailure)
 }

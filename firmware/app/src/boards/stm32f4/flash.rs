@@ -4,7 +4,7 @@
 use core::ptr;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
-use hums_stm32f4::flash::{self, Refused, WORD};
+use hums_stm32f4::flash::{self, FlashRefusal, WORD};
 
 const FLASH_BEGIN: usize = 0x0800_0000;
 /// Of each of the first four sectors (RM0090, table 5).
@@ -17,8 +17,8 @@ pub(crate) enum FlashError {
     Refused,
 }
 
-impl From<Refused> for FlashError {
-    fn from(_: Refused) -> Self {
+impl From<FlashRefusal> for FlashError {
+    fn from(_: FlashRefusal) -> Self {
         Self::Refused
     }
 }

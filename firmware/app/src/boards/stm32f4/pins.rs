@@ -3,7 +3,7 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{self, Level, Output};
 use hums_core::clock::Instant;
-use hums_recorder::spi::{Clock, Port, PortFailed};
+use hums_recorder::spi::{Clock, Port, PortFailure};
 use hums_stm32f4::pins::{Bus, Pin};
 
 use super::card::Pause;
@@ -37,7 +37,7 @@ impl Port for PinPort {
         self.select.set_level(if selected { Level::Low } else { Level::High });
     }
 
-    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailed> {
+    fn exchange(&mut self, bytes: &mut [u8]) -> Result<(), PortFailure> {
         self.pause.before();
         for byte in &mut *bytes {
             *byte = self.bus.byte(*byte);
@@ -46,7 +46,7 @@ impl Port for PinPort {
         Ok(())
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailed> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortFailure> {
         for byte in bytes {
             self.bus.byte(*byte);
         }

@@ -20,8 +20,8 @@ use hums_link::request::{Port, Reply, Request};
 use self::file::Open;
 use self::log::Places;
 use self::step::{LibraryOutput, LibraryStep};
-use super::limiter::Asker;
-use super::ways::Ways;
+use super::limiter::Requester;
+use super::ways::PortOutlets;
 use crate::shelf::{Answered, LogRequest, RequestedLog, RequestedPart};
 
 /// Answers looked at in one call. The port's budget limits them too.
@@ -40,7 +40,7 @@ pub(crate) struct Library {
 
 #[derive(Clone, Copy, Debug)]
 struct Job {
-    asker: Asker,
+    asker: Requester,
     kind: Kind,
 }
 
@@ -72,12 +72,12 @@ impl Library {
         self.ticket
     }
 
-    fn begin(&mut self, asker: Asker, kind: Kind) {
+    fn begin(&mut self, asker: Requester, kind: Kind) {
         self.job = Some(Job { asker, kind });
         self.next_ticket();
     }
 
-    pub(crate) fn asked(&mut self, asker: Asker, request: &Request<'_>) -> bool {
+    pub(crate) fn asked(&mut self, asker: Requester, request: &Request<'_>) -> bool {
         match *request {
             Request::LogList(first, last) => self.begin(asker, Kind::List(log::List::new(first, last))),
             Request::LogData(id, offset, count) => match log::Data::new(id, offset, count, &self.places) {
@@ -94,7 +94,7 @@ impl Library {
         true
     }
 
-    fn asked_for_file(&mut self, asker: Asker, payload: &[u8]) {
+    fn asked_for_file(&mut self, asker: Requester, payload: &[u8]) {
         let file = file::Job::new(&ftp::read(payload), &mut self.open);
         if let Some(Job { asker: by, kind: Kind::File(under_way) }) = &mut self.job
             && under_way.takes_over(&file)
@@ -105,7 +105,7 @@ impl Library {
         self.begin(asker, Kind::File(file));
     }
 
-    pub(crate) fn lend(&mut self, now: Instant, ways: &mut Ways) -> Option<(Port, Reply)> {
+    pub(crate) fn lend(&mut self, now: Instant, ways: &mut PortOutlets) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();
             self.erases = !ways.queues.shelf.want(LogRequest {
@@ -145,7 +145,7 @@ impl Library {
     fn answered(
         &mut self,
         (which, what): (RequestedLog, RequestedPart),
-        ways: &mut Ways,
+        ways: &mut PortOutlets,
     ) -> Option<Answered> {
         let seen = ways.queues.shelf.answer(self.ticket).cloned();
         if seen.is_none() && !self.asked {

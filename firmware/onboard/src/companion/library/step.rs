@@ -6,8 +6,8 @@ use hums_link::outlet::Class;
 use hums_link::packet::Packet;
 use hums_link::request::Reply;
 
-use super::super::limiter::Asker;
-use super::super::ways::Ways;
+use super::super::limiter::Requester;
+use super::super::ways::PortOutlets;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LibraryStep {
@@ -25,8 +25,8 @@ const FTP_DATA_MIN: usize = 20;
 
 pub(super) struct LibraryOutput<'o, 'w, 'q> {
     pub(super) now: Instant,
-    pub(super) asker: Asker,
-    pub(super) ways: &'o mut Ways<'w, 'q>,
+    pub(super) asker: Requester,
+    pub(super) ways: &'o mut PortOutlets<'w, 'q>,
 }
 
 impl LibraryOutput<'_, '_, '_> {

@@ -397,7 +397,8 @@ impl<'w> Session<'w> {
         }
         let craft = state.craft();
         let mut result = Ok(());
-        let mut said = Said { at: when.at, observations: want.observations, craft, epoch, firmware, take };
+        let mut said =
+            ReportSink { at: when.at, observations: want.observations, craft, epoch, firmware, take };
         let mut hand = |say: &Say<'_>| {
             if result.is_ok() {
                 result = said.hand(say);
@@ -519,7 +520,7 @@ fn add(counts: &mut BTreeMap<String, (u64, u64)>, name: String, (count, bytes): 
     sum.1 += bytes;
 }
 
-struct Said<'a, 't> {
+struct ReportSink<'a, 't> {
     at: Instant,
     observations: bool,
     craft: Craft,
@@ -528,7 +529,7 @@ struct Said<'a, 't> {
     take: &'a mut ItemReceiver<'t>,
 }
 
-impl Said<'_, '_> {
+impl ReportSink<'_, '_> {
     fn hand(&mut self, say: &Say<'_>) -> Result<()> {
         let item = match *say {
             Say::Observation(observation) if self.observations => Item::Observation(SOURCE, observation),

@@ -37,7 +37,7 @@ pub(super) fn has_handler(name: &str) -> bool {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Resolved {
+pub(super) struct ResolvedHandler {
     pub(super) handler: &'static Handler,
     slots: Slots,
     base: u8,
@@ -45,51 +45,55 @@ pub(super) struct Resolved {
 
 #[derive(Debug)]
 pub(super) struct Handlers {
-    by_kind: Vec<Looked>,
+    by_kind: Vec<HandlerLookup>,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Looked {
+enum HandlerLookup {
     NotYet,
     /// There is none.
     Nothing,
-    Found(Resolved),
+    Found(ResolvedHandler),
 }
 
 impl Default for Handlers {
     fn default() -> Self {
-        Self { by_kind: vec![Looked::NotYet; 256] }
+        Self { by_kind: vec![HandlerLookup::NotYet; 256] }
     }
 }
 
 impl Handlers {
-    pub(super) fn of(&mut self, format: &Format) -> Option<&Resolved> {
+    pub(super) fn of(&mut self, format: &Format) -> Option<&ResolvedHandler> {
         let slot = self.by_kind.get_mut(usize::from(format.kind))?;
-        if matches!(slot, Looked::NotYet) {
-            *slot = handler(&format.name).map_or(Looked::Nothing, |(handler, base)| {
-                Looked::Found(Resolved { handler, slots: handler.resolve(&format.fields), base })
+        if matches!(slot, HandlerLookup::NotYet) {
+            *slot = handler(&format.name).map_or(HandlerLookup::Nothing, |(handler, base)| {
+                HandlerLookup::Found(ResolvedHandler {
+                    handler,
+                    slots: handler.resolve(&format.fields),
+                    base,
+                })
             });
         }
         match slot {
-            Looked::Found(resolved) => Some(resolved),
-            Looked::NotYet | Looked::Nothing => None,
+            HandlerLookup::Found(resolved) => Some(resolved),
+            HandlerLookup::NotYet | HandlerLookup::Nothing => None,
         }
     }
 
     pub(super) fn forget(&mut self, kind: u8) {
         if let Some(slot) = self.by_kind.get_mut(usize::from(kind)) {
-            *slot = Looked::NotYet;
+            *slot = HandlerLookup::NotYet;
         }
     }
 }
 
 pub(super) fn take(
     state: &mut State,
-    resolved: &Resolved,
+    resolved: &ResolvedHandler,
     message: &Message<'_>,
     (at, boot_us): (Instant, Option<u64>),
     out: &mut Out<'_>,
 ) {
-    let Resolved { handler, slots, base } = resolved;
+    let ResolvedHandler { handler, slots, base } = resolved;
     (handler.take)(state, &Given { message, slots, base: *base, at, boot_us }, out);
 }
