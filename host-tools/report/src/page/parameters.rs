@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hums_core::clock::Instant;
 use serde::Serialize;
 
-use super::more::Default as DefaultValue;
+use super::more::ParameterDefault;
 
 /// Parameters at most: `ArduPilot` has some 1,400. Further ones are counted.
 const PARAMETERS_MAX: usize = 3_000;
@@ -16,7 +16,7 @@ const CHANGES_MAX: usize = 16;
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
     known: BTreeMap<String, Vec<(Instant, f64)>>,
-    defaults: BTreeMap<String, DefaultValue>,
+    defaults: BTreeMap<String, ParameterDefault>,
     /// Values of parameters beyond [`PARAMETERS_MAX`].
     left_out: u64,
     newest: Option<Instant>,
@@ -54,7 +54,7 @@ impl Parameters {
     }
 
     /// Takes a parameter's default.
-    pub fn learn_default(&mut self, default: &DefaultValue) {
+    pub fn learn_default(&mut self, default: &ParameterDefault) {
         let known = self.defaults.get(&default.name);
         let has_room = known.is_some() || self.defaults.len() < PARAMETERS_MAX;
         if has_room && known.is_none_or(|known| default.is_of_airframe || !known.is_of_airframe) {
@@ -107,7 +107,7 @@ mod tests {
         parameters.take(Instant::ZERO, "MC_ROLL_P", 8.0);
         assert!(!parameters.tells_defaults());
         let default =
-            |value, is_of_airframe| DefaultValue { name: "MC_ROLL_P".to_owned(), value, is_of_airframe };
+            |value, is_of_airframe| ParameterDefault { name: "MC_ROLL_P".to_owned(), value, is_of_airframe };
         for (value, is_of_airframe) in [(6.5, false), (7.0, true), (6.5, false)] {
             parameters.learn_default(&default(value, is_of_airframe));
         }
