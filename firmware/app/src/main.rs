@@ -29,7 +29,7 @@ mod usb;
 mod watch;
 
 use hums_blackbox::Writer;
-use hums_blackbox::record::{Boot, PreviousSession};
+use hums_blackbox::record::{Boot, LastSession};
 use hums_core::Monitor;
 use hums_core::parameters::{Param, Params};
 use hums_onboard::persist::mailbox::MailboxOut;
@@ -83,7 +83,7 @@ fn start() -> board::Idle {
         reset_name: parts.boot.cause.name(),
         uid: parts.boot.id,
         boots,
-        before: PreviousSession::default(),
+        before: LastSession::default(),
     };
     let monitor = Monitor::begin(MONITOR.uninit(), &Params::defaults());
     let (items_in, items_out) = MAILBOX.take().split();

@@ -120,13 +120,13 @@ struct Message {
 
 #[derive(Clone, Copy, Debug)]
 struct PendingRequest {
-    what: RequestSubject,
+    what: Requested,
     at: Instant,
     tries: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum RequestSubject {
+enum Requested {
     /// A single message, to test whether the autopilot supports it.
     One(usize),
     Interval(usize),
@@ -217,7 +217,7 @@ impl Asking {
     pub fn told(&mut self, name: &str) {
         if let Some(place) = battery_cells::known(name) {
             self.parameters &= !(1 << place);
-            if self.asked.is_some_and(|asked| asked.what == RequestSubject::Parameter(usize::from(place))) {
+            if self.asked.is_some_and(|asked| asked.what == Requested::Parameter(usize::from(place))) {
                 (self.asked, self.deaf) = (None, 0);
             }
         }
@@ -227,16 +227,16 @@ impl Asking {
     pub fn answered(&mut self, command: u16, result: u8) {
         let Some(asked) = self.asked else { return };
         let (expected, message) = match asked.what {
-            RequestSubject::One(index) => (REQUEST_MESSAGE, &mut self.messages[index]),
-            RequestSubject::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
-            RequestSubject::Identity => (REQUEST_MESSAGE, &mut self.identity),
-            RequestSubject::Parameter(_) => return,
+            Requested::One(index) => (REQUEST_MESSAGE, &mut self.messages[index]),
+            Requested::Interval(index) => (SET_MESSAGE_INTERVAL, &mut self.messages[index]),
+            Requested::Identity => (REQUEST_MESSAGE, &mut self.identity),
+            Requested::Parameter(_) => return,
         };
         if command != expected || result == CommandAck::IN_PROGRESS {
             return;
         }
         // An autopilot that does not know this command may know the other one.
-        let asks_one = matches!(asked.what, RequestSubject::One(_));
+        let asks_one = matches!(asked.what, Requested::One(_));
         let is_granted = matches!(result, CommandAck::ACCEPTED | CommandAck::TEMPORARILY_REJECTED)
             || (asks_one && result == CommandAck::UNSUPPORTED);
         message.has = if is_granted { Support::Yes } else { Support::No };
@@ -320,14 +320,12 @@ impl Asking {
             }
             self.asked = None;
             match asked.what {
-                RequestSubject::Parameter(place) => self.parameters &= !(1 << place),
-                RequestSubject::One(index) => {
+                Requested::Parameter(place) => self.parameters &= !(1 << place),
+                Requested::One(index) => {
                     self.messages[index].due = false;
                     self.deaf = self.deaf.saturating_add(TRIES);
                 }
-                RequestSubject::Interval(_) | RequestSubject::Identity => {
-                    self.deaf = self.deaf.saturating_add(TRIES)
-                }
+                Requested::Interval(_) | Requested::Identity => self.deaf = self.deaf.saturating_add(TRIES),
             }
         }
         if let Some(group) = self.groups {
@@ -347,27 +345,27 @@ impl Asking {
         let Some(what) = self.next(known) else { return };
         if send(&packet(what, known)) {
             match what {
-                RequestSubject::Identity => self.identity.due = false,
-                RequestSubject::Interval(index) => self.messages[index].due = false,
-                RequestSubject::One(_) | RequestSubject::Parameter(_) => {}
+                Requested::Identity => self.identity.due = false,
+                Requested::Interval(index) => self.messages[index].due = false,
+                Requested::One(_) | Requested::Parameter(_) => {}
             }
             // An unanswered parameter request is repeated once.
-            let tries = if matches!(what, RequestSubject::Parameter(_)) { TRIES - 1 } else { 1 };
+            let tries = if matches!(what, Requested::Parameter(_)) { TRIES - 1 } else { 1 };
             self.asked = Some(PendingRequest { what, at: now, tries });
         }
     }
 
-    fn next(&self, known: &KnownVehicle) -> Option<RequestSubject> {
+    fn next(&self, known: &KnownVehicle) -> Option<Requested> {
         let commands = || {
             if self.identity.due {
-                return Some(RequestSubject::Identity);
+                return Some(Requested::Identity);
             }
             let (index, message) = self.messages.iter().enumerate().find(|(_, message)| message.due)?;
             let asks_one = known.autopilot == Autopilot::ArduPilot && message.has == Support::Perhaps;
-            Some(if asks_one { RequestSubject::One(index) } else { RequestSubject::Interval(index) })
+            Some(if asks_one { Requested::One(index) } else { Requested::Interval(index) })
         };
         let command = self.groups.is_none().then(commands).flatten();
-        command.or_else(|| self.parameter(known).map(RequestSubject::Parameter))
+        command.or_else(|| self.parameter(known).map(Requested::Parameter))
     }
 
     fn parameter(&self, known: &KnownVehicle) -> Option<usize> {
@@ -400,21 +398,21 @@ fn stretch(autopilot: Autopilot, baud: u32) -> u32 {
     bytes_per_s.div_ceil(carried).max(1)
 }
 
-fn packet(what: RequestSubject, known: &KnownVehicle) -> Packet {
+fn packet(what: Requested, known: &KnownVehicle) -> Packet {
     let Source { system, component } = known.source;
     match what {
-        RequestSubject::Interval(index) => {
+        Requested::Interval(index) => {
             let (id, _, rate_hz, _) = WANTED[index];
             let interval_us = 1_000_000 / u32::from(rate_hz) * stretch(known.autopilot, known.baud);
             messages::command_long(SET_MESSAGE_INTERVAL, &[id as f32, interval_us as f32], system, component)
         }
-        RequestSubject::One(index) => {
+        Requested::One(index) => {
             messages::command_long(REQUEST_MESSAGE, &[WANTED[index].0 as f32], system, component)
         }
-        RequestSubject::Identity => {
+        Requested::Identity => {
             messages::command_long(REQUEST_MESSAGE, &[ids::AUTOPILOT_VERSION as f32], system, component)
         }
-        RequestSubject::Parameter(place) => messages::param_request_read(KNOWN[place].1, system, component),
+        Requested::Parameter(place) => messages::param_request_read(KNOWN[place].1, system, component),
     }
 }
 

@@ -24,7 +24,7 @@ use crate::messages::{self, ComputerStatus};
 use crate::outlet::{Class, Outlet};
 use crate::packet::Packet;
 use crate::statustext::{Severity, TEXT_BYTES_MAX, Text};
-use crate::telling::{self, SendDecision, SentFindings, order};
+use crate::telling::{self, SendTime, SentFindings, order};
 
 /// Forwarded messages: id and how long between two, in milliseconds (0: every one).
 const FORWARDED: &[(u32, u16)] = &[
@@ -288,17 +288,17 @@ impl Summary {
             };
             let fate = match health {
                 _ if is_critical => self.telling.fate(now, finding, None),
-                Some(health) if is_explained(health) => SendDecision::Never,
+                Some(health) if is_explained(health) => SendTime::Never,
                 Some(health) if is_so(health) => self.telling.fate(now, finding, Some(health)),
-                _ => SendDecision::Later,
+                _ => SendTime::Later,
             };
             match fate {
-                SendDecision::Now => {}
-                SendDecision::Later => {
+                SendTime::Now => {}
+                SendTime::Later => {
                     place += 1;
                     continue;
                 }
-                SendDecision::Never => {
+                SendTime::Never => {
                     self.waiting.remove(place);
                     continue;
                 }

@@ -45,7 +45,7 @@ const MISHAP_MAX: u8 = 2;
 const OPEN_MAX: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum SendDecision {
+pub(crate) enum SendTime {
     Now,
     Later,
     Never,
@@ -124,7 +124,7 @@ impl SentFindings {
     }
 
     /// `health` is not known at a change of level.
-    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding, health: Option<&Health>) -> SendDecision {
+    pub(crate) fn fate(&mut self, now: Instant, finding: &Finding, health: Option<&Health>) -> SendTime {
         let event = &self.events[family(finding.subsystem) as usize];
         let is_mishap = finding.subsystem == Subsystem::Mishap;
         if finding.level == Level::Critical {
@@ -132,10 +132,10 @@ impl SentFindings {
             let order = order(finding);
             let is_asked_for = !order.is_empty() && event.asked_for(order);
             let is_told = is_running && (is_asked_for || (is_mishap && event.told >= MISHAP_MAX));
-            return if is_told { SendDecision::Never } else { SendDecision::Now };
+            return if is_told { SendTime::Never } else { SendTime::Now };
         }
         if is_mishap {
-            return SendDecision::Never;
+            return SendTime::Never;
         }
         let is_held =
             finding.level == Level::Warning && now.since(Instant::of(finding.at, now)) < hold(finding.check);
@@ -143,12 +143,12 @@ impl SentFindings {
         let is_busy = event.is_running(now) || others.any(|event| event.is_running(now));
         let is_busy = is_busy && !health.is_some_and(|health| self.has_effect(finding, health));
         if health.is_some_and(|health| self.leaves_effect(finding, health)) {
-            return SendDecision::Later;
+            return SendTime::Later;
         }
         while self.mild.front().is_some_and(|at_ms| since(now, *at_ms) >= SPAN.as_millis()) {
             self.mild.pop_front();
         }
-        if is_held || is_busy || self.mild.is_full() { SendDecision::Later } else { SendDecision::Now }
+        if is_held || is_busy || self.mild.is_full() { SendTime::Later } else { SendTime::Now }
     }
 
     /// Whether `told` makes a waiting finding obsolete: a mishap, and its consequences.

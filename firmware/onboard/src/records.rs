@@ -1,8 +1,8 @@
 //! The monitor's knowledge for the record: identity and time, usage, wear.
 
 use hums_blackbox::record::{
-    Boot, Clock, Component as ComponentRecord, ComponentReason, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime,
-    Moment, Parameter, Record, USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord,
+    Boot, Clock, Component as ComponentRecord, Exceedance, LIFETIME_ENTRIES_MAX, Lifetime, Moment, Parameter,
+    Record, RecordReason, USAGE_ENTRIES_MAX, Usage, Vehicle as VehicleRecord,
 };
 use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, ComponentFigures, Label, Status};
@@ -133,8 +133,7 @@ impl RecordedState {
         if moment != Moment::Periodic {
             life(now, moment, book, sectors);
             for place in 0..COMPONENTS_MAX {
-                let why =
-                    if moment == Moment::Start { ComponentReason::Start } else { ComponentReason::Status };
+                let why = if moment == Moment::Start { RecordReason::Start } else { RecordReason::Status };
                 component(now, place, why, book, sectors);
             }
         }
@@ -184,13 +183,7 @@ fn exceedances(
 }
 
 #[inline(never)]
-fn component(
-    now: Instant,
-    place: usize,
-    why: ComponentReason,
-    book: &mut Logbook<'_>,
-    sectors: &mut SectorsIn,
-) {
+fn component(now: Instant, place: usize, why: RecordReason, book: &mut Logbook<'_>, sectors: &mut SectorsIn) {
     let Logbook { monitor, journal, .. } = book;
     let Some((figures, status)) = monitor.component_figures(place) else { return };
     let used_percent = monitor.component_used_percent(place);
@@ -212,10 +205,10 @@ pub(crate) fn replace_component(
     let used_percent = monitor.component_used_percent(place);
     let serial = Label::new(serial);
     let Some(old) = monitor.replace_component(place, serial) else { return false };
-    let record = component_record(&old, place, old.ran(), status, used_percent, ComponentReason::Replaced);
+    let record = component_record(&old, place, old.ran(), status, used_percent, RecordReason::Replaced);
     let record = ComponentRecord { by, new_serial: serial.as_str(), ..record };
     journal.record(now, &Record::Component(record), sectors);
-    component(now, place, ComponentReason::Status, book, sectors);
+    component(now, place, RecordReason::Status, book, sectors);
     true
 }
 
@@ -225,7 +218,7 @@ fn component_record(
     figures: ComponentFigures,
     status: Status,
     used_percent: Option<f32>,
-    why: ComponentReason,
+    why: RecordReason,
 ) -> ComponentRecord<'_> {
     ComponentRecord {
         why,

@@ -49,7 +49,7 @@ pub enum WaitReason {
 
 /// The segment in work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OpenSegment {
+pub struct OpenLog {
     /// Its name.
     pub name: LogName,
     /// The session number in the seal of its sectors.
@@ -223,10 +223,10 @@ impl<'a, D: CardDevice> Recorder<'a, D> {
     }
 
     /// Finished part; data behind it is old.
-    pub fn in_work(&self) -> Option<OpenSegment> {
+    pub fn in_work(&self) -> Option<OpenLog> {
         let log = self.open_segment()?;
         let blocks = log.base.map_or(0, |_| self.buffers.parity.borrow().end());
-        Some(OpenSegment { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
+        Some(OpenLog { name: log.name, session: log.session, first: log.base.unwrap_or(0), blocks })
     }
 
     /// The card, for stored logs; `None` without one.

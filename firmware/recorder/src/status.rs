@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-use hums_blackbox::record::{PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, PreviousEnd};
 use hums_core::clock::{Instant, Span};
 
 const IDLE: u32 = u32::MAX;
@@ -295,7 +295,7 @@ impl CardStatus {
         self.format_wanted.swap(false, Ordering::Acquire)
     }
 
-    pub(crate) fn set_before(&self, before: &PreviousSession) {
+    pub(crate) fn set_before(&self, before: &LastSession) {
         self.before_found.store(before.found as u8, Ordering::Relaxed);
         self.before_number.store(before.number, Ordering::Relaxed);
         self.before_session.store(before.session, Ordering::Relaxed);
@@ -307,8 +307,8 @@ impl CardStatus {
 
     /// The previous session, once for each card that is opened. The fields are stable until the next card: storage
     /// looks for one once a second.
-    pub fn take_before(&self) -> Option<PreviousSession> {
-        self.before_news.swap(false, Ordering::Acquire).then(|| PreviousSession {
+    pub fn take_before(&self) -> Option<LastSession> {
+        self.before_news.swap(false, Ordering::Acquire).then(|| LastSession {
             found: PreviousEnd::from_number(self.before_found.load(Ordering::Relaxed)),
             number: self.before_number.load(Ordering::Relaxed),
             session: self.before_session.load(Ordering::Relaxed),

@@ -9,7 +9,7 @@ use common::{MIB_BLOCKS, MemCard, held};
 use hums_blackbox::parity::{
     COLUMNS, Column, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block,
 };
-use hums_blackbox::record::{PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, PreviousEnd};
 use hums_blackbox::{Header, Sector, SectorSink, Writer};
 use hums_core::clock::{Instant, Span};
 use hums_recorder::card::Card;
@@ -430,8 +430,7 @@ fn the_next_start_finds_where_the_session_before_ended() {
         let session = stored(&device)[0].2.session;
         let check = check_of(written.last().expect("it is not empty"));
         let sectors = written.len() as u32;
-        let expected =
-            PreviousSession { found: PreviousEnd::Frames, number: 1, session, sectors, frames, check };
+        let expected = LastSession { found: PreviousEnd::Frames, number: 1, session, sectors, frames, check };
         assert_eq!(before, expected, "{count} frames");
         assert_eq!(
             Recorder::new(device.clone(), &CardStatus::new(), held(), 9).write(Instant::ZERO, &mut []),
@@ -617,7 +616,7 @@ fn the_only_log_of_a_full_card_is_looked_at_before_it_makes_room() {
     assert_eq!((before.number, before.session, before.sectors), (5, 0x55, all.len() as u32));
 }
 
-fn found_at_next_start(device: &MemCard) -> PreviousSession {
+fn found_at_next_start(device: &MemCard) -> LastSession {
     let whole = device.blocks.borrow().clone();
     let status = CardStatus::new();
     let mut recorder = Recorder::new(device.clone(), &status, held(), 8);

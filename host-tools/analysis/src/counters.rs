@@ -13,7 +13,7 @@ use crate::names::counter_name;
 #[derive(Debug, Default, Serialize)]
 pub struct Counters {
     /// Those of the vehicle.
-    pub plain: Vec<CounterLine>,
+    pub plain: Vec<Counter>,
     /// By motor.
     pub motors: Vec<Motor>,
     /// By quantity.
@@ -24,7 +24,7 @@ pub struct Counters {
 
 /// A counter of the vehicle.
 #[derive(Debug, Serialize)]
-pub struct CounterLine {
+pub struct Counter {
     /// For people.
     pub title: String,
     /// Empty for a count.
@@ -195,7 +195,7 @@ pub fn of(session: &BTreeMap<String, f64>, life: &BTreeMap<String, f64>) -> Coun
             }
             None => (name, "", 2),
         };
-        all.plain.push(CounterLine { title, unit, decimals, session: value, life: lived });
+        all.plain.push(Counter { title, unit, decimals, session: value, life: lived });
     }
     all.motors.sort_by_key(|motor| motor.number);
     all

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 
 use anyhow::Result;
-use hums_blackbox::record::{ComponentReason, Loss, Moment, Stats, Vehicle};
+use hums_blackbox::record::{Loss, Moment, RecordReason, Stats, Vehicle};
 use hums_blackbox::{Cause, Gap, Record};
 use hums_core::clock::{Instant, Span};
 use hums_core::component::{COMPONENTS_MAX, ComponentFigures, ComponentKind};
@@ -25,7 +25,7 @@ use crate::plural::are;
 use crate::progress;
 use crate::soundness::Soundness;
 use crate::source::epochs::Epochs;
-use crate::source::item::{self, Amount, Item, ItemReceiver, MessageCount, Needs};
+use crate::source::item::{self, Amount, Item, ItemSink, MessageCount, Needs};
 use crate::source::own::OwnReader;
 use crate::source::parts::{ItemCollector, PartReceiver};
 use crate::source::recording::Format;
@@ -386,7 +386,7 @@ impl Contents {
                 self.exceeded((record.check.to_owned(), record.instance), line);
             }
             // Its successor is recorded after it.
-            Record::Component(record) if record.why != ComponentReason::Replaced => {
+            Record::Component(record) if record.why != RecordReason::Replaced => {
                 let line = ComponentLine {
                     kind: record.kind.name(),
                     number: record.number,
@@ -526,7 +526,7 @@ impl Overview {
     }
 
     /// Hands on the content in order; of several vehicles this system id.
-    pub fn told(log: &Log, system: Option<u8>, take: &mut ItemReceiver<'_>) -> Result<Self> {
+    pub fn told(log: &Log, system: Option<u8>, take: &mut ItemSink<'_>) -> Result<Self> {
         Self::read(log, Needs { system, ..Needs::default() }, Some(take))
     }
 
@@ -535,7 +535,7 @@ impl Overview {
         Self::read(log, Needs { frames: true, ..Needs::default() }, None)
     }
 
-    fn read(log: &Log, want: Needs<'_>, take: Option<&mut ItemReceiver<'_>>) -> Result<Self> {
+    fn read(log: &Log, want: Needs<'_>, take: Option<&mut ItemSink<'_>>) -> Result<Self> {
         let bar = progress::bytes(Some(log.bytes()), &log.name);
         let mut contents = Contents::default();
         let (reader, seen) = (OwnReader::new(log.clone()), |bytes| bar.set_position(bytes));

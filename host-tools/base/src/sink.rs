@@ -155,8 +155,7 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
         _ => {
             let duplex = duplex::open(endpoint, SILENCE)?;
             let writer = SideOutput::new(FLAG, To::Stream(duplex.writer));
-            let input =
-                listen(duplex.reader).context("--gs: a thread cannot be started; close other programs")?;
+            let input = listen(duplex.reader).context("--gs: no thread; close other programs")?;
             Ok(Ground { writer, input })
         }
     }

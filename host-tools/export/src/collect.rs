@@ -9,7 +9,7 @@ use super::context::Context;
 use super::format::{Entry, GroupEncoder};
 use super::record::{gap_row, rows};
 use super::row::Row;
-use super::story::{Story, StoryEntry, WaitingObservation};
+use super::story::{HeldObservation, Story, StoryEntry};
 use crate::mavlink::frame::{Peek, peek};
 use crate::mavlink::values::Payload;
 use crate::source::item::Item;
@@ -87,7 +87,7 @@ impl ItemCollector for CollectedGroup<'_> {
     fn item(&mut self, at: Instant, item: Item<'_>) {
         // Always: later items depend on the vehicle's earlier state.
         if let Item::Observation(source, observation) = item {
-            self.story.observed.push(WaitingObservation { at, source, observation: *observation });
+            self.story.observed.push(HeldObservation { at, source, observation: *observation });
         }
         if !self.context.selection.has_time(at, &self.context.epochs) {
             return;

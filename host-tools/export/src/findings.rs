@@ -12,7 +12,7 @@ use hums_link::{messages, summary};
 
 use super::context::Context;
 use crate::check;
-use crate::check::judge::{Limits, ReceptionPlace};
+use crate::check::judge::{HeardAt, Limits};
 use crate::source::recording::LogPlace;
 use crate::source::told::Finding;
 
@@ -29,7 +29,7 @@ pub struct Findings {
 impl Findings {
     /// As `hums check` has them.
     pub fn of(place: &LogPlace) -> Result<Self> {
-        let judged = check::recording(place, &Limits::default(), ReceptionPlace::Somewhere)?.judged;
+        let judged = check::recording(place, &Limits::default(), HeardAt::Somewhere)?.judged;
         let system = judged.vehicle().source.map_or(1, |source| source.system);
         Ok(Self { system, list: judged.findings })
     }

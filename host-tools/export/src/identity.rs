@@ -20,7 +20,7 @@ use crate::naming::Traits;
 use crate::source::epochs::Epochs;
 use crate::source::item::Item;
 use crate::source::recording::LogPlace;
-use crate::story::WaitingObservation;
+use crate::story::HeldObservation;
 use crate::summary::Overview;
 use crate::utc::iso8601;
 
@@ -61,7 +61,7 @@ pub struct RecordingContent {
 
 /// A recording, read once before the first byte is written.
 #[derive(Clone, Debug)]
-pub struct KnownRecording {
+pub struct Preview {
     /// Its names.
     pub identity: Identity,
     /// The findings by the monitor here, as in `hums check`; `None` if one on board checked it.
@@ -72,19 +72,14 @@ pub struct KnownRecording {
 
 /// Vehicle, date, UTC and content of a recording, read once. With `judges`, also the findings by the monitor
 /// here. `session` comes from the files' names, so it does not depend on this version's messages.
-pub fn identity(
-    place: &LogPlace,
-    traits: &Traits,
-    judges: bool,
-    given: Option<&str>,
-) -> Result<KnownRecording> {
+pub fn identity(place: &LogPlace, traits: &Traits, judges: bool, given: Option<&str>) -> Result<Preview> {
     let (mut sources, mut epochs) = (Sources::default(), Epochs::default());
     let (mut motion, mut track, mut speeds) = (Motion::default(), Track::default(), Track::default());
     let (overview, judged) = overview_telling(place, &mut |at, item| {
         epochs.take(at, &item);
         sources.take(at, &item);
         if let Item::Observation(source, observation) = item {
-            let observed = WaitingObservation { at, source, observation: *observation };
+            let observed = HeldObservation { at, source, observation: *observation };
             if motion.observe(&observed)
                 && let Some(fix) = motion.fix_by(&observed.observation)
             {
@@ -116,7 +111,7 @@ pub fn identity(
         board: traits.board(),
         fingerprint: traits.fingerprint(),
     };
-    Ok(KnownRecording { identity: Identity { vehicle, date, session, recording, epochs }, checked, about })
+    Ok(Preview { identity: Identity { vehicle, date, session, recording, epochs }, checked, about })
 }
 
 #[derive(Default)]

@@ -4,7 +4,7 @@ use hums_core::observation::{Attitude, Observation};
 use hums_core::units::Position;
 use hums_core::vehicle::Vehicle;
 
-use crate::story::WaitingObservation;
+use crate::story::HeldObservation;
 
 /// Metres of a degree of latitude, on the sphere of the mean radius of the earth (6,371,009 m).
 const DEGREE_M: f64 = 111_195.08;
@@ -30,7 +30,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    pub(crate) fn observe(&mut self, observed: &WaitingObservation) -> bool {
+    pub(crate) fn observe(&mut self, observed: &HeldObservation) -> bool {
         let own = self.vehicle.observe(observed.at.into(), observed.source, &observed.observation);
         if own {
             self.origin = self.origin.or_else(|| self.fix_by(&observed.observation));

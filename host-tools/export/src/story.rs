@@ -7,7 +7,7 @@ use crate::source::item::Item;
 
 /// A frame's observation, kept until the frames before it have been taken.
 #[derive(Clone, Copy, Debug)]
-pub struct WaitingObservation {
+pub struct HeldObservation {
     /// Time of its frame.
     pub at: Instant,
     /// The sender.
@@ -70,7 +70,7 @@ impl StoryEntry {
 #[derive(Clone, Debug, Default)]
 pub struct Story {
     /// Observations, also from before the wanted time: later ones depend on them.
-    pub observed: Vec<WaitingObservation>,
+    pub observed: Vec<HeldObservation>,
     /// Texts and parameters in the wanted time.
     pub said: Vec<StoryEntry>,
 }
@@ -78,7 +78,7 @@ pub struct Story {
 impl Story {
     /// Bytes of memory that it holds, roughly.
     pub fn held_bytes(&self) -> usize {
-        size_of::<WaitingObservation>() * self.observed.len()
+        size_of::<HeldObservation>() * self.observed.len()
             + self.said.iter().map(StoryEntry::held_bytes).sum::<usize>()
     }
 }

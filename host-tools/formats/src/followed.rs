@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use hums_blackbox::record::{PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, PreviousEnd};
 
 use crate::ending::{Ending, Proof, SessionBefore};
 use crate::logs::sessions::{Sessions, place};
@@ -79,7 +79,7 @@ impl<T: HasEnding> EndResolver<T> {
         }
     }
 
-    fn tell(&mut self, before: &PreviousSession, next: &mut Ending) {
+    fn tell(&mut self, before: &LastSession, next: &mut Ending) {
         let (card, number) = place(&next.name);
         let mut held: Vec<&mut Ending> = self.held.iter_mut().filter_map(HasEnding::ending).collect();
         // The last file was to be written anew, and held another session's sectors.
@@ -166,12 +166,8 @@ mod tests {
         assert!(log.strange().join("").contains("9 sectors of 00006_01.HUM"), "{:?}", log.strange());
         let mut next = Ending { name: "00007".to_owned(), ..Ending::default() };
         next.summary.session = Some(9);
-        let before = PreviousSession {
-            found: PreviousEnd::Frames,
-            number: 6,
-            session: 7,
-            ..PreviousSession::default()
-        };
+        let before =
+            LastSession { found: PreviousEnd::Frames, number: 6, session: 7, ..LastSession::default() };
         next.summary.marks.before = Some(before);
         let mut followed = EndResolver::new(Sessions::default());
         let mut done = followed.push(log);
@@ -192,11 +188,8 @@ mod tests {
             (blocks.blocks, blocks.empty, blocks.damaged) = (900 + damaged, 900, damaged);
             let mut next = Ending { name: "00002".into(), ..Ending::default() };
             next.summary.session = Some(9);
-            next.summary.marks.before = Some(PreviousSession {
-                found: PreviousEnd::Unreadable,
-                number,
-                ..PreviousSession::default()
-            });
+            next.summary.marks.before =
+                Some(LastSession { found: PreviousEnd::Unreadable, number, ..LastSession::default() });
             let mut followed = EndResolver::new(Sessions::default());
             let mut done = followed.push(log);
             done.extend(followed.push(next));

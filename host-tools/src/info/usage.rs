@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use hums_core::clock::Span;
 
 use super::number::short;
-use crate::counters::{self, Band, CounterLine, Motor};
+use crate::counters::{self, Band, Counter, Motor};
 use crate::plural::count;
 use crate::summary::Overview;
 use crate::table::{Table, left, right};
@@ -50,8 +50,8 @@ pub(super) fn text(text: &mut String, log: &Overview) {
     }
 }
 
-fn plain(counter: &CounterLine) -> Option<[String; 3]> {
-    let CounterLine { title, unit, session, life, .. } = counter;
+fn plain(counter: &Counter) -> Option<[String; 3]> {
+    let Counter { title, unit, session, life, .. } = counter;
     let said = |value: f64| match *unit {
         "s" => seconds(value),
         "" => short(value),

@@ -129,7 +129,7 @@ fn follow(
         let player = Player::new(&name, limits.clone(), hub, commands, influx);
         thread.spawn(move || player.run(opened))
     };
-    started.context("a thread cannot be started; close other programs")
+    started.context("no thread; close other programs")
 }
 
 fn database(args: &cli::Live) -> Result<Option<Influx>> {

@@ -99,10 +99,10 @@ pub enum Content<'a> {
 }
 
 /// Time, UTC of time zero if known, part read (0 to 1), item. `false` ends the reading.
-pub type ItemReceiver<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
+pub type ItemSink<'a> = dyn FnMut(Instant, Option<u64>, f64, Content<'_>) -> io::Result<bool> + 'a;
 
 /// Reads once; returns the evidence of a log's end.
-pub fn each(opened: &mut OpenedInput, take: &mut ItemReceiver<'_>) -> Result<Option<Ending>> {
+pub fn each(opened: &mut OpenedInput, take: &mut ItemSink<'_>) -> Result<Option<Ending>> {
     let Some(recording) = opened.recording.take() else { return Ok(None) };
     let progress = recording.progress.clone();
     let mut epoch_us = None;

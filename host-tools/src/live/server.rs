@@ -72,10 +72,7 @@ pub fn start(listener: TcpListener, hub: Arc<Hub>, guard: Guard) -> Result<()> {
             });
         }
     };
-    Builder::new()
-        .name("server".to_owned())
-        .spawn(accept)
-        .context("--listen: a thread cannot be started; close other programs")?;
+    Builder::new().name("server".to_owned()).spawn(accept).context("no thread; close other programs")?;
     Ok(())
 }
 

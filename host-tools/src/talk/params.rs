@@ -258,9 +258,7 @@ fn list(client: &mut Client) -> Result<(Vec<Param>, Vec<String>)> {
         values.insert(
             index,
             value.with_context(|| {
-                format!(
-                    "system {system}: parameter {index} of {count}: no answer; check the link, and call again"
-                )
+                format!("system {system}: parameter {index} of {count}: no answer; check the link")
             })?,
         );
     }

@@ -46,7 +46,7 @@ impl PreviousEnd {
 /// The session recorded before this one, as found when the card was opened. It shows the end of an earlier log, and what is
 /// missing there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PreviousSession {
+pub struct LastSession {
     /// The result of the search.
     pub found: PreviousEnd,
     /// Beginning of its files' names.
@@ -61,7 +61,7 @@ pub struct PreviousSession {
     pub check: u32,
 }
 
-impl PreviousSession {
+impl LastSession {
     /// End of the previous session, if found.
     pub const fn has_end(&self) -> bool {
         matches!(self.found, PreviousEnd::Sectors | PreviousEnd::Frames)
@@ -86,12 +86,12 @@ pub struct Boot<'a> {
     /// Boots so far.
     pub boots: u32,
     /// The session before on this card. Known only after the card is open: the record is then written again.
-    pub before: PreviousSession,
+    pub before: LastSession,
 }
 
 impl<'a> Boot<'a> {
     pub(super) fn store(&self, sink: &mut Sink<'_>) {
-        let PreviousSession { found, number, session, sectors, frames, check } = self.before;
+        let LastSession { found, number, session, sectors, frames, check } = self.before;
         sink.head(1).u32(self.reset).u32(self.boots);
         sink.u32(number).u32(session).u32(sectors).u32(frames).u32(check);
         sink.name(self.version).name(self.git).name(self.board).name(self.reset_name).bytes(&self.uid);
@@ -107,7 +107,7 @@ impl<'a> Boot<'a> {
             reset_name: fields.text(),
             uid: fields.array(),
             boots: fields.u32(),
-            before: PreviousSession {
+            before: LastSession {
                 number: fields.u32(),
                 session: fields.u32(),
                 sectors: fields.u32(),

@@ -19,7 +19,7 @@ mod wear;
 use core::fmt;
 
 pub use crate::limits::{NAME_BYTES_MAX, RECORD_BYTES_MAX, TEXT_BYTES_MAX};
-pub use boot::{Boot, Fault, PreviousEnd, PreviousSession};
+pub use boot::{Boot, Fault, LastSession, PreviousEnd};
 pub use finding::{Event, FindingRecord, Note};
 pub use keep::Keep;
 pub use loss::{Loss, LossKind, Stats};
@@ -27,7 +27,7 @@ pub use mark::{Mark, MarkReason};
 pub use snapshot::{Protection, Snapshot, SnapshotValues};
 pub use usage::{LIFETIME_ENTRIES_MAX, Lifetime, Moment, USAGE_ENTRIES_MAX, Usage};
 pub use vehicle::{Clock, Parameter, Vehicle};
-pub use wear::{Component, ComponentReason, Exceedance};
+pub use wear::{Component, Exceedance, RecordReason};
 
 use stored::{Fields, Sink};
 pub(crate) use stored::{HEAD_BYTES, Shape};
@@ -192,7 +192,7 @@ mod tests {
             reset_name: "pin",
             uid: *b"123456789012",
             boots: 99,
-            before: PreviousSession {
+            before: LastSession {
                 found: PreviousEnd::Frames,
                 number: 7,
                 session: 0xfeed,
@@ -260,7 +260,7 @@ mod tests {
             lifetime: crossings(70.25),
         }));
         reads_back(Record::Component(Component {
-            why: ComponentReason::Replaced,
+            why: RecordReason::Replaced,
             place: 7,
             kind: ComponentKind::Propeller,
             number: 4,

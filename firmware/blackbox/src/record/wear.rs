@@ -63,7 +63,7 @@ impl<'a> Exceedance<'a> {
 /// The reason of a component's record. The numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
-pub enum ComponentReason {
+pub enum RecordReason {
     /// As it stood at the start of the session.
     Start = 0,
     /// The status, now or at the end.
@@ -75,7 +75,7 @@ pub enum ComponentReason {
     Named = 3,
 }
 
-impl ComponentReason {
+impl RecordReason {
     /// The name that reports use.
     pub const fn name(self) -> &'static str {
         match self {
@@ -100,7 +100,7 @@ impl ComponentReason {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Component<'a> {
     /// Reason.
-    pub why: ComponentReason,
+    pub why: RecordReason,
     /// Its place, from 0.
     pub place: u8,
     /// Its kind.
@@ -139,7 +139,7 @@ impl<'a> Component<'a> {
 
     pub(super) fn read(fields: &mut Fields<'a>) -> Self {
         Self {
-            why: ComponentReason::from_number(fields.u8()),
+            why: RecordReason::from_number(fields.u8()),
             place: fields.u8(),
             kind: ComponentKind::from_number(fields.u8()).unwrap_or_default(),
             number: fields.u8(),

@@ -43,7 +43,7 @@ use limiter::Requester;
 use pass::BackChannel;
 use secure::{RequestSigning, Trust};
 use settings::Settings;
-use ways::PortOutlets;
+use ways::Outlets;
 
 /// Bytes that may wait at the autopilot's port. Its queue has room for them, for as many of the summary where the
 /// autopilot carries it, and for the longest frame.
@@ -166,7 +166,7 @@ impl Companion {
     ) {
         self.asked(now, port, frame, book, sectors);
         let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.pass.up(now, port, frame, book.monitor, &mut PortOutlets { outlets, queues: gs });
+        self.pass.up(now, port, frame, book.monitor, &mut Outlets { outlets, queues: gs });
     }
 
     /// An answer to us, a request, or data.
@@ -209,7 +209,7 @@ impl Companion {
         gs: &mut GsIn,
     ) {
         let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        self.pass.down(now, frame, book.monitor, &mut PortOutlets { outlets, queues: gs });
+        self.pass.down(now, frame, book.monitor, &mut Outlets { outlets, queues: gs });
     }
 
     fn asked(
@@ -435,7 +435,7 @@ impl Companion {
         gs: &mut GsIn,
     ) {
         let outlets = [&mut summary.outlet, &mut self.outlet, &mut self.usb];
-        let mut ways = PortOutlets { outlets, queues: gs };
+        let mut ways = Outlets { outlets, queues: gs };
         let replies = &mut self.commands.replies;
         for _ in 0..replies.len() {
             let Some((port, reply)) = replies.first() else { break };
@@ -499,7 +499,7 @@ mod tests {
             let (mut companion, mut summary) = (Companion::new(&params), Summary::new(&params));
             let bulk = Packet::new(ids::LOG_DATA).bytes(0, &vec![1; bytes - 12][..]);
             let outlets = [&mut summary.outlet, &mut companion.outlet, &mut companion.usb];
-            let mut ways = PortOutlets { outlets, queues: &mut gs_in };
+            let mut ways = Outlets { outlets, queues: &mut gs_in };
             let taken = (0..99).take_while(|_| ways.send(NOW, Port::Usb, Class::Bulk, &bulk)).count();
             assert!(taken >= 2, "{taken} of {bytes} bytes");
             let mut out = [0; FRAME_BYTES_MAX];

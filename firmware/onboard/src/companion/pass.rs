@@ -22,7 +22,7 @@ use hums_link::ids;
 use hums_link::outlet::Class;
 use hums_link::request::Port;
 
-use super::ways::PortOutlets;
+use super::ways::Outlets;
 use crate::queues::SummaryRoute;
 
 const RADIO: [u32; 2] = [ids::RADIO, ids::RADIO_STATUS];
@@ -60,7 +60,7 @@ impl BackChannel {
         port: Port,
         frame: &Frame<'_>,
         monitor: &Monitor,
-        ways: &mut PortOutlets,
+        ways: &mut Outlets,
     ) {
         let Some(vehicle) = monitor.vehicle().source else { return };
         let of = (frame.system(), frame.component());
@@ -76,13 +76,7 @@ impl BackChannel {
         self.lost = self.lost.saturating_add(u32::from(!sent));
     }
 
-    pub(crate) fn down(
-        &mut self,
-        now: Instant,
-        frame: &Frame<'_>,
-        monitor: &Monitor,
-        ways: &mut PortOutlets,
-    ) {
+    pub(crate) fn down(&mut self, now: Instant, frame: &Frame<'_>, monitor: &Monitor, ways: &mut Outlets) {
         let to = [Port::Gs, Port::Usb].map(|port| Some(port).filter(|port| is_on(*port, monitor, ways)));
         if to == [None; 2] || frame.id() == ids::SETUP_SIGNING {
             return;
@@ -108,7 +102,7 @@ impl BackChannel {
     }
 }
 
-fn is_on(port: Port, monitor: &Monitor, ways: &PortOutlets) -> bool {
+fn is_on(port: Port, monitor: &Monitor, ways: &Outlets) -> bool {
     let is_used =
         if port == Port::Gs { ways.queues.route() == SummaryRoute::Port } else { ways.queues.is_open(port) };
     is_used && monitor.params().get(Param::GsPass) > 0.5

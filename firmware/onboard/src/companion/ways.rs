@@ -8,13 +8,13 @@ use hums_link::request::Port;
 
 use crate::queues::GsIn;
 
-pub(crate) struct PortOutlets<'w, 'q> {
+pub(crate) struct Outlets<'w, 'q> {
     /// By the port's number.
     pub(crate) outlets: [&'w mut Outlet; Port::ALL.len()],
     pub(crate) queues: &'w mut GsIn<'q>,
 }
 
-impl PortOutlets<'_, '_> {
+impl Outlets<'_, '_> {
     pub(crate) fn send(&mut self, now: Instant, port: Port, class: Class, packet: &Packet) -> bool {
         let Self { outlets, queues } = self;
         let has_room = queues.has_room(port, room(class));

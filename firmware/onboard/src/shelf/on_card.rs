@@ -13,7 +13,7 @@ use core::ops::Range;
 use hums_blackbox::Header;
 use hums_blackbox::parity::{COLUMNS, PARITY_SECTORS, Parity, STRETCH_SECTORS, data_blocks, parity_block};
 use hums_recorder::card::Segment;
-use hums_recorder::recorder::OpenSegment;
+use hums_recorder::recorder::OpenLog;
 use hums_recorder::{BLOCK_BYTES, Block, Card, CardDevice, CardError, LogName, Trouble};
 
 use super::asked::LogId;
@@ -128,8 +128,8 @@ pub(super) fn measure<D: CardDevice>(
 }
 
 /// The log in work: its finished part, without earlier data.
-pub(super) fn in_work(log: &OpenSegment) -> (LogId, u32) {
-    let OpenSegment { name, session, first, blocks } = *log;
+pub(super) fn in_work(log: &OpenLog) -> (LogId, u32) {
+    let OpenLog { name, session, first, blocks } = *log;
     let log = if blocks > 0 { LogId { name, session, first } } else { LogId { name, ..LogId::NONE } };
     (log, blocks)
 }

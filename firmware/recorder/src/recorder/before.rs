@@ -9,7 +9,7 @@
 
 use crate::{BLOCK_BYTES, Block, CardDevice};
 use hums_blackbox::parity::data_blocks;
-use hums_blackbox::record::{PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, PreviousEnd};
 use hums_blackbox::{GROUP_SECTORS, Header, Sector};
 
 use crate::card::{Card, CardError, LogEntry, Segment};
@@ -19,16 +19,16 @@ use crate::directory::Newest;
 const PROBE_BLOCKS: u32 = 9;
 /// The end of the newest log on the card. A segment without a sector (power failed when it was made) does not count;
 /// the one before it does.
-pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> PreviousSession {
+pub(super) fn look<D: CardDevice>(card: &Card<'_, D>, newest: &Newest) -> LastSession {
     let number = newest.first().map_or(0, |newest| newest.name.session);
-    let unreadable = PreviousSession { found: PreviousEnd::Unreadable, number, ..PreviousSession::default() };
+    let unreadable = LastSession { found: PreviousEnd::Unreadable, number, ..LastSession::default() };
     search(card, newest).ok().flatten().unwrap_or(unreadable)
 }
 
 fn search<D: CardDevice>(
     card: &Card<'_, D>,
     newest: &Newest,
-) -> Result<Option<PreviousSession>, CardError<D::Error>> {
+) -> Result<Option<LastSession>, CardError<D::Error>> {
     let mut older = newest.iter();
     while let Some(entry) = older.next() {
         if let Some(before) = end_of(card, entry, older.as_slice().first())? {
@@ -43,7 +43,7 @@ fn end_of<D: CardDevice>(
     card: &Card<'_, D>,
     entry: &LogEntry,
     older: Option<&LogEntry>,
-) -> Result<Option<PreviousSession>, CardError<D::Error>> {
+) -> Result<Option<LastSession>, CardError<D::Error>> {
     let mut segment = Segment::of(entry);
     let mut reader = Reader { card, segment: &mut segment, block: [0; BLOCK_BYTES] };
     let begin = match older.and_then(|older| Some((older, first(card, older).ok()??))) {
@@ -75,7 +75,7 @@ fn end_of<D: CardDevice>(
         }
     }
     let end = reader.end(base, last, &header)?;
-    Ok(Some(PreviousSession {
+    Ok(Some(LastSession {
         found: if end.is_some() { PreviousEnd::Frames } else { PreviousEnd::Sectors },
         number: entry.name.session,
         session,

@@ -1,6 +1,6 @@
 //! The choice of segments: the session's next one, made in free room, or else in place of the oldest.
 
-use hums_blackbox::record::{PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, PreviousEnd};
 use hums_core::clock::Instant;
 
 use super::before;
@@ -76,10 +76,8 @@ impl<'a> Segments<'a> {
         } else {
             self.earlier = card.newest().clone();
             if newest.is_none() {
-                self.status.set_before(&PreviousSession {
-                    found: PreviousEnd::Nothing,
-                    ..PreviousSession::default()
-                });
+                self.status
+                    .set_before(&LastSession { found: PreviousEnd::Nothing, ..LastSession::default() });
             }
             let name = next.ok_or(CardError::Full)?;
             let session = mix(mix(volume_id, name.session), self.entropy);

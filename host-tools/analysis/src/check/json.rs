@@ -10,7 +10,7 @@ use super::problem::Problem;
 use super::text::firmware;
 use crate::log_json::{FindingJson, finite};
 use crate::names::{autopilot_name, type_name, vocabulary};
-use crate::source::item::{FactSubject, Gap};
+use crate::source::item::{FactKind, Gap};
 use crate::states;
 use crate::utc::iso8601;
 
@@ -242,8 +242,8 @@ fn vehicle(judged: &Judgement) -> Option<VehicleJson> {
         autopilot: autopilot_name(heartbeat.autopilot_number),
         r#type: type_name(heartbeat.type_number),
         version: identity.and_then(|identity| firmware(identity.firmware)),
-        firmware: fact(FactSubject::Firmware),
-        hardware: fact(FactSubject::Hardware),
+        firmware: fact(FactKind::Firmware),
+        hardware: fact(FactKind::Hardware),
         uid: identity.filter(|identity| identity.uid != 0).map(|identity| format!("{:016x}", identity.uid)),
     })
 }

@@ -34,7 +34,7 @@ use super::trends::{self, Episode, FlightFigures};
 use crate::names::vocabulary;
 use crate::part;
 use crate::source::epochs::Epochs;
-use crate::source::item::{Cause as Why, Event, Fact, FactSubject, Gap, Item, Text};
+use crate::source::item::{Cause as Why, Event, Fact, FactKind, Gap, Item, Text};
 use crate::source::recording::Format;
 use crate::source::repairs::Repairs;
 use crate::source::told::{Finding, MonitorRecord};
@@ -56,7 +56,7 @@ const DISARMED: &str = "disarmed_in_air";
 
 /// Place of reception.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ReceptionPlace {
+pub enum HeardAt {
     /// Checks of the wire are not judged.
     #[default]
     Somewhere,
@@ -127,7 +127,7 @@ pub struct Judge {
     cells: Cells,
     flights: Flights,
     episodes: Vec<Episode>,
-    facts: BTreeMap<FactSubject, String>,
+    facts: BTreeMap<FactKind, String>,
     details: Details,
     epochs: Epochs,
     gaps: Vec<Gap>,
@@ -185,8 +185,8 @@ impl Judge {
 
     /// Received at this place.
     #[must_use]
-    pub fn heard(self, heard: ReceptionPlace) -> Self {
-        Self { wire: (heard == ReceptionPlace::OnTheWire).then(Sequences::new), ..self }
+    pub fn heard(self, heard: HeardAt) -> Self {
+        Self { wire: (heard == HeardAt::OnTheWire).then(Sequences::new), ..self }
     }
 
     /// Flight from 0, as in [`Judgement::flights`].
@@ -239,14 +239,11 @@ impl Judge {
                     self.link_loss.observe(steps, observation, self.monitor.vehicle());
                 }
             }
-            Item::Fact(Fact { about: FactSubject::Failsafes, words }) => {
+            Item::Fact(Fact { about: FactKind::Failsafes, words }) => {
                 self.details.failsafes(words);
                 self.tell(details::FAILSAFE);
             }
-            Item::Fact(Fact {
-                about: about @ (FactSubject::Emergency | FactSubject::ProcessorFault),
-                words,
-            }) => {
+            Item::Fact(Fact { about: about @ (FactKind::Emergency | FactKind::ProcessorFault), words }) => {
                 self.reported(at, about, words);
             }
             Item::Fact(fact) => {
@@ -473,8 +470,8 @@ impl Judge {
     }
 
     /// An end at its report: motors stop, or the processor restarts.
-    fn reported(&mut self, at: Instant, about: FactSubject, words: &str) {
-        let is_emergency = about == FactSubject::Emergency;
+    fn reported(&mut self, at: Instant, about: FactKind, words: &str) {
+        let is_emergency = about == FactKind::Emergency;
         let what = if is_emergency { details::EMERGENCY } else { details::PROCESSOR_FAULT };
         self.advance(at);
         if self.here.is_open(what.0) {
@@ -613,7 +610,7 @@ impl Judge {
 
     /// Guessed arming: a closed throttle does not disarm.
     fn distrust_disarming(&mut self) {
-        if self.facts.get(&FactSubject::Arming).is_some_and(|words| !words.is_empty()) {
+        if self.facts.get(&FactKind::Arming).is_some_and(|words| !words.is_empty()) {
             self.here.drop_checks(|check| check == DISARMED);
             self.flights.forget_disarming();
         }
@@ -651,7 +648,7 @@ impl Judge {
     fn remarks(&mut self, by: JudgedBy, flights: &[Flight]) -> Vec<String> {
         let (of_cells, of_vehicles) =
             (self.cells.words(by, begin_in_air(flights)), self.details.remarks(self.system()));
-        let of_file = [FactSubject::Beginning, FactSubject::Unchecked].map(|about| self.facts.remove(&about));
+        let of_file = [FactKind::Beginning, FactKind::Unchecked].map(|about| self.facts.remove(&about));
         let remarks = joined(&self.joints).into_iter().chain(of_cells).chain(of_vehicles);
         remarks.chain(of_file.into_iter().flatten()).collect()
     }
@@ -712,11 +709,7 @@ impl Judge {
             is_of_link: self.format.is_of_link(),
             on_the_wire: self.wire.is_some(),
             armed,
-            arming: self
-                .facts
-                .get(&FactSubject::Arming)
-                .map(String::as_str)
-                .filter(|words| !words.is_empty()),
+            arming: self.facts.get(&FactKind::Arming).map(String::as_str).filter(|words| !words.is_empty()),
             flew: !flights.is_empty(),
             cells_unknown: self.cells.are_unknown(by),
             problems: &worst_first,

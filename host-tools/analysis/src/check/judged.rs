@@ -13,7 +13,7 @@ use super::problem::{LISTED_MAX, Problem, Problems, rank, worst_first};
 use super::trends::{Baselines, Episode, because};
 use crate::names::vocabulary;
 use crate::source::epochs::Epochs;
-use crate::source::item::{Cause, FactSubject, Gap};
+use crate::source::item::{Cause, FactKind, Gap};
 use crate::source::told::Finding;
 use crate::summary::{EndsInAir, JudgedChecks};
 
@@ -82,7 +82,7 @@ pub struct Judgement {
     /// Vehicle, usage, exceedances at the end.
     pub monitor: Box<Monitor>,
     /// The last of each kind.
-    pub facts: BTreeMap<FactSubject, String>,
+    pub facts: BTreeMap<FactKind, String>,
     /// UTC of each part of the recording.
     pub epochs: Epochs,
     /// First and last time.

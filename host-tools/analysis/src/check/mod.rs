@@ -41,7 +41,7 @@ use crate::progress;
 use crate::source::find::{find_each, sessions_of};
 use crate::source::recording::{Format, LogPlace};
 use checked::Checked;
-use judge::{Limits, ReceptionPlace};
+use judge::{HeardAt, Limits};
 use judged::Judgement;
 use overview::Read;
 use past::{EarlierFlights, Series};
@@ -154,7 +154,7 @@ pub fn run_showing(args: &Request<'_>, mut show: impl FnMut(&Checked) -> Result<
 }
 
 fn told(past: &EarlierFlights, place: &LogPlace, shows: bool) -> Told {
-    let read = past.judge(place, ReceptionPlace::Somewhere, shows).and_then(|read| {
+    let read = past.judge(place, HeardAt::Somewhere, shows).and_then(|read| {
         overview::is_heard(place, read.judged.vehicle().source.is_some())?;
         Ok(checked(place, read))
     });
@@ -171,8 +171,7 @@ fn vehicles(place: &LogPlace, format: Format, judged: &Judgement) -> Vec<LogPlac
 /// A recording, once for each of its vehicles: those that `hums check` judges. An unreadable recording is returned as it is.
 pub fn by_vehicle(place: &LogPlace) -> Vec<LogPlace> {
     let is_of_link = place.path().is_some() && place.open().is_ok_and(|open| open.format.is_of_link());
-    let read =
-        is_of_link.then(|| overview::judge(place, &Limits::default(), ReceptionPlace::Somewhere, false));
+    let read = is_of_link.then(|| overview::judge(place, &Limits::default(), HeardAt::Somewhere, false));
     let read = read.and_then(Result::ok);
     let all = read.map(|read| vehicles(place, read.format, &read.judged)).unwrap_or_default();
     if all.is_empty() { vec![place.clone()] } else { all }
@@ -199,7 +198,7 @@ impl HasEnding for Told {
 }
 
 /// Judges one recording, as `hums check` does.
-pub fn recording(place: &LogPlace, limits: &Limits, heard: ReceptionPlace) -> Result<Checked> {
+pub fn recording(place: &LogPlace, limits: &Limits, heard: HeardAt) -> Result<Checked> {
     overview::judge(place, limits, heard, false).map(|read| checked(place, read))
 }
 

@@ -12,7 +12,7 @@ use hums_core::observation::Observation;
 use hums_core::usage::UsageCounter;
 
 use super::flights::Flight;
-use super::judge::{Judge, Limits, ReceptionPlace};
+use super::judge::{HeardAt, Judge, Limits};
 use super::judged::Judgement;
 use super::problem::{give_worst, problems};
 use crate::counters::is_told;
@@ -23,7 +23,7 @@ use crate::logs::reader;
 use crate::names::counter_name;
 use crate::outcome::usage;
 use crate::progress;
-use crate::source::item::{Gap, Item, ItemReceiver, Needs, RecordingSummary};
+use crate::source::item::{Gap, Item, ItemSink, Needs, RecordingSummary};
 use crate::source::recording::{Format, LogPlace};
 use crate::summary::{Contents, ExceedanceLine, Overview};
 
@@ -43,22 +43,22 @@ pub(super) struct Read {
 }
 
 /// `shows`: progress.
-pub(super) fn judge(place: &LogPlace, limits: &Limits, heard: ReceptionPlace, shows: bool) -> Result<Read> {
+pub(super) fn judge(place: &LogPlace, limits: &Limits, heard: HeardAt, shows: bool) -> Result<Read> {
     judge_telling(place, limits, heard, shows, &mut |_, _| Ok(()))
 }
 
 fn judge_telling(
     place: &LogPlace,
     limits: &Limits,
-    heard: ReceptionPlace,
+    heard: HeardAt,
     shows: bool,
-    take: &mut ItemReceiver<'_>,
+    take: &mut ItemSink<'_>,
 ) -> Result<Read> {
     let recording = place.open()?;
     let (format, progress) = (recording.format, recording.progress.clone());
     let bar = progress::bytes(progress.total().filter(|_| shows), &place.title);
     let (mut judge, mut items) = (Judge::new(limits, format).heard(heard), 0_u32);
-    let want = Needs { observations: true, frames: heard == ReceptionPlace::OnTheWire, ..Needs::default() };
+    let want = Needs { observations: true, frames: heard == HeardAt::OnTheWire, ..Needs::default() };
     let summary = recording.read(want, &mut |at, item| {
         judge.item(at, item);
         items = items.wrapping_add(1);
@@ -78,14 +78,11 @@ pub fn overview(place: &LogPlace) -> Result<Overview> {
 
 /// The same, and hands on the recording's content in order: one reading for both. Returns the judgement too, if the monitor
 /// here checked the recording.
-pub fn overview_telling(
-    place: &LogPlace,
-    take: &mut ItemReceiver<'_>,
-) -> Result<(Overview, Option<Judgement>)> {
+pub fn overview_telling(place: &LogPlace, take: &mut ItemSink<'_>) -> Result<(Overview, Option<Judgement>)> {
     read(place, Some(take))
 }
 
-fn read(place: &LogPlace, take: Option<&mut ItemReceiver<'_>>) -> Result<(Overview, Option<Judgement>)> {
+fn read(place: &LogPlace, take: Option<&mut ItemSink<'_>>) -> Result<(Overview, Option<Judgement>)> {
     match place.own() {
         Some(log) => read_own(place, log, take),
         None => read_other(place, take),
@@ -95,7 +92,7 @@ fn read(place: &LogPlace, take: Option<&mut ItemReceiver<'_>>) -> Result<(Overvi
 fn read_own(
     place: &LogPlace,
     log: &Log,
-    mut take: Option<&mut ItemReceiver<'_>>,
+    mut take: Option<&mut ItemSink<'_>>,
 ) -> Result<(Overview, Option<Judgement>)> {
     let (limits, is_told) = (Limits::default(), take.is_some());
     // A monitor ran: not judged here.
@@ -126,7 +123,7 @@ fn read_own(
     if contents.frames() > 0 && (!is_checked || is_little || breaks_off) {
         let judged = match here {
             Some(here) => here,
-            None => judge(place, &limits, ReceptionPlace::Somewhere, true)?.judged,
+            None => judge(place, &limits, HeardAt::Somewhere, true)?.judged,
         };
         if is_checked && breaks_off {
             give_worst(&mut overview.contents.findings, &judged.problems);
@@ -141,15 +138,12 @@ fn read_own(
     Ok((overview, kept))
 }
 
-fn read_other(
-    place: &LogPlace,
-    take: Option<&mut ItemReceiver<'_>>,
-) -> Result<(Overview, Option<Judgement>)> {
+fn read_other(place: &LogPlace, take: Option<&mut ItemSink<'_>>) -> Result<(Overview, Option<Judgement>)> {
     let (limits, is_told) = (Limits::default(), take.is_some());
     let mut nothing = |_, _: Item<'_>| Ok(());
     let take = take.unwrap_or(&mut nothing);
     let Read { format, judged, summary, taken } =
-        judge_telling(place, &limits, ReceptionPlace::Somewhere, true, take)?;
+        judge_telling(place, &limits, HeardAt::Somewhere, true, take)?;
     is_heard(place, judged.vehicle().source.is_some())?;
     let mut contents = Contents {
         messages: summary.messages,

@@ -7,7 +7,7 @@ use hums_blackbox::record::Vehicle;
 use hums_core::lifetime::Airframe;
 
 use super::checked::Checked;
-use super::judge::{Limits, ReceptionPlace};
+use super::judge::{HeardAt, Limits};
 use super::judged::Judgement;
 use super::overview::{self, Read};
 use super::trends::{Baselines, FLIGHTS_MIN};
@@ -44,7 +44,7 @@ impl EarlierFlights {
     }
 
     /// `shows`: progress; another vehicle's trends are not judged, with a message.
-    pub(super) fn judge(&self, place: &LogPlace, heard: ReceptionPlace, shows: bool) -> Result<Read> {
+    pub(super) fn judge(&self, place: &LogPlace, heard: HeardAt, shows: bool) -> Result<Read> {
         let mut read = overview::judge(place, &self.limits, heard, shows)?;
         let Some((baselines, past)) = &self.taught else { return Ok(read) };
         match (past, vehicle(&read.judged, read.format)) {
@@ -99,7 +99,7 @@ pub fn learn(limits: &Limits, places: &[LogPlace]) -> Result<Baselines> {
 fn learnt(limits: &Limits, places: &[LogPlace]) -> Result<(Baselines, Option<Vehicle>)> {
     let (mut baselines, mut first) = (Baselines::default(), None::<(&str, Vehicle)>);
     for place in places {
-        let mut read = overview::judge(place, limits, ReceptionPlace::Somewhere, false)?;
+        let mut read = overview::judge(place, limits, HeardAt::Somewhere, false)?;
         read.judged.judge_trends(&mut baselines);
         let Some(own) = vehicle(&read.judged, read.format) else { continue };
         let (title, vehicle) = first.get_or_insert((&place.title, own));

@@ -21,7 +21,7 @@ use crate::part;
 use crate::plural::count;
 use crate::printable::word;
 use crate::soundness::Soundness;
-use crate::source::item::{Cause, FactSubject, Gap};
+use crate::source::item::{Cause, FactKind, Gap};
 use crate::source::recording::Format;
 use crate::states::{ShownValue, Values, meaning, quantity, shown};
 use crate::summary::since_power_on;
@@ -50,7 +50,7 @@ pub fn screen(checked: &Checked, mention: UnjudgedList) -> String {
     let judged = &checked.judged;
     let mut text = format!("{}: {}{}\n", word(&checked.name), word(&verdict(judged)), but(checked));
     let has_data = judged.worst().is_some() && judged.checks().judged > 0;
-    if has_data || judged.facts.contains_key(&FactSubject::Firmware) {
+    if has_data || judged.facts.contains_key(&FactKind::Firmware) {
         let _ = writeln!(text, "  log      {}", checked.format.words());
         let _ = writeln!(text, "  vehicle  {}", word(&vehicle(judged)));
         let _ = writeln!(text, "  when     {}", when(checked));
@@ -206,17 +206,17 @@ fn vehicle(judged: &Judgement) -> String {
     let Some((source, heartbeat)) = judged.vehicle().source.zip(judged.vehicle().heartbeat.get()) else {
         let firmware = judged
             .facts
-            .get(&FactSubject::Firmware)
+            .get(&FactKind::Firmware)
             .map(|firmware| format!("{firmware}, of which nothing was heard"));
         return firmware.or_else(|| judged.unheard()).unwrap_or_default();
     };
-    let told = judged.facts.get(&FactSubject::Firmware).cloned();
+    let told = judged.facts.get(&FactKind::Firmware).cloned();
     let firmware = told.unwrap_or_else(|| {
         let version = judged.vehicle().identity.get().and_then(|identity| firmware(identity.firmware));
         format!("{} {}", autopilot_name(heartbeat.autopilot_number), version.unwrap_or_default())
     });
     let mut text = format!("{}, {}", type_name(heartbeat.type_number), firmware.trim_end());
-    if let Some(hardware) = judged.facts.get(&FactSubject::Hardware) {
+    if let Some(hardware) = judged.facts.get(&FactKind::Hardware) {
         let _ = write!(text, ", {hardware}");
     }
     let _ = write!(text, ", system {}", source.system);
@@ -254,7 +254,7 @@ fn when(checked: &Checked) -> String {
 
 fn in_air(checked: &Checked) -> String {
     let judged = &checked.judged;
-    let told = judged.facts.get(&FactSubject::Arming).map(String::as_str).filter(|words| !words.is_empty());
+    let told = judged.facts.get(&FactKind::Arming).map(String::as_str).filter(|words| !words.is_empty());
     let armed = clock(judged.armed);
     if judged.worst().is_none() {
         return "not known".to_owned();

@@ -18,7 +18,7 @@
 //! Wear never improves hover or battery: a flight better beyond its reach begins a new baseline, because a part was changed.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::ComponentReason;
+use hums_blackbox::record::RecordReason;
 use hums_core::Monitor;
 use hums_core::clock::Instant;
 use hums_core::component::ComponentKind;
@@ -54,7 +54,7 @@ pub(super) fn because(effect: &Problem, others: &[Problem]) -> Option<String> {
 
 pub(super) fn is_change(record: &Record<'_>) -> bool {
     match record {
-        Record::Component(part) => part.why == ComponentReason::Replaced && part.kind != ComponentKind::Card,
+        Record::Component(part) => part.why == RecordReason::Replaced && part.kind != ComponentKind::Card,
         Record::Event(event) => event.text.starts_with(PARTS_CHANGED),
         _ => false,
     }

@@ -16,7 +16,7 @@ use crate::format::{Files, Finished, FormatDetails, Totals, Writer};
 use crate::made::OutputFile;
 use crate::mavlink::values::Scalar;
 use crate::reference::{MOTORS, Quantity, Reference};
-use crate::story::{Story, WaitingObservation};
+use crate::story::{HeldObservation, Story};
 
 /// After a silence of this length, the vehicle's values do not count for the second.
 const SILENCE_MAX: Span = Span::from_secs(10);
@@ -43,7 +43,7 @@ pub(super) struct Thesis {
 }
 
 impl Thesis {
-    fn observe(&mut self, context: &Context, observed: &WaitingObservation) -> Result<()> {
+    fn observe(&mut self, context: &Context, observed: &HeldObservation) -> Result<()> {
         let at_us = observed.at.as_micros();
         let mut next = *self.next.get_or_insert(at_us.next_multiple_of(SECOND_US));
         while next <= at_us {

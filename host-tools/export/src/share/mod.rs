@@ -31,7 +31,7 @@ use crate::printable;
 use crate::source::find::find;
 use crate::source::item::{Item, Needs};
 use crate::source::recording::LogPlace;
-use crate::story::{Story, StoryEntry, WaitingObservation};
+use crate::story::{HeldObservation, Story, StoryEntry};
 use moved::{Displacement, SHARED_UTC_US};
 use rules::{Rule, Rules};
 
@@ -255,7 +255,7 @@ impl Share {
                     Some(observation) => {
                         self.kept += 1;
                         let source = Source { system: self.system(source.system), ..source };
-                        story.observed.push(WaitingObservation { at, source, observation });
+                        story.observed.push(HeldObservation { at, source, observation });
                     }
                     None => self.remove(OBSERVATIONS),
                 },

@@ -1,6 +1,6 @@
 //! The proof of a log's end.
 
-use hums_blackbox::record::{MarkReason, PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, MarkReason, PreviousEnd};
 use hums_core::clock::Instant;
 
 use crate::logs::reader::LogSummary;
@@ -44,7 +44,7 @@ pub enum Teller {
 
 impl Proof {
     /// Proof by the log, and by the next start's record if known.
-    pub fn of(summary: &LogSummary, next: Option<&PreviousSession>) -> Self {
+    pub fn of(summary: &LogSummary, next: Option<&LastSession>) -> Self {
         let next = next.filter(|next| next.has_end() && Some(next.session) == summary.session);
         let sectors = summary.last_number.map_or(0, |last| last.wrapping_add(1));
         let whole = sectors.saturating_sub(u32::from(summary.ends_partial));
@@ -192,12 +192,12 @@ mod tests {
             frames_end: Some(3047),
             ..LogSummary::default()
         };
-        let next = |frames| PreviousSession {
+        let next = |frames| LastSession {
             found: PreviousEnd::Frames,
             session: 7,
             sectors: 26,
             frames,
-            ..PreviousSession::default()
+            ..LastSession::default()
         };
         let short = Proof::Short { sectors: 0, frames: Some(17), by: Teller::NextStart };
         assert_eq!(Proof::of(&summary, Some(&next(3064))), short);

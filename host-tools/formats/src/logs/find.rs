@@ -18,10 +18,7 @@ use crate::files::{is_seekable, why_unread};
 /// an error.
 pub fn find(inputs: &[PathBuf], salvage: bool) -> Result<FoundLogs> {
     search(inputs, salvage, |input| {
-        bail!(
-            "{}: no log of HUMS is in there; name a card, its image, or a folder of .HUM files",
-            input.display()
-        )
+        bail!("{}: has no log of HUMS; name a card or .HUM file", input.display())
     })
 }
 

@@ -1,7 +1,7 @@
 //! Facts from a log's own records.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::{MarkReason, PreviousEnd, PreviousSession};
+use hums_blackbox::record::{LastSession, MarkReason, PreviousEnd};
 use hums_core::clock::Instant;
 
 use crate::loss::lost;
@@ -36,7 +36,7 @@ pub struct Marks {
     /// Lost frames and records, by the recorder.
     pub lost: u64,
     /// The log before, by the last boot record.
-    pub before: Option<PreviousSession>,
+    pub before: Option<LastSession>,
     /// Packed on a PC.
     pub packed: bool,
     /// Recorded by a box.

@@ -103,14 +103,14 @@ pub struct Event<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fact<'a> {
     /// The subject.
-    pub about: FactSubject,
+    pub about: FactKind,
     /// Untrusted.
     pub words: &'a str,
 }
 
 /// The subject of a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FactSubject {
+pub enum FactKind {
     /// `ArduCopter V4.6.0 (3fc7011a)`.
     Firmware,
     /// The autopilot's hardware: `PX4_FMU_V5`.
@@ -392,25 +392,20 @@ impl Rows<'_> {
 }
 
 /// An error ends the reading; [`Stop`] is not a failure.
-pub type ItemReceiver<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
+pub type ItemSink<'a> = dyn FnMut(Instant, Item<'_>) -> Result<()> + 'a;
 
 /// A text or event after its alert, if observations are wanted.
-pub fn hand_said(
-    at: Instant,
-    item: Item<'_>,
-    want_observations: bool,
-    take: &mut ItemReceiver<'_>,
-) -> Result<()> {
+pub fn hand_said(at: Instant, item: Item<'_>, observes: bool, take: &mut ItemSink<'_>) -> Result<()> {
     if let Item::Text(Text { source, alert: Some(alert), .. })
     | Item::Event(Event { source, alert: Some(alert), .. }) = item
-        && want_observations
+        && observes
     {
         take(at, Item::Observation(source, &Observation::Alert(alert)))?;
     }
     take(at, item)
 }
 
-/// A [`ItemReceiver`] has had enough.
+/// A [`ItemSink`] has had enough.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stop;
 
@@ -472,5 +467,5 @@ pub struct RecordingSummary {
 /// Reads one recording.
 pub trait Reader: Send {
     /// Reads it from its beginning to its end.
-    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary>;
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary>;
 }

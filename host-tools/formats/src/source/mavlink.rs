@@ -12,7 +12,7 @@ use super::checksums::Checksums;
 use super::counts::Counts;
 use super::daytime::Daytime;
 use super::input::Input;
-use super::item::{Cause, Fact, FactSubject, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary};
+use super::item::{Cause, Fact, FactKind, Gap, Item, ItemSink, Needs, Reader, RecordingSummary};
 use super::pace::Pace;
 use super::paced::PacedSource;
 use super::raw::Raw;
@@ -44,7 +44,7 @@ impl TlogReader {
 }
 
 impl Reader for TlogReader {
-    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), FrameReports::default(), Counts::new());
         let mut times = Times::default();
         let mut checksums = Checksums::default();
@@ -102,7 +102,7 @@ impl Reader for TlogReader {
             take(times.now(), Item::Gap(&gap))?;
         }
         if let Some(words) = checksums.words() {
-            take(times.now(), Item::Fact(Fact { about: FactSubject::Unchecked, words: &words }))?;
+            take(times.now(), Item::Fact(Fact { about: FactKind::Unchecked, words: &words }))?;
         }
         let summary = summary(counts);
         let frames = summary.messages.iter().map(|message| message.amount.count).sum();
@@ -123,7 +123,7 @@ struct Noise {
 }
 
 impl Noise {
-    fn tell(self, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn tell(self, take: &mut ItemSink<'_>) -> Result<()> {
         let (cause, what) = if self.is_cut {
             (Cause::Cut, "a record that the end cuts off")
         } else {
@@ -147,14 +147,14 @@ impl RawReader {
 }
 
 impl Reader for RawReader {
-    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         let (mut framer, mut said, mut counts) = (Framer::new(), FrameReports::default(), Counts::new());
         let mut line = Instant::ZERO;
         let (mut times, mut blocks) = (BootTimes::default(), BlockFinder::default());
         let (mut pace, mut bytes) = (Pace::default(), 0);
         let (mut daytime, mut strays) = (Daytime::default(), Strays::default());
         let now = std::cell::Cell::new(Instant::ZERO);
-        let mut each = |line, frame: hums_link::Frame<'_>, take: &mut ItemReceiver<'_>| {
+        let mut each = |line, frame: hums_link::Frame<'_>, take: &mut ItemSink<'_>| {
             counts.add(frame.id(), true, frame.bytes().len());
             let (at, begins) = times.at(line, &frame);
             now.set(at);
@@ -254,13 +254,13 @@ impl Strays {
         }
     }
 
-    fn tell(self, now: Instant, others: u64, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn tell(self, now: Instant, others: u64, take: &mut ItemSink<'_>) -> Result<()> {
         if self.words > 0 {
             let words = format!(
                 "{} at its beginning are words and no frame, as of an autopilot that boots: nothing is lost",
                 count(self.words, "byte")
             );
-            take(now, Item::Fact(Fact { about: FactSubject::Beginning, words: &words }))?;
+            take(now, Item::Fact(Fact { about: FactKind::Beginning, words: &words }))?;
         }
         let noise = self.bytes.saturating_sub(self.words + others);
         if noise > 0 {

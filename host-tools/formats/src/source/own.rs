@@ -10,7 +10,7 @@ use hums_link::{Check, Frame, observe};
 use super::checksums::wrong_checksums;
 use super::counts::Counts;
 use super::input::Progress;
-use super::item::{Cause, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary};
+use super::item::{Cause, Gap, Item, ItemSink, Needs, Reader, RecordingSummary};
 use super::parts::{ItemCollector, PartReceiver};
 use super::said::FrameReports;
 use crate::ending::Ending;
@@ -76,7 +76,7 @@ impl OwnReader {
         want: Needs<'_>,
         new: impl Fn() -> C + Sync,
         deliver: &mut impl PartReceiver<C>,
-        take: &mut ItemReceiver<'_>,
+        take: &mut ItemSink<'_>,
         seen: impl FnMut(u64),
     ) -> Result<RecordingSummary> {
         let in_order = Needs { observations: true, system: want.system, ..Needs::default() };
@@ -94,7 +94,7 @@ impl OwnReader {
 }
 
 impl Reader for OwnReader {
-    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         if let Some(epoch) = epoch(&self.log)? {
             take(Instant::ZERO, Item::Epoch(epoch))?;
         }
@@ -252,7 +252,7 @@ impl<C, D: PartReceiver<C>> PartReceiver<Both<C>> for BothForwarder<'_, '_, '_, 
 
 struct ItemForwarder<'a, 'b> {
     want: Needs<'a>,
-    take: &'a mut ItemReceiver<'b>,
+    take: &'a mut ItemSink<'b>,
     said: FrameReports,
     /// Losses until recording goes on: there is a record for each second.
     lost: Option<(Instant, Loss)>,

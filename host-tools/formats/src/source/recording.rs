@@ -10,7 +10,7 @@ use hums_core::clock::Instant;
 
 use super::format::{Detected, KNOWN, LOOK_BYTES, detect, hint};
 use super::input::{Input, Progress};
-use super::item::{Cause, Gap, Item, ItemReceiver, Needs, Reader, RecordingSummary, Stop};
+use super::item::{Cause, Gap, Item, ItemSink, Needs, Reader, RecordingSummary, Stop};
 use super::mavlink::{RawReader, TlogReader};
 use super::own::OwnReader;
 use super::parts::{ItemCollector, PART_BYTES, PART_ITEMS, PartReceiver};
@@ -142,7 +142,7 @@ impl LogPlace {
         want: Needs<'_>,
         new: impl Fn() -> C + Sync,
         deliver: &mut impl PartReceiver<C>,
-        take: &mut ItemReceiver<'_>,
+        take: &mut ItemSink<'_>,
     ) -> Result<RecordingSummary> {
         let bar = progress::bytes(Some(log.bytes()), &self.title);
         let want = Needs { system: self.system, ..want };
@@ -245,7 +245,7 @@ impl Recording {
     }
 
     /// Reads until the end, or until `take` returns [`Stop`].
-    pub fn read(mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    pub fn read(mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         let want = Needs { system: self.system, ..want };
         let (mut last, mut is_takers, mut seen) = (Instant::ZERO, false, Seen::default());
         let mut follow = |at: Instant, item: Item<'_>| {

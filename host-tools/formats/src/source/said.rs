@@ -10,7 +10,7 @@ use hums_link::packet::Fields;
 use hums_link::{Check, Frame, LongTexts, observe};
 
 use super::dataflash::is_firmware;
-use super::item::{AUTOPILOT, Event, Fact, FactSubject, Item, ItemReceiver, Mode, Needs, Parameter, Text};
+use super::item::{AUTOPILOT, Event, Fact, FactKind, Item, ItemSink, Mode, Needs, Parameter, Text};
 use crate::mavlink::ids::{EVENT, PARAM_VALUE, STATUSTEXT};
 use crate::statustext::{self, Texts};
 
@@ -28,7 +28,7 @@ impl FrameReports {
         at: Instant,
         frame: &Frame<'_>,
         want: Needs<'_>,
-        take: &mut ItemReceiver<'_>,
+        take: &mut ItemSink<'_>,
     ) -> Result<()> {
         if want.leaves_out(frame.source()) {
             return Ok(());
@@ -71,11 +71,11 @@ impl FrameReports {
     }
 
     /// The recording ends.
-    pub(super) fn end(&mut self, take: &mut ItemReceiver<'_>) -> Result<()> {
+    pub(super) fn end(&mut self, take: &mut ItemSink<'_>) -> Result<()> {
         hand_texts(take, |hand| self.texts.end(&mut |text| hand(text)))
     }
 
-    fn text(&mut self, at: Instant, frame: &Frame<'_>, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn text(&mut self, at: Instant, frame: &Frame<'_>, take: &mut ItemSink<'_>) -> Result<()> {
         let Some(text) = statustext::StatusText::of(at, frame.source(), frame.payload()) else {
             return Ok(());
         };
@@ -84,7 +84,7 @@ impl FrameReports {
 }
 
 fn hand_texts(
-    take: &mut ItemReceiver<'_>,
+    take: &mut ItemSink<'_>,
     make: impl FnOnce(&mut dyn FnMut(statustext::StatusText)),
 ) -> Result<()> {
     let mut result = Ok(());
@@ -97,17 +97,17 @@ fn hand_texts(
 }
 
 /// `ArduPilot` names its firmware in a text, when parameters are requested (`send_banner`).
-fn hand_text(text: &statustext::StatusText, take: &mut ItemReceiver<'_>) -> Result<()> {
+fn hand_text(text: &statustext::StatusText, take: &mut ItemSink<'_>) -> Result<()> {
     let words = text.words.as_str();
     if text.source.component == AUTOPILOT && is_firmware(words) {
-        take(text.at, Item::Fact(Fact { about: FactSubject::Firmware, words }))?;
+        take(text.at, Item::Fact(Fact { about: FactKind::Firmware, words }))?;
     }
     let statustext::StatusText { source, severity, alert, .. } = *text;
     take(text.at, Item::Text(Text { source, severity, words, alert }))
 }
 
 /// Number, name if known, external level. From 8 on it is not for people.
-fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut ItemReceiver<'_>) -> Result<()> {
+fn event(at: Instant, frame: &Frame<'_>, alert: Option<Alert>, take: &mut ItemSink<'_>) -> Result<()> {
     let fields = Fields(frame.payload());
     let (number, severity) = (fields.u32(0), fields.u8(12) & 0xF);
     let words = event_name(number).unwrap_or_default();
@@ -144,7 +144,7 @@ mod tests {
         let frame = Frame::parse(bytes).expect("a frame of ours");
         let (mut said, mut firmware) = (FrameReports::default(), None);
         let mut take = |_: Instant, item: Item<'_>| {
-            if let Item::Fact(Fact { about: FactSubject::Firmware, words }) = item {
+            if let Item::Fact(Fact { about: FactKind::Firmware, words }) = item {
                 firmware = Some(words.to_owned());
             }
             Ok(())

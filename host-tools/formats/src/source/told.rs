@@ -1,7 +1,7 @@
 //! A HUMS log's records besides frames.
 
 use hums_blackbox::Record;
-use hums_blackbox::record::{ComponentReason, FindingRecord, LossKind};
+use hums_blackbox::record::{FindingRecord, LossKind, RecordReason};
 use hums_core::clock::Instant;
 use hums_core::component::{COMPONENTS_MAX, Component, Label};
 use hums_core::health::{self, Level, Subsystem};
@@ -155,7 +155,7 @@ impl MonitorRecord {
                 (component.kind, component.number) = (recorded.kind, recorded.number);
                 component.replaced = recorded.replaced.try_into().unwrap_or(u16::MAX);
                 component.name = Label::new(recorded.name);
-                if recorded.why == ComponentReason::Replaced {
+                if recorded.why == RecordReason::Replaced {
                     component.serial = Label::new(recorded.new_serial);
                 } else {
                     component.serial = Label::new(recorded.serial);

@@ -46,7 +46,7 @@ pub fn start(target: Target, queue: Arc<Queue>) -> Result<JoinHandle<()>> {
     let thread = std::thread::Builder::new().name("influx".to_owned());
     thread
         .spawn(move || write_all(&agent, &target, &queue))
-        .context("--influx: a thread cannot be started; close other programs")
+        .context("--influx: no thread; close other programs")
 }
 
 fn write_all(agent: &Agent, target: &Target, queue: &Queue) {

@@ -63,10 +63,7 @@ pub(super) fn run(run: &cli::Sim, firmware: &Path) -> Result<Outcome> {
     tell(&mut report, &board.traffic(), frames, &on_card);
     report.blocks_written = medium.writes();
     if run.costs {
-        report.cycles =
-            Some(board.stage_cycles().context(
-                "--costs needs an ELF file of this version's firmware; `cargo xtask dist` makes it",
-            )?);
+        report.cycles = Some(board.stage_cycles().context("--costs needs an ELF file of this version's")?);
         report.stack_by_urgency = Some(board.stack_by_urgency());
         report.busy_percent_max = Some(board.busy_percent_max());
     }

@@ -169,7 +169,7 @@ impl Ftp {
                     .context("the box's list has a file without a length; call again")?;
                 // A plain file name in our directory.
                 if name.contains(['/', '\\']) || name.starts_with('.') {
-                    bail!("the box's list has an invalid file name, {name:?}; read the card itself");
+                    bail!("invalid file name in the box's list: {name:?}; read the card");
                 }
                 logs.push((
                     name.to_owned(),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use hums::check::causes::causes as causes_of;
 use hums::check::flights::Flight;
-use hums::check::judge::{Limits, ReceptionPlace};
+use hums::check::judge::{HeardAt, Limits};
 use hums::check::judged::Judgement;
 use hums::check::trends::Baselines;
 use hums::names::{autopilot_name, counter_name, type_name};
@@ -75,7 +75,7 @@ pub(super) fn count<'a>(alarms: impl IntoIterator<Item = &'a False>, level: Leve
 /// Judges one flight.
 pub(super) fn judge(place: &LogPlace, label: Option<&Label>) -> Result<Outcome> {
     // Labelled flights come from a telemetry port.
-    let heard = if label.is_some() { ReceptionPlace::OnTheWire } else { ReceptionPlace::Somewhere };
+    let heard = if label.is_some() { HeardAt::OnTheWire } else { HeardAt::Somewhere };
     let past = label.map_or(&[][..], |label| &label.past);
     let mut judged = hums::check::recording(place, &Limits::default(), heard)?.judged;
     if !past.is_empty() {

@@ -19,7 +19,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
-use hums::check::judge::{Limits, ReceptionPlace};
+use hums::check::judge::{HeardAt, Limits};
 use hums::check::judged::Judgement;
 use hums::names::vocabulary;
 use hums::source::recording::LogPlace;
@@ -227,7 +227,7 @@ fn read(folder: &Path, text: &str, flights: &mut BTreeMap<String, Flight>) -> Re
 pub(super) fn judge(set: &Set) -> Result<Results> {
     let outcomes = set.flights.par_iter().with_max_len(1).map(|flight| {
         let place = LogPlace::file(&flight.path);
-        let recording = hums::check::recording(&place, &Limits::default(), ReceptionPlace::Somewhere);
+        let recording = hums::check::recording(&place, &Limits::default(), HeardAt::Somewhere);
         Ok(of(flight, &recording.with_context(|| flight.name.clone())?.judged))
     });
     Ok(Results { name: set.name.clone(), known: set.known, outcomes: outcomes.collect::<Result<_>>()? })

@@ -11,7 +11,7 @@ use hums_link::request::Reply;
 use hums_recorder::LogName;
 
 use super::builtin::BuiltinFile;
-use super::step::{LibraryOutput, LibraryStep};
+use super::step::{JobOut, JobStep};
 use crate::shelf::{Answer, LogId, NoLog, RequestedLog, RequestedPart};
 
 /// Bytes of one burst, in messages of the longest data. The client then asks for the next one, so a client that has
@@ -138,51 +138,51 @@ impl Job {
         &mut self,
         answer: Option<(&Answer, &[u8])>,
         open: &mut Option<Open>,
-        out: &mut LibraryOutput<'_, '_, '_>,
-    ) -> LibraryStep {
+        out: &mut JobOut<'_, '_, '_>,
+    ) -> JobStep {
         let mut buffer = [0; ftp::HEAD + ftp::DATA_MAX];
         let Self { reply, kind } = self;
         match (*kind, answer) {
-            (Kind::Say(None), _) => out.file(reply.ack(&[], &mut buffer), LibraryStep::Done),
-            (Kind::Say(Some(error)), _) => out.file(reply.nak(error, &mut buffer), LibraryStep::Done),
+            (Kind::Say(None), _) => out.file(reply.ack(&[], &mut buffer), JobStep::Done),
+            (Kind::Say(Some(error)), _) => out.file(reply.nak(error, &mut buffer), JobStep::Done),
             // An entry without a name has its place in the list; without a directory there is no list.
             (Kind::List(_), Some((answer, _))) if answer.found == Err(NoLog::Unread) && answer.count > 0 => {
-                out.file(reply.ack(b"S\0", &mut buffer), LibraryStep::Done)
+                out.file(reply.ack(b"S\0", &mut buffer), JobStep::Done)
             }
             // The card cannot read it now. The client asks again.
             (_, Some((answer, _))) if answer.found == Err(NoLog::Unread) => {
-                out.file(reply.nak(Error::Fail, &mut buffer), LibraryStep::Done)
+                out.file(reply.nak(Error::Fail, &mut buffer), JobStep::Done)
             }
             (Kind::List(_), Some((answer, _))) if answer.found.is_err() => {
-                out.file(reply.nak(Error::EndOfFile, &mut buffer), LibraryStep::Done)
+                out.file(reply.nak(Error::EndOfFile, &mut buffer), JobStep::Done)
             }
             (Kind::List(_), Some((answer, _))) => {
                 let mut text = heapless::String::<40>::new();
                 // Fits: 12 characters of a name and at most 10 digits.
                 let _ = write!(text, "F{}\t{}\0", answer.log.name, answer.bytes);
-                out.file(reply.ack(text.as_bytes(), &mut buffer), LibraryStep::Done)
+                out.file(reply.ack(text.as_bytes(), &mut buffer), JobStep::Done)
             }
             (Kind::Open(_) | Kind::Checksum { .. }, Some((answer, _))) if answer.found.is_err() => {
-                out.file(reply.nak(Error::FileNotFound, &mut buffer), LibraryStep::Done)
+                out.file(reply.nak(Error::FileNotFound, &mut buffer), JobStep::Done)
             }
             (Kind::Open(_), Some((answer, _))) => {
                 *open = Some(Open::Log(answer.log));
-                out.file(reply.ack(&answer.bytes.to_le_bytes(), &mut buffer), LibraryStep::Done)
+                out.file(reply.ack(&answer.bytes.to_le_bytes(), &mut buffer), JobStep::Done)
             }
             (Kind::Checksum { name, bytes, sum: None }, Some((answer, data))) => {
                 reply.offset = answer.offset;
                 let sum = data.first_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
                 // It is not computed again if the port is full now.
                 *kind = Kind::Checksum { name, bytes, sum: Some(sum) };
-                out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), LibraryStep::Done)
+                out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), JobStep::Done)
             }
             (Kind::Checksum { sum: Some(sum), .. } | Kind::Number(sum), _) => {
-                out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), LibraryStep::Done)
+                out.file(reply.ack(&sum.to_le_bytes(), &mut buffer), JobStep::Done)
             }
             (Kind::Read { of, .. } | Kind::Burst { of, .. }, Some((answer, _))) if answer.found.is_err() => {
                 let step =
-                    out.file(reply.nak(Error::FileNotFound, &mut buffer), LibraryStep::End(Reply::LogGone));
-                if step != LibraryStep::Wait && *open == Some(of) {
+                    out.file(reply.nak(Error::FileNotFound, &mut buffer), JobStep::End(Reply::LogGone));
+                if step != JobStep::Wait && *open == Some(of) {
                     *open = None;
                 }
                 step
@@ -201,7 +201,7 @@ impl Job {
                 let rest = bytes.get(self.reply.offset as usize..).unwrap_or_default();
                 self.read(bytes.len() as u32, rest, &mut buffer, out)
             }
-            (_, None) => LibraryStep::Done,
+            (_, None) => JobStep::Done,
         }
     }
 
@@ -216,39 +216,37 @@ impl Job {
         bytes: u32,
         data: &[u8],
         buffer: &mut [u8; ftp::HEAD + ftp::DATA_MAX],
-        out: &mut LibraryOutput<'_, '_, '_>,
-    ) -> LibraryStep {
+        out: &mut JobOut<'_, '_, '_>,
+    ) -> JobStep {
         let Self { reply, kind } = self;
         let (asked, mut left) = match *kind {
             Kind::Burst { size, left, .. } => (usize::from(size), left),
             Kind::Read { size, .. } => (usize::from(size), 0),
-            _ => return LibraryStep::Done,
+            _ => return JobStep::Done,
         };
         let (size, is_burst) = (asked.min(out.file_data_max()), reply.opcode == ftp::BURST);
         let mut rest = data;
         loop {
             if reply.offset >= bytes {
-                return out.file(reply.nak(Error::EndOfFile, buffer), LibraryStep::Done);
+                return out.file(reply.nak(Error::EndOfFile, buffer), JobStep::Done);
             }
             let piece = rest.get(..size).unwrap_or(rest);
             let end = reply.offset.saturating_add(piece.len() as u32);
             if is_burst && left == 0 {
                 reply.complete = true;
-                return out.file(reply.ack(&[], buffer), LibraryStep::Done);
+                return out.file(reply.ack(&[], buffer), JobStep::Done);
             }
             if data.is_empty() {
-                return out.file(reply.nak(Error::Fail, buffer), LibraryStep::Done);
+                return out.file(reply.nak(Error::Fail, buffer), JobStep::Done);
             }
             if piece.len() < size && end < bytes {
-                return LibraryStep::Next;
+                return JobStep::Next;
             }
             let is_last = left <= piece.len() as u32;
             reply.complete = is_burst && is_last && piece.len() == asked;
             let is_done = reply.complete || !is_burst;
-            match out
-                .file(reply.ack(piece, buffer), if is_done { LibraryStep::Done } else { LibraryStep::Next })
-            {
-                LibraryStep::Next => {
+            match out.file(reply.ack(piece, buffer), if is_done { JobStep::Done } else { JobStep::Next }) {
+                JobStep::Next => {
                     left = left.saturating_sub(piece.len() as u32);
                     if let Kind::Burst { left: kept, .. } = kind {
                         *kept = left;

@@ -8,7 +8,7 @@
 use hums_link::messages;
 use hums_link::request::Reply;
 
-use super::step::{LibraryOutput, LibraryStep};
+use super::step::{JobOut, JobStep};
 use crate::shelf::{Answer, LogId, NoLog, RequestedLog, RequestedPart};
 
 const DATA_BYTES: usize = 90;
@@ -65,11 +65,11 @@ impl Places {
     }
 
     /// Reports a refusal once, until there is a list or a download again: a client may repeat its request for ever.
-    fn refuse(&mut self) -> LibraryStep {
+    fn refuse(&mut self) -> JobStep {
         if core::mem::replace(&mut self.told, true) {
-            LibraryStep::Done
+            JobStep::Done
         } else {
-            LibraryStep::End(Reply::LogsChanged)
+            JobStep::End(Reply::LogsChanged)
         }
     }
 }
@@ -91,8 +91,8 @@ impl List {
         (RequestedLog::At(self.next), RequestedPart::Length)
     }
 
-    const fn end(&self) -> LibraryStep {
-        if self.lacks { LibraryStep::End(Reply::LogsUnread) } else { LibraryStep::Done }
+    const fn end(&self) -> JobStep {
+        if self.lacks { JobStep::End(Reply::LogsUnread) } else { JobStep::Done }
     }
 
     /// `LOG_ENTRY`
@@ -100,8 +100,8 @@ impl List {
         &mut self,
         answer: &Answer,
         places: &mut Places,
-        out: &mut LibraryOutput<'_, '_, '_>,
-    ) -> LibraryStep {
+        out: &mut JobOut<'_, '_, '_>,
+    ) -> JobStep {
         let count = answer.count;
         if answer.found == Err(NoLog::Unread) {
             self.lacks = true;
@@ -119,14 +119,14 @@ impl List {
             return if count == 0 { out.say(&none, self.end()) } else { self.end() };
         }
         let is_last = self.next >= self.last || self.next + 1 >= count;
-        let then = if is_last { self.end() } else { LibraryStep::Next };
+        let then = if is_last { self.end() } else { JobStep::Next };
         let step = match answer.found {
             Ok(()) => out
                 .say(&messages::log_entry(self.next + 1, count, count, answer.bytes, answer.utc_secs), then),
             // Its length is unknown.
             Err(_) => then,
         };
-        if step == LibraryStep::Next {
+        if step == JobStep::Next {
             self.next += 1;
         }
         step
@@ -157,19 +157,19 @@ impl Data {
         &mut self,
         (answer, data): (&Answer, &[u8]),
         places: &mut Places,
-        out: &mut LibraryOutput<'_, '_, '_>,
-    ) -> LibraryStep {
+        out: &mut JobOut<'_, '_, '_>,
+    ) -> JobStep {
         match self.which {
             // The card cannot read it now. The client asks again.
-            _ if answer.found == Err(NoLog::Unread) => return LibraryStep::Done,
+            _ if answer.found == Err(NoLog::Unread) => return JobStep::Done,
             RequestedLog::Same(_) if answer.found.is_err() => {
                 places.lose(self.id);
-                return LibraryStep::End(Reply::LogGone);
+                return JobStep::End(Reply::LogGone);
             }
             RequestedLog::Same(_) => {}
             _ if !places.is_listed(self.offset, answer.directory) => return places.refuse(),
             _ if answer.found.is_err() => {
-                return out.say(&messages::log_data(self.id, self.offset, &[]), LibraryStep::Done);
+                return out.say(&messages::log_data(self.id, self.offset, &[]), JobStep::Done);
             }
             _ => {
                 places.bind(self.id, answer.log);
@@ -178,12 +178,12 @@ impl Data {
         }
         if data.is_empty() && self.offset < answer.bytes {
             // As above.
-            return LibraryStep::Done;
+            return JobStep::Done;
         }
         self.send(answer, data, out)
     }
 
-    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut LibraryOutput<'_, '_, '_>) -> LibraryStep {
+    fn send(&mut self, answer: &Answer, data: &[u8], out: &mut JobOut<'_, '_, '_>) -> JobStep {
         // Sent before the port was full.
         let mut rest = data.get(self.offset.wrapping_sub(answer.offset) as usize..).unwrap_or_default();
         loop {
@@ -191,13 +191,13 @@ impl Data {
             let piece = rest.get(..wanted).unwrap_or(rest);
             // Short, but the log goes on: the next answer has the rest.
             if piece.len() < wanted && self.offset.saturating_add(piece.len() as u32) < answer.bytes {
-                return LibraryStep::Next;
+                return JobStep::Next;
             }
             let is_last =
                 piece.len() < DATA_BYTES || self.offset.saturating_add(DATA_BYTES as u32) >= self.end;
             let packet = messages::log_data(self.id, self.offset, piece);
-            match out.say(&packet, if is_last { LibraryStep::Done } else { LibraryStep::Next }) {
-                LibraryStep::Next => {
+            match out.say(&packet, if is_last { JobStep::Done } else { JobStep::Next }) {
+                JobStep::Next => {
                     self.offset = self.offset.saturating_add(piece.len() as u32);
                     rest = rest.get(piece.len()..).unwrap_or_default();
                 }
@@ -238,7 +238,7 @@ mod tests {
     fn what_was_never_listed_may_be_begun_but_not_gone_on_with() {
         let mut places = Places::new();
         assert!(places.is_listed(0, 7) && !places.is_listed(90, 7));
-        assert_eq!(places.refuse(), LibraryStep::End(Reply::LogsChanged));
-        assert_eq!(places.refuse(), LibraryStep::Done, "it is told once");
+        assert_eq!(places.refuse(), JobStep::End(Reply::LogsChanged));
+        assert_eq!(places.refuse(), JobStep::Done, "it is told once");
     }
 }

@@ -19,9 +19,9 @@ use hums_link::request::{Port, Reply, Request};
 
 use self::file::Open;
 use self::log::Places;
-use self::step::{LibraryOutput, LibraryStep};
+use self::step::{JobOut, JobStep};
 use super::limiter::Requester;
-use super::ways::PortOutlets;
+use super::ways::Outlets;
 use crate::shelf::{Answered, LogRequest, RequestedLog, RequestedPart};
 
 /// Answers looked at in one call. The port's budget limits them too.
@@ -105,7 +105,7 @@ impl Library {
         self.begin(asker, Kind::File(file));
     }
 
-    pub(crate) fn lend(&mut self, now: Instant, ways: &mut PortOutlets) -> Option<(Port, Reply)> {
+    pub(crate) fn lend(&mut self, now: Instant, ways: &mut Outlets) -> Option<(Port, Reply)> {
         if self.erases {
             let ticket = self.next_ticket();
             self.erases = !ways.queues.shelf.want(LogRequest {
@@ -124,18 +124,18 @@ impl Library {
                 Some(want) => Some(self.answered(want, ways)?),
                 None => None,
             };
-            let mut out = LibraryOutput { now, asker: job.asker, ways };
+            let mut out = JobOut { now, asker: job.asker, ways };
             let step = self.step(&mut job, answered.as_ref(), &mut out);
-            let goes_on = matches!(step, LibraryStep::Wait | LibraryStep::Next);
+            let goes_on = matches!(step, JobStep::Wait | JobStep::Next);
             self.job = goes_on.then_some(job);
-            if step == LibraryStep::Wait {
+            if step == JobStep::Wait {
                 return None;
             }
             self.asked = false;
             if answered.is_some() {
                 ways.queues.shelf.release();
             }
-            if let LibraryStep::End(reply) = step {
+            if let JobStep::End(reply) = step {
                 return Some((job.asker.port, reply));
             }
         }
@@ -145,7 +145,7 @@ impl Library {
     fn answered(
         &mut self,
         (which, what): (RequestedLog, RequestedPart),
-        ways: &mut PortOutlets,
+        ways: &mut Outlets,
     ) -> Option<Answered> {
         let seen = ways.queues.shelf.answer(self.ticket).cloned();
         if seen.is_none() && !self.asked {
@@ -155,18 +155,13 @@ impl Library {
         seen
     }
 
-    fn step(
-        &mut self,
-        job: &mut Job,
-        answered: Option<&Answered>,
-        out: &mut LibraryOutput<'_, '_, '_>,
-    ) -> LibraryStep {
+    fn step(&mut self, job: &mut Job, answered: Option<&Answered>, out: &mut JobOut<'_, '_, '_>) -> JobStep {
         let answer = answered.map(|(answer, data)| (answer, data.as_slice()));
         match (&mut job.kind, answer) {
             (Kind::List(list), Some((answer, _))) => list.step(answer, &mut self.places, out),
             (Kind::Data(data), Some(answer)) => data.step(answer, &mut self.places, out),
             (Kind::File(file), answer) => file.step(answer, &mut self.open, out),
-            (Kind::List(_) | Kind::Data(_), None) => LibraryStep::Done,
+            (Kind::List(_) | Kind::Data(_), None) => JobStep::Done,
         }
     }
 }

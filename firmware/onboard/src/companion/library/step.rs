@@ -7,10 +7,10 @@ use hums_link::packet::Packet;
 use hums_link::request::Reply;
 
 use super::super::limiter::Requester;
-use super::super::ways::PortOutlets;
+use super::super::ways::Outlets;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LibraryStep {
+pub(super) enum JobStep {
     Wait,
     Next,
     /// All is sent.
@@ -23,18 +23,18 @@ const FTP_FRAME: usize = 12 + 3 + hums_link::ftp::HEAD + 13;
 /// Worth a message.
 const FTP_DATA_MIN: usize = 20;
 
-pub(super) struct LibraryOutput<'o, 'w, 'q> {
+pub(super) struct JobOut<'o, 'w, 'q> {
     pub(super) now: Instant,
     pub(super) asker: Requester,
-    pub(super) ways: &'o mut PortOutlets<'w, 'q>,
+    pub(super) ways: &'o mut Outlets<'w, 'q>,
 }
 
-impl LibraryOutput<'_, '_, '_> {
-    pub(super) fn say(&mut self, packet: &Packet, then: LibraryStep) -> LibraryStep {
-        if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { LibraryStep::Wait }
+impl JobOut<'_, '_, '_> {
+    pub(super) fn say(&mut self, packet: &Packet, then: JobStep) -> JobStep {
+        if self.ways.send(self.now, self.asker.port, Class::Bulk, packet) { then } else { JobStep::Wait }
     }
 
-    pub(super) fn file(&mut self, payload: &[u8], then: LibraryStep) -> LibraryStep {
+    pub(super) fn file(&mut self, payload: &[u8], then: JobStep) -> JobStep {
         let (system, component) = self.asker.by;
         self.say(&messages::file_transfer(system, component, payload), then)
     }

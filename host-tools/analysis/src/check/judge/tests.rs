@@ -111,7 +111,7 @@ fn disarmed_high_with(falls: bool, arming: Option<&str>) -> Judgement {
     use hums_core::units::{Metres, MetresPerSecond};
     let mut judge = Judge::new(&Limits::default(), Format::Tlog);
     if let Some(words) = arming {
-        judge.item(Instant::ZERO, Item::Fact(Fact { about: FactSubject::Arming, words }));
+        judge.item(Instant::ZERO, Item::Fact(Fact { about: FactKind::Arming, words }));
     }
     for tick in 0..300_u64 {
         let (at, armed) = (Instant::from_millis(tick * 100), (20..200).contains(&tick));
@@ -454,7 +454,7 @@ fn a_recording_that_does_not_tell_arming_says_so_and_not_never() {
     use crate::source::item::Fact;
     let words = "the log does not tell whether it was armed";
     let mut judge = Judge::new(&Limits::default(), Format::DataFlash);
-    judge.item(Instant::ZERO, Item::Fact(Fact { about: FactSubject::Arming, words }));
+    judge.item(Instant::ZERO, Item::Fact(Fact { about: FactKind::Arming, words }));
     for second in 0..20 {
         let at = Instant::from_millis(second * 1_000);
         judge.item(at, Item::Observation(AUTOPILOT, &heartbeat(false)));
@@ -485,7 +485,7 @@ fn nothing_of_a_vehicle_is_no_good_news() {
 }
 
 /// 10 Hz; after 20 s lost percents, and all from 40 to 48 s.
-fn link_faults(heard: ReceptionPlace) -> Judgement {
+fn link_faults(heard: HeardAt) -> Judgement {
     use hums_link::encode::{Encoder, FRAME_BYTES_MAX};
     use hums_link::{Frame, messages};
     let mut judge = Judge::new(&Limits::default(), Format::Tlog).heard(heard);
@@ -506,7 +506,7 @@ fn link_faults(heard: ReceptionPlace) -> Judgement {
 
 #[test]
 fn the_wire_is_judged_where_the_recording_was_heard_at_the_monitors_own_place() {
-    let judged = link_faults(ReceptionPlace::OnTheWire);
+    let judged = link_faults(HeardAt::OnTheWire);
     let first = |check: &str| {
         let finding = judged.findings.iter().find(|finding| finding.check == check);
         finding.map(|finding| (finding.level, finding.at.as_secs_f64()))
@@ -518,7 +518,7 @@ fn the_wire_is_judged_where_the_recording_was_heard_at_the_monitors_own_place() 
     let Some((Level::Warning, at)) = first("heartbeat") else { panic!("{:?}", judged.findings) };
     assert!((43.4..43.6).contains(&at), "{at}");
     assert!(judged.judged.contains(&"frames_lost"), "{:?}", judged.judged);
-    let judged = link_faults(ReceptionPlace::Somewhere);
+    let judged = link_faults(HeardAt::Somewhere);
     assert!(judged.findings.iter().all(|finding| finding.check != "frames_lost"), "{:?}", judged.findings);
 }
 

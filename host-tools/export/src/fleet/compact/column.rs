@@ -54,10 +54,7 @@ impl Input {
         input.segments = input.find_segments(part).with_context(context)?;
         let own = session_of(&name);
         if own.is_some_and(|own| input.segments.iter().any(|segment| segment.session != own)) {
-            bail!(
-                "{}: has rows of another session; move it away, and decode that session again",
-                path.display()
-            );
+            bail!("{}: has rows of another session; move it away", path.display());
         }
         Ok(input)
     }

@@ -35,7 +35,7 @@ pub use self::observe::mode_name;
 use self::session::{First, Session};
 use self::text::{Line, Lines};
 use super::input::Input;
-use super::item::{Cause, ItemReceiver, Needs, Reader, RecordingSummary};
+use super::item::{Cause, ItemSink, Needs, Reader, RecordingSummary};
 
 /// Searched first. Definitions and parameters, 100 KiB, come in the first second, among up to 1 MiB of other
 /// messages.
@@ -95,7 +95,7 @@ struct DataFlash {
 }
 
 impl Reader for DataFlash {
-    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         let Some(input) = self.input.take() else { bail!("a recording is read once") };
         match self.form {
             Form::Binary => binary(input, want, take),
@@ -116,7 +116,7 @@ const CUT_LINE: &str = "a line that the beginning of another log cuts off";
 pub fn binary(
     input: impl std::io::Read,
     want: Needs<'_>,
-    take: &mut ItemReceiver<'_>,
+    take: &mut ItemSink<'_>,
 ) -> Result<RecordingSummary> {
     let mut bytes = Binary::new(input);
     let mut session = Session::new(first_of_bytes(&mut bytes)?, want);
@@ -157,7 +157,7 @@ fn first_of_bytes(bytes: &mut Binary<impl std::io::Read>) -> Result<First> {
     Ok(first)
 }
 
-fn text(input: impl std::io::Read, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+fn text(input: impl std::io::Read, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
     let mut lines = Lines::new(input);
     let (mut session, mut kinds) = (Session::new(first_of_lines(&mut lines)?, want), Kinds::default());
     session.tell_banner(take)?;

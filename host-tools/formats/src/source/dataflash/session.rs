@@ -20,7 +20,7 @@ use super::table::{self, Tables};
 use crate::plural::count;
 use crate::source::clock::WrongTimes;
 use crate::source::item::{
-    Amount, Cause, Event, Fact, FactSubject, Gap, Item, ItemReceiver, MessageCount, Mode, Needs, Parameter,
+    Amount, Cause, Event, Fact, FactKind, Gap, Item, ItemSink, MessageCount, Mode, Needs, Parameter,
     RecordingSummary, Row, Rows, Table, Text, hand_said,
 };
 use crate::source::pace::Pace;
@@ -220,7 +220,7 @@ impl<'w> Session<'w> {
     }
 
     /// All earlier state is void.
-    pub(super) fn begin_another(&mut self, first: First, take: &mut ItemReceiver<'_>) -> Result<()> {
+    pub(super) fn begin_another(&mut self, first: First, take: &mut ItemSink<'_>) -> Result<()> {
         self.count_by_name();
         let First { formats, state, begins_us, banner, .. } = first;
         self.formats = formats.begun_again();
@@ -246,11 +246,11 @@ impl<'w> Session<'w> {
         }
     }
 
-    pub(super) fn tell_banner(&mut self, take: &mut ItemReceiver<'_>) -> Result<()> {
+    pub(super) fn tell_banner(&mut self, take: &mut ItemSink<'_>) -> Result<()> {
         if self.firmware.is_empty() {
             return Ok(());
         }
-        take(self.clock.now(), Item::Fact(Fact { about: FactSubject::Firmware, words: &self.firmware }))
+        take(self.clock.now(), Item::Fact(Fact { about: FactKind::Firmware, words: &self.firmware }))
     }
 
     pub(super) fn formats(&self) -> &Formats {
@@ -268,7 +268,7 @@ impl<'w> Session<'w> {
         place: u64,
         bytes: u64,
         ahead: Ahead<'_>,
-        take: &mut ItemReceiver<'_>,
+        take: &mut ItemSink<'_>,
     ) -> Result<()> {
         let index = usize::from(kind);
         self.unpaced += bytes;
@@ -315,7 +315,7 @@ impl<'w> Session<'w> {
         format.role != Role::Other || observed || rows
     }
 
-    fn define(&mut self, kind: u8, body: Body<'_>, place: u64, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn define(&mut self, kind: u8, body: Body<'_>, place: u64, take: &mut ItemSink<'_>) -> Result<()> {
         if self.formats.get(kind).is_none_or(|format| format.role == Role::Other) {
             return Ok(());
         }
@@ -332,7 +332,7 @@ impl<'w> Session<'w> {
         }
     }
 
-    fn tell_odd(&mut self, kind: u8, place: u64, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn tell_odd(&mut self, kind: u8, place: u64, take: &mut ItemSink<'_>) -> Result<()> {
         match self.formats.take_odd(kind) {
             Some(words) => self.gap(Cause::Damaged, Some(place), 0, words, take),
             None => Ok(()),
@@ -355,7 +355,7 @@ impl<'w> Session<'w> {
         (kind, body): (u8, Body<'_>),
         place: u64,
         ahead: Ahead<'_>,
-        take: &mut ItemReceiver<'_>,
+        take: &mut ItemSink<'_>,
     ) -> Result<()> {
         let Self {
             want, formats, state, clock, handlers, epoch, firmware, later, wrong, pace, unpaced, ..
@@ -431,7 +431,7 @@ impl<'w> Session<'w> {
         result
     }
 
-    fn row(&mut self, kind: u8, body: Body<'_>, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn row(&mut self, kind: u8, body: Body<'_>, take: &mut ItemSink<'_>) -> Result<()> {
         if matches!(self.want.rows, Rows::None) {
             return Ok(());
         }
@@ -459,7 +459,7 @@ impl<'w> Session<'w> {
     }
 
     /// Reports once, after too many definitions.
-    fn refuse_rows(&mut self, kind: u8, take: &mut ItemReceiver<'_>) -> Result<()> {
+    fn refuse_rows(&mut self, kind: u8, take: &mut ItemSink<'_>) -> Result<()> {
         if std::mem::replace(&mut self.rows_refused, true) {
             return Ok(());
         }
@@ -475,14 +475,14 @@ impl<'w> Session<'w> {
         place: Option<u64>,
         bytes: u64,
         words: String,
-        take: &mut ItemReceiver<'_>,
+        take: &mut ItemSink<'_>,
     ) -> Result<()> {
         let now = self.clock.now();
         let from = Some(now).filter(|_| self.clock.has_begun());
         take(now, Item::Gap(&Gap { from, to: None, cause, place, bytes, words, own: None }))
     }
 
-    pub(super) fn end(mut self, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    pub(super) fn end(mut self, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         if let Some((_, words)) = self.state.open_text.take() {
             let alert = alert::of_text(None, words.as_bytes());
             take(self.clock.now(), Item::Text(Text { source: SOURCE, severity: 6, words: &words, alert }))?;
@@ -526,7 +526,7 @@ struct ReportSink<'a, 't> {
     craft: Craft,
     epoch: &'a mut Epoch,
     firmware: &'a mut String,
-    take: &'a mut ItemReceiver<'t>,
+    take: &'a mut ItemSink<'t>,
 }
 
 impl ReportSink<'_, '_> {
@@ -540,15 +540,15 @@ impl ReportSink<'_, '_> {
             Say::Event(number, severity, words, alert) => {
                 Item::Event(Event { source: SOURCE, number, severity, words, alert })
             }
-            Say::Arming(words) => Item::Fact(Fact { about: FactSubject::Arming, words }),
-            Say::Failsafes(words) => Item::Fact(Fact { about: FactSubject::Failsafes, words }),
-            Say::Emergency(words) => Item::Fact(Fact { about: FactSubject::Emergency, words }),
-            Say::ProcessorFault(words) => Item::Fact(Fact { about: FactSubject::ProcessorFault, words }),
-            Say::Frame(words) => Item::Fact(Fact { about: FactSubject::Frame, words }),
+            Say::Arming(words) => Item::Fact(Fact { about: FactKind::Arming, words }),
+            Say::Failsafes(words) => Item::Fact(Fact { about: FactKind::Failsafes, words }),
+            Say::Emergency(words) => Item::Fact(Fact { about: FactKind::Emergency, words }),
+            Say::ProcessorFault(words) => Item::Fact(Fact { about: FactKind::ProcessorFault, words }),
+            Say::Frame(words) => Item::Fact(Fact { about: FactKind::Frame, words }),
             Say::Firmware(words) if words == self.firmware => return Ok(()),
             Say::Firmware(words) => {
                 words.clone_into(self.firmware);
-                Item::Fact(Fact { about: FactSubject::Firmware, words })
+                Item::Fact(Fact { about: FactKind::Firmware, words })
             }
             Say::Utc(utc_us) => match self.epoch.take(utc_us.saturating_sub(self.at.as_micros())) {
                 Some(epoch_us) => Item::Epoch(epoch_us),

@@ -35,7 +35,7 @@ use anyhow::Result;
 
 pub use self::px4::{mode_name, nav_state};
 use super::input::Input;
-use super::item::{ItemReceiver, Needs, Reader, RecordingSummary};
+use super::item::{ItemSink, Needs, Reader, RecordingSummary};
 use window::Window;
 
 /// Whether these first bytes are of a ULog.
@@ -61,7 +61,7 @@ impl<R: Read> Ulog<R> {
 }
 
 impl<R: Read + Send> Reader for Ulog<R> {
-    fn read(&mut self, want: Needs<'_>, take: &mut ItemReceiver<'_>) -> Result<RecordingSummary> {
+    fn read(&mut self, want: Needs<'_>, take: &mut ItemSink<'_>) -> Result<RecordingSummary> {
         session::read(&mut self.window, want, take)
     }
 }

@@ -21,8 +21,8 @@ use super::topics::Subscriptions;
 use super::window::Window;
 use crate::source::clock::{self, Clock, Reading, Stamp, WrongTimes};
 use crate::source::item::{
-    Cause, CellValue, Column, ColumnType, Event, Fact, FactSubject, Gap, Item, ItemReceiver, Mode, Needs,
-    Parameter, RecordingSummary, Row, Rows, Table, Text, hand_said,
+    Cause, CellValue, Column, ColumnType, Event, Fact, FactKind, Gap, Item, ItemSink, Mode, Needs, Parameter,
+    RecordingSummary, Row, Rows, Table, Text, hand_said,
 };
 use crate::source::pace::Pace;
 
@@ -45,7 +45,7 @@ const WORDS_BYTES_MAX: usize = 256;
 pub(super) fn read<R: Read>(
     window: &mut Window<R>,
     want: Needs<'_>,
-    take: &mut ItemReceiver<'_>,
+    take: &mut ItemSink<'_>,
 ) -> Result<RecordingSummary> {
     window.fill(FILE_HEADER_BYTES);
     let Some((version, time_us)) = beginning(window.rest()) else {
@@ -110,7 +110,7 @@ fn damage<R: Read>(window: &mut Window<R>, session: &mut Session<'_, '_>, cut: b
 
 struct Session<'a, 'b> {
     want: Needs<'a>,
-    take: &'a mut ItemReceiver<'b>,
+    take: &'a mut ItemSink<'b>,
     formats: Formats,
     subscriptions: Subscriptions,
     clock: Clock,
@@ -144,7 +144,7 @@ const KEPT: [&str; 8] = [
 ];
 
 impl<'a, 'b> Session<'a, 'b> {
-    fn new(want: Needs<'a>, take: &'a mut ItemReceiver<'b>) -> Self {
+    fn new(want: Needs<'a>, take: &'a mut ItemSink<'b>) -> Self {
         Self {
             want,
             take,
@@ -312,7 +312,7 @@ impl<'a, 'b> Session<'a, 'b> {
             let first = text.unwrap_or_default().lines().find(|line| !line.trim().is_empty());
             let first = first.map_or_else(String::new, |line| format!(": {}", line.trim()));
             let words = format!("the autopilot's processor had a hard fault{first}");
-            self.tell(Item::Fact(Fact { about: FactSubject::ProcessorFault, words: &words }))?;
+            self.tell(Item::Fact(Fact { about: FactKind::ProcessorFault, words: &words }))?;
         }
         let Some(table) = self.own.information.clone() else { return Ok(()) };
         let number = value.number().map_or(CellValue::Unknown, CellValue::Double);
@@ -466,7 +466,7 @@ impl<'a, 'b> Session<'a, 'b> {
             }
             Report::Mode { number, name } => self.tell(Item::Mode(Mode { number, name })),
             Report::Failsafes(words) => {
-                self.tell(Item::Fact(Fact { about: FactSubject::Failsafes, words: &words }))
+                self.tell(Item::Fact(Fact { about: FactKind::Failsafes, words: &words }))
             }
             Report::Utc { utc_us, recorded_us } => self.epoch(i128::from(utc_us) - i128::from(recorded_us)),
         }
@@ -548,17 +548,17 @@ impl<'a, 'b> Session<'a, 'b> {
         let commit = known("ver_sw").and_then(|commit| commit.get(..8)).map(|commit| format!(" ({commit})"));
         if release != 0 || commit.is_some() {
             let version = if release == 0 { String::new() } else { format!(" v{}", version(release)) };
-            facts.push((FactSubject::Firmware, format!("{name}{version}{}", commit.unwrap_or_default())));
+            facts.push((FactKind::Firmware, format!("{name}{version}{}", commit.unwrap_or_default())));
         }
         if let Some(hardware) = known("ver_hw") {
             let kind = known("ver_hw_subtype").map_or_else(String::new, |kind| format!(" {kind}"));
-            facts.push((FactSubject::Hardware, format!("{hardware}{kind}")));
+            facts.push((FactKind::Hardware, format!("{hardware}{kind}")));
         }
         if let Some(kind) = known("log_type") {
-            facts.push((FactSubject::Recorder, format!("PX4's logger, a log of kind {kind}")));
+            facts.push((FactKind::Recorder, format!("PX4's logger, a log of kind {kind}")));
         }
         if let Some(replayed) = known("replay") {
-            facts.push((FactSubject::Recorder, format!("PX4's replay of {replayed}")));
+            facts.push((FactKind::Recorder, format!("PX4's replay of {replayed}")));
         }
         facts.iter().try_for_each(|(about, words)| self.tell(Item::Fact(Fact { about: *about, words })))
     }
