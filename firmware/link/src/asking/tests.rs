@@ -181,7 +181,7 @@ fn an_ardupilot_is_asked_for_no_interval_of_what_it_does_not_have() {
         );
     }
     for (id, by, rate, _) in WANTED.into_iter().filter(|wanted| ![225, 11_039].contains(&wanted.0)) {
-        let asked = by != By::Px4;
+        let asked = by != Senders::Px4;
         assert_eq!(copter.rate(id), asked.then_some(u32::from(rate)), "{id}");
         assert_eq!(copter.count(REQUEST_MESSAGE, id), usize::from(asked), "{id}");
     }
