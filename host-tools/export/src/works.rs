@@ -5,14 +5,14 @@ use anyhow::Result;
 use super::context::Formats;
 use crate::logs::sessions::Sessions;
 use crate::logs::side_by_side::side_by_side;
-use crate::naming::{self, Named, Traits};
+use crate::naming::{self, LogFileName, Traits};
 use crate::outcome::usage as usage_error;
 use crate::source::recording::LogPlace;
 
 pub(super) struct NamedLog<'a> {
     pub(super) log: &'a LogPlace,
     pub(super) traits: Traits,
-    pub(super) named: Named,
+    pub(super) named: LogFileName,
     /// It has no MAVLink frames.
     pub(super) is_native: bool,
 }

@@ -4,7 +4,7 @@
 //! here. Its recorder's state comes from the HUMS alone.
 
 use hums_core::clock::{Instant, Span};
-use hums_core::health::{self, EXPECTED, Finding, Level, Subsystem, When};
+use hums_core::health::{self, CheckPhase, EXPECTED, Finding, Level, Subsystem};
 use hums_link::summary;
 use serde::Serialize;
 
@@ -207,10 +207,10 @@ fn is_silent(craft: &Craft, now: Instant) -> bool {
 
 /// Whether a subsystem waits: some checks begin with arming or flight.
 fn waits(craft: &Craft, subsystem: Subsystem) -> bool {
-    let later = |when: When| match when {
-        When::Always => false,
-        When::Armed => !craft.monitor.vehicle().armed(),
-        When::InFlight => !craft.monitor.flight().airborne(),
+    let later = |when: CheckPhase| match when {
+        CheckPhase::Always => false,
+        CheckPhase::Armed => !craft.monitor.vehicle().armed(),
+        CheckPhase::InFlight => !craft.monitor.flight().airborne(),
     };
     health::checks().any(|check| check.subsystem == subsystem && later(check.when))
 }
@@ -218,7 +218,7 @@ fn waits(craft: &Craft, subsystem: Subsystem) -> bool {
 fn waits_for(craft: &Craft, subsystem: Subsystem) -> &'static str {
     let mut checks = health::checks().filter(|check| check.subsystem == subsystem);
     let vehicle = craft.monitor.vehicle();
-    if !vehicle.armed() && checks.any(|check| check.when == When::Armed) {
+    if !vehicle.armed() && checks.any(|check| check.when == CheckPhase::Armed) {
         "is checked once it is armed"
     } else if !tells_flight(vehicle) {
         "is checked in the air, and nothing tells whether it is there"

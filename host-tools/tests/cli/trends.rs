@@ -4,7 +4,7 @@
 mod common;
 
 use common::{AUTOPILOT, Quad};
-use hums::check::trends::{Baselines, Flown};
+use hums::check::trends::{Baselines, FlightFigures};
 use hums::source::told::Finding;
 use hums_core::Monitor;
 use hums_core::clock;
@@ -43,7 +43,7 @@ fn fly(past: &mut Baselines, change: Change, pulses: Option<[u16; 4]>) -> Vec<Fi
         let link = LinkReading { frames_lost: Some(0.0), at: now };
         monitor.tick(now, &link, &quad.recorder, &mut |_| {});
     }
-    let flown = Flown::of(clock::Instant::from_millis(100_000), true, &monitor);
+    let flown = FlightFigures::of(clock::Instant::from_millis(100_000), true, &monitor);
     past.judge(&flown, &Params::defaults()).0
 }
 

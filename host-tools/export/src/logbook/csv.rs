@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result, bail};
 use super::{BY_HAND, Book, Life, LogbookEntry, Spot};
 use crate::files::{Inputs, Output, make_parent, settle};
 use crate::text::push_csv_text;
-use crate::utc::When;
+use crate::utc::TimePoint;
 
 /// The columns of the recordings. The first one names a flight.
 const COLUMNS: [&str; 18] = [
@@ -138,7 +138,7 @@ fn entry<'a>(cell: &impl Fn(&str) -> &'a str, by_hand: BTreeMap<String, String>)
 /// Microseconds since 1970. A spreadsheet may write a time without its zone.
 fn utc_us(text: &str) -> Option<u64> {
     match text.parse().or_else(|_| format!("{text}Z").parse()) {
-        Ok(When::Utc(utc_us)) => Some(utc_us),
+        Ok(TimePoint::Utc(utc_us)) => Some(utc_us),
         _ => None,
     }
 }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::{Book, LogbookEntry, hours};
 use crate::files::{Inputs, Output, make_directory, make_parent, says_directory, settle};
-use crate::identity::Known;
+use crate::identity::Preview;
 use crate::outcome::usage;
 use crate::utc::iso8601;
 
@@ -52,7 +52,7 @@ fn one(flight: &Value, path: &Path, inputs: &Inputs) -> Result<()> {
     output.finish()
 }
 
-fn exchange(entry: &LogbookEntry, known: &Known) -> Option<Value> {
+fn exchange(entry: &LogbookEntry, known: &Preview) -> Option<Value> {
     let (from, to) = entry.span?;
     let epochs = &known.identity.epochs;
     let start_us = epochs.utc_us(from)?;
@@ -110,7 +110,7 @@ struct Way {
     events: Vec<Value>,
 }
 
-fn way(entry: &LogbookEntry, known: &Known, (from, to): (Instant, Instant), start_us: u64) -> Way {
+fn way(entry: &LogbookEntry, known: &Preview, (from, to): (Instant, Instant), start_us: u64) -> Way {
     let (about, epochs) = (&known.about, &known.identity.epochs);
     let points = about.track.points();
     let speeds = about.speeds.points();

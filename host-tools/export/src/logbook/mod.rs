@@ -22,9 +22,9 @@ use crate::check::problem::Problem;
 use crate::check::text::sentence;
 use crate::checked::problems_of;
 use crate::files::{Inputs, says_directory};
-use crate::identity::{Known, RecordingContent, identity};
+use crate::identity::{Preview, RecordingContent, identity};
 use crate::logs::side_by_side::side_by_side;
-use crate::naming::{self, Named};
+use crate::naming::{self, LogFileName};
 use crate::outcome::{Outcome, usage as usage_error};
 use crate::output;
 use crate::plural::count;
@@ -81,7 +81,7 @@ pub(crate) struct LogbookEntry {
     /// Take-off and landing, or the end of the record, in microseconds since 1970, if known.
     pub(crate) utc_us: Option<(u64, u64)>,
     /// The recording, if the output needs its tracks.
-    pub(crate) known: Option<Arc<Known>>,
+    pub(crate) known: Option<Arc<Preview>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,11 +147,11 @@ pub fn run(args: &LogbookRequest) -> Result<Outcome> {
     side_by_side(
         &works,
         |work| match &work.named {
-            Named::As(..) => {
+            LogFileName::As(..) => {
                 let known = identity(work.log, &work.traits, false, args.vehicle.as_deref())?;
                 Ok(Some(Session::of(known, has_tracks)))
             }
-            Named::Copy(_) => Ok(None),
+            LogFileName::Copy(_) => Ok(None),
         },
         |session: Result<Option<Session>>| {
             let Some(session) = session? else { return Ok(()) };
@@ -234,7 +234,7 @@ struct Session {
 
 impl Session {
     /// Of a recording. Its entries keep it only if the output needs its tracks, which take most of the memory.
-    fn of(known: Known, has_tracks: bool) -> Self {
+    fn of(known: Preview, has_tracks: bool) -> Self {
         let (identity, about) = (&known.identity, &known.about);
         let overview = &about.overview;
         let counter = |counter: UsageCounter| overview.contents.lifetime.get(counter.name()).copied();
@@ -279,7 +279,7 @@ fn kind(about: &RecordingContent) -> String {
     vehicle(&about.overview).map_or_else(String::new, |of| format!("{}, {}", of.r#type, of.autopilot))
 }
 
-fn entries(record: &str, known: &Known) -> Vec<LogbookEntry> {
+fn entries(record: &str, known: &Preview) -> Vec<LogbookEntry> {
     let (identity, about) = (&known.identity, &known.about);
     let contents = &about.overview.contents;
     let summary = &about.overview.ending.summary;

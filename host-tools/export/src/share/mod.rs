@@ -21,7 +21,7 @@ use hums_link::{Check, Frame};
 
 use crate::context::Context;
 use crate::files::{Inputs, says_directory};
-use crate::format::{Single, Totals, Writer as _};
+use crate::format::{SingleFile, Totals, Writer as _};
 use crate::formats::ulog::{Ulog, Words};
 use crate::names::message_name;
 use crate::outcome::{Outcome, usage};
@@ -151,7 +151,7 @@ impl Share {
 
     /// Returns whether the recording has damage.
     fn link(&mut self, place: &LogPlace, context: &Context, args: &ShareRequest) -> Result<bool> {
-        let mut file = Single::open(context, &args.output)?;
+        let mut file = SingleFile::open(context, &args.output)?;
         let want = Needs { frames: true, ..Needs::default() };
         let (mut bytes, mut lossy) = (Vec::new(), false);
         let summary = place.open()?.read(want, &mut |at, item| {

@@ -10,7 +10,7 @@ use lz4_flex::frame::FrameEncoder;
 
 use crate::context::Context;
 use crate::files::cannot_write;
-use crate::format::Single;
+use crate::format::SingleFile;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const CHUNK_BYTES: usize = 1 << 20;
@@ -30,7 +30,7 @@ const DATA_END: u8 = 0x0F;
 
 /// A file, open.
 pub(super) struct Container {
-    file: Single,
+    file: SingleFile,
     path: PathBuf,
     /// Bytes written.
     place: u64,
@@ -110,7 +110,7 @@ fn span_with(span: Option<(u64, u64)>, time_ns: u64) -> (u64, u64) {
 impl Container {
     pub(super) fn open(context: &Context, path: &Path) -> Result<Self> {
         let mut container = Self {
-            file: Single::open(context, path)?,
+            file: SingleFile::open(context, path)?,
             path: path.to_owned(),
             place: 0,
             chunk: Chunk::default(),
@@ -214,7 +214,7 @@ impl Container {
         Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Result<(Single, u64)> {
+    pub(super) fn finish(mut self) -> Result<(SingleFile, u64)> {
         self.end_chunk()?;
         self.write(&Record::default().u32(0).record(DATA_END))?;
         let messages = self.counts.iter().sum();

@@ -57,7 +57,12 @@ impl Ahead<'_> {
     }
 
     /// The first few accepted times.
-    pub(super) fn stamps(self, formats: &Formats, week: Week, asks: &dyn Fn(Stamp) -> bool) -> clock::Ahead {
+    pub(super) fn stamps(
+        self,
+        formats: &Formats,
+        week: Week,
+        asks: &dyn Fn(Stamp) -> bool,
+    ) -> clock::LaterTimes {
         let bytes = self.bytes.get(..AHEAD_BYTES).unwrap_or(self.bytes);
         let mut is_end = self.is_end && bytes.len() == self.bytes.len();
         let mut stamps = Vec::with_capacity(ASKED);
@@ -71,7 +76,7 @@ impl Ahead<'_> {
             let (read, begins) = of_bytes(bytes, formats, &mut take);
             is_end |= begins || bytes.len() - read >= ERASED_BYTES;
         }
-        clock::Ahead { is_end: is_end && stamps.len() < ASKED, stamps }
+        clock::LaterTimes { is_end: is_end && stamps.len() < ASKED, stamps }
     }
 }
 

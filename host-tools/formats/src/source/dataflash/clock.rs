@@ -6,7 +6,7 @@
 
 use hums_core::clock::{Instant, Span};
 
-use super::ahead::LaterTimes;
+use super::ahead::Ahead;
 use super::format::Formats;
 use super::message::Message;
 use super::stamp::{Week, stamp, week_us};
@@ -85,7 +85,7 @@ impl Clock {
         self.times.now()
     }
 
-    pub(super) fn at(&mut self, message: &Message<'_>, ahead: LaterTimes<'_>, formats: &Formats) -> When {
+    pub(super) fn at(&mut self, message: &Message<'_>, ahead: Ahead<'_>, formats: &Formats) -> When {
         let boot_us = message.time_us();
         if boot_us.is_none()
             && let Some(week_us) = week_us(message, formats)
