@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use hums_core::exposure;
-use hums_core::health::{Check, Said, Side, VOCABULARY, When, Words, checks};
+use hums_core::health::{Check, CheckPhase, RadioWords, Side, VOCABULARY, Words, checks};
 use hums_core::params::{Param, Params, TABLE};
 use hums_core::time::Millis;
 

@@ -79,10 +79,10 @@ impl Display for Values {
 pub fn measured(finding: &Finding) -> String {
     let Finding { check, level, value, worst, limit, unit, .. } = finding;
     let (words, limit) = match shown(check, *value, *limit) {
-        Shown::State(state) => {
+        ShownValue::State(state) => {
             (state.filter(|state| !state.ends_with(level.name())).unwrap_or_default().to_owned(), None)
         }
-        Shown::Quantity(_, limit) => (Values::new(*value, *worst, unit).to_string(), limit),
+        ShownValue::Quantity(_, limit) => (Values::new(*value, *worst, unit).to_string(), limit),
     };
     let limit = limit.filter(|_| !words.is_empty());
     words + &limit.map_or_else(String::new, |limit| format!(" (limit {})", quantity(limit, unit)))

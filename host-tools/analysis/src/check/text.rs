@@ -494,7 +494,7 @@ pub fn sentence(group: &[&Problem]) -> String {
     text
 }
 
-fn not_judged(text: &mut String, judged: &Judged, mention: NotJudged) {
+fn not_judged(text: &mut String, judged: &Judgement, mention: UnjudgedList) {
     let checks = judged.checks();
     if judged.worst().is_none() || judged.not_judged.is_empty() {
         return;
@@ -510,7 +510,7 @@ fn not_judged(text: &mut String, judged: &Judged, mention: NotJudged) {
 }
 
 /// Checks without data, by reason: a line each.
-pub fn reasons(judged: &Judged) -> String {
+pub fn reasons(judged: &Judgement) -> String {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for (check, why) in &judged.not_judged {
         let check = check_name(check, &[]);

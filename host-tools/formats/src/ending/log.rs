@@ -5,7 +5,7 @@ use super::proof::Proof;
 use crate::logs::Log;
 use crate::logs::reader::LogSummary;
 use crate::logs::sessions::copy_words;
-use crate::logs::strangers::Strange;
+use crate::logs::strangers::ForeignSectors;
 use crate::plural::{are, count, noun};
 
 /// The end of a log that was read: the evidence of its completeness, the same for every command.

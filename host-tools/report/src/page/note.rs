@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::names::{check_name, unit_name, vocabulary};
 use crate::part;
 use crate::source::told;
-use crate::states::{Shown, meaning, measured, shown};
+use crate::states::{ShownValue, meaning, measured, shown};
 use crate::statustext::StatusText;
 
 const OURS: &str = "HUMS: ";

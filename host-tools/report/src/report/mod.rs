@@ -214,8 +214,8 @@ impl Making<'_> {
                 None => self.names.entry(place.system).or_default().name(index, place, &traits),
             };
             match named {
-                Named::Copy(of) => copy = self.places.get(of).map(|place| copy_words(&place.name)),
-                Named::As(name, _) => {
+                LogFileName::Copy(of) => copy = self.places.get(of).map(|place| copy_words(&place.name)),
+                LogFileName::As(name, _) => {
                     let path = self.wanted.path(&of_vehicle(name, place.system));
                     let free = Output::check(&path, self.inputs);
                     // A single page that cannot be written is an error, as any output.
