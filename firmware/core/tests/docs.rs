@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use hums_core::exposure;
 use hums_core::health::{Check, CheckPhase, RadioWords, Side, VOCABULARY, Words, checks};
-use hums_core::params::{Param, Params, TABLE};
+use hums_core::parameters::{Param, Params, TABLE};
 use hums_core::time::Millis;
 
 /// The inputs of each check, and the source of its limits unless a parameter is.
