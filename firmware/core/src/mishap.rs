@@ -1,8 +1,4 @@
-//! Reports of a mishap: kind, place and text.
-
-use core::fmt::Write as _;
-
-use heapless::String;
+//! Reports of a mishap: kind and place.
 
 use crate::motion::height_m;
 use crate::parameters::Param;
@@ -82,44 +78,4 @@ pub struct Report {
     pub place: Location,
     /// How fast it touched, tenths of a metre a second.
     pub touch: u16,
-}
-
-/// Characters of [`Report::text`]: with `HUMS: ` before it, it is one `STATUSTEXT`.
-const TEXT_MAX: usize = 44;
-
-impl Report {
-    /// The text for the ground, after our name: event and place.
-    pub fn text(&self) -> String<TEXT_MAX> {
-        let mut text = String::new();
-        let Self { change, place, touch } = self;
-        let words = match change {
-            MishapChange::Began(_) => "mishap at",
-            MishapChange::Down => "down at",
-            MishapChange::FliesOn => "mishap over, it flies on",
-            MishapChange::FliesAgain => "it flies again, KEEP CLEAR",
-            MishapChange::OnBench(kind) => kind.name(),
-        };
-        if !matches!(change, MishapChange::Began(_) | MishapChange::Down) {
-            return String::try_from(words).unwrap_or_default();
-        }
-        let degrees = |e7: i32| {
-            let micros = e7 / 10;
-            let sign = if micros < 0 { "-" } else { "" };
-            (sign, micros.unsigned_abs() / 1_000_000, micros.unsigned_abs() % 1_000_000)
-        };
-        // Cut where it does not fit, which a test rules out.
-        let _ = match place.position {
-            Some((latitude, longitude)) => {
-                let ((south, lat, lat_e6), (west, lon, lon_e6)) = (degrees(latitude), degrees(longitude));
-                write!(text, "{words} {south}{lat}.{lat_e6:06},{west}{lon}.{lon_e6:06}")
-            }
-            None => write!(text, "{words} unknown place"),
-        };
-        let _ = match change {
-            MishapChange::Down if *touch == 0 => Ok(()),
-            MishapChange::Down => write!(text, " {}.{} m/s", touch / 10, touch % 10),
-            _ => write!(text, " {} m", place.height_m),
-        };
-        text
-    }
 }

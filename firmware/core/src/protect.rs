@@ -29,10 +29,6 @@
 //! show a mission's landing by none of these: a mission that sinks in the last `APPROACH_M` is one (`approaches`).
 //! The control structure and its hazards are in docs/safety.md.
 
-use core::fmt::Write as _;
-
-use heapless::String;
-
 use crate::flight::{Flight, Phase};
 use crate::health::{Health, Level, Subsystem};
 use crate::latest::Latest;
@@ -43,9 +39,6 @@ use crate::observation::{
 use crate::parameters::{Param, Params};
 use crate::time::{BootMs, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
-
-/// Bytes of a text that a ground station shows to the pilot: one `STATUSTEXT`.
-pub const TEXT_BYTES_MAX: usize = 50;
 
 const AGAIN: Millis = Millis::from_secs(1);
 /// Requests at most.
@@ -121,36 +114,6 @@ pub struct Step {
     pub stage: Stage,
     /// Seconds, attempt or `MAV_RESULT`, as the stage says.
     pub detail: u8,
-}
-
-impl Step {
-    /// The text for the pilot, with its `MAV_SEVERITY`.
-    pub fn text(&self) -> (u8, String<TEXT_BYTES_MAX>) {
-        let name = self.action.name();
-        let mut text = String::new();
-        // Cut where it does not fit, which a test rules out.
-        let _ = match self.stage {
-            Stage::Announced => {
-                write!(text, "HUMS: {name} in {} s, change mode to cancel", self.detail)
-            }
-            Stage::Counting => write!(text, "HUMS: {name} in {} s", self.detail),
-            Stage::CancelledByMode => write!(text, "HUMS: {name} cancelled: mode changed"),
-            Stage::CancelledOnGround => write!(text, "HUMS: {name} cancelled: on the ground"),
-            Stage::CancelledByCommand => write!(text, "HUMS: {name} cancelled by command"),
-            Stage::CancelledClear => write!(text, "HUMS: {name} cancelled: ok again"),
-            Stage::AlreadyDone => write!(text, "HUMS: {name}: already on its way"),
-            Stage::Asked => write!(text, "HUMS: {name} asked for"),
-            Stage::Answered if self.detail == 0 => write!(text, "HUMS: {name} accepted"),
-            Stage::Answered => write!(text, "HUMS: {name} refused (result {})", self.detail),
-            Stage::Unanswered => write!(text, "HUMS: {name}: the autopilot does not answer"),
-        };
-        let severity = match self.stage {
-            Stage::Announced | Stage::Counting | Stage::Asked | Stage::Unanswered => 2,
-            Stage::Answered if self.detail != 0 => 2,
-            _ => 5,
-        };
-        (severity, text)
-    }
 }
 
 /// What to send to the autopilot: a `COMMAND_LONG` to its system and component, all parameters zero.
@@ -509,20 +472,4 @@ fn is_landing(situation: &Situation<'_>) -> bool {
     vehicle.landed.within(now, SILENT) == Some(&LandedState::Landing)
         || flight.phase(now, vehicle) == Phase::Landing
         || approaches(situation)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_text_fits_with_the_largest_number() {
-        for action in [Action::Return, Action::Land] {
-            for stage in Stage::ALL {
-                let (_, text) = Step { action, stage, detail: 255 }.text();
-                assert!(text.len() < TEXT_BYTES_MAX, "{text}");
-                assert!(!text.ends_with(':'), "{text}");
-            }
-        }
-    }
 }

@@ -3,7 +3,7 @@
 use core::fmt::{self, Write as _};
 
 /// Bytes of text in one message.
-pub use hums_core::protect::TEXT_BYTES_MAX;
+pub const TEXT_BYTES_MAX: usize = 50;
 
 /// `MAV_SEVERITY`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -98,27 +98,6 @@ fn what_was_wrong_before_a_mishap_ends_when_it_lies_disarmed_and_when_it_is_sile
 }
 
 #[test]
-fn every_text_of_a_mishap_fits() {
-    let place = |height_m| Place { position: Some((-899_999_999, -1_799_999_999)), height_m };
-    let unknown = Place { position: None, height_m: -12_345 };
-    let began = MishapChange::Began(MishapKind::Sinking);
-    for (change, place, end) in [
-        (began, place(-999), " m"),
-        (began, place(12_345), " m"),
-        (began, unknown, " m"),
-        (MishapChange::Down, place(0), "999.9 m/s"),
-        (MishapChange::FliesOn, unknown, ""),
-        (MishapChange::OnBench(MishapKind::Disarmed), unknown, ""),
-    ] {
-        let text = Report { change, place, touch: 9_999 }.text();
-        assert!(!text.is_empty() && text.ends_with(end) && "HUMS: ".len() + text.len() <= 50, "{text}");
-    }
-    let place = Place { position: Some((473_977_420, -85_455_940)), height_m: 30 };
-    let report = Report { change: MishapChange::Began(MishapKind::Impact), place, touch: 0 };
-    assert_eq!(report.text(), "mishap at 47.397742,-8.545594 30 m");
-}
-
-#[test]
 fn a_flight_that_is_terminated_without_an_estimate_falls_by_the_air_pressure() {
     let falls =
         "0 state=8; 0-1 hpa=980..980.6; 1-2 hpa=980.6..982.35; 2-2.5 hpa=982.35..983.7; 2.5 hpa=983.7";

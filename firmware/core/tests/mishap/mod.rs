@@ -10,7 +10,7 @@ mod turns;
 use crate::common::{AUTOPILOT, Quad, Run, Said, Script, observe, rows};
 use hums_core::Monitor;
 use hums_core::health::{Finding, Level, Orders, Subsystem};
-use hums_core::mishap::{MishapChange, MishapKind, Place, Report};
+use hums_core::mishap::{MishapChange, MishapKind, Report};
 use hums_core::observation::{
     Air, Attitude, AttitudeSetpoint, Autopilot, GlobalPosition, Hud, Imu, LandedState, Observation, Source,
     TelemetryRadio,

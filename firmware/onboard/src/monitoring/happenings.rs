@@ -9,7 +9,7 @@ use hums_core::mishap::MishapChange;
 
 use super::marks::Marks;
 use crate::journal::Logbook;
-use crate::notices::{Notice, Notices};
+use crate::notices::{self, Notice, Notices};
 use crate::queues::SectorsIn;
 use crate::records::RecordedState;
 
@@ -94,7 +94,8 @@ fn mishap(
         }
     };
     let report = book.monitor.flight().report(change);
-    book.journal.record(now, &Record::Event(Event { number, text: &report.text() }), sectors);
+    let text = notices::of_mishap(&report);
+    book.journal.record(now, &Record::Event(Event { number, text: text.as_str() }), sectors);
     // The beginning is reported as a finding.
     if !matches!(change, MishapChange::Began(_)) {
         notices.announce(Notice::Mishap(report));
