@@ -19,7 +19,7 @@ use crate::latest::Latest;
 use crate::lifetime::{ItemKey, Lifetime, Saving};
 use crate::observation::{Feeds, Observation, Source};
 use crate::parameters::{Param, Params};
-use crate::protect::{Protect, Request, Situation};
+use crate::protect::{Protect, Request};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{BootMs, Millis};
@@ -202,7 +202,9 @@ impl Monitor {
             self.saving.change(ItemKey::Exceedances);
         }
         self.exposure.step(now, &self.vehicle, self.usage.current_a);
-        self.step_protect(now);
+        if let Some(step) = self.protect.step(&inputs, &self.health) {
+            self.happenings.push(Happening::Protect(step));
+        }
         self.step_cells(now);
         self.step_life(now, event);
         self.step_happenings(now, event);
@@ -311,14 +313,6 @@ impl Monitor {
     /// All parameters about cells were asked for: unknown cells stay unknown.
     pub const fn parameters_asked(&mut self) {
         self.parameters_asked = true;
-    }
-
-    fn step_protect(&mut self, now: BootMs) {
-        let Self { vehicle, flight, health, params, protect, happenings, .. } = self;
-        let situation = Situation { now, vehicle, flight, health, params };
-        if let Some(step) = protect.step(&situation) {
-            happenings.push(Happening::Protect(step));
-        }
     }
 
     fn step_happenings(&mut self, now: BootMs, event: Option<FlightEvent>) {

@@ -29,14 +29,14 @@
 //! show a mission's landing by none of these: a mission that sinks in the last `APPROACH_M` is one (`approaches`).
 //! The control structure and its hazards are in docs/safety.md.
 
-use crate::flight::{Flight, Phase};
-use crate::health::{Health, Level, Subsystem};
+use crate::flight::Phase;
+use crate::health::{Health, Inputs, Level, Subsystem};
 use crate::latest::Latest;
 use crate::motion;
 use crate::observation::{
     Autopilot, CommandAck, Feeds, LandedState, OUR_COMPONENT, Source, VehicleKind, VtolState,
 };
-use crate::parameters::{Param, Params};
+use crate::parameters::Param;
 use crate::time::{BootMs, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
@@ -191,24 +191,6 @@ pub struct Protect {
     reason: Option<u16>,
 }
 
-#[derive(Clone, Copy)]
-pub(crate) struct Situation<'a> {
-    pub(crate) now: BootMs,
-    pub(crate) vehicle: &'a Vehicle,
-    pub(crate) flight: &'a Flight,
-    pub(crate) health: &'a Health,
-    pub(crate) params: &'a Params,
-}
-
-impl Situation<'_> {
-    fn flies(&self) -> bool {
-        self.flight.airborne()
-            && !self.flight.in_mishap()
-            && self.vehicle.armed()
-            && self.vehicle.kind() != VehicleKind::Surface
-    }
-}
-
 impl Protect {
     pub(crate) const fn take_request(&mut self) -> Option<Request> {
         self.request.take()
@@ -219,15 +201,15 @@ impl Protect {
         self.cancelled
     }
 
-    pub(crate) fn step(&mut self, situation: &Situation<'_>) -> Option<Step> {
+    pub(crate) fn step(&mut self, inputs: &Inputs<'_>, health: &Health) -> Option<Step> {
         use Input::{Answer, Command, Flies, FlightOver, ModeByAutopilot, ModeByPilot, Waits};
         use State::{Asking, Counting, Done, Idle, ModeChanged, OnItsWay};
-        let Situation { now, vehicle, .. } = *situation;
-        let step_ms = self.stepped_at.age_ms(now).unwrap_or(0) as u32;
+        let Inputs { now, vehicle, .. } = *inputs;
+        let step_ms = self.stepped_at.age(now).map_or(0, Millis::as_millis) as u32;
         self.stepped_at = Stamp::at(now);
-        let (next, told) = match (self.state, self.input(situation)) {
+        let (next, told) = match (self.state, self.input(inputs)) {
             (Counting { .. } | Asking { .. }, FlightOver) => (Idle, Some((Stage::CancelledOnGround, 0))),
-            (Asking { attempt, .. }, Answer(result)) => self.hear(situation, attempt, result),
+            (Asking { attempt, .. }, Answer(result)) => self.hear(inputs, attempt, result),
             (Counting { .. } | Asking { .. }, Command) => (Done, Some((Stage::CancelledByCommand, 0))),
             (Counting { .. } | Asking { .. }, Input::Way(way)) => {
                 (OnItsWay(way, now), Some((Stage::AlreadyDone, 0)))
@@ -249,9 +231,9 @@ impl Protect {
             (ModeChanged, _) if self.changed_at.older_than(now, SIGN) => (Done, None),
             (ModeChanged, _) if vehicle.alerts.have_begun_within(now, SIGN) => (Idle, None),
             (Counting { left_ms, .. }, Waits) => (Counting { left_ms, told_s: u8::MAX }, None),
-            (Idle, input) if situation.flies() => self.start(situation, input),
+            (Idle, input) if flies(inputs) => self.start(inputs, health, input),
             (Counting { left_ms, told_s }, Flies) => {
-                self.count(situation, left_ms.saturating_sub(step_ms), told_s)
+                self.count(inputs, health, left_ms.saturating_sub(step_ms), told_s)
             }
             (Asking { attempt, at, progress }, Flies) => self.insist(now, attempt, at, progress),
             (state, _) => (state, None),
@@ -260,11 +242,11 @@ impl Protect {
         told.map(|(stage, detail)| Step { action: self.action, stage, detail })
     }
 
-    fn input(&mut self, situation: &Situation<'_>) -> Input {
-        let Situation { now, vehicle, flight, .. } = *situation;
+    fn input(&mut self, inputs: &Inputs<'_>) -> Input {
+        let Inputs { now, vehicle, flight, .. } = *inputs;
         let cancelled = core::mem::take(&mut self.cancelled);
         let changed = self.note_mode(now, vehicle);
-        let lands_now = is_landing(situation);
+        let lands_now = is_landing(inputs);
         // One message proves nothing, nor do the pauses of a stream at 1 Hz.
         if self.lands_since.run(lands_now, now, PAUSE) {
             self.landing_at = Stamp::at(now);
@@ -285,7 +267,7 @@ impl Protect {
             return Input::Way(Way::Mode);
         }
         let lands = self.landing_at.age(now).is_some_and(|age| age < LANDING_LASTS);
-        changed.unwrap_or(match (lands, situation.flies() && !lands_now) {
+        changed.unwrap_or(match (lands, flies(inputs) && !lands_now) {
             (true, _) => Input::Way(Way::Landing),
             (false, true) => Input::Flies,
             (false, false) => Input::Waits,
@@ -313,11 +295,11 @@ impl Protect {
             .filter(|result| *result != CommandAck::TEMPORARILY_REJECTED || attempt == ATTEMPTS_MAX)
     }
 
-    fn start(&mut self, situation: &Situation<'_>, input: Input) -> Move {
-        let Situation { now, params, .. } = *situation;
+    fn start(&mut self, inputs: &Inputs<'_>, health: &Health, input: Input) -> Move {
+        let Inputs { now, params, .. } = *inputs;
         let action = Action::from_number(params.get(Param::ProtAction) as u8);
         let Some(action) = action.filter(|_| self.mode.is_some()) else { return (State::Idle, None) };
-        self.reason = reason(situation, None);
+        self.reason = reason(inputs, health, None);
         if self.reason.is_none() {
             return (State::Idle, None);
         }
@@ -330,13 +312,13 @@ impl Protect {
         (State::Counting { left_ms, told_s: delay_s }, Some((Stage::Announced, delay_s)))
     }
 
-    fn count(&mut self, situation: &Situation<'_>, left_ms: u32, told_s: u8) -> Move {
-        self.reason = reason(situation, self.reason);
+    fn count(&mut self, inputs: &Inputs<'_>, health: &Health, left_ms: u32, told_s: u8) -> Move {
+        self.reason = reason(inputs, health, self.reason);
         if self.reason.is_none() {
             return (State::Idle, Some((Stage::CancelledClear, 0)));
         }
         if left_ms == 0 {
-            return self.ask(situation.now, 1);
+            return self.ask(inputs.now, 1);
         }
         let left_s = left_ms.div_ceil(1_000).min(255) as u8;
         let tells = left_s < told_s && (left_s.is_multiple_of(5) || left_s <= 3);
@@ -349,13 +331,13 @@ impl Protect {
         (State::Asking { attempt, at: now, progress: false }, Some((Stage::Asked, attempt)))
     }
 
-    fn hear(&self, situation: &Situation<'_>, attempt: u8, result: u8) -> Move {
-        let at = situation.now;
+    fn hear(&self, inputs: &Inputs<'_>, attempt: u8, result: u8) -> Move {
+        let at = inputs.now;
         let next = match result {
             // What follows is waited for from here on.
             CommandAck::IN_PROGRESS => return (State::Asking { attempt, at, progress: true }, None),
             CommandAck::ACCEPTED => State::OnItsWay(Way::Accepted, at),
-            _ if self.action == Action::Return && hovers(situation) => {
+            _ if self.action == Action::Return && hovers(inputs) => {
                 State::Asking { attempt: 0, at, progress: false }
             }
             _ => State::Done,
@@ -376,16 +358,22 @@ impl Protect {
     }
 }
 
+fn flies(inputs: &Inputs<'_>) -> bool {
+    let Inputs { vehicle, flight, .. } = inputs;
+    let in_air = flight.airborne() && !flight.in_mishap();
+    in_air && vehicle.armed() && vehicle.kind() != VehicleKind::Surface
+}
+
 /// A VTOL has to report a hover: a headwind can stop it over the ground.
-fn hovers(situation: &Situation<'_>) -> bool {
-    let Situation { now, vehicle, .. } = *situation;
+fn hovers(inputs: &Inputs<'_>) -> bool {
+    let Inputs { now, vehicle, .. } = *inputs;
     vehicle.hovers(now) == Some(true)
         && (vehicle.kind() != VehicleKind::Vtol || vehicle.vtol == VtolState::Hover)
 }
 
 /// A mission to a lower place looks like its landing, and is waited for too.
-fn approaches(situation: &Situation<'_>) -> bool {
-    let Situation { now, vehicle, .. } = *situation;
+fn approaches(inputs: &Inputs<'_>) -> bool {
+    let Inputs { now, vehicle, .. } = *inputs;
     let mode = vehicle.heartbeat.get().map(|heartbeat| heartbeat.mode);
     modes(vehicle).is_some_and(|modes| Some(modes.mission) == mode && !modes.tells_landing)
         && motion::climb_mps(now, vehicle).is_some_and(|climb_mps| climb_mps < -APPROACH_MPS)
@@ -401,8 +389,8 @@ fn is_ours(ack: &CommandAck, vehicle: &Vehicle, action: Action) -> bool {
 /// The critical check, of those that `PROT_CHECK` selects: 0 an empty battery (by its remaining charge or its cells), from 1 on
 /// any check of a subsystem. A check that becomes stale stays the reason. Batteries of avionics, of a payload or of an unknown
 /// consumer do not count.
-fn reason(situation: &Situation<'_>, before: Option<u16>) -> Option<u16> {
-    let Situation { vehicle, health, params, .. } = *situation;
+fn reason(inputs: &Inputs<'_>, health: &Health, before: Option<u16>) -> Option<u16> {
+    let Inputs { vehicle, params, .. } = *inputs;
     let chosen = params.get(Param::ProtCheck) as u8;
     let reasons = health.numbered_levels().filter_map(|(number, check, instance, level)| {
         let concerned = match chosen.checked_sub(1) {
@@ -467,9 +455,9 @@ fn is_own_change(now: BootMs, vehicle: &Vehicle, before: u32, after: u32) -> boo
     })
 }
 
-fn is_landing(situation: &Situation<'_>) -> bool {
-    let Situation { now, vehicle, flight, .. } = *situation;
+fn is_landing(inputs: &Inputs<'_>) -> bool {
+    let Inputs { now, vehicle, flight, .. } = *inputs;
     vehicle.landed.within(now, SILENT) == Some(&LandedState::Landing)
         || flight.phase(now, vehicle) == Phase::Landing
-        || approaches(situation)
+        || approaches(inputs)
 }

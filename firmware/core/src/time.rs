@@ -110,10 +110,6 @@ impl Stamp {
         Some(now.since(self.0?))
     }
 
-    pub(crate) fn age_ms(self, now: BootMs) -> Option<u64> {
-        Some(self.age(now)?.as_millis())
-    }
-
     pub(crate) fn instant(self, now: BootMs) -> Option<BootMs> {
         Some(self.0?.earlier(now))
     }
