@@ -6,21 +6,31 @@ pub(crate) fn apart(act: impl FnOnce()) {
     act();
 }
 
-/// Makes a structure in a place ([`core::mem::MaybeUninit`]) out of all its fields, one after the other; gives the
-/// reference to it.
-macro_rules! place {
-    ($place:expr, $Whole:ident { $($part:ident: $value:expr),* $(,)? }) => {{
-        let place: &mut core::mem::MaybeUninit<$Whole> = $place;
-        let whole = place.as_mut_ptr();
-        $($crate::apart::apart(|| {
-            let part = $value;
-            // SAFETY: the place is ours alone and large enough; a field of it is written, nothing is read.
-            unsafe { (&raw mut (*whole).$part).write(part) }
-        });)*
-        let _all = |$($part),*| $Whole { $($part),* };
-        // SAFETY: `_all` names each field there is, and each of these was written.
-        unsafe { place.assume_init_mut() }
-    }};
+/// A structure that is made in a place ([`core::mem::MaybeUninit`]), one field after the other: each begins with the
+/// default of its type, or with the value behind it, which may use the argument.
+macro_rules! made_in_place {
+    ($(#[$meta:meta])* $vis:vis struct $name:ident($argument:ident: $of:ty) {
+        $($(#[$doc:meta])* $field:ident: $type:ty $(= $value:expr)?,)*
+    }) => {
+        $(#[$meta])*
+        $vis struct $name {
+            $($(#[$doc])* $field: $type,)*
+        }
+
+        impl $name {
+            /// Before the first input, built in place: never whole on the stack.
+            $vis fn begin<'a>(place: &'a mut core::mem::MaybeUninit<Self>, $argument: $of) -> &'a mut Self {
+                let whole = place.as_mut_ptr();
+                $($crate::apart::apart(|| {
+                    let part = state!(@initial $type $(, $value)?);
+                    // SAFETY: the place is ours alone and large enough; a field of it is written, nothing is read.
+                    unsafe { (&raw mut (*whole).$field).write(part) }
+                });)*
+                // SAFETY: each field was written.
+                unsafe { place.assume_init_mut() }
+            }
+        }
+    };
 }
 
-pub(crate) use place;
+pub(crate) use made_in_place;

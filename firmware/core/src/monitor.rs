@@ -5,7 +5,7 @@ mod stored;
 
 use core::mem::MaybeUninit;
 
-use crate::apart::{apart, place};
+use crate::apart::{apart, made_in_place};
 use crate::battery_cells;
 use crate::component::{COMPONENTS_MAX, Component, ComponentKind};
 use crate::derived::Derived;
@@ -29,33 +29,35 @@ use crate::vehicle::{BATTERIES_MAX, Vehicle};
 /// How often [`Monitor::tick`] is to be called: a finding comes at most this much after its debounce.
 pub const TICK: Millis = Millis::from_millis(50);
 
-/// Everything that the monitor knows and decides.
-#[derive(Clone, Copy, Debug)]
-pub struct Monitor {
-    params: Params,
-    vehicle: Vehicle,
-    flight: Flight,
-    derived: Derived,
-    health: Health,
-    usage: Usage,
-    /// Totals of earlier sessions.
-    before: Lifetime,
-    exceedances: Exceedances,
-    exposure: Exposure,
-    components: [Component; COMPONENTS_MAX],
-    /// For each component its subsystem and the used part of its life, percent; one is updated each tick.
-    wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX],
-    wear_next: u8,
-    figures: Figures,
-    snapshots: Snapshots,
-    protect: Protect,
-    saving: Saving,
-    happenings: Happenings,
-    before_tick: Before,
-    ticked_at: BootMs,
-    cells_told: bool,
-    parameters_asked: bool,
-    parts_known: bool,
+made_in_place! {
+    /// Everything that the monitor knows and decides.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Monitor(params: &Params) {
+        params: Params = *params,
+        vehicle: Vehicle,
+        flight: Flight,
+        derived: Derived,
+        health: Health,
+        usage: Usage,
+        /// Totals of earlier sessions.
+        before: Lifetime,
+        exceedances: Exceedances,
+        exposure: Exposure,
+        components: [Component; COMPONENTS_MAX] = [Component::default(); COMPONENTS_MAX],
+        /// For each component its subsystem and the used part of its life, percent; one is updated each tick.
+        wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX] = [None; COMPONENTS_MAX],
+        wear_next: u8,
+        figures: Figures,
+        snapshots: Snapshots,
+        protect: Protect,
+        saving: Saving,
+        happenings: Happenings,
+        before_tick: Before,
+        ticked_at: BootMs,
+        cells_told: bool,
+        parameters_asked: bool,
+        parts_known: bool = true,
+    }
 }
 
 state! {
@@ -90,37 +92,6 @@ impl Monitor {
     /// Before the first observation.
     pub fn new(params: Params) -> Self {
         *Self::begin(&mut MaybeUninit::uninit(), &params)
-    }
-
-    /// The same, built in place: never whole on the stack.
-    pub fn begin<'a>(place: &'a mut MaybeUninit<Self>, params: &Params) -> &'a mut Self {
-        place!(
-            place,
-            Monitor {
-                params: *params,
-                vehicle: Vehicle::default(),
-                flight: Flight::default(),
-                derived: Derived::default(),
-                health: Health::default(),
-                usage: Usage::default(),
-                before: Lifetime::default(),
-                exceedances: Exceedances::default(),
-                exposure: Exposure::default(),
-                components: [Component::default(); COMPONENTS_MAX],
-                wear: [None; COMPONENTS_MAX],
-                wear_next: 0,
-                figures: Figures::default(),
-                snapshots: Snapshots::default(),
-                protect: Protect::default(),
-                saving: Saving::default(),
-                happenings: Happenings::default(),
-                before_tick: Before::default(),
-                ticked_at: BootMs::ZERO,
-                cells_told: false,
-                parameters_asked: false,
-                parts_known: true,
-            }
-        )
     }
 
     /// Takes an observation from the link; `false` if it is not of the monitored vehicle.
