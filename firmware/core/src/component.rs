@@ -8,7 +8,7 @@ use crate::bytes::{Fields, Item, Unreadable, fields};
 use crate::health::finding::Subsystem;
 use crate::observation::MOTORS_MAX;
 use crate::parameters::{Param, Params};
-use crate::usage::{UsageCounter, Wear};
+use crate::usage::{Totals, UsageCounter};
 
 /// Components at most.
 pub const COMPONENTS_MAX: usize = 8;
@@ -108,12 +108,12 @@ impl ComponentFigures {
     }
 
     /// The figures of a part of this kind and number in one session.
-    pub fn after(wear: &Wear<'_>, kind: ComponentKind, number: u8) -> Self {
+    pub fn after(totals: &Totals, kind: ComponentKind, number: u8) -> Self {
         if kind == ComponentKind::None {
             return Self::default();
         }
-        let total = |counter| wear.totals.value(counter).unwrap_or(0.0);
-        let motors = &wear.totals.motors;
+        let total = |counter| totals.value(counter).unwrap_or(0.0);
+        let motors = &totals.motors;
         let place = usize::from(number).checked_sub(1);
         let motor_s = match (kind, place) {
             (ComponentKind::Motor | ComponentKind::Propeller | ComponentKind::Esc, Some(place)) => {
@@ -122,7 +122,7 @@ impl ComponentFigures {
             _ => motors.iter().fold(0.0, |longest: f64, motor| longest.max(motor.seconds)),
         };
         let cycles = match (kind, place) {
-            (ComponentKind::Battery, Some(place)) => wear.battery_cycles.get(place).copied().unwrap_or(0.0),
+            (ComponentKind::Battery, Some(place)) => totals.battery_cycles.get(place).copied().unwrap_or(0.0),
             _ => total(UsageCounter::BatteryCycles),
         };
         Self {
@@ -186,24 +186,25 @@ pub struct Component {
     pub number: u8,
     /// How often the part in this place was replaced.
     pub replaced: u16,
-    base: ComponentFigures,
-    /// The power-on before which `base` counts; stored items only.
-    as_of: u32,
+    /// Its figures of earlier sessions.
+    pub ran: ComponentFigures,
+    /// The power-on before which `ran` counts; stored items only.
+    pub(crate) as_of: u32,
 }
 
 impl Component {
     /// Its figures over its life.
-    pub fn figures(&self, wear: &Wear<'_>) -> ComponentFigures {
-        self.base
-            .zip(ComponentFigures::after(wear, self.kind, self.number), |base, ran| (base + ran).max(0.0))
+    pub fn figures(&self, totals: &Totals) -> ComponentFigures {
+        self.ran
+            .zip(ComponentFigures::after(totals, self.kind, self.number), |base, ran| (base + ran).max(0.0))
     }
 
     /// The part of its life that is used, percent, by the limit that trips first; `None` if it has no limit.
-    pub fn used_percent(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Option<f32> {
+    pub fn used_percent(&self, place: usize, totals: &Totals, params: &Params) -> Option<f32> {
         if self.kind == ComponentKind::None {
             return None;
         }
-        let figures = self.figures(wear);
+        let figures = self.figures(totals);
         let is_powered = matches!(self.kind, ComponentKind::Card | ComponentKind::Other);
         let hours = if is_powered { figures.powered_s } else { figures.flight_s };
         let used = [
@@ -220,8 +221,8 @@ impl Component {
     }
 
     /// Green, yellow or red.
-    pub fn status(&self, place: usize, wear: &Wear<'_>, params: &Params) -> Status {
-        let used_percent = self.used_percent(place, wear, params).unwrap_or(0.0);
+    pub fn status(&self, place: usize, totals: &Totals, params: &Params) -> Status {
+        let used_percent = self.used_percent(place, totals, params).unwrap_or(0.0);
         if used_percent >= params.get(Param::CompRed) {
             Status::Red
         } else if used_percent >= params.get(Param::CompYellow) {
@@ -232,41 +233,30 @@ impl Component {
     }
 
     /// `true` if kind or number changed; the figures stay.
-    pub(crate) fn describe(&mut self, place: usize, wear: &Wear<'_>, params: &Params) -> bool {
+    pub(crate) fn describe(&mut self, place: usize, totals: &Totals, params: &Params) -> bool {
         let kind = ComponentKind::from_number(Setting::Kind.of(place, params) as u8).unwrap_or_default();
         let number = (Setting::Number.of(place, params) as u8).min(MOTORS_MAX as u8);
-        if (kind, number) == (self.kind, self.number) {
-            return false;
+        let is_new = (kind, number) != (self.kind, self.number);
+        if is_new {
+            let figures = self.figures(totals);
+            (self.kind, self.number) = (kind, number);
+            self.set_figures(figures, totals);
         }
-        self.base =
-            self.figures(wear).zip(ComponentFigures::after(wear, kind, number), |ran, counted| ran - counted);
-        (self.kind, self.number) = (kind, number);
-        true
+        is_new
     }
 
-    pub(crate) fn replace(&mut self, serial: Label, wear: &Wear<'_>) -> Self {
-        let old = Self { base: self.figures(wear), ..*self };
+    /// Sets its figures, of which this session has counted a part.
+    pub(crate) fn set_figures(&mut self, figures: ComponentFigures, totals: &Totals) {
+        let counted = ComponentFigures::after(totals, self.kind, self.number);
+        self.ran = figures.zip(counted, |figure, counted| figure - counted);
+    }
+
+    pub(crate) fn replace(&mut self, serial: Label, totals: &Totals) -> Self {
+        let old = Self { ran: self.figures(totals), ..*self };
         self.serial = serial;
         self.replaced = self.replaced.saturating_add(1);
-        self.base = ComponentFigures::default()
-            .zip(ComponentFigures::after(wear, self.kind, self.number), |ran, counted| ran - counted);
+        self.set_figures(ComponentFigures::default(), totals);
         old
-    }
-
-    /// Figures of a component from [`crate::Monitor`], to which no session adds.
-    pub const fn ran(&self) -> ComponentFigures {
-        self.base
-    }
-
-    /// This component with other figures.
-    pub const fn having_run(self, ran: ComponentFigures) -> Self {
-        Self { base: ran, ..self }
-    }
-
-    /// The same component in a session that has counted a part of its figures already.
-    pub(crate) fn in_session(self, wear: &Wear<'_>) -> Self {
-        let counted = ComponentFigures::after(wear, self.kind, self.number);
-        self.having_run(self.base.zip(counted, |ran, counted| ran - counted))
     }
 
     pub(crate) const fn begin(&mut self, boots: u32) -> bool {
@@ -276,15 +266,10 @@ impl Component {
     }
 
     /// Adds the session of power-on `boots`, unless its figures include that session.
-    pub(crate) fn add(&mut self, boots: u32, wear: &Wear<'_>) {
+    pub(crate) fn add(&mut self, boots: u32, totals: &Totals) {
         if boots == self.as_of {
-            self.base = self.figures(wear);
+            self.ran = self.figures(totals);
         }
-    }
-
-    /// The stored form: figures as of the beginning of this power-on.
-    pub(crate) const fn as_of(self, boots: u32) -> Self {
-        Self { as_of: boots, ..self }
     }
 }
 
@@ -296,7 +281,7 @@ impl Item for Component {
     const BYTES: usize = 65;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-        let ComponentFigures { powered_s, flight_s, motor_s, flights, cycles } = &mut self.base;
+        let ComponentFigures { powered_s, flight_s, motor_s, flights, cycles } = &mut self.ran;
         let mut kind = self.kind as u8;
         let mut ran = [*powered_s, *flight_s, *motor_s].map(|seconds| libm::round(seconds * 10.0) as i32);
         let mut flown = *flights as i32;

@@ -1,7 +1,7 @@
 //! Exposure: how long each quantity that ages a part stood in which range, in this session and over the airframe's life.
 
 use crate::bytes::{Fields, Item, Unreadable, fields};
-use crate::time::{BootMs, Millis, PAUSE, SILENT};
+use crate::time::{BootMs, SILENT};
 use crate::units::Celsius;
 use crate::vehicle::Vehicle;
 
@@ -44,7 +44,7 @@ impl ExposureQuantity {
         }
     }
 
-    fn value(self, now: BootMs, vehicle: &Vehicle, current_a: Option<f32>) -> Option<f32> {
+    pub(crate) fn value(self, now: BootMs, vehicle: &Vehicle, current_a: Option<f32>) -> Option<f32> {
         fn hottest(temperatures: impl Iterator<Item = Option<Celsius>>) -> Option<f32> {
             temperatures.flatten().filter_map(Celsius::sane).reduce(f32::max)
         }
@@ -72,65 +72,11 @@ impl ExposureQuantity {
 pub(crate) type Tenths = [[u32; BINS]; ExposureQuantity::ALL.len()];
 
 state! {
-    /// Time in ranges.
+    /// Time in ranges of earlier sessions, as it is stored.
     pub struct Exposure {
-        last: Option<BootMs>,
-        pub(crate) session: Tenths,
-        before: Tenths,
-        /// The power-on before which `before` counts.
-        as_of: u32,
-    }
-}
-
-const EVERY: Millis = Millis::from_millis(100);
-
-impl Exposure {
-    pub(crate) fn step(&mut self, now: BootMs, vehicle: &Vehicle, current_a: Option<f32>) {
-        let step = self.last.map_or(Millis::ZERO, |last| now.since(last));
-        if self.last.is_some() && step < EVERY {
-            return;
-        }
-        // Whole tenths are counted; the rest goes into the next step.
-        let tenths = (step.as_millis() / 100) as u32;
-        let rest = Millis::from_millis(step.as_millis() % 100);
-        self.last = Some(now - rest);
-        if step > PAUSE {
-            return;
-        }
-        for (quantity, bins) in ExposureQuantity::ALL.into_iter().zip(&mut self.session) {
-            if let Some(value) = quantity.value(now, vehicle, current_a) {
-                let bin = quantity.edges().iter().take_while(|edge| value >= **edge).count();
-                bins[bin] = bins[bin].saturating_add(tenths);
-            }
-        }
-    }
-
-    /// Every range that the session was in: quantity, range, seconds.
-    pub fn for_each(&self, each: impl FnMut(ExposureQuantity, usize, f64)) {
-        visit(&self.session, each);
-    }
-
-    /// Every range that the airframe was in, this session included.
-    pub fn for_each_of_life(&self, each: impl FnMut(ExposureQuantity, usize, f64)) {
-        let mut both = self.before;
-        add(&mut both, &self.session);
-        visit(&both, each);
-    }
-
-    pub(crate) fn forget_life(&mut self) {
-        self.before = Tenths::default();
-    }
-
-    /// Adds the session of power-on `boots`, unless it is counted already.
-    pub(crate) fn add(&mut self, boots: u32, session: &Tenths) {
-        if boots == self.as_of {
-            add(&mut self.before, session);
-        }
-    }
-
-    /// The stored form: as of the beginning of this power-on.
-    pub(crate) const fn as_of(self, boots: u32) -> Self {
-        Self { as_of: boots, ..self }
+        pub(crate) ranges: Tenths,
+        /// The power-on before which they count.
+        pub(crate) as_of: u32,
     }
 }
 
@@ -140,22 +86,14 @@ impl Item for Exposure {
     const BYTES: usize = 165;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-        fields!(fields: self.before, self.as_of);
+        fields!(fields: self.ranges, self.as_of);
         Ok(())
     }
 }
 
-fn add(sums: &mut Tenths, more: &Tenths) {
+pub(crate) fn add(sums: &mut Tenths, more: &Tenths) {
     for (sum, more) in sums.iter_mut().flatten().zip(more.iter().flatten()) {
         *sum = sum.saturating_add(*more);
-    }
-}
-
-fn visit(tenths: &Tenths, mut each: impl FnMut(ExposureQuantity, usize, f64)) {
-    for (quantity, bins) in ExposureQuantity::ALL.into_iter().zip(tenths) {
-        for (bin, tenths) in bins.iter().enumerate().filter(|(_, tenths)| **tenths > 0) {
-            each(quantity, bin, f64::from(*tenths) / 10.0);
-        }
     }
 }
 
@@ -163,51 +101,39 @@ fn visit(tenths: &Tenths, mut each: impl FnMut(ExposureQuantity, usize, f64)) {
 mod tests {
     use super::*;
     use crate::observation::{Heartbeat, Observation, Processor, Source};
+    use crate::usage::{Usage, exposure_number};
 
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
-    fn heat(exposure: &mut Exposure, from_ms: u64, to_ms: u64, celsius: f32) {
+    fn heat(usage: &mut Usage, from_ms: u64, to_ms: u64, celsius: f32) {
         let mut vehicle = Vehicle::default();
         vehicle.observe(BootMs::ZERO, AUTOPILOT, &Observation::Heartbeat(Heartbeat::default()));
         for now_ms in (from_ms..to_ms).step_by(50) {
             let now = BootMs::from_millis(now_ms);
             let processor = Processor { temperature: Some(Celsius(celsius)) };
             vehicle.observe(now, AUTOPILOT, &Observation::Processor(processor));
-            exposure.step(now, &vehicle, None);
+            usage.expose(now, &vehicle);
         }
     }
 
-    fn seen(exposure: &Exposure) -> Vec<(usize, f64)> {
-        let mut seen = Vec::new();
-        exposure.for_each_of_life(|quantity, bin, seconds| {
-            assert_eq!(quantity, ExposureQuantity::McuTemperature);
-            seen.push((bin, seconds));
-        });
-        seen
-    }
-
     #[test]
-    fn time_goes_to_the_range_of_the_value_and_adds_up_over_sessions() {
-        let mut exposure = Exposure::default();
-        heat(&mut exposure, 0, 10_050, -5.0);
-        heat(&mut exposure, 10_050, 20_050, 45.0);
-        heat(&mut exposure, 20_050, 21_050, f32::NAN);
-        heat(&mut exposure, 21_050, 22_050, 1e9);
-        heat(&mut exposure, 90_000, 90_500, 200.0);
-        assert_eq!(seen(&exposure), [(0, 10.0), (3, 10.0), (7, 0.4)]);
-        let session = exposure.session;
-        let mut stored = [0; Exposure::BYTES];
-        exposure.as_of(8).encode(&mut stored);
-        let mut exposure = Exposure::decode(&stored).expect("readable");
-        exposure.add(7, &session);
-        assert_eq!(seen(&exposure), [], "it is in it");
-        exposure.as_of = 7;
-        exposure.add(7, &session);
-        heat(&mut exposure, 0, 1_050, 45.0);
-        assert_eq!(seen(&exposure), [(0, 10.0), (3, 11.0), (7, 0.4)]);
-        let mut session = 0.0;
-        exposure.for_each(|_, _, seconds| session += seconds);
-        assert_eq!(session.to_bits(), 1.0_f64.to_bits());
+    fn time_goes_to_the_range_of_the_value() {
+        let mut usage = Usage::default();
+        heat(&mut usage, 0, 10_050, -5.0);
+        heat(&mut usage, 10_050, 20_050, 45.0);
+        heat(&mut usage, 20_050, 21_050, f32::NAN);
+        heat(&mut usage, 21_050, 22_050, 1e9);
+        heat(&mut usage, 90_000, 90_500, 200.0);
+        let bins = [100, 0, 0, 100, 0, 0, 0, 4];
+        let [.., mcu, _, _] = usage.totals().ranges;
+        assert_eq!(mcu, bins);
+        let mut seen = Vec::new();
+        usage.totals().for_each(|number, seconds| {
+            if number >= exposure_number(ExposureQuantity::EscTemperature, 0) {
+                seen.push((number - exposure_number(ExposureQuantity::McuTemperature, 0), seconds));
+            }
+        });
+        assert_eq!(seen, [(0, 10.0), (3, 10.0), (7, 0.4)]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::apart::{apart, made_in_place};
 use crate::battery_cells;
 use crate::component::{COMPONENTS_MAX, Component, ComponentKind};
 use crate::derived::Derived;
-use crate::exposure::Exposure;
+use crate::exposure;
 use crate::figures::{Figures, Quantity};
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::happening::{Happening, Happenings};
@@ -23,7 +23,7 @@ use crate::protect::{Protect, Request};
 use crate::snapshot::{Snapshot, Snapshots};
 use crate::status::{LinkReading, RecorderStatus};
 use crate::time::{BootMs, Millis};
-use crate::usage::{Usage, UsageCounter, exposure_number, figure_number};
+use crate::usage::{Usage, UsageCounter, figure_number};
 use crate::vehicle::{BATTERIES_MAX, Vehicle};
 
 /// How often [`Monitor::tick`] is to be called: a finding comes at most this much after its debounce.
@@ -42,7 +42,8 @@ made_in_place! {
         /// Totals of earlier sessions.
         before: Lifetime,
         exceedances: Exceedances,
-        exposure: Exposure,
+        /// The power-on before which the time in ranges of `before` counts.
+        ranges_as_of: u32,
         components: [Component; COMPONENTS_MAX] = [Component::default(); COMPONENTS_MAX],
         /// For each component its subsystem and the used part of its life, percent; one is updated each tick.
         wear: [Option<(Subsystem, f32)>; COMPONENTS_MAX] = [None; COMPONENTS_MAX],
@@ -172,7 +173,7 @@ impl Monitor {
         if crossed || self.exceedances.lasting() {
             self.saving.change(ItemKey::Exceedances);
         }
-        self.exposure.step(now, &self.vehicle, self.usage.current_a);
+        self.usage.expose(now, &self.vehicle);
         if let Some(step) = self.protect.step(&inputs, &self.health) {
             self.happenings.push(Happening::Protect(step));
         }
@@ -320,10 +321,9 @@ impl Monitor {
     pub fn describe_component(&mut self, place: usize) {
         let boots = self.boots();
         let Self { usage, params, components, saving, .. } = self;
-        let wear = usage.wear();
         let Some(component) = components.get_mut(place) else { return };
         let key = ItemKey::Component(place as u8);
-        if component.describe(place, &wear, params) {
+        if component.describe(place, &usage.counted, params) {
             saving.hurry(key);
         }
         if component.kind != ComponentKind::None && component.begin(boots) {
@@ -371,19 +371,21 @@ impl Monitor {
 
     /// The airframe's life, this session included.
     pub fn lifetime(&self) -> Lifetime {
+        let mut totals = self.usage.totals();
+        totals.join(&self.before.totals);
+        exposure::add(&mut totals.ranges, &self.before.totals.ranges);
         Lifetime {
             airframe: self.before.airframe,
             boots: self.boots(),
             sessions: self.before.sessions.saturating_add(u32::from(self.heard())),
             cells: self.before.cells,
-            totals: self.before.totals.join(&self.usage.totals()),
+            totals,
         }
     }
 
     /// Every known figure of this session: its stored number and its value.
     pub fn for_each_counter(&self, mut each: impl FnMut(u8, f64)) {
-        self.usage.for_each(&mut each);
-        self.exposure.for_each(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
+        self.usage.totals().for_each(&mut each);
         for quantity in Quantity::all() {
             if let Some(figure) = self.figures.get(quantity) {
                 each(figure_number(quantity), f64::from(figure));
@@ -391,21 +393,9 @@ impl Monitor {
         }
     }
 
-    /// Calls `each` with every counter of the airframe's life.
-    pub fn for_each_counter_of_life(&self, mut each: impl FnMut(u8, f64)) {
-        self.lifetime().totals.for_each(&mut each);
-        self.exposure
-            .for_each_of_life(|quantity, bin, seconds| each(exposure_number(quantity, bin), seconds));
-    }
-
     /// Limits that were crossed.
     pub const fn exceedances(&self) -> &Exceedances {
         &self.exceedances
-    }
-
-    /// Time in ranges.
-    pub const fn exposure(&self) -> &Exposure {
-        &self.exposure
     }
 
     /// The components by place; without a kind there is none.

@@ -1,6 +1,6 @@
 //! Slow figures: a battery's internal resistance against its own past, and rates of counters that wrap.
 
-use crate::time::BootMs;
+use crate::time::{BootMs, Millis};
 use crate::units::{Amperes, Volts};
 
 state! {
@@ -91,26 +91,24 @@ impl Resistance {
 pub(crate) struct Rate {
     count: u32,
     events: [u32; 2],
-    /// Milliseconds since power-on, modulo 2^32.
-    half_began_ms: u32,
+    half_began: BootMs,
 }
 
 impl Rate {
-    const HALF_MS: u32 = 30_000;
+    const HALF: Millis = Millis::from_secs(30);
     /// A larger step is a counter that started again.
     const STEP_MAX: u32 = 10_000;
 
     pub(crate) const fn new(at: BootMs, count: u32) -> Self {
-        Self { count, events: [0; 2], half_began_ms: at.as_millis() as u32 }
+        Self { count, events: [0; 2], half_began: at }
     }
 
     pub(crate) fn take(&mut self, at: BootMs, count: u32) {
-        let now_ms = at.as_millis() as u32;
-        let age_ms = now_ms.wrapping_sub(self.half_began_ms);
-        if age_ms >= Self::HALF_MS {
-            let recent = age_ms < 2 * Self::HALF_MS;
+        let age = at.since(self.half_began);
+        if age >= Self::HALF {
+            let recent = age < Self::HALF + Self::HALF;
             self.events = [0, if recent { self.events[0] } else { 0 }];
-            self.half_began_ms = now_ms;
+            self.half_began = at;
         }
         let step = count.wrapping_sub(self.count);
         self.count = count;

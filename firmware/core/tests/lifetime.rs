@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use crate::common::params;
 use hums_core::Monitor;
 use hums_core::component::{ComponentKind, Label, Status};
+use hums_core::exposure::BINS;
 use hums_core::lifetime::{EVERY, EVERY_ARMED, ITEM_BYTES_MAX, ItemKey, Room};
 use hums_core::observation::{
     AutopilotIdentity, Battery, Esc, EscGroup, GlobalPosition, Heartbeat, Observation, Source, VehicleKind,
@@ -14,7 +15,7 @@ use hums_core::parameters::Params;
 use hums_core::status::{LinkReading, RecorderStatus};
 use hums_core::time::BootMs;
 use hums_core::units::{Amperes, Metres, MetresPerSecond, Rpm, Volts};
-use hums_core::usage::UsageCounter;
+use hums_core::usage::{EXPOSURE_FIRST, FIGURE_FIRST, UsageCounter};
 
 #[derive(Default)]
 struct Store(BTreeMap<u8, Vec<u8>>);
@@ -124,8 +125,10 @@ fn sums(monitor: &Monitor) -> Vec<f64> {
     ];
     let mut sums: Vec<f64> = counters.into_iter().map(|counter| life.totals.raw(counter)).collect();
     sums.extend([life.totals.motors[0].seconds, life.totals.motors[0].revolutions / 100.0]);
-    monitor.exposure().for_each_of_life(|_, bin, seconds| {
-        if bin == 4 {
+    life.totals.for_each(|number, seconds| {
+        if (EXPOSURE_FIRST..FIGURE_FIRST).contains(&number)
+            && usize::from(number - EXPOSURE_FIRST) % BINS == 4
+        {
             sums.push(seconds);
         }
     });
@@ -234,11 +237,11 @@ fn a_component_wears_over_sessions_and_is_replaced_at_once() {
     let mut monitor = store.start(&params);
     assert_eq!(monitor.replace_component(0, Label::new("S1")), None, "there is none");
     let old = monitor.replace_component(2, Label::new("S2")).unwrap();
-    assert_eq!(old.ran().flights, 2.0);
+    assert_eq!(old.ran.flights, 2.0);
     assert_eq!(store.save(&mut monitor, BootMs::from_millis(50)), [ItemKey::Component(2)]);
     let again = store.start(&params);
     let component = again.components()[2];
-    assert_eq!((component.serial.as_str(), component.replaced, component.ran().flights), ("S2", 1, 0.0));
+    assert_eq!((component.serial.as_str(), component.replaced, component.ran.flights), ("S2", 1, 0.0));
 }
 
 #[test]

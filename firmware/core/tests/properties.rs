@@ -290,7 +290,7 @@ fn check(monitor: &mut Monitor, now: BootMs) {
         assert!(value.is_finite() && sign, "counter {counter} is {value}");
     };
     monitor.for_each_counter(sane);
-    monitor.for_each_counter_of_life(sane);
+    monitor.lifetime().totals.for_each(sane);
     let health = monitor.health();
     let overall = health.overall();
     for (check, instance, level) in health.levels() {

@@ -77,7 +77,7 @@ fn look(monitor: &mut Monitor, now: BootMs) {
         assert!(value.is_finite() && sign, "counter {counter} is {value}");
     };
     monitor.for_each_counter(sane);
-    monitor.for_each_counter_of_life(sane);
+    monitor.lifetime().totals.for_each(sane);
     while monitor.take_happening().is_some() {}
     while let Some(snapshot) = monitor.take_snapshot(now) {
         assert!(snapshot.values().count() <= SAMPLES * COLUMNS_MAX);

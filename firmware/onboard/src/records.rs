@@ -161,7 +161,7 @@ fn life(now: Instant, moment: Moment, book: &mut Logbook<'_>, sectors: &mut Sect
     let mut put = |part: &[_]| {
         journal.record(now, &Record::Lifetime(Lifetime::new(moment, &life, part)), sectors);
     };
-    monitor.for_each_counter_of_life(|number, value| counters.push(number, value, &mut put));
+    life.totals.for_each(|number, value| counters.push(number, value, &mut put));
     counters.flush(put);
 }
 
@@ -205,7 +205,7 @@ pub(crate) fn replace_component(
     let used_percent = monitor.component_used_percent(place);
     let serial = Label::new(serial);
     let Some(old) = monitor.replace_component(place, serial) else { return false };
-    let record = component_record(&old, place, old.ran(), status, used_percent, RecordReason::Replaced);
+    let record = component_record(&old, place, old.ran, status, used_percent, RecordReason::Replaced);
     let record = ComponentRecord { by, new_serial: serial.as_str(), ..record };
     journal.record(now, &Record::Component(record), sectors);
     component(now, place, RecordReason::Status, book, sectors);

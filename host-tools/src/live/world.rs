@@ -521,8 +521,8 @@ mod tests {
     fn motor() -> MonitorRecord {
         let mut component = Component::default();
         (component.kind, component.number) = (ComponentKind::Motor, 2);
-        let ran = ComponentFigures { motor_s: 9.5 * 3_600.0, ..ComponentFigures::default() };
-        MonitorRecord::Part { place: 0, component: component.having_run(ran) }
+        component.ran = ComponentFigures { motor_s: 9.5 * 3_600.0, ..ComponentFigures::default() };
+        MonitorRecord::Part { place: 0, component }
     }
 
     #[test]

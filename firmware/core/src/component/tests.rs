@@ -1,6 +1,4 @@
 use super::*;
-use crate::usage::Totals;
-use crate::vehicle::BATTERIES_MAX;
 
 fn params(set: &[(&str, f32)]) -> Params {
     let mut params = Params::defaults();
@@ -8,10 +6,6 @@ fn params(set: &[(&str, f32)]) -> Params {
         params.set(name, *value).expect(name);
     }
     params
-}
-
-fn wear(totals: &Totals) -> Wear<'_> {
-    Wear { totals, battery_cycles: &[0.0; BATTERIES_MAX] }
 }
 
 fn flown(hours: f64, flights: f64) -> Totals {
@@ -33,48 +27,50 @@ fn the_limit_that_trips_first_decides() {
         (2.0, 10.0, Status::Red),
     ] {
         component.kind = ComponentKind::Airframe;
-        let is = component.status(1, &wear(&flown(hours, flights)), &params);
+        let is = component.status(1, &flown(hours, flights), &params);
         assert_eq!(is, status, "{hours} h, {flights} flights");
     }
-    assert_eq!(component.used_percent(0, &wear(&flown(1e6, 1e6)), &params), None, "without a limit");
+    assert_eq!(component.used_percent(0, &flown(1e6, 1e6), &params), None, "without a limit");
 }
 
 #[test]
 fn a_replaced_part_has_run_nothing_and_the_old_ones_figures_are_told() {
     let params = params(&[("CMP1_KIND", 3.0), ("CMP1_NUMBER", 2.0), ("CMP1_MOT_HOURS", 50.0)]);
     let mut component = Component::default();
-    assert!(component.describe(0, &wear(&Totals::default()), &params));
+    assert!(component.describe(0, &Totals::default(), &params));
     let totals = flown(60.0, 5.0);
-    let wear = wear(&totals);
-    assert_eq!(component.status(0, &wear, &params), Status::Red);
-    let old = component.replace(Label::new("SN 2"), &wear);
-    assert_eq!((old.serial, old.ran().flights), (Label::default(), 5.0));
-    assert_eq!((component.figures(&wear), component.serial.as_str()), (ComponentFigures::default(), "SN 2"));
-    assert_eq!(component.status(0, &wear, &params), Status::Green);
+    assert_eq!(component.status(0, &totals, &params), Status::Red);
+    let old = component.replace(Label::new("SN 2"), &totals);
+    assert_eq!((old.serial, old.ran.flights), (Label::default(), 5.0));
+    assert_eq!(
+        (component.figures(&totals), component.serial.as_str()),
+        (ComponentFigures::default(), "SN 2")
+    );
+    assert_eq!(component.status(0, &totals, &params), Status::Green);
 }
 
 #[test]
 fn a_component_reads_back_and_the_session_is_added_once() {
     let params = params(&[("CMP1_KIND", 2.0), ("CMP1_NUMBER", 1.0)]);
-    let totals = flown(1.0, 2.0);
+    let mut totals = flown(1.0, 2.0);
+    totals.battery_cycles = [0.75, 0.0, 0.0, 0.0];
     let mut component = Component { name: Label::new("pack A"), ..Component::default() };
-    component.describe(0, &wear(&Totals::default()), &params);
-    let wear = Wear { totals: &totals, battery_cycles: &[0.75, 0.0, 0.0, 0.0] };
+    component.describe(0, &Totals::default(), &params);
     let ran =
         ComponentFigures { cycles: 0.75, flight_s: 3_600.0, flights: 2.0, motor_s: 3_600.0, powered_s: 0.0 };
     let mut replaced = component;
-    replaced.replace(Label::new("pack B"), &wear);
+    replaced.replace(Label::new("pack B"), &totals);
     for (component, boots, expected) in [
         (component, 5, ran),
         (component, 6, ComponentFigures::default()),
         (replaced, 5, ComponentFigures::default()),
     ] {
         let mut stored = [0; Component::BYTES];
-        component.as_of(boots).encode(&mut stored);
+        Component { as_of: boots, ..component }.encode(&mut stored);
         let mut read = Component::decode(&stored).expect("readable");
         assert_eq!((read.name.as_str(), read.kind, read.number), ("pack A", ComponentKind::Battery, 1));
-        read.add(5, &wear);
-        assert_eq!(read.ran(), expected, "as of power-on {boots}");
+        read.add(5, &totals);
+        assert_eq!(read.ran, expected, "as of power-on {boots}");
         for cut in 0..Component::BYTES {
             assert_eq!(Component::decode(&stored[..cut]), Err(Unreadable));
         }

@@ -205,14 +205,15 @@ mod tests {
         };
         let mut totals = life([0; BATTERIES_MAX], value, (1_790.0, 150_000.0)).totals;
         totals.motors[4..].fill(MotorTotals::default());
-        let (battery_cycles, exposure) = ([0.0, 0.5, 0.0, 0.0], [[0, 0, 12_000, 6_000, 0, 0, 0, 0]; 5]);
-        Session { boots: 70_000, heard: true, totals, battery_cycles, exposure }
+        totals.battery_cycles = [0.0, 0.5, 0.0, 0.0];
+        totals.ranges = [[0, 0, 12_000, 6_000, 0, 0, 0, 0]; 5];
+        Session { boots: 70_000, heard: true, totals }
     }
 
     fn longest() -> Session {
-        let totals = life([0; BATTERIES_MAX], |_| f64::MAX, (f64::MAX, f64::MAX)).totals;
-        let (battery_cycles, exposure) = ([f64::MAX; BATTERIES_MAX], [[u32::MAX; 8]; 5]);
-        Session { boots: u32::MAX, heard: true, totals, battery_cycles, exposure }
+        let mut totals = life([0; BATTERIES_MAX], |_| f64::MAX, (f64::MAX, f64::MAX)).totals;
+        (totals.battery_cycles, totals.ranges) = ([f64::MAX; BATTERIES_MAX], [[u32::MAX; 8]; 5]);
+        Session { boots: u32::MAX, heard: true, totals }
     }
 
     fn stored(item: impl Item) -> Vec<u8> {

@@ -22,9 +22,8 @@
 
 use super::{COUNTERS_V1, Item, Lifetime, Unreadable, counters, motors};
 use crate::bytes::{Fields, fields};
-use crate::exposure::{BINS, Exposure, ExposureQuantity, Tenths};
-use crate::usage::{Form, Totals, Usage, UsageCounter, Wear};
-use crate::vehicle::BATTERIES_MAX;
+use crate::exposure::{BINS, ExposureQuantity};
+use crate::usage::{Form, Totals, UsageCounter};
 
 const RANGE_BYTES: usize = (BINS * ExposureQuantity::ALL.len()).div_ceil(8);
 
@@ -37,22 +36,11 @@ pub struct Session {
     pub heard: bool,
     /// Its counters.
     pub totals: Totals,
-    pub(super) battery_cycles: [f64; BATTERIES_MAX],
-    pub(crate) exposure: Tenths,
 }
 
 impl Session {
     /// Bytes that a quad with four ESCs needs after half an hour, generously.
     pub const BYTES_TYPICAL: usize = 160;
-
-    pub(crate) fn now(boots: u32, heard: bool, usage: &Usage, exposure: &Exposure) -> Self {
-        let (totals, battery_cycles) = (usage.totals(), *usage.wear().battery_cycles);
-        Self { boots, heard, totals, battery_cycles, exposure: exposure.session }
-    }
-
-    pub(crate) const fn wear(&self) -> Wear<'_> {
-        Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
-    }
 }
 
 impl Item for Session {
@@ -61,23 +49,23 @@ impl Item for Session {
     const SHORT: bool = true;
 
     fn fields(&mut self, fields: &mut Fields<'_>) -> Result<(), Unreadable> {
-        let Self { boots, heard, totals, battery_cycles, exposure } = self;
+        let Self { boots, heard, totals } = self;
         let mut was_heard = u8::from(*heard);
         fields!(fields: boots, was_heard);
         *heard = was_heard != 0;
         counters(totals, 0..COUNTERS_V1, fields)?;
         motors(totals, fields)?;
         fields.list(
-            battery_cycles,
+            &mut totals.battery_cycles,
             |cycles| *cycles > 0.0,
             |fields, cycles| fields.counter(Form::Amount, cycles),
         )?;
         let mut entered = [0_u8; RANGE_BYTES];
-        for (place, _) in exposure.iter().flatten().enumerate().filter(|(_, tenths)| **tenths > 0) {
+        for (place, _) in totals.ranges.iter().flatten().enumerate().filter(|(_, tenths)| **tenths > 0) {
             entered[place / 8] |= 1 << (place % 8);
         }
         fields!(fields: entered);
-        let ranges = exposure.iter_mut().flatten().enumerate();
+        let ranges = totals.ranges.iter_mut().flatten().enumerate();
         ranges
             .filter(|(place, _)| entered[place / 8] & 1 << (place % 8) != 0)
             .try_for_each(|(_, tenths)| fields.count(tenths))?;
@@ -90,7 +78,7 @@ impl Lifetime {
     pub fn add(&mut self, session: &Session) {
         if session.boots == self.boots {
             self.sessions = self.sessions.saturating_add(u32::from(session.heard));
-            self.totals = self.totals.join(&session.totals);
+            self.totals.join(&session.totals);
         }
     }
 }

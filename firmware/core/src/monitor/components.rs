@@ -10,13 +10,13 @@ impl Monitor {
     pub fn component_figures(&self, place: usize) -> Option<(ComponentFigures, Status)> {
         let component =
             self.components.get(place).filter(|component| component.kind != ComponentKind::None)?;
-        let wear = self.usage.wear();
-        Some((component.figures(&wear), component.status(place, &wear, &self.params)))
+        let totals = &self.usage.counted;
+        Some((component.figures(totals), component.status(place, totals, &self.params)))
     }
 
     /// The part of a component's life that is used, percent; `None` if it has no limit.
     pub fn component_used_percent(&self, place: usize) -> Option<f32> {
-        self.components.get(place)?.used_percent(place, &self.usage.wear(), &self.params)
+        self.components.get(place)?.used_percent(place, &self.usage.counted, &self.params)
     }
 
     /// Whether the wear of parts is judged. Until a card's settings are read, a stored part may be a replaced one.
@@ -26,9 +26,9 @@ impl Monitor {
 
     /// Takes a component from another monitor of this vehicle in this session: later counts add to it.
     pub fn learn_component(&mut self, place: usize, known: Component) {
-        let known = known.in_session(&self.usage.wear());
         if let Some(component) = self.components.get_mut(place) {
             *component = known;
+            component.set_figures(known.ran, &self.usage.counted);
         }
     }
 
@@ -38,7 +38,7 @@ impl Monitor {
         let Self { usage, components, saving, .. } = self;
         let component =
             components.get_mut(place).filter(|component| component.kind != ComponentKind::None)?;
-        let old = component.replace(serial, &usage.wear());
+        let old = component.replace(serial, &usage.counted);
         saving.hurry(ItemKey::Component(place as u8));
         if old.kind == ComponentKind::Battery {
             for (number, resistance) in (1..).zip(&mut self.derived.resistance) {

@@ -7,9 +7,10 @@ pub use counters::{
     CounterName, EXPOSURE_FIRST, FIGURE_FIRST, Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter,
     counter_name, exposure_number, figure_number,
 };
-pub use totals::{MotorTotals, Totals, Wear};
+pub use totals::{MotorTotals, Totals};
 
 use crate::derived::Derived;
+use crate::exposure::ExposureQuantity;
 use crate::flight::{Flight, FlightEvent, Phase};
 use crate::health::Inputs;
 use crate::motion::ground_speed_mps;
@@ -20,7 +21,7 @@ use crate::power_draw::{PowerDraw, drawn};
 use crate::rainflow::Rainflow;
 use crate::time::{BootMs, Millis, PAUSE, SILENT};
 use crate::units::{Metres, Rpm};
-use crate::vehicle::{BATTERIES_MAX, Vehicle};
+use crate::vehicle::Vehicle;
 
 /// Greater accelerations, m/s2 or g, are garbage: no vehicle here reaches them.
 const ACCELERATION_MAX: f32 = 10_000.0;
@@ -29,12 +30,13 @@ state! {
     /// Usage since power-on.
     pub struct Usage {
         last: Option<BootMs>,
-        pub(crate) current_a: Option<f32>,
+        current_a: Option<f32>,
         /// All counters but the cycles of the load factor, which are computed when asked for.
-        totals: Totals,
+        pub(crate) counted: Totals,
+        /// When time in ranges was counted last.
+        exposed_at: Option<BootMs>,
+        /// Batteries share it equally.
         capacity_ah: f32,
-        /// Full discharges of each battery, if the capacity is known. Batteries share it equally.
-        battery_cycles: [f64; BATTERIES_MAX],
         load_cycles: Rainflow<7> = Rainflow::new(LOAD_RANGES_G, LOAD_TURN_G),
         /// Seconds armed and in the air that wait for the vehicle to report again.
         held_s: [f64; 2],
@@ -43,6 +45,8 @@ state! {
     }
 }
 
+/// Between two steps of the time in ranges.
+const EXPOSED_EVERY: Millis = Millis::from_millis(100);
 const LOAD_RANGES_G: [f32; 7] = [0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// A load factor that turns back by less is vibration and noise.
 const LOAD_TURN_G: f32 = 0.1;
@@ -84,14 +88,14 @@ impl Usage {
     fn take_battery(&mut self, at: BootMs, vehicle: &Vehicle) {
         let PowerDraw { voltage_v, current_a, .. } = drawn(at, vehicle);
         if let Some(voltage_v) = voltage_v.filter(|voltage_v| *voltage_v > 0.0) {
-            self.totals.extend(UsageCounter::VoltageMin, f64::from(voltage_v));
+            self.counted.extend(UsageCounter::VoltageMin, f64::from(voltage_v));
         }
-        self.totals.extend(UsageCounter::CurrentMax, f64::from(current_a.unwrap_or(0.0)));
+        self.counted.extend(UsageCounter::CurrentMax, f64::from(current_a.unwrap_or(0.0)));
     }
 
     fn extend(&mut self, counter: UsageCounter, value: f32, limit: f32) {
         if value <= limit {
-            self.totals.extend(counter, f64::from(value));
+            self.counted.extend(counter, f64::from(value));
         }
     }
 
@@ -99,31 +103,31 @@ impl Usage {
     pub(crate) fn step(&mut self, inputs: &Inputs<'_>, event: Option<FlightEvent>) {
         let Inputs { now, vehicle, flight, derived, params, .. } = *inputs;
         if event == Some(FlightEvent::TakeOff) {
-            self.totals.add(UsageCounter::Flights, 1.0);
+            self.counted.add(UsageCounter::Flights, 1.0);
         }
         if event.is_some_and(|event| event != FlightEvent::Landing) {
             // The event is found some time after it happened.
             let late = flight.airborne_since().map_or(Millis::ZERO, |since| now.since(since));
-            self.totals.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
+            self.counted.add(UsageCounter::Flight, f64::from(late.as_secs_f32()));
         }
         if event == Some(FlightEvent::Landing) {
             self.land(flight, params);
         }
-        self.totals.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
+        self.counted.set(UsageCounter::AutopilotReboots, f64::from(vehicle.reboots));
         let set_ah = params.get(Param::BatCapacity);
         self.capacity_ah = if set_ah > 0.0 { set_ah } else { derived.cells.capacity_ah() };
         let before = self.last.replace(now);
         let step = before.map_or(Millis::ZERO, |last| now.since(last));
         let powered = now.since(before.unwrap_or(BootMs::ZERO));
-        self.totals.add(UsageCounter::Powered, f64::from(powered.as_secs_f32()));
+        self.counted.add(UsageCounter::Powered, f64::from(powered.as_secs_f32()));
         if step > PAUSE {
             return;
         }
         let step_s = f64::from(step.as_secs_f32());
         self.step_times(now, vehicle, flight, step_s);
         if let Some(speed_mps) = ground_speed_mps(now, vehicle).filter(|_| flight.airborne()) {
-            self.totals.add(UsageCounter::Distance, f64::from(speed_mps) * step_s);
-            self.totals.extend(UsageCounter::SpeedMax, f64::from(speed_mps));
+            self.counted.add(UsageCounter::Distance, f64::from(speed_mps) * step_s);
+            self.counted.extend(UsageCounter::SpeedMax, f64::from(speed_mps));
         }
         self.step_battery(now, vehicle, step_s);
         self.step_motors(now, vehicle, step_s);
@@ -144,13 +148,13 @@ impl Usage {
         for ((counter, is_so, is_known), held_s) in states.into_iter().zip(&mut self.held_s) {
             let passed_s = if is_so { step_s + *held_s } else { 0.0 };
             *held_s = 0.0;
-            if is_known { self.totals.add(counter, passed_s) } else { *held_s = passed_s }
+            if is_known { self.counted.add(counter, passed_s) } else { *held_s = passed_s }
         }
         if is_known {
             let landing_s = core::mem::take(&mut self.landing_s);
             // The regimes follow each other as the phases do.
             let regime = UsageCounter::Ground as usize + flight.phase(now, vehicle) as usize;
-            self.totals.add(UsageCounter::ALL[regime], step_s + landing_s);
+            self.counted.add(UsageCounter::ALL[regime], step_s + landing_s);
         } else if reports {
             self.landing_s += step_s;
         }
@@ -162,13 +166,13 @@ impl Usage {
         // Dividing is dear.
         let hours = step_s / 3_600.0;
         let charge_ah = f64::from(drawn.current_a.unwrap_or(0.0)) * hours;
-        self.totals.add(UsageCounter::Charge, charge_ah);
-        self.totals.add(UsageCounter::Energy, f64::from(drawn.power_w) * hours);
+        self.counted.add(UsageCounter::Charge, charge_ah);
+        self.counted.add(UsageCounter::Energy, f64::from(drawn.power_w) * hours);
         if self.capacity_ah > 0.0 {
-            self.totals.add(UsageCounter::BatteryCycles, charge_ah / f64::from(self.capacity_ah));
+            self.counted.add(UsageCounter::BatteryCycles, charge_ah / f64::from(self.capacity_ah));
             let batteries = vehicle.batteries.iter().filter(|slot| slot.get().is_some()).count().max(1);
             let capacity_ah = f64::from(self.capacity_ah) / batteries as f64;
-            for (cycles, discharge_a) in self.battery_cycles.iter_mut().zip(drawn.each_a) {
+            for (cycles, discharge_a) in self.counted.battery_cycles.iter_mut().zip(drawn.each_a) {
                 *cycles += f64::from(discharge_a) * hours / capacity_ah;
             }
         }
@@ -176,10 +180,10 @@ impl Usage {
 
     fn land(&mut self, flight: &Flight, params: &Params) {
         let ended = if flight.is_down() { UsageCounter::Mishaps } else { UsageCounter::Landings };
-        self.totals.add(ended, 1.0);
-        self.totals.extend(UsageCounter::TouchdownMax, f64::from(flight.touch_mps));
+        self.counted.add(ended, 1.0);
+        self.counted.extend(UsageCounter::TouchdownMax, f64::from(flight.touch_mps));
         if flight.touch_mps >= params.get(Param::HardLanding) {
-            self.totals.add(UsageCounter::HardLandings, 1.0);
+            self.counted.add(UsageCounter::HardLandings, 1.0);
         }
     }
 
@@ -189,7 +193,7 @@ impl Usage {
 
     fn step_motors(&mut self, now: BootMs, vehicle: &Vehicle, step_s: f64) {
         let minutes = step_s / 60.0;
-        for (number, usage) in self.totals.motors.iter_mut().enumerate() {
+        for (number, usage) in self.counted.motors.iter_mut().enumerate() {
             let motor = &vehicle.motors[number];
             let fresh = motor.moved_at.is_some_and(|at| now.since(at) <= PAUSE);
             if fresh && turns(vehicle, number) {
@@ -200,14 +204,28 @@ impl Usage {
         }
     }
 
-    /// Every known counter: its stored number and its value.
-    pub fn for_each(&self, each: impl FnMut(u8, f64)) {
-        self.totals().for_each(each);
+    /// Counts the time in ranges in whole tenths of a second; the rest goes into the next step.
+    pub(crate) fn expose(&mut self, now: BootMs, vehicle: &Vehicle) {
+        let step = self.exposed_at.map_or(Millis::ZERO, |last| now.since(last));
+        if self.exposed_at.is_some() && step < EXPOSED_EVERY {
+            return;
+        }
+        let tenths = (step.as_millis() / 100) as u32;
+        self.exposed_at = Some(now - Millis::from_millis(step.as_millis() % 100));
+        if step > PAUSE {
+            return;
+        }
+        for (quantity, bins) in ExposureQuantity::ALL.into_iter().zip(&mut self.counted.ranges) {
+            if let Some(value) = quantity.value(now, vehicle, self.current_a) {
+                let bin = quantity.edges().iter().take_while(|edge| value >= **edge).count();
+                bins[bin] = bins[bin].saturating_add(tenths);
+            }
+        }
     }
 
     /// Every counter as it stands now.
     pub fn totals(&self) -> Totals {
-        let mut totals = self.totals;
+        let mut totals = self.counted;
         let cycles = UsageCounter::ALL.iter().skip(UsageCounter::LoadCycles0 as usize);
         for (bin, counter) in cycles.take(LOAD_RANGES_G.len()).enumerate() {
             totals.set(*counter, self.load_cycles.cycles(bin));
@@ -223,10 +241,5 @@ impl Usage {
 
     pub(crate) fn until(&self) -> BootMs {
         self.last.unwrap_or_default()
-    }
-
-    /// The wear of components.
-    pub const fn wear(&self) -> Wear<'_> {
-        Wear { totals: &self.totals, battery_cycles: &self.battery_cycles }
     }
 }

@@ -1,6 +1,7 @@
 //! Sums, maxima and minima of all counters, of one session or of many.
 
-use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter};
+use super::counters::{Form, MOTOR_REVOLUTIONS_FIRST, MOTOR_TIME_FIRST, UsageCounter, exposure_number};
+use crate::exposure::{ExposureQuantity, Tenths};
 use crate::observation::MOTORS_MAX;
 use crate::vehicle::BATTERIES_MAX;
 
@@ -13,7 +14,7 @@ state! {
         pub revolutions: f64,
     }
 
-    /// Every counter, added up.
+    /// Everything that counts, added up.
     pub struct Totals {
         counters: [f64; UsageCounter::ALL.len()] = {
             let mut counters = [0.0; _];
@@ -26,6 +27,9 @@ state! {
         },
         /// Motors by number.
         pub motors: [MotorTotals; MOTORS_MAX] = [MotorTotals::default(); MOTORS_MAX],
+        /// Full discharges of each battery, if the capacity is known.
+        pub(crate) battery_cycles: [f64; BATTERIES_MAX],
+        pub(crate) ranges: Tenths,
     }
 }
 
@@ -62,7 +66,7 @@ impl Totals {
         (value.is_finite() && !unknown).then_some(value)
     }
 
-    /// Every known counter: its stored number and its value.
+    /// Every known figure: its stored number and its value.
     pub fn for_each(&self, mut each: impl FnMut(u8, f64)) {
         for counter in UsageCounter::ALL {
             if let Some(value) = self.value(*counter) {
@@ -75,33 +79,28 @@ impl Totals {
                 each(MOTOR_REVOLUTIONS_FIRST + motor, usage.revolutions);
             }
         }
-    }
-
-    /// The sum of these and `later`.
-    pub fn join(&self, later: &Self) -> Self {
-        let mut both = *self;
-        for counter in UsageCounter::ALL {
-            let value = later.raw(*counter);
-            match counter.form() {
-                Form::Highest | Form::Lowest => both.extend(*counter, value),
-                _ => both.add(*counter, value),
+        for (quantity, bins) in ExposureQuantity::ALL.into_iter().zip(&self.ranges) {
+            for (bin, tenths) in bins.iter().enumerate().filter(|(_, tenths)| **tenths > 0) {
+                each(exposure_number(quantity, bin), f64::from(*tenths) / 10.0);
             }
         }
-        for (motor, later) in both.motors.iter_mut().zip(&later.motors) {
-            motor.seconds += later.seconds;
-            motor.revolutions += later.revolutions;
-        }
-        both
     }
-}
 
-/// The counters of a session by which components wear: sums, without the cycles of the load factor.
-#[derive(Clone, Copy, Debug)]
-pub struct Wear<'a> {
-    /// The session's counters.
-    pub totals: &'a Totals,
-    /// Full discharges of each battery.
-    pub battery_cycles: &'a [f64; BATTERIES_MAX],
+    /// Adds the counters of vehicle and motors of another session. Time in ranges has an item of its own
+    /// ([`crate::exposure::Exposure`]), and cycles are those of components.
+    pub fn join(&mut self, other: &Self) {
+        for counter in UsageCounter::ALL {
+            let value = other.raw(*counter);
+            match counter.form() {
+                Form::Highest | Form::Lowest => self.extend(*counter, value),
+                _ => self.add(*counter, value),
+            }
+        }
+        for (motor, other) in self.motors.iter_mut().zip(&other.motors) {
+            motor.seconds += other.seconds;
+            motor.revolutions += other.revolutions;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -119,12 +118,15 @@ mod tests {
             totals.extend(UsageCounter::VoltageMin, voltage);
             totals.motors[3].revolutions = 1e6;
         }
-        let both = first.join(&second);
+        let mut both = first;
+        both.join(&second);
         assert_eq!(both.value(UsageCounter::Flights), Some(5.0));
         assert_eq!(both.value(UsageCounter::HeightMax), Some(80.0));
         assert_eq!(both.value(UsageCounter::VoltageMin), Some(13.7));
         assert_eq!(both.motors[3].revolutions.to_bits(), 2e6_f64.to_bits());
-        assert_eq!(Totals::default().join(&first), first);
+        let mut first_alone = Totals::default();
+        first_alone.join(&first);
+        assert_eq!(first_alone, first);
     }
 
     #[test]

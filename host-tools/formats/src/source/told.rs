@@ -159,7 +159,7 @@ impl MonitorRecord {
                     component.serial = Label::new(recorded.new_serial);
                 } else {
                     component.serial = Label::new(recorded.serial);
-                    component = component.having_run(recorded.figures);
+                    component.ran = recorded.figures;
                 }
                 (place < COMPONENTS_MAX).then_some(Self::Part { place, component })
             }

@@ -185,8 +185,8 @@ fn a_part_that_is_due_is_reported_only_if_the_card_does_not_replace_it() {
     let mut part = Component::default();
     (part.kind, part.serial) = (ComponentKind::Airframe, Label::new("old"));
     let mut monitor = Monitor::new(params);
-    let flown = ComponentFigures { flights: 5.0, ..ComponentFigures::default() };
-    monitor.learn_component(0, part.having_run(flown));
+    part.ran = ComponentFigures { flights: 5.0, ..ComponentFigures::default() };
+    monitor.learn_component(0, part);
     let is_due = |text, comes: &[(u64, Comes)]| {
         after(&monitor, text, ResetCause::PowerOn, 1, comes, |monitor| {
             let mut exceeded = monitor.exceedances().changed(Instant::ZERO.into(), Instant::ZERO.into());
