@@ -98,59 +98,53 @@ const RATE: Row = Row {
     ..ROW
 };
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Comparison {
-    MagHeading,
-    BaroGnss,
-    BaroNoise,
-    BaroClimb,
-    Ahrs2Tilt,
-    Ahrs2Height,
-    Ahrs2Position,
-    Satellites0,
-    Satellites1,
-    Hdop0,
-    Hdop1,
-    Vibration,
-    VibrationPx4,
-    RollRate,
-    PitchRate,
+/// The height of two sources, with an offset that is learnt.
+const HEIGHT: Row = Row { side: Side::Either, learn: Learn::Level, hold: 4.0, ..AHRS2 };
+
+/// Each comparison with its row.
+macro_rules! comparisons {
+    ($($name:ident $row:expr;)*) => {
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum Comparison { $($name,)* }
+
+        static ROWS: [Row; [$(Comparison::$name),*].len()] = [$($row),*];
+    };
+}
+
+comparisons! {
+    MagHeading Row {
+        gates: gates::SETTLED | gates::CLEAR | gates::ONE_FRAME,
+        // A stream that is slower than 4 Hz is smoothed over as many samples.
+        step_max: Millis::from_millis(250),
+        clamp: 30.0,
+        period: 360.0,
+        side: Side::Either,
+        hold: 6.0,
+        ..ROW
+    };
+    BaroGnss Row { gates: gates::AIRBORNE | gates::CLEAR, ..HEIGHT };
+    BaroNoise Row { gates: gates::SETTLED | gates::CLEAR | gates::STILL, hold: 1.0, ..ROW };
+    BaroClimb Row { gates: gates::SETTLED | gates::HOVERS, ..RATE };
+    Ahrs2Tilt AHRS2;
+    Ahrs2Height HEIGHT;
+    Ahrs2Position AHRS2;
+    Satellites0 CONSTELLATION;
+    Satellites1 CONSTELLATION;
+    Hdop0 CONSTELLATION;
+    Hdop1 CONSTELLATION;
+    Vibration VIBRATION;
+    VibrationPx4 Row { hold: 1.0, ..VIBRATION };
+    RollRate RATE;
+    PitchRate RATE;
 }
 
 impl Comparison {
-    const COUNT: usize = Self::PitchRate as usize + 1;
     pub(crate) const SATELLITES: [Self; RECEIVERS_MAX] = [Self::Satellites0, Self::Satellites1];
     pub(crate) const HDOP: [Self; RECEIVERS_MAX] = [Self::Hdop0, Self::Hdop1];
     pub(crate) const RATES: [Self; 2] = [Self::RollRate, Self::PitchRate];
 
-    const fn row(self) -> &'static Row {
-        const MAG_HEADING: Row = Row {
-            gates: gates::SETTLED | gates::CLEAR | gates::ONE_FRAME,
-            // A stream that is slower than 4 Hz is smoothed over as many samples.
-            step_max: Millis::from_millis(250),
-            clamp: 30.0,
-            period: 360.0,
-            side: Side::Either,
-            hold: 6.0,
-            ..ROW
-        };
-        const BARO_GNSS: Row = Row { gates: gates::AIRBORNE | gates::CLEAR, ..AHRS2_HEIGHT };
-        const BARO_NOISE: Row = Row { gates: gates::SETTLED | gates::CLEAR | gates::STILL, hold: 1.0, ..ROW };
-        const BARO_CLIMB: Row = Row { gates: gates::SETTLED | gates::HOVERS, ..RATE };
-        const AHRS2_HEIGHT: Row = Row { side: Side::Either, learn: Learn::Level, hold: 4.0, ..AHRS2 };
-        const VIBRATION_PX4: Row = Row { hold: 1.0, ..VIBRATION };
-        match self {
-            Self::MagHeading => &MAG_HEADING,
-            Self::BaroGnss => &BARO_GNSS,
-            Self::BaroNoise => &BARO_NOISE,
-            Self::BaroClimb => &BARO_CLIMB,
-            Self::Ahrs2Tilt | Self::Ahrs2Position => &AHRS2,
-            Self::Ahrs2Height => &AHRS2_HEIGHT,
-            Self::Satellites0 | Self::Satellites1 | Self::Hdop0 | Self::Hdop1 => &CONSTELLATION,
-            Self::Vibration => &VIBRATION,
-            Self::VibrationPx4 => &VIBRATION_PX4,
-            Self::RollRate | Self::PitchRate => &RATE,
-        }
+    fn row(self) -> &'static Row {
+        &ROWS[self as usize]
     }
 }
 
@@ -244,7 +238,7 @@ impl Residual {
 state! {
     pub(crate) struct Residuals {
         pub(crate) gates: Gates,
-        each: [Residual; Comparison::COUNT] = [Residual::default(); Comparison::COUNT],
+        each: [Residual; ROWS.len()] = [Residual::default(); ROWS.len()],
     }
 }
 
