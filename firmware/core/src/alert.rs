@@ -48,20 +48,26 @@ const fn has_both(flags: u16) -> bool {
 }
 
 state! {
+    /// Flags of one message.
     struct Flags {
         now: Causes,
         before: Causes,
+        /// Those that it reports on, as failed or as good.
+        covered: Causes,
         at: Stamp,
     }
 }
 
 impl Flags {
-    const fn take(&mut self, at: BootMs, causes: Causes) {
-        *self = Self { now: causes, before: self.now, at: Stamp::at(at) };
+    const fn take(&mut self, at: BootMs, causes: Causes, covered: Causes) {
+        *self = Self { now: causes, before: self.now, covered, at: Stamp::at(at) };
     }
 
-    fn has(&self, now: BootMs, cause: Cause) -> bool {
-        self.now.both(self.before).has(cause) && self.at.age(now).is_some_and(|age| age <= SILENT)
+    /// Whether a cause has failed; `None` if the message does not come or does not report on it.
+    fn says(&self, now: BootMs, cause: Cause) -> Option<bool> {
+        let has = self.now.both(self.before).has(cause);
+        let comes = self.at.age(now).is_some_and(|age| age <= SILENT);
+        (comes && (has || self.covered.has(cause))).then_some(has)
     }
 }
 
@@ -80,8 +86,6 @@ state! {
         armed_at: Stamp,
         /// Causes that a flag called healthy once. Parts that never were healthy are not fitted or not switched on.
         had: Causes,
-        /// Causes that flags of the last `SYS_STATUS` cover, healthy or not.
-        spoken_of: Causes,
         had_both: bool,
     }
 }
@@ -132,22 +136,18 @@ impl Alerts {
         self.had = self.had.or(healthy);
         let lost = Causes::of_sensors(sensors.lost).both(self.had);
         let wrong = Causes::of_sensors(sensors.unhealthy).or(lost);
-        self.spoken_of = healthy.or(wrong);
-        self.sensors.take(at, wrong);
+        self.sensors.take(at, wrong, healthy.or(wrong));
     }
 
     /// `HIGH_LATENCY2`
-    pub(crate) const fn take_failures(&mut self, at: BootMs, causes: Causes) {
-        self.failures.take(at, causes);
+    pub(crate) fn take_failures(&mut self, at: BootMs, causes: Causes) {
+        self.failures.take(at, causes, Causes::of_failure_flags(u16::MAX));
     }
 
     pub(crate) fn take_estimator(&mut self, at: BootMs, estimator: &Estimator, has_fix: bool, in_air: bool) {
         self.had_both |= has_both(estimator.flags);
-        self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix, in_air));
-    }
-
-    const fn flags(&self) -> [&Flags; 3] {
-        [&self.sensors, &self.failures, &self.estimator]
+        let covered = Causes::NONE.with(Cause::Estimator).with(Cause::Gnss).with(Cause::Accelerometer);
+        self.estimator.take(at, of_estimator(estimator, self.had_both, has_fix, in_air), covered);
     }
 
     /// The level of a cause, as [`Urgency`] numbers it.
@@ -159,28 +159,17 @@ impl Alerts {
         let told = self.told.get(cause as usize)?;
         let urgency = told.map(|(urgency, _)| urgency);
         let is_judged = self.armed && !in_mishap;
-        let is_flagged = is_judged
-            && self.flags().iter().any(|flags| flags.has(now, cause))
-            && (cause != Cause::RemoteControl || self.had.has(cause));
+        let flags = [&self.sensors, &self.failures, &self.estimator];
+        let said = |failed| is_judged && flags.iter().any(|flags| flags.says(now, cause) == Some(failed));
+        let is_flagged = said(true) && (cause != Cause::RemoteControl || self.had.has(cause));
         let holds = told.is_some_and(|(_, until)| !now.is_after(until));
         let held = urgency.filter(|urgency| *urgency != Urgency::Over && holds);
         let wrong = held.max(is_flagged.then_some(Urgency::Warning));
-        let is_over = urgency == Some(Urgency::Over) || is_judged && self.is_cleared(now, cause);
+        let is_over = urgency == Some(Urgency::Over) || said(false);
         let good = if is_over { f32::from(Urgency::Over as u8) } else { ENDED };
         // Once flags were received each cause has a level.
-        let was_said = told.is_some() || self.flags().iter().any(|flags| flags.at.is_set());
+        let was_said = told.is_some() || flags.iter().any(|flags| flags.at.is_set());
         wrong.map(|urgency| f32::from(urgency as u8)).or(was_said.then_some(good))
-    }
-
-    fn is_cleared(&self, now: BootMs, cause: Cause) -> bool {
-        let comes = |flags: &Flags| {
-            let has = flags.now.both(flags.before).has(cause);
-            !has && flags.at.age(now).is_some_and(|age| age <= SILENT)
-        };
-        let by_estimator = matches!(cause, Cause::Estimator | Cause::Gnss | Cause::Accelerometer);
-        (self.spoken_of.has(cause) && comes(&self.sensors))
-            || (Causes::of_failure_flags(u16::MAX).has(cause) && comes(&self.failures))
-            || (by_estimator && comes(&self.estimator))
     }
 }
 
