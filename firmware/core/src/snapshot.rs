@@ -104,7 +104,6 @@ state! {
         filled: u8,
         newest: BootMs,
         pending: [Option<Pending>; PENDING_MAX] = [None; PENDING_MAX],
-        left_out: u16,
     }
 }
 
@@ -161,18 +160,16 @@ impl Snapshots {
         (0..usize::from(self.filled)).map(move |sample| &self.ring[(first + sample) % SAMPLES])
     }
 
-    /// No snapshot of a subsystem begins while one of it is being taken.
+    /// No snapshot of a subsystem begins while one of it is being taken, or while [`PENDING_MAX`] of others are.
     pub(crate) fn trigger(&mut self, finding: &Finding) {
         let same = |pending: &Pending| pending.subsystem == finding.subsystem;
         if finding.level != Level::Critical || self.pending.iter().flatten().any(same) {
             return;
         }
-        let Some(place) = self.pending.iter_mut().find(|place| place.is_none()) else {
-            self.left_out = self.left_out.saturating_add(1);
-            return;
-        };
-        let Finding { at, check, instance, subsystem, .. } = *finding;
-        *place = Some(Pending { at, check, instance, subsystem, before_told: false });
+        if let Some(place) = self.pending.iter_mut().find(|place| place.is_none()) {
+            let Finding { at, check, instance, subsystem, .. } = *finding;
+            *place = Some(Pending { at, check, instance, subsystem, before_told: false });
+        }
     }
 
     pub(crate) fn take(&mut self, now: BootMs) -> Option<Snapshot<'_>> {
@@ -186,11 +183,6 @@ impl Snapshots {
         let length = INTERVAL.as_millis() * u64::from(self.filled.saturating_sub(1));
         let first = self.newest - Millis::from_millis(length);
         Some(Snapshot { at, check, instance, subsystem, after: before_told, first, snapshots: self })
-    }
-
-    /// Findings without a snapshot because too many were being taken.
-    pub const fn left_out(&self) -> u16 {
-        self.left_out
     }
 }
 

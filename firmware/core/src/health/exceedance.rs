@@ -1,8 +1,8 @@
 //! Exceedances: crossings of limits, their peak and duration, for each check and instance, in this session and over
 //! the airframe's life.
 //!
-//! Bounded: [`EXCEEDANCES_MAX`] checks and instances. One more is counted as left out, unless it is critical and
-//! another never was: it takes that one's place.
+//! Bounded: [`EXCEEDANCES_MAX`] checks and instances. One more is left out, unless it is critical and another never
+//! was: it takes that one's place.
 
 use super::check::{Check, Side};
 use super::finding::{Finding, Level};
@@ -102,7 +102,6 @@ state! {
     /// All exceedances.
     pub struct Exceedances {
         entries: [Option<Entry>; EXCEEDANCES_MAX] = [None; EXCEEDANCES_MAX],
-        left_out: u16,
     }
 }
 
@@ -161,10 +160,8 @@ impl Exceedances {
         let never_critical = |entry: &Entry| entry.session.criticals == 0 && entry.before.criticals == 0;
         let is_lesser = |entry: &Entry| finding.level == Level::Critical && never_critical(entry);
         let free = self.entries.iter().position(Option::is_none);
-        let place = free.or_else(|| {
-            self.left_out = self.left_out.saturating_add(1);
-            self.entries.iter().position(|entry| entry.as_ref().is_some_and(is_lesser))
-        });
+        let place =
+            free.or_else(|| self.entries.iter().position(|entry| entry.as_ref().is_some_and(is_lesser)));
         Some(self.entries.get_mut(place?)?.insert(Entry::of(check, finding.instance, finding.at)))
     }
 
@@ -188,11 +185,6 @@ impl Exceedances {
 
     pub(crate) fn lasting(&self) -> bool {
         self.entries.iter().flatten().any(|entry| entry.level.alarm() > 0)
-    }
-
-    /// Checks that found no room.
-    pub const fn left_out(&self) -> u16 {
-        self.left_out
     }
 
     /// Forgets the exceedances of the life: they are another airframe's.
