@@ -175,7 +175,7 @@ impl Crosschecks {
         // A vehicle that stands does not move, whatever an estimator makes of the touch-down.
         let idles = throttle(now, vehicle).is_some_and(|throttle| throttle < IDLE_THROTTLE);
         if !(idles && self.residuals.gates.are(gates::HOVERS) && vehicle.inertial.is_level(now)) {
-            self.repeats.step(now, step_s, vehicle);
+            self.repeats.moved.step(now, step_s, vehicle);
         }
     }
 

@@ -114,7 +114,7 @@ impl Stuck {
 }
 
 state! {
-    struct Moved {
+    pub(crate) struct Moved {
         climbed_m: f32,
         travelled_m: f32,
         turned_rad: f32,
@@ -124,7 +124,7 @@ state! {
 }
 
 impl Moved {
-    fn step(&mut self, now: BootMs, step_s: f32, vehicle: &Vehicle) {
+    pub(crate) fn step(&mut self, now: BootMs, step_s: f32, vehicle: &Vehicle) {
         let climb_mps = climb_mps(now, vehicle).map_or(0.0, libm::fabsf);
         self.climbed_m += if climb_mps > HANGS_MPS { climb_mps * step_s } else { 0.0 };
         self.travelled_m += ground_speed_mps(now, vehicle).map_or(0.0, |speed| speed * step_s);
@@ -149,7 +149,7 @@ impl Moved {
 
 state! {
     pub(crate) struct Repeats {
-        moved: Moved,
+        pub(crate) moved: Moved,
         sensors: [[Stuck; SENSORS_MAX]; Kind::COUNT] = [[Stuck::default(); SENSORS_MAX]; Kind::COUNT],
         receivers: [Stuck; RECEIVERS_MAX],
     }
@@ -160,10 +160,6 @@ impl Repeats {
         let mut begun = Self::default();
         begun.sensors[Kind::Barometer as usize] = self.sensors[Kind::Barometer as usize].map(Stuck::begun);
         begun
-    }
-
-    pub(crate) fn step(&mut self, now: BootMs, step_s: f32, vehicle: &Vehicle) {
-        self.moved.step(now, step_s, vehicle);
     }
 
     const fn moved(&self, kind: Kind) -> (f32, f32) {

@@ -419,12 +419,8 @@ impl State {
     pub(super) fn hold(&mut self, before: &Self, change: Option<LevelChange>) -> Option<LevelChange> {
         self.held = before.held;
         let change = change?;
-        let known = [before.held, Some(change.previous), Some(change.level)];
-        self.held = if known.contains(&Some(Level::Critical)) {
-            Some(Level::Critical)
-        } else {
-            known.contains(&Some(Level::Warning)).then_some(Level::Warning)
-        };
+        let known = [before.held, Some(change.previous), Some(change.level)].into_iter().flatten();
+        self.held = known.filter(|level| level.alarm() > 0).max_by_key(|level| level.alarm());
         match self.held {
             Some(held) if change.level != Level::Stale && change.level != held => {
                 *self = Self { level: Some(held), held: Some(held), ..*before };

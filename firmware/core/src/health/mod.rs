@@ -230,16 +230,6 @@ impl Health {
         Some((known.alarm()?, known.cause.is_some()))
     }
 
-    /// Of each check, in the order of [`checks`], the levels of its instances.
-    pub fn by_check(&self) -> impl Iterator<Item = impl Iterator<Item = Level>> {
-        let mut states = &self.states[..];
-        checks().map(move |check| {
-            let (mine, rest) = states.split_at_checked(usize::from(check.instances)).unwrap_or_default();
-            states = rest;
-            mine.iter().filter_map(State::level)
-        })
-    }
-
     /// A subsystem's level: its worst known part; stale where nothing is known.
     pub fn subsystem(&self, subsystem: Subsystem) -> Level {
         let part = self.levels().filter(|(check, ..)| check.subsystem == subsystem);
@@ -300,14 +290,8 @@ fn unreported(reported: &Reported, inputs: &Inputs<'_>) -> Option<&'static str> 
 
 /// Critical before stale before warning: not knowing is worse than a known warning, and better than a known danger.
 fn worst(levels: impl Iterator<Item = Level>) -> Level {
-    let rank = |level: Level| match level {
-        Level::Ok => 0,
-        Level::Advisory => 1,
-        Level::Warning => 2,
-        Level::Stale => 3,
-        Level::Critical => 4,
-    };
-    levels.max_by_key(|level| rank(*level)).unwrap_or(Level::Stale)
+    const FROM_BEST: [Level; 5] = [Level::Ok, Level::Advisory, Level::Warning, Level::Stale, Level::Critical];
+    levels.max_by_key(|level| FROM_BEST.iter().position(|one| one == level)).unwrap_or(Level::Stale)
 }
 
 #[cfg(test)]

@@ -62,8 +62,11 @@ impl Coverage {
                 (check.read)(&inputs, instance).is_some_and(|reading| reading.value.is_finite())
             });
         }
-        for (seen, mut levels) in self.seen.iter_mut().zip(monitor.health().by_check()) {
-            seen.level = seen.level || levels.any(|level| level != Level::Stale);
+        for (check, ..) in monitor.health().levels().filter(|(.., level)| *level != Level::Stale) {
+            let place = checks().position(|known| known.name == check.name);
+            if let Some(seen) = place.and_then(|place| self.seen.get_mut(place)) {
+                seen.level = true;
+            }
         }
     }
 
