@@ -54,27 +54,35 @@ const _: () = assert!(
     STATES <= STATES_MAX,
     "too many states: lower `instances` of a check, or raise STATES_MAX and budgets.toml"
 );
-const _: () = assert!(CHECKS_COUNT < u16::MAX as usize, "the number of a check has 16 bits");
+const _: () = assert!(CHECKS_COUNT <= u8::MAX as usize, "the number of a check has 8 bits");
 
 /// All checks, by subsystem.
 pub fn checks() -> impl ExactSizeIterator<Item = &'static Check> + Clone {
     CHECKS.iter()
 }
 
+/// Of each state its check, by its place in [`CHECKS`], and the instance.
+static SLOTS: [(u8, u8); STATES] = {
+    let mut slots = [(0, 0); STATES];
+    let (mut check, mut slot) = (0, 0);
+    while check < CHECKS_COUNT {
+        let mut instance = 0;
+        while instance < CHECKS[check].instances {
+            slots[slot] = (check as u8, instance);
+            (instance, slot) = (instance + 1, slot + 1);
+        }
+        check += 1;
+    }
+    slots
+};
+
 pub(super) fn slots() -> impl Iterator<Item = (u16, &'static Check, u8)> + Clone {
-    let each = checks().flat_map(|check| (0..check.instances).map(move |instance| (check, instance)));
-    (0..).zip(each).map(|(slot, (check, instance))| (slot, check, instance))
+    (0..).zip(&SLOTS).map(|(slot, (check, instance))| (slot, &CHECKS[usize::from(*check)], *instance))
 }
 
 pub(super) fn check_of(slot: u16) -> Option<(&'static Check, u8)> {
-    let mut left = slot;
-    for check in checks() {
-        match left.checked_sub(check.instances.into()) {
-            Some(beyond) => left = beyond,
-            None => return Some((check, left as u8)),
-        }
-    }
-    None
+    let (check, instance) = *SLOTS.get(usize::from(slot))?;
+    Some((CHECKS.get(usize::from(check))?, instance))
 }
 
 pub(super) fn slot_of(name: &str, instance: u8) -> Option<u16> {
