@@ -195,6 +195,8 @@ impl SentFindings {
         }
     }
 
+    /// Whether an alarm that was sent has this cause. Each waiting finding asks it twice in a tick at most, and each of [`OPEN_MAX`]
+    /// alarms is looked up by its name: in the worst case 512 times among all checks.
     pub(crate) fn has_effect(&self, cause: &Finding, health: &Health) -> bool {
         let Some((cause, _)) = health.alarm(cause.check, cause.instance) else { return false };
         let known = |(number, instance): &(u8, u8)| health.alarm(check_of(*number)?.name, *instance);

@@ -1,3 +1,5 @@
+use hums_core::status::{LinkReading, RecorderStatus, Recording};
+
 use super::*;
 use crate::encode::{Encoder, FRAME_BYTES_MAX};
 use crate::packet::Packet;
@@ -276,18 +278,19 @@ fn told_because(findings: &[Comes], because: &'static str) -> Vec<(u64, String)>
     told_where(findings, because, |_| Orders::Own)
 }
 
+fn sent_text(bytes: &[u8]) -> Option<String> {
+    let text = bytes.get(11..bytes.len().saturating_sub(2)).filter(|_| bytes.get(7) == Some(&253))?;
+    let text = text.strip_prefix(b"HUMS: ")?;
+    Some(String::from_utf8_lossy(text).trim_end_matches('\0').to_owned())
+}
+
 fn told_where(findings: &[Comes], because: &'static str, orders: fn(&str) -> Orders) -> Vec<(u64, String)> {
     let mut summary = Summary::new(&Params::defaults());
     let monitor = Monitor::new(Params::defaults());
     let mut told = Vec::new();
     for tenths in 0..1_800 {
         let now = Instant::from_millis(tenths * 100);
-        let mut out = |bytes: &[u8]| {
-            let text = bytes.get(11..bytes.len().saturating_sub(2)).unwrap_or_default();
-            if let (Some(253), Some(text)) = (bytes.get(7), text.strip_prefix(b"HUMS: ")) {
-                told.push((tenths, String::from_utf8_lossy(text).trim_end_matches('\0').to_owned()));
-            }
-        };
+        let mut out = |bytes: &[u8]| told.extend(sent_text(bytes).map(|text| (tenths, text)));
         for (_, check, instance, level, previous) in findings.iter().filter(|(at, ..)| *at == tenths) {
             let check = health::check_named(check).expect("a check");
             let finding = Finding {
@@ -475,6 +478,43 @@ fn what_a_dead_sensor_says_is_not_over_while_it_is_dead() {
     let expected =
         [(10, "compass 1 frozen"), (210, "compass 1 and others differ"), (600, "over: compass 1 frozen")];
     assert_eq!(texts(&told(&findings)), expected);
+}
+
+/// A box that does not record from 10 to 20 s, and whose queue is full from 12 s to `full_until`, tenths of a second.
+fn told_of_recorder(full_until: u64) -> Vec<(u64, String)> {
+    let mut summary = Summary::new(&Params::defaults());
+    let mut monitor = Monitor::new(Params::defaults());
+    let mut told = Vec::new();
+    for tenths in 0..1_000 {
+        let now = Instant::from_millis(tenths * 100);
+        let stops = (100..200).contains(&tenths);
+        let recorder = RecorderStatus {
+            recording: if stops { Recording::Stopped } else { Recording::Running },
+            queue: if (120..full_until).contains(&tenths) { 0.95 } else { 0.0 },
+            ..RecorderStatus::default()
+        };
+        let mut findings = Vec::new();
+        let mut out = |bytes: &[u8]| told.extend(sent_text(bytes).map(|text| (tenths, text)));
+        monitor.tick(now.into(), &LinkReading::default(), &recorder, &mut |finding| findings.push(*finding));
+        for finding in &findings {
+            summary.finding(now, finding, &mut out);
+        }
+        summary.tick(now, &monitor, &mut out);
+    }
+    told
+}
+
+#[test]
+fn the_end_of_a_cause_is_told_once_its_critical_effect_is_over() {
+    let over = |full_until| {
+        let told = told_of_recorder(full_until);
+        let begins = ["not recording", "card slow: buffer 95 % full, CHANGE CARD"];
+        assert!(begins.iter().zip(&told).all(|(begins, (_, text))| begins == text), "{told:?}");
+        told.iter().find(|(_, text)| text == "over: not recording").map(|(at, _)| *at)
+    };
+    // The record works again from 22 s on, and the event of the critical text ends in the same second.
+    assert!(over(150).is_some_and(|at| (220..240).contains(&at)), "{:?}", over(150));
+    assert!(over(600).is_some_and(|at| (620..640).contains(&at)), "{:?}", over(600));
 }
 
 #[test]
