@@ -180,7 +180,7 @@ pub(crate) fn of_mishap(report: &Report) -> Text {
 
 #[cfg(test)]
 mod tests {
-    use hums_core::mishap::{MishapKind, Place};
+    use hums_core::mishap::{Location, MishapKind};
     use hums_core::protect::Action;
 
     use super::*;
@@ -199,8 +199,8 @@ mod tests {
 
     #[test]
     fn every_text_of_a_mishap_fits() {
-        let place = |height_m| Place { position: Some((-899_999_999, -1_799_999_999)), height_m };
-        let unknown = Place { position: None, height_m: -12_345 };
+        let place = |height_m| Location { position: Some((-899_999_999, -1_799_999_999)), height_m };
+        let unknown = Location { position: None, height_m: -12_345 };
         let began = MishapChange::Began(MishapKind::Sinking);
         for (change, place, end) in [
             (began, place(-999), " m"),
@@ -214,7 +214,7 @@ mod tests {
             let text = text.as_str();
             assert!(text.ends_with(end) && "HUMS: ".len() + text.len() <= TEXT_BYTES_MAX, "{text}");
         }
-        let place = Place { position: Some((473_977_420, -85_455_940)), height_m: 30 };
+        let place = Location { position: Some((473_977_420, -85_455_940)), height_m: 30 };
         let report = Report { change: MishapChange::Began(MishapKind::Impact), place, touch: 0 };
         assert_eq!(of_mishap(&report).as_str(), "mishap at 47.397742,-8.545594 30 m");
     }
