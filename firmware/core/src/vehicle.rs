@@ -303,14 +303,7 @@ impl Vehicle {
                 self.take_imu(at, imu);
                 self.take_air(at, air);
             }
-            Observation::Attitude(attitude) => {
-                if let Some(boot_ms) = attitude.boot_ms {
-                    self.take_boot_time(at, boot_ms);
-                }
-                self.inertial.take_rates(at, attitude.rates);
-                self.inertial.take_attitude(at, &attitude);
-                self.attitude.set(at, attitude);
-            }
+            Observation::Attitude(attitude) => self.take_attitude(at, attitude),
             Observation::AttitudeSetpoint(AttitudeSetpoint { roll, pitch, .. })
                 if (roll.0 + pitch.0).is_finite() =>
             {
@@ -353,6 +346,15 @@ impl Vehicle {
             | Observation::FlightInformation { .. }
             | Observation::Shock(_) => {}
         }
+    }
+
+    fn take_attitude(&mut self, at: BootMs, attitude: Attitude) {
+        if let Some(boot_ms) = attitude.boot_ms {
+            self.take_boot_time(at, boot_ms);
+        }
+        self.inertial.take_rates(at, attitude.rates);
+        self.inertial.take_attitude(at, &attitude);
+        self.attitude.set(at, attitude);
     }
 
     fn take_heartbeat(&mut self, at: BootMs, heartbeat: Heartbeat) {
