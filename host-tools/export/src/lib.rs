@@ -170,11 +170,10 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
     inputs.refuse(&args.output)?;
     args.manifest.iter().try_for_each(|to| inputs.refuse(to))?;
     let is_wanted = |name: &String| wanted.as_ref().is_none_or(|wanted| wanted == name);
-    let asked = works.iter().filter(|work| is_wanted(&work.log.name)).count();
-    let standard_output = check_output(args, asked, &formats)?;
+    let logs = works.iter().filter(|work| is_wanted(&work.log.name)).count();
+    let standard_output = check_output(args, logs, &formats)?;
     check_forms(&mut works, &formats)?;
     let selection = Selection::new(args, works.iter().any(|work| work.is_native))?;
-    let logs = asked;
     let mut followed = EndResolver::new(sessions);
     let task = Task {
         formats,
