@@ -4,9 +4,9 @@ use core::ptr;
 use core::slice;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use embedded_storage::nor_flash::NorFlash as _;
 use hums_onboard::ResetCause;
 use hums_onboard::update::RunningImage;
+use hums_stm32f4::words;
 use hums_update::header::Header;
 use hums_update::map;
 use hums_update::message::Message;
@@ -16,16 +16,10 @@ use crate::boards::board;
 
 static ON_TRIAL: AtomicBool = AtomicBool::new(false);
 
-fn words() -> *mut [u32; 4] {
-    ptr::with_exposed_provenance_mut(map::MESSAGE as usize)
-}
-
 /// The message of the resident program, and the cause of this start by it. Clears the message: every start calls it once.
 pub(crate) fn take(reset: ResetCause) -> (ResetCause, Option<Message>) {
-    // SAFETY: no variable of either program has these words.
-    let message = Message::of(unsafe { words().read_volatile() });
-    // SAFETY: as above.
-    unsafe { words().write_volatile([0; 4]) };
+    let message = Message::of(words::read());
+    words::write([0; 4]);
     match message.filter(|message| reset == ResetCause::Software && *message != Message::Install) {
         Some(message) => (ResetCause::Update, Some(message)),
         None => (reset, None),
@@ -33,8 +27,7 @@ pub(crate) fn take(reset: ResetCause) -> (ResetCause, Option<Message>) {
 }
 
 pub(crate) fn restart(message: Message) -> ! {
-    // SAFETY: no variable of either program has these words.
-    unsafe { words().write_volatile(message.words()) };
+    words::write(message.words());
     board::restart()
 }
 
@@ -62,8 +55,13 @@ pub(crate) fn is_on_trial() -> bool {
 pub(crate) fn confirm(running: &RunningImage<'static>) {
     let Some(header) = &running.header else { return };
     let bytes = Record::Confirmed(header.floor).bytes(header.id());
-    let at = running.state.free as u32;
-    if board::StateFlash::new().write(at, &bytes).is_ok() {
+    let words = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word));
+    let at = running.state.free;
+    if at + bytes.len() > map::STATE_BYTES {
+        return;
+    }
+    // SAFETY: aligned words of the state's sector, which no slice borrows now.
+    if unsafe { hums_stm32f4::flash::write(map::STATE as usize + at, words) }.is_ok() {
         ON_TRIAL.store(false, Ordering::Relaxed);
     }
 }

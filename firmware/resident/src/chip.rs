@@ -1,11 +1,10 @@
 //! Clock, and the words that survive a reset.
 
-use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DCB, DWT, SCB};
 use hums_core::clock::Instant;
-use hums_update::map;
+use hums_stm32f4::words;
 use hums_update::message::Message;
 use hums_update::resident::Cause;
 use stm32_metapac::flash::vals::Latency;
@@ -23,23 +22,18 @@ pub(crate) fn cause() -> Cause {
     if !(flags.wdgrstf() || flags.wwdgrstf() || flags.sftrstf()) {
         return Cause::Usual;
     }
-    let message: *mut [u32; 4] = ptr::with_exposed_provenance_mut(map::MESSAGE as usize);
-    // SAFETY: no variable of either program has these words.
-    let cause = match Message::of(unsafe { message.read_volatile() }) {
+    let cause = match Message::of(words::read()) {
         Some(Message::Install) => Cause::Asked,
         Some(Message::Planned) => Cause::Usual,
         // One of this program is for the application.
         _ => return Cause::Crash,
     };
-    // SAFETY: as above.
-    unsafe { message.write_volatile([0; 4]) };
+    words::write([0; 4]);
     cause
 }
 
 pub(crate) fn restart(message: Message) -> ! {
-    let words: *mut [u32; 4] = ptr::with_exposed_provenance_mut(map::MESSAGE as usize);
-    // SAFETY: no variable of either program has these words.
-    unsafe { words.write_volatile(message.words()) };
+    words::write(message.words());
     SCB::sys_reset()
 }
 

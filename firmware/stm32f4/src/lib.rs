@@ -5,3 +5,4 @@ pub mod flash;
 pub mod pins;
 pub mod supply;
 pub mod watchdog;
+pub mod words;

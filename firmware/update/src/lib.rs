@@ -1,11 +1,11 @@
-//! Signed update from the card, without a way to a box that a card cannot bring back (`docs/update.md`).
+//! Signed update from the card (`docs/update.md`).
 //!
 //! The *resident program* starts first and is never rewritten. It installs an image from the card into the
 //! *application's region*, or starts the application there. All of it but the registers is here, and runs on a PC.
 //!
 //! | module | content |
 //! |---|---|
-//! | [`map`] | the places of both programs in flash, and of the words between them in memory |
+//! | [`map`] | the places of both programs in flash |
 //! | [`header`] | the header of an image: board, version, length, signature |
 //! | [`keys`] | the public keys |
 //! | [`files`] | a file in a card's root directory, read only |

@@ -1,5 +1,4 @@
-//! The flash of an STM32F405RG (RM0090, table 5), as both programs and the tools divide it (ARCHITECTURE.md), and the words in
-//! memory that survive a reset.
+//! The flash of an STM32F405RG (RM0090, table 5), as both programs and the tools divide it (ARCHITECTURE.md).
 
 /// First address of the flash: the resident program's vector table, in sector 0.
 pub const FLASH: u32 = 0x0800_0000;
@@ -19,6 +18,3 @@ pub const SECTOR_BYTES: usize = 128 * 1024;
 pub const APPLICATION_BYTES: usize = 7 * SECTOR_BYTES;
 /// The application's vector table, behind its header.
 pub const VECTORS: u32 = APPLICATION + crate::header::BYTES as u32;
-
-/// Words at the end of memory that neither program's linker gives to a variable ([`crate::message`]).
-pub const MESSAGE: u32 = 0x2001_FFF0;
