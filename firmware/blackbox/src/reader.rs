@@ -177,12 +177,6 @@ impl LogReader {
         }
     }
 
-    /// UTC at power-on, microseconds since 1970, of an earlier pass (`epoch_micros`): back-dates items before the first clock
-    /// record.
-    pub const fn set_epoch_micros(&mut self, epoch_micros: Option<u64>) {
-        self.epoch_micros = epoch_micros;
-    }
-
     /// UTC at power-on, microseconds since 1970, if known by now.
     pub const fn epoch_micros(&self) -> Option<u64> {
         self.epoch_micros

@@ -455,11 +455,6 @@ impl<'a, D: CardDevice> Card<'a, D> {
         Ok(())
     }
 
-    /// The segment's name.
-    pub fn open_name(&self) -> Option<LogName> {
-        self.open.as_ref().map(|open| open.name)
-    }
-
     /// Whole ones of the open segment.
     pub fn open_blocks(&self) -> u32 {
         self.open.as_ref().map_or(0, Segment::blocks)

@@ -144,11 +144,6 @@ impl Layout {
         })
     }
 
-    /// Whether a block belongs to a cluster.
-    pub const fn is_data(&self, block: u32) -> bool {
-        block >= self.data_start && block - self.data_start < self.clusters * self.cluster_blocks
-    }
-
     /// Bytes that files and directories can hold.
     pub const fn data_bytes(&self) -> u64 {
         self.clusters as u64 * self.cluster_blocks as u64 * BLOCK_BYTES as u64

@@ -111,15 +111,9 @@ fn writing_in_place_touches_neither_fat_nor_directory() {
         card.write(index, &[pattern(index)]).expect("in place");
     }
     assert_eq!(device.journal.borrow().len(), 2048);
-    let layout = *card.layout();
-    assert!(
-        device
-            .journal
-            .borrow()
-            .iter()
-            .all(|(at, _)| layout.is_data(*at) && *at >= layout.data_start + layout.cluster_blocks),
-        "only the segment"
-    );
+    let layout = card.layout();
+    let behind_root = layout.data_start + layout.cluster_blocks..layout.end();
+    assert!(device.journal.borrow().iter().all(|(at, _)| behind_root.contains(at)), "only the segment");
 }
 
 /// Every prefix of the journal, whole and with the last block torn either way, is a valid card. All listed logs are
@@ -200,7 +194,6 @@ fn a_recycled_segment_keeps_its_size_under_its_new_name() {
     device.journal.borrow_mut().clear();
     card.recycle(&oldest, SECOND).expect("it is there");
     assert_eq!(device.journal.borrow().len(), 1, "one block write");
-    assert_eq!(card.open_name(), Some(SECOND));
     assert_eq!(logs(&card).iter().map(|log| (log.name, log.bytes)).collect::<Vec<_>>(), [(SECOND, 1 << 20)]);
     assert_eq!(card.recycle(&oldest, FIRST), Err(CardError::Damaged), "the entry is another one now");
 }
