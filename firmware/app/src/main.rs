@@ -59,12 +59,13 @@ const ONCE: &str = "each task is spawned once";
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    start().run()
+    start();
+    board::idle()
 }
 
 // Own stack frame (ARCHITECTURE.md, Memory).
 #[inline(never)]
-fn start() -> board::Idle {
+fn start() {
     // SAFETY: this is the program's first statement: CCM is untouched and no interrupt is unmasked.
     unsafe { memory::init() };
     let boots = fault::count_start();
@@ -121,9 +122,7 @@ fn start() -> board::Idle {
         sectors: sectors_in,
         gs: gs_in,
     });
-    on.monitor.spawn(
-        monitor::run(monitoring, ends, handover, parts.boot, message, parts.watchdog, parts.led).expect(ONCE),
-    );
+    on.monitor.spawn(monitor::run(monitoring, ends, handover, parts.boot, message, parts.led).expect(ONCE));
     on.downlink.spawn(tasks::downlink::run(gs_tx, gs_out).expect(ONCE));
     on.downlink.spawn(tasks::downlink::requests(autopilot_tx, queues.autopilot_out).expect(ONCE));
     let uplink = &*UPLINK_IN.init(queues.uplink_in);
@@ -131,7 +130,6 @@ fn start() -> board::Idle {
     on.downlink.spawn(tasks::usb::run(plug, queues.usb_out, uplink).expect(ONCE));
     let storage = storage::body(parts.card, entropy, sectors_out, queues.shelf, store_writer);
     on.storage.spawn(storage::run(storage).expect(ONCE));
-    parts.idle
 }
 
 /// Substitute for a random number: the start counts of the store and of the surviving memory, and the chip's unique id.
@@ -146,7 +144,7 @@ fn counted(mounts: u32, identity: &Boot<'_>) -> u32 {
 
 #[inline(never)]
 fn restore(
-    store: Option<board::StoreFlash>,
+    store: board::StoreFlash,
     items: MailboxOut<'static>,
     cause: ResetCause,
     monitor: &mut Monitor,

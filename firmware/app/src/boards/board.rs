@@ -17,9 +17,8 @@ use super::stm32f4::{
     random_number, reset_cause, start,
 };
 pub(crate) use super::stm32f4::{
-    Idle, LATE_TURNS, Led, PortRx, PortTx, StateFlash, StoreFlash, Watchdog, begin_with_data0, chip_is_wrong,
-    crystal_failed, crystal_is_wrong, drop_control_packet, feed_watchdog, frame_number, has_bus_event,
-    restart,
+    LATE_TURNS, Led, PortRx, PortTx, StoreFlash, begin_with_data0, chip_is_wrong, crystal_failed,
+    crystal_is_wrong, drop_control_packet, feed_watchdog, frame_number, has_bus_event, idle, restart,
 };
 
 static RING: ConstStaticCell<[u8; RING_BYTES]> = ConstStaticCell::new([0; RING_BYTES]);
@@ -30,12 +29,10 @@ pub(crate) struct Parts {
     pub(crate) gs: (PortRx, PortTx),
     pub(crate) card: Card,
     /// Two sectors.
-    pub(crate) store: Option<StoreFlash>,
+    pub(crate) store: StoreFlash,
     pub(crate) usb: Usb,
     pub(crate) led: Led,
     pub(crate) button: bool,
-    pub(crate) watchdog: Watchdog,
-    pub(crate) idle: Idle,
     pub(crate) boot: Boot,
 }
 
@@ -142,12 +139,10 @@ macro_rules! board {
                 autopilot,
                 gs,
                 card: Card::new(card!(p $($card)*)),
-                store: Some(StoreFlash::new()),
+                store: StoreFlash::new(),
                 usb: Usb { port: p.USB_OTG_FS, plus: p.PA12, minus: p.PA11 },
                 button: button!(p $($button)*),
                 led: Led::new(Flex::new(p.$led), Level::$lit, $waits),
-                watchdog: Watchdog::new(),
-                idle: Idle(()),
                 boot: Boot { id: embassy_stm32::uid::uid(), cause, cause_register, entropy: random_number() },
             }
         }

@@ -9,11 +9,12 @@
 //! | `PORT_INTERRUPTS` | what moves the bytes of ports and card |
 //! | `take() -> Parts` | starts the machine; to be called once, first |
 //! | `PortRx`, `Card` and so on | the types of its parts |
-//! | `Idle::run()` | what the processor does while all tasks wait; never returns |
+//! | `idle()` | what the processor does while all tasks wait; never returns |
 //! | `crystal_failed()` | whether the clock has gone over to a less exact oscillator |
 //! | `LATE_TURNS` | when the watchdog counts as late (`watch`) |
 //! | `restart()` | after a fault |
-//! | `feed_watchdog()` and the functions of the USB port | for the card reader |
+//! | `feed_watchdog()` | for the monitor, and the watch in card-reader mode |
+//! | the functions of the USB port | for its driver |
 
 pub(crate) mod board;
 pub(crate) mod machine;

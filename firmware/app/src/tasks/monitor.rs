@@ -52,7 +52,6 @@ pub(crate) async fn run(
     handover: &'static mut Handover<'static>,
     boot: Boot,
     message: Option<Message>,
-    mut watchdog: board::Watchdog,
     mut led: board::Led,
 ) -> ! {
     body.start(now(), &mut ends.sectors);
@@ -84,11 +83,10 @@ pub(crate) async fn run(
                 }
                 tick(body, ends, handover);
                 if body.wants_card_reader(now()) {
-                    leave(body, ends, handover, &mut watchdog, card_reader::restart).await;
+                    leave(body, ends, handover, card_reader::restart).await;
                 }
                 if watch_update(body, ends, &mut update) {
-                    leave(body, ends, handover, &mut watchdog, || crate::update::restart(Message::Install))
-                        .await;
+                    leave(body, ends, handover, || crate::update::restart(Message::Install)).await;
                 }
                 tell_board(body, ends, &mut told, boot.entropy.is_some());
                 ticks = ticks.wrapping_add(1);
@@ -98,7 +96,7 @@ pub(crate) async fn run(
                 fault::silent(silent);
                 // Otherwise the watchdog resets the machine.
                 if silent.is_none() {
-                    watchdog.feed();
+                    board::feed_watchdog();
                     watch::fed();
                 }
             }
@@ -118,7 +116,6 @@ async fn leave(
     body: &mut Monitoring<'static>,
     ends: &mut Ends,
     handover: &mut Handover<'static>,
-    watchdog: &mut board::Watchdog,
     restart: fn() -> !,
 ) -> ! {
     finish(body, ends);
@@ -128,7 +125,7 @@ async fn leave(
         if is_saved && LOG_ENDED.load(Ordering::Relaxed) {
             break;
         }
-        watchdog.feed();
+        board::feed_watchdog();
         watch::fed();
         wake_others();
         Timer::after(links::wait(TICK)).await;

@@ -239,7 +239,7 @@ mod tests {
         let mut flash = Flash::blank();
         let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
         let (items_in, items_out) = mailbox.split();
-        let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
+        let mut store_writer = StoreWriter::mount(&mut flash, items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));
         let mut handover = Handover::new(items_in, &status, &mut monitor);
         let mut secure = RequestSigning::new();
@@ -260,7 +260,7 @@ mod tests {
         let mut flash = Flash::blank();
         let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
         let (items_in, items_out) = mailbox.split();
-        let mut store_writer = StoreWriter::mount(Some(&mut flash), items_out, &status);
+        let mut store_writer = StoreWriter::mount(&mut flash, items_out, &status);
         let mut monitor = Box::new(Monitor::new(Params::defaults()));
         let mut handover = Handover::new(items_in, &status, &mut monitor);
         let mut secure = RequestSigning::new();

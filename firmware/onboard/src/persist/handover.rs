@@ -42,7 +42,7 @@ impl<'a> Handover<'a> {
     /// Call after [`StoreWriter::load`](super::StoreWriter::load): parameters then equal their stored values.
     pub fn new(items: MailboxIn<'a>, status: &'a StoreStatus, monitor: &mut Monitor) -> Self {
         monitor.params_mut().all_saved();
-        let told = StoreReading { state: StoreState::Kept, ..StoreReading::default() };
+        let told = StoreReading::default();
         Self { items, status, told, frames: 0, frames_at: Instant::ZERO, active_at: Instant::ZERO }
     }
 
@@ -81,7 +81,6 @@ impl<'a> Handover<'a> {
             told.state = now.state;
             return match now.state {
                 StoreState::Kept => None,
-                StoreState::Absent => news(5, "HUMS: no store, counters end with the power"),
                 StoreState::New => news(6, STORE_NEW),
                 StoreState::Remade => news(3, "HUMS: store unreadable, counters begin anew"),
                 StoreState::Failed => news(3, "HUMS: store broken, counters end with the power"),

@@ -8,17 +8,15 @@ use hums_core::lifetime::Room;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StoreState {
-    /// No store: saved items are lost at power-off.
-    #[default]
-    Absent = 0,
     /// The stored items have been read.
-    Kept = 1,
+    #[default]
+    Kept = 0,
     /// The store was new.
-    New = 2,
+    New = 1,
     /// The stored items were unreadable, and the store begins anew.
-    Remade = 3,
-    /// The flash does not work.
-    Failed = 4,
+    Remade = 2,
+    /// The flash does not work: saved items are lost at power-off.
+    Failed = 3,
 }
 
 /// The cost of an erase now, by the vehicle's state. An erase stops the processor for up to 0.5 s.
@@ -71,7 +69,7 @@ impl StoreStatus {
     /// Nothing done.
     pub const fn new() -> Self {
         Self {
-            state: AtomicU8::new(StoreState::Absent as u8),
+            state: AtomicU8::new(StoreState::Kept as u8),
             unreadable: AtomicU32::new(0),
             saved: AtomicU32::new(0),
             refused: AtomicU32::new(0),
@@ -86,11 +84,10 @@ impl StoreStatus {
     pub fn read(&self) -> StoreReading {
         StoreReading {
             state: match self.state.load(Ordering::Relaxed) {
-                1 => StoreState::Kept,
-                2 => StoreState::New,
-                3 => StoreState::Remade,
-                4 => StoreState::Failed,
-                _ => StoreState::Absent,
+                1 => StoreState::New,
+                2 => StoreState::Remade,
+                3 => StoreState::Failed,
+                _ => StoreState::Kept,
             },
             unreadable: self.unreadable.load(Ordering::Relaxed),
             saved: self.saved.load(Ordering::Relaxed),

@@ -44,25 +44,19 @@ pub struct StoreWriter<'a, F: NorFlash> {
 }
 
 impl<'a, F: NorFlash> StoreWriter<'a, F> {
-    /// Mounts the store in `flash`, if there is one. It completes interrupted work, which may take an erase: before
-    /// reception begins.
-    pub fn mount(flash: Option<F>, items: MailboxOut<'a>, status: &'a StoreStatus) -> Self {
-        let store = flash.and_then(|flash| {
-            let Ok((store, found)) = Store::mount(flash) else {
-                status.set_state(StoreState::Failed);
-                return None;
-            };
-            status.set_state(match found {
-                StoreCondition::Kept => StoreState::Kept,
-                StoreCondition::Damaged => {
-                    count(&status.unreadable);
-                    StoreState::Kept
-                }
-                StoreCondition::Blank => StoreState::New,
-                StoreCondition::Unreadable => StoreState::Remade,
-            });
-            Some(store)
-        });
+    /// Mounts the store in `flash`. It completes interrupted work, which may take an erase: before reception begins.
+    pub fn mount(flash: F, items: MailboxOut<'a>, status: &'a StoreStatus) -> Self {
+        let (store, state) = match Store::mount(flash) {
+            Err(_) => (None, StoreState::Failed),
+            Ok((store, StoreCondition::Kept)) => (Some(store), StoreState::Kept),
+            Ok((store, StoreCondition::Damaged)) => {
+                count(&status.unreadable);
+                (Some(store), StoreState::Kept)
+            }
+            Ok((store, StoreCondition::Blank)) => (Some(store), StoreState::New),
+            Ok((store, StoreCondition::Unreadable)) => (Some(store), StoreState::Remade),
+        };
+        status.set_state(state);
         Self { store, items, status, waits: false, turned: false, scarce: false }
     }
 
@@ -106,7 +100,7 @@ impl<'a, F: NorFlash> StoreWriter<'a, F> {
         got.and_then(Result::ok).flatten().unwrap_or(0)
     }
 
-    /// Mounts since it was made; 0 without a store.
+    /// Mounts since it was made; 0 if the flash does not work.
     pub fn mounts(&mut self) -> u32 {
         self.store.as_mut().and_then(|store| store.mounts().ok()).unwrap_or(0)
     }

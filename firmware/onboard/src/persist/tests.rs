@@ -25,7 +25,7 @@ fn session(flash: &mut Flash, act: impl FnOnce(&mut Monitor, &mut Handover, &mut
     let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
-    let mut store_writer = StoreWriter::mount(Some(flash), items_out, &status);
+    let mut store_writer = StoreWriter::mount(flash, items_out, &status);
     store_writer.turn_ahead();
     store_writer.load(&mut monitor);
     monitor.tick(Instant::ZERO.into(), &LinkReading::default(), &RecorderStatus::default(), &mut |_| ());
@@ -307,10 +307,12 @@ fn without_a_store_all_goes_on_and_it_is_told() {
     let (mut mailbox, status) = (Mailbox::new(), StoreStatus::new());
     let (items_in, items_out) = mailbox.split();
     let mut monitor = Box::new(Monitor::new(Params::defaults()));
-    let mut store_writer = StoreWriter::<Flash>::mount(None, items_out, &status);
+    let mut flash = Flash::blank();
+    flash.cut_after(1, 1);
+    let mut store_writer = StoreWriter::mount(flash, items_out, &status);
     store_writer.load(&mut monitor);
     let mut handover = Handover::new(items_in, &status, &mut monitor);
-    assert!(handover.news().is_some_and(|news| news.text.contains("no store")));
+    assert!(handover.news().is_some_and(|news| news.text.contains("store broken")));
     for second in 0..100 {
         handover.step(Instant::from_millis(second * 1_000), &mut monitor, 0);
         while store_writer.service(false) == SaveStep::Took {}

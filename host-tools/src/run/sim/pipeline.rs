@@ -105,7 +105,7 @@ impl<'a, 'w> Pipeline<'a, 'w> {
         let Memory { card_status, port_status, store_status, mailbox, held, queues, writer, monitor } =
             memory;
         let (items_in, items_out) = mailbox.split();
-        let mut store_writer = StoreWriter::mount(Some(outside.flash.clone()), items_out, store_status);
+        let mut store_writer = StoreWriter::mount(outside.flash.clone(), items_out, store_status);
         store_writer.turn_ahead();
         store_writer.load(monitor);
         let handover = Handover::new(items_in, store_status, monitor);

@@ -21,14 +21,13 @@ use embassy_time::{Duration, Instant};
 
 pub(crate) use card::SpiPort;
 pub(crate) use clock::{Crystal, crystal_failed, crystal_is_wrong};
-pub(crate) use flash::{StateFlash, StoreFlash};
+pub(crate) use flash::StoreFlash;
 pub(crate) use hums_stm32f4::watchdog::feed as feed_watchdog;
 pub(crate) use pins::PinPort;
 pub(crate) use port::{PortRx, PortTx, halves};
 pub(crate) use random::number as random_number;
 pub(crate) use reset::{reset_cause, restart};
 pub(crate) use usb::{begin_with_data0, drop_control_packet, frame_number, has_bus_event};
-pub(crate) use watchdog::Watchdog;
 
 use crate::boards::machine::SYSTICK_RELOAD;
 
@@ -120,13 +119,8 @@ impl Led {
 }
 
 /// Sleeps between interrupts.
-pub(crate) struct Idle(pub(crate) ());
-
-impl Idle {
-    #[expect(clippy::unused_self, reason = "whoever has it may sleep")]
-    pub(crate) fn run(self) -> ! {
-        loop {
-            cortex_m::asm::wfi();
-        }
+pub(crate) fn idle() -> ! {
+    loop {
+        cortex_m::asm::wfi();
     }
 }

@@ -8,17 +8,3 @@ pub(super) fn start() {
     // A second of 32 kHz.
     watchdog::start(Divider::DIVIDE_BY8, 4_000);
 }
-
-pub(crate) struct Watchdog(());
-
-impl Watchdog {
-    /// The watchdog, which the resident program started.
-    pub(crate) const fn new() -> Self {
-        Self(())
-    }
-
-    #[expect(clippy::unused_self, reason = "whoever has it may feed it")]
-    pub(crate) fn feed(&mut self) {
-        watchdog::feed();
-    }
-}
