@@ -38,13 +38,14 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options) -> Result<()> {
     let check = options.check;
     let key = options.key.as_deref().map(update::release_key).transpose()?.map(Rc::new);
+    if key.is_some() && !git(&["status", "--porcelain", "--", KEYS])?.is_empty() {
+        bail!("{KEYS} differs from the commit that the release is built from. Commit it first");
+    }
     if key.is_none() {
         eprintln!("note: no update files (HUMS.UPD) without --key FILE; the others are for a cable");
     }
     if keys::ALL == [keys::TEST] {
-        eprintln!(
-            "WARNING: firmware/update/keys has no key but the test key: no card can ever update these boxes"
-        );
+        eprintln!("WARNING: {KEYS} has no key but the test key: no card can ever update these boxes");
     }
     let mut needs = vec![Need::Linker, Need::Clippy, Need::FirmwareTarget, Need::StaticTarget];
     needs.push(Need::BrowserTarget);
@@ -93,6 +94,9 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     println!("built again in {}: all {} files are the same", elsewhere.display(), files.len());
     Ok(())
 }
+
+/// Public keys that the boxes take.
+const KEYS: &str = "firmware/update/keys";
 
 /// Name and content.
 pub(crate) type File = (String, Vec<u8>);
