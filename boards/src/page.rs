@@ -30,7 +30,7 @@ For a board with an STM32F405RG and a crystal of 4 to 26 MHz (an even number). N
 2. Add a line to `boards/facts.csv` for each pin, with its source and the commit of the source.
 3. `cargo test -p hums-boards` compares both, after `cargo xtask boards` has made this page.
 4. `cargo xtask firmware --board NAME` builds it. A pin without the wanted function, or a DMA stream that does not serve a port, does not compile.
-5. `cargo xtask prove boards` runs the image: boot, flight, card pulled, power cut.
+5. `cargo xtask prove boards` runs the image: boot, flight, stall, card pulled, power cut, USB host, update.
 ";
 
 /// The page.

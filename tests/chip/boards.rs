@@ -1,20 +1,24 @@
 //! Other boards' images, each with its own crystal, ports, card's bus and held pins.
 
-use hums_boards::Board;
-use hums_sdcard::{Event, Kind, Model};
-use hums_tests::chip::{pin, record::Compared, rig::Rig};
+use hums_boards::{Board, Level};
+use hums_sdcard::{Event, Fault, Kind, Model, Plan};
+use hums_tests::chip::pin;
+use hums_tests::chip::record::Compared;
+use hums_tests::chip::rig::{Bench, Rig};
 use hums_tests::program;
 use stm32f405_model::machine::Board as Parts;
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, SECOND, US};
 
-use super::bench_of;
+use super::{bench_of, update, usb};
 
 const IN_MEMORY_MAX: usize = 700;
+/// Of a card that is busy while frames come at full rate.
+const STALL_NS: u64 = 1_000_000_000;
 
-fn rig(board: &Board) -> Rig {
+fn bench(board: &Board) -> (Bench, Parts) {
     let image = program::firmware().with_file_name(format!("hums-{}.elf", board.name));
-    bench_of(&image).rig(Parts { hse_hz: board.crystal_hz, ..Parts::default() })
+    (bench_of(&image), Parts { hse_hz: board.crystal_hz, ..Parts::default() })
 }
 
 #[track_caller]
@@ -30,7 +34,8 @@ fn assert_held(rig: &Rig) {
 
 fn fly(board: &Board) {
     println!("{}", board.name);
-    let mut rig = rig(board);
+    let (bench, parts) = bench(board);
+    let mut rig = bench.rig(parts);
     while rig.slot.counts().bytes == 0 {
         assert!(rig.machine.now() < SECOND, "{}: no clock to the card", board.name);
         rig.run(rig.machine.now() + 20 * US, false).unwrap();
@@ -45,15 +50,16 @@ fn fly(board: &Board) {
     rig.run(3 * SECOND, true).unwrap();
     let blinks_without_a_card = blinks(&rig) - before;
     assert!(blinks_without_a_card > 5, "{}: {blinks_without_a_card} changes of the LED", board.name);
-    rig.slot.event(Event::Insert(Model::new(Kind::Sdhc, rig.medium.clone())));
+    let stall = Plan::always(Fault::Busy(STALL_NS)).from(rig.slot.now_ns() + 2 * STALL_NS).times(1);
+    rig.slot.event(Event::Insert(Model::new(Kind::Sdhc, rig.medium.clone()).with(stall)));
     rig.run(5 * SECOND, false).unwrap();
-    rig.run(6 * SECOND, true).unwrap();
+    rig.run(7 * SECOND, true).unwrap();
     rig.machine.power_off();
-    rig.run(6 * SECOND + 100 * MS, false).unwrap();
+    rig.run(7 * SECOND + 100 * MS, false).unwrap();
     rig.machine.power_on();
-    rig.run(7 * SECOND, false).unwrap();
-    rig.run(8 * SECOND, true).unwrap();
-    rig.run(9 * SECOND, false).unwrap();
+    rig.run(8 * SECOND, false).unwrap();
+    rig.run(9 * SECOND, true).unwrap();
+    rig.run(10 * SECOND, false).unwrap();
     assert_held(&rig);
     assert!(rig.machine.resets.iter().all(|(_, cause)| *cause == Cause::Power), "{:?}", rig.machine.resets);
     assert!(rig.slot.violations().is_empty(), "{}: {:?}", board.name, rig.slot.violations());
@@ -65,8 +71,26 @@ fn fly(board: &Board) {
 
 #[test]
 #[ignore = "wants the images of all boards: `cargo xtask prove boards`"]
-fn each_board_records_and_survives_the_loss_of_card_and_power() {
+fn each_board_records_and_survives_a_stall_and_the_loss_of_card_and_power() {
     hums_boards::all().iter().for_each(fly);
+}
+
+#[test]
+#[ignore = "wants the images of all boards: `cargo xtask prove boards`"]
+fn each_board_serves_a_usb_host_and_installs_an_update() {
+    for board in hums_boards::all() {
+        println!("{}", board.name);
+        let (bench, parts) = bench(board);
+        let mut rig = bench.settled(parts).unwrap();
+        rig.run(rig.machine.now() + SECOND, false).unwrap();
+        usb::serve(&mut rig);
+        if let Some(button) = &board.button {
+            let mut rig = bench.settled(parts).unwrap();
+            rig.machine.drive(pin(button.pin), Some(button.pressed == Level::High));
+            usb::read_card(&mut rig);
+        }
+        update::install(&mut bench.rig(parts));
+    }
 }
 
 #[test]

@@ -49,3 +49,10 @@ fn bench_of(image: &std::path::Path) -> hums_tests::chip::rig::Bench {
     let frames = chip::frames(&tlog).into_iter().map(|(_, frame)| frame.to_vec()).collect();
     chip::rig::Bench { image, frames }
 }
+
+/// Bytes that `budgets.toml` allows.
+#[cfg(feature = "chip")]
+fn budget(table: &str, name: &str) -> u32 {
+    let budgets: toml::Table = include_str!("../../budgets.toml").parse().unwrap();
+    budgets[table][name]["bytes_max"].as_integer().unwrap() as u32
+}

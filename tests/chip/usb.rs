@@ -20,15 +20,14 @@ use stm32f405_model::otg::{Action, Reply};
 use stm32f405_model::rcc::Cause;
 use stm32f405_model::time::{MS, Ps, SECOND};
 
-use super::bench;
+use super::{bench, budget};
 
 /// `base_mode` of a heartbeat.
 const DISARMED: u8 = 0x51;
 /// The same with `MAV_MODE_FLAG_SAFETY_ARMED`.
 const ARMED: u8 = 0xD1;
-/// Urgencies that serve the USB port: exception (16 and the interrupt's number), and limit of the stack as in `budgets.toml`.
-const STACKS: [(&str, u16, u32); 3] =
-    [("monitor", 16 + 20, 5_344), ("downlink", 16 + 21, 1_360), ("USB", 16 + 67, 1_360)];
+/// Urgencies that serve the USB port, and their exceptions: 16 and the interrupt's number.
+const URGENCIES: [(&str, u16); 3] = [("monitor", 16 + 20), ("downlink", 16 + 21), ("downlink", 16 + 67)];
 /// In thousandths, with a bus full of control transfers and full rate at the autopilot's port.
 const LOAD_MAX: u64 = 900;
 /// In kB/s: an hour's log in a minute. The bus itself carries 1,216 (USB 2.0, table 5-9).
@@ -38,6 +37,12 @@ fn on_the_ground() -> Rig {
     let mut rig = bench().settled(Board::default()).unwrap();
     let begin = rig.machine.now() + SECOND;
     rig.run(begin, false).unwrap();
+    stand(&mut rig);
+    rig
+}
+
+/// Three seconds of a disarmed vehicle.
+fn stand(rig: &mut Rig) {
     for second in 0..3_u8 {
         let now = rig.machine.now();
         let beat = heartbeat(second);
@@ -45,7 +50,6 @@ fn on_the_ground() -> Rig {
         rig.sent.push((end, beat));
         rig.run(now + SECOND, false).unwrap();
     }
-    rig
 }
 
 fn command(rig: &mut Rig, action: f32) {
@@ -58,15 +62,48 @@ fn command(rig: &mut Rig, action: f32) {
 
 fn reading() -> (Rig, usize) {
     let mut rig = on_the_ground();
+    let resets = start_card_reader(&mut rig);
+    (rig, resets)
+}
+
+/// Returns the number of resets so far.
+fn start_card_reader(rig: &mut Rig) -> usize {
     let resets = rig.machine.resets.len();
-    command(&mut rig, 5.0);
+    command(rig, 5.0);
     let now = rig.machine.now();
     rig.run(now + 3 * SECOND, false).unwrap();
     assert_eq!(
         rig.machine.resets[resets..].iter().map(|(_, cause)| *cause).collect::<Vec<_>>(),
         [Cause::Software]
     );
-    (rig, resets + 1)
+    resets + 1
+}
+
+/// The serial port during a record at full rate, then the card as a disk.
+pub(super) fn serve(rig: &mut Rig) {
+    use_host_while(rig, 20 * SECOND, true, |bus| {
+        let serial = &mut Serial::attach(bus)?;
+        hears_all(serial)?;
+        asks(serial, 4_000.0)
+    });
+    rig.machine.unplug();
+    stand(rig);
+    let compared = rig.compared();
+    assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
+    start_card_reader(rig);
+    read_card(rig);
+}
+
+/// The disk has the blocks of the card. Ejects it.
+pub(super) fn read_card(rig: &mut Rig) {
+    let card = rig.medium.content();
+    use_host(rig, 60 * SECOND, move |bus| {
+        let mut disk = Disk::attach(bus)?;
+        for (at, block) in card {
+            ensure!(disk.read(at, 1)?.data == block, "block {at} is another one");
+        }
+        disk.eject()
+    });
 }
 
 fn use_host<T: Send + 'static>(
@@ -238,10 +275,10 @@ fn a_serial_port_serves_a_station_while_the_record_at_full_rate_stays_whole() {
     assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
     let losses: Vec<_> = rig.sessions().into_iter().flat_map(|session| session.losses).collect();
     assert!(losses.is_empty(), "{losses:?}");
-    for (name, exception, limit) in STACKS {
-        let depth = rig.machine.core.stack_depth(exception);
-        println!("{name}: {depth} bytes of stack");
-        assert!(depth <= limit, "{name}: {depth} bytes of stack");
+    for (name, exception) in URGENCIES {
+        let (depth, limit) = (rig.machine.core.stack_depth(exception), budget("stack", name));
+        println!("{name}, exception {exception}: {depth} bytes of stack");
+        assert!(depth <= limit, "{name}: {depth} of {limit} bytes of stack");
     }
 }
 

@@ -23,6 +23,7 @@ pub(crate) struct Depths {
 
 impl Depths {
     pub(crate) fn begin(&mut self, stack: u32) {
+        self.note();
         self.levels.clear();
         self.levels.push(Level { exception: 0, begin: stack, interrupted: stack });
         self.lowest = stack;
