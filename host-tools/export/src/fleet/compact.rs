@@ -223,7 +223,6 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
         }
         let name = format!("{PREFIX}{}{EXTENSION}", hex(&hash.finalize()[..12]));
         let path = transaction.path(&format!("{place}/{name}"));
-        path.parent().map_or(Ok(()), fs::create_dir_all)?;
         let rows = merge(&inputs, &path).with_context(|| place.to_owned())?;
         let expected: usize = inputs.iter().map(Input::rows).sum();
         let written = SerializedFileReader::new(File::open(&path)?)?.metadata().file_metadata().num_rows();

@@ -211,8 +211,7 @@ impl Session {
 
     pub(crate) fn file(&self, table: &str, part: u32) -> Result<File> {
         let path = self.transaction.path(&self.place(table, part));
-        let made = path.parent().map_or(Ok(()), fs::create_dir_all);
-        let file = made.and_then(|()| File::options().write(true).create_new(true).open(&path));
+        let file = File::options().write(true).create_new(true).open(&path);
         file.with_context(|| cannot_write(&self.path(table, part)))
     }
 

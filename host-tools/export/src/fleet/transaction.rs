@@ -1,6 +1,6 @@
 //! Changes of a fleet's files that happen as a whole, also if the program or the computer stops at any step.
 //!
-//! 1. The new files are written in a hidden folder, by the places that they will have, and go to the disk.
+//! 1. The new files are written in a hidden folder, named by the places that they will have, and go to the disk.
 //! 2. The folder gets the list of the files that they replace. It is renamed: from here on the change counts.
 //! 3. The replaced files are removed, and the new ones are moved to their places.
 //!
@@ -28,6 +28,18 @@ pub(crate) const PART: &str = ".hums-part";
 const FILES: &str = "files";
 const REPLACED: &str = "replaced";
 const COMPACTED: &str = "compacted";
+
+/// The name of a new file in its hidden folder: one folder for all of them costs a tenth of the time of a tree.
+fn name_of(place: &str) -> String {
+    place.replace('/', ",")
+}
+
+fn places_in(files: &Path) -> io::Result<Vec<String>> {
+    let places = fs::read_dir(files)?.map(|entry| Ok(entry?.file_name().to_string_lossy().replace(',', "/")));
+    let mut places = places.collect::<io::Result<Vec<_>>>()?;
+    places.sort_unstable();
+    Ok(places)
+}
 
 #[cfg(test)]
 pub(crate) mod stop {
@@ -137,33 +149,27 @@ impl Transaction {
     pub(crate) fn begin(root: &Path) -> Result<Self> {
         let own = root.join(OWN);
         let part = fs::create_dir_all(&own)
-            .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own));
+            .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own))
+            .and_then(|part| fs::create_dir(part.path().join(FILES)).map(|()| part));
         Ok(Self { root: root.to_owned(), part: settle(part, root)? })
     }
 
     pub(crate) fn path(&self, place: &str) -> PathBuf {
-        self.part.path().join(FILES).join(place)
+        self.part.path().join(FILES).join(name_of(place))
     }
 
     pub(crate) fn places(&self) -> Result<Vec<String>> {
-        let mut places = Vec::new();
-        let listed = each(&self.part.path().join(FILES), "", &mut |place| {
-            places.push(place.to_owned());
-            Ok(())
-        });
-        settle(listed, &self.root)?;
-        Ok(places)
+        settle(places_in(&self.part.path().join(FILES)), &self.root)
     }
 
     /// All files are there and closed: they go to the disk. A change that counts must have them after a power cut.
     /// Other changes may be made meanwhile.
     pub(crate) fn sync(self) -> Result<SyncedChange> {
         let places = self.places()?;
-        let Self { root, part } = self;
-        let folder = part.path().join(FILES);
         let mut next = places.iter();
-        let sync = |place: &String| File::open(folder.join(place)).and_then(|file| file.sync_all());
-        in_order(SYNCS_AT_ONCE, places.len(), || Ok(next.next()), sync, |synced| settle(synced, &root))?;
+        let sync = |place: &String| File::open(self.path(place)).and_then(|file| file.sync_all());
+        in_order(SYNCS_AT_ONCE, places.len(), || Ok(next.next()), sync, |synced| settle(synced, &self.root))?;
+        let Self { root, part } = self;
         Ok(SyncedChange { root, part, places })
     }
 }
@@ -199,7 +205,8 @@ impl SyncedChange {
     ) -> io::Result<PathBuf> {
         // A new file of the same place replaces the old one by its move.
         let files = part.path().join(FILES);
-        let replaced: Vec<&String> = replaced.iter().filter(|place| !files.join(place).exists()).collect();
+        let replaced: Vec<&String> =
+            replaced.iter().filter(|place| !files.join(name_of(place)).exists()).collect();
         let lines = |lines: &mut dyn Iterator<Item = &String>| {
             lines.fold(String::new(), |text, line| text + line + "\n")
         };
@@ -239,12 +246,17 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
             _ => {}
         }
     }
-    each(&files, "", &mut |place| {
+    for place in places_in(&files)? {
         stop::step()?;
-        let to = root.join(place);
-        to.parent().map_or(Ok(()), fs::create_dir_all)?;
-        fs::rename(files.join(place), to)
-    })?;
+        let (from, to) = (files.join(name_of(&place)), root.join(&place));
+        match fs::rename(&from, &to) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                to.parent().map_or(Ok(()), fs::create_dir_all)?;
+                fs::rename(from, to)?;
+            }
+            moved => moved?,
+        }
+    }
     // A session twice in the index is harmless.
     for session in fs::read_to_string(folder.join(COMPACTED))?.lines() {
         let index = root.join(OWN).join(COMPACTED);
@@ -258,19 +270,4 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     fs::rename(folder, &done)?;
     stop::step()?;
     fs::remove_dir_all(done)
-}
-
-fn each(folder: &Path, prefix: &str, take: &mut dyn FnMut(&str) -> io::Result<()>) -> io::Result<()> {
-    let mut entries = fs::read_dir(folder.join(prefix))?.collect::<io::Result<Vec<_>>>()?;
-    entries.sort_by_key(fs::DirEntry::file_name);
-    for entry in entries {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let place = if prefix.is_empty() { name } else { format!("{prefix}/{name}") };
-        if entry.file_type()?.is_dir() {
-            each(folder, &place, take)?;
-        } else {
-            take(&place)?;
-        }
-    }
-    Ok(())
 }

@@ -19,6 +19,7 @@ pub(crate) use columns::TAKEN_FRAMES;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -52,7 +53,7 @@ const GROUP_ROWS: usize = 128 * 1024;
 const PAGE_BYTES: usize = 32 * 1024;
 /// Columns of texts of a table at most that have a dictionary: it takes 73 kB of each.
 const DICTIONARIES_MAX: usize = 32;
-const OPEN_FILE_BYTES: usize = 10 << 10;
+const OPEN_FILE_BYTES: usize = 18 << 10;
 const OPEN_COLUMN_BYTES: usize = 1_000;
 /// Memory of each column of a written row group.
 const CHUNK_BYTES: usize = 800;
@@ -91,8 +92,21 @@ struct TableFile {
 
 struct Open {
     path: PathBuf,
-    writer: SerializedFileWriter<File>,
+    writer: SerializedFileWriter<Buffer>,
     bytes: usize,
+}
+
+/// Without flushes: the library flushes each column.
+struct Buffer(BufWriter<File>);
+
+impl Write for Buffer {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 impl ParquetTables {
@@ -271,7 +285,7 @@ impl Open {
         let schema = types.and_then(|types| {
             Type::group_type_builder("hums").with_repetition(Repetition::REQUIRED).with_fields(types).build()
         });
-        let file = session.file(table, part)?;
+        let file = Buffer(BufWriter::new(session.file(table, part)?));
         let writer = schema
             .and_then(|schema| SerializedFileWriter::new(file, Arc::new(schema), Arc::new(writer.build())))
             .with_context(|| cannot_write(&path))?;
@@ -350,7 +364,8 @@ impl TableFile {
 
     fn end_file(&mut self) -> Result<()> {
         let Some(Open { path, writer, .. }) = self.open.take() else { return Ok(()) };
-        writer.close().map(|_| ()).with_context(|| cannot_write(&path))
+        let written = writer.into_inner().and_then(|mut file| Ok(file.0.flush()?));
+        written.with_context(|| cannot_write(&path))
     }
 }
 
