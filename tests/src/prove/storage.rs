@@ -33,6 +33,8 @@ const KEYS: [(&str, &str); 2] = [("AWS_ACCESS_KEY_ID", "hums"), ("AWS_SECRET_ACC
 const CONFIG: &str = r#"{"identities": [{"name": "hums", "credentials": [{"accessKey": "hums", "secretKey": "secret"}],
     "actions": ["Admin", "Read", "Write", "List"]}]}"#;
 const FLEET: &str = "s3://fleet/all";
+/// The recording whose record is a card's image.
+const FLOWN: &str = "ap_quad_faults.tlog";
 /// Recordings of different lengths, tried until a kill is in the middle of an upload.
 const KILLS: usize = 40;
 
@@ -128,12 +130,13 @@ pub fn run() -> Result<String> {
     let dir = tempfile::tempdir()?;
     let cards = dir.path().join("cards");
     fs::create_dir(&cards)?;
-    for name in OWN {
+    // Two records of one flight have the same worst values: which session has them would be open.
+    for name in OWN.into_iter().filter(|name| *name != FLOWN) {
         fs::copy(own(name), cards.join(name))?;
     }
     let image = cards.join("box.img");
     let sim = ["sim", "--speed", "max", "--seed", "1", "--sd"].map(OsStr::new);
-    child::run(command(sim).arg(&image).arg(own("ap_quad_faults.tlog")), LIMIT).expect_code(&[0]);
+    child::run(command(sim).arg(&image).arg(own(FLOWN)), LIMIT).expect_code(&[0]);
     let mut text = String::new();
     wrong_settings(&server, &cards)?;
     jobs(&server, &cards, &mut text)?;
@@ -172,7 +175,7 @@ fn wrong_settings(server: &Server, cards: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Three programs add the same four sessions at once.
+/// Three programs add the same sessions at once.
 fn jobs(server: &Server, cards: &Path, text: &mut String) -> Result<()> {
     let begun = Instant::now();
     thread::scope(|scope| {
@@ -183,7 +186,7 @@ fn jobs(server: &Server, cards: &Path, text: &mut String) -> Result<()> {
     let seconds = begun.elapsed().as_secs_f64();
     let all = server.keys("")?;
     let sessions = server.keys("sessions/")?.len();
-    ensure!(sessions == OWN.len() + 1, "{sessions} sessions");
+    ensure!(sessions == OWN.len(), "{sessions} sessions");
     ensure!(server.keys(".hums-fleet/lease/")?.is_empty(), "leases are left");
     let again = server.hums(&decode(cards, FLEET)).expect_code(&[0, 3]);
     let told = format!("skipped: {sessions} sessions are there already");
