@@ -50,7 +50,7 @@ fn what_is_made_on_standard_output_by_its_path_is_nothing_but_that() {
         }
         let file = fs::File::create(dir.path().join("redirected")).expect("made");
         let words = line.split_whitespace().map(|word| if word == "PX4" { px4() } else { word.into() });
-        let mut command = std::process::Command::new(hums().get_program());
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_hums"));
         let status = command.current_dir(dir.path()).args(words).arg("/dev/stdout").stdout(file).status();
         assert!(status.expect("it runs").success());
         assert!(fs::read(dir.path().join("redirected")).expect("there") == whole, "{line} into a file");
