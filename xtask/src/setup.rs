@@ -30,6 +30,7 @@ pub(crate) enum Need {
     FirmwareTarget,
     BrowserTarget,
     StaticTarget,
+    Musl,
     WindowsTarget,
     Mingw,
     Wine,
@@ -55,11 +56,16 @@ enum Source {
     Packages(&'static str, &'static str),
 }
 
-const TABLE: [(Need, &str, Source); 18] = [
+const TABLE: [(Need, &str, Source); 19] = [
     (Need::Linker, "a C linker", Packages("command -v cc", "gcc libc6-dev")),
     (Need::FirmwareTarget, "Rust's target of the firmware", Target(FIRMWARE_TARGET)),
     (Need::BrowserTarget, "Rust's target of the check in a browser", Target(BROWSER_TARGET)),
     (Need::StaticTarget, "Rust's musl target, for the hums of a release", Target(STATIC_TARGET)),
+    (
+        Need::Musl,
+        "a C compiler for musl, for object storage in a release",
+        Packages("command -v musl-gcc", "musl-tools"),
+    ),
     (Need::WindowsTarget, "Rust's target for hums.exe", Target(WINDOWS_TARGET)),
     (Need::Mingw, "MinGW, which links hums.exe", Packages(FIND_MINGW, "gcc-mingw-w64-x86-64")),
     (Need::Wine, "Wine, which runs hums.exe for dist --check", Packages(FIND_WINE, "wine64")),
