@@ -87,10 +87,13 @@ pub(super) fn serve(rig: &mut Rig) {
         asks(serial, 4_000.0)
     });
     rig.machine.unplug();
+    // The line is still busy with the last frame.
+    rig.run(rig.machine.now() + 10 * MS, false).unwrap();
     stand(rig);
+    // Ends the log.
+    start_card_reader(rig);
     let compared = rig.compared();
     assert_eq!((compared.missing, compared.wrong), (0, 0), "{compared:?}");
-    start_card_reader(rig);
     read_card(rig);
 }
 

@@ -1,6 +1,6 @@
 //! The file that a path leads to, whatever its spelling: links, hard links, `./` and `..` give one identity.
 
-use std::fs::{self, Metadata};
+use std::fs::Metadata;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ impl FileId {
     #[cfg(unix)]
     pub fn of(path: &Path) -> io::Result<Self> {
         use std::os::unix::fs::MetadataExt as _;
-        fs::metadata(path).map(|about| Self(about.dev(), about.ino()))
+        path.metadata().map(|about| Self(about.dev(), about.ino()))
     }
 
     /// The identity of the file that `path` leads to. A browser's files have no links: a path is one file.
@@ -21,7 +21,7 @@ impl FileId {
     pub fn of(path: &Path) -> io::Result<Self> {
         use std::hash::{DefaultHasher, Hash as _, Hasher as _};
         use std::path::Component;
-        fs::metadata(path)?;
+        path.metadata()?;
         let mut hasher = DefaultHasher::new();
         path.components()
             .filter(|part| !matches!(part, Component::RootDir | Component::CurDir))

@@ -1,6 +1,6 @@
 //! Files that are updated in place: a simulated card and a simulated board's flash.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::Path;
 
@@ -27,6 +27,7 @@ pub fn open_in_place(options: &mut OpenOptions, path: &Path) -> io::Result<File>
     }
     #[cfg(not(windows))]
     {
+        use std::fs::TryLockError;
         let file = options.open(path)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => Err(busy()),
