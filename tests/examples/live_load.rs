@@ -1,9 +1,8 @@
 //! ```text
 //! live_load HUMS SECONDS MESSAGES_PER_SECOND RECORDING.tlog
 //! ```
-//! For instance: `cargo run --release -p hums-tests --example live_load -- target/release/hums 600 2000
-//! tests/flights/ap_quad_faults.tlog`. Prints the server's share of one core, its memory, and the time of a page's
-//! frame in Chromium until it is painted, in the first and in the last seconds.
+//! Prints the server's share of one core, its memory, and the time of a page's frame in Chromium until it is
+//! painted, in the first and in the last seconds.
 
 use std::net::UdpSocket;
 use std::path::Path;

@@ -1,9 +1,6 @@
 //! Memory and time for a long log: `long_log HUMS MIB RECORDING.tlog [WHAT...]`.
 //!
 //! The log repeats one recording. Output files take up to 30 times the log's size meanwhile.
-//!
-//! For instance: `cargo run --release -p hums-tests --example long_log -- target/release/hums 128
-//! tests/flights/ap_quad_faults.tlog`.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};

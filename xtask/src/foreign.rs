@@ -1,7 +1,6 @@
 //! `cargo xtask prove foreign`: foreign programs on the chip's model, a second opinion on our reading of the manual.
 //!
-//! Examples in registry packages, fetched and built; only their names are here. Embassy's come from a checkout, if any. Judges:
-//! `chip/stm32f405/examples/foreign`.
+//! Examples in registry packages, fetched and built; only their names are here. Embassy's come from a checkout, if any.
 
 use std::fs;
 use std::path::{Path, PathBuf};

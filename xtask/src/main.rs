@@ -1,7 +1,6 @@
 //! `cargo xtask`: the tasks of this repository, from nothing but Rust and git.
 //!
-//! Commands look for requirements ([`setup`]), install missing ones if they may, or print what to type. Nothing here is needed
-//! to use `hums` itself.
+//! Commands look for requirements ([`setup`]), install missing ones if they may, or print what to type.
 
 mod bench;
 mod browser;

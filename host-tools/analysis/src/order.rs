@@ -4,8 +4,7 @@
 //! * logs of one card: by their numbers;
 //! * logs of one box: by its count of power-ons, and within a power-on by the time since then, unless the count is no order
 //!   (`uncounted`);
-//! * other logs of one box, logs of different boxes, and recordings of other programs: by UTC. A log without UTC stays after
-//!   the log before it.
+//! * other logs of one box, logs of different boxes, and recordings of other programs: by UTC.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,7 +1,6 @@
 //! Ctrl-C and SIGTERM end an endless run in good order: waiting data is written, the log is closed and the results
 //! are printed. A second signal ends the program at once, unless it follows so closely that it belongs to the first.
-//! With a database the second one ends the wait for that, and the third one the program. `systemctl stop` and `docker
-//! stop` send SIGTERM.
+//! With a database the second one ends the wait for that, and the third one the program.
 //!
 //! SIGHUP keeps its default, so that `nohup` works. SIGXFSZ, which a file beyond the limit of `ulimit -f` sends, is
 //! only noted: then the write fails with an error that names the file.

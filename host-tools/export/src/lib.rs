@@ -9,8 +9,6 @@
 //! A log's files are named after its session ([`naming`]).
 //!
 //! An autopilot's log has its own tables (`native`).
-//!
-//! Gaps are in every format.
 
 #![deny(
     clippy::print_stderr,

@@ -3,8 +3,7 @@
 //! * `Host` must be an address, `localhost`, or the user's name: a foreign name pointed here (DNS rebinding)
 //!   is refused.
 //! * A browser names the requesting page in `Origin`: only ours is accepted. Programs send none.
-//! * Where other machines reach it, the data connection needs the token. The page itself is part of the
-//!   program and public.
+//! * Where other machines reach it, the data connection needs the token.
 
 use std::net::{IpAddr, SocketAddr};
 

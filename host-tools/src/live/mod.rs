@@ -6,7 +6,7 @@
 //! ```
 //!
 //! One thread follows the vehicle (`feed`, `playback`) and never waits for the others; each page has one, and one writes
-//! to a database. Pages take the newest state and the missing history (`hub`); points wait in memory (`influx`).
+//! to a database.
 
 pub mod assets;
 pub mod board;

@@ -1,7 +1,6 @@
 //! The same flight from its autopilot's log and from a telemetry port: the monitor finds the same in both.
 //!
-//! PX4 in its simulator, a motor dies (`tests/labelled/px4`). The log is cut to the mapped topics, and to the rates
-//! at which they are read.
+//! PX4 in its simulator, a motor dies (`tests/labelled/px4`).
 
 use std::path::Path;
 

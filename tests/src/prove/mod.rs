@@ -1,7 +1,7 @@
 //! Campaigns: the promises about the record, tested in thousands of cases each.
 //!
-//! Each runs in this process, on the same tasks as `hums sim`: ten thousand program runs would take a day. A campaign
-//! is one file here and one line in [`CAMPAIGNS`].
+//! Each runs in this process, on the same tasks as `hums sim`. A campaign is one file here and one line in
+//! [`CAMPAIGNS`].
 
 mod card;
 mod damage;

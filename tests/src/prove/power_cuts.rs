@@ -1,8 +1,7 @@
 //! Power cuts at any block write.
 //!
 //! A session is recorded once, with every block write kept. Then the writes are replayed up to a random one, that one
-//! whole or in part. So one recording gives any number of cuts. Decoded frames are compared with the sent ones, in
-//! order, with their arrival times.
+//! whole or in part. Decoded frames are compared with the sent ones, in order, with their arrival times.
 
 pub(super) mod careless;
 

@@ -1,6 +1,5 @@
-//! `cargo xtask bench logs`: `hums check` beside pymavlink's `DFReader` (`DataFlash`) and pyulog (`ULog`). One core,
-//! one after the other; speeds depend on the machine, ratios hardly. The program's processor time counts, the best of
-//! some rounds.
+//! `cargo xtask bench logs`: `hums check` beside pymavlink's `DFReader` (`DataFlash`) and pyulog (`ULog`). The
+//! program's processor time counts, the best of some rounds.
 //!
 //! Each log is repeated to 16 MB, as `cat` joins it: the start of two milliseconds does not count.
 //!

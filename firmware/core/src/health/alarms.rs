@@ -6,8 +6,7 @@ use super::tables::STATES;
 use crate::time::{BootMs, Millis};
 
 /// Alarms that are kept. One more is reported, explains nothing and is not explained. The square of this number bounds the search
-/// for causes at each change of a level. A step with 34 changes and all places in use takes as long as 21 usual ones (46 and 2.2 us
-/// on a PC).
+/// for causes at each change of a level. The worst step takes as long as 21 usual ones (46 us on a PC).
 pub(super) const ALARMS_MAX: usize = 32;
 
 /// An explained alarm is reported by itself if it lasts this long after its cause ended or fell below it. A disturbed

@@ -39,8 +39,7 @@
 //!
 //! A power-on with four components begins with 0.8 KB. At least 10 KB are free then, and 1.25 KB are reserved for
 //! landing and disarming ([`Room::Reserve`](hums_core::lifetime::Room)). The other 8 KB hold 46 saves in flight: 1.7
-//! hours, after which nothing is saved until the landing. A new sector with 14 KB holds 70 saves: 3.8 hours. A longer
-//! flight loses nothing as long as power stays.
+//! hours, after which nothing is saved until the landing. A new sector with 14 KB holds 70 saves: 3.8 hours.
 //!
 //! A flight of 20 minutes takes 3 KB with all of this. So about every second power-on has an erase. Each of the two
 //! sectors lasts for 10,000 erases (datasheet, table 41), together 40,000 flights: ten a day for eleven years.

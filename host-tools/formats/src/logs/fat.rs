@@ -1,10 +1,10 @@
 //! Reads a card's FAT32 volume and trusts nothing on it: every number is checked, every walk bounded. Damage is reported, and
 //! sound parts are read.
 //!
-//! The recorder's reader would stop at the first error. Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
+//! Source of the layout: Microsoft FAT specification 1.03 (`fatgen103`).
 //!
 //! Memory: a bit for each cluster (32 MiB for the largest volume of FAT32), 64 KiB of the FAT, and at most `FILES_MAX` files in
-//! `EXTENTS_MAX` extents: 10 MiB and 16 MiB. More entries are counted.
+//! `EXTENTS_MAX` extents: 10 MiB and 16 MiB.
 
 use std::fmt;
 use std::fs::File;

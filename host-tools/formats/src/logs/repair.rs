@@ -4,8 +4,6 @@
 //! The sector with the number `n` is at block `n - base` of its file. The base shows the lost sectors: every
 //! place with another sector, or none. Most sound sectors agree on it, unless the recorder had just begun to
 //! rewrite the file.
-//!
-//! Files longer than any of the recorder are not repaired: memory is bounded.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -2,8 +2,7 @@
 //!
 //! The recorder writes a file from its beginning, so the sector at block `n` has at least the number `n`. A
 //! copy of a sector in progress may be one block further. So in a recycled file the older session's sectors
-//! follow the newest one. Lower numbers of another session came in another way: joined logs, or a file over a
-//! deleted log. Without a sector of the log all are strange.
+//! follow the newest one.
 
 use hums_blackbox::{Header, SECTOR_BYTES};
 

@@ -1,7 +1,6 @@
 //! Checks whether a recording's clock runs.
 //!
-//! A bad clock stops, is zero from some place on, or has milliseconds as microseconds. Then hours seem to be
-//! a moment, in which checks find nothing. Four signs:
+//! A bad clock stops, is zero from some place on, or has milliseconds as microseconds. Four signs:
 //!
 //! | measure | reason |
 //! |---|---|

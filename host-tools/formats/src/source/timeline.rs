@@ -4,8 +4,6 @@
 //! - A small step back is a reordering: the late item counts as coming now.
 //! - A larger step back is a restart. Time goes on a microsecond after its last value.
 //! - A step forward beyond a day does not count; if the clock stays there, time goes on from there.
-//!
-//! [`super::doubt`] finds the wrong times before.
 
 use hums_core::clock::Instant;
 

@@ -3,9 +3,6 @@
 //!
 //! It only grows at its end, so a page asks for the part after its last one ([`Cursor`]); a slow page needs no queue.
 //! If older parts changed (joined intervals, a thinned track) the page takes everything again.
-//!
-//! For playback of a recording it is complete at the start; a page is then shown the part up to the present
-//! moment.
 
 use std::borrow::Cow;
 use std::collections::VecDeque;

@@ -1,7 +1,7 @@
 //! The checks that name the cause of each class of fault.
 //!
 //! A pilot or mechanic who reads the check's text knows which part to examine. A general check (a failsafe, "a sensor
-//! is unhealthy", a large variance of the estimator) names no cause. No monitor and no check knows this table.
+//! is unhealthy", a large variance of the estimator) names no cause.
 
 #[derive(Debug)]
 pub(super) struct Class {

@@ -1,8 +1,7 @@
 //! The judge of the monitor's diagnosis.
 //!
-//! Flights are recordings with labels (`labels`), in sets by whether they were known when the limits were chosen
-//! (`sets`); `real` judges real flights, whose findings have labels. It is not a campaign of `docs/proof.md`: those test promises,
-//! and this one measures an imperfect diagnosis.
+//! Flights are recordings with labels (`labels`), in sets by whether they were known when the limits were chosen (`sets`); `real`
+//! judges real flights, whose findings have labels.
 
 mod alarms;
 mod bound;

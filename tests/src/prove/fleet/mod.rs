@@ -1,6 +1,4 @@
 //! A fleet of 10,000 vehicles with 20,000 sessions: their ingest, the size and speed of their tables, and the sum for a year.
-//!
-//! It is not a campaign of `docs/proof.md`: its figures are of the machine that runs it.
 
 mod sessions;
 

@@ -4,7 +4,6 @@
 //! - If a chain of messages begins inside of it, it is damaged, and reading goes on at the chain.
 //! - If not, it is whole, and the bytes after it are skipped up to the next chain.
 //!
-//! Skipped bytes are reported once, before the next message.
 //!
 //! Memory: one buffer; each byte is looked at a bounded number of times (255 at most).
 
