@@ -62,6 +62,7 @@ def duck(document, connection, one):
 
 def spark(asked, one):
     try:
+        from pyspark.errors import AnalysisException
         from pyspark.sql import SparkSession
     except ImportError:
         return "pyspark is not installed"
@@ -83,10 +84,11 @@ def spark(asked, one):
     same, different = 0, []
     for heading, query, rows in asked:
         try:
-            answer = session.sql(TABLE.sub(r"\1", query)).collect()
-        except Exception:
+            plan = session.sql(TABLE.sub(r"\1", query))
+        except AnalysisException:
             different.append(heading)
             continue
+        answer = plan.collect()
         if plain(answer) != plain(rows):
             sys.exit(f"Spark answers {heading} with {plain(answer)[:3]}, DuckDB with {plain(rows)[:3]}")
         same += 1

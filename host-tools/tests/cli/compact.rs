@@ -6,7 +6,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use parquet::file::reader::SerializedFileReader;
+use parquet::basic::ConvertedType as Of;
+use parquet::basic::Encoding::BYTE_STREAM_SPLIT;
+use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
 
 use super::support::{contents, px4, run, text};
 
@@ -18,8 +21,13 @@ fn rows(fleet: &Path) -> BTreeMap<String, Vec<String>> {
         }
         let table = name.split('/').next().expect("a table").to_owned();
         let file = File::open(fleet.join(&name)).expect("a file");
-        let rows = SerializedFileReader::new(file).expect("a table").into_iter();
-        let rows = rows.map(|row| row.expect("a row").to_string());
+        let reader = SerializedFileReader::new(file).expect("a table");
+        // Spark does not read these.
+        for column in reader.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns) {
+            let is_large = matches!(column.column_descr().converted_type(), Of::UINT_32 | Of::UINT_64);
+            assert!(!is_large || column.encodings().all(|encoding| encoding != BYTE_STREAM_SPLIT), "{name}");
+        }
+        let rows = reader.into_iter().map(|row| row.expect("a row").to_string());
         tables.entry(table).or_default().extend(rows);
     }
     for rows in tables.values_mut() {

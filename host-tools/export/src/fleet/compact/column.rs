@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
-use parquet::basic::Encoding;
+use parquet::basic::{ConvertedType, Encoding};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{BoolType, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::errors::Result as ParquetResult;
@@ -13,7 +13,7 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::file::properties::WriterPropertiesBuilder;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
-use parquet::schema::types::{ColumnPath, Type, TypePtr};
+use parquet::schema::types::{ColumnPath, SchemaDescriptor, Type, TypePtr};
 
 use super::super::session_of;
 use super::Rows;
@@ -248,10 +248,16 @@ impl<T: DataType> Values<T> {
             schema.get_fields().get(column).context("a column is missing; decode its session again")?;
         let one = Type::group_type_builder("hums").with_fields(vec![field.clone()]).build()?;
         let one = Arc::new(one);
-        let path = path_of(field);
+        let leaf = SchemaDescriptor::new(one.clone()).column(0);
+        let path = leaf.path().clone();
+        // Spark 4.3 does not read such integers with this encoding.
+        let is_unread = |encoding: &&Encoding| {
+            **encoding == Encoding::BYTE_STREAM_SPLIT
+                && matches!(leaf.converted_type(), ConvertedType::UINT_32 | ConvertedType::UINT_64)
+        };
         let sample = self.sample();
         let mut best = None;
-        for encoding in encodings {
+        for encoding in encodings.iter().filter(|encoding| !is_unread(encoding)) {
             let with = |properties| encode(properties, &path, *encoding);
             let mut bytes = Vec::new();
             let properties = Arc::new(with(super::base()).build());
@@ -280,15 +286,6 @@ fn encode(
         Encoding::RLE_DICTIONARY => properties.set_column_dictionary_enabled(path.clone(), true),
         encoding => properties.set_column_encoding(path.clone(), encoding),
     }
-}
-
-fn path_of(field: &Type) -> ColumnPath {
-    let (mut path, mut field) = (vec![field.name().to_owned()], field);
-    while let Some(inner) = (!field.is_primitive()).then(|| field.get_fields().first()).flatten() {
-        path.push(inner.name().to_owned());
-        field = inner;
-    }
-    ColumnPath::new(path)
 }
 
 impl Column {
