@@ -98,7 +98,7 @@ pub(crate) fn run(options: &Options) -> Result<()> {
 /// Public keys that the boxes take.
 const KEYS: &str = "firmware/update/keys";
 
-/// Arguments for `hums`. One program is for pilots and for owners of a fleet: object storage has 3 of its 18 MB.
+/// Arguments for `hums`. One program is for pilots and for owners of a fleet: object storage has 5 of its 22 MB.
 const fn hums(target: &str) -> [&str; 4] {
     ["--target", target, "--features", "object-storage"]
 }
