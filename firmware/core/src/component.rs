@@ -245,7 +245,7 @@ impl Component {
         is_new
     }
 
-    /// Sets its figures, of which this session has counted a part.
+    /// Sets its figures. They include the part that this session has counted.
     pub(crate) fn set_figures(&mut self, figures: ComponentFigures, totals: &Totals) {
         let counted = ComponentFigures::after(totals, self.kind, self.number);
         self.ran = figures.zip(counted, |figure, counted| figure - counted);

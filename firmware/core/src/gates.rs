@@ -41,7 +41,7 @@ state! {
 }
 
 impl Gates {
-    /// Gates of which these are open.
+    /// Only these gates are open.
     #[cfg(test)]
     pub(crate) fn open(open: u16) -> Self {
         Self { open, ..Self::default() }

@@ -50,7 +50,7 @@ pub(crate) fn hums() -> Command {
     command
 }
 
-/// With these bytes on a pipe. It may end before it has read them all.
+/// With these bytes on a pipe.
 pub(crate) fn piped(command: &mut Command, input: &[u8]) -> Output {
     let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("it runs");

@@ -4,7 +4,7 @@
 //! 2. The folder gets the list of the files that they replace. It is renamed: from here on the change counts.
 //! 3. The replaced files are removed, and the new ones are moved to their places.
 //!
-//! Whoever comes next does the rest of step 3 ([`recover`]). One program at a time changes a fleet: it holds a lock.
+//! The next program does the rest of step 3 ([`recover`]). One program at a time changes a fleet: it holds a lock.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
