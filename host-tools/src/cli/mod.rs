@@ -79,7 +79,7 @@ pub enum Command {
     /// Merge a fleet's Parquet files into few large ones; may be stopped and started again at any time
     Compact(Compact),
     /// Run the firmware's pipeline on this PC: bytes in at the autopilot UART, an SD card image out
-    Sim(Sim),
+    Sim(Box<Sim>),
     /// Set up the box, and talk with it over MAVLink: its logs, its parameters, its card
     Box(BoxArgs),
     /// Print a script for a shell, which completes commands, flags and file names
