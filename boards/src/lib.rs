@@ -168,9 +168,11 @@ pub struct Hold {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Owner {
-    /// Where to buy it.
+    /// Shops.
     pub buy: String,
-    /// Price, if a source names one.
+    /// The maker's page.
+    pub page: String,
+    /// Price with its year.
     pub price: String,
     /// Power input.
     pub power: String,

@@ -11,8 +11,8 @@ For the buyer and the builder of a box. Afterwards you can choose a board, and k
 [wiring.md](wiring.md) has the autopilot's side and its settings. `cargo xtask boards` makes this page from the files in [`boards/`](../boards).
 
 **No board of this page was tried on hardware.** `cargo xtask prove boards` runs the image of each on the [model of the chip](chip.md). Pins,
-crystals and levels come from the sources in [`boards/facts.csv`](../boards/facts.csv). If you try a board, please report it with the file of
-`hums box report`.
+crystals, levels and prices come from the sources in [`boards/facts.csv`](../boards/facts.csv). Each price was seen in its year, and may have
+changed. If you try a board, please report it with the file of `hums box report`.
 
 * A flight controller is used here as a recorder only. Its own sensors, OSD and motor outputs stay unused. Do not connect motors.
 * The USB plug loads the firmware, is a [serial port](companion.md#the-usb-port), and can show the card as a [disk](runbook.md#read-the-card-over-usb).
@@ -27,7 +27,7 @@ For a board with an STM32F405RG and a crystal of 4 to 26 MHz (an even number). N
 
 1. Copy the file of the most similar board to `boards/NAME.toml`, and change it. The chip's manual (RM0090) has the DMA streams in tables 42 and 43.
    Without `bus` the processor moves the card's pins itself.
-2. Add a line to `boards/facts.csv` for each pin, with its source and the commit of the source.
+2. Add a line to `boards/facts.csv` for each pin, the price and the page, with its source and the commit of the source.
 3. `cargo test -p hums-boards` compares both, after `cargo xtask boards` has made this page.
 4. `cargo xtask firmware --board NAME` builds it. A pin without the wanted function, or a DMA stream that does not serve a port, does not compile.
 5. `cargo xtask prove boards` runs the image: boot, flight, stall, card pulled, power cut, USB host, update.
@@ -54,8 +54,8 @@ pub fn table(page: &str) -> String {
     table
 }
 
-fn to_buy(Owner { buy, price, .. }: &Owner) -> String {
-    format!("{buy}; {price}")
+fn to_buy(Owner { buy, page, price, .. }: &Owner) -> String {
+    format!("[{buy}]({page}); {price}")
 }
 
 fn anchor(title: &str) -> String {
