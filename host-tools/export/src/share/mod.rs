@@ -79,6 +79,13 @@ pub struct ShareRequest {
 
 /// Runs `hums share`.
 pub fn run(args: &ShareRequest) -> Result<Outcome> {
+    let (share, lossy) = copy(args)?;
+    share.told(args).iter().try_for_each(|line| output::line(&printable::word(line)))?;
+    Ok(Outcome::lossy(lossy))
+}
+
+/// Returns what was removed, and whether the recording has damage.
+fn copy(args: &ShareRequest) -> Result<(Share, bool)> {
     let found = find(std::slice::from_ref(&args.input), false)?;
     found.remarks.iter().for_each(|remark| note!("{remark}"));
     let wanted = found.name_of(args.session.as_deref())?;
@@ -102,8 +109,7 @@ pub fn run(args: &ShareRequest) -> Result<Outcome> {
     } else {
         share.own(place, &context, args)?
     };
-    share.tell(args)?;
-    Ok(Outcome::lossy(lossy))
+    Ok((share, lossy))
 }
 
 struct Share {
@@ -275,24 +281,27 @@ impl Share {
         Ok(lossy)
     }
 
-    fn tell(self, args: &ShareRequest) -> Result<()> {
-        let line = |words: &str| output::line(&printable::word(words));
-        line(&format!("{}: {} kept", args.output.display(), count(self.kept, "message")))?;
-        line(
-            "moved: places to the Atlantic, altitudes to sea level, pressure to 1013.25 hPa, times to 2020",
-        )?;
-        for (what, number) in &self.removed {
+    /// The lines that the user gets.
+    fn told(&self, args: &ShareRequest) -> Vec<String> {
+        let mut lines = vec![
+            format!("{}: {} kept", args.output.display(), count(self.kept, "message")),
+            "moved: places to the Atlantic, altitudes to sea level, pressure to 1013.25 hPa, times to 2020"
+                .to_owned(),
+        ];
+        lines.extend(self.removed.iter().map(|(what, number)| {
             // A field is in as many messages as there are of its name.
             let all = self.seen.get(what).or_else(|| self.seen.get(what.split('.').next()?));
             let of = all.map_or_else(String::new, |all| format!("{number} of {all} "));
-            line(&format!("removed: {of}{what}"))?;
-        }
+            format!("removed: {of}{what}")
+        }));
         if self.removed_others > 0 {
-            line(&format!("removed: {} of further names", count(self.removed_others, "message")))?;
+            lines.push(format!("removed: {} of further names", count(self.removed_others, "message")));
         }
-        line(
-            "stays: the magnetic field, wind, temperature and the shape of the track; docs/decode.md says what they tell",
-        )
+        lines.push(
+            "stays: the magnetic field, wind, temperature and the shape of the track; docs/decode.md says what they tell"
+                .to_owned(),
+        );
+        lines
     }
 }
 

@@ -57,11 +57,12 @@ fn record(at_us: u64, packet: &Packet) -> Vec<u8> {
     [&(UTC_US + at_us).to_be_bytes()[..], Encoder::of(1, 1).frame(&mut buffer, packet)].concat()
 }
 
-fn share(input: &Path, output: &Path) -> Vec<u8> {
+/// The copy, and the lines about it.
+fn share(input: &Path, output: &Path) -> (Vec<u8>, Vec<String>) {
     let args =
         ShareRequest { input: input.to_owned(), session: None, output: output.to_owned(), force: false };
-    run(&args).expect("a copy");
-    fs::read(output).expect("the copy")
+    let (share, _) = copy(&args).expect("a copy");
+    (fs::read(output).expect("the copy"), share.told(&args))
 }
 
 #[track_caller]
@@ -123,9 +124,14 @@ fn no_fact_of_any_message_is_in_the_copy_of_a_recording() {
     for secret in &secrets[..2] {
         assert!(tlog.windows(secret.len()).any(|part| part == secret), "it is planted");
     }
-    let copy = share(&input, &output);
+    let (copy, told) = share(&input, &output);
     assert!(copy.len() > 2_000, "{}", copy.len());
     assert_silent(&copy, &secrets);
+    for removed in
+        ["1 of 1 HOME_POSITION", "1 of 1 STATUSTEXT", "1 of 1 PARAM_VALUE", "1 of 1 AUTOPILOT_VERSION.uid"]
+    {
+        assert!(told.iter().any(|line| line == &format!("removed: {removed}")), "{removed}: {told:#?}");
+    }
     // The way stays as it was.
     let places = observations(&output).into_iter().filter_map(|observation| match observation {
         Observation::GlobalPosition(global) => {
@@ -171,7 +177,7 @@ fn an_autopilots_own_log_gives_nothing_away_either() {
     assert!(secrets.len() > 10, "{}", secrets.len());
     // A thousand are enough of a search in all bytes.
     let few: Vec<Vec<u8>> = secrets.iter().step_by(secrets.len().div_ceil(1_000)).cloned().collect();
-    assert_silent(&share(&input, &output), &few);
+    assert_silent(&share(&input, &output).0, &few);
     let near = |observation: &Observation| match observation {
         Observation::GlobalPosition(global) => {
             global.position.is_none_or(|place| (place.latitude_deg - 45.0).abs() < 1.0)
