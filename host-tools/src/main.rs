@@ -3,5 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    hums::run(std::env::args_os())
+    let code = hums::run(std::env::args_os());
+    hums_base::console::hold();
+    code
 }

@@ -18,6 +18,7 @@ macro_rules! note {
 
 pub mod archive;
 pub mod colour;
+pub mod console;
 #[cfg(not(target_family = "wasm"))]
 pub mod duplex;
 pub mod endpoint;
