@@ -250,7 +250,8 @@ impl Details {
                 if let Some((at, jump_m)) =
                     self.jump.filter(|(at, _)| since.is_some_and(|since| since.since(*at) <= NEAR))
                 {
-                    problems.detail(check, &format!("its position jumped {jump_m:.0} m at {}", moment(at)));
+                    let words = format!("GPS 1 position jumped {jump_m:.0} m at {}", moment(at));
+                    problems.event(check, &words);
                 }
             }
             _ => self.tell_alert(check, problems),

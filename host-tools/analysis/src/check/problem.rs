@@ -50,6 +50,8 @@ pub struct Problem {
     pub unit: String,
     /// Names of parts.
     pub details: Vec<String>,
+    /// The detail that the verdict begins with.
+    pub event: Option<String>,
     /// Last reception, for a radio gap's mishap.
     pub unheard_from: Option<Instant>,
     /// Check with as bad an alarm at each finding.
@@ -178,6 +180,7 @@ impl Problems {
             limit: finding.limit,
             unit: finding.unit.clone(),
             details: Vec::new(),
+            event: None,
             unheard_from: None,
             because: None,
         };
@@ -266,6 +269,13 @@ impl Problems {
         let Some(OpenProblem { problem, .. }) = known else { return };
         if problem.details.len() < DETAILS_MAX && !problem.details.iter().any(|known| known == name) {
             problem.details.push(name.to_owned());
+        }
+    }
+
+    pub(super) fn event(&mut self, check: &str, words: &str) {
+        self.detail(check, words);
+        if let Some(OpenProblem { problem, .. }) = self.open.get_mut(&(check.to_owned(), 0)) {
+            problem.event.get_or_insert_with(|| words.to_owned());
         }
     }
 

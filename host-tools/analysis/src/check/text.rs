@@ -389,12 +389,17 @@ fn found(groups: &[Group<'_>]) -> String {
         return String::new();
     };
     let worst = worst_of(&group.members);
-    let details = worst.map_or_else(String::new, |worst| details(worst, HEADLINE_DETAILS_MAX));
+    let event = worst.and_then(|worst| worst.event.as_ref());
+    let details = match worst {
+        Some(worst) if event.is_none() => details(worst, HEADLINE_DETAILS_MAX),
+        _ => String::new(),
+    };
     let (onset, worst) =
         worst.and_then(values).map(|(values, _)| (values.onset, values.worst)).unwrap_or_default();
     let after_comma = |words: String| if words.is_empty() { words } else { format!(", {words}") };
     let (onset, worst) = (after_comma(onset), after_comma(worst));
-    format!("{}{onset}{details} at {}{worst}", alarm(&group.members), moment(first.at))
+    let found = format!("{}{onset}{details} at {}{worst}", alarm(&group.members), moment(first.at));
+    event.map_or(found.clone(), |event| format!("{event} ({found})"))
 }
 
 fn problems(text: &mut String, problems: &[Problem]) {
@@ -578,6 +583,7 @@ mod tests {
             limit: 10.0,
             unit: String::new(),
             details: Vec::new(),
+            event: None,
             unheard_from: None,
             because: None,
         }
