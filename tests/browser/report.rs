@@ -656,6 +656,9 @@ fn a_report_is_read_on_paper_in_the_dark_with_high_contrast_on_a_phone_and_from_
         page.media(media, &features);
         let worst = page.run(CONTRAST);
         assert!(worst[0].as_f64() >= Some(least), "{media} {scheme} {contrast}: {worst}");
+        let tops =
+            page.run("return ['findings', 'summary'].map((id) => document.getElementById(id).offsetTop)");
+        assert_eq!(tops[0].as_f64() < tops[1].as_f64(), media == "print", "findings first on paper: {tops}");
         if let Some(name) = name {
             shoot(&mut page, name);
         }
