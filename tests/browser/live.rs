@@ -125,7 +125,7 @@ fn assert_sound(page: &mut LivePage) {
     assert!(width[1].as_f64() <= window, "something sticks out: {width} in a window of {window:?}");
 }
 
-/// A picture of the window. `HUMS_SHOTS=docs` makes those of the documents anew.
+/// `HUMS_SHOTS=docs` makes the documents' pictures.
 pub(crate) fn shoot(page: &mut LivePage, name: &str) {
     let Some(folder) = std::env::var_os("HUMS_SHOTS") else { return };
     page.run("scrollTo(0, 0); return null");
@@ -177,6 +177,10 @@ fn every_panel_shows_the_recorded_flight_at_that_moment_and_seeking_goes_there()
         if let Some(name) = name {
             shoot(&mut page, name);
         }
+        let first = "
+            return ['horizon', 'map', 'height', 'groundspeed', 'battery_percent'].every((id) =>
+              document.querySelector(`[data-panel=${id}]`).getBoundingClientRect().bottom < innerHeight)";
+        assert_eq!(page.run(first), json!(width == 1440), "a pilot sees them first, on a phone the health");
     }
 }
 
@@ -299,7 +303,7 @@ fn a_flight_over_udp_is_followed_until_it_stops_and_then_looks_stale() {
     );
     let seen = page.read();
     assert_eq!(seen["source"], "silent");
-    for panel in ["horizon", "map", "groundspeed", "velocity_module"] {
+    for panel in ["horizon", "map", "groundspeed", "place"] {
         assert_eq!(seen["panels"][panel]["stale"], true, "{panel}: {}", seen["panels"]);
     }
 }

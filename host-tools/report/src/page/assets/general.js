@@ -1,4 +1,4 @@
-// The reference system's row General Information, battery first.
+// Voltage, flight time, air.
 
 import { el } from "./elements.js";
 import { flight } from "./flight.js";
@@ -8,7 +8,6 @@ import { clock } from "./text.js";
 
 export const general = () => {
   const time = stat("flight_time", "Flight time", { format: clock });
-  const percent = gauge("battery_percent", "Battery remaining", { unit: "%", high: 100 });
   const volts = stat("battery_volts", "Battery voltage", { unit: "V", line: "PackVolts" });
   const pressure = gauge("pressure", "Air pressure", { unit: "hPa", low: 500, high: 1100 });
   const celsius = stat("temperature", "Baro temperature", {
@@ -25,12 +24,11 @@ export const general = () => {
       el(
         "div",
         { class: "instruments" },
-        [percent, volts, time, pressure, celsius].map((part) => part.node),
+        [volts, time, pressure, celsius].map((part) => part.node),
       ),
     ),
     update({ values, cells, now_s: now }) {
       time.update(values.flight_time, now);
-      percent.update(values.battery_percent, flight.limits("PackPercent"));
       const [warning, critical] = flight.limits("CellVolts") ?? [0, 0],
         lowest = Math.min(...cells);
       // A pack that reports no cells has none to be judged by.

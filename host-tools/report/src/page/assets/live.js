@@ -100,7 +100,7 @@ for (const { node } of rows) {
   bar.append(el("a", { href: `#${node.id}` }, node.firstChild.textContent));
   body.append(node);
 }
-// On a phone one column: health first, as the reader wants to know first whether all is well.
+// On a phone one column: health first.
 main.append(body, el("aside", {}, sides[0].node, log.node, sides[2].node, sides[1].node), cursorTime);
 section("time", "Timeline", body).append(strip.node);
 const last = section("parameters", "Parameters", body);

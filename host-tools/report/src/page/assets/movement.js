@@ -1,7 +1,8 @@
-// The reference system's third row: Movement Information; with horizon, heading and track.
+// What a pilot looks at first.
 
 import { say, panel } from "./dom.js";
 import { el } from "./elements.js";
+import { flight } from "./flight.js";
 import { fixed } from "./text.js";
 import { bars } from "./bar.js";
 import { compass } from "./compass.js";
@@ -12,11 +13,11 @@ import { chart } from "./plot.js";
 
 const place = () => {
   const numbers = ["latitude", "longitude"].map((id) => el("b", { "data-value": id }));
-  const height = el("b", { "data-value": "height" }),
+  const speed = el("b", { "data-value": "velocity_module" }),
     altitude = el("b", { "data-value": "altitude" });
   const box = panel(
     "place",
-    "Position",
+    "Position and speed",
     el(
       "dl",
       { class: "place" },
@@ -24,7 +25,7 @@ const place = () => {
         ["Latitude", numbers[0], "\u00b0"],
         ["Longitude", numbers[1], "\u00b0"],
         ["Above sea level", altitude, " m"],
-        ["Above home", height, " m"],
+        ["Speed, all directions", speed, " m/s"],
       ].map(([name, number, unit]) => el("div", {}, el("dt", {}, name), el("dd", {}, number, unit))),
     ),
     { class: "instrument" },
@@ -36,7 +37,7 @@ const place = () => {
       say(numbers[0], fixed(values.latitude?.[0], 7));
       say(numbers[1], fixed(values.longitude?.[0], 7));
       say(altitude, fixed(values.altitude?.[0], 1));
-      say(height, fixed(values.height?.[0], 1));
+      say(speed, fixed(values.velocity_module?.[0], 1));
     },
   };
 };
@@ -59,12 +60,14 @@ const acceleration = () => {
 
 export const movement = () => {
   const scale = { top: 20, grows: true };
-  const speeds = [
+  // Name, gauge, plot with its limits.
+  const gauges = [
+    ["height", gauge("height", "Height", { unit: "m", scale: { top: 50, grows: true }, decimals: 1 })],
     ["airspeed", gauge("airspeed", "Air speed", { unit: "m/s", scale, decimals: 1 })],
     ["groundspeed", gauge("groundspeed", "Ground speed", { unit: "m/s", scale, decimals: 1 })],
-    ["velocity_module", gauge("velocity_module", "Speed, all directions", { unit: "m/s", scale, decimals: 1 })],
     ["climb", gauge("climb", "Climb rate", { unit: "m/s", low: -10, high: 10, decimals: 1 })],
     ["throttle", gauge("throttle", "Throttle", { unit: "%", high: 100 })],
+    ["battery_percent", gauge("battery_percent", "Battery", { unit: "%", high: 100 }), "PackPercent"],
   ];
   const views = [horizon(), compass()],
     track = map(),
@@ -82,7 +85,7 @@ export const movement = () => {
         "div",
         { class: "instruments" },
         views[1].node,
-        speeds.map(([, part]) => part.node),
+        gauges.map(([, part]) => part.node),
       ),
       el(
         "div",
@@ -93,7 +96,7 @@ export const movement = () => {
     ),
     update(state) {
       const { values } = state;
-      for (const [name, part] of speeds) part.update(values[name]);
+      for (const [name, part, plot] of gauges) part.update(values[name], plot && flight.limits(plot));
       views[0].update(state);
       views[1].update(state);
       const { latitude, longitude } = values,
