@@ -57,9 +57,9 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         let check = file_system(image);
         all.is_card_damaged |= check.failed > 0;
         if !args.json {
-            output::line(&format!("Card {}", path(&image.path)))?;
-            print(&[check])?;
-            image.not_looked_at().map_or(Ok(()), |words| output::line(&format!("  besides {words}")))?;
+            let rest = image.not_looked_at().map(|words| format!("; {words}")).unwrap_or_default();
+            let state = if check.failed > 0 { warning("the file system is damaged") } else { level("ok") };
+            print(&format!("Card {}: {state}{rest}", path(&image.path)), &[check], args.verbose)?;
         }
     }
     let mut manifest = Manifest::default();
@@ -82,7 +82,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         if let Some(list) = &mut list {
             return list.element(&log);
         }
-        print_log(&log, overview)
+        print_log(&log, overview, args.verbose)
     })?;
     if !ok || failed > 0 {
         all.worst = Verdict::NotProved;
@@ -104,17 +104,14 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
 }
 
 struct Totals {
-    /// Number of sessions.
     logs: u64,
     worst: Verdict,
-    /// The worst of them.
     soundness: Soundness,
     /// Sectors that were rebuilt, and missing ones with parity: a card is damaged, and no frame is lost.
     made_again: u64,
     unprotected: u64,
     /// The logs before it were not read.
     without_earlier: Option<String>,
-    /// The file system of a card.
     is_card_damaged: bool,
 }
 
@@ -209,7 +206,6 @@ pub fn verdict(log: &Overview) -> Verdict {
     if log.ok { log.verdict } else { Verdict::NotProved }
 }
 
-/// Sectors lost and rebuilt.
 const INTACT: &str = "sectors intact";
 
 /// Failed checks with reasons; needs [`Overview::verified`].
@@ -228,23 +224,26 @@ pub fn failed(log: &Overview) -> Vec<(&'static str, String)> {
     failed
 }
 
-fn print_log(log: &LogJson, overview: &Overview) -> Result<()> {
-    let files = overview.ending.files.join(", ");
-    output::line(&format!("Session {} ({})", word(&log.name), word(&files)))?;
-    print(&log.checks)?;
-    let lacks = overview.soundness().words();
-    if !lacks.is_empty() {
-        output::line(&format!("  state    {}", warning(lacks)))?;
-    }
-    for words in came_damaged(&overview.contents).into_iter().chain(overview.ending.aside()) {
+fn print_log(log: &LogJson, overview: &Overview, verbose: bool) -> Result<()> {
+    let (ending, lacks) = (&overview.ending, overview.soundness().words());
+    let files = ending.files.join(", ");
+    let state = if lacks.is_empty() { level("ok") } else { warning(lacks) };
+    let (sectors, frames) = (ending.summary.blocks.sectors, overview.contents.frames());
+    let of = format!("{}, {}", count(sectors, "sector"), count(frames, "frame"));
+    let end = if lacks.is_empty() { format!("; {}", ending.words()) } else { String::new() };
+    let head = format!("Session {} ({}): {state}; {of}{end}", word(&log.name), word(&files));
+    print(&head, &log.checks, verbose)?;
+    for words in came_damaged(&overview.contents).into_iter().chain(ending.aside()) {
         output::line(&format!("  {}", word(&words)))?;
     }
     Ok(())
 }
 
-fn print(checks: &[Check]) -> Result<()> {
+/// The failed checks, or all of them if `verbose`.
+fn print(head: &str, checks: &[Check], verbose: bool) -> Result<()> {
+    output::line(head)?;
     let mut table = Table::new(2, [left(6), left(17), left(0)]);
-    for Check { name, checked, failed, detail } in checks {
+    for Check { name, checked, failed, detail } in checks.iter().filter(|check| verbose || check.failed > 0) {
         let verdict = level(match *name {
             _ if *failed == 0 => "ok",
             INTACT => "rebuilt",
@@ -254,7 +253,8 @@ fn print(checks: &[Check]) -> Result<()> {
         let words = format!("{checked} checked, {failed} failed{detail}");
         table.row([verdict.to_string(), (*name).to_owned(), words]);
     }
-    output::line(&table.text())
+    let text = table.text();
+    if text.is_empty() { Ok(()) } else { output::line(&text) }
 }
 
 #[derive(Debug, Serialize)]
@@ -308,7 +308,6 @@ impl LogJson {
         // Unknown numbers count as one.
         let missing: u64 = gaps().map(|gap| u64::from(loss::sectors_lost(gap).unwrap_or(1))).sum();
         let useless: u64 = gaps().map(|gap| u64::from(gap.sectors_skipped)).sum();
-        // Unknown numbers count as one.
         let frames_missing = summary.frames_missing + summary.gaps_uncounted;
         let uncounted = match summary.gaps_uncounted {
             0 => String::new(),
@@ -378,7 +377,6 @@ fn weakened(log: &Overview) -> Vec<Check> {
     let sectors = summary.blocks.sectors;
     let intact = check(INTACT, sectors, ending.made_again(), "made again from parity, without a loss");
     if ending.aside().is_some() {
-        // A copy's card may be damaged too.
         return Some(intact).filter(|intact| intact.failed > 0).into_iter().collect();
     }
     let words = "parity is missing: what the card loses of these files cannot be made again";

@@ -30,7 +30,9 @@ const FREEZES_IWDG: u32 = 1 << 12;
 /// Exit code 3: the end of a record that power cut in the air cannot be proved.
 #[track_caller]
 pub(crate) fn assert_verifies(card: &Path) {
-    let said = hums(["info".as_ref(), "--verify".as_ref(), card.as_os_str()]).expect_code(&[0, 3]).text();
+    let said = hums(["info".as_ref(), "--verify".as_ref(), "-v".as_ref(), card.as_os_str()])
+        .expect_code(&[0, 3])
+        .text();
     let checks: Vec<_> = said.lines().filter(|line| line.contains(" checked, ")).collect();
     assert!(checks.len() > 10, "{said}");
     for check in checks {

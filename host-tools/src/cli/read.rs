@@ -181,6 +181,7 @@ const INFO_EXAMPLES: &str = "Examples:
   hums info --json 00001_00.HUM
   hums info --list cards/ flight.tlog
   hums info --verify card.img
+  hums info --verify -v card.img
   hums info --verify --manifest card.txt card.img
 
 --list: a line a log, in the order in which they began: date, length, time in the air, size, worst finding.
@@ -199,9 +200,12 @@ pub struct Info {
     /// Print a line a log: date, length, time in the air, size, worst finding
     #[arg(long)]
     pub list: bool,
-    /// Verify HUMS logs and cards, and print each check: checksums, order, ends
+    /// Verify HUMS logs and cards: checksums, order, ends; a line for each log, and its failed checks
     #[arg(long, conflicts_with_all = ["list", "session", "system"])]
     pub verify: bool,
+    /// With --verify: print all checks of each log, not only failed ones
+    #[arg(long, short)]
+    pub verbose: bool,
     /// As --verify, and write a manifest of the files read: SHA-256, repairs, losses; as JSON if FILE ends in .json
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,

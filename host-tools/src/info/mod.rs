@@ -33,6 +33,9 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     if args.verify || args.manifest.is_some() {
         return verify::run(args);
     }
+    if args.verbose {
+        return Err(usage("-v is for --verify"));
+    }
     if args.list {
         return list::run(args);
     }

@@ -235,7 +235,7 @@ fn blocks_that_do_not_count_are_counted_by_verify_and_info() {
     });
     block(3, &|block| block.fill(0x5a));
     fs::write(&path, log).expect("written");
-    for command in ["info --verify", "info"] {
+    for command in ["info --verify -v", "info"] {
         let said = text(&run(dir.path(), &format!("{command} copied"), 0));
         for words in ["1 sector superseded", "1 block of another session, 1 block that is no sector"] {
             assert!(said.contains(words), "{command}: `{words}` is not in {said}");
@@ -273,7 +273,7 @@ fn noise_behind_the_last_end_mark_is_told_by_every_command() {
     let mut film = log.clone();
     film[last * BLOCK..].iter_mut().enumerate().for_each(noise);
     fs::write(&path, film).expect("written");
-    let said = text(&run(dir.path(), "info --verify copied", 0));
+    let said = text(&run(dir.path(), "info --verify -v copied", 0));
     assert!(said.contains("blocks that are no sectors") && said.contains("cannot be proved"), "{said}");
     for empty in [0x00, 0xff] {
         let mut log = log.clone();

@@ -62,11 +62,11 @@ fn a_recording_in_a_folder_that_holds_nothing_is_told() {
 #[test]
 fn not_everything_holds_where_something_was_passed_over() {
     let dir = copied(2);
-    let verdict = || {
-        let said = text(&run(dir.path(), "info --verify copied", 0));
-        said.lines().last().expect("a verdict").to_owned()
-    };
+    let verify = |words| text(&run(dir.path(), words, 0));
+    let verdict = || verify("info --verify copied").lines().last().expect("a verdict").to_owned();
     assert_eq!(verdict(), "2 sessions: everything holds");
+    assert_eq!(verify("info --verify copied").lines().count(), 3, "a line for each session");
+    assert_eq!(verify("info --verify -v copied").matches(" checked, 0 failed").count(), 34);
     let link = dir.path().join("copied/00003_00.HUM");
     std::os::unix::fs::symlink("nowhere", &link).expect("a link");
     assert_eq!(verdict(), "2 sessions: all that was read holds; what was passed over was not read");

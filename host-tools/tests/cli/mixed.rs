@@ -20,7 +20,7 @@ fn another_session_under_the_number_of_the_session_before_is_told_by_every_comma
     let said = String::from_utf8_lossy(&run(dir.path(), "info --verify copied", 3).stdout).into_owned();
     assert!(said.contains("FAILED  session before     1 checked, 1 failed"), "{said}");
     fs::remove_file(at("00002_00.HUM")).expect("removed");
-    let said = String::from_utf8_lossy(&run(dir.path(), "info --verify copied", 0).stdout).into_owned();
+    let said = String::from_utf8_lossy(&run(dir.path(), "info --verify -v copied", 0).stdout).into_owned();
     let words = "session before     0 checked, 0 failed; session 00002 is not among what was read";
     assert!(said.contains(words), "{said}");
 }
