@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
+use std::path::Path;
 
 use anyhow::Result;
 use hums_blackbox::record::{Loss, Moment, RecordReason, Stats, Vehicle};
@@ -520,6 +521,12 @@ impl HasEnding for Overview {
 }
 
 impl Overview {
+    /// Its first file's name, without folders.
+    pub fn file_name(&self) -> Option<String> {
+        let file = Path::new(self.ending.files.first()?).file_name()?;
+        Some(file.to_string_lossy().into_owned())
+    }
+
     /// Only the record shows whose frames they are; see [`Overview::verified`].
     pub fn of(log: &Log) -> Result<Self> {
         Self::read(log, Needs::default(), None)

@@ -102,6 +102,7 @@ fn what_people_wrote_stays_when_the_logbook_is_made_again() {
     assert_eq!(again.matches("A. <Pilot>").count(), 1, "{again}");
     assert!(again.contains("Model X,A. <Pilot>,VLOS,done,\"cell, replaced\",fine"), "{again}");
     assert_eq!(again.lines().count(), 4, "three flights: {again}");
+    assert!(again.contains(",px4.tlog,") && !again.contains("cards/"), "folders stay private: {again}");
     let page = fs::read_to_string(dir.path().join("book.html")).expect("a page");
     assert!(page.contains("A. &lt;Pilot&gt;") && page.contains("Model X"), "{page}");
     let of_pilot = contents(&dir.path().join("flights")).into_iter().filter(|(_, bytes)| {

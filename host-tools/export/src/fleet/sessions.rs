@@ -1,6 +1,5 @@
 //! The table `sessions`: a row for each session.
 
-use std::path::Path;
 use std::sync::LazyLock;
 
 use hums_analysis::log_json::{VehicleJson, duration_s, finite, vehicle};
@@ -64,12 +63,10 @@ pub(crate) fn row(context: &Context, about: &RecordingContent) -> Row {
     let RecordingContent { overview, board, fingerprint, track, .. } = about;
     let summary = &overview.ending.summary;
     let place = track.points().first();
-    let file = overview.ending.files.first().and_then(|file| Path::new(file).file_name());
-    let file = file.map(|file| file.to_string_lossy().into_owned());
     let end_utc_us = summary.last.and_then(|last| context.epochs.utc_us(last));
     let mut cells = vec![
         ("fingerprint", text(hex(fingerprint))),
-        ("file", known(file, Cell::Text, CellType::Text)),
+        ("file", known(overview.file_name(), Cell::Text, CellType::Text)),
         ("format", text(overview.format.map_or("hums", Format::name))),
         ("end_utc", known(end_utc_us, Cell::Count, CellType::Count)),
         ("duration[s]", Cell::Double(duration_s(overview))),

@@ -239,7 +239,7 @@ impl Session {
         let overview = &about.overview;
         let counter = |counter: UsageCounter| overview.contents.lifetime.get(counter.name()).copied();
         let life = counter(UsageCounter::Flights).zip(counter(UsageCounter::Flight));
-        let record = overview.ending.files.first().cloned().unwrap_or_default();
+        let record = overview.file_name().unwrap_or_default();
         let mut session = Self {
             recording: identity.recording.clone(),
             vehicle: identity.vehicle.clone(),
