@@ -172,7 +172,7 @@ impl Totals {
     }
 }
 
-/// Hands each log on in order, with the others' evidence. Returns the number of unreadable ones, which are reported.
+/// Hands each log on in order. Returns the number of unreadable ones, which are reported.
 pub fn verify_each(found: &FoundLogs, mut done: impl FnMut(&Overview) -> Result<()>) -> Result<u64> {
     let named = found.logs.iter().map(|log| (log.name.as_str(), log));
     let mut followed = EndResolver::new(Sessions::of(named));
@@ -357,7 +357,6 @@ impl LogJson {
     }
 }
 
-/// Outside the copied session.
 fn beside_copy(ending: &Ending) -> Vec<Check> {
     let (besides, files) = (ending.besides(), ending.files.len() as u64);
     let check =
@@ -464,7 +463,6 @@ mod tests {
 
     use super::*;
 
-    /// A cut search or an unreadable log fails beside logs that lost nothing.
     #[test]
     fn logs_that_lost_nothing_do_not_name_what_failed() {
         let totals = |soundness| {

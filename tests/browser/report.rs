@@ -617,7 +617,7 @@ for (let text = walk.nextNode(); text; text = walk.nextNode()) {
 return worst;
 ";
 
-/// Plots from a wide window too: drawn as wide as A4 within its margins, before the layout on paper.
+/// Plots of a wide window too are as wide as A4 within its margins.
 #[track_caller]
 fn assert_fits_on_paper(page: &mut LivePage, address: &str) {
     page.open(address, "light", 1920, 1000);

@@ -11,7 +11,6 @@ pub fn hold() {
     let count = unsafe { GetConsoleProcessList(processes.as_mut_ptr(), processes.len() as u32) };
     if count == 1 && io::stdin().is_terminal() && io::stderr().is_terminal() {
         crate::output::aside("\nPress Enter to close this window.");
-        // No input: it closes.
         let _ = io::stdin().read_line(&mut String::new());
     }
 }

@@ -1,6 +1,6 @@
 //! Numbers for people.
 
-/// Three decimals at most; absurdly large values are not written out.
+/// Three decimals at most.
 pub(super) fn short(value: f64) -> String {
     if value.abs() >= 1e15 {
         return format!("{value:.0e}");

@@ -1,4 +1,4 @@
-//! Usage counters for people: zeros are left out, durations are hours and minutes.
+//! Usage counters for people.
 
 use std::fmt::Write as _;
 

@@ -259,7 +259,6 @@ impl Problems {
         })
     }
 
-    /// The start of this check's open problem.
     pub(super) fn open_since(&self, check: &str) -> Option<Instant> {
         self.open.get(&(check.to_owned(), 0)).and_then(|followed| followed.since.map(|(since, _)| since))
     }
@@ -321,7 +320,6 @@ impl Problems {
         (count, findings, problems)
     }
 
-    /// Problems by [`Problem::order`] within a level.
     pub(super) fn worst_first(self) -> Vec<Problem> {
         let mut problems: Vec<_> = self
             .open

@@ -1,4 +1,4 @@
-// A round gauge: an arc from the lowest to the highest value, its limits beside it, the number in the middle.
+// A round gauge.
 
 import { say, attribute, toggle, panel } from "./dom.js";
 import { svg } from "./elements.js";

@@ -4,7 +4,7 @@ import { el } from "./elements.js";
 import { flight } from "./flight.js";
 import { chart } from "./plot.js";
 
-// Whether no line of a plot changes: such plots fold away in a flight that is whole.
+// No line changes: such plots fold away in a whole flight.
 const isFlat = (id) =>
   flight.lines(id).every(([number]) => {
     const [low, high] = flight.extremes(id, number);
