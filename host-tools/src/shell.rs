@@ -32,7 +32,7 @@ pub fn man(args: &cli::Man) -> Result<Outcome> {
 }
 
 fn print(text: &[u8]) -> Result<Outcome> {
-    let mut out = Stdout::new();
+    let mut out = Stdout::default();
     out.write_all(text)?;
     out.flush()?;
     Ok(Outcome::Done)

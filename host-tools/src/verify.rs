@@ -42,7 +42,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
         note!("{remark}");
     }
     let mut ok = !found.is_cut();
-    let mut all = Totals::none();
+    let mut all = Totals::default();
     for folder in args.inputs.iter().filter(|input| input.is_dir()) {
         let (words, is_broken) = besides(folder, &found)?;
         for words in words {
@@ -67,17 +67,8 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     let failed = verify_each(&found, |overview: &Overview| {
         let log = LogJson::new(overview);
         let (soundness, ending) = (overview.soundness(), Some(&overview.ending));
-        let (name, frames, gaps) = (&overview.ending.name, 0, 0);
-        manifest.log(ReadLog {
-            name,
-            session: None,
-            frames,
-            gaps,
-            copy_of: None,
-            soundness,
-            ending,
-            remarks: &[],
-        });
+        let (name, session, copy_of, frames, gaps) = (&overview.ending.name, None, None, 0, 0);
+        manifest.log(ReadLog { name, session, frames, gaps, copy_of, soundness, ending, remarks: &[] });
         all.add(overview, log.verdict);
         if let Some(list) = &mut list {
             return list.element(&log);
@@ -103,6 +94,7 @@ pub fn run(args: &cli::Info) -> Result<Outcome> {
     Ok(Outcome::lossy(!ok))
 }
 
+#[derive(Default)]
 struct Totals {
     logs: u64,
     worst: Verdict,
@@ -110,24 +102,11 @@ struct Totals {
     /// Sectors that were rebuilt, and missing ones with parity: a card is damaged, and no frame is lost.
     made_again: u64,
     unprotected: u64,
-    /// The logs before it were not read.
     without_earlier: Option<String>,
     is_card_damaged: bool,
 }
 
 impl Totals {
-    const fn none() -> Self {
-        Self {
-            logs: 0,
-            worst: Verdict::Holds,
-            soundness: Soundness::Whole,
-            made_again: 0,
-            unprotected: 0,
-            without_earlier: None,
-            is_card_damaged: false,
-        }
-    }
-
     fn add(&mut self, overview: &Overview, verdict: Verdict) {
         let ending = &overview.ending;
         self.worst = self.worst.max(verdict);
@@ -190,9 +169,10 @@ pub fn verify_each(found: &FoundLogs, mut done: impl FnMut(&Overview) -> Result<
 }
 
 /// A log's verdict.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// Nothing is missing, nor at its end.
+    #[default]
     Holds,
     /// Up to the last end mark; the rest as far as it goes.
     ToMark,
@@ -364,7 +344,6 @@ fn beside_copy(ending: &Ending) -> Vec<Check> {
     Some(check).filter(|check| check.failed > 0).into_iter().collect()
 }
 
-/// Damage of the card without lost frames.
 fn weakened(log: &Overview) -> Vec<Check> {
     let (ending, summary) = (&log.ending, &log.ending.summary);
     let check = |name, checked, failed, words: &str| Check {
@@ -395,16 +374,13 @@ fn ends(log: &Overview) -> [Check; 7] {
     };
     let among = among_words(summary);
     let among = if among.is_empty() { among } else { format!("; before it: {among}") };
-    let gone = ending.before.gone();
-    let (before_checked, before_failed) = match ending.before {
-        SessionBefore::NotNamed | SessionBefore::NotLookedFor(_) => (0, 0),
-        SessionBefore::There => (1, 0),
-        SessionBefore::Gone(_) => (1, 1),
-    };
-    let before = match ending.before {
-        SessionBefore::NotNamed => "it names none".to_owned(),
-        SessionBefore::NotLookedFor(number) => format!("session {number:05} is not among what was read"),
-        SessionBefore::There | SessionBefore::Gone(_) => gone.unwrap_or_default(),
+    let (before_checked, before_failed, before) = match ending.before {
+        SessionBefore::NotNamed => (0, 0, "it names none".to_owned()),
+        SessionBefore::NotLookedFor(number) => {
+            (0, 0, format!("session {number:05} is not among what was read"))
+        }
+        SessionBefore::There => (1, 0, String::new()),
+        SessionBefore::Gone(_) => (1, 1, ending.before.gone().unwrap_or_default()),
     };
     let strange = ending.strange();
     let holds = ending.proof.holds() && ending.noise().is_none();

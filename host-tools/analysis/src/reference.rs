@@ -120,7 +120,7 @@ impl Quantity {
 }
 
 /// Replayed from observations.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Reference {
     vehicle: Vehicle,
     flight: Flight,
@@ -129,23 +129,7 @@ pub struct Reference {
     heard: Option<Instant>,
 }
 
-impl Default for Reference {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Reference {
-    /// Empty.
-    pub fn new() -> Self {
-        Self {
-            vehicle: Vehicle::default(),
-            flight: Flight::default(),
-            flown: Millis::from_secs(0),
-            heard: None,
-        }
-    }
-
     /// `false` if not the vehicle's.
     pub fn observe(&mut self, at: Instant, source: Source, observation: &Observation) -> bool {
         if !self.vehicle.observe(at.into(), source, observation) {
@@ -324,7 +308,7 @@ mod tests {
     const AUTOPILOT: Source = Source { system: 1, component: 1 };
 
     fn known() -> Reference {
-        let mut reference = Reference::new();
+        let mut reference = Reference::default();
         let heartbeat = Heartbeat { kind: VehicleKind::Rotorcraft, armed: true, ..Heartbeat::default() };
         assert!(reference.observe(Instant::ZERO, AUTOPILOT, &Observation::Heartbeat(heartbeat)));
         reference

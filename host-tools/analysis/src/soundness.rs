@@ -4,9 +4,10 @@ use crate::ending::Ending;
 use crate::source::item::{Cause, Gap};
 
 /// The least first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Soundness {
     /// Nothing.
+    #[default]
     Whole,
     /// Rebuilt from parity: nothing.
     Repaired,

@@ -175,16 +175,9 @@ pub fn settle(result: io::Result<()>) -> Result<()> {
 #[derive(Debug)]
 pub struct Stdout(io::Stdout);
 
-impl Stdout {
-    /// This process's standard output.
-    pub fn new() -> Self {
-        Self(io::stdout())
-    }
-}
-
 impl Default for Stdout {
     fn default() -> Self {
-        Self::new()
+        Self(io::stdout())
     }
 }
 

@@ -149,7 +149,7 @@ pub fn open(endpoint: &Endpoint, inputs: &Inputs) -> Result<Ground> {
             Ok(Ground { writer: SideOutput::file(FLAG, file), input })
         }
         Endpoint::Standard => {
-            let stream = To::Stream(Box::new(BufWriter::new(Stdout::new())));
+            let stream = To::Stream(Box::new(BufWriter::new(Stdout::default())));
             Ok(Ground { writer: SideOutput::new(FLAG, stream), input })
         }
         _ => {

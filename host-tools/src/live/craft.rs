@@ -93,7 +93,7 @@ impl Craft {
     pub fn new(at: Instant, params: &Params, on_the_wire: bool) -> Self {
         Self {
             monitor: Monitor::new(*params),
-            reference: Reference::new(),
+            reference: Reference::default(),
             latest: Latest::default(),
             companion: Companion::default(),
             speed_sensors: [None; 2],

@@ -113,7 +113,7 @@ impl LogJson {
         let name = log.name.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
         let mut this = Self { name, ..Self::default() };
         let mut kept = BTreeMap::new();
-        let rules = share::TextRules::new();
+        let rules = share::TextRules::default();
         let overview = Overview::told(log, None, &mut |at, item| {
             if let Item::Record(record) = item {
                 this.take(at, record, &rules, &mut kept);
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn each_table_keeps_its_newest_records() {
-        let (mut log, mut kept, rules) = (LogJson::default(), BTreeMap::new(), share::TextRules::new());
+        let (mut log, mut kept, rules) = (LogJson::default(), BTreeMap::new(), share::TextRules::default());
         let at = Instant::from_millis;
         log.take(at(0), &Record::Stats(Stats::default()), &rules, &mut kept);
         for ms in 1..=502 {

@@ -390,10 +390,8 @@ fn found(groups: &[Group<'_>]) -> String {
     };
     let worst = worst_of(&group.members);
     let event = worst.and_then(|worst| worst.event.as_ref());
-    let details = match worst {
-        Some(worst) if event.is_none() => details(worst, HEADLINE_DETAILS_MAX),
-        _ => String::new(),
-    };
+    let max = if event.is_some() { 0 } else { HEADLINE_DETAILS_MAX };
+    let details = worst.map_or_else(String::new, |worst| details(worst, max));
     let (onset, worst) =
         worst.and_then(values).map(|(values, _)| (values.onset, values.worst)).unwrap_or_default();
     let after_comma = |words: String| if words.is_empty() { words } else { format!(", {words}") };

@@ -55,7 +55,7 @@ impl Output {
         if means_standard_output(path) {
             // The results that the command prints are not to stand in the output.
             crate::output::leave_standard_output();
-            return Ok(Self::new(To::Standard(Stdout::new()), path, Part::None));
+            return Ok(Self::new(To::Standard(Stdout::default()), path, Part::None));
         }
         Self::check(path, inputs)?;
         let context = || cannot_write(path);

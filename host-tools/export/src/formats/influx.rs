@@ -398,7 +398,7 @@ impl Writer for Influx {
             file: SingleFile::open(context, path)?,
             messages: Clock::default(),
             quantities: Clock::default(),
-            reference: Reference::new(),
+            reference: Reference::default(),
             text: Vec::new(),
             count: 0,
         })

@@ -100,7 +100,7 @@ impl Writer for Srt {
         let findings = context.checked.iter().flat_map(Checked::findings);
         let findings = findings.map(|(finding, _)| finding.clone()).collect();
         let file = SingleFile::open(context, path)?;
-        Ok(Self { file, reference: Reference::new(), begin_us: None, next_us: 0, findings, cues: 0 })
+        Ok(Self { file, reference: Reference::default(), begin_us: None, next_us: 0, findings, cues: 0 })
     }
 
     fn part(&mut self, context: &Context, part: CollectedFindings, story: &Story) -> Result<()> {

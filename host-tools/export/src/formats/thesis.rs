@@ -123,7 +123,7 @@ impl Writer for Thesis {
             table("vfr_hud.csv", VFR_HUD)?,
             table("gaps.csv", GAPS)?,
         ];
-        Ok(Self { folder, tables, reference: Reference::new(), next: None, rows: 0 })
+        Ok(Self { folder, tables, reference: Reference::default(), next: None, rows: 0 })
     }
 
     fn part(&mut self, context: &Context, (): (), story: &Story) -> Result<()> {

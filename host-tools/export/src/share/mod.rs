@@ -47,11 +47,6 @@ const PARAMETERS: &str = "parameters";
 pub struct TextRules(Rules);
 
 impl TextRules {
-    /// The rules of all messages.
-    pub fn new() -> Self {
-        Self(Rules::new())
-    }
-
     /// Whether a text names neither place nor person.
     pub fn keeps(&self, text: &str) -> bool {
         self.0.keeps_text(text)
@@ -59,8 +54,9 @@ impl TextRules {
 }
 
 impl Default for TextRules {
+    /// The rules of all messages.
     fn default() -> Self {
-        Self::new()
+        Self(Rules::new())
     }
 }
 

@@ -383,7 +383,7 @@ mod tests {
     }
 
     fn tell(history: &mut History, second: u64) {
-        history.sample(seconds(second), &Reference::new(), &airspeed());
+        history.sample(seconds(second), &Reference::default(), &airspeed());
     }
 
     fn airspeed() -> Observation {
@@ -418,7 +418,7 @@ mod tests {
         let at = |ms: u64| Instant::from_millis(10_000 + ms);
         tell(&mut history, 10);
         assert_eq!(follow(&mut cursor, &history, at(0)), (true, 1, 0));
-        history.sample(at(60), &Reference::new(), &airspeed());
+        history.sample(at(60), &Reference::default(), &airspeed());
         history.note(at(60), note(at(60)));
         assert_eq!(follow(&mut cursor, &history, at(60)), (false, 0, 1));
         assert_eq!(
@@ -426,7 +426,7 @@ mod tests {
             (false, 2, 0),
             "a recording is paused: that is all"
         );
-        history.sample(at(120), &Reference::new(), &airspeed());
+        history.sample(at(120), &Reference::default(), &airspeed());
         assert_eq!(follow(&mut cursor, &history, at(120)), (false, 0, 0));
         assert_eq!(follow(&mut cursor, &history, at(160)), (false, 2, 0));
     }

@@ -168,7 +168,7 @@ mod tests {
             let relative_altitude = Metres(second.saturating_sub(take_off_s) as f32);
             let global = GlobalPosition { relative_altitude, ..GlobalPosition::default() };
             let at = Instant::from_millis(second * 1_000);
-            history.sample(at, &Reference::new(), &Observation::GlobalPosition(global));
+            history.sample(at, &Reference::default(), &Observation::GlobalPosition(global));
         }
         history
     }

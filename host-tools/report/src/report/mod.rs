@@ -382,9 +382,7 @@ fn file_name(path: &Path) -> String {
 fn without_folders(overview: &Overview) -> Overview {
     let mut overview = overview.clone();
     for file in &mut overview.ending.files {
-        if let Some(name) = Path::new(file).file_name() {
-            *file = name.to_string_lossy().into_owned();
-        }
+        *file = file_name(Path::new(file));
     }
     overview
 }
