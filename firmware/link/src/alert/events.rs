@@ -1,5 +1,5 @@
 //! Meanings of PX4's events (`EVENT`, 410). Source: names, argument types and enumerations of PX4's public event
-//! definitions (`events/all_events.json` of a build of v1.17, BSD-3-Clause).
+//! definitions (`events/all_events.json` of a build of v1.17, BSD-3-Clause), and of v1.13 to v1.16.
 //!
 //! An event's number is its component, 1 for the autopilot, in the highest byte, and the FNV-1a hash of its name in
 //! the three others. So a name gives its number here, while the firmware is built, and stays the same for all
@@ -54,7 +54,8 @@ events! {
         commander_arm_denied_throttle_center commander_arm_denied_throttle_high mavlink_log_not_enough_bw;
     warning Compass:
         sensor_failover_mag check_mag_missing check_mag_no_data check_mag_fault check_mag_consistency
-        check_mag_sys_has_mag_missing check_estimator_mag_fault check_estimator_mag_interference;
+        check_mag_sys_has_mag_missing check_estimator_mag_fault check_estimator_mag_interference
+        commander_stopping_mag_use;
     warning Barometer:
         sensor_failover_baro check_baro_missing check_baro_no_data;
     warning Accelerometer:
@@ -70,10 +71,12 @@ events! {
         check_estimator_gps_pdop_too_high check_estimator_gps_speed_acc_too_low
         check_estimator_gps_hor_pos_drift_too_high check_estimator_gps_hor_pos_err_too_high
         check_estimator_gps_hor_speed_drift_too_high check_estimator_gps_vert_pos_drift_too_high
-        check_estimator_gps_vert_pos_err_too_high check_estimator_gps_vert_speed_drift_too_high;
+        check_estimator_gps_vert_pos_err_too_high check_estimator_gps_vert_speed_drift_too_high
+        check_estimator_gps_spoofing_indicated commander_stopping_gnss_heading_use;
     critical Gnss:
         check_estimator_gnss_warning_jamming check_estimator_gnss_warning_spoofing
-        check_estimator_gps_jamming_critical check_estimator_gps_jammed check_estimator_gps_spoofed;
+        check_estimator_gps_jamming_critical check_estimator_gps_jammed check_estimator_gps_spoofed
+        check_estimator_gps_multiple_spoofing_indicated;
     over Gnss:
         check_estimator_gnss_fusion_started;
     warning Estimator:

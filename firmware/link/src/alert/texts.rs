@@ -77,9 +77,8 @@ texts! {
     (critical Crash): "crash" "ditching";
     (warning Crash): "hard landing";
     (critical Crash): "parachute*releas" "parachute*deploy";
-    // PX4 sends this also for a pilot's kill switch after a landing. HEARTBEAT reports it too, and decides whether it
-    // matters.
-    (fine): "flight termination active";
+    // PX4 sends these also after a landing, for a pilot's kill switch. HEARTBEAT decides whether it matters.
+    (fine): "flight termination active" "kill-switch engaged";
     (critical Crash): "terminat";
     // Motors, before sensors: "thrust loss", "imbalanced propeller".
     (warning Propulsion): "thrust loss";
