@@ -3,6 +3,7 @@
 use crate::flight::Flight;
 use crate::motion::{CLEAR_M, climb_mps};
 use crate::observation::{Gnss, LandedState, VehicleKind};
+use crate::thrust::Power;
 use crate::time::{BootMs, FRESH, Millis, PAUSE, SILENT, Stamp};
 use crate::vehicle::Vehicle;
 
@@ -21,8 +22,8 @@ pub(crate) const ROTORS: u16 = 1 << 5;
 pub(crate) const ONE_FRAME: u16 = 1 << 6;
 /// The vehicle flies on rotors; so may a VTOL.
 pub(crate) const HOVERS: u16 = 1 << 7;
-/// One set of actuators controls it: the two of a VTOL share the work in a transition.
-pub(crate) const ONE_CONTROL: u16 = 1 << 8;
+/// Its actuators can turn it: rotors with thrust, or wings. The two sets of a VTOL share the work in a transition.
+pub(crate) const CONTROLLED: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
 
@@ -60,6 +61,7 @@ impl Gates {
         let kind = vehicle.kind();
         let hovers = vehicle.hovers(now) == Some(true);
         let rotors = kind == VehicleKind::Rotorcraft;
+        let has_thrust = flight.power(now, vehicle) != Some(Power::Idle);
         self.open = 0;
         for (gate, is_open) in [
             (AIRBORNE, flight.airborne()),
@@ -70,7 +72,7 @@ impl Gates {
             (ROTORS, rotors),
             (ONE_FRAME, rotors || kind == VehicleKind::Plane),
             (HOVERS, hovers),
-            (ONE_CONTROL, kind != VehicleKind::Vtol || hovers),
+            (CONTROLLED, if hovers { has_thrust } else { kind != VehicleKind::Vtol }),
             (EXACT, exact && self.inexact_at.age(now).is_none_or(|age| age > EXACT_FOR)),
         ] {
             self.open |= if is_open { gate } else { 0 };

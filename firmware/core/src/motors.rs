@@ -21,10 +21,9 @@ use core::ops::Range;
 
 use crate::flight::Flight;
 use crate::latest::Reading;
-use crate::motion::IDLE_THROTTLE;
 use crate::observation::{EscGroup, MOTORS_MAX, VehicleKind};
 use crate::outputs::MotorOutputs;
-use crate::thrust::CARRIES;
+use crate::thrust::{CARRIES, Power};
 use crate::time::{BootMs, FRESH, Millis, PAUSE, Stamp};
 use crate::trend::Rate;
 use crate::units::Rpm;
@@ -271,12 +270,10 @@ impl Motors {
     ) -> Option<Reading> {
         let track = self.track(motor).filter(|track| track.is_fitted() && !self.outputs.is_off(motor))?;
         let middle = self.middle_speed()?;
-        // On the ground, still armed, each motor idles as it likes.
-        let throttle = vehicle.hud.within(now, FRESH).and_then(|hud| hud.throttle);
-        let idles = throttle.is_some_and(|throttle| throttle.0 < IDLE_THROTTLE);
-        // If one is lost, the one opposite may stop too, and the vehicle may turn.
+        // If one is lost, the opposite one may stop too.
         let lost = track.smooth_rpm < LOST_PART * middle;
-        if idles
+        // On the ground, still armed, each motor idles as it likes.
+        if flight.power(now, vehicle) == Some(Power::Idle)
             || !vehicle.is_multicopter()
             || !self.turn_as_in_flight(now, middle)
             || !(lost || vehicle.inertial.turns_little(now, TURNED))

@@ -206,7 +206,7 @@ impl MotorOutputs {
             if self.takeoff_not_recorded {
                 self.at = Stamp::at(at);
                 self.note_moved(outputs);
-                let used = outputs.iter().take(count).all(|output| *output > 0);
+                let used = count > 4 && outputs.iter().take(count).all(|output| *output > 0);
                 self.verdict = self.judge_unseen(at, given, used, flies_level);
             }
             return;
@@ -309,8 +309,9 @@ impl MotorOutputs {
         if is_quiet {
             self.outputs.iter_mut().for_each(|output| output.share.learn(step_s));
         }
-        // Opposite to a motor that alone drives, an idle motor is the balance, and no fault. An oscillating one idles for moments.
-        let mut outputs = (0_u8..).zip(&self.outputs).take(count).filter(|_| is_quiet);
+        // Opposite to a motor that alone drives, an idle one is the balance. An oscillating one idles for moments. On three of four motors
+        // no vehicle flies level.
+        let mut outputs = (0_u8..).zip(&self.outputs).take(count).filter(|_| is_quiet && count > 4);
         let shut_off = outputs.find(|(_, output)| output.off && output.share.smooth < SHUT_OFF_SHARE);
         self.verdict = match shut_off {
             Some((place, _)) => (place, Verdict::ShutOff),

@@ -247,10 +247,11 @@ impl Flight {
 
     fn take_shock(&mut self, at: BootMs, load_g: f32, vehicle: &Vehicle, params: &Params) {
         if load_g.is_finite() && load_g > params.get(Param::MisImpact) {
-            // What broke off a speed goes on while it bounces, or thrashes about.
+            // What broke off a speed or a fall goes on while it bounces, or thrashes about.
             let before = self.shock.and_then(|shock| {
                 let goes_on = at.since(shock.at) <= BREAKS_OFF;
-                let thrashes = shock.stopped && at.since(self.hit_at) <= THRASHES;
+                let ends = shock.stopped || shock.dropped || shock.has_hit;
+                let thrashes = ends && at.since(self.hit_at) <= THRASHES;
                 if goes_on { Some(shock) } else { thrashes.then_some(Shock { at, ..shock }) }
             });
             let shock = before.unwrap_or(Shock {
@@ -260,10 +261,9 @@ impl Flight {
                 sink_mps: self.motion.sink.greatest(at),
                 stopped: false,
                 has_hit: false,
-                dropped: self.shock.is_some_and(|shock| shock.dropped)
-                    || (self.signs.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle)),
+                dropped: self.signs.unloaded.lasts(at, DROPS) && on_rotors(at, vehicle),
             });
-            if self.shock.is_none() && self.signs.worst[MishapKind::Impact as usize] == 0.0 {
+            if before.is_none() && self.signs.worst[MishapKind::Impact as usize] == 0.0 {
                 self.hit_at = at;
             }
             let greatest_g = self.shock.map_or(load_g, |before| before.load_g.max(load_g));
@@ -319,7 +319,7 @@ impl Flight {
         if let Some(shock) = &mut self.shock
             && at.since(shock.at) <= BREAKS_OFF
         {
-            shock.stopped |= speed_mps < BROKEN_OFF * shock.speed_mps;
+            shock.stopped |= shock.speed_mps >= IMPACT_MPS && speed_mps < BROKEN_OFF * shock.speed_mps;
         }
         self.motion.speed.take(at, speed_mps);
         // If the sink breaks off in a mishap, the vehicle touched the ground.
@@ -390,8 +390,7 @@ impl Flight {
             && shock.speed_mps < SKIDS_MPS
             && power.is_none_or(|power| power == Power::Idle);
         let hard = shock.load_g > LEGS_G || shock.sink_mps > LEGS_MPS;
-        let stopped = shock.stopped && shock.speed_mps >= IMPACT_MPS && hard && !lands;
-        let has_hit = stopped
+        let has_hit = (shock.stopped && hard && !lands)
             || (shock.dropped && shock.load_g > LEGS_G)
             || (on_rotors(now, vehicle) && self.lies(now, vehicle));
         self.shock = Some(Shock { has_hit, ..shock });

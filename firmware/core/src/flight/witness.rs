@@ -148,7 +148,7 @@ impl Flight {
     }
 
     /// The effect of the throttle. `None` if it is not reported, or if it is reported as zero while motors shake the vehicle.
-    pub(super) fn power(&self, now: BootMs, vehicle: &Vehicle) -> Option<Power> {
+    pub(crate) fn power(&self, now: BootMs, vehicle: &Vehicle) -> Option<Power> {
         let power = throttle(now, vehicle).map(|part| self.thrust.power(part));
         power.filter(|power| {
             *power != Power::Idle || self.thrust.has_flown || vehicle.inertial.shakes(now) != Some(true)

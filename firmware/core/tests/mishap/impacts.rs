@@ -91,6 +91,16 @@ fn what_is_disarmed_is_not_to_be_disarmed_and_what_a_mishap_was_is_no_value_of_n
 }
 
 #[test]
+fn what_its_rotors_shake_hit_something_at_the_last_shocks_and_not_at_the_first() {
+    for of in ROTORS {
+        let outcome =
+            fly(of, "0-20.1%0.4:0-0.1 load=4.5; 20-20.1 load=12; 20.1-21 rates=3,0.5,0; 20.1 roll=2.5 thr=0");
+        let hit_ms = outcome.monitor.flight().hit_at().as_millis();
+        assert!((AT_MS + 19_000..=AT_MS + 20_100).contains(&hit_ms), "{of}: {hit_ms}");
+    }
+}
+
+#[test]
 fn a_second_shock_does_not_hide_the_first() {
     for of in ROTORS {
         let shocks =
