@@ -1,7 +1,7 @@
-//! Conditions of the flight, as bits: computed once a step, read by every comparison that needs them.
+//! Conditions of the flight, as bits: computed once a step.
 
 use crate::flight::Flight;
-use crate::motion::{CLEAR_M, climb_mps};
+use crate::motion::{CLEAR_M, MOVES_MPS, climb_mps, ground_speed_mps};
 use crate::observation::{Gnss, LandedState, VehicleKind};
 use crate::thrust::Power;
 use crate::time::{BootMs, FRESH, Millis, PAUSE, SILENT, Stamp};
@@ -11,7 +11,7 @@ use crate::vehicle::Vehicle;
 pub(crate) const AIRBORNE: u16 = 1 << 0;
 /// In the air for three seconds.
 pub(crate) const SETTLED: u16 = 1 << 1;
-/// Away from the ground, as far as that is known: near it legs shake sensors, and motors hold the vehicle on its legs.
+/// Away from the ground, as far as that is known: near it legs shake sensors, and hold the vehicle.
 pub(crate) const CLEAR: u16 = 1 << 2;
 /// It turned slower than 40 degrees a second for a second.
 pub(crate) const STILL: u16 = 1 << 3;
@@ -22,10 +22,11 @@ pub(crate) const ROTORS: u16 = 1 << 5;
 pub(crate) const ONE_FRAME: u16 = 1 << 6;
 /// The vehicle flies on rotors; so may a VTOL.
 pub(crate) const HOVERS: u16 = 1 << 7;
-/// Its actuators can turn it: rotors with thrust, or wings. The two sets of a VTOL share the work in a transition.
+/// Wings control it, or rotors with thrust. In its transition a VTOL has both.
 pub(crate) const CONTROLLED: u16 = 1 << 8;
 /// The first receiver has been exact for 15 s: `AHRS_RP_P` 0.2 makes DCM level within three time constants of 5 s.
 pub(crate) const EXACT: u16 = 1 << 9;
+pub(crate) const MOVES: u16 = 1 << 10;
 
 pub(crate) const TURNED: Millis = Millis::from_secs(1);
 const EXACT_FOR: Millis = Millis::from_secs(15);
@@ -73,6 +74,7 @@ impl Gates {
             (ONE_FRAME, rotors || kind == VehicleKind::Plane),
             (HOVERS, hovers),
             (CONTROLLED, if hovers { has_thrust } else { kind != VehicleKind::Vtol }),
+            (MOVES, ground_speed_mps(now, vehicle).is_some_and(|speed_mps| speed_mps > MOVES_MPS)),
             (EXACT, exact && self.inexact_at.age(now).is_none_or(|age| age > EXACT_FOR)),
         ] {
             self.open |= if is_open { gate } else { 0 };
