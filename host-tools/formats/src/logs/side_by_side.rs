@@ -5,7 +5,7 @@ use anyhow::Result;
 
 use super::in_order::{in_order, workers};
 
-/// Writing one leaves its workers idle: a few fill the pauses.
+/// Also on two processors: while one log waits for the disk, another one is in work.
 const AT_ONCE: usize = 4;
 /// Logs in work, or done and waiting for an earlier one.
 const AHEAD_MAX: usize = 16;
@@ -21,8 +21,9 @@ pub fn side_by_side<I: Sync, R: Send>(
     if let [item] = items {
         return tell(work(item));
     }
+    let at_once = if workers() > 1 { AT_ONCE } else { 1 };
     let mut next = items.iter();
-    in_order(workers().min(AT_ONCE), AHEAD_MAX, || Ok(next.next()), work, tell)
+    in_order(at_once, AHEAD_MAX, || Ok(next.next()), work, tell)
 }
 
 #[cfg(test)]
