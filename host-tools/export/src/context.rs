@@ -96,7 +96,7 @@ pub struct Context {
     /// Seconds from the log's beginning to the video's.
     pub offset_s: f64,
     /// Files that must not be overwritten.
-    pub inputs: Inputs,
+    pub inputs: Arc<Inputs>,
     /// This program's findings, if the recorder ran no checks and an earlier reading made them.
     pub checked: Option<Checked>,
     /// The findings that go into a tlog as texts.

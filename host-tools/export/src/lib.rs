@@ -176,7 +176,7 @@ fn decode(args: &DecodeRequest, bucket: Option<Bucket>) -> Result<Outcome> {
     let task = Task {
         formats,
         selection,
-        inputs,
+        inputs: Arc::new(inputs),
         output: &args.output,
         standard_output,
         logs,
@@ -321,7 +321,7 @@ type Read<'a> = (RecordingSummary, Writers<'a>, Option<Checked>);
 struct Task<'a> {
     formats: Formats,
     selection: Selection,
-    inputs: Inputs,
+    inputs: Arc<Inputs>,
     output: &'a Path,
     standard_output: bool,
     logs: usize,

@@ -52,7 +52,6 @@ pub(crate) struct Bucket {
     pub(super) address: Address,
     objects: Box<dyn Objects>,
     patience: Duration,
-    is_begun: Mutex<bool>,
 }
 
 impl std::fmt::Debug for Bucket {
@@ -75,15 +74,11 @@ impl Bucket {
     }
 
     pub(super) fn with(address: Address, objects: Box<dyn Objects>, patience: Duration) -> Self {
-        Self { address, objects, patience, is_begun: Mutex::default() }
+        Self { address, objects, patience }
     }
 
-    /// Once for each program: the tables are of `decode`, and begun changes are completed.
+    /// The tables are of `decode`, and begun changes are completed.
     pub(super) fn begin(&self) -> Result<()> {
-        let mut is_begun = self.is_begun.lock().unwrap_or_else(PoisonError::into_inner);
-        if *is_begun {
-            return Ok(());
-        }
         let mark = format!("{OWN}/{STORAGE}");
         if self.objects.get(&mark)?.is_none() {
             if !self.objects.folders(SESSIONS)?.is_empty() {
@@ -103,9 +98,7 @@ impl Bucket {
                 );
             }
         }
-        self.recover()?;
-        *is_begun = true;
-        Ok(())
+        self.recover()
     }
 
     /// Completes changes that count.

@@ -223,7 +223,7 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
         }
         let name = format!("{PREFIX}{}{EXTENSION}", hex(&hash.finalize()[..12]));
         let path = transaction.path(&format!("{place}/{name}"));
-        let rows = merge(&inputs, &path).with_context(|| place.to_owned())?;
+        let (rows, file) = merge(&inputs, &path).with_context(|| place.to_owned())?;
         let expected: usize = inputs.iter().map(Input::rows).sum();
         let written = SerializedFileReader::new(File::open(&path)?)?.metadata().file_metadata().num_rows();
         if rows != expected || written != expected as i64 {
@@ -231,7 +231,8 @@ fn of_table(transaction: &Transaction, place: &str, paths: &[PathBuf]) -> Result
                 "{place}: only {written} of {expected} rows were written, so the old files stay; try again"
             );
         }
-        sum = (sum.0 + 1, sum.1 + fs::metadata(&path)?.len());
+        sum = (sum.0 + 1, sum.1 + file.metadata()?.len());
+        transaction.end_file(file);
     }
     Ok(sum)
 }
@@ -270,9 +271,9 @@ pub(super) fn cut(segments: impl Iterator<Item = (Rows, usize)>) -> Vec<Vec<Rows
     groups
 }
 
-fn merge(inputs: &[Input], path: &Path) -> Result<usize> {
+fn merge(inputs: &[Input], path: &Path) -> Result<(usize, File)> {
     let groups = groups(inputs);
-    let (Some(first), Some(group)) = (inputs.first(), groups.first()) else { return Ok(0) };
+    let (Some(first), Some(group)) = (inputs.first(), groups.first()) else { bail!("no file has a row") };
     let schema: TypePtr = Arc::new(first.schema());
     let mut properties = base();
     for column in 0..first.columns() {
@@ -294,8 +295,7 @@ fn merge(inputs: &[Input], path: &Path) -> Result<usize> {
         to.close()?;
         rows += group.iter().map(|(_, _, rows)| rows).sum::<usize>();
     }
-    writer.close()?;
-    Ok(rows)
+    Ok((rows, writer.into_inner()?))
 }
 
 fn base() -> parquet::file::properties::WriterPropertiesBuilder {

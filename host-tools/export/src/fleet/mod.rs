@@ -11,6 +11,7 @@
 
 pub(crate) mod bucket;
 pub mod compact;
+mod disk;
 pub mod overview;
 pub(crate) mod sessions;
 #[cfg(test)]
@@ -18,7 +19,7 @@ mod tests;
 pub(crate) mod transaction;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::fs::{self, DirEntry, File};
 use std::io::{self, BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -69,6 +70,7 @@ pub(crate) struct Fleet {
     /// The folder of the tables, or of files that go to the bucket.
     root: PathBuf,
     bucket: Option<Bucket>,
+    is_begun: Mutex<bool>,
     /// The number of frames of each session.
     written: Mutex<BTreeMap<String, u64>>,
 }
@@ -81,12 +83,26 @@ enum Found {
 
 impl Fleet {
     pub(crate) fn new(root: &Path, bucket: Option<Bucket>) -> Self {
-        Self { root: root.to_owned(), bucket, written: Mutex::default() }
+        Self { root: root.to_owned(), bucket, is_begun: Mutex::default(), written: Mutex::default() }
     }
 
-    /// The path of a file as it is shown.
     fn shown(&self, place: &str) -> PathBuf {
         self.bucket.as_ref().map_or_else(|| self.root.join(place), |bucket| bucket.address.shown(place))
+    }
+
+    /// Once for each program.
+    fn begin(&self, inputs: &Inputs) -> Result<()> {
+        let mut is_begun = self.is_begun.lock().unwrap_or_else(PoisonError::into_inner);
+        if !*is_begun {
+            inputs.refuse(&self.root)?;
+            make_directory(&self.root)?;
+            match &self.bucket {
+                Some(bucket) => bucket.begin()?,
+                None => transaction::recover(&self.root)?,
+            }
+            *is_begun = true;
+        }
+        Ok(())
     }
 
     fn find(&self, session: &str) -> Result<Option<Found>> {
@@ -152,6 +168,19 @@ fn shard(session: &str) -> String {
 }
 
 pub(crate) fn names(folder: &Path) -> Result<Vec<String>> {
+    names_of(folder, |_| true)
+}
+
+fn folders(folder: &Path) -> Result<Vec<String>> {
+    let is_folder = |entry: &DirEntry| match entry.file_type() {
+        Ok(kind) if !kind.is_symlink() => kind.is_dir(),
+        _ => entry.path().is_dir(),
+    };
+    let names = names_of(folder, is_folder)?.into_iter();
+    Ok(names.filter(|name| !name.starts_with('.')).collect())
+}
+
+fn names_of(folder: &Path, is_wanted: impl Fn(&DirEntry) -> bool) -> Result<Vec<String>> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
@@ -162,20 +191,16 @@ pub(crate) fn names(folder: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in entries {
         let entry = entry.with_context(|| format!("{}: cannot be read", folder.display()))?;
-        names.extend(entry.file_name().into_string().ok());
+        names.extend(entry.file_name().into_string().ok().filter(|_| is_wanted(&entry)));
     }
     names.sort_unstable();
     Ok(names)
 }
 
-fn folders(folder: &Path) -> Result<Vec<String>> {
-    let names = names(folder)?.into_iter();
-    Ok(names.filter(|name| !name.starts_with('.') && folder.join(name).is_dir()).collect())
-}
-
 pub(crate) struct Session {
     transaction: Transaction,
     root: PathBuf,
+    is_local: bool,
     partition: String,
     name: String,
 }
@@ -184,12 +209,7 @@ impl Session {
     pub(crate) fn begin(context: &Context) -> Result<Self> {
         let Some(fleet) = &context.fleet else { bail!("the output of the tables is unknown") };
         let identity = &context.identity;
-        context.inputs.refuse(&fleet.root)?;
-        make_directory(&fleet.root)?;
-        match &fleet.bucket {
-            Some(bucket) => bucket.begin()?,
-            None => transaction::recover(&fleet.root)?,
-        }
+        fleet.begin(&context.inputs)?;
         let name = identity.recording.clone();
         if fleet.is_written(&name).is_none()
             && let Some(found) = fleet.find(&name)?
@@ -197,8 +217,8 @@ impl Session {
             fleet.check(&name, &found, &context.inputs)?;
         }
         let partition = partition(&identity.vehicle, identity.date.as_deref());
-        let root = fleet.shown("");
-        Ok(Self { transaction: Transaction::begin(&fleet.root)?, root, partition, name })
+        let (root, is_local) = (fleet.shown(""), fleet.bucket.is_none());
+        Ok(Self { transaction: Transaction::begin(&fleet.root)?, root, is_local, partition, name })
     }
 
     fn place(&self, table: &str, part: u32) -> String {
@@ -213,6 +233,13 @@ impl Session {
         let path = self.transaction.path(&self.place(table, part));
         let file = File::options().write(true).create_new(true).open(&path);
         file.with_context(|| cannot_write(&self.path(table, part)))
+    }
+
+    pub(crate) fn end_file(&self, file: File) {
+        // A bucket's server does that.
+        if self.is_local {
+            self.transaction.end_file(file);
+        }
     }
 
     /// All files are there and closed: they take their places. Of two recordings of one session in one call the longer one
@@ -249,7 +276,7 @@ impl Session {
         context: &Context,
         frames: u64,
     ) -> Result<Option<Vec<PathBuf>>> {
-        let Self { transaction, root, partition, name } = self;
+        let Self { transaction, root, partition, name, .. } = self;
         let places = transaction.places()?;
         let lease = bucket.lease(&name, &places, None)?;
         let found = fleet.find(&name)?;

@@ -33,7 +33,7 @@ pub(super) fn context(fleet: &Arc<Fleet>, number: u64, date: Option<&str>, force
     Context {
         fleet: Some(fleet.clone()),
         identity,
-        inputs: Inputs::none().forcing(force),
+        inputs: Arc::new(Inputs::none().forcing(force)),
         ..Context::default()
     }
 }

@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use tempfile::TempDir;
 
+use super::disk::Syncs;
 use super::{names, shard};
 use crate::files::{check_parent, settle};
-use crate::logs::in_order::in_order;
 use crate::storage::is_inside;
 
 /// The folder of this program in a fleet's folder. Readers of tables ignore names with a dot.
@@ -28,7 +28,7 @@ const FILES: &str = "files";
 const REPLACED: &str = "replaced";
 const COMPACTED: &str = "compacted";
 
-/// The name of a new file in its hidden folder: one folder for all of them costs a tenth of the time of a tree.
+/// The name of a new file in its hidden folder.
 fn name_of(place: &str) -> String {
     place.replace('/', ",")
 }
@@ -121,20 +121,17 @@ pub(crate) fn recover(root: &Path) -> Result<()> {
     if is_begun { lock(root).map(|_| ()) } else { Ok(()) }
 }
 
-/// Whether the change in a folder of this name counts and is not complete. The folder of a complete one may lack its lists.
+/// Whether the change in a folder of this name counts and is not complete.
 fn is_begun(name: &str) -> bool {
     name.starts_with(COMMIT) && !name.ends_with(PART)
 }
-
-/// Files that go to the disk at once. File systems with a journal write one entry for all that wait: 45 files took 200 ms one
-/// after the other, and 5 ms so (ext4).
-const SYNCS_AT_ONCE: usize = 8;
 
 /// A change that does not count yet. Dropped, it leaves nothing.
 #[derive(Debug)]
 pub(crate) struct Transaction {
     root: PathBuf,
     part: TempDir,
+    syncs: Syncs,
 }
 
 /// A change with all of its new files on the disk.
@@ -150,7 +147,7 @@ impl Transaction {
         let part = fs::create_dir_all(&own)
             .and_then(|()| tempfile::Builder::new().prefix(".").suffix(PART).tempdir_in(&own))
             .and_then(|part| fs::create_dir(part.path().join(FILES)).map(|()| part));
-        Ok(Self { root: root.to_owned(), part: settle(part, root)? })
+        Ok(Self { root: root.to_owned(), part: settle(part, root)?, syncs: Syncs::default() })
     }
 
     pub(crate) fn path(&self, place: &str) -> PathBuf {
@@ -161,14 +158,16 @@ impl Transaction {
         settle(places_in(&self.part.path().join(FILES)), &self.root)
     }
 
-    /// All files are there and closed: they go to the disk. A change that counts must have them after a power cut.
-    /// Other changes may be made meanwhile.
+    /// A complete file goes to the disk: a change that counts must have it after a power cut.
+    pub(crate) fn end_file(&self, file: File) {
+        self.syncs.add(file);
+    }
+
+    /// Waits until all ended files are on the disk. Other changes may be made meanwhile.
     pub(crate) fn sync(self) -> Result<SyncedChange> {
         let places = self.places()?;
-        let mut next = places.iter();
-        let sync = |place: &String| File::open(self.path(place)).and_then(|file| file.sync_all());
-        in_order(SYNCS_AT_ONCE, places.len(), || Ok(next.next()), sync, |synced| settle(synced, &self.root))?;
-        let Self { root, part } = self;
+        let Self { root, part, syncs } = self;
+        settle(syncs.end(), &root)?;
         Ok(SyncedChange { root, part, places })
     }
 }
@@ -209,9 +208,9 @@ impl SyncedChange {
         let lines = |lines: &mut dyn Iterator<Item = &String>| {
             lines.fold(String::new(), |text, line| text + line + "\n")
         };
-        for (name, text) in
-            [(REPLACED, lines(&mut replaced.iter().copied())), (COMPACTED, lines(&mut compacted.iter()))]
-        {
+        let lists =
+            [(REPLACED, lines(&mut replaced.iter().copied())), (COMPACTED, lines(&mut compacted.iter()))];
+        for (name, text) in lists.into_iter().filter(|(_, text)| !text.is_empty()) {
             stop::step()?;
             let mut file = File::create(part.path().join(name))?;
             file.write_all(text.as_bytes())?;
@@ -228,10 +227,16 @@ impl SyncedChange {
     }
 }
 
+/// An empty list has no file.
+fn read_list(path: &Path) -> io::Result<String> {
+    let list = fs::read_to_string(path);
+    list.or_else(|error| if error.kind() == io::ErrorKind::NotFound { Ok(String::new()) } else { Err(error) })
+}
+
 /// Applies a change; each of its steps may have been done before.
 fn apply(root: &Path, folder: &Path) -> io::Result<()> {
     let files = folder.join(FILES);
-    let replaced = fs::read_to_string(folder.join(REPLACED))?;
+    let replaced = read_list(&folder.join(REPLACED))?;
     if let Some(place) = replaced.lines().find(|place| !is_inside(place)) {
         return Err(io::Error::other(format!(
             "{}: wants to remove {place}, which is outside of the tables; if it is not your own, delete this folder",
@@ -257,7 +262,7 @@ fn apply(root: &Path, folder: &Path) -> io::Result<()> {
         }
     }
     // A session twice in the index is harmless.
-    for session in fs::read_to_string(folder.join(COMPACTED))?.lines() {
+    for session in read_list(&folder.join(COMPACTED))?.lines() {
         let index = root.join(OWN).join(COMPACTED);
         fs::create_dir_all(&index)?;
         let mut index = File::options().create(true).append(true).open(index.join(shard(session)))?;

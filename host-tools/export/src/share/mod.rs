@@ -11,6 +11,7 @@ mod rules;
 use crate::mavlink::ids::{GLOBAL_POSITION_INT, PARAM_VALUE, STATUSTEXT};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::Result;
 use hums_core::clock::Instant;
@@ -98,7 +99,7 @@ fn copy(args: &ShareRequest) -> Result<(Share, bool)> {
         return Err(usage("share reads a file and writes a file; name both"));
     }
     let inputs = Inputs::of([args.input.as_path()].into_iter().chain(found.paths())).forcing(args.force);
-    let context = Context { inputs, ..Context::default() };
+    let context = Context { inputs: Arc::new(inputs), ..Context::default() };
     let mut share = Share::new();
     let lossy = if place.open()?.format.is_of_link() || place.own().is_some() {
         share.link(place, &context, args)?

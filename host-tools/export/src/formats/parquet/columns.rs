@@ -448,7 +448,6 @@ impl TableRows {
         push(FieldValue::Text(&digits));
     }
 
-    /// Adds a row.
     pub(super) fn row(&mut self, at: Instant, utc_us: Option<u64>, row: &Row) {
         let mut cells = row.cells.iter();
         for column in self.begin(at, utc_us) {
@@ -478,7 +477,6 @@ impl TableRows {
         &self.columns
     }
 
-    /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }

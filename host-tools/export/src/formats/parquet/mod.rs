@@ -19,7 +19,7 @@ pub(crate) use columns::TAKEN_FRAMES;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -150,7 +150,7 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Makes room: writes this many waiting bytes, in as few row groups as possible.
+    /// Writes this many waiting bytes, in few row groups.
     fn write_largest(&mut self, bytes: usize) -> Result<()> {
         let mut sizes: Vec<_> =
             self.tables.iter().map(|(table, file)| (Reverse(file.pending_bytes), *table)).collect();
@@ -172,7 +172,7 @@ impl ParquetTables {
         Ok(())
     }
 
-    /// Ends the files that take the most, if all together take too much: their tables go on in further ones.
+    /// Ends the largest files beyond the limit.
     fn close_largest(&mut self) -> Result<()> {
         let mut open: Vec<&mut TableFile> =
             self.tables.values_mut().filter(|table| table.open.is_some()).collect();
@@ -183,7 +183,7 @@ impl ParquetTables {
                 break;
             }
             bytes -= table.open_bytes();
-            table.end_file()?;
+            table.end_file(&self.session)?;
         }
         Ok(())
     }
@@ -194,7 +194,7 @@ impl ParquetTables {
         let mut tables = std::mem::take(&mut self.tables).into_values();
         let write = |mut table: TableFile| {
             table.write_group(session, properties)?;
-            table.end_file()
+            table.end_file(session)
         };
         in_order(workers(), AT_ONCE, || Ok(tables.next()), write, |written| written)?;
         Ok((self.session, count))
@@ -362,10 +362,13 @@ impl TableFile {
         open.write(&rows, properties).with_context(|| cannot_write(&open.path))
     }
 
-    fn end_file(&mut self) -> Result<()> {
+    fn end_file(&mut self, session: &Session) -> Result<()> {
         let Some(Open { path, writer, .. }) = self.open.take() else { return Ok(()) };
-        let written = writer.into_inner().and_then(|mut file| Ok(file.0.flush()?));
-        written.with_context(|| cannot_write(&path))
+        let file = writer
+            .into_inner()
+            .and_then(|file| Ok(file.0.into_inner().map_err(IntoInnerError::into_error)?));
+        session.end_file(file.with_context(|| cannot_write(&path))?);
+        Ok(())
     }
 }
 
@@ -390,7 +393,7 @@ mod tests {
         let decode = |limits, name: &str| {
             let context = Context {
                 fleet: Some(Arc::new(Fleet::new(dir.path(), None))),
-                inputs: Inputs::none().forcing(true),
+                inputs: Arc::new(Inputs::none().forcing(true)),
                 identity: Identity {
                     vehicle: "uid-1".to_owned(),
                     recording: name.to_owned(),
